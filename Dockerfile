@@ -1,0 +1,46 @@
+# syntax=docker/dockerfile:1
+# One image for every process; compose.yaml says which one a container runs.
+#
+# The base is an argument, so that whoever builds can pin the digest that they have checked:
+#   docker build --build-arg BASE_IMAGE=docker.io/library/python:3.11-slim-bookworm@sha256:... .
+ARG BASE_IMAGE=docker.io/library/python:3.11-slim-bookworm
+
+# The project's wheel; the tools that build it stay in this stage.
+FROM ${BASE_IMAGE} AS wheel
+WORKDIR /src
+COPY requirements.lock ./
+RUN python -m venv /tools && /tools/bin/pip install --no-cache-dir --require-hashes -r requirements.lock
+COPY pyproject.toml README.md LICENSE ./
+COPY assets assets
+COPY web web
+COPY rolling_panda rolling_panda
+COPY bridge bridge
+COPY controller controller
+COPY perception perception
+COPY server server
+COPY benchmarks benchmarks
+RUN /tools/bin/pip wheel --no-cache-dir --no-deps --no-build-isolation --wheel-dir /wheel .
+
+# What runs: locked dependencies first, as they change seldom.
+FROM ${BASE_IMAGE} AS install
+COPY requirements-run.lock /
+RUN python -m venv /app && /app/bin/pip install --no-cache-dir --require-hashes -r /requirements-run.lock
+COPY --from=wheel /wheel /wheel
+RUN /app/bin/pip install --no-cache-dir --no-deps /wheel/*.whl
+
+FROM ${BASE_IMAGE}
+LABEL org.opencontainers.image.title="Rolling Panda" \
+      org.opencontainers.image.description="Browser supervision and teleoperation of a mobile manipulator that prunes grapevines" \
+      org.opencontainers.image.licenses="BSD-3-Clause"
+RUN useradd --system --uid 10001 --no-create-home --shell /usr/sbin/nologin panda
+COPY --from=install /app /app
+# MuJoCo computes here and draws nothing, so it needs no OpenGL. One thread of linear algebra a process: see launch.py.
+ENV PATH=/app/bin:$PATH \
+    PYTHONUNBUFFERED=1 \
+    PYTHONDONTWRITEBYTECODE=1 \
+    MUJOCO_GL=disable
+USER 10001:10001
+WORKDIR /tmp
+STOPSIGNAL SIGTERM
+ENTRYPOINT ["rolling-panda"]
+CMD ["--help"]

@@ -1,0 +1,77 @@
+# `make demo` and `make test` are all that a newcomer needs; each makes the virtual environment when it is missing.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+TYPESCRIPT := typescript@5.9.3
+
+.PHONY: help demo test check bench clean lock browser
+.DEFAULT_GOAL := help
+
+help:
+	@echo "make demo    start everything in simulation; prints a link to sign in with   (ARGS='--port 8001 --seed 3')"
+	@echo "make test    make check, then every test"
+	@echo "make check   formatting, types, import contracts, generated files"
+	@echo "make bench   measurements                                                     (ARGS='tick --json tick.json')"
+	@echo "make lock    bring the lock files up to date with pyproject.toml"
+	@echo "make clean   remove the virtual environment and caches"
+
+demo: $(VENV)/.project
+	@exec $(BIN)/rolling-panda demo $(ARGS)
+
+test: check browser
+	$(BIN)/pytest $(ARGS)
+
+check: $(VENV)/.project
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/python -m rolling_panda.generate --check
+	@if ! command -v npx >/dev/null; then \
+		echo "web/: not type-checked, as Node.js is not installed here"; \
+	elif ! npx --yes --package $(TYPESCRIPT) tsc --version >/dev/null 2>&1; then \
+		echo "web/: not type-checked, as $(TYPESCRIPT) cannot be fetched here"; \
+	else \
+		echo "npx $(TYPESCRIPT) tsc -p web/jsconfig.json"; \
+		npx --yes --package $(TYPESCRIPT) tsc -p web/jsconfig.json --noEmit; \
+	fi
+
+bench: $(VENV)/.project
+	@exec $(BIN)/rolling-panda bench $(ARGS)
+
+# The browser tests drive the system's Chromium, or else Playwright's own (Ubuntu has no package that works in a
+# container); without one, and without the right to install it, they fail and say how.
+browser: $(VENV)/.project
+	@if command -v chromium >/dev/null; then :; \
+	elif [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+		echo "installing Chromium"; apt-get update -qq; \
+		DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends chromium >/dev/null \
+			|| $(BIN)/playwright install --with-deps chromium; \
+	else \
+		echo "Chromium is not installed; the browser tests may fail. Install it: sudo apt-get install chromium"; \
+	fi
+
+$(VENV)/.locked: requirements.lock
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed: make PYTHON=python3.11")'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	@touch $@
+
+$(VENV)/.project: $(VENV)/.locked pyproject.toml
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@touch $@
+
+# pip-tools lives apart, as it is no part of what the locks describe. No index address is written into them.
+COMPILE = CUSTOM_COMPILE_COMMAND='make lock' build/lock/bin/pip-compile --quiet --generate-hashes --allow-unsafe \
+	--strip-extras --no-emit-index-url --no-emit-trusted-host --no-emit-find-links --no-emit-options
+
+lock:
+	$(PYTHON) -m venv build/lock
+	build/lock/bin/pip install --quiet 'pip-tools>=7.5,<8'
+	$(COMPILE) --extra dev --output-file requirements.lock pyproject.toml
+	$(COMPILE) --constraint requirements.lock --output-file requirements-run.lock pyproject.toml
+
+clean:
+	rm -rf $(VENV) build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,1 @@
+"""Measurements anyone can repeat, each a subcommand of `rolling-panda bench`."""

@@ -1,0 +1,36 @@
+"""`python -m benchmarks NAME`: run one benchmark."""
+
+import argparse
+import importlib
+import sys
+from collections.abc import Sequence
+
+#: Benchmarks: name, module with `main(argv) -> int`, and one line for people.
+BENCHMARKS = {
+    "tick": ("benchmarks.tick", "time of one control step"),
+    "row": ("benchmarks.row", "cuts in simulated rows, end to end"),
+    "load": ("benchmarks.load", "processor, memory and traffic of the demo"),
+    "perception": ("benchmarks.perception_points", "pruning points against the truth of simulated rows"),
+}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the benchmark that the first argument names, with the rest as its arguments. Returns the exit code."""
+    words = list(sys.argv[1:] if argv is None else argv)
+    if words and words[0] in BENCHMARKS:
+        code: int = importlib.import_module(BENCHMARKS[words[0]][0]).main(words[1:])
+        return code
+    lines = "\n".join(f"  {name:<12}{about}" for name, (_, about) in BENCHMARKS.items())
+    parser = argparse.ArgumentParser(
+        prog="rolling-panda bench",
+        description="Measure the program.",
+        epilog=f"benchmarks:\n{lines}\n\n`rolling-panda bench NAME --help` explains one.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("name", choices=tuple(BENCHMARKS), help="which benchmark")
+    parser.parse_args(words)
+    return 2
+
+
+if __name__ == "__main__":
+    sys.exit(main())

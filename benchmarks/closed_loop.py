@@ -1,0 +1,128 @@
+"""The whole robot in one thread: bridge, controller and perception on one simulated clock, without sockets or sleeping.
+
+What the processes exchange over the wire is handed over directly, at the rates they have there, so that the same seed
+and the same operator give the same trace, faster than real time.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Self
+
+from bridge.core import TICK_S, BridgeOutputs
+from bridge.sim.build import simulated_bridge
+from controller.config import ControllerConfig
+from controller.core import Controller
+from controller.interface import Inputs, Outputs, Sample
+from perception.config import PerceptionConfig
+from perception.pipeline import Perception
+from perception.segmenter import LabelImageSegmenter
+from rolling_panda import intents
+from rolling_panda import messages as m
+from rolling_panda.config import RobotConfig, load_section
+from rolling_panda.resources import resource
+
+_CONTROL_TICKS = 10
+# A frame takes perception about this long, so its points come later by as much.
+_PERCEPTION_S = 0.15
+
+
+class ClosedLoop:
+    """A simulated robot with an operator who is always present. `now` is simulated time (s)."""
+
+    def __init__(self, seed: int, trace: Path | None = None, config_path: Path | None = None) -> None:
+        """Grow the row and stand the robot beside it.
+
+        Args:
+            seed: Of the row and of the camera's noise.
+            trace: File for the record of what was actuated.
+            config_path: TOML configuration; None takes the simulation's.
+        """
+        path = config_path or resource("assets/config/sim.toml")
+        self.bridge = simulated_bridge(path, seed, trace)
+        robot = load_section(path, "robot", RobotConfig)
+        self.controller = Controller(load_section(path, "controller", ControllerConfig), robot)
+        self.perception = Perception(load_section(path, "perception", PerceptionConfig), LabelImageSegmenter())
+        self.now = 0.0
+        self.inputs = Inputs(present=frozenset(m.PROCESSES))
+        self.state: m.ControllerState | None = None
+        self.events: list[m.LogEvent] = []
+        self._ticks = 0
+        self._seen: tuple[float, m.PruningPoints] | None = None
+
+    def tick(self) -> None:
+        """Advance one millisecond."""
+        self._ticks += 1
+        self.now = self._ticks * TICK_S
+        self._receive(self.bridge.step(self.now))
+        if self._ticks % _CONTROL_TICKS == 0:
+            self.inputs = replace(self.inputs, server_seen=self.now, perception_seen=self.now)
+            self._send(self.controller.step(self.inputs, self.now))
+            self.inputs = replace(self.inputs, stops=())
+
+    def run(self, seconds: float) -> None:
+        """Advance by simulated seconds."""
+        for _ in range(round(seconds / TICK_S)):
+            self.tick()
+
+    def run_until(self, condition: Callable[[], bool], limit_s: float) -> bool:
+        """Advance until `condition()` holds; False when it does not within `limit_s` simulated seconds."""
+        end = self.now + limit_s
+        while self.now < end:
+            for _ in range(_CONTROL_TICKS):
+                self.tick()
+            if condition():
+                return True
+        return False
+
+    def ask(self, intent: intents.Intent) -> m.Answer:
+        """What an operator asks for, answered at once."""
+        return self.controller.answer(intent, self.now)
+
+    def stop(self, reason: str) -> None:
+        """Press the software stop."""
+        request = m.StopRequest(stop_id=f"stop-{self._ticks}", source="server", user="operator", reason=reason)
+        self.bridge.on_stop(request, self.now)
+        self.inputs = replace(self.inputs, stops=(request,))
+
+    def queue(self, *states: m.PointState) -> Iterator[m.QueueEntry]:
+        """Entries of the queue in these states, in the order of work; all without states."""
+        entries = () if self.state is None else self.state.queue
+        return (entry for entry in entries if not states or entry.state in states)
+
+    def close(self) -> None:
+        """Close the trace."""
+        self.bridge.robot.close()
+
+    def __enter__(self) -> Self:
+        """Return the loop."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the trace."""
+        self.close()
+
+    def _receive(self, outputs: BridgeOutputs) -> None:
+        if outputs.joints is not None:
+            self.inputs = replace(self.inputs, joints=Sample(outputs.joints, self.now))
+        if outputs.odometry is not None:
+            self.inputs = replace(self.inputs, odometry=Sample(outputs.odometry, self.now))
+        if outputs.state is not None:
+            self.inputs = replace(self.inputs, bridge=Sample(outputs.state, self.now))
+        if outputs.frame is not None:
+            self._seen = self.now + _PERCEPTION_S, self.perception.process(outputs.frame)
+        if self._seen is not None and self.now >= self._seen[0]:
+            self.inputs = replace(self.inputs, points=Sample(self._seen[1], self.now))
+            self._seen = None
+        self.events.extend(outputs.events)
+
+    def _send(self, outputs: Outputs) -> None:
+        if outputs.motion is not None:
+            self.bridge.on_motion(outputs.motion, self.now)
+        if outputs.cut is not None:
+            self.bridge.on_cut(outputs.cut, self.now)
+        if outputs.release is not None:
+            self.bridge.on_release(outputs.release, self.now)
+        if outputs.state is not None:
+            self.state = outputs.state
+        self.events.extend(outputs.events)

@@ -1,0 +1,164 @@
+"""A robot without mass or contact: velocities follow commands with a first-order lag. For control tests and timing."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from controller.core import Controller
+from controller.interface import Inputs, Outputs, Sample
+from rolling_panda import intents
+from rolling_panda import messages as m
+from rolling_panda.differential_drive import NXI, Array
+from rolling_panda.robot_model import ARM_Q, RobotModel
+
+_ALL = frozenset({"bridge", "controller", "perception", "server"})
+Nine = tuple[float, float, float, float, float, float, float, float, float]
+
+
+def nine(vector: Array) -> Nine:
+    """A vector over ξ as the wire has it."""
+    a, b, c, d, e, f, g, h, i = (float(value) for value in vector)
+    return a, b, c, d, e, f, g, h, i
+
+
+@dataclass
+class KinematicRobot:
+    """The robot and its cutter as the controller sees them, stepped together with the controller.
+
+    Attributes:
+        controller: What commands it.
+        start_arm: Posture at the start (7, rad).
+        lag: Time constant of every velocity servo (s).
+        dt: Control period (s).
+        outcome: How a cut ends.
+        server: False takes the server away.
+        perception: False takes perception away.
+        record: Velocities commanded (9 each).
+    """
+
+    controller: Controller
+    start_arm: tuple[float, ...]
+    lag: float = 0.03
+    dt: float = 0.01
+    outcome: m.Outcome = "DONE"
+    server: bool = True
+    perception: bool = True
+    frozen_sensors: bool = False
+    teleop: m.TeleopTarget | None = None
+    record: list[Array] = field(default_factory=list)
+    cuts: list[tuple[str, Array]] = field(default_factory=list)
+    events: list[str] = field(default_factory=list)
+    state: m.ControllerState | None = None
+    now: float = 0.0
+    stop_id: str = ""
+
+    def __post_init__(self) -> None:
+        """Place the robot at the origin."""
+        self.model = RobotModel()
+        self.q: Array = np.zeros(12)
+        self.q[ARM_Q] = self.start_arm
+        self.xi: Array = np.zeros(NXI)
+        self._sequence, self._epoch = 0, 0
+        self._cut_id, self._cut_at = "", 0.0
+        self._points: Sample[m.PruningPoints] | None = None
+        self._stops: tuple[m.StopRequest, ...] = ()
+        self._joints: Sample[m.JointState] | None = None
+        self._odometry: Sample[m.Odometry] | None = None
+
+    def show(self, points: tuple[m.PruningPoint, ...]) -> None:
+        """What perception holds true from now on."""
+        message = m.PruningPoints(header=m.Header(self.now, "odom"), segmenter="none", frames=1, points=points)
+        self._points = Sample(message, self.now)
+
+    def stop(self, stop_id: str = "stop-1") -> None:
+        """Press the software stop."""
+        self._stops = (m.StopRequest(stop_id=stop_id, source="test", user="ada", reason="test"),)
+        self.stop_id = stop_id
+
+    def inputs(self) -> Inputs:
+        """What the controller is given now."""
+        self._sequence += 1
+        if not self.frozen_sensors or self._joints is None:
+            self._measure()
+        seen = self.now
+        present = _ALL - ({"server"} if not self.server else set()) - ({"perception"} if not self.perception else set())
+        stops, self._stops = self._stops, ()
+        return Inputs(
+            joints=self._joints,
+            odometry=self._odometry,
+            bridge=Sample(self._bridge(), self.now),
+            points=self._points,
+            teleop=None if self.teleop is None else Sample(self.teleop, self.now),
+            server_seen=seen,
+            perception_seen=seen,
+            present=present,
+            stops=stops,
+        )
+
+    def step(self) -> Outputs:
+        """One control period: controller first, then the robot."""
+        return self.take(self.controller.step(self.inputs(), self.now))
+
+    def take(self, out: Outputs) -> Outputs:
+        """Act on what the controller sent, for one period."""
+        command = np.zeros(NXI)
+        if out.motion is not None:
+            command = np.array(out.motion.xi)
+            self._epoch = out.motion.epoch
+        if out.cut is not None and out.cut.cut_id != self._cut_id:
+            self._cut_id, self._cut_at = out.cut.cut_id, self.now
+            self.cuts.append((out.cut.point_id, self.model.kinematics(self.q).T_odom_tool.homogeneous.copy()))
+        if out.release is not None and out.release.stop_id == self.stop_id:
+            self.stop_id = ""
+        if out.state is not None:
+            self.state = out.state
+        self.events += [event.text for event in out.events]
+        self.record.append(command)
+        self._integrate(command)
+        self.now += self.dt
+        return out
+
+    def ask(self, intent: intents.Intent) -> m.Answer:
+        """An operator's intent."""
+        return self.controller.answer(intent, self.now)
+
+    def run(self, seconds: float) -> None:
+        """Let time pass."""
+        for _ in range(round(seconds / self.dt)):
+            self.step()
+
+    def _measure(self) -> None:
+        header = m.Header(self.now, "odom")
+        v, w = self.model.drive.twist(float(self.xi[0]), float(self.xi[1]))
+        self._joints = Sample(
+            m.JointState(header=header, sequence=self._sequence, position=nine(self.q[3:]), velocity=nine(self.xi)),
+            self.now,
+        )
+        x, y, phi = (float(value) for value in self.q[:3])
+        pose = m.PlanarPose(x, y, phi)
+        self._odometry = Sample(
+            m.Odometry(header=header, sequence=self._sequence, pose=pose, linear=v, angular=w), self.now
+        )
+
+    def _bridge(self) -> m.BridgeState:
+        done = self._cut_id != "" and self.now - self._cut_at > 0.5
+        return m.BridgeState(
+            header=m.Header(self.now),
+            kind="sim",
+            epoch=self._epoch,
+            watchdog=False,
+            stop_id=self.stop_id,
+            stopped_by="ada" if self.stop_id else "",
+            cutter="closing" if self._cut_id and not done else "open",
+            cut_id=self._cut_id,
+            outcome=self.outcome if done else "",
+            real_time_factor=1.0,
+        )
+
+    def _integrate(self, command: Array) -> None:
+        inner = 10
+        dt = self.dt / inner
+        for _ in range(inner):
+            self.xi += (command - self.xi) * min(dt / self.lag, 1.0)
+            self.q[:3] = self.model.drive.integrate(self.q[:3], float(self.xi[0] * dt), float(self.xi[1] * dt))
+            self.q[3:] += self.xi * dt

@@ -1,0 +1,51 @@
+"""Configuration of the bridge: section `[bridge]`."""
+
+from typing import Annotated
+
+from msgspec import Meta, Struct
+
+from rolling_panda.config import Positive
+
+Joint = Annotated[float, Meta(ge=-3.2, le=3.8)]
+ArmPosture = tuple[Joint, Joint, Joint, Joint, Joint, Joint, Joint]
+
+
+class BridgeConfig(Struct, frozen=True, forbid_unknown_fields=True):
+    """What the bridge enforces, and the plant behind the simulated one. Units: s, m, rad, N.
+
+    Attributes:
+        start_arm: Posture of the simulated arm at the start (rad).
+        max_age_s: A command computed from an older joint state is refused.
+        fade_s: Silence after which the last setpoint begins to fade.
+        deadline_s: Silence after which the setpoint is zero, the arm holds and the cutter is inhibited.
+        wheel_acceleration: Bound on what is sent on to each wheel (rad/s²): 1.8 m/s², since braking tips the base with
+            the arm stretched forward before the vendor's 2.4 m/s² are reached.
+        joint_margin: Distance to an arm joint's limit (rad) at which motion towards it has come to rest.
+        arm_lag_s: Time constant of the simulated arm's velocity servos.
+        wheel_lag_s: Time constant of the simulated wheels' velocity servos.
+        close_s: Time the blades take to close, and to open again.
+        opening: Gap between the open blades, along the tool's x.
+        blade_half_length: Reach of the blades to either side of the tool's origin, along its z.
+        blade_half_thickness: Half the thickness of the blades, along its y.
+        largest_diameter: Wood that is thicker jams the blades.
+        camera_moving_hz: Pictures a second while the robot moves or just after the row has changed.
+        camera_resting_hz: Pictures a second otherwise.
+        scenery_s: Period of the display scenery.
+    """
+
+    start_arm: ArmPosture = (1.57, -1.2, 0.0, -2.6, 0.0, 1.9, 0.785)
+    max_age_s: Positive = 0.2
+    fade_s: Positive = 0.07
+    deadline_s: Positive = 0.2
+    wheel_acceleration: Positive = 13.5
+    joint_margin: Positive = 0.01
+    arm_lag_s: Positive = 0.02
+    wheel_lag_s: Positive = 0.05
+    close_s: Positive = 0.3
+    opening: Positive = 0.030
+    blade_half_length: Positive = 0.018
+    blade_half_thickness: Positive = 0.0025
+    largest_diameter: Positive = 0.025
+    camera_moving_hz: Positive = 2.0
+    camera_resting_hz: Positive = 0.5
+    scenery_s: Positive = 2.0

@@ -1,0 +1,280 @@
+"""The bridge without wires: commands in, one tick of 1 ms, and what is due to be sent out.
+
+The latch, the watchdog and the limits are here and are the bridge's own: no other process can overrule them.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from bridge.config import BridgeConfig
+from bridge.cut_orders import CutOrders
+from bridge.gate import Gate
+from bridge.interface import Measurement, Robot, Setpoint
+from bridge.latch import StopLatch
+from bridge.limiter import Limiter
+from bridge.pace import Pace
+from bridge.refusals import Refusals
+from bridge.shutter import Shutter
+from bridge.watchdog import Watchdog
+from rolling_panda import messages as m
+from rolling_panda.differential_drive import Array, DifferentialDrive
+from rolling_panda.robot_model import Limits
+from rolling_panda.topics import BRIDGE, CUT, JOINTS, MOTION, ODOMETRY
+from rolling_panda.transport import Rejections
+
+TICK_S = 0.001
+_JOINT_TICKS = round(1 / JOINTS.rate_hz / TICK_S)
+_ODOMETRY_TICKS = round(1 / ODOMETRY.rate_hz / TICK_S)
+_STATE_TICKS = round(1 / BRIDGE.rate_hz / TICK_S)
+# Faster than this (rad/s) is motion that the camera should follow.
+_MOVING = 0.01
+
+SceneryOf = Callable[[], tuple[int, tuple[m.Capsule, ...]]]
+
+
+@dataclass(frozen=True)
+class BridgeOutputs:
+    """What is due after a tick; None or empty when nothing is."""
+
+    joints: m.JointState | None = None
+    odometry: m.Odometry | None = None
+    state: m.BridgeState | None = None
+    frame: m.CameraFrame | None = None
+    scenery: m.Scenery | None = None
+    events: tuple[m.LogEvent, ...] = ()
+
+
+class BridgeCore:
+    """Stands between the wire and a robot. `now` is the bridge's own clock (s), and never goes back; one thread."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        config: BridgeConfig,
+        limits: Limits,
+        drive: DifferentialDrive,
+        kind: Literal["sim", "real"],
+        scenery: SceneryOf | None = None,
+        rejections: Rejections | None = None,
+    ) -> None:
+        """Start with the watchdog tripped, at rest, without a stop.
+
+        Args:
+            robot: Simulated or real.
+            config: Deadlines and rates.
+            limits: Of the robot, over ξ.
+            drive: Geometry of the base, for the odometry.
+            kind: What the robot is, for people.
+            scenery: Revision and rods to show; None on a real robot.
+            rejections: Table of refusals shared with the transport.
+        """
+        self.robot = robot
+        self.refusals = Refusals(rejections)
+        self._kind = kind
+        self._drive = drive
+        self._scenery = scenery
+        self._scenery_ticks = round(config.scenery_s / TICK_S)
+        self._scenery_revision = -1
+        self._gate = Gate(limits.velocity, config.max_age_s)
+        self._watchdog = Watchdog(config.fade_s, config.deadline_s)
+        self._limiter = Limiter(limits, config.wheel_acceleration, config.joint_margin, TICK_S)
+        self._latch = StopLatch()
+        self._orders = CutOrders()
+        self._shutter = Shutter(config.camera_moving_hz, config.camera_resting_hz, TICK_S)
+        self._pace = Pace()
+        self._ticks = 0
+        self._desired: Array = np.zeros_like(limits.velocity)
+        self._was_tripped = True
+        self._measured = robot.read()
+        self._pose = np.zeros(3)
+        self._wheels = self._measured.position[:2].copy()
+        self._cut_id = ""
+        self._outcome: m.Outcome = ""
+        self._events: list[tuple[m.Severity, str]] = []
+        self._state_due = True
+
+    def on_motion(self, command: m.MotionCommand, now: float) -> None:
+        """Take a motion command received at `now`; a refused one is counted and changes nothing."""
+        reason = self._gate.refuse(command, now)
+        if reason is not None:
+            self.refusals.add(MOTION.name, reason)
+            return
+        self._watchdog.feed(now)
+        self._desired = np.array(command.xi)
+
+    def on_cut(self, command: m.CutCommand, now: float) -> None:
+        """Close the blades, once for a `cut_id`."""
+        inhibited = ""
+        if self._latch.stop_id:
+            inhibited = "the software stop is latched"
+        elif self._watchdog.tripped(now) or self._gate.must_rest:
+            inhibited = "no valid setpoint keeps the cutter enabled"
+        free = self._measured.cutter == "open"
+        verdict, reason = self._orders.judge(command, self._gate.epoch, free, inhibited)
+        if verdict == "refuse":
+            self.refusals.add(CUT.name, reason)
+        if verdict == "cut":
+            self.robot.cut(command.cut_id, command.point_id)
+            self._measured = replace(self._measured, cutter="closing", cut_id=command.cut_id, outcome="", detail="")
+            self._begin_cut(command.cut_id, "")
+        elif verdict == "refuse" and reason == inhibited:
+            self._begin_cut(command.cut_id, "FAILED_NOT_CUT")
+
+    def on_stop(self, request: m.StopRequest, now: float) -> None:
+        """Latch the software stop; repetitions and further stops keep the first one."""
+        if self._latch.stop(request):
+            self._say("warning", f"software stop by {request.user or request.source}: {request.reason}")
+            self._state_due = True
+
+    def on_release(self, request: m.ReleaseStop, now: float) -> m.Answer:
+        """Release the latched stop that the request names. Nothing moves before a setpoint at rest has come."""
+        reason = self._latch.release(request)
+        if reason:
+            return m.Answer(ok=False, reason=reason)
+        self._halt()
+        self._say("info", f"software stop released by {request.user}: {request.reason}")
+        return m.Answer(ok=True)
+
+    def step(self, now: float) -> BridgeOutputs:
+        """Advance one tick of 1 ms."""
+        tripped = self._watch(now)
+        stopped = bool(self._latch.stop_id)
+        share = 0.0 if stopped else self._watchdog.trust(now)
+        xi = self._limiter.step(share * self._desired, self._measured.position[2:])
+        blades = not (stopped or tripped)
+        self.robot.write(Setpoint(xi, blades, self._gate.epoch, self._gate.sequence, now))
+        self._measured = self.robot.read()
+        self._ticks += 1
+        self._follow_cut()
+        return self._outputs(now)
+
+    def _watch(self, now: float) -> bool:
+        tripped = self._watchdog.tripped(now)
+        if tripped and not self._was_tripped:
+            self._halt()
+            self._say("warning", "no valid setpoint: base 0, arm holds, cutter inhibited")
+        elif self._was_tripped and not tripped:
+            self._say("info", "setpoints come in: the robot follows")
+        if tripped != self._was_tripped:
+            self._state_due = True
+        self._was_tripped = tripped
+        return tripped
+
+    def _halt(self) -> None:
+        self._desired = np.zeros_like(self._desired)
+        self._gate.require_rest()
+
+    def _begin_cut(self, cut_id: str, outcome: m.Outcome) -> None:
+        self._cut_id, self._outcome = cut_id, outcome
+        self._state_due = True
+
+    def _follow_cut(self) -> None:
+        measured = self._measured
+        if measured.cut_id == self._cut_id and measured.outcome != self._outcome:
+            self._outcome = measured.outcome
+            severity: m.Severity = "info" if measured.outcome == "DONE" else "warning"
+            self._say(severity, f"cut {self._cut_id}: {measured.outcome}, {measured.detail}")
+            self._shutter.wake(self._ticks)
+            self._state_due = True
+
+    def _say(self, severity: m.Severity, text: str) -> None:
+        self._events.append((severity, text[:500]))
+
+    def _outputs(self, now: float) -> BridgeOutputs:
+        joints = odometry = state = frame = None
+        ticks = self._ticks
+        if ticks % _JOINT_TICKS == 0:
+            self._integrate()
+            joints = self._joint_state(now)
+            self._gate.sent(joints.sequence, now)
+            frame = self._frame(now)
+            if ticks % _ODOMETRY_TICKS == 0:
+                odometry = self._odometry(now)
+        if self._state_due or ticks % _STATE_TICKS == 0:
+            state = self._state(now)
+            self._events += [("warning", line) for line in self.refusals.lines(now)]
+        scenery = self._scenery_message(now) if self._scenery_is_due() else None
+        events, self._events = self._events, []
+        return BridgeOutputs(
+            joints,
+            odometry,
+            state,
+            frame,
+            scenery,
+            tuple(
+                m.LogEvent(header=m.Header(now), process="bridge", severity=severity, text=text)
+                for severity, text in events
+            ),
+        )
+
+    def _integrate(self) -> None:
+        left, right = self._measured.position[:2] - self._wheels
+        self._pose = self._drive.integrate(self._pose, float(left), float(right))
+        self._wheels = self._measured.position[:2].copy()
+
+    def _joint_state(self, now: float) -> m.JointState:
+        return m.JointState(
+            header=m.Header(now),
+            sequence=self._ticks // _JOINT_TICKS,
+            position=_actuated(self._measured.position),
+            velocity=_actuated(self._measured.velocity),
+        )
+
+    def _odometry(self, now: float) -> m.Odometry:
+        linear, angular = self._drive.twist(*(float(v) for v in self._measured.velocity[:2]))
+        return m.Odometry(
+            header=m.Header(now, "odom"),
+            sequence=self._ticks // _ODOMETRY_TICKS,
+            pose=self._planar(),
+            linear=linear,
+            angular=angular,
+        )
+
+    def _planar(self) -> m.PlanarPose:
+        x, y, phi = (float(value) for value in self._pose)
+        return m.PlanarPose(x, y, phi)
+
+    def _state(self, now: float) -> m.BridgeState:
+        self._state_due = False
+        return m.BridgeState(
+            header=m.Header(now),
+            kind=self._kind,
+            epoch=self._gate.epoch,
+            watchdog=self._was_tripped,
+            stop_id=self._latch.stop_id,
+            stopped_by=self._latch.stopped_by,
+            cutter=self._measured.cutter,
+            cut_id=self._cut_id,
+            outcome=self._outcome,
+            real_time_factor=self._pace.factor(self._ticks * TICK_S, now),
+            rejections=self.refusals.counts(),
+        )
+
+    def _frame(self, now: float) -> m.CameraFrame | None:
+        measured: Measurement = self._measured
+        if bool(np.abs(measured.velocity).max() > _MOVING):
+            self._shutter.wake(self._ticks)
+        expose = self._shutter.due(self._ticks)
+        if expose:
+            self._shutter.exposed(self._ticks, m.Header(now, "camera"), self._planar(), _actuated(measured.position))
+        picture = self.robot.capture(expose)
+        return None if picture is None else self._shutter.frame(picture)
+
+    def _scenery_is_due(self) -> bool:
+        if self._scenery is None:
+            return False
+        return self._ticks % self._scenery_ticks == 1 or self._scenery()[0] != self._scenery_revision
+
+    def _scenery_message(self, now: float) -> m.Scenery | None:
+        if self._scenery is None:
+            return None
+        self._scenery_revision, capsules = self._scenery()
+        return m.Scenery(header=m.Header(now, "odom"), revision=self._scenery_revision, capsules=capsules)
+
+
+def _actuated(values: Array) -> m.Actuated:
+    a, b, c, d, e, f, g, h, i = (float(value) for value in values)
+    return a, b, c, d, e, f, g, h, i

@@ -1,0 +1,52 @@
+"""What a robot is to the bridge: four methods, the same for the simulated and the real one."""
+
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+from bridge.picture import Picture
+from rolling_panda.differential_drive import Array
+from rolling_panda.messages import Outcome
+
+CutterState = Literal["open", "closing", "opening", "jammed"]
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What the robot's sensors say: ξ and its rates over [θ_l, θ_r, q₁…q₇] (rad, rad/s), and the cutter."""
+
+    position: Array
+    velocity: Array
+    cutter: CutterState
+    cut_id: str
+    outcome: Outcome
+    detail: str
+
+
+@dataclass(frozen=True)
+class Setpoint:
+    """What is really sent on: ξ̇ (rad/s), whether the blades may close, and the token that it follows from."""
+
+    xi: Array
+    blades: bool
+    epoch: int
+    sequence: int
+    at: float
+
+
+class Robot(Protocol):
+    """A base, an arm, a cutter and a camera. Calls come from one thread."""
+
+    def read(self) -> Measurement:
+        """The newest measurement; does not wait."""
+
+    def write(self, setpoint: Setpoint) -> None:
+        """Actuate for one period of 1 ms, which passes meanwhile; without `blades` the cutter opens."""
+
+    def cut(self, cut_id: str, point_id: str) -> None:
+        """Begin to close the blades; how it ends is in later measurements."""
+
+    def capture(self, expose: bool) -> Picture | None:
+        """Take a picture now if `expose` is set; returns one that has become ready, each once."""
+
+    def close(self) -> None:
+        """Let go of the hardware; safe to call twice."""

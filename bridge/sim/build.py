@@ -1,0 +1,48 @@
+"""The simulated bridge from a configuration file and a seed."""
+
+from pathlib import Path
+from typing import Literal
+
+from bridge.config import BridgeConfig
+from bridge.core import BridgeCore
+from bridge.sim.camera_config import CameraConfig
+from bridge.sim.photographer import InlinePhotographer, Photographer, ProcessPhotographer
+from bridge.sim.robot import SimulatedRobot
+from bridge.sim.trace import TraceWriter
+from bridge.sim.vineyard import grow
+from bridge.sim.vineyard_config import VineyardConfig
+from rolling_panda.config import RobotConfig, load_section
+from rolling_panda.robot_model import RobotModel
+from rolling_panda.transport import Rejections
+
+
+def simulated_bridge(
+    config_path: Path,
+    seed: int,
+    trace: Path | None = None,
+    camera: Literal["inline", "process"] = "inline",
+    rejections: Rejections | None = None,
+) -> BridgeCore:
+    """A bridge with the simulated robot beside a row grown from `seed`.
+
+    Args:
+        config_path: TOML file with the sections robot, bridge, vineyard and camera.
+        seed: Of the row and of the camera's noise.
+        trace: File to record every physics step in.
+        camera: `inline` renders within a step, so that the same seed and commands give the same messages; `process`
+            renders beside it, so that the physics keeps time.
+        rejections: Table to count refusals in, shared with the transport.
+
+    Raises:
+        ConfigError: A section is wrong, or the trace cannot be written.
+    """
+    config = load_section(config_path, "bridge", BridgeConfig)
+    row = grow(load_section(config_path, "vineyard", VineyardConfig), seed)
+    lens = load_section(config_path, "camera", CameraConfig)
+    model = RobotModel(load_section(config_path, "robot", RobotConfig))
+    writer = None if trace is None else TraceWriter(trace)
+    photographer: Photographer = (
+        InlinePhotographer(lens, seed) if camera == "inline" else ProcessPhotographer(lens, seed)
+    )
+    robot = SimulatedRobot(config, row, photographer, writer)
+    return BridgeCore(robot, config, model.limits, model.drive, "sim", robot.scenery, rejections)

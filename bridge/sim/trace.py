@@ -1,0 +1,149 @@
+"""The independent record at the simulated actuator: one row a physics step, and an event a cut.
+
+The file is a sequence of blocks: one letter, a length (uint32, little-endian), then that many bytes. `H` is JSON with
+the fields of a row, `R` is rows, `E` is one event in JSON. Blocks are handed to the operating system whole, every 100
+steps, so that a killed bridge loses no more than that; a torn last block is left out when reading.
+"""
+
+import json
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rolling_panda.errors import ConfigError, InputError
+
+#: Fields of a row. Velocities are true ones, not measured ones; `setpoint` is what the servos were given.
+ROW = np.dtype(
+    [
+        ("time", "<f8"),  # simulated time at the end of the step (s)
+        ("clock", "<f8"),  # the bridge's clock when the step was asked for (s): monotonic in a running bridge
+        ("base", "<f8", 3),  # true x, y (m) and heading (rad, not wrapped) of base_link in the world
+        ("base_velocity", "<f8", 3),  # true velocity of base_link along its x and y (m/s), yaw rate (rad/s)
+        ("position", "<f8", 9),  # θ_l, θ_r, q₁…q₇ (rad)
+        ("velocity", "<f8", 9),  # rad/s
+        ("setpoint", "<f8", 9),  # ξ̇ sent to the servos (rad/s)
+        ("tool", "<f8", 3),  # true position of the tool in the world (m)
+        ("epoch", "<u8"),  # token of the command that the setpoint follows from
+        ("sequence", "<i8"),  # -1 before the first command
+        ("cutter", "u1"),  # index in CUTTER
+        ("contacts", "<u2"),  # contacts of the robot with posts, trunks and cordons
+    ]
+)
+CUTTER = ("open", "closing", "opening", "jammed")
+_BLOCK = 100
+_HEAD = struct.Struct("<cI")
+
+
+@dataclass(frozen=True)
+class Trace:
+    """A trace in memory: `rows` with the fields of `ROW`, and `events` in order."""
+
+    rows: NDArray[Any]
+    events: tuple[dict[str, Any], ...]
+
+    def still_after(self, clock: float, base: float = 0.01, joint: float = 0.01) -> float:
+        """The robot's seconds from a fault until base and arm are still and stay so; inf if never.
+
+        Simulated seconds, which are those of the clock unless the machine is too slow for real time.
+
+        Args:
+            clock: When the fault was (s, the bridge's clock).
+            base: What counts as still (m/s, and rad/s of yaw).
+            joint: What counts as still for an arm joint (rad/s).
+        """
+        after = self.rows[self.rows["clock"] >= clock]
+        moving = (np.abs(after["base_velocity"]).max(axis=1, initial=0.0) > base) | (
+            np.abs(after["velocity"][:, 2:]).max(axis=1, initial=0.0) > joint
+        )
+        last = np.flatnonzero(moving)
+        if len(after) == 0 or (len(last) and last[-1] == len(after) - 1):
+            return float("inf")
+        return float(after["time"][last[-1] + 1] - after["time"][0]) if len(last) else 0.0
+
+
+class TraceWriter:
+    """Writes a trace. Fill `row` and call `commit` for each step."""
+
+    def __init__(self, path: Path) -> None:
+        """Begin the file, replacing what was there.
+
+        Raises:
+            ConfigError: The file cannot be written.
+        """
+        try:
+            self._file = path.open("wb", buffering=0)
+        except OSError as error:
+            raise ConfigError(f"cannot write the trace {path}: {error.strerror}") from error
+        self._rows = np.zeros(_BLOCK, ROW)
+        self._filled = 0
+        self._block(b"H", json.dumps({"row": ROW.descr, "cutter": CUTTER}).encode())
+
+    @property
+    def row(self) -> Any:
+        """The row to fill, valid until `commit`."""
+        return self._rows[self._filled]
+
+    def commit(self) -> None:
+        """The row is complete."""
+        self._filled += 1
+        if self._filled == _BLOCK:
+            self.flush()
+
+    def event(self, event: dict[str, Any]) -> None:
+        """Write an event at once, after the rows before it."""
+        self.flush()
+        self._block(b"E", json.dumps(event).encode())
+
+    def flush(self) -> None:
+        """Hand over the rows that wait."""
+        if self._filled:
+            self._block(b"R", self._rows[: self._filled].tobytes())
+            self._filled = 0
+
+    def close(self) -> None:
+        """Write what waits and close; safe to call twice."""
+        if not self._file.closed:
+            self.flush()
+            self._file.close()
+
+    def __enter__(self) -> Self:
+        """Return the writer."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close."""
+        self.close()
+
+    def _block(self, kind: bytes, data: bytes) -> None:
+        self._file.write(_HEAD.pack(kind, len(data)) + data)
+
+
+def read(path: Path) -> Trace:
+    """Load a trace, also one that is still being written or whose writer was killed.
+
+    Raises:
+        InputError: Not a trace, or of another version.
+    """
+    data = path.read_bytes()
+    blocks, events, at, header = [], [], 0, None
+    while at + _HEAD.size <= len(data):
+        kind, length = _HEAD.unpack_from(data, at)
+        body = data[at + _HEAD.size : at + _HEAD.size + length]
+        at += _HEAD.size + length
+        if len(body) < length:
+            break
+        if kind == b"H":
+            header = json.loads(body)
+        elif kind == b"R":
+            blocks.append(np.frombuffer(body, ROW))
+        elif kind == b"E":
+            events.append(json.loads(body))
+        else:
+            break
+    if header is None or header["row"] != json.loads(json.dumps(ROW.descr)):
+        raise InputError(f"{path} is not a trace of this version")
+    return Trace(np.concatenate([np.zeros(0, ROW), *blocks]), tuple(events))

@@ -1,0 +1,90 @@
+"""Numbers of the row that the simulation grows: spreads of spur-pruned, vertically shoot-positioned vineyards."""
+
+from typing import Annotated
+
+from msgspec import Meta, Struct
+
+from rolling_panda.config import Positive
+from rolling_panda.errors import ConfigError
+
+Share = Annotated[float, Meta(ge=0.0, le=1.0)]
+Metres = Annotated[float, Meta(ge=-1e3, le=1e3)]
+
+
+class VineyardConfig(Struct, frozen=True, forbid_unknown_fields=True):
+    """What `grow` draws from. Pairs are the lower and upper end of a spread; all lengths in metres, angles in radians.
+
+    Attributes:
+        row_distance: The row runs along +x at this y.
+        first_vine_x: Trunk of vine 0.
+        vines: How many vines.
+        vine_spacing: From trunk to trunk.
+        vines_per_post: Vines between two posts.
+        post_radius: Of a post.
+        post_height: Of a post.
+        wires: Heights of the wires above the cordon; the fruiting wire under the cordon is always there.
+        wire_radius: Of every wire.
+        cordon_height: Axis of the cordon above the ground.
+        cordon_radius: Of an arm at its end and at the trunk.
+        trunk_radius: At the head and at the ground.
+        first_spur: Trunk to first spur along an arm.
+        spur_spacing: Between two spurs on an arm.
+        spurs_per_arm: At most so many.
+        stub_length: Two-year wood of a spur, outside the cordon.
+        stub_radius: Of that stub.
+        cane_shares: Share of spurs with one, two and three canes.
+        cane_length: One-year cane.
+        cane_radius: Of a cane at its base; drawn around the mean.
+        cane_radius_mean: Mean of that draw.
+        cane_radius_deviation: Standard deviation of that draw.
+        cane_taper: Radius at the tip as a share of that at the base.
+        cane_tilt: Standard deviation of a cane's lean along the row; across the row it is half of that.
+        basal: From the cane's base (where it leaves the stub's bark) to the middle of the basal bud.
+        internode: Between the middles of two nodes.
+        node_length: Of the swelling.
+        node_swelling: Radius of the swelling over the cane's radius there.
+    """
+
+    row_distance: Metres = 0.75
+    first_vine_x: Metres = 0.5
+    vines: Annotated[int, Meta(ge=1, le=100)] = 3
+    vine_spacing: Positive = 1.8
+    vines_per_post: Annotated[int, Meta(ge=1, le=20)] = 3
+    post_radius: Positive = 0.038
+    post_height: Positive = 1.95
+    wires: tuple[Positive, ...] = (0.3, 0.6, 0.9)
+    wire_radius: Positive = 0.00125
+    cordon_height: Positive = 0.9
+    cordon_radius: tuple[Positive, Positive] = (0.012, 0.020)
+    trunk_radius: tuple[Positive, Positive] = (0.024, 0.032)
+    first_spur: tuple[Positive, Positive] = (0.07, 0.12)
+    spur_spacing: tuple[Positive, Positive] = (0.09, 0.15)
+    spurs_per_arm: Annotated[int, Meta(ge=1, le=30)] = 7
+    stub_length: tuple[Positive, Positive] = (0.03, 0.08)
+    stub_radius: tuple[Positive, Positive] = (0.006, 0.009)
+    cane_shares: tuple[Share, Share, Share] = (0.15, 0.7, 0.15)
+    cane_length: tuple[Positive, Positive] = (0.9, 1.5)
+    cane_radius: tuple[Positive, Positive] = (0.0025, 0.0065)
+    cane_radius_mean: Positive = 0.004
+    cane_radius_deviation: Positive = 0.0008
+    cane_taper: Positive = 0.5
+    cane_tilt: Share = 0.12
+    basal: tuple[Positive, Positive] = (0.01, 0.04)
+    internode: tuple[Positive, Positive] = (0.06, 0.10)
+    node_length: tuple[Positive, Positive] = (0.010, 0.014)
+    node_swelling: tuple[Positive, Positive] = (1.35, 1.5)
+
+    def check(self) -> None:
+        """Refuse what no vine could be.
+
+        Raises:
+            ConfigError: A spread runs backwards, or the shares of canes do not add up to 1.
+        """
+        for name in self.__struct_fields__:
+            value = getattr(self, name)
+            if isinstance(value, tuple) and len(value) == 2 and value[0] > value[1]:
+                raise ConfigError(f"[vineyard] {name} = {list(value)} runs backwards; write the smaller value first")
+        if abs(sum(self.cane_shares) - 1.0) > 1e-6:
+            raise ConfigError(f"[vineyard] cane_shares add up to {sum(self.cane_shares):.3f}; they must add up to 1")
+        if self.node_length[1] / 2 > self.basal[0] or self.node_length[1] >= self.internode[0]:
+            raise ConfigError("[vineyard] nodes would overlap; shorten node_length or lengthen basal and internode")

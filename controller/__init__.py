@@ -1,0 +1,1 @@
+"""Whole-body control, trajectories, the supervision state machine and the queue of cuts."""

@@ -1,0 +1,112 @@
+"""Settings of the controller, section `[controller]` of the configuration."""
+
+from typing import Annotated, Literal
+
+from msgspec import Meta, Struct
+
+from rolling_panda.config import Positive
+
+Gain = Annotated[float, Meta(ge=0.0, le=100.0)]
+ArmPosture = tuple[float, float, float, float, float, float, float]
+
+
+class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
+    """How the robot is moved and supervised.
+
+    Attributes:
+        home: Survey posture of the arm (rad): the camera looks at the row.
+        reach: Posture the search for a cut posture starts from (rad), elbow aside, tool to the left.
+        method: Whole-body method by name.
+        rate_hz: Control rate.
+        row_heading: Direction of the row in odom (rad); the base keeps parallel to it, the row on its left.
+        row_distance: Distance of the row from the line y = 0 along `row_heading` where the base drives (m).
+        base_speed: Limit of the base in automatic work and teleoperation (m/s).
+        base_yaw_rate: Limit of the base's turning (rad/s).
+        base_acceleration: Limit of the base (m/s²), kept low so that the stretched arm does not tip it.
+        base_braking: The same when the robot has to stop (m/s²).
+        arm_share: Share of the arm's rated velocity that is used.
+        arm_acceleration_share: Share of the arm's rated acceleration that is used.
+        tool_speed: Limit of the tool between cuts (m/s).
+        tool_turn: Limit of the tool's turning (rad/s).
+        tool_acceleration: Of planned motions (m/s²).
+        tool_jerk: Of planned motions (m/s³).
+        cut_speed: Limit in the last `slow_zone` before the cut (m/s).
+        slow_zone: Length of it (m).
+        advance_speed: Limit along the approach line (m/s).
+        stand_off: Distance of the stand-off from the cut (m).
+        clearance: Distance kept from the canes between cuts (m).
+        position_tolerance: The tool is in place to cut (m).
+        rotation_tolerance: The same for its direction (rad).
+        settle_s: Time in tolerance before it counts (s).
+        reach_timeout_s: A motion that has not ended this long after its planned end has failed (s).
+        cut_timeout_s: A cut without outcome for this long is UNKNOWN (s).
+        largest_radius: Canes thicker than this are refused (m).
+        moved_tolerance: A point that moved further than this after acceptance is not cut (m).
+        gain_position: Of the tool's position error (1/s).
+        gain_rotation: Of the tool's rotation error (1/s).
+        gain_posture: Of the null-space posture (1/s).
+        gain_heading: Of the base's heading to the row (1/s).
+        gain_manipulability: k₀ of the manipulability gradient.
+        gain_limits: k of the joint-limit repulsion.
+        limit_zone: γ_start, distance from a limit where repulsion begins (rad).
+        damping: λ of the damped pseudo-inverse, in units of the weighted Jacobian.
+        joint_margin: Distance from every joint limit that is never entered (rad).
+        search_steps: Iterations of the posture search in one control period.
+        joints_max_age_s: Older joint states stop the robot (s).
+        odometry_max_age_s: Older odometry stops the robot (s).
+        bridge_max_age_s: Older bridge states stop the robot (s).
+        server_max_age_s: Older server heartbeats stop automatic work (s).
+        hold_link_max_age_s: Older server heartbeats end teleoperation (s).
+        perception_max_age_s: Older perception heartbeats stop automatic work (s).
+        hold_max_age_s: Teleoperation ends after this silence (s).
+        teleop_speed: Limit of the tool in teleoperation (m/s).
+        teleop_turn: The same for turning (rad/s).
+    """
+
+    home: ArmPosture = (-0.2784, -0.1128, -0.0354, -2.0055, 1.6759, 1.2124, -0.269)
+    reach: ArmPosture = (-0.3, -1.2, 1.1, -1.7, 2.25, 2.4, 0.55)
+    method: Literal["nullspace"] = "nullspace"
+    rate_hz: Positive = 100.0
+    row_heading: float = 0.0
+    row_distance: Positive = 0.75
+    base_speed: Positive = 0.3
+    base_yaw_rate: Positive = 0.2
+    base_acceleration: Positive = 0.8
+    base_braking: Positive = 1.5
+    arm_share: Annotated[float, Meta(gt=0.0, le=1.0)] = 0.6
+    arm_acceleration_share: Annotated[float, Meta(gt=0.0, le=1.0)] = 0.5
+    tool_speed: Positive = 0.3
+    tool_turn: Positive = 0.8
+    tool_acceleration: Positive = 0.6
+    tool_jerk: Positive = 4.0
+    cut_speed: Positive = 0.03
+    slow_zone: Positive = 0.04
+    advance_speed: Positive = 0.1
+    stand_off: Positive = 0.15
+    clearance: Positive = 0.22
+    position_tolerance: Positive = 0.0015
+    rotation_tolerance: Positive = 0.0175
+    settle_s: Positive = 0.1
+    reach_timeout_s: Positive = 6.0
+    cut_timeout_s: Positive = 3.0
+    largest_radius: Positive = 0.0075
+    moved_tolerance: Positive = 0.005
+    gain_position: Gain = 3.0
+    gain_rotation: Gain = 3.0
+    gain_posture: Gain = 1.0
+    gain_heading: Gain = 0.8
+    gain_manipulability: Gain = 0.2
+    gain_limits: Gain = 2.0
+    limit_zone: Positive = 0.25
+    damping: Positive = 0.01
+    joint_margin: Annotated[float, Meta(ge=0.0, le=0.5)] = 0.03
+    search_steps: Annotated[int, Meta(ge=1, le=200)] = 10
+    joints_max_age_s: Positive = 0.2
+    odometry_max_age_s: Positive = 0.25
+    bridge_max_age_s: Positive = 0.5
+    server_max_age_s: Positive = 1.0
+    hold_link_max_age_s: Positive = 0.3
+    perception_max_age_s: Positive = 1.0
+    hold_max_age_s: Positive = 0.15
+    teleop_speed: Positive = 0.25
+    teleop_turn: Positive = 0.6

@@ -1,0 +1,369 @@
+"""The controller without wires: newest inputs and intents in, commands and state out. No clock, no thread."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from controller import modes, safety
+from controller.config import ControllerConfig
+from controller.cut_sequence import CutSequence
+from controller.estimate import configuration_now
+from controller.homing import Homing
+from controller.interface import Inputs, Outputs
+from controller.modes import Event
+from controller.motion import Follower, Measured, Tracking
+from controller.operator import Operator
+from controller.queue import PointQueue
+from controller.reach import PostureSearch
+from controller.report import controller_state
+from controller.stop_latch import StopLatch
+from controller.teleoperation import Teleoperation
+from controller.whole_body.registry import make_method
+from controller.whole_body.saturation import Saturation
+from rolling_panda import intents
+from rolling_panda import messages as m
+from rolling_panda.config import RobotConfig
+from rolling_panda.differential_drive import NXI, Array
+from rolling_panda.errors import ControlError
+from rolling_panda.robot_model import RobotModel
+
+_STATE_S = 0.05
+
+
+class Controller:
+    """Supervision, queue and whole-body control of one robot.
+
+    `step` it at the configured rate; `answer` operators between steps, on the same thread.
+    """
+
+    def __init__(self, config: ControllerConfig, robot_config: RobotConfig, run_id: str = "cut") -> None:
+        """Build the robot's model and start in IDLE.
+
+        Args:
+            config: Section `[controller]`.
+            robot_config: Section `[robot]`.
+            run_id: Makes this start's cut ids unlike any other's; letters, digits, `_.:-`.
+
+        Raises:
+            ConfigError: There is no such method.
+            ModelError: A robot description is missing.
+        """
+        self._config, self._dt = config, 1.0 / config.rate_hz
+        self._robot = RobotModel(robot_config)
+        self._saturation = Saturation(self._robot, config, self._dt)
+        method = make_method(self._robot, config)
+        self._follower = Follower(self._robot, config, method, self._saturation, self._dt)
+        self._queue = PointQueue(config)
+        search = PostureSearch(RobotModel(robot_config), config)
+        self._sequence = CutSequence(config, search, self._follower, self._saturation, self._queue, run_id)
+        self._teleoperation = Teleoperation(config, self._follower)
+        self._stops = StopLatch()
+        self._operator = Operator(self._queue)
+        self._homing: Homing | None = None
+        self._state = modes.boot()
+        self._inputs = Inputs()
+        self._health = _health(self._inputs, None, 0.0)
+        self._measured: Measured | None = None
+        self._tracking: Tracking | None = None
+        self._sent: Array = np.zeros(NXI)
+        self._epoch: int | None = None
+        self._sequence_number = 0
+        self._points_seen: object = None
+        self._now = 0.0
+        self._state_due = -math.inf
+        self._events: list[m.LogEvent] = []
+
+    @property
+    def mode(self) -> m.Mode:
+        """Mode of the supervision machine."""
+        return self._state.mode
+
+    def step(self, inputs: Inputs, now: float) -> Outputs:
+        """One control period.
+
+        Args:
+            inputs: Newest of everything.
+            now: Monotonic time (s), the clock of the inputs' arrival times.
+        """
+        self._now = now
+        self._take(inputs, now)
+        self._supervise(now)
+        try:
+            xi, cut = self._move(now)
+        except ControlError as error:
+            self._event(Event.FAULT, now, str(error))
+            xi, cut = self._saturation.ramp(self._sent), None
+        xi = self._checked(xi)
+        motion = self._motion(xi)
+        release = self._stops.release_due()
+        state = None
+        if now >= self._state_due:
+            self._state_due = now + _STATE_S
+            state = self._report(now)
+        events, self._events = tuple(self._events), []
+        return Outputs(motion, cut, release, state, events)
+
+    def answer(self, intent: intents.Intent, now: float) -> m.Answer:
+        """Do what an operator asks, or say why not.
+
+        Args:
+            intent: What is asked.
+            now: Monotonic time (s).
+        """
+        self._now = now
+        refused = self._refusal(intent, now)
+        if not refused:
+            refused = self._do(intent, now)
+        what = type(intent).__name__
+        if refused:
+            self._say("warning", f"{intent.user}: {what} refused: {refused}")
+            return m.Answer(ok=False, reason=refused[:500])
+        self._say("info", f"{intent.user}: {self._operator.told(intent)}")
+        return m.Answer(ok=True)
+
+    # --- inputs and supervision --------------------------------------------------------------------------------------
+
+    def _take(self, inputs: Inputs, now: float) -> None:
+        self._inputs = inputs
+        bridge = inputs.bridge.message if inputs.bridge is not None else None
+        if bridge is not None and self._epoch is None:
+            self._epoch = bridge.epoch + 1
+        self._health = _health(inputs, self._epoch, now)
+        if inputs.joints is not None and inputs.odometry is not None:
+            q = configuration_now(inputs.joints.message, inputs.odometry.message, self._robot.drive)
+            self._measured = Measured(q, self._robot.kinematics(q), self._sent)
+        if bridge is not None:
+            for text in self._sequence.watch(bridge, now):
+                self._say("info", text)
+        if inputs.points is not None and inputs.points is not self._points_seen:
+            self._points_seen = inputs.points
+            for text in self._queue.update(inputs.points.message, self._sequence.in_canes):
+                self._say("warning", text)
+
+    def _supervise(self, now: float) -> None:
+        bridge = self._inputs.bridge.message if self._inputs.bridge is not None else None
+        latched = self._stops.take(self._inputs.stops, bridge)
+        if latched:
+            self._event(Event.STOP, now, latched)
+        elif self._stops.released(bridge):
+            self._event(Event.RESET, now, self._stops.reset_reason)
+        verdict = safety.check(self._state.mode, self._homing is not None, self._health, self._config)
+        if verdict.action == "fault":
+            self._event(Event.FAULT, now, verdict.reason)
+        elif verdict.action == "protect":
+            self._event(Event.PROTECT, now, verdict.reason)
+        elif verdict.action == "pause":
+            self._homing = None
+            if self._state.mode in ("AUTO", "TELEOP"):
+                self._event(Event.PAUSE, now, verdict.reason)
+            else:
+                self._say("warning", f"bringing the arm home was stopped: {verdict.reason}")
+        self._state = modes.observe(self._state, self._cause(), now)
+        self._supervise_hold(now)
+
+    def _supervise_hold(self, now: float) -> None:
+        holding = self._teleoperation.holding(self._inputs.teleop, now)
+        if self._state.mode == "TELEOP" and not holding:
+            self._event(Event.RELEASE, now, "the hold was released")
+        elif self._state.mode == "READY" and holding and self._homing is None and self._teleoperation.pressed:
+            why = safety.sensors(self._health, self._config) or safety.supervision(self._health, self._config, True)
+            if why:
+                self._teleoperation.refuse()
+                self._say("warning", f"teleoperation refused: {why}")
+            else:
+                self._event(Event.HOLD, now, f"{self._teleoperation.user} moves the tool")
+
+    def _cause(self) -> str:
+        """Why a PROTECTIVE_STOP or FAULT could not be left now; empty when its cause is gone."""
+        if self._health.overruled:
+            return "another controller commands this robot"
+        return safety.sensors(self._health, self._config) or ("watchdog" if self._health.watchdog else "")
+
+    def _event(self, event: Event, now: float, reason: str) -> str:
+        """Put an event to the machine; what it changes is logged. Returns the refusal."""
+        before = self._state
+        transition = modes.step(before, event, now, reason)
+        self._state = transition.state
+        if self._state.mode != before.mode:
+            self._leave(before.mode)
+            worse = modes.severity(self._state.mode) >= modes.severity("PAUSED")
+            self._say("warning" if worse else "info", f"{before.mode} → {self._state.mode}: {self._state.reason}")
+        return transition.refused
+
+    def _leave(self, mode: m.Mode) -> None:
+        self._homing = None
+        if mode == "AUTO":
+            self._sequence.abort()
+        self._teleoperation.refuse()
+
+    # --- motion ------------------------------------------------------------------------------------------------------
+
+    def _move(self, now: float) -> tuple[Array, m.CutCommand | None]:
+        """ξ̇ (9) for this period, and the cut to command."""
+        self._tracking = None
+        robot, mode = self._measured, self._state.mode
+        if robot is None or mode not in ("READY", "TELEOP", "AUTO"):
+            return self._saturation.ramp(self._sent), None
+        if mode == "TELEOP":
+            self._tracking = self._teleoperation.step(robot)
+            return self._tracking.xi, None
+        if mode == "READY":
+            return self._ready(robot), None
+        work = self._sequence.step(robot, now)
+        self._tracking = work.tracking
+        for text in work.events:
+            self._say("warning", text)
+        if work.pause:
+            self._event(Event.PAUSE, now, work.pause)
+        elif work.finished:
+            self._event(Event.FINISHED, now, "no accepted point is left")
+        cut = None
+        if work.cut is not None and self._epoch is not None and self._state.mode == "AUTO":
+            cut = m.CutCommand(epoch=self._epoch, cut_id=work.cut[0], point_id=work.cut[1])
+        return work.xi, cut
+
+    def _ready(self, robot: Measured) -> Array:
+        if self._homing is None:
+            return self._saturation.ramp(self._sent)
+        xi = self._homing.step(robot)
+        if self._homing.done:
+            self._homing = None
+            self._state = replace(self._state, reason="the arm is home")
+            self._say("info", "the arm is home")
+        return xi
+
+    def _checked(self, xi: Array) -> Array:
+        """The last gate: what is not finite or outside the limits is not sent; the robot brakes instead."""
+        if self._saturation.admits(xi, self._sent):
+            return xi
+        self._say("error", "a velocity outside the limits was not sent; the robot brakes")
+        return self._saturation.brake(self._sent)
+
+    def _motion(self, xi: Array) -> m.MotionCommand | None:
+        joints = self._inputs.joints
+        latched_and_still = self._state.mode == "ESTOP_LATCHED" and not np.any(xi)
+        if self._epoch is None or joints is None or latched_and_still or self._health.overruled:
+            self._sent = np.zeros(NXI)
+            return None
+        self._sent = xi
+        self._sequence_number += 1
+        a, b, c, d, e, f, g, h, i = xi.tolist()
+        return m.MotionCommand(
+            epoch=self._epoch,
+            sequence=self._sequence_number,
+            echo=joints.message.sequence,
+            xi=(a, b, c, d, e, f, g, h, i),
+        )
+
+    # --- operator ----------------------------------------------------------------------------------------------------
+
+    def _refusal(self, intent: intents.Intent, now: float) -> str:
+        """Why an intent would not be taken now, apart from its own content; empty when it would."""
+        mode = self._state.mode
+        event = _EVENTS.get(type(intent))
+        if event is not None:
+            refused = modes.step(self._state, event, now).refused
+            if refused:
+                return refused
+        if isinstance(intent, intents.Arm | intents.Start | intents.Home):
+            why = safety.sensors(self._health, self._config)
+            if why:
+                return why
+            if self._health.watchdog:
+                return "the bridge's watchdog holds the robot: wait until it takes commands"
+        if isinstance(intent, intents.Start | intents.Home):
+            why = safety.supervision(self._health, self._config, False)
+            if why:
+                return why
+            if self._homing is not None:
+                return "the arm is being brought home; wait until it is there"
+        if isinstance(intent, intents.Start):
+            if self._queue.next() is None:
+                return "no point is accepted"
+            return safety.perception(self._health, self._config)
+        if isinstance(intent, intents.Home) and mode != "READY":
+            return f"the arm is brought home in READY; the robot is in {mode}"
+        return ""
+
+    def _do(self, intent: intents.Intent, now: float) -> str:
+        """Do what was not refused; returns what the content itself is refused for."""
+        if isinstance(intent, intents.Reset):
+            bridge = self._inputs.bridge
+            return self._stops.ask_release(intent, bridge.message if bridge is not None else None, now)
+        event = _EVENTS.get(type(intent))
+        if event is not None:
+            refused = self._event(event, now, f"{event.value} by {intent.user}")
+            if isinstance(intent, intents.Start) and not refused:
+                self._sequence.begin()
+            return refused
+        if isinstance(intent, intents.Home):
+            self._homing = Homing(self._config, self._follower, self._saturation, self._dt)
+            self._state = replace(self._state, reason="the arm is being brought home")
+            return ""
+        return self._operator.points(intent)
+
+    # --- report ------------------------------------------------------------------------------------------------------
+
+    def _report(self, now: float) -> m.ControllerState:
+        allowed = tuple(
+            kind.__name__ for kind, probe in _PROBES.items() if probe is None or not self._refusal(probe, now)
+        )
+        return controller_state(
+            config=self._config,
+            robot=self._robot,
+            state=self._state,
+            phase=self._sequence.phase,
+            active=self._sequence.active,
+            measured=self._measured,
+            tracking=self._tracking,
+            allowed=allowed,
+            inputs=self._inputs,
+            queue=self._queue.entries(),
+            now=now,
+        )
+
+    def _say(self, severity: m.Severity, text: str) -> None:
+        self._events.append(
+            m.LogEvent(header=m.Header(self._now), process="controller", severity=severity, text=text[:500])
+        )
+
+
+_EVENTS: dict[type[intents.Intent], Event] = {
+    intents.Arm: Event.ARM,
+    intents.Start: Event.START,
+    intents.Pause: Event.PAUSE,
+    intents.Resume: Event.RESUME,
+    intents.Acknowledge: Event.ACKNOWLEDGE,
+    intents.Reset: Event.RESET,
+}
+#: One intent of each type, to ask whether it would be taken; None where only its content can be refused.
+_PROBES: dict[type[intents.Intent], intents.Intent | None] = {
+    intents.Arm: intents.Arm(user=""),
+    intents.AcceptPoint: None,
+    intents.RejectPoint: None,
+    intents.AcceptAll: None,
+    intents.Start: intents.Start(user=""),
+    intents.Pause: intents.Pause(user=""),
+    intents.Resume: intents.Resume(user=""),
+    intents.Home: intents.Home(user=""),
+    intents.Acknowledge: intents.Acknowledge(user=""),
+    intents.Reset: intents.Reset(user="", reason="-"),
+}
+
+
+def _health(inputs: Inputs, epoch: int | None, now: float) -> safety.Health:
+    def age(at: float | None) -> float:
+        return math.inf if at is None else now - at
+
+    bridge = inputs.bridge
+    return safety.Health(
+        joints=age(inputs.joints.at if inputs.joints is not None else None),
+        odometry=age(inputs.odometry.at if inputs.odometry is not None else None),
+        bridge=age(bridge.at if bridge is not None else None),
+        server=age(inputs.server_seen),
+        perception=age(inputs.perception_seen),
+        present=inputs.present,
+        watchdog=bridge is not None and bridge.message.watchdog,
+        overruled=bridge is not None and epoch is not None and bridge.message.epoch > epoch,
+    )

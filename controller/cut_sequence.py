@@ -1,0 +1,387 @@
+"""The work on accepted points: find a posture, travel, approach, advance, cut, retreat, and on to the next.
+
+Between cuts the tool keeps `clearance` from the canes; into them and out of them it moves on one straight line with
+the base standing still.
+"""
+
+from collections.abc import Generator
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+import numpy as np
+
+from controller.config import ControllerConfig
+from controller.cut_pose import escape_pose
+from controller.motion import Follower, Measured, ToolMotion, Tracking
+from controller.queue import PointQueue
+from controller.reach import CutPlan, PostureSearch, Unreachable
+from controller.whole_body.saturation import Saturation
+from rolling_panda import messages as m
+from rolling_panda.differential_drive import Array
+
+#: A cut command is repeated this often until the bridge has seen it (s).
+_REPEAT_S = 0.05
+#: Between motions without an end to hold: near enough to go on (m).
+_NEAR = 0.02
+#: At the stand-off before going in (m, rad).
+_STAND_OFF_NEAR, _STAND_OFF_TURN = 0.004, 0.035
+
+
+class Stage(Enum):
+    """Step of the sequence."""
+
+    REST = "rest"
+    ESCAPE = "getting clear of the canes"
+    SEARCH = "looking for a posture"
+    TRAVEL = "on the way"
+    APPROACH = "to the stand-off"
+    ADVANCE = "straight in"
+    CUT = "cutting"
+    RETREAT = "straight back"
+
+
+_PHASES: dict[Stage, m.Phase] = {
+    Stage.REST: "",
+    Stage.ESCAPE: "RETREAT",
+    Stage.SEARCH: "APPROACH",
+    Stage.TRAVEL: "APPROACH",
+    Stage.APPROACH: "APPROACH",
+    Stage.ADVANCE: "ADVANCE",
+    Stage.CUT: "CUT",
+    Stage.RETREAT: "RETREAT",
+}
+
+
+@dataclass(frozen=True)
+class Work:
+    """What one period of work gave.
+
+    Attributes:
+        xi: ξ̇ to send (9).
+        tracking: Of the motion, None while standing.
+        cut: The cut to command now: (cut_id, point_id) as a message without its epoch, else None.
+        finished: True when no accepted point is left.
+        pause: Why work must pause, empty when it goes on.
+        events: What happened, in words.
+    """
+
+    xi: Array
+    tracking: Tracking | None = None
+    cut: tuple[str, str] | None = None
+    finished: bool = False
+    pause: str = ""
+    events: tuple[str, ...] = ()
+
+
+@dataclass
+class _Cut:
+    """A cut under way: the blades may have moved."""
+
+    point_id: str
+    cut_id: str
+    deadline: float
+    asked_at: float = float("-inf")
+
+
+class CutSequence:
+    """Works off the queue. `begin` it, `step` it each period while the mode is AUTO, `abort` it otherwise."""
+
+    def __init__(
+        self,
+        config: ControllerConfig,
+        search: PostureSearch,
+        follower: Follower,
+        saturation: Saturation,
+        queue: PointQueue,
+        run_id: str,
+    ) -> None:
+        """Bind the parts. `run_id` makes the cut ids of this start unlike those of any other."""
+        self._config, self._search, self._follower = config, search, follower
+        self._saturation, self._queue, self._run_id = saturation, queue, run_id
+        heading = config.row_heading
+        self._left = np.array([-np.sin(heading), np.cos(heading), 0.0])
+        self._cuts = 0
+        self._cut: _Cut | None = None
+        self._events: list[str] = []
+        self._motion: ToolMotion | None = None
+        self._plan: CutPlan | None = None
+        self._finding: Generator[None, None, CutPlan | Unreachable] | None = None
+        self._forget()
+
+    @property
+    def phase(self) -> m.Phase:
+        """Phase on the wire."""
+        return _PHASES[self._stage]
+
+    @property
+    def active(self) -> str:
+        """Point being worked on, empty when none."""
+        return self._point_id
+
+    @property
+    def in_canes(self) -> str:
+        """Point that the tool hides from the camera now, empty when none."""
+        return self._point_id if self._stage in (Stage.ADVANCE, Stage.CUT, Stage.RETREAT) else ""
+
+    def begin(self) -> None:
+        """Start with getting the tool clear of the canes."""
+        self._forget()
+        self._stage = Stage.ESCAPE
+
+    def abort(self) -> None:
+        """Leave the work; a cut under way is still watched, an accepted point stays accepted."""
+        self._forget()
+
+    def watch(self, bridge: m.BridgeState, now: float) -> tuple[str, ...]:
+        """Take in how a cut ended, in every mode; returns what happened, in words."""
+        cut = self._cut
+        if cut is None:
+            return ()
+        if bridge.cut_id == cut.cut_id and bridge.outcome:
+            self._cut = None
+            text = _OUTCOMES[bridge.outcome]
+            self._queue.resolve(cut.point_id, bridge.outcome, text)
+            return (f"{cut.point_id}: {text}",)
+        if now > cut.deadline:
+            self._cut = None
+            text = f"no word from the cutter for {self._config.cut_timeout_s} s; look whether it is cut"
+            self._queue.resolve(cut.point_id, "UNKNOWN", text)
+            return (f"{cut.point_id}: UNKNOWN: {text}",)
+        return ()
+
+    def step(self, robot: Measured, now: float) -> Work:
+        """One period of work.
+
+        Args:
+            robot: Measured robot.
+            now: Monotonic time (s).
+        """
+        self._events = []
+        if self._stage in (Stage.SEARCH, Stage.TRAVEL, Stage.APPROACH, Stage.ADVANCE):
+            self._check_acceptance(robot)
+        work = _STEPS[self._stage](self, robot, now)
+        return work if not self._events else _with(work, tuple(self._events))
+
+    # --- stages ------------------------------------------------------------------------------------------------------
+
+    def _escape(self, robot: Measured, now: float) -> Work:
+        if self._motion is None:
+            pose = robot.kinematics.T_odom_tool
+            limit = self._config.row_distance - self._config.clearance
+            depth = float(pose.translation @ self._left) - limit - 0.03
+            if depth <= 0.0:
+                return self._next(robot)
+            self._go(robot, escape_pose(pose, self._left, depth), robot.q, self._config.advance_speed, frozen=True)
+        tracking = self._track(robot)
+        if self._over(tracking, now, _NEAR):
+            return self._next(robot)
+        if self._late(now):
+            return Work(self._saturation.ramp(robot.sent), pause=self._missed("a place clear of the canes", tracking))
+        return Work(tracking.xi, tracking)
+
+    def _next(self, robot: Measured) -> Work:
+        """Choose the next point and look for a posture; stand still while looking."""
+        self._forget()
+        ticket = self._queue.next()
+        if ticket is None or ticket.accepted is None:
+            return Work(self._saturation.ramp(robot.sent), finished=True)
+        self._point_id, self._stage = ticket.point.point_id, Stage.SEARCH
+        self._finding = self._search.find(
+            np.array(ticket.accepted.position), np.array(ticket.accepted.tangent), robot.q
+        )
+        return Work(self._saturation.ramp(robot.sent))
+
+    def _find(self, robot: Measured, now: float) -> Work:
+        xi = self._saturation.ramp(robot.sent)
+        if self._finding is not None:
+            found = _advance(self._finding, self._config.search_steps)
+            if found is None:
+                return Work(xi)
+            self._finding = None
+            if isinstance(found, Unreachable):
+                return self._fail(robot, f"not reachable: {found.reason}")
+            self._plan = found
+        if np.any(robot.sent):
+            return Work(xi)
+        assert self._plan is not None
+        self._stage = Stage.TRAVEL
+        self._go(robot, self._plan.poses.clear, self._plan.q_clear, self._config.tool_speed)
+        return Work(xi)
+
+    def _travel(self, robot: Measured, now: float) -> Work:
+        tracking = self._track(robot)
+        if self._over(tracking, now, _NEAR):
+            assert self._plan is not None
+            self._stage = Stage.APPROACH
+            self._go(robot, self._plan.poses.stand_off, self._plan.q_stand_off, self._config.tool_speed)
+        elif self._late(now):
+            return self._fail(robot, self._missed("the way to it", tracking))
+        return Work(tracking.xi, tracking)
+
+    def _approach(self, robot: Measured, now: float) -> Work:
+        tracking = self._track(robot)
+        if self._over(tracking, now, _STAND_OFF_NEAR, _STAND_OFF_TURN, self._config.settle_s):
+            assert self._plan is not None
+            self._stage = Stage.ADVANCE
+            self._go(
+                robot,
+                self._plan.poses.cut,
+                _at_base(self._plan.q_cut, robot.q),
+                self._config.advance_speed,
+                frozen=True,
+                slow_end=True,
+            )
+        elif self._late(now):
+            return self._fail(robot, self._missed("the stand-off", tracking))
+        return Work(tracking.xi, tracking)
+
+    def _advance(self, robot: Measured, now: float) -> Work:
+        tracking = self._track(robot)
+        config = self._config
+        if self._over(tracking, now, config.position_tolerance, config.rotation_tolerance, config.settle_s):
+            self._cuts += 1
+            self._cut = _Cut(self._point_id, f"{self._run_id}-{self._cuts}", now + config.cut_timeout_s)
+            self._queue.intend(self._point_id, self._cut.cut_id)
+            self._stage = Stage.CUT
+        elif self._late(now):
+            reason = self._missed("the cut", tracking)
+            self._queue.resolve(self._point_id, "FAILED_NOT_CUT", reason)
+            self._events.append(f"{self._point_id}: not cut: {reason}")
+            self._retreat_from(robot)
+        return Work(tracking.xi, tracking)
+
+    def _cutting(self, robot: Measured, now: float) -> Work:
+        tracking = self._track(robot)
+        cut = self._cut
+        if cut is None:
+            self._retreat_from(robot)
+            return Work(tracking.xi, tracking)
+        if now - cut.asked_at < _REPEAT_S:
+            return Work(tracking.xi, tracking)
+        cut.asked_at = now
+        return Work(tracking.xi, tracking, cut=(cut.cut_id, cut.point_id))
+
+    def _retreat(self, robot: Measured, now: float) -> Work:
+        tracking = self._track(robot)
+        if not self._over(tracking, now, _NEAR):
+            if not self._late(now):
+                return Work(tracking.xi, tracking)
+            return Work(self._saturation.ramp(robot.sent), pause=self._missed("the way back", tracking))
+        ticket = self._queue.get(self._point_id)
+        if ticket is not None and ticket.state == "UNKNOWN":
+            return Work(tracking.xi, tracking, pause=f"{self._point_id} is UNKNOWN: {ticket.reason}")
+        return self._next(robot)
+
+    def _rest(self, robot: Measured, now: float) -> Work:
+        return Work(self._saturation.ramp(robot.sent), finished=True)
+
+    # --- parts -------------------------------------------------------------------------------------------------------
+
+    def _forget(self) -> None:
+        self._stage = Stage.REST
+        self._point_id = ""
+        self._motion = self._plan = self._finding = None
+        self._started: float | None = None
+        self._in_place_since: float | None = None
+
+    def _check_acceptance(self, robot: Measured) -> None:
+        ticket = self._queue.get(self._point_id)
+        if ticket is not None and ticket.state == "ACCEPTED":
+            return
+        why = ticket.reason if ticket is not None else "the point has gone"
+        self._events.append(f"{self._point_id}: left: {why}")
+        if self._stage is Stage.ADVANCE:
+            self._retreat_from(robot)
+        else:
+            self._forget()
+            self._stage = Stage.ESCAPE
+
+    def _retreat_from(self, robot: Measured) -> None:
+        assert self._plan is not None
+        self._stage = Stage.RETREAT
+        self._go(
+            robot, self._plan.poses.clear, _at_base(self._plan.q_clear, robot.q), self._config.tool_speed, frozen=True
+        )
+
+    def _fail(self, robot: Measured, reason: str) -> Work:
+        self._queue.resolve(self._point_id, "FAILED_NOT_CUT", reason)
+        self._events.append(f"{self._point_id}: not cut: {reason}")
+        self._forget()
+        self._stage = Stage.ESCAPE
+        return Work(self._saturation.ramp(robot.sent))
+
+    def _go(
+        self, robot: Measured, goal: Any, q_goal: Array, speed: float, frozen: bool = False, slow_end: bool = False
+    ) -> None:
+        # From where the tool is, not from where it should be: a stage begins at rest.
+        self._motion = ToolMotion(
+            self._config, robot.kinematics.T_odom_tool, goal, robot.q, q_goal, speed, frozen, slow_end
+        )
+        self._started = self._in_place_since = None
+
+    def _track(self, robot: Measured) -> Tracking:
+        assert self._motion is not None
+        return self._follower.follow(self._motion, robot)
+
+    def _over(self, tracking: Tracking, now: float, near: float, turn: float = 0.2, settle_s: float = 0.0) -> bool:
+        """Whether the motion has run out and the tool has been in place for `settle_s`."""
+        if self._started is None:
+            self._started = now
+        if not tracking.done or tracking.position_error > near or tracking.rotation_error > turn:
+            self._in_place_since = None
+            return False
+        if self._in_place_since is None:
+            self._in_place_since = now
+        return now - self._in_place_since >= settle_s
+
+    def _late(self, now: float) -> bool:
+        if self._started is None or self._motion is None:
+            return False
+        return now - self._started > 2.5 * self._motion.trajectory.duration + self._config.reach_timeout_s
+
+    def _missed(self, what: str, tracking: Tracking) -> str:
+        braked = ", at a joint limit" if tracking.braked else ""
+        return (
+            f"{what} was not reached in time: {1e3 * tracking.position_error:.1f} mm and "
+            f"{np.degrees(tracking.rotation_error):.1f}° are missing{braked}"
+        )
+
+
+_OUTCOMES: dict[str, str] = {
+    "DONE": "cut",
+    "FAILED_NOT_CUT": "the cutter reports that nothing was cut",
+    "UNKNOWN": "the cutter does not know whether it cut",
+}
+_STEPS = {
+    Stage.REST: CutSequence._rest,
+    Stage.ESCAPE: CutSequence._escape,
+    Stage.SEARCH: CutSequence._find,
+    Stage.TRAVEL: CutSequence._travel,
+    Stage.APPROACH: CutSequence._approach,
+    Stage.ADVANCE: CutSequence._advance,
+    Stage.CUT: CutSequence._cutting,
+    Stage.RETREAT: CutSequence._retreat,
+}
+
+
+def _advance(search: Generator[None, None, CutPlan | Unreachable], iterations: int) -> CutPlan | Unreachable | None:
+    """Run a search for some iterations; its result, or None while it goes on."""
+    for _ in range(iterations):
+        try:
+            next(search)
+        except StopIteration as end:
+            result: CutPlan | Unreachable = end.value
+            return result
+    return None
+
+
+def _at_base(q_goal: Array, q: Array) -> Array:
+    """The goal's arm posture with the base where it stands."""
+    out = q.copy()
+    out[5:] = q_goal[5:]
+    return out
+
+
+def _with(work: Work, events: tuple[str, ...]) -> Work:
+    return Work(work.xi, work.tracking, work.cut, work.finished, work.pause, work.events + events)

@@ -1,0 +1,49 @@
+"""Bringing the arm back to its survey posture with the base still: first straight out of the canes, then by joints."""
+
+import numpy as np
+
+from controller.config import ControllerConfig
+from controller.cut_pose import escape_pose
+from controller.motion import ArmMotion, Follower, Measured, ToolMotion
+from controller.whole_body.saturation import Saturation
+from rolling_panda.differential_drive import Array
+from rolling_panda.robot_model import ARM_Q
+
+#: The posture is reached (rad).
+_NEAR = 0.01
+#: Near enough to the place clear of the canes to go on (m).
+_CLEAR = 0.02
+
+
+class Homing:
+    """One way home; `step` it until `done`, drop it to stop."""
+
+    def __init__(self, config: ControllerConfig, follower: Follower, saturation: Saturation, dt: float) -> None:
+        """Bind the parts for a control period of `dt` (s)."""
+        self._config, self._follower, self._saturation, self._dt = config, follower, saturation, dt
+        self._goal = np.array(config.home)
+        heading = config.row_heading
+        self._left = np.array([-np.sin(heading), np.cos(heading), 0.0])
+        self._out: ToolMotion | None = None
+        self._in: ArmMotion | None = None
+        self.done = False
+
+    def step(self, robot: Measured) -> Array:
+        """One period: ξ̇ to send (9)."""
+        if self._in is None:
+            depth = float(robot.kinematics.T_odom_tool.translation @ self._left)
+            depth -= self._config.row_distance - self._config.clearance - 0.03
+            if self._out is None and depth > 0.0:
+                pose = robot.kinematics.T_odom_tool
+                goal = escape_pose(pose, self._left, depth)
+                self._out = ToolMotion(
+                    self._config, pose, goal, robot.q, robot.q, self._config.advance_speed, frozen=True
+                )
+            if self._out is not None:
+                tracking = self._follower.follow(self._out, robot)
+                if not tracking.done or tracking.position_error > _CLEAR:
+                    return tracking.xi
+            self._in = ArmMotion(self._config, robot.q[ARM_Q].copy(), self._goal)
+        xi = self._in.step(robot, self._saturation, self._dt)
+        self.done = self._in.done and float(np.abs(robot.q[ARM_Q] - self._goal).max()) < _NEAR
+        return xi

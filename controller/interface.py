@@ -1,0 +1,58 @@
+"""What goes into one control step and what comes out."""
+
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from rolling_panda import messages as m
+
+Msg = TypeVar("Msg", bound=m.Message)
+
+
+@dataclass(frozen=True)
+class Sample(Generic[Msg]):
+    """A message and when it came in (s, the clock of `now`)."""
+
+    message: Msg
+    at: float
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """The newest of everything; None where nothing has come yet.
+
+    Attributes:
+        joints: Measured wheels and arm.
+        odometry: Base from its wheels.
+        bridge: Latch, watchdog and cutter.
+        points: What perception holds true.
+        teleop: Where the held gizmo is.
+        server_seen: When the server's newest heartbeat came in (s).
+        perception_seen: The same of perception.
+        present: Processes connected now.
+        stops: Stop requests that came in since the last step.
+        tick_s: Median time of one control step, measured by the loop (s).
+        late_ticks: Control periods missed, counted by the loop.
+    """
+
+    joints: Sample[m.JointState] | None = None
+    odometry: Sample[m.Odometry] | None = None
+    bridge: Sample[m.BridgeState] | None = None
+    points: Sample[m.PruningPoints] | None = None
+    teleop: Sample[m.TeleopTarget] | None = None
+    server_seen: float | None = None
+    perception_seen: float | None = None
+    present: frozenset[str] = frozenset()
+    stops: tuple[m.StopRequest, ...] = ()
+    tick_s: float = 0.0
+    late_ticks: int = 0
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """What to send after one step; None or empty where nothing is due."""
+
+    motion: m.MotionCommand | None = None
+    cut: m.CutCommand | None = None
+    release: m.ReleaseStop | None = None
+    state: m.ControllerState | None = None
+    events: tuple[m.LogEvent, ...] = ()

@@ -1,0 +1,160 @@
+"""The control loop on the wire: update, step, publish, at a fixed rate."""
+
+import queue
+import statistics
+import threading
+import time
+from collections import deque
+from concurrent.futures import Future
+from concurrent.futures import TimeoutError as FutureTimeoutError
+
+from controller.core import Controller
+from controller.interface import Inputs, Outputs, Sample
+from rolling_panda import intents
+from rolling_panda import messages as m
+from rolling_panda.errors import ServiceError
+from rolling_panda.topics import (
+    BRIDGE,
+    CONTROLLER,
+    CUT,
+    EVENT,
+    HEARTBEAT,
+    INTENT,
+    JOINTS,
+    MOTION,
+    ODOMETRY,
+    POINTS,
+    RELEASE,
+    STOP,
+    TELEOP,
+)
+from rolling_panda.transport import Msg, Slot, Transport
+
+#: How long an operator's question waits for the loop (s); less than the service's timeout.
+_ANSWER_S = 0.8
+
+
+class Loop:
+    """Ties one `Controller` to the wire."""
+
+    def __init__(self, controller: Controller, transport: Transport, rate_hz: float) -> None:
+        """Subscribe and announce; nothing runs before `run`."""
+        self._controller, self._transport, self._period = controller, transport, 1.0 / rate_hz
+        self._joints, self._odometry = transport.slot(JOINTS), transport.slot(ODOMETRY)
+        self._bridge, self._points = transport.slot(BRIDGE), transport.slot(POINTS)
+        self._teleop, self._stops = transport.slot(TELEOP), transport.feed(STOP, 32)
+        self._samples: dict[str, Sample[m.Message]] = {}
+        self._beats: dict[m.Process, tuple[int, float]] = {}
+        transport.subscribe(HEARTBEAT, self._on_heartbeat)
+        self._intents: queue.SimpleQueue[tuple[intents.Intent, Future[m.Answer]]] = queue.SimpleQueue()
+        self._said: queue.SimpleQueue[str] = queue.SimpleQueue()
+        transport.on_reject = lambda topic, reason: self._said.put(f"refused on {topic}: {reason}")
+        transport.serve(INTENT, self._ask)
+        self._motion, self._cut = transport.publisher(MOTION), transport.publisher(CUT)
+        self._state, self._event = transport.publisher(CONTROLLER), transport.publisher(EVENT)
+        self._ticks: deque[float] = deque(maxlen=round(rate_hz))
+        self._tick_s = 0.0
+        self._late = 0
+
+    def update(self) -> Inputs:
+        """The newest of everything."""
+        beats = self._beats
+        return Inputs(
+            joints=self._newest("joints", self._joints),
+            odometry=self._newest("odometry", self._odometry),
+            bridge=self._newest("bridge", self._bridge),
+            points=self._newest("points", self._points),
+            teleop=self._newest("teleop", self._teleop),
+            server_seen=beats["server"][1] if "server" in beats else None,
+            perception_seen=beats["perception"][1] if "perception" in beats else None,
+            present=self._transport.present(),
+            stops=tuple(stop.message for stop in self._stops.drain()),
+            tick_s=self._tick_s,
+            late_ticks=self._late,
+        )
+
+    def publish(self, outputs: Outputs) -> None:
+        """Send what is due."""
+        if outputs.motion is not None:
+            self._motion.put(outputs.motion)
+        if outputs.cut is not None:
+            self._cut.put(outputs.cut)
+        if outputs.release is not None:
+            threading.Thread(target=self._release, args=(outputs.release,), daemon=True).start()
+        if outputs.state is not None:
+            self._state.put(outputs.state)
+            self._tick_s = statistics.median(self._ticks) if self._ticks else 0.0
+        for event in outputs.events:
+            self._event.put(event)
+
+    def run(self, stopping: threading.Event) -> None:
+        """Keep time until told to stop; a period that comes too late is counted and skipped, never made up for."""
+        due = time.monotonic()
+        while not stopping.is_set():
+            started = time.monotonic()
+            self._answer_waiting(started)
+            outputs = self._controller.step(self.update(), started)
+            self._ticks.append(time.monotonic() - started)
+            self.publish(outputs)
+            self._publish_said()
+            due += self._period
+            wait = due - time.monotonic()
+            if wait > 0:
+                time.sleep(wait)
+            else:
+                missed = int(-wait / self._period) + 1
+                self._late += missed
+                due += (missed - 1) * self._period
+
+    def _newest(self, name: str, slot: Slot[Msg]) -> Sample[Msg] | None:
+        """The slot's sample; the same object as long as it holds the same message."""
+        received = slot.peek()
+        if received is None:
+            return None
+        held = self._samples.get(name)
+        if held is None or held.message is not received.message:
+            sample: Sample[Msg] = Sample(received.message, received.at)
+            self._samples[name] = sample  # type: ignore[assignment]
+            return sample
+        return held  # type: ignore[return-value]
+
+    def _on_heartbeat(self, beat: m.Heartbeat, at: float) -> None:
+        last = self._beats.get(beat.process)
+        # A beat whose number stands still comes from a loop that stands still.
+        if last is None or last[0] != beat.sequence:
+            self._beats[beat.process] = (beat.sequence, at)
+
+    def _ask(self, intent: intents.Intent) -> m.Answer:
+        """On a thread of the transport: hand the intent to the loop and wait for its answer."""
+        future: Future[m.Answer] = Future()
+        self._intents.put((intent, future))
+        try:
+            return future.result(_ANSWER_S)
+        except FutureTimeoutError:
+            future.cancel()
+            return m.Answer(ok=False, reason="the control loop did not answer in time; nothing was done")
+
+    def _answer_waiting(self, now: float) -> None:
+        while not self._intents.empty():
+            intent, future = self._intents.get()
+            # What nobody waits for any more must not be done.
+            if future.set_running_or_notify_cancel():
+                future.set_result(self._controller.answer(intent, now))
+
+    def _release(self, release: m.ReleaseStop) -> None:
+        """On a thread of its own: a service call may wait, the control loop may not."""
+        try:
+            answer = self._transport.call(RELEASE, release)
+        except ServiceError as error:
+            self._said.put(f"the stop is not released: {error}")
+            return
+        if not answer.ok:
+            self._said.put(f"the bridge does not release the stop: {answer.reason}")
+
+    def _publish_said(self) -> None:
+        for _ in range(20):
+            if self._said.empty():
+                return
+            text = self._said.get()[:500]
+            header = m.Header(time.monotonic())
+            self._event.put(m.LogEvent(header=header, process="controller", severity="warning", text=text))

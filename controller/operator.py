@@ -1,0 +1,45 @@
+"""What operators ask of the queue, and how the log tells it."""
+
+from controller.queue import PointQueue
+from rolling_panda import intents
+
+
+class Operator:
+    """Decisions about points."""
+
+    def __init__(self, queue: PointQueue) -> None:
+        """Bind the queue."""
+        self._queue = queue
+        self._accepted = 0
+
+    def points(self, intent: intents.Intent) -> str:
+        """Accept or reject; returns why not, empty when done."""
+        if isinstance(intent, intents.AcceptPoint):
+            return self._queue.accept(intent.point_id, intent.revision, intent.user)
+        if isinstance(intent, intents.RejectPoint):
+            return self._queue.reject(intent.point_id, intent.user, intent.reason)
+        if isinstance(intent, intents.AcceptAll):
+            return self._accept_all(intent)
+        return f"{type(intent).__name__} is not something this controller does"
+
+    def told(self, intent: intents.Intent) -> str:
+        """The log's words for what was done."""
+        if isinstance(intent, intents.AcceptPoint):
+            return f"accepted {intent.point_id}, revision {intent.revision}"
+        if isinstance(intent, intents.RejectPoint):
+            return f"rejected {intent.point_id}{f': {intent.reason}' if intent.reason else ''}"
+        if isinstance(intent, intents.AcceptAll):
+            return f"accepted {self._accepted} points of confidence {intent.confidence:.2f} and more"
+        if isinstance(intent, intents.Reset):
+            return f"Reset: {intent.reason}"
+        return type(intent).__name__
+
+    def _accept_all(self, intent: intents.AcceptAll) -> str:
+        points = self._queue.proposed(intent.confidence)
+        refusals = [self._queue.accept(point.point_id, point.revision, intent.user) for point in points]
+        self._accepted = refusals.count("")
+        if self._accepted:
+            return ""
+        if not points:
+            return f"no proposed point has a confidence of {intent.confidence:.2f} or more"
+        return "; ".join(refusals)

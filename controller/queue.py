@@ -1,0 +1,181 @@
+"""The pruning points and what became of them, in the order of work along the row."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from controller.config import ControllerConfig
+from rolling_panda.differential_drive import Array
+from rolling_panda.messages import PointState, PruningPoint, PruningPoints, QueueEntry
+
+#: A cane that turned further than this after acceptance is not the one the operator saw (rad).
+_TURNED_TOLERANCE = 0.35
+_ACCEPTABLE: frozenset[PointState] = frozenset({"PROPOSED", "REJECTED", "FAILED_NOT_CUT", "UNKNOWN"})
+
+
+@dataclass(frozen=True)
+class Ticket:
+    """A point on the queue.
+
+    Attributes:
+        point: As perceived last.
+        state: Of its life.
+        reason: Why it is there.
+        user: Who accepted or rejected it.
+        accepted: The point as the operator saw it when accepting; what is cut.
+        cut_id: Of the last cut made for it.
+        seen: True while perception holds the point true.
+    """
+
+    point: PruningPoint
+    state: PointState = "PROPOSED"
+    reason: str = ""
+    user: str = ""
+    accepted: PruningPoint | None = None
+    cut_id: str = ""
+    seen: bool = True
+
+
+class PointQueue:
+    """All points ever proposed, by id. Every change of state goes through a method that says why."""
+
+    def __init__(self, config: ControllerConfig) -> None:
+        """Start empty."""
+        self._config = config
+        self._along = np.array([np.cos(config.row_heading), np.sin(config.row_heading), 0.0])
+        self._tickets: dict[str, Ticket] = {}
+        self._order: list[str] = []
+        self._entries: tuple[QueueEntry, ...] | None = None
+
+    def update(self, points: PruningPoints, keep: str = "") -> list[str]:
+        """Take in what perception holds true now; returns the acceptances it voided, in words.
+
+        Args:
+            points: Everything perceived.
+            keep: Point in front of the blades, which hide it from the camera: its disappearance means nothing.
+        """
+        voided: list[str] = []
+        seen = {point.point_id for point in points.points}
+        for point in points.points:
+            ticket = self._tickets.get(point.point_id)
+            if ticket is None:
+                self._put(point.point_id, Ticket(point))
+                continue
+            ticket = replace(ticket, point=point, seen=True)
+            why = self._changed(ticket) if point.point_id != keep else ""
+            self._put(point.point_id, self._void(ticket, why, voided) if why else ticket)
+        for point_id, ticket in list(self._tickets.items()):
+            if point_id in seen or point_id == keep or not ticket.seen:
+                continue
+            gone = replace(ticket, seen=False)
+            if ticket.state == "ACCEPTED":
+                gone = self._void(gone, "perception does not see it any more", voided)
+            if gone.state == "PROPOSED" and ticket.state == "PROPOSED":
+                self._drop(point_id)
+            else:
+                self._put(point_id, gone)
+        self._order.sort(key=self._place)
+        return voided
+
+    def get(self, point_id: str) -> Ticket | None:
+        """The ticket of a point, None when there is none."""
+        return self._tickets.get(point_id)
+
+    def accept(self, point_id: str, revision: int, user: str) -> str:
+        """Bind an acceptance to the point as the operator saw it; returns why not, empty when accepted."""
+        ticket = self._tickets.get(point_id)
+        if ticket is None:
+            return f"there is no point {point_id!r}"
+        if ticket.state not in _ACCEPTABLE:
+            return f"{point_id} is {ticket.state}"
+        if not ticket.seen:
+            return f"perception does not see {point_id} any more"
+        if ticket.point.revision != revision:
+            return f"{point_id} has changed since: revision {revision} was seen, it is {ticket.point.revision} now"
+        radius = ticket.point.radius
+        if radius > self._config.largest_radius:
+            limit = 2e3 * self._config.largest_radius
+            return f"{point_id}: the cane is {2e3 * radius:.0f} mm thick, the limit is {limit:.0f} mm"
+        self._put(point_id, replace(ticket, state="ACCEPTED", reason="", user=user, accepted=ticket.point))
+        return ""
+
+    def reject(self, point_id: str, user: str, reason: str) -> str:
+        """Take a point off; returns why not, empty when rejected."""
+        ticket = self._tickets.get(point_id)
+        if ticket is None:
+            return f"there is no point {point_id!r}"
+        if ticket.state in ("INTENT", "DONE"):
+            return f"{point_id} is {ticket.state}"
+        self._put(point_id, replace(ticket, state="REJECTED", reason=reason or "rejected", user=user, accepted=None))
+        return ""
+
+    def proposed(self, confidence: float) -> list[PruningPoint]:
+        """Points that wait for a decision and are at least this sure."""
+        tickets = (self._tickets[i] for i in self._order)
+        return [t.point for t in tickets if t.state == "PROPOSED" and t.seen and t.point.confidence >= confidence]
+
+    def next(self, skip: Callable[[str], bool] = lambda _: False) -> Ticket | None:
+        """The first accepted point in the order of work."""
+        for point_id in self._order:
+            if self._tickets[point_id].state == "ACCEPTED" and not skip(point_id):
+                return self._tickets[point_id]
+        return None
+
+    def intend(self, point_id: str, cut_id: str) -> None:
+        """ACCEPTED → INTENT: the blades are about to move."""
+        self._put(point_id, replace(self._tickets[point_id], state="INTENT", cut_id=cut_id, reason="cutting"))
+
+    def resolve(self, point_id: str, state: PointState, reason: str) -> None:
+        """End of a point's work: DONE, FAILED_NOT_CUT or UNKNOWN."""
+        self._put(point_id, replace(self._tickets[point_id], state=state, reason=reason))
+
+    def entries(self) -> tuple[QueueEntry, ...]:
+        """Every point in the order of work, for the wire."""
+        if self._entries is None:
+            self._entries = tuple(_entry(self._tickets[point_id]) for point_id in self._order)
+        return self._entries
+
+    def _changed(self, ticket: Ticket) -> str:
+        if ticket.state != "ACCEPTED" or ticket.accepted is None:
+            return ""
+        moved = float(np.linalg.norm(np.subtract(ticket.point.position, ticket.accepted.position)))
+        if moved > self._config.moved_tolerance:
+            return f"it moved by {1e3 * moved:.0f} mm after it was accepted"
+        turned = float(np.clip(abs(np.dot(ticket.point.tangent, ticket.accepted.tangent)), 0.0, 1.0))
+        if np.arccos(turned) > _TURNED_TOLERANCE:
+            return f"its cane turned by {np.degrees(np.arccos(turned)):.0f}° after it was accepted"
+        return ""
+
+    def _void(self, ticket: Ticket, why: str, voided: list[str]) -> Ticket:
+        text = f"acceptance void: {why}"
+        voided.append(f"{ticket.point.point_id}: {text}")
+        return replace(ticket, state="PROPOSED", reason=text, accepted=None)
+
+    def _place(self, point_id: str) -> tuple[float, str]:
+        ticket = self._tickets[point_id]
+        at: Array = np.array((ticket.accepted or ticket.point).position)
+        return float(at @ self._along), point_id
+
+    def _put(self, point_id: str, ticket: Ticket) -> None:
+        if point_id not in self._tickets:
+            self._order.append(point_id)
+        if self._tickets.get(point_id) != ticket:
+            self._entries = None
+        self._tickets[point_id] = ticket
+
+    def _drop(self, point_id: str) -> None:
+        del self._tickets[point_id]
+        self._order.remove(point_id)
+        self._entries = None
+
+
+def _entry(ticket: Ticket) -> QueueEntry:
+    return QueueEntry(
+        point_id=ticket.point.point_id,
+        state=ticket.state,
+        reason=ticket.reason,
+        user=ticket.user,
+        cut_id=ticket.cut_id,
+        accepted_position=None if ticket.accepted is None else ticket.accepted.position,
+    )

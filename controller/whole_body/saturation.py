@@ -1,0 +1,109 @@
+"""Limits of what is sent: velocity, acceleration against the last sent command, and braking before a joint limit."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from controller.config import ControllerConfig
+from rolling_panda.differential_drive import NXI, Array
+from rolling_panda.robot_model import ARM_Q, ARM_XI, RobotModel
+
+_SLACK = 1e-9
+
+
+@dataclass(frozen=True)
+class Saturated:
+    """What may be sent.
+
+    Attributes:
+        xi: ξ̇ (9), within every limit.
+        scale: Share of the wanted velocity that fits, 0…1; the motion's clock is slowed by it.
+        braked: True when no share fitted and every actuator brakes at its maximum.
+    """
+
+    xi: Array
+    scale: float
+    braked: bool
+
+
+class Saturation:
+    """Makes a wanted velocity sendable by scaling it in time, never by bending it joint by joint."""
+
+    def __init__(self, robot: RobotModel, config: ControllerConfig, dt: float) -> None:
+        """Precompute the limits for a control period of `dt` (s)."""
+        self._dt = dt
+        limits = robot.limits
+        self._lower = limits.lower[ARM_Q] + config.joint_margin
+        self._upper = limits.upper[ARM_Q] - config.joint_margin
+        self.velocity = limits.velocity * config.arm_share
+        wheel = (config.base_speed + 0.5 * config.base_yaw_rate * robot.drive.half_track) / robot.drive.wheel_radius
+        self.velocity[:2] = min(wheel, float(limits.velocity[0]))
+        self.acceleration = limits.acceleration * config.arm_acceleration_share
+        base = config.base_acceleration / robot.drive.wheel_radius
+        self.acceleration[:2] = min(base, float(limits.acceleration[0]))
+        self._step = self.acceleration * dt
+        # What may stop the robot, and the most that the last gate lets through.
+        self._stop_step = self._step.copy()
+        braking = min(config.base_braking / robot.drive.wheel_radius, float(limits.acceleration[0]))
+        self._stop_step[:2] = np.maximum(braking * dt, self._step[:2])
+        self._most, self._least = self.velocity, -self.velocity
+        self._brake = 0.5 * self.acceleration[ARM_XI]
+        self._brake_step = self._brake * dt
+
+    def apply(self, wanted: Array, q: Array, sent: Array) -> Saturated:
+        """The velocity to send.
+
+        Args:
+            wanted: ξ̇ (9) of the method.
+            q: Configuration (12).
+            sent: ξ̇ (9) sent last.
+        """
+        upper, lower = self._box(q)
+        # The box holds zero, so that of each pair of quotients the positive one counts.
+        demanded = max(float((wanted / upper).max()), float((wanted / lower).max()))
+        scale = 1.0 if demanded <= 1.0 else 1.0 / demanded
+        aimed = wanted * scale
+        change = aimed - sent
+        largest = float((np.abs(change) / self._step).max())
+        xi = aimed if largest <= 1.0 else sent + change / largest
+        if (xi > upper + _SLACK).any() or (xi < lower - _SLACK).any():
+            return Saturated(self.brake(sent), 0.0, True)
+        # How fast the motion's clock may run: no faster than the velocity that could be reached.
+        reached = 1.0 if largest <= 1.0 else _along(xi, wanted)
+        return Saturated(xi, min(scale, reached), False)
+
+    def admits(self, xi: Array, sent: Array) -> bool:
+        """Whether a velocity (9) may follow the one sent last: finite, and inside velocity and acceleration."""
+        # Comparisons with NaN are false, so that NaN is not admitted.
+        return bool(
+            (np.abs(xi) <= self.velocity + 2 * _SLACK).all()
+            and (np.abs(xi - sent) <= self._stop_step * (1 + 1e-9) + _SLACK).all()
+        )
+
+    def brake(self, sent: Array) -> Array:
+        """The velocity (9) after one period of the greatest deceleration of every actuator."""
+        slower: Array = np.sign(sent) * np.maximum(np.abs(sent) - self._stop_step, 0.0)
+        return slower
+
+    def ramp(self, sent: Array) -> Array:
+        """The velocity (9) after one period of slowing down in proportion, which keeps the direction of motion."""
+        largest = float((np.abs(sent) / self._stop_step).max())
+        return np.zeros(NXI) if largest <= 1.0 else sent * (1.0 - 1.0 / largest)
+
+    def _box(self, q: Array) -> tuple[Array, Array]:
+        """Velocities from which every joint can still stop before its limit, also after one more period."""
+        arm = q[ARM_Q]
+        upper, lower = self._most.copy(), self._least.copy()
+        # After one more period at this velocity, half of the deceleration suffices; the rest is for the servo's lag.
+        a, a_dt = self._brake, self._brake_step
+        above = np.sqrt(a_dt * a_dt + 2.0 * a * np.maximum(self._upper - arm, 0.0)) - a_dt
+        below = np.sqrt(a_dt * a_dt + 2.0 * a * np.maximum(arm - self._lower, 0.0)) - a_dt
+        upper[ARM_XI] = np.minimum(upper[ARM_XI], above) + _SLACK
+        lower[ARM_XI] = np.maximum(lower[ARM_XI], -below) - _SLACK
+        return upper, lower
+
+
+def _along(xi: Array, wanted: Array) -> float:
+    """Share of `wanted` that `xi` holds in its direction, 0…1."""
+    square = float(wanted @ wanted)
+    return max(0.0, min(1.0, float(xi @ wanted) / square)) if square > 1e-12 else 1.0

@@ -1,0 +1,28 @@
+"""Start perception: `python -m perception` or `rolling-panda perception`."""
+
+import sys
+from collections.abc import Sequence
+
+from perception.config import PerceptionConfig
+from perception.loop import Loop
+from perception.pipeline import Perception
+from perception.segmenter import LabelImageSegmenter
+from rolling_panda.config import RobotConfig, load_section
+from rolling_panda.process import ProcessContext, run_process
+from rolling_panda.robot_model import RobotModel
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run until told to stop; returns the exit code."""
+    return run_process("perception", "Finds pruning points in the camera's frames.", run, argv=argv)
+
+
+def run(context: ProcessContext) -> None:
+    """Work until `context.stopping` is set."""
+    config = load_section(context.config_path, "perception", PerceptionConfig)
+    model = RobotModel(load_section(context.config_path, "robot", RobotConfig))
+    Loop(context.transport, config, Perception(config, LabelImageSegmenter(), model)).run(context.stopping)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,134 @@
+"""What perception may be told: the pruning rule's numbers, what counts as seen, and how points are tracked."""
+
+from typing import Annotated
+
+from msgspec import Meta, Struct
+
+from rolling_panda.config import Positive
+
+Hits = Annotated[int, Meta(ge=1, le=1000)]
+
+
+class RuleConfig(Struct, frozen=True, forbid_unknown_fields=True):
+    """The spur-pruning rule. Lengths along the cane in metres.
+
+    Attributes:
+        nodes_kept: Count nodes that stay on the new spur; the basal bud is not counted.
+        keeper_diameter: The lowest cane at least this thick becomes the new spur, else the thickest (m).
+        offset: Cut this far past the last kept node (m).
+        short_internode: Where the next node is nearer than this, cut midway instead (m).
+        basal_reach: A node nearer to the cane's base than this is the basal bud (m).
+        clear_beyond: This much cane past the last kept node must be in plain view (m).
+        node_room: A hidden stretch at least this far from every seen node might hide another node (m).
+        diameter_doubt: Diameters closer to `keeper_diameter` than this leave the choice in doubt (m).
+        crowded: Nodes nearer to each other than this past the basal bud may belong to two canes (m).
+        height_doubt: Canes whose bases differ in height by less than this cannot be told apart by it (m).
+        stub_room: Least free stub between the keeper and the next cane for one cut that removes the rest (m).
+        shears_room: Wood that must stay keeps at least this distance from the cut (m).
+        crossing: Another cane this near to the cut would be between the open blades too: half their opening (m).
+        base_doubt: A cane whose base is hidden over more than this cannot have its nodes counted (m).
+        largest_diameter: Thicker wood is refused (m).
+        wire_distance: No cut is proposed nearer to a wire than this (m).
+    """
+
+    nodes_kept: Annotated[int, Meta(ge=1, le=5)] = 2
+    keeper_diameter: Positive = 0.006
+    offset: Positive = 0.020
+    short_internode: Positive = 0.040
+    basal_reach: Positive = 0.055
+    clear_beyond: Positive = 0.045
+    node_room: Positive = 0.035
+    diameter_doubt: Positive = 0.00035
+    crowded: Positive = 0.03
+    height_doubt: Positive = 0.004
+    stub_room: Positive = 0.016
+    shears_room: Positive = 0.022
+    base_doubt: Positive = 0.015
+    crossing: Positive = 0.015
+    largest_diameter: Positive = 0.015
+    wire_distance: Positive = 0.018
+
+
+class SkeletonConfig(Struct, frozen=True, forbid_unknown_fields=True):
+    """How pixels become canes.
+
+    Attributes:
+        nearest: Depths below this are no measurement (m).
+        farthest: Wood beyond this belongs to another row (m).
+        depth_step: Neighbouring pixels that differ by more belong to different canes (m).
+        least_pixels: Smaller pieces of skeleton are dropped (px).
+        bridge: Longest hidden stretch over which two pieces may be one cane (m).
+        bend: Largest change of direction over such a stretch (rad).
+        miss: How far the straight continuation of one piece may pass by the other (m).
+        sample: Distance of samples along a cane (m).
+        smoothing: Standard deviation of the kernel that smooths a cane's axis (m).
+        reach: A cane grows from the spur or cordon within this distance of its base (m).
+        stray: A cane whose base is hidden but within this distance of a spur may be one of its canes (m).
+        border: A spur nearer than this to the image's edge may have canes out of view (px).
+        least_cane: Shorter pieces are not called canes (m).
+        least_node_pixels: Smaller node blobs are ignored (px).
+    """
+
+    nearest: Positive = 0.15
+    farthest: Positive = 1.6
+    depth_step: Positive = 0.012
+    least_pixels: Annotated[int, Meta(ge=2, le=100)] = 4
+    bridge: Positive = 0.06
+    bend: Positive = 0.5
+    miss: Positive = 0.008
+    sample: Positive = 0.005
+    smoothing: Positive = 0.012
+    reach: Positive = 0.035
+    stray: Positive = 0.09
+    border: Annotated[float, Meta(ge=0.0, le=1000.0)] = 30.0
+    least_cane: Positive = 0.03
+    least_node_pixels: Annotated[int, Meta(ge=1, le=100)] = 4
+
+
+class TrackerConfig(Struct, frozen=True, forbid_unknown_fields=True):
+    """How points keep their identity from frame to frame.
+
+    Attributes:
+        association: A cut this near to a known point is the same one (m).
+        hits: Frames that must agree before a point is shown.
+        memory: Frames that a running average looks back.
+        moved: A point that has moved by more than this gets a new revision (m).
+        turned: The same for its tangent (rad).
+        gone: Frames that must show the cane gone before its point is withdrawn.
+        probe: The cane is looked for this far past the cut (m).
+        vine_spacing: Distance between vines (m), for numbering where no trunk is in view.
+        spur_separation: Spur positions nearer than this are one (m).
+    """
+
+    association: Positive = 0.03
+    hits: Hits = 3
+    memory: Hits = 20
+    moved: Positive = 0.004
+    turned: Positive = 0.15
+    gone: Hits = 3
+    probe: Positive = 0.025
+    vine_spacing: Positive = 1.8
+    spur_separation: Positive = 0.045
+
+
+class PerceptionConfig(Struct, frozen=True, forbid_unknown_fields=True):
+    """Section `[perception]`.
+
+    Attributes:
+        rate_hz: Turns of the process's loop a second; one heartbeat each.
+        hang_s: A frame that takes longer than this stops the heartbeat (s).
+        survey_nearest: A frame with the cordon nearer than this is no survey: it shows parts of spurs only, so that it
+            may confirm that wood has gone and propose nothing (m).
+        survey_farthest: The same for a cordon farther away, where canes are too thin in the image (m).
+        rule: Where to cut.
+        skeleton: Pixels to canes.
+        tracker: Points over time.
+    """
+
+    rate_hz: Positive = 20.0
+    hang_s: Positive = 3.0
+    survey_nearest: Positive = 0.55
+    survey_farthest: Positive = 1.1
+    rule: RuleConfig = RuleConfig()
+    skeleton: SkeletonConfig = SkeletonConfig()
+    tracker: TrackerConfig = TrackerConfig()

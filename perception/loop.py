@@ -1,0 +1,105 @@
+"""The process's loop: newest frame in, points out, one heartbeat a turn."""
+
+import threading
+import time
+from dataclasses import dataclass
+
+from perception.config import PerceptionConfig
+from perception.pipeline import Perception
+from perception.worker import Worker
+from rolling_panda import messages as m
+from rolling_panda import topics
+from rolling_panda.transport import Transport
+
+
+@dataclass(frozen=True)
+class _Result:
+    points: m.PruningPoints
+    withdrawn: tuple[str, ...]
+
+
+class Loop:
+    """Turns at `rate_hz`. Frames are worked on beside it; a frame that hangs stops the heartbeat's count."""
+
+    def __init__(self, transport: Transport, config: PerceptionConfig, perception: Perception) -> None:
+        """Subscribe and announce.
+
+        Args:
+            transport: Open session.
+            config: Section `[perception]`.
+            perception: What does the work; from now on the worker's alone.
+        """
+        self._config = config
+        self._frames = transport.slot(topics.CAMERA)
+        self._points = transport.publisher(topics.POINTS)
+        self._heartbeat = transport.publisher(topics.HEARTBEAT)
+        self._events = transport.publisher(topics.EVENT)
+        self._worker: Worker[m.CameraFrame, _Result] = Worker(
+            lambda frame: _Result(perception.process(frame), perception.withdrawn)
+        )
+        self._newest: m.PruningPoints | None = None
+        self._sequence = 0
+        self._sent = -1e9
+        self._last_error = ""
+        self._shown: frozenset[str] = frozenset()
+        self._hanging = False
+
+    def run(self, stopping: threading.Event) -> None:
+        """Keep time until told to stop."""
+        period = 1.0 / self._config.rate_hz
+        due = time.monotonic()
+        self._tell("info", "perception is up and waits for camera frames", due)
+        while not stopping.is_set():
+            self.turn(time.monotonic())
+            due = max(due + period, time.monotonic())
+            stopping.wait(max(0.0, due - time.monotonic()))
+
+    def turn(self, now: float) -> None:
+        """One turn at `now` (s, monotonic)."""
+        done = self._worker.poll()
+        if done is not None and done.result is not None:
+            self._take(done.result, now)
+        elif done is not None:
+            self._refuse(str(done.error), now)
+        if self._worker.busy_for(now) == 0.0:
+            frame = self._frames.take()
+            if frame is not None:
+                self._worker.submit(frame.message, now)
+        if self._newest is not None and now - self._sent >= 1.0 / topics.POINTS.rate_hz:
+            self._publish(now)
+        self._beat(now)
+
+    def _take(self, result: _Result, now: float) -> None:
+        self._newest, self._last_error = result.points, ""
+        self._publish(now)
+        shown = frozenset(point.point_id for point in result.points.points)
+        if shown - self._shown:
+            self._tell("info", f"{len(shown - self._shown)} new pruning points, {len(shown)} in all", now)
+        for text in result.withdrawn:
+            self._tell("warning", text, now)
+        self._shown = shown
+
+    def _refuse(self, reason: str, now: float) -> None:
+        # The same fault frame after frame is told once.
+        if reason.split(":")[-1] != self._last_error:
+            self._tell("error", f"a camera frame was refused: {reason}", now)
+        self._last_error = reason.split(":")[-1]
+
+    def _publish(self, now: float) -> None:
+        if self._newest is not None:
+            self._points.put(self._newest)
+            self._sent = now
+
+    def _beat(self, now: float) -> None:
+        hanging = self._worker.busy_for(now) > self._config.hang_s
+        if hanging and not self._hanging:
+            self._tell("error", f"a frame has taken more than {self._config.hang_s:g} s", now)
+        self._hanging = hanging
+        if not hanging:
+            self._sequence += 1
+        self._heartbeat.put(
+            m.Heartbeat(process="perception", sequence=self._sequence, status="hangs in a frame" if hanging else "")
+        )
+
+    def _tell(self, severity: m.Severity, text: str, now: float) -> None:
+        self._events.put(m.LogEvent(header=m.Header(now), process="perception", severity=severity, text=text[:500]))

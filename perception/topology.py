@@ -1,0 +1,156 @@
+"""Which cane grows from which spur: canes rooted at the two-year wood they touch."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+from scipy.spatial import cKDTree
+
+from perception.centreline import Centreline, base_radius
+from perception.config import SkeletonConfig
+from perception.frame import View
+from perception.plant import Array, Cane, Node, Plant, Span, Spur
+from rolling_panda.messages import WOOD_CLASSES
+
+_SPUR, _CORDON, _TRUNK = (WOOD_CLASSES.index(name) for name in ("spur", "cordon", "trunk"))
+_EIGHT = np.ones((3, 3), dtype=bool)
+#: Spur pixels fewer than these are a speck.
+_LEAST_SPUR, _LEAST_TRUNK = 12, 300
+#: Pieces of spur nearer than this are one spur that something thin crosses (m).
+_SAME_SPUR = 0.025
+
+
+def build_plant(view: View, labels: NDArray[np.uint8], lines: list[Centreline], config: SkeletonConfig) -> Plant:
+    """Root every cane at the spur it grows from.
+
+    Args:
+        view: The frame.
+        labels: Its classes.
+        lines: Canes without roots.
+        config: How near is touching.
+    """
+    clouds = _merge(_clouds(view, labels, _SPUR, _LEAST_SPUR, config))
+    trunks = _clouds(view, labels, _TRUNK, _LEAST_TRUNK, config)
+    cordon = _cordon(view, labels, config)
+    rooted: list[list[Cane]] = [[] for _ in clouds]
+    loose: list[Array] = []
+    strays: set[int] = set()
+    if clouds:
+        tree = cKDTree(np.concatenate(clouds))
+        owner = np.repeat(np.arange(len(clouds)), [len(cloud) for cloud in clouds])
+        for line in lines:
+            if line.arc[-1] < config.least_cane:
+                continue
+            gaps, nearest = tree.query(np.stack([line.axis[0], line.axis[-1]]))
+            end = int(np.argmin(gaps))
+            if gaps[end] > config.reach:
+                loose.append(line.axis)
+                if gaps[end] < config.stray:
+                    strays.add(int(owner[nearest[end]]))
+            else:
+                rooted[int(owner[nearest[end]])].append(_cane(line, end == 1, float(gaps[end])))
+    else:
+        loose = [line.axis for line in lines]
+    along = _row_direction(cordon, view)
+    spurs = [
+        _spur(view, cloud, cordon, canes, _doubt(view, cloud, k in strays, config))
+        for k, (cloud, canes) in enumerate(zip(clouds, rooted, strict=True))
+    ]
+    spurs.sort(key=lambda spur: float(spur.position @ along))
+    return Plant(tuple(spurs), np.array([cloud.mean(axis=0) for cloud in trunks]).reshape(-1, 3), tuple(loose))
+
+
+def _cane(line: Centreline, reverse: bool, gap: float) -> Cane:
+    # What lies between the spur's bark and the first point that was seen is part of the cane, and counts as hidden.
+    length = float(line.arc[-1])
+    nodes, hidden, axis, end = line.nodes, line.hidden, line.axis, line.ends[1]
+    arc = line.arc
+    if reverse:
+        nodes = tuple(Node(length - node.arc, node.pixels) for node in reversed(nodes))
+        hidden = tuple(Span(length - span.end, length - span.start) for span in reversed(hidden))
+        axis, end, arc = axis[::-1], line.ends[0], length - arc[::-1]
+    radius = base_radius(line, reverse)
+    start = max(0.0, gap - radius)
+    return Cane(
+        axis=axis,
+        arc=arc + start,
+        radius=radius,
+        nodes=tuple(Node(node.arc + start, node.pixels) for node in nodes),
+        hidden=tuple(Span(span.start + start, span.end + start) for span in hidden),
+        end=end,
+        base_gap=start,
+    )
+
+
+def _clouds(view: View, labels: NDArray[np.uint8], kind: int, least: int, config: SkeletonConfig) -> list[Array]:
+    """Surface points of each blob of a class, each N×3 in odom (m)."""
+    mask = (labels == kind) & (view.depth > config.nearest) & (view.depth < config.farthest)
+    labelled, count = ndimage.label(mask, structure=_EIGHT)
+    rows, cols = np.nonzero(mask)
+    owner = labelled[rows, cols] - 1
+    points = view.points(rows, cols, view.depth[rows, cols].astype(float))
+    order = np.argsort(owner, kind="stable")
+    bounds = np.searchsorted(owner[order], np.arange(count + 1))
+    out = [points[order[bounds[k] : bounds[k + 1]]] for k in range(count)]
+    return [cloud for cloud in out if len(cloud) >= least]
+
+
+def _merge(clouds: list[Array]) -> list[Array]:
+    out: list[Array] = []
+    for cloud in sorted(clouds, key=len, reverse=True):
+        for k, other in enumerate(out):
+            if np.linalg.norm(other.mean(axis=0) - cloud.mean(axis=0)) < 0.08:
+                if float(cKDTree(other).query(cloud)[0].min()) < _SAME_SPUR:
+                    out[k] = np.concatenate([other, cloud])
+                    break
+        else:
+            out.append(cloud)
+    return out
+
+
+def _cordon(view: View, labels: NDArray[np.uint8], config: SkeletonConfig) -> Array:
+    rows, cols = np.nonzero((labels == _CORDON) & (view.depth > config.nearest) & (view.depth < config.farthest))
+    rows, cols = rows[::4], cols[::4]
+    return view.points(rows, cols, view.depth[rows, cols].astype(float))
+
+
+def _row_direction(cordon: Array, view: View) -> Array:
+    """Unit vector along the row: the cordon's, turned to the camera's right where both allow."""
+    right: Array = view.R[:, 0]
+    if len(cordon) < 50:
+        return right
+    direction: Array = np.linalg.svd(cordon - cordon.mean(axis=0), full_matrices=False)[2][0]
+    return direction if float(direction[np.argmax(np.abs(direction))]) > 0.0 else -direction
+
+
+def _spur(view: View, cloud: Array, cordon: Array, canes: list[Cane], doubt: str) -> Spur:
+    centre = cloud.mean(axis=0)
+    _, spread, axes = np.linalg.svd(cloud - centre, full_matrices=False)
+    axis, radius = None, 0.0
+    if len(cordon) and spread[0] > 1.5 * spread[1]:
+        along = (cloud - centre) @ axes[0]
+        ends = centre + np.outer(np.percentile(along, [2, 98]), axes[0])
+        gaps, _ = cKDTree(cordon).query(ends)
+        ends = ends if gaps[0] <= gaps[1] else ends[::-1]
+        across = (cloud - centre) @ axes[1]
+        radius = float(np.percentile(across, 95) - np.percentile(across, 5)) / 2 * 1.05
+        ray = centre - view.t
+        axis = ends + _surface(ray, axes[0]) * radius * np.pi / 4
+    return Spur(centre, axis, radius, tuple(sorted(canes, key=lambda cane: -cane.length)), doubt)
+
+
+def _doubt(view: View, cloud: Array, stray: bool, config: SkeletonConfig) -> str:
+    """Why some of the spur's canes may be out of sight."""
+    height, width = view.depth.shape
+    u, v, _ = view.pixels(cloud).T
+    margin = config.border
+    if u.min() < margin or u.max() > width - margin or v.min() < margin or v.max() > height - 1:
+        return "the spur is at the edge of the image, so not all of its canes may be in view"
+    if stray:
+        return "a cane seems to start here, but its base is hidden"
+    return ""
+
+
+def _surface(ray: Array, axis: Array) -> Array:
+    square = ray - float(ray @ axis) * axis
+    out: Array = square / np.linalg.norm(square)
+    return out

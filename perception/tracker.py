@@ -1,0 +1,205 @@
+"""Points over time: identities that last, averages that beat the noise, and withdrawal of what has gone."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perception.config import TrackerConfig
+from perception.fragments import CANE, NODE
+from perception.frame import View
+from perception.numbering import SpurNumber
+from perception.plant import Array
+from perception.rule import Cut, CutKind
+from rolling_panda import messages as m
+from rolling_panda.messages import WOOD_CLASSES
+
+_SPUR = WOOD_CLASSES.index("spur")
+#: How far from where it should be wood may be seen and still be the same (m).
+_SAME_DEPTH = 0.025
+#: A depth camera is blind nearer than this (0.18 m for the D435i), with room for a point off its place (m).
+_NEAREST = 0.25
+#: How far to the side of where it should be it is looked for (m): odometry and a close view are off by millimetres.
+_AROUND = 0.008
+#: Frames without support after which a point never shown is forgotten, and a contradicted one withdrawn.
+_PATIENCE = 5
+
+Look = Literal["standing", "gone", "unseen"]
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A cut that one frame proposes, and the spur it belongs to."""
+
+    cut: Cut
+    number: SpurNumber
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """What the tracker holds true: points to show, and what it withdrew in this frame, with the reason."""
+
+    points: tuple[m.PruningPoint, ...]
+    withdrawn: tuple[str, ...]
+
+
+@dataclass
+class _Track:
+    point_id: str
+    number: SpurNumber
+    cut: Cut
+    position: Array
+    tangent: Array
+    radius: float
+    hits: int = 1
+    misses: int = 0
+    gone: int = 0
+    shown: m.PruningPoint | None = None
+
+    def add(self, cut: Cut, memory: int) -> None:
+        self.hits += 1
+        self.misses = self.gone = 0
+        share = 1.0 / min(self.hits, memory)
+        self.position = self.position + share * (cut.position - self.position)
+        tangent = self.tangent + share * (cut.tangent - self.tangent)
+        self.tangent = tangent / np.linalg.norm(tangent)
+        self.radius += share * (cut.radius - self.radius)
+        self.cut = cut
+
+
+class Tracker:
+    """Holds the pruning points of a row. One frame at a time, no clock: the same frames give the same points."""
+
+    def __init__(self, config: TrackerConfig) -> None:
+        """Start with no points."""
+        self._config = config
+        self._tracks: list[_Track] = []
+        self._named = 0
+
+    def update(self, view: View, labels: NDArray[np.uint8], proposals: list[Proposal]) -> Tracked:
+        """Take one frame in.
+
+        Args:
+            view: The frame.
+            labels: Its classes.
+            proposals: Cuts that it proposes.
+        """
+        supported = self._associate(proposals)
+        contradicted = {(track.number, track.cut.kind) for track in supported}
+        withdrawn: list[str] = []
+        keep = []
+        for track in self._tracks:
+            reason = None if track in supported else self._doubt(track, view, labels, contradicted)
+            if reason is None:
+                keep.append(track)
+            elif track.shown is not None and reason:
+                withdrawn.append(f"{track.point_id} (vine {track.number.vine}, spur {track.number.spur}) {reason}")
+        self._tracks = keep
+        self._show(supported)
+        return Tracked(self.points(), tuple(withdrawn))
+
+    def points(self) -> tuple[m.PruningPoint, ...]:
+        """The points shown, in the order in which they were first seen."""
+        return tuple(track.shown for track in self._tracks if track.shown is not None)
+
+    def _associate(self, proposals: list[Proposal]) -> list[_Track]:
+        """Each proposal joins the nearest track of its kind, or starts one; returns the tracks supported."""
+        known = list(self._tracks)
+        pairs = sorted(
+            (float(np.linalg.norm(track.position - proposal.cut.position)), t, p)
+            for t, track in enumerate(known)
+            for p, proposal in enumerate(proposals)
+            if track.cut.kind == proposal.cut.kind
+        )
+        supported: list[_Track] = []
+        used: set[int] = set()
+        for distance, t, p in pairs:
+            if distance > self._config.association:
+                break
+            if p not in used and known[t] not in supported:
+                used.add(p)
+                known[t].add(proposals[p].cut, self._config.memory)
+                supported.append(known[t])
+        for p, proposal in enumerate(proposals):
+            if p not in used:
+                cut = proposal.cut
+                self._named += 1
+                track = _Track(f"p{self._named}", proposal.number, cut, cut.position, cut.tangent, cut.radius)
+                self._tracks.append(track)
+                supported.append(track)
+        return supported
+
+    def _doubt(
+        self, track: _Track, view: View, labels: NDArray[np.uint8], contradicted: set[tuple[SpurNumber, CutKind]]
+    ) -> str | None:
+        """Why a point that this frame did not propose is withdrawn; None to keep it, empty to drop it in silence."""
+        look = self._look(track, view, labels)
+        if look == "unseen":
+            return None
+        track.gone = track.gone + 1 if look == "gone" else 0
+        if track.gone >= self._config.gone:
+            return f"withdrawn: the wood beyond it was gone in {track.gone} frames, so it has been cut"
+        if track.shown is None or (track.number, track.cut.kind) in contradicted:
+            track.misses += 1
+            if track.misses >= _PATIENCE:
+                return "withdrawn: closer looks put the cut elsewhere on this spur" if track.shown is not None else ""
+        return None
+
+    def _look(self, track: _Track, view: View, labels: NDArray[np.uint8]) -> Look:
+        """Whether the wood just beyond the cut is still there, as far as this frame can tell."""
+        u, v, z = view.pixels(track.position + self._config.probe * track.tangent)[0]
+        height, width = view.depth.shape
+        reach = max(2, round(view.intrinsics.fx * _AROUND / max(z, 0.1)))
+        if z < _NEAREST or not (reach <= u < width - reach - 1 and reach <= v < height - reach - 1):
+            return "unseen"
+        row, col = round(v), round(u)
+        window = slice(row - reach, row + reach + 1), slice(col - reach, col + reach + 1)
+        depth, kind = view.depth[window], labels[window]
+        wood = (kind == CANE) | (kind == NODE) | (kind == _SPUR)
+        if (wood & (np.abs(depth - z) < _SAME_DEPTH)).any():
+            return "standing"
+        # Nearer things hide the place, and wood without depth is too near to place.
+        if (wood & (depth == 0.0)).any() or ((depth > 0.0) & (depth < z - _SAME_DEPTH)).any():
+            return "unseen"
+        return "gone"
+
+    def _show(self, supported: list[_Track]) -> None:
+        taken = {(track.number, track.cut.kind) for track in self._tracks if track.shown is not None}
+        for track in supported:
+            place = (track.number, track.cut.kind)
+            if track.shown is None and (track.hits < self._config.hits or place in taken):
+                continue
+            taken.add(place)
+            track.shown = self._message(track)
+
+    def _message(self, track: _Track) -> m.PruningPoint:
+        """The wire form; position and tangent change only together with the revision."""
+        old, cut = track.shown, track.cut
+        position, tangent, revision = _vector(track.position), _vector(track.tangent), 1
+        if old is not None:
+            moved = float(np.linalg.norm(track.position - np.array(old.position)))
+            turned = float(np.arccos(np.clip(track.tangent @ np.array(old.tangent), -1.0, 1.0)))
+            revision = old.revision
+            if moved > self._config.moved or turned > self._config.turned:
+                revision += 1
+            else:
+                position, tangent = old.position, old.tangent
+        return m.PruningPoint(
+            point_id=track.point_id,
+            revision=revision,
+            position=position,
+            tangent=tangent,
+            radius=float(track.radius),
+            confidence=cut.confidence,
+            nodes_seen=min(cut.nodes_seen, 100),
+            nodes_kept=min(cut.nodes_kept, 100),
+            vine=track.number.vine,
+            spur=track.number.spur,
+            reason=cut.reason[:500],
+        )
+
+
+def _vector(values: Array) -> tuple[float, float, float]:
+    x, y, z = (float(value) for value in values)
+    return x, y, z

@@ -1,0 +1,7 @@
+"""`python -m rolling_panda`: the same as the `rolling-panda` command."""
+
+import sys
+
+from rolling_panda.cli import main
+
+sys.exit(main())

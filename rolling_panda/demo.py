@@ -1,0 +1,189 @@
+"""`rolling-panda demo`: the whole program on this machine, in simulation, until Ctrl-C or until one process ends."""
+
+import argparse
+import os
+import secrets
+import socket
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+from rolling_panda import __version__
+from rolling_panda.config import RobotConfig, TransportConfig, load_section
+from rolling_panda.demo_readiness import Readiness
+from rolling_panda.demo_supervisor import Death, Supervisor
+from rolling_panda.errors import InputError
+from rolling_panda.launch import python_command
+from rolling_panda.process import ROBOT_ID, stop_on_signals
+from rolling_panda.resources import resource
+
+#: A program that is not complete after this long has failed to start (s).
+STARTUP_S = 120.0
+_POLL_S = 0.1
+_HOST = "127.0.0.1"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the demo."""
+    parser.add_argument("--port", type=int, default=8000, help="port of the operator's page (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=0, help="which vineyard row to grow (default: %(default)s)")
+    parser.add_argument("--trace", type=Path, metavar="FILE", help="record there what was really actuated, each step")
+    parser.add_argument(
+        "--config",
+        type=Path,
+        default=resource("assets/config/sim.toml"),
+        metavar="FILE",
+        help="TOML configuration (default: the simulation's)",
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Start everything, print the link, supervise, end everything.
+
+    Returns:
+        0 when a person ended it, 1 when a process ended by itself or did not come up.
+
+    Raises:
+        InputError: The port is taken, or a file cannot be used.
+        ConfigError: The configuration is missing or wrong.
+    """
+    check(arguments)
+    stopping = stop_on_signals()
+    folder = Path(tempfile.mkdtemp(prefix="rolling-panda-"))
+    supervisor = Supervisor(folder)
+    _say(f"Rolling Panda {__version__}: simulation, seed {arguments.seed}")
+    _say(f"Logs of the processes are in {folder}")
+    token_file = folder / "sign-in-token"
+    try:
+        death = _start_and_watch(arguments, supervisor, token_file, stopping)
+    finally:
+        supervisor.end()
+        token_file.unlink(missing_ok=True)
+    if death is None:
+        _say("\nStopped; every process has ended.")
+        return 0
+    _say(f"\n{death.name} ended {death.how}; everything else was stopped. It said last:")
+    _say("\n".join(f"  | {line}" for line in (death.tail or "(nothing)").splitlines()))
+    return 1
+
+
+def check(arguments: argparse.Namespace) -> None:
+    """Refuse what cannot work before anything is started.
+
+    Raises:
+        InputError: The port is taken, or a file cannot be used.
+        ConfigError: The configuration is missing or wrong.
+    """
+    load_section(arguments.config, "transport", TransportConfig)
+    load_section(arguments.config, "robot", RobotConfig)
+    if not 1 <= arguments.port <= 65535:
+        raise InputError(f"--port {arguments.port} is not a port; give one from 1 to 65535")
+    if not 0 <= arguments.seed < 2**32:
+        raise InputError(f"--seed {arguments.seed} is out of range; give one from 0 to {2**32 - 1}")
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((_HOST, arguments.port))
+            probe.listen()
+        except OSError as error:
+            raise InputError(
+                f"port {arguments.port} cannot be used ({error.strerror}); give another one with --port"
+            ) from error
+    if arguments.trace is not None:
+        _check_writable(arguments.trace)
+
+
+def _check_writable(path: Path) -> None:
+    if path.is_dir():
+        raise InputError(f"--trace {path} is a folder; give the name of a file")
+    if not path.resolve().parent.is_dir():
+        raise InputError(f"--trace {path}: there is no folder {path.resolve().parent}; make it first")
+    if not os.access(path if path.exists() else path.resolve().parent, os.W_OK):
+        raise InputError(f"--trace {path} cannot be written; choose another place")
+
+
+def _start_and_watch(
+    arguments: argparse.Namespace, supervisor: Supervisor, token_file: Path, stopping: threading.Event
+) -> Death | None:
+    """What ended the run: a process, or a person (None)."""
+    began = time.monotonic()
+    page = f"http://{_HOST}:{arguments.port}"
+    router_port = _free_port()
+    endpoint = f"tcp/{_HOST}:{router_port}"
+    supervisor.start("router", python_command("rolling_panda", ["router", "--listen", endpoint, "--exit-with-parent"]))
+    while not _accepts(router_port):
+        if supervisor.death() is not None or stopping.wait(_POLL_S):
+            return supervisor.death()
+        if time.monotonic() - began > STARTUP_S:
+            raise InputError(
+                f"the router did not listen within {STARTUP_S:.0f} s; its log is {supervisor.log('router')}"
+            )
+    _progress("router", began)
+
+    token = secrets.token_urlsafe(32)
+    write_secret(token_file, token)
+    for name, own in _own_arguments(arguments, token_file).items():
+        shared = ["--config", str(arguments.config.resolve()), "--robot-id", ROBOT_ID, "--connect", endpoint]
+        supervisor.start(name, python_command(name, [*shared, "--exit-with-parent", *own]))
+
+    with Readiness(endpoint, ROBOT_ID, page) as readiness:
+        missing = ["bridge", "controller", "perception", "server"]
+        while missing:
+            if supervisor.death() is not None or stopping.wait(_POLL_S):
+                return supervisor.death()
+            for name in sorted(readiness.up() & set(missing)):
+                missing.remove(name)
+                _progress(name, began)
+            if missing and time.monotonic() - began > STARTUP_S:
+                logs = ", ".join(str(supervisor.log(name)) for name in missing)
+                raise InputError(f"not up within {STARTUP_S:.0f} s: {', '.join(missing)}; see {logs}")
+
+    _say(f"\nSign in once with this link, on this machine:\n\n    {page}/sign-in?token={token}\n")
+    _say("Ctrl-C ends everything.")
+    while supervisor.death() is None:
+        if stopping.wait(_POLL_S):
+            return None
+    return supervisor.death()
+
+
+def write_secret(path: Path, text: str) -> None:
+    """Write a new file that only this user can read.
+
+    The token is handed over in a file, as a command line or an environment can be read by others on the machine.
+    """
+    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    with os.fdopen(descriptor, "w", encoding="ascii") as file:
+        file.write(text)
+
+
+def _own_arguments(arguments: argparse.Namespace, token_file: Path) -> dict[str, list[str]]:
+    trace = [] if arguments.trace is None else ["--trace", str(arguments.trace.resolve())]
+    return {
+        "bridge": ["--seed", str(arguments.seed), *trace],
+        "controller": [],
+        "perception": [],
+        "server": ["--port", str(arguments.port), "--sign-in-token-file", str(token_file)],
+    }
+
+
+def _progress(name: str, began: float) -> None:
+    _say(f"  {name:<10} up  {time.monotonic() - began:5.1f} s")
+
+
+def _say(text: str) -> None:
+    print(text, flush=True)
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind((_HOST, 0))
+        return int(probe.getsockname()[1])
+
+
+def _accepts(port: int) -> bool:
+    try:
+        with socket.create_connection((_HOST, port), timeout=0.5):
+            return True
+    except OSError:
+        return False

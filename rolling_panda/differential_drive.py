@@ -1,0 +1,75 @@
+"""The two-wheel base: its rolling constraints and its odometry.
+
+q = [x, y, φ, θ_l, θ_r, q₁…q₇]; ξ = [θ_l, θ_r, q₁…q₇]. The paper's matrices with the wheels in the order of q
+(docs/paper.md): left wheel forward turns right.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+NQ, NXI = 12, 9
+Array = NDArray[np.float64]
+#: The lower part of S: the actuated coordinates are themselves.
+_ACTUATED = np.vstack([np.zeros((NQ - NXI, NXI)), np.eye(NXI)])
+
+
+@dataclass(frozen=True)
+class DifferentialDrive:
+    """Geometry of the base.
+
+    Attributes:
+        wheel_radius: R, effective rolling radius (m).
+        half_track: μ, half the distance between the wheel contacts (m).
+        rho: ρ, distance of the reference point (x, y) ahead of the axle (m).
+    """
+
+    wheel_radius: float
+    half_track: float
+    rho: float = 0.0
+
+    def constraint(self, phi: float) -> Array:
+        """A(q), 3×12: A q̇ = 0 for no sideways slip of the axle and pure rolling of the left and the right wheel."""
+        c, s = np.cos(phi), np.sin(phi)
+        A = np.zeros((3, NQ))
+        A[0, :3] = -s, c, -self.rho
+        A[1, :4] = c, s, -self.half_track, -self.wheel_radius
+        A[2, :3] = c, s, self.half_track
+        A[2, 4] = -self.wheel_radius
+        return A
+
+    def basis(self, phi: float) -> Array:
+        """S(q), 12×9: q̇ = S ξ̇, spanning the null space of A."""
+        c, s = math.cos(phi), math.sin(phi)
+        half, turn = self.wheel_radius / 2, self.wheel_radius / (2 * self.half_track)
+        S = _ACTUATED.copy()
+        S[0, :2] = half * c + turn * self.rho * s, half * c - turn * self.rho * s
+        S[1, :2] = half * s - turn * self.rho * c, half * s + turn * self.rho * c
+        S[2, :2] = -turn, turn
+        return S
+
+    def twist(self, wheel_left: float, wheel_right: float) -> tuple[float, float]:
+        """Forward velocity of the axle centre (m/s) and yaw rate (rad/s) from the wheel speeds (rad/s)."""
+        v = self.wheel_radius * (wheel_left + wheel_right) / 2
+        return v, self.wheel_radius * (wheel_right - wheel_left) / (2 * self.half_track)
+
+    def wheels(self, v: float, omega: float) -> tuple[float, float]:
+        """Wheel speeds left, right (rad/s) for a forward velocity (m/s) and a yaw rate (rad/s)."""
+        turn = omega * self.half_track
+        return (v - turn) / self.wheel_radius, (v + turn) / self.wheel_radius
+
+    def integrate(self, pose: Array, turned_left: float, turned_right: float) -> Array:
+        """The base pose [x, y, φ] of the reference point after the wheels turned by these angles (rad).
+
+        Exact for constant wheel speeds: the axle centre follows an arc.
+        """
+        distance, angle = self.twist(turned_left, turned_right)
+        x, y, phi = pose
+        x, y = x - self.rho * np.cos(phi), y - self.rho * np.sin(phi)
+        # Chord of the arc: sinc keeps the straight line exact.
+        chord = distance * np.sinc(angle / (2 * np.pi))
+        x, y = x + chord * np.cos(phi + angle / 2), y + chord * np.sin(phi + angle / 2)
+        phi += angle
+        return np.array([x + self.rho * np.cos(phi), y + self.rho * np.sin(phi), phi])

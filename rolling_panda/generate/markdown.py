@@ -1,0 +1,193 @@
+"""The tables of `docs/wire.md`, filled in between markers; the words around them are written by hand."""
+
+import re
+from collections.abc import Callable, Iterable
+from typing import Annotated, Any, Literal, get_args, get_origin
+
+import msgspec
+
+from rolling_panda import messages, page_messages
+from rolling_panda.errors import MessageError
+from rolling_panda.generate.description import alias_name, aliases, describe, is_union, reachable, union_members
+from rolling_panda.topics import SERVICES, TOPICS
+
+_BLOCK = re.compile(r"(<!-- generated: ([a-z-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
+_PLAIN: dict[Any, str] = {
+    bool: "bool",
+    int: "int",
+    float: "float",
+    str: "string",
+    bytes: "bytes",
+    type(None): "nil",
+}
+
+
+def fill(document: str) -> str:
+    """The document with every marked block made anew.
+
+    Raises:
+        MessageError: A block's name is unknown, or one of the blocks is missing.
+    """
+    seen: set[str] = set()
+
+    def replace(match: re.Match[str]) -> str:
+        name = match[2]
+        if name not in BLOCKS:
+            raise MessageError(f"docs/wire.md asks for the block {name}; there are {', '.join(BLOCKS)}")
+        seen.add(name)
+        return f"{match[1]}\n{BLOCKS[name]()}\n{match[3]}"
+
+    out = _BLOCK.sub(replace, document)
+    if seen != set(BLOCKS):
+        raise MessageError(f"docs/wire.md lacks the blocks {', '.join(sorted(set(BLOCKS) - seen))}")
+    return out
+
+
+def topics_table() -> str:
+    """One row a topic."""
+    rows = []
+    for topic in TOPICS:
+        rate = f"{topic.rate_hz:g} Hz" if topic.rate_hz else "on event"
+        notes = [word for word, on in (("express", topic.express), ("latched", topic.latched)) if on]
+        rows.append(
+            (
+                f"`{topic.name}`",
+                _link(topic.message),
+                topic.sender,
+                rate,
+                topic.priority,
+                topic.congestion,
+                ", ".join(notes),
+                topic.about,
+            )
+        )
+    return _table(("topic", "message", "sender", "rate", "priority", "congestion", "carried", "what"), rows)
+
+
+def services_table() -> str:
+    """One row a service."""
+    rows = [
+        (
+            f"`{service.name}`",
+            ", ".join(_link(request) for request in service.requests),
+            service.server,
+            f"{service.timeout_s:g} s",
+            service.about,
+        )
+        for service in SERVICES
+    ]
+    return _table(("service", "requests", "answered by", "timeout", "what"), rows)
+
+
+def types_table() -> str:
+    """One row a named type that is not a message."""
+    rows = [(f"`{name}`", spelled_out(hint)) for name, hint in aliases().items()]
+    return _table(("name", "values"), rows)
+
+
+def wire_messages() -> str:
+    """A section for every message of the topics and services, and for the parts that they contain."""
+    roots = [topic.message for topic in TOPICS]
+    requests = [request for service in SERVICES for request in service.requests]
+    return _sections((*roots, *requests, messages.Answer))
+
+
+def page_message_sections() -> str:
+    """A section for every message of the page's socket that is not already a message of the wire."""
+    known = set(reachable([*(topic.message for topic in TOPICS)]))
+    unions = (page_messages.FromServer, page_messages.FromPage)
+    return _sections([member for union in unions for member in union_members(union)], leave_out=known)
+
+
+def spelled_out(hint: Any) -> str:
+    """An annotation in words: base type, bounds, length, pattern.
+
+    Raises:
+        MessageError: This generator does not know the annotation.
+    """
+    if hint in _PLAIN:
+        return _PLAIN[hint]
+    origin, arguments = get_origin(hint), get_args(hint)
+    if isinstance(hint, type) and issubclass(hint, msgspec.Struct):
+        return _link(hint)
+    if origin is Annotated:
+        return ", ".join([spelled_out(arguments[0]), *_bounds(arguments[1:])])
+    if origin is Literal:
+        return " \\| ".join(f'`"{value}"`' for value in arguments)
+    if is_union(hint):
+        return " or ".join(_named(argument) for argument in arguments)
+    if origin is tuple and arguments[-1] is Ellipsis:
+        return f"array of {_named(arguments[0])}"
+    if origin is tuple:
+        kinds = {_named(argument) for argument in arguments}
+        if len(kinds) == 1:
+            return f"array of {len(arguments)} {kinds.pop()}"
+        return f"array of ({', '.join(_named(argument) for argument in arguments)})"
+    raise MessageError(f"no words for {hint}; teach rolling_panda/generate/markdown.py")
+
+
+def _named(hint: Any) -> str:
+    name = alias_name(hint)
+    return spelled_out(hint) if name is None else f"`{name}`"
+
+
+def _bounds(metas: Iterable[Any]) -> list[str]:
+    out = []
+    for meta in metas:
+        if meta.ge is not None and meta.le is not None:
+            out.append(f"{_number(meta.ge)} … {_number(meta.le)}")
+        elif meta.gt is not None and meta.le is not None:
+            out.append(f"more than {_number(meta.gt)}, at most {_number(meta.le)}")
+        if meta.min_length is not None:
+            out.append(f"at least {meta.min_length} character{'s' if meta.min_length > 1 else ''}")
+        if meta.max_length is not None:
+            out.append(f"at most {meta.max_length} characters")
+        if meta.pattern is not None:
+            out.append(f"matching `{meta.pattern}`")
+    return out
+
+
+def _number(value: float) -> str:
+    return "2^62" if value == 2**62 else f"{value:g}"
+
+
+def _sections(roots: Iterable[type[msgspec.Struct]], leave_out: set[type[msgspec.Struct]] | None = None) -> str:
+    parts = []
+    for struct in reachable(roots):
+        if leave_out and struct in leave_out:
+            continue
+        text = describe(struct)
+        parts.append(f"### {text.name}\n\n{text.about}\n")
+        rows = [] if text.tag is None else [("`type`", f'`"{text.tag}"`', "required", "the tag")]
+        for field in text.fields:
+            default = "required" if field.required else f"`{_default(field.default)}`"
+            rows.append((f"`{field.name}`", _named(field.hint), default, field.about))
+        parts.append(_table(("field", "type", "default", "meaning"), rows))
+    return "\n".join(parts)
+
+
+def _default(value: Any) -> str:
+    if value is None:
+        return "nil"
+    if isinstance(value, bytes):
+        return '""'
+    return f'"{value}"' if isinstance(value, str) else str(value).replace("()", "[]")
+
+
+def _link(struct: type[msgspec.Struct]) -> str:
+    return f"[{struct.__name__}](#{struct.__name__.lower()})"
+
+
+def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    lines.extend("| " + " | ".join(row) + " |" for row in rows)
+    return "\n".join(lines) + "\n"
+
+
+BLOCKS: dict[str, Callable[[], str]] = {
+    "topics": topics_table,
+    "services": services_table,
+    "types": types_table,
+    "messages": wire_messages,
+    "page-messages": page_message_sections,
+}

@@ -1,0 +1,66 @@
+"""What an operator may ask of the controller: the requests of the intent service, each answered with an `Answer`."""
+
+from typing import Annotated
+
+from msgspec import Meta, Struct
+
+from rolling_panda.messages import Count, Fraction, Name, Text
+
+
+class Intent(Struct, frozen=True, kw_only=True, tag=True, forbid_unknown_fields=True):
+    """Root of what an operator may ask of the controller. `user` is who asks, `role` what they may."""
+
+    user: Text
+
+
+class Arm(Intent, frozen=True, kw_only=True):
+    """IDLE → READY."""
+
+
+class AcceptPoint(Intent, frozen=True, kw_only=True):
+    """Put a proposed point on the queue; `revision` is the one the operator saw."""
+
+    point_id: Name
+    revision: Count
+
+
+class RejectPoint(Intent, frozen=True, kw_only=True):
+    """Take a point off the queue."""
+
+    point_id: Name
+    reason: Text = ""
+
+
+class AcceptAll(Intent, frozen=True, kw_only=True):
+    """Accept every proposed point with at least this confidence."""
+
+    confidence: Fraction = 0.0
+
+
+class Start(Intent, frozen=True, kw_only=True):
+    """READY → AUTO on the accepted points."""
+
+
+class Pause(Intent, frozen=True, kw_only=True):
+    """AUTO or TELEOP → PAUSED."""
+
+
+class Resume(Intent, frozen=True, kw_only=True):
+    """PAUSED → READY; starting again is separate."""
+
+
+class Home(Intent, frozen=True, kw_only=True):
+    """READY: bring the arm back to its survey posture beside the row."""
+
+
+class Acknowledge(Intent, frozen=True, kw_only=True):
+    """PROTECTIVE_STOP → PAUSED, FAULT → IDLE, once the cause is gone."""
+
+
+class Reset(Intent, frozen=True, kw_only=True):
+    """ESTOP_LATCHED → IDLE, with a reason. It moves nothing."""
+
+    reason: Annotated[str, Meta(min_length=1, max_length=500)]
+
+
+AnyIntent = Arm | AcceptPoint | RejectPoint | AcceptAll | Start | Pause | Resume | Home | Acknowledge | Reset

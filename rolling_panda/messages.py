@@ -1,0 +1,396 @@
+"""Every message on the wire: frozen, typed, SI units, strict.
+
+Frames are those of REP-105 (`odom`, `base_link`, `tool`, `camera`). Quaternions say their order in the name. A bound
+on a number is part of its type, so decoding refuses NaN and infinity as well as what is out of range, and never clamps.
+Field names follow ROS where ROS has the message.
+"""
+
+from typing import Annotated, Literal
+
+from msgspec import Meta, Struct
+
+SCHEMA_VERSION = 1
+
+Finite = Annotated[float, Meta(ge=-1e9, le=1e9)]
+Metre = Annotated[float, Meta(ge=-1e4, le=1e4)]
+Unit = Annotated[float, Meta(ge=-1.001, le=1.001)]
+NonNegative = Annotated[float, Meta(ge=0.0, le=1e9)]
+Fraction = Annotated[float, Meta(ge=0.0, le=1.0)]
+Angle = Annotated[float, Meta(ge=-1e6, le=1e6)]
+Speed = Annotated[float, Meta(ge=-100.0, le=100.0)]
+Count = Annotated[int, Meta(ge=0, le=2**62)]
+Name = Annotated[str, Meta(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9_.:\-]+$")]
+Text = Annotated[str, Meta(max_length=500)]
+
+Vector3 = tuple[Metre, Metre, Metre]
+UnitVector3 = tuple[Unit, Unit, Unit]
+QuatXyzw = tuple[Unit, Unit, Unit, Unit]
+ArmVector = tuple[Angle, Angle, Angle, Angle, Angle, Angle, Angle]
+#: θ_l, θ_r, q₁…q₇ (rad): the actuated coordinates ξ.
+Actuated = tuple[Angle, Angle, Angle, Angle, Angle, Angle, Angle, Angle, Angle]
+#: Velocities of ξ (rad/s).
+ActuatedVelocity = tuple[Speed, Speed, Speed, Speed, Speed, Speed, Speed, Speed, Speed]
+
+Process = Literal["bridge", "controller", "perception", "server"]
+PROCESSES: tuple[Process, ...] = ("bridge", "controller", "perception", "server")
+
+Mode = Literal["IDLE", "READY", "TELEOP", "AUTO", "PAUSED", "PROTECTIVE_STOP", "FAULT", "ESTOP_LATCHED"]
+Phase = Literal["", "APPROACH", "ADVANCE", "CUT", "RETREAT"]
+PointState = Literal["PROPOSED", "ACCEPTED", "INTENT", "DONE", "FAILED_NOT_CUT", "UNKNOWN", "REJECTED"]
+Severity = Literal["info", "warning", "error"]
+Outcome = Literal["", "DONE", "FAILED_NOT_CUT", "UNKNOWN"]
+WoodClass = Literal["background", "ground", "post", "trunk", "cordon", "spur", "cane", "node", "wire"]
+#: Index = value in a label image.
+WOOD_CLASSES: tuple[WoodClass, ...] = (
+    "background",
+    "ground",
+    "post",
+    "trunk",
+    "cordon",
+    "spur",
+    "cane",
+    "node",
+    "wire",
+)
+
+
+class Message(Struct, frozen=True, kw_only=True, tag=True, forbid_unknown_fields=True):
+    """Root of the wire messages: a map with a `type` tag; unknown fields are refused."""
+
+
+class Header(Struct, frozen=True, forbid_unknown_fields=True):
+    """Who measured when: `stamp` is the sender's monotonic clock (s), for differences only, in frame `frame_id`."""
+
+    stamp: Finite = 0.0
+    frame_id: Annotated[str, Meta(max_length=64)] = ""
+
+
+class Pose(Struct, frozen=True, forbid_unknown_fields=True):
+    """A rigid placement: `position` (m) and `quat_xyzw` (unit) of a child frame in the frame that the owner names."""
+
+    position: Vector3
+    quat_xyzw: QuatXyzw
+
+
+class PlanarPose(Struct, frozen=True, forbid_unknown_fields=True):
+    """The base on the ground: `x`, `y` (m) and heading `phi` (rad) of base_link in odom."""
+
+    x: Metre = 0.0
+    y: Metre = 0.0
+    phi: Angle = 0.0
+
+
+# --- commands --------------------------------------------------------------------------------------------------------
+
+
+class MotionCommand(Message, frozen=True, kw_only=True):
+    """Controller → bridge: the velocity of every actuator, newest wins.
+
+    Attributes:
+        epoch: One more than the newest epoch the bridge had seen when this controller started; an older one is refused.
+        sequence: Strictly increasing within an epoch.
+        echo: `sequence` of the newest `JointState` the command was computed from. The bridge knows when it sent that
+            state, so it judges the command's age on its own clock.
+        xi: [θ̇_l, θ̇_r, q̇₁…q̇₇] in rad/s.
+    """
+
+    epoch: Count
+    sequence: Count
+    echo: Count
+    xi: ActuatedVelocity
+
+
+class CutCommand(Message, frozen=True, kw_only=True):
+    """Controller → bridge: close the blades once. Repeated until seen; the bridge acts on a `cut_id` once."""
+
+    epoch: Count
+    cut_id: Name
+    point_id: Name
+
+
+class StopRequest(Message, frozen=True, kw_only=True):
+    """Anyone → bridge and controller: the software stop, latched by both. Sent several times with one `stop_id`."""
+
+    stop_id: Name
+    source: Name
+    user: Text
+    reason: Text
+
+
+class TeleopTarget(Message, frozen=True, kw_only=True):
+    """Server → controller while the operator holds the gizmo: where the tool should be, in odom.
+
+    Attributes:
+        sequence: Strictly increasing within a hold.
+        hold: False ends the hold at once; silence ends it too.
+        user: Who holds.
+        target: Desired T_odom_tool.
+    """
+
+    sequence: Count
+    hold: bool
+    user: Text
+    target: Pose
+
+
+# --- state -----------------------------------------------------------------------------------------------------------
+
+
+class JointState(Message, frozen=True, kw_only=True):
+    """Bridge → all: measured actuated coordinates, [θ_l, θ_r, q₁…q₇] (rad, rad/s), as sensor_msgs/JointState."""
+
+    header: Header
+    sequence: Count
+    position: Actuated
+    velocity: ActuatedVelocity
+
+
+class Odometry(Message, frozen=True, kw_only=True):
+    """Bridge → all: the base from its wheels.
+
+    Attributes:
+        header: `frame_id` is odom.
+        sequence: Strictly increasing.
+        pose: base_link in odom.
+        linear: Forward velocity of the axle centre (m/s).
+        angular: Yaw rate (rad/s).
+    """
+
+    header: Header
+    sequence: Count
+    pose: PlanarPose
+    linear: Speed
+    angular: Speed
+
+
+class RejectionCount(Struct, frozen=True, forbid_unknown_fields=True):
+    """How many messages of a topic were refused for one reason."""
+
+    topic: Text
+    reason: Text
+    count: Count
+
+
+class BridgeState(Message, frozen=True, kw_only=True):
+    """Bridge → all: its own latch, watchdog and cutter; the controller cannot overrule any of them.
+
+    Attributes:
+        kind: `sim` or `real`.
+        epoch: Newest controller epoch accepted.
+        watchdog: True while no valid setpoint has come for the deadline: base 0, arm holds, cutter inhibited.
+        stop_id: The latched software stop, empty when none.
+        stopped_by: User and reason of that stop.
+        cutter: What the blades do.
+        cut_id: The last cut asked for, empty when none.
+        outcome: How that cut ended, empty while it goes on.
+        real_time_factor: Simulated seconds a second; 1 on a real robot.
+        rejections: Messages refused since the start, by reason.
+    """
+
+    header: Header
+    kind: Literal["sim", "real"]
+    epoch: Count
+    watchdog: bool
+    stop_id: Annotated[str, Meta(max_length=64)]
+    stopped_by: Text
+    cutter: Literal["open", "closing", "opening", "jammed"]
+    cut_id: Annotated[str, Meta(max_length=64)]
+    outcome: Outcome
+    real_time_factor: NonNegative
+    rejections: tuple[RejectionCount, ...] = ()
+
+
+class QueueEntry(Struct, frozen=True, forbid_unknown_fields=True):
+    """One pruning point in the controller's queue: its life, and why it is where it is, in words."""
+
+    point_id: Name
+    state: PointState
+    reason: Text = ""
+    user: Text = ""
+    cut_id: Annotated[str, Meta(max_length=64)] = ""
+    accepted_position: Vector3 | None = None
+
+
+class ControllerState(Message, frozen=True, kw_only=True):
+    """Controller → all: mode, queue and the quality of tracking.
+
+    Attributes:
+        mode: State of the supervision machine.
+        phase: Step of the cut sequence in AUTO, else empty.
+        reason: Why the machine is in this mode.
+        allowed: Intent types that would be taken now; every other one is answered with a reason.
+        active_point_id: The point being worked on, empty when none.
+        method: Name of the whole-body method.
+        T_odom_tool: Measured tool pose.
+        T_odom_tool_desired: Where the trajectory has it now; None when nothing is tracked.
+        position_error: Tool position error (m).
+        rotation_error: Tool rotation error (rad).
+        manipulability: ω of the arm.
+        joint_margin: Least distance of an arm joint to its limit (rad).
+        tick_s: Median time of one control step over the last second (s).
+        late_ticks: Control periods missed since the start.
+        queue: Every point known, in the order of work.
+    """
+
+    header: Header
+    mode: Mode
+    phase: Phase
+    reason: Text
+    allowed: tuple[str, ...]
+    active_point_id: Annotated[str, Meta(max_length=64)]
+    method: Name
+    T_odom_tool: Pose | None
+    T_odom_tool_desired: Pose | None
+    position_error: NonNegative
+    rotation_error: NonNegative
+    manipulability: NonNegative
+    joint_margin: Finite
+    tick_s: NonNegative
+    late_ticks: Count
+    queue: tuple[QueueEntry, ...]
+
+
+class Heartbeat(Message, frozen=True, kw_only=True):
+    """A process's loop is turning: `sequence` grows with each turn, not with each send."""
+
+    process: Process
+    sequence: Count
+    status: Text = ""
+
+
+class LogEvent(Message, frozen=True, kw_only=True):
+    """Something a person should be able to read later: what happened, or why something was refused."""
+
+    header: Header
+    process: Process
+    severity: Severity
+    text: Text
+
+
+# --- perception ------------------------------------------------------------------------------------------------------
+
+
+class Intrinsics(Struct, frozen=True, forbid_unknown_fields=True):
+    """Pinhole camera: image size (px), focal lengths and principal point (px)."""
+
+    width: Annotated[int, Meta(ge=1, le=4096)]
+    height: Annotated[int, Meta(ge=1, le=4096)]
+    fx: NonNegative
+    fy: NonNegative
+    cx: Finite
+    cy: Finite
+
+
+class CameraFrame(Message, frozen=True, kw_only=True):
+    """Bridge → perception and server: one RGB-D frame with the robot's measured posture when it was taken.
+
+    Attributes:
+        header: `frame_id` is camera: z forward, x right, y down.
+        sequence: Strictly increasing.
+        intrinsics: Of all images in the frame.
+        base: Measured base_link in odom at exposure.
+        position: Measured actuated coordinates at exposure (rad).
+        color_jpeg: H×W×3, JPEG.
+        depth_zlib: H×W uint16 little-endian, row-major, zlib; in units of `depth_unit`; 0 = no return.
+        depth_unit: Metres a count.
+        labels_zlib: H×W uint8 class indices (`WOOD_CLASSES`), zlib. Empty without a label camera (a real robot).
+    """
+
+    header: Header
+    sequence: Count
+    intrinsics: Intrinsics
+    base: PlanarPose
+    position: Actuated
+    color_jpeg: bytes
+    depth_zlib: bytes
+    depth_unit: Annotated[float, Meta(gt=0.0, le=0.01)]
+    labels_zlib: bytes = b""
+
+
+class PruningPoint(Struct, frozen=True, forbid_unknown_fields=True):
+    """Where to cut, and why.
+
+    Attributes:
+        point_id: Stable while the point is tracked from frame to frame.
+        revision: Grows when position or tangent changes by more than the tracker's noise.
+        position: On the cane's axis, in odom (m).
+        tangent: Unit vector along the cane, pointing away from the cordon, in odom.
+        radius: Of the cane (m).
+        confidence: 0…1.
+        nodes_seen: Count nodes seen on the cane (the basal bud is not counted).
+        nodes_kept: Count nodes that stay below the cut.
+        vine: Number of the vine along the row, as perceived.
+        spur: Number of the spur position on that vine, as perceived.
+        reason: Why here, in one sentence a grower understands.
+    """
+
+    point_id: Name
+    revision: Count
+    position: Vector3
+    tangent: UnitVector3
+    radius: Annotated[float, Meta(gt=0.0, le=0.1)]
+    confidence: Fraction
+    nodes_seen: Annotated[int, Meta(ge=0, le=100)]
+    nodes_kept: Annotated[int, Meta(ge=0, le=100)]
+    vine: Annotated[int, Meta(ge=0, le=100000)]
+    spur: Annotated[int, Meta(ge=0, le=100000)]
+    reason: Text
+
+
+class PruningPoints(Message, frozen=True, kw_only=True):
+    """Perception → all: every point it holds true now.
+
+    Attributes:
+        header: `frame_id` is odom.
+        segmenter: Name of the segmenter behind it.
+        frames: Camera frames used so far.
+        points: All points.
+        abstained: Places looked at without a point, each with its reason.
+        canes: Axis of each cane as perceived: polylines in odom (m).
+    """
+
+    header: Header
+    segmenter: Text
+    frames: Count
+    points: tuple[PruningPoint, ...]
+    abstained: tuple[Text, ...] = ()
+    canes: tuple[tuple[Vector3, ...], ...] = ()
+
+
+class Capsule(Struct, frozen=True, forbid_unknown_fields=True):
+    """A rod with round ends: axis from `start` to `end` (m), radii at both (m)."""
+
+    kind: WoodClass
+    start: Vector3
+    end: Vector3
+    start_radius: NonNegative
+    end_radius: NonNegative
+
+
+class Scenery(Message, frozen=True, kw_only=True):
+    """Simulated bridge → server: the row as it stands, for display only. Perception and control never subscribe.
+
+    `revision` grows whenever something was severed.
+    """
+
+    header: Header
+    revision: Count
+    capsules: tuple[Capsule, ...]
+
+
+# --- services --------------------------------------------------------------------------------------------------------
+
+
+class ReleaseStop(Message, frozen=True, kw_only=True):
+    """Controller → bridge: release the latched stop `stop_id`. Moves nothing; any other id is refused."""
+
+    stop_id: Name
+    user: Text
+    reason: Annotated[str, Meta(min_length=1, max_length=500)]
+
+
+class Answer(Message, frozen=True, kw_only=True):
+    """Reply of every service: done or not, and the reason in words."""
+
+    ok: bool
+    reason: Text = ""

@@ -1,0 +1,139 @@
+"""What the server and the operator's page say to each other over `/ws`, as JSON; `web/messages.js` is made from it."""
+
+from typing import Annotated, Literal
+
+from msgspec import Meta, Struct
+
+from rolling_panda import messages as m
+
+Role = Literal["viewer", "operator", "supervisor"]
+Age = Annotated[float, Meta(ge=0.0, le=1e9)]
+
+
+class PageMessage(Struct, frozen=True, kw_only=True, tag=True, forbid_unknown_fields=True):
+    """Root of the page's messages: an object with a `type`; unknown fields are refused."""
+
+
+# --- server → page ---------------------------------------------------------------------------------------------------
+
+
+class ProcessPresence(Struct, frozen=True, forbid_unknown_fields=True):
+    """Is a process connected, and how old is its last word (s; None before the first)."""
+
+    process: m.Process
+    present: bool
+    age_s: Age | None
+
+
+class PageState(PageMessage, frozen=True, kw_only=True):
+    """10 Hz: everything that changes all the time. The last known state stays, with its age.
+
+    Attributes:
+        number: Grows by one a message; the page echoes the last one it rendered.
+        user: Who is signed in on this page.
+        role: What they may do.
+        viewers: Pages open now.
+        processes: One row a process.
+        controller: Its newest state, None before the first. Without its queue, which is in `PagePoints`.
+        controller_age_s: Age of it (s).
+        bridge: Its newest state.
+        bridge_age_s: Age of it (s).
+        joints: Newest joint state: speeds for the gauges.
+        base: Base pose in odom.
+        camera_frame: Sequence of the newest camera frame, to fetch `/camera/color.jpg?n=…`.
+    """
+
+    number: m.Count
+    user: m.Text
+    role: Role
+    viewers: m.Count
+    processes: tuple[ProcessPresence, ...]
+    controller: m.ControllerState | None
+    controller_age_s: Age | None
+    bridge: m.BridgeState | None
+    bridge_age_s: Age | None
+    joints: m.JointState | None
+    base: m.PlanarPose | None
+    camera_frame: m.Count
+
+
+class PagePoint(Struct, frozen=True, forbid_unknown_fields=True):
+    """One row of the queue: the point as perceived and its life in the controller's queue.
+
+    `pixel` is its place in the newest camera image (px, None when outside), for drawing.
+    """
+
+    point: m.PruningPoint
+    entry: m.QueueEntry
+    pixel: tuple[float, float] | None = None
+
+
+class PagePoints(PageMessage, frozen=True, kw_only=True):
+    """Sent when it changed: every point in the order of work, and the places where perception abstained."""
+
+    points: tuple[PagePoint, ...]
+    abstained: tuple[m.Text, ...]
+    segmenter: m.Text
+    frames: m.Count
+    image_size: tuple[int, int]
+
+
+class PageEvent(Struct, frozen=True, forbid_unknown_fields=True):
+    """A line of the log: `number` grows; `wall_time` is the server's clock (s since 1970), for people."""
+
+    number: m.Count
+    wall_time: float
+    process: str
+    severity: m.Severity
+    text: str
+
+
+class PageEvents(PageMessage, frozen=True, kw_only=True):
+    """New lines of the log, oldest first; the last 200 at the start."""
+
+    events: tuple[PageEvent, ...]
+
+
+class Selected(PageMessage, frozen=True, kw_only=True):
+    """A point was clicked in the 3-D view of this session; empty = nothing."""
+
+    point_id: str
+
+
+class Pong(PageMessage, frozen=True, kw_only=True):
+    """Answer to a `Ping`, at once, for the round trip."""
+
+    number: m.Count
+
+
+# --- page → server ---------------------------------------------------------------------------------------------------
+
+
+class Ping(PageMessage, frozen=True, kw_only=True):
+    """10 Hz: the page is alive, and `rendered` is the number of the last `PageState` it drew."""
+
+    number: m.Count
+    rendered: m.Count
+
+
+class Hold(PageMessage, frozen=True, kw_only=True):
+    """20 Hz while the operator holds: the tool may follow the gizmo. `hold` false, or silence, ends it."""
+
+    sequence: m.Count
+    hold: bool
+
+
+class ShowGizmo(PageMessage, frozen=True, kw_only=True):
+    """Show or hide this session's gizmo in the 3-D view; shown, it starts at the tool."""
+
+    visible: bool
+
+
+class Select(PageMessage, frozen=True, kw_only=True):
+    """Highlight a point in the 3-D view; empty = none."""
+
+    point_id: Annotated[str, Meta(max_length=64)]
+
+
+FromServer = PageState | PagePoints | PageEvents | Selected | Pong
+FromPage = Ping | Hold | ShowGizmo | Select

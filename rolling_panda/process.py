@@ -1,0 +1,114 @@
+"""How a process starts and ends: arguments, configuration, transport, signals, and errors as one clear line."""
+
+import argparse
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from rolling_panda import __version__
+from rolling_panda import messages as m
+from rolling_panda.config import TransportConfig, load_section
+from rolling_panda.errors import RollingPandaError
+from rolling_panda.priority import Role, take_priority
+from rolling_panda.resources import resource
+from rolling_panda.transport import Transport
+
+ROBOT_ID = "rp1"
+_PRIORITY: dict[m.Process, Role] = {
+    "bridge": "control",
+    "controller": "control",
+    "server": "interface",
+    "perception": "interface",
+}
+
+
+@dataclass(frozen=True)
+class ProcessContext:
+    """What a process is given when it starts.
+
+    Attributes:
+        arguments: Parsed command line.
+        config_path: The TOML file.
+        transport: Open session on the robot's wire.
+        stopping: Set when the process should end; loops watch it.
+    """
+
+    arguments: argparse.Namespace
+    config_path: Path
+    transport: Transport
+    stopping: threading.Event
+
+
+def run_process(
+    process: m.Process,
+    description: str,
+    run: Callable[[ProcessContext], None],
+    add_arguments: Callable[[argparse.ArgumentParser], None] | None = None,
+    argv: Sequence[str] | None = None,
+) -> int:
+    """Parse, configure, connect, run until SIGINT or SIGTERM, close. Returns the exit code.
+
+    Args:
+        process: Which of the processes this is.
+        description: For `--help`.
+        run: Does the work; returns when `context.stopping` is set.
+        add_arguments: Adds the process's own options.
+        argv: Command line without the program's name; None takes `sys.argv`.
+    """
+    parser = argparse.ArgumentParser(prog=f"rolling-panda {process}", description=description)
+    add_common_arguments(parser)
+    if add_arguments is not None:
+        add_arguments(parser)
+    arguments = parser.parse_args(argv)
+    stopping = stop_on_signals()
+    if arguments.exit_with_parent:
+        end_with_parent(stopping)
+    try:
+        transport_config = load_section(arguments.config, "transport", TransportConfig)
+        if arguments.connect is not None:
+            transport_config = msgspec.structs.replace(transport_config, connect=(arguments.connect,))
+        take_priority(_PRIORITY[process])
+        with Transport(transport_config, process, arguments.robot_id) as transport:
+            run(ProcessContext(arguments, arguments.config, transport, stopping))
+    except RollingPandaError as error:
+        print(f"rolling-panda {process}: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def add_common_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options that every process takes."""
+    default = resource("assets/config/sim.toml")
+    parser.add_argument("--config", type=Path, default=default, help="TOML configuration (default: the simulation's)")
+    parser.add_argument("--robot-id", default=ROBOT_ID, help="robot on the wire (default: %(default)s)")
+    parser.add_argument("--connect", metavar="ENDPOINT", help="router, tcp/HOST:PORT (default: the configuration's)")
+    parser.add_argument("--exit-with-parent", action="store_true", help="end when standard input closes")
+    parser.add_argument("--version", action="version", version=f"rolling-panda {__version__}")
+
+
+def stop_on_signals() -> threading.Event:
+    """An event that SIGINT and SIGTERM set."""
+    stopping = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stopping.set())
+    return stopping
+
+
+def end_with_parent(stopping: threading.Event, grace_s: float = 2.0) -> None:
+    """End this process when its standard input closes, which happens even when the parent is killed."""
+
+    def watch() -> None:
+        while os.read(0, 4096):
+            pass
+        stopping.set()
+        # A loop that hangs must not outlive the demo that started it.
+        threading.Event().wait(grace_s)
+        os._exit(1)
+
+    threading.Thread(target=watch, name="parent-watch", daemon=True).start()

@@ -1,0 +1,140 @@
+"""The one table of what is on the wire: publishers, subscribers, staleness and `docs/wire.md` derive from it.
+
+A key is `rp/<robot_id>/v1/<topic>`.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Generic, Literal, TypeVar
+
+from rolling_panda import intents
+from rolling_panda import messages as m
+
+Priority = Literal["REAL_TIME", "INTERACTIVE_HIGH", "DATA_LOW", "BACKGROUND"]
+Congestion = Literal["DROP", "BLOCK"]
+Msg = TypeVar("Msg", bound=m.Message)
+Req = TypeVar("Req")
+
+
+@dataclass(frozen=True)
+class Topic(Generic[Msg]):
+    """One row: what is published where, how often, and how it is carried.
+
+    Attributes:
+        name: Last part of the key.
+        message: The only type accepted on it.
+        sender: Process that publishes, or "any".
+        rate_hz: Nominal rate; 0 = when something happens.
+        priority: Zenoh priority.
+        congestion: What happens to a message when the wire is full.
+        express: Sent at once, never batched.
+        latched: The sender repeats the newest one at `rate_hz`, so that late joiners get it.
+        about: One line for people.
+    """
+
+    name: str
+    message: type[Msg]
+    sender: str
+    rate_hz: float
+    priority: Priority
+    congestion: Congestion
+    about: str
+    express: bool = False
+    latched: bool = False
+
+
+@dataclass(frozen=True)
+class Service(Generic[Req]):
+    """One row of the request table; the reply is always `Answer`.
+
+    Attributes:
+        name: Last part of the key.
+        requests: The types accepted, told apart by their tag.
+        server: Process that answers.
+        timeout_s: How long a caller waits.
+        about: One line for people.
+    """
+
+    name: str
+    requests: tuple[type[Req], ...]
+    server: str
+    timeout_s: float
+    about: str
+
+
+# fmt: off
+MOTION = Topic(
+    "command/motion", m.MotionCommand, "controller", 100, "REAL_TIME", "DROP",
+    "velocity of every actuator, newest wins", express=True,
+)
+CUT = Topic(
+    "command/cut", m.CutCommand, "controller", 0, "REAL_TIME", "BLOCK",
+    "close the blades once, repeated until seen", express=True,
+)
+STOP = Topic(
+    "command/stop", m.StopRequest, "any", 0, "REAL_TIME", "BLOCK",
+    "software stop, sent several times", express=True,
+)
+TELEOP = Topic(
+    "operator/teleop", m.TeleopTarget, "server", 30, "REAL_TIME", "DROP",
+    "where the held gizmo is", express=True,
+)
+JOINTS = Topic(
+    "state/joints", m.JointState, "bridge", 100, "INTERACTIVE_HIGH", "DROP",
+    "measured wheels and arm", express=True,
+)
+ODOMETRY = Topic(
+    "state/odometry", m.Odometry, "bridge", 50, "INTERACTIVE_HIGH", "DROP",
+    "base pose and twist from the wheels", express=True,
+)
+BRIDGE = Topic(
+    "state/bridge", m.BridgeState, "bridge", 20, "INTERACTIVE_HIGH", "DROP",
+    "latch, watchdog, cutter, refusals",
+)
+CONTROLLER = Topic(
+    "state/controller", m.ControllerState, "controller", 20, "INTERACTIVE_HIGH", "DROP",
+    "mode, queue, tracking",
+)
+HEARTBEAT = Topic(
+    "heartbeat", m.Heartbeat, "any", 20, "INTERACTIVE_HIGH", "DROP",
+    "a process's loop is turning",
+)
+EVENT = Topic(
+    "event", m.LogEvent, "any", 0, "DATA_LOW", "BLOCK",
+    "what happened, and why something was refused",
+)
+CAMERA = Topic(
+    "camera/frame", m.CameraFrame, "bridge", 2, "DATA_LOW", "DROP",
+    "RGB-D frame with the posture it was taken in",
+)
+POINTS = Topic(
+    "perception/points", m.PruningPoints, "perception", 2, "DATA_LOW", "DROP",
+    "every pruning point held true now", latched=True,
+)
+SCENERY = Topic(
+    "scenery", m.Scenery, "bridge", 0.5, "BACKGROUND", "DROP",
+    "the simulated row, for display only", latched=True,
+)
+
+TOPICS: tuple[Topic[Any], ...] = (
+    MOTION, CUT, STOP, TELEOP, JOINTS, ODOMETRY, BRIDGE, CONTROLLER, HEARTBEAT, EVENT, CAMERA, POINTS, SCENERY,
+)
+
+
+INTENT: Service[intents.Intent] = Service(
+    "service/intent",
+    (
+        intents.Arm, intents.AcceptPoint, intents.RejectPoint, intents.AcceptAll, intents.Start, intents.Pause,
+        intents.Resume, intents.Home, intents.Acknowledge, intents.Reset,
+    ),
+    "controller", 1.0, "what an operator asks for",
+)
+RELEASE: Service[m.ReleaseStop] = Service(
+    "service/release", (m.ReleaseStop,), "bridge", 0.5, "release a latched stop",
+)
+SERVICES: tuple[Service[Any], ...] = (INTENT, RELEASE)
+# fmt: on
+
+
+def key(robot_id: str, name: str) -> str:
+    """Zenoh key of a topic, service or liveliness token of one robot."""
+    return f"rp/{robot_id}/v{m.SCHEMA_VERSION}/{name}"

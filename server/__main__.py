@@ -1,0 +1,29 @@
+"""The operator's server: `rolling-panda server` or `python -m server`."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from rolling_panda.process import run_process
+from server.service import run
+
+
+def main() -> int:
+    """Run the process."""
+    return run_process("server", "Serve the operator's page, REST and the 3-D view.", run, add_arguments)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The server's own options."""
+    parser.add_argument("--host", default="127.0.0.1", help="address to listen on (default: %(default)s)")
+    parser.add_argument("--port", type=int, default=8000, help="port of the page (default: %(default)s; 0 = any)")
+    parser.add_argument(
+        "--sign-in-token-file",
+        type=Path,
+        metavar="FILE",
+        help="file with the token of the first sign-in link; deleted once read (default: make one, print the link)",
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

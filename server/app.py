@@ -1,0 +1,83 @@
+"""The application: routes, error answers and the guard around them."""
+
+from typing import Any
+
+import msgspec
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from starlette.exceptions import HTTPException
+from starlette.staticfiles import StaticFiles
+from starlette.types import ASGIApp
+
+from rolling_panda import __version__
+from rolling_panda.page_messages import PageEvents, PagePoints, PageState
+from rolling_panda.resources import resource
+from server.desk import Desk, Result
+from server.guard import Guard
+from server.operator_api import answer, operator_router
+from server.pages import pages_router
+from server.sessions import Session
+from server.site import site_router
+from server.viser_proxy import viser_router
+
+_ABOUT = (
+    "Everything that the page can do. Sign in with `POST /api/sign-in` and the token of a sign-in link, keep the "
+    "cookie, and send an `Origin` header with the server's own address on every POST. "
+    "Units are SI; frames follow REP-105."
+)
+
+
+def create_app(desk: Desk, origins: frozenset[str]) -> ASGIApp:
+    """The guarded application; `origins` are the exact origins that the page may have."""
+    web = resource("web")
+    app = FastAPI(
+        title="Rolling Panda",
+        version=__version__,
+        description=_ABOUT,
+        openapi_url="/api/openapi.json",
+        docs_url=None,
+        redoc_url=None,
+    )
+
+    def dropped(session: Session, kind: str) -> None:
+        desk.note("warning", f"a view of {session.user} sent {kind!r} to the 3-D view; dropped")
+
+    app.include_router(site_router(desk, web))
+    app.include_router(operator_router(desk))
+    app.include_router(pages_router(desk))
+    app.include_router(viser_router(desk.scene, dropped))
+    app.mount("/", StaticFiles(directory=web), name="web")
+    app.add_exception_handler(RequestValidationError, _invalid)
+    app.add_exception_handler(HTTPException, _failed)
+    schema = app.openapi
+
+    def openapi() -> dict[str, Any]:
+        document = schema()
+        _, messages = msgspec.json.schema_components(
+            (PageState, PagePoints, PageEvents), ref_template="#/components/schemas/{name}"
+        )
+        document.setdefault("components", {}).setdefault("schemas", {}).update(messages)
+        return document
+
+    app.openapi = openapi  # type: ignore[method-assign]
+    return Guard(
+        app,
+        desk.sessions,
+        origins,
+        desk.cookie,
+        desk.config.max_body_bytes,
+        on_refusal=lambda text: desk.note("warning", text),
+    )
+
+
+async def _invalid(_: Request, error: Exception) -> JSONResponse:
+    """Validation errors in words: which field, what is wrong."""
+    problems = error.errors() if isinstance(error, RequestValidationError) else []
+    words = [f"{'.'.join(str(part) for part in problem['loc'])}: {problem['msg']}" for problem in problems[:5]]
+    return answer(Result(422, False, "; ".join(words)[:500] or "the request is wrong"))
+
+
+async def _failed(_: Request, error: Exception) -> JSONResponse:
+    status = error.status_code if isinstance(error, HTTPException) else 500
+    return answer(Result(status, False, str(getattr(error, "detail", ""))[:500]))

@@ -1,0 +1,37 @@
+"""What can be set about the operator's server."""
+
+from typing import Annotated
+
+from msgspec import Meta, Struct
+
+from rolling_panda.config import Positive
+
+
+class ServerConfig(Struct, frozen=True, forbid_unknown_fields=True):
+    """Rates and limits of the operator's server.
+
+    Attributes:
+        page_rate_hz: `PageState` messages a second to each page.
+        scene_rate_hz: Most updates a second of the 3-D view; nothing is sent while nothing moves.
+        teleop_rate_hz: `TeleopTarget` messages a second while the operator holds.
+        hold_timeout_s: A hold that is not renewed for this long has ended.
+        view_timeout_s: A page that has not drawn a state younger than this may not move the robot.
+        stop_confirm_s: How long a stop waits for the bridge to say that it has latched.
+        session_idle_s: A session unused for this long has ended.
+        invite_s: Life of a sign-in link that a supervisor makes for somebody else.
+        log_lines: Log lines kept in memory.
+        max_body_bytes: Longest request body, and longest WebSocket frame from a client.
+        origins: Further origins that the page may be served under, as `https://HOST`, beside the loopback ones.
+    """
+
+    page_rate_hz: Positive = 10.0
+    scene_rate_hz: Positive = 30.0
+    teleop_rate_hz: Positive = 30.0
+    hold_timeout_s: Positive = 0.15
+    view_timeout_s: Positive = 0.5
+    stop_confirm_s: Positive = 0.5
+    session_idle_s: Positive = 12 * 3600.0
+    invite_s: Positive = 600.0
+    log_lines: Annotated[int, Meta(ge=200, le=100_000)] = 1000
+    max_body_bytes: Annotated[int, Meta(ge=1024, le=1 << 20)] = 64 << 10
+    origins: tuple[str, ...] = ()

@@ -1,0 +1,195 @@
+"""The operator's desk: what REST and the pages share, and what happens when somebody asks for something."""
+
+import asyncio
+import time
+from collections import deque
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from rolling_panda import intents
+from rolling_panda import messages as m
+from rolling_panda.errors import InputError, ServiceError
+from rolling_panda.page_messages import PagePoints, PageState
+from server.config import ServerConfig
+from server.event_log import EventLog
+from server.page_view import PageView
+from server.robot_link import RobotLink
+from server.scene import Scene
+from server.sessions import Session, Sessions
+from server.teleop import TeleopHold
+
+_CONFIRM_POLL_S = 0.01
+
+
+@dataclass(frozen=True)
+class Result:
+    """How a request ended: the HTTP status that says so, and the reason in words."""
+
+    status: int
+    ok: bool
+    reason: str
+
+
+class Listener(Protocol):
+    """An open page."""
+
+    session: Session
+
+    def wake(self) -> None:
+        """There may be something new to send."""
+
+    def selected(self, point_id: str) -> None:
+        """A point was clicked in the 3-D view of this page's session."""
+
+
+@dataclass(eq=False)
+class Desk:
+    """Shared state of the server; its event loop alone touches it."""
+
+    config: ServerConfig
+    link: RobotLink
+    scene: Scene
+    view: PageView
+    sessions: Sessions
+    log: EventLog
+    teleop: TeleopHold
+    address: str
+    cookie: str
+    pages: set["Listener"] = field(default_factory=set)
+    state: PageState | None = None
+    points: PagePoints | None = None
+    _made_at: deque[tuple[int, float]] = field(default_factory=lambda: deque(maxlen=100))
+    _refused_holds: dict[str, str] = field(default_factory=dict)
+
+    def note(self, severity: m.Severity, text: str) -> None:
+        """Write a line of the server's own into the log, here and on the wire."""
+        self.log.add("server", severity, text[:500], time.time())
+        self.link.event(severity, text, time.monotonic())
+
+    def made_state(self, state: PageState, now: float) -> None:
+        """A new state goes out to the pages."""
+        self.state = state
+        self._made_at.append((state.number, now))
+
+    def drew(self, session: Session, number: int) -> None:
+        """A page of this session has drawn state `number`."""
+        for known, made_at in reversed(self._made_at):
+            if known == number:
+                self.teleop.drew(session.session_id, made_at)
+                return
+
+    def fetched(self, session: Session, now: float) -> None:
+        """A script has fetched the state that was made last."""
+        session.looked_at = now
+        if self._made_at:
+            self.teleop.drew(session.session_id, self._made_at[-1][1])
+
+    async def ask(self, session: Session, intent: intents.Intent) -> Result:
+        """Ask the controller, and log why it refused."""
+        name = type(intent).__name__
+        if not session.may_operate:
+            return Result(403, False, f"a {session.role} may look and stop, not operate")
+        try:
+            answer = await self.link.ask(intent)
+        except ServiceError as error:
+            self.note("error", f"{name} by {session.user}: no answer from the controller")
+            return Result(503, False, f"The controller does not answer: {error}")
+        if not answer.ok:
+            self.note("warning", f"{name} by {session.user} refused: {answer.reason}")
+            return Result(409, False, answer.reason)
+        return Result(200, True, answer.reason)
+
+    async def stop(self, session: Session, reason: str) -> Result:
+        """Send the software stop at once and wait for the bridge to confirm its latch."""
+        sent_at = time.monotonic()
+        self.link.stop(session.user, reason)
+        holder = self.teleop.holder
+        if holder is not None:
+            self.teleop.release(holder)
+            self.held_out(holder)
+        self.note("warning", f"software stop by {session.user}: {reason}")
+        while time.monotonic() - sent_at < self.config.stop_confirm_s:
+            bridge = self.link.bridge.peek()
+            if bridge is not None and bridge.at >= sent_at and bridge.message.stop_id:
+                return Result(200, True, "stopped: the bridge has latched the stop")
+            await asyncio.sleep(_CONFIRM_POLL_S)
+        return Result(
+            503, False, "The stop was sent, but the bridge has not confirmed it: use the robot's emergency stop."
+        )
+
+    def hold(self, session: Session, now: float) -> Result:
+        """Start or renew this session's hold on the tool."""
+        key = session.session_id
+        if not session.may_operate:
+            return self._refuse_hold(session, f"a {session.role} may look and stop, not operate", 403)
+        was_holding = self.teleop.holder == key
+        try:
+            self.teleop.hold(key, session.user, now)
+        except InputError as error:
+            return self._refuse_hold(session, str(error), 409)
+        self._refused_holds.pop(key, None)
+        if not was_holding:
+            self.note("info", f"{session.user} holds the tool")
+        return Result(200, True, "holding")
+
+    def let_go(self, session: Session) -> None:
+        """End this session's hold at once; its gizmo goes back to the tool."""
+        self._refused_holds.pop(session.session_id, None)
+        if self.teleop.release(session.session_id):
+            self.held_out(session.session_id)
+            self.note("info", f"{session.user} let go of the tool")
+
+    def held_out(self, owner: str) -> None:
+        """A hold has ended: the gizmo goes back to the tool, and aims there."""
+        tool = self.view.tool(time.monotonic())
+        if tool is not None and self.scene.gizmos.shown(owner):
+            self.scene.gizmos.reset(owner, tool)
+            self.teleop.aim(owner, tool)
+
+    def show_gizmo(self, session: Session, visible: bool) -> None:
+        """Show this session's gizmo at the tool, or hide it and end its hold."""
+        if not visible:
+            self.let_go(session)
+            self.scene.gizmos.hide(session.session_id)
+            return
+        tool = self.view.tool(time.monotonic())
+        if not session.may_operate or tool is None:
+            self.note("warning", f"no gizmo for {session.user}: the tool's place is not known, or the role is viewer")
+            return
+        self.scene.show_gizmo(session.session_id, tool)
+        self.teleop.aim(session.session_id, tool)
+
+    def sign_out(self, session: Session) -> None:
+        """End a session everywhere."""
+        self.let_go(session)
+        self.teleop.forget(session.session_id)
+        self.scene.forget(session.session_id)
+        self.sessions.end(session)
+        self.note("info", f"{session.user} signed out")
+
+    def wake_pages(self) -> None:
+        """There is something new for the pages."""
+        for page in self.pages:
+            page.wake()
+
+    def clicked(self, owner: str, point_id: str) -> None:
+        """`owner` clicked a point in their 3-D view."""
+        self.scene.select(owner, point_id)
+        for page in self.pages:
+            if page.session.session_id == owner:
+                page.selected(point_id)
+
+    def page_closed(self, page: Listener, holding: bool) -> None:
+        """A page has gone; with the last one of its session goes the gizmo, and with a holding one the hold."""
+        self.pages.discard(page)
+        if holding:
+            self.let_go(page.session)
+        if not any(other.session is page.session for other in self.pages):
+            self.show_gizmo(page.session, False)
+
+    def _refuse_hold(self, session: Session, reason: str, status: int) -> Result:
+        # Held buttons repeat at 20 Hz; one line for each new reason is enough.
+        if self._refused_holds.get(session.session_id) != reason:
+            self._refused_holds[session.session_id] = reason
+            self.note("warning", f"hold by {session.user} refused: {reason}")
+        return Result(status, False, reason)

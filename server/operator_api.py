@@ -1,0 +1,168 @@
+"""REST for everything an operator can do, so that a script can be the operator.
+
+A script signs in as a page does: `POST /api/sign-in` with a single-use token, keep the cookie, and send an `Origin`
+header with the server's own address on every POST.
+"""
+
+import time
+from typing import Annotated, Any
+
+import msgspec
+from fastapi import APIRouter, Depends, HTTPException, Query, Request, Response
+from fastapi.responses import JSONResponse
+
+from rolling_panda import intents
+from rolling_panda import messages as m
+from rolling_panda.page_messages import PageEvents
+from server import requests as body
+from server.desk import Desk, Result
+from server.page_view import addressed
+from server.sessions import Session
+
+PointId = Annotated[str, body.POINT_ID]
+
+
+def _session(request: Request) -> Session:
+    session: Session | None = request.state.session
+    if session is None:
+        raise HTTPException(401, "sign in first")
+    return session
+
+
+Caller = Annotated[Session, Depends(_session)]
+
+_ANSWERS: dict[int | str, dict[str, Any]] = {
+    200: {"model": body.Outcome, "description": "Done."},
+    401: {"model": body.Outcome, "description": "Not signed in."},
+    403: {"model": body.Outcome, "description": "The role may not, or the Origin header is missing or foreign."},
+    409: {"model": body.Outcome, "description": "Refused by the controller; `reason` says why."},
+    422: {"model": body.Outcome, "description": "The request is wrong; `reason` names the field."},
+    503: {"model": body.Outcome, "description": "The controller does not answer."},
+}
+
+
+def operator_router(desk: Desk) -> APIRouter:
+    """Everything under `/api` that needs a session."""
+    router = APIRouter(prefix="/api", responses=_ANSWERS)
+
+    async def ask(session: Session, intent: intents.Intent) -> JSONResponse:
+        return answer(await desk.ask(session, intent))
+
+    @router.post("/points/accept-all", tags=["points"])
+    async def accept_all(session: Caller, request: body.AcceptAll) -> Response:
+        """Accept every proposed point with at least this confidence."""
+        return await ask(session, intents.AcceptAll(user=session.user, confidence=request.confidence))
+
+    @router.post("/points/{point_id}/accept", tags=["points"])
+    async def accept(session: Caller, point_id: PointId, request: body.AcceptPoint) -> Response:
+        """Accept a point as it was seen: with the revision that `GET /api/points` showed."""
+        return await ask(session, intents.AcceptPoint(user=session.user, point_id=point_id, revision=request.revision))
+
+    @router.post("/points/{point_id}/reject", tags=["points"])
+    async def reject(session: Caller, point_id: PointId, request: body.RejectPoint) -> Response:
+        """Take a point off the queue."""
+        return await ask(session, intents.RejectPoint(user=session.user, point_id=point_id, reason=request.reason))
+
+    @router.post("/arm", tags=["mode"])
+    async def arm(session: Caller) -> Response:
+        """IDLE to READY."""
+        return await ask(session, intents.Arm(user=session.user))
+
+    @router.post("/start", tags=["mode"])
+    async def start(session: Caller) -> Response:
+        """Start automatic work on the accepted points."""
+        return await ask(session, intents.Start(user=session.user))
+
+    @router.post("/pause", tags=["mode"])
+    async def pause(session: Caller) -> Response:
+        """Pause; nothing resumes by itself."""
+        return await ask(session, intents.Pause(user=session.user))
+
+    @router.post("/resume", tags=["mode"])
+    async def resume(session: Caller) -> Response:
+        """PAUSED to READY; starting again is separate."""
+        return await ask(session, intents.Resume(user=session.user))
+
+    @router.post("/home", tags=["mode"])
+    async def home(session: Caller) -> Response:
+        """Bring the arm back to its survey posture."""
+        return await ask(session, intents.Home(user=session.user))
+
+    @router.post("/acknowledge", tags=["mode"])
+    async def acknowledge(session: Caller) -> Response:
+        """Acknowledge a protective stop or a fault whose cause has gone."""
+        return await ask(session, intents.Acknowledge(user=session.user))
+
+    @router.post("/stop", tags=["mode"])
+    async def stop(session: Caller, request: body.Stop) -> Response:
+        """Software stop, by every role. It goes straight to bridge and controller; 503 = the bridge did not confirm."""
+        return answer(await desk.stop(session, request.reason))
+
+    @router.post("/reset", tags=["mode"])
+    async def reset(session: Caller, request: body.Reset) -> Response:
+        """Release the latched stop, with a reason; moves nothing. Supervisors only."""
+        if session.role != "supervisor":
+            return answer(Result(403, False, "only a supervisor may release a stop"))
+        return await ask(session, intents.Reset(user=session.user, reason=request.reason))
+
+    @router.post("/teleop", tags=["teleoperation"])
+    async def teleop(session: Caller, request: body.Teleop) -> Response:
+        """Hold the tool to a target (T_odom_tool) for the next 150 ms; repeat to keep holding.
+
+        Only while the caller also fetches `GET /api/state` at least twice a second: who does not look may not move.
+        """
+        if not request.hold:
+            desk.let_go(session)
+            return answer(Result(200, True, "released"))
+        if request.target is not None:
+            desk.teleop.aim(session.session_id, m.Pose(request.target.position, request.target.quat_xyzw))
+        return answer(desk.hold(session, time.monotonic()))
+
+    @router.get("/state", tags=["state"], responses=_schema("PageState"))
+    async def state(session: Caller) -> Response:
+        """The newest state of the robot: what the page gets 10 times a second."""
+        if desk.state is None:
+            return answer(Result(503, False, "The server is starting; ask again."))
+        desk.fetched(session, time.monotonic())
+        return _json(addressed(desk.state, session))
+
+    @router.get("/points", tags=["state"], responses=_schema("PagePoints"))
+    async def points(session: Caller) -> Response:
+        """Every pruning point in the order of work, with its life in the queue."""
+        return _json(desk.points if desk.points is not None else desk.view.points(time.monotonic()))
+
+    @router.get("/events", tags=["state"], responses=_schema("PageEvents"))
+    async def events(session: Caller, after: Annotated[int, Query(ge=0)] = 0) -> Response:
+        """Log lines after line number `after`, oldest first."""
+        return _json(PageEvents(events=desk.log.after(after, desk.config.log_lines)))
+
+    @router.get("/me", tags=["state"])
+    async def me(session: Caller) -> body.Me:
+        """Who is signed in."""
+        return body.Me(user=session.user, role=session.role)
+
+    @router.post("/invite", tags=["sessions"])
+    async def invite(session: Caller, request: body.Invite) -> Response:
+        """A single-use sign-in link for somebody else or for a script. Supervisors only."""
+        if session.role != "supervisor":
+            return answer(Result(403, False, "only a supervisor may invite"))
+        expires_at = time.monotonic() + desk.config.invite_s
+        token = desk.sessions.invite(request.user, request.role, expires_at)
+        desk.note("info", f"{session.user} made a sign-in link for {request.user} ({request.role})")
+        return JSONResponse({"ok": True, "reason": "", "link": f"{desk.address}/sign-in?token={token}"})
+
+    return router
+
+
+def answer(result: Result) -> JSONResponse:
+    """A result as every request is answered: `{ok, reason}`."""
+    return JSONResponse({"ok": result.ok, "reason": result.reason}, result.status)
+
+
+def _json(message: msgspec.Struct) -> Response:
+    return Response(msgspec.json.encode(message), media_type="application/json")
+
+
+def _schema(name: str) -> dict[int | str, dict[str, Any]]:
+    content = {"application/json": {"schema": {"$ref": f"#/components/schemas/{name}"}}}
+    return {200: {"description": "Now.", "content": content, "model": None}}

@@ -1,0 +1,122 @@
+"""What the page is shown, put together from the newest messages of the robot."""
+
+import msgspec
+import numpy as np
+
+from rolling_panda import messages as m
+from rolling_panda.page_messages import PagePoint, PagePoints, PageState, Role
+from rolling_panda.robot_model import RobotModel, configuration, pose_message
+from server.robot_link import RobotLink
+from server.sessions import Session
+
+#: A count of frames alone is not worth sending every point again more often than this (s).
+_RECOUNT_S = 5.0
+_NOT_QUEUED = "the controller has not taken it up yet"
+
+
+class PageView:
+    """Builds `PageState` and `PagePoints`. The last known state stays, with its age."""
+
+    def __init__(self, link: RobotLink, model: RobotModel) -> None:
+        """Read from `link`; `model` projects points into the camera image."""
+        self._link = link
+        self._model = model
+        self._seen: dict[str, m.PruningPoint] = {}
+        self._made_from: tuple[object, ...] = ()
+        self._made: PagePoints | None = None
+        self._made_at = 0.0
+
+    def state(self, number: int, viewers: int, now: float) -> PageState:
+        """The state of this moment, addressed to nobody yet."""
+        controller, bridge = self._link.controller.peek(), self._link.bridge.peek()
+        joints, odometry = self._link.joints.peek(), self._link.odometry.peek()
+        camera = self._link.camera.peek()
+        return PageState(
+            number=number,
+            user="",
+            role="viewer",
+            viewers=viewers,
+            processes=self._link.presence(now),
+            controller=msgspec.structs.replace(controller.message, queue=()) if controller else None,
+            controller_age_s=max(now - controller.at, 0.0) if controller else None,
+            bridge=bridge.message if bridge else None,
+            bridge_age_s=max(now - bridge.at, 0.0) if bridge else None,
+            joints=joints.message if joints else None,
+            base=odometry.message.pose if odometry else None,
+            camera_frame=camera.message.sequence if camera else 0,
+        )
+
+    def tool(self, now: float) -> m.Pose | None:
+        """Measured T_odom_tool, or None before the robot has said where it is."""
+        posture = self._link.posture(now)
+        if posture is None:
+            return None
+        return pose_message(self._model.pose(configuration(posture.base, posture.position), self._model.tool_id))
+
+    def points(self, now: float) -> PagePoints:
+        """Every point in the order of work; those that perception no longer sees stay while the queue has them.
+
+        The same object as before while nothing has changed; the count of frames alone is renewed now and then.
+        """
+        received, controller = self._link.points.peek(), self._link.controller.peek()
+        camera = self._link.camera.peek()
+        queue = controller.message.queue if controller else ()
+        made_from = (received, camera, queue)
+        before = self._made
+        if before is not None and made_from == self._made_from:
+            return before
+        made = self._make_points(received.message if received else None, queue, camera.message if camera else None)
+        self._made_from = made_from
+        if before is not None:
+            recounted = msgspec.structs.replace(before, frames=made.frames)
+            if made == before or (made == recounted and now - self._made_at <= _RECOUNT_S):
+                return before
+        self._made, self._made_at = made, now
+        return made
+
+    def _make_points(
+        self, perceived: m.PruningPoints | None, queue: tuple[m.QueueEntry, ...], camera: m.CameraFrame | None
+    ) -> PagePoints:
+        points = perceived.points if perceived else ()
+        queued = {entry.point_id for entry in queue}
+        current = {point.point_id: point for point in points}
+        self._seen = {key: point for key, point in self._seen.items() if key in queued} | current
+        rows = [(self._seen[entry.point_id], entry) for entry in queue if entry.point_id in self._seen]
+        rows += [
+            (point, m.QueueEntry(point.point_id, "PROPOSED", _NOT_QUEUED))
+            for point in points
+            if point.point_id not in queued
+        ]
+        pixels = project([point.position for point, _ in rows], camera, self._model)
+        return PagePoints(
+            points=tuple(PagePoint(point, entry, pixel) for (point, entry), pixel in zip(rows, pixels, strict=True)),
+            abstained=perceived.abstained if perceived else (),
+            segmenter=perceived.segmenter if perceived else "",
+            frames=perceived.frames if perceived else 0,
+            image_size=(camera.intrinsics.width, camera.intrinsics.height) if camera else (0, 0),
+        )
+
+
+def addressed(state: PageState, session: Session) -> PageState:
+    """The same state for one reader."""
+    role: Role = session.role
+    return msgspec.structs.replace(state, user=session.user, role=role)
+
+
+def project(
+    positions: list[m.Vector3], frame: m.CameraFrame | None, model: RobotModel
+) -> list[tuple[float, float] | None]:
+    """Pixels of points in odom (m) in a camera frame, whole numbers; None where outside the image or behind."""
+    if frame is None or not positions:
+        return [None] * len(positions)
+    camera = model.pose(configuration(frame.base, frame.position), model.camera_id)
+    points = (np.array(positions) - camera.translation) @ camera.rotation
+    lens = frame.intrinsics
+    pixels: list[tuple[float, float] | None] = []
+    for x, y, z in points:
+        if z < 0.05:
+            pixels.append(None)
+            continue
+        u, v = float(round(lens.fx * x / z + lens.cx)), float(round(lens.fy * y / z + lens.cy))
+        pixels.append((u, v) if 0 <= u < lens.width and 0 <= v < lens.height else None)
+    return pixels

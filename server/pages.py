@@ -1,0 +1,161 @@
+"""The page's WebSocket `/ws`: states out, newest wins; heartbeats, holds and gestures in, strict."""
+
+import asyncio
+import time
+
+import msgspec
+from fastapi import APIRouter
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from rolling_panda.page_messages import (
+    FromPage,
+    Hold,
+    PageEvents,
+    PageMessage,
+    PagePoints,
+    PageState,
+    Ping,
+    Pong,
+    Select,
+    Selected,
+    ShowGizmo,
+)
+from server.desk import Desk
+from server.page_view import addressed
+from server.sessions import Session
+
+_ENCODER = msgspec.json.Encoder()
+_DECODER: msgspec.json.Decoder[FromPage] = msgspec.json.Decoder(FromPage, strict=True)
+_EVENTS_AT_ONCE = 200
+_POLICY = 1008
+
+
+class OpenPage:
+    """One open page. A page that reads slowly skips states; nothing queues up for it."""
+
+    def __init__(self, desk: Desk, websocket: WebSocket, session: Session) -> None:
+        """Nothing has been sent yet."""
+        self._desk = desk
+        self._websocket = websocket
+        self.session = session
+        self._wake = asyncio.Event()
+        self._pong: Pong | None = None
+        self._selected: str | None = None
+        self._state: PageState | None = None
+        self._points: PagePoints | None = None
+        self._event_number = 0
+        self._hold_sequence = -1
+        self._holding = False
+
+    async def run(self) -> None:
+        """Serve the page until it goes, breaks the rules, or the session ends."""
+        desk = self._desk
+        desk.pages.add(self)
+        self.wake()
+        legs = [
+            asyncio.create_task(self._write()),
+            asyncio.create_task(self._read()),
+            asyncio.create_task(self.session.ended.wait()),
+        ]
+        try:
+            await asyncio.wait(legs, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            desk.page_closed(self, self._holding)
+            for leg in legs:
+                leg.cancel()
+            await asyncio.gather(*legs, return_exceptions=True)
+        if self.session.ended.is_set():
+            await self._close("signed out")
+
+    def selected(self, point_id: str) -> None:
+        """A point was clicked in the 3-D view of this session."""
+        self._selected = point_id
+        self.wake()
+
+    def wake(self) -> None:
+        """There may be something new to send."""
+        self._wake.set()
+
+    async def _write(self) -> None:
+        try:
+            while True:
+                await self._wake.wait()
+                self._wake.clear()
+                while (message := self._next()) is not None:
+                    await self._websocket.send_text(_ENCODER.encode(message).decode())
+        except (WebSocketDisconnect, RuntimeError):
+            return
+
+    def _next(self) -> PageMessage | None:
+        """The most urgent message that this page has not been sent."""
+        desk = self._desk
+        if self._pong is not None:
+            pong, self._pong = self._pong, None
+            return pong
+        if desk.state is not None and desk.state is not self._state:
+            self._state = desk.state
+            return addressed(desk.state, self.session)
+        if self._selected is not None:
+            point_id, self._selected = self._selected, None
+            return Selected(point_id=point_id)
+        if desk.points is not None and desk.points is not self._points:
+            self._points = desk.points
+            return desk.points
+        if desk.log.number > self._event_number:
+            events = desk.log.after(self._event_number, _EVENTS_AT_ONCE)
+            self._event_number = desk.log.number
+            return PageEvents(events=events)
+        return None
+
+    async def _read(self) -> None:
+        try:
+            while True:
+                text = await self._websocket.receive_text()
+                try:
+                    message = _DECODER.decode(text)
+                except (msgspec.MsgspecError, UnicodeEncodeError, RecursionError) as error:
+                    self._desk.note("warning", f"a page of {self.session.user} was closed: {str(error)[:200]}")
+                    await self._close("this message is not one that a page may send")
+                    return
+                self._take(message)
+        except (WebSocketDisconnect, KeyError, RuntimeError):
+            # KeyError: a binary frame, which no page sends.
+            return
+
+    def _take(self, message: FromPage) -> None:
+        match message:
+            case Ping(number=number, rendered=rendered):
+                self._desk.drew(self.session, rendered)
+                self._pong = Pong(number=number)
+                self.wake()
+            case Hold(sequence=sequence, hold=hold):
+                if sequence <= self._hold_sequence:
+                    return
+                self._hold_sequence = sequence
+                if hold:
+                    self._holding = self._desk.hold(self.session, time.monotonic()).ok
+                else:
+                    self._holding = False
+                    self._desk.let_go(self.session)
+            case ShowGizmo(visible=visible):
+                self._desk.show_gizmo(self.session, visible)
+            case Select(point_id=point_id):
+                self._desk.scene.select(self.session.session_id, point_id)
+
+    async def _close(self, reason: str) -> None:
+        try:
+            await self._websocket.close(_POLICY, reason)
+        except RuntimeError:
+            return
+
+
+def pages_router(desk: Desk) -> APIRouter:
+    """The WebSocket `/ws`."""
+    router = APIRouter(include_in_schema=False)
+
+    @router.websocket("/ws")
+    async def page(websocket: WebSocket) -> None:
+        await websocket.accept()
+        await OpenPage(desk, websocket, websocket.state.session).run()
+
+    return router

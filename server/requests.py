@@ -1,0 +1,106 @@
+"""Bodies of the REST requests: strict, bounded, no unknown field, no NaN."""
+
+from typing import Annotated, Any
+
+from fastapi import Path
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+
+from rolling_panda.page_messages import Role
+
+#: As `rolling_panda.messages.Name`.
+POINT_ID: Any = Path(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9_.:\-]+$")
+_Text = Annotated[str, Field(max_length=500)]
+_Metre = Annotated[float, Field(ge=-1e4, le=1e4)]
+_Unit = Annotated[float, Field(ge=-1.001, le=1.001)]
+
+
+class _Body(BaseModel):
+    model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
+
+
+class _JsonTuples(_Body):
+    """JSON has no tuples, so these fields take lists of the same length."""
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _tuples(cls, value: Any) -> Any:
+        return tuple(value) if isinstance(value, list) else value
+
+
+class SignIn(_Body):
+    """The token of a sign-in link."""
+
+    token: Annotated[str, Field(min_length=1, max_length=200)]
+
+
+class AcceptPoint(_Body):
+    """The revision that the operator saw; an older one is refused."""
+
+    revision: Annotated[int, Field(ge=0, le=2**62)]
+
+
+class RejectPoint(_Body):
+    """Why."""
+
+    reason: _Text = ""
+
+
+class AcceptAll(_Body):
+    """Least confidence, 0…1."""
+
+    confidence: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
+
+
+class Stop(_Body):
+    """Why."""
+
+    reason: _Text = "software stop"
+
+
+class Reset(_Body):
+    """Why it is safe again."""
+
+    reason: Annotated[str, Field(min_length=1, max_length=500)]
+
+
+class Target(_JsonTuples):
+    """T_odom_tool: position in m and unit quaternion x, y, z, w."""
+
+    position: tuple[_Metre, _Metre, _Metre]
+    quat_xyzw: tuple[_Unit, _Unit, _Unit, _Unit]
+
+    @field_validator("quat_xyzw")
+    @classmethod
+    def _is_rotation(cls, value: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+        length = sum(part * part for part in value) ** 0.5
+        if abs(length - 1.0) > 1e-2:
+            raise ValueError(f"a quaternion has length 1, this one has {length:.3f}")
+        return value
+
+
+class Teleop(_Body):
+    """Hold, and where to; without a target the last one stays."""
+
+    hold: bool
+    target: Target | None = None
+
+
+class Invite(_Body):
+    """Who is invited."""
+
+    user: Annotated[str, Field(min_length=1, max_length=40, pattern=r"^[A-Za-z0-9_.\- ]+$")]
+    role: Role
+
+
+class Outcome(BaseModel):
+    """Done or not, and the reason in words."""
+
+    ok: bool
+    reason: str
+
+
+class Me(BaseModel):
+    """Who is signed in."""
+
+    user: str
+    role: Role

@@ -1,0 +1,226 @@
+"""The 3-D view: a viser server on a loopback port of its own, seen by browsers through the filtering proxy alone."""
+
+import contextlib
+import io
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import viser
+
+from rolling_panda import messages as m
+from rolling_panda.differential_drive import Array
+from rolling_panda.page_messages import PagePoint
+from server.robot_meshes import Part
+from server.scene_door import SceneDoor
+from server.scene_gizmo import SceneGizmos
+from server.scene_markers import STATE_COLORS, cut_marker, quat_wxyz_of_axis, selection_ring
+from server.scene_robot import SceneRobot
+from server.scene_row import color_of, drawn_kinds, rods_mesh
+
+VIEW_VERSION = viser.__version__
+_SKY_TOP, _SKY_BOTTOM = np.array([22.0, 27.0, 34.0]), np.array([58.0, 66.0, 76.0])
+_CANE_LINES = "/canes"
+_SELECTION = "/selection"
+
+
+def view_page() -> bytes:
+    """The client's page: one self-contained HTML file."""
+    return (Path(viser.__file__).parent / "client" / "build" / "index.html").read_bytes()
+
+
+class Scene:
+    """Everything that is drawn. Its methods are called from the server's loop; callbacks come on viser's thread."""
+
+    def __init__(
+        self,
+        model: Any,
+        parts: list[Part],
+        on_select: Callable[[str, str], object],
+        on_aim: Callable[[str, m.Pose], object],
+        on_stranger: Callable[[], object],
+    ) -> None:
+        """Start viser and draw the robot.
+
+        Args:
+            model: Pinocchio model of the robot.
+            parts: Its looks.
+            on_select: Called with (owner, point_id) when `owner` clicked a point.
+            on_aim: Called with (owner, target) when `owner` dragged their gizmo.
+            on_stranger: Called when a connection that did not come through the proxy was refused.
+        """
+        with contextlib.redirect_stdout(io.StringIO()):
+            self._server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        self.port = int(self._server.get_port())
+        self.door = SceneDoor(self._server, on_stranger)
+        self.gizmos = SceneGizmos(on_aim)
+        self._on_select = on_select
+        self._marker = cut_marker()
+        self._points: dict[str, tuple[PagePoint, viser.MeshHandle]] = {}
+        self._canes: tuple[tuple[m.Vector3, ...], ...] = ()
+        self._rods: dict[str, list[m.Capsule]] = {}
+        self._selected: dict[str, str] = {}
+        self._draw_surroundings()
+        self.robot = SceneRobot(self._server, model, parts)
+        self._server.on_client_connect(self._on_client)
+        self._server.on_client_disconnect(self._on_client_gone)
+
+    def show_row(self, scenery: m.Scenery) -> None:
+        """Draw the row; kinds of rods that did not change are not sent again."""
+        rods: dict[str, list[m.Capsule]] = {kind: [] for kind in drawn_kinds()}
+        for capsule in scenery.capsules:
+            if capsule.kind in rods:
+                rods[capsule.kind].append(capsule)
+        for kind in drawn_kinds():
+            capsules = rods[kind]
+            if capsules == self._rods.get(kind):
+                continue
+            self._rods[kind] = capsules
+            if capsules:
+                vertices, faces = rods_mesh(kind, capsules)
+                self._server.scene.add_mesh_simple(
+                    f"/row/{kind}", vertices, faces, color=color_of(kind), flat_shading=True, receive_shadow=False
+                )
+            else:
+                self._server.scene.remove_by_name(f"/row/{kind}")
+
+    def show_points(self, points: tuple[PagePoint, ...]) -> None:
+        """Draw the pruning points, coloured by state; only what changed is sent."""
+        shown = {row.point.point_id: row for row in points}
+        with self._server.atomic():
+            for point_id in [key for key in self._points if key not in shown]:
+                self._points.pop(point_id)[1].remove()
+            for point_id, row in shown.items():
+                self._show_point(point_id, row)
+        for owner in list(self._selected):
+            self._draw_selection(owner)
+
+    def show_canes(self, canes: tuple[tuple[m.Vector3, ...], ...]) -> None:
+        """Draw the axes of the canes as perceived (polylines in odom, m)."""
+        if canes == self._canes:
+            return
+        self._canes = canes
+        pairs = [(a, b) for line in canes for a, b in zip(line, line[1:], strict=False)]
+        if pairs:
+            self._server.scene.add_line_segments(
+                _CANE_LINES,
+                np.array(pairs, dtype=np.float32),
+                colors=(96, 160, 190),
+                thickness=1.0,
+                thickness_units="screen",
+            )
+        else:
+            self._server.scene.remove_by_name(_CANE_LINES)
+
+    def select(self, owner: str, point_id: str) -> None:
+        """Put the ring around a point on the views of `owner`; empty = none."""
+        self._selected[owner] = point_id
+        self._draw_selection(owner)
+
+    def show_gizmo(self, owner: str, tool: m.Pose) -> None:
+        """Show the gizmo of `owner` at the tool (pose in odom)."""
+        self.gizmos.show(owner, tool, self._clients(owner))
+
+    def forget(self, owner: str) -> None:
+        """`owner` has signed out."""
+        self._selected.pop(owner, None)
+        self.gizmos.hide(owner)
+
+    def move(self, q: Array) -> bool:
+        """Show the robot at q (12); True when something was sent."""
+        return self.robot.move(q)
+
+    def close(self) -> None:
+        """Stop viser."""
+        with contextlib.redirect_stdout(io.StringIO()):
+            self._server.stop()
+
+    def _show_point(self, point_id: str, row: PagePoint) -> None:
+        color = STATE_COLORS[row.entry.state]
+        wxyz = quat_wxyz_of_axis(row.point.tangent)
+        if point_id not in self._points:
+            handle = self._server.scene.add_mesh_simple(
+                f"/points/{point_id}",
+                self._marker.vertices,
+                self._marker.faces,
+                color=color,
+                flat_shading=True,
+                cast_shadow=False,
+                receive_shadow=False,
+                position=row.point.position,
+                wxyz=wxyz,
+            )
+
+            async def clicked(event: viser.SceneNodePointerEvent[Any]) -> None:
+                owner = self.door.owner(event.client_id)
+                if owner is not None:
+                    self._on_select(owner, point_id)
+
+            handle.on_click(clicked)
+        else:
+            before, handle = self._points[point_id]
+            if before.entry.state != row.entry.state:
+                handle.color = color
+            if before.point.position != row.point.position:
+                handle.position = row.point.position
+            if before.point.tangent != row.point.tangent:
+                handle.wxyz = wxyz
+        self._points[point_id] = (row, handle)
+
+    def _draw_selection(self, owner: str) -> None:
+        shown = self._points.get(self._selected.get(owner, ""))
+        for client in self._clients(owner):
+            if shown is None:
+                client.scene.remove_by_name(_SELECTION)
+                continue
+            point = shown[0].point
+            ring = client.scene.get_handle_by_name(_SELECTION)
+            if ring is None:
+                shape = selection_ring()
+                ring = client.scene.add_mesh_simple(
+                    _SELECTION, shape.vertices, shape.faces, color=(255, 255, 255), cast_shadow=False
+                )
+            ring.position = point.position
+            ring.wxyz = quat_wxyz_of_axis(point.tangent)
+
+    def _clients(self, owner: str) -> list[viser.ClientHandle]:
+        clients = self._server.get_clients()
+        return [client for client_id, client in clients.items() if self.door.owner(client_id) == owner]
+
+    async def _on_client(self, client: viser.ClientHandle) -> None:
+        owner = self.door.owner(client.client_id)
+        if owner is not None:
+            self.gizmos.attach(owner, client)
+            self._draw_selection(owner)
+
+    async def _on_client_gone(self, client: viser.ClientHandle) -> None:
+        self.gizmos.detach(client.client_id)
+
+    def _draw_surroundings(self) -> None:
+        server, scene = self._server, self._server.scene
+        server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
+        server.gui.main_panel.minimize()
+        server.initial_camera.position = (-1.45, -1.95, 1.85)
+        server.initial_camera.look_at = (0.3, 0.45, 0.8)
+        server.initial_camera.fov = 0.82
+        scene.world_axes.visible = False
+        sky = _SKY_TOP + np.linspace(0.0, 1.0, 64)[:, None, None] * (_SKY_BOTTOM - _SKY_TOP)
+        scene.set_background_image(np.repeat(sky, 4, axis=1).astype(np.uint8), format="png")
+        scene.configure_environment_map("park", environment_intensity=0.45)
+        scene.configure_default_lights(enabled=False)
+        scene.add_light_directional("/light/sun", intensity=2.2, color=(255, 244, 228), position=(-3.0, -4.0, 6.0))
+        scene.add_light_directional("/light/sky", intensity=0.7, color=(200, 220, 255), position=(3.0, -2.0, 3.0))
+        ground = np.array([[-60.0, -60.0, -0.004], [60.0, -60.0, -0.004], [60.0, 60.0, -0.004], [-60.0, 60.0, -0.004]])
+        scene.add_mesh_simple("/ground", ground, np.array([[0, 1, 2], [0, 2, 3]]), color=(74, 82, 66))
+        scene.add_grid(
+            "/grid",
+            width=40.0,
+            height=40.0,
+            cell_size=0.5,
+            section_size=1.0,
+            cell_color=(78, 86, 71),
+            section_color=(86, 94, 80),
+            fade_distance=14.0,
+            shadow_opacity=0.0,
+        )

@@ -1,0 +1,108 @@
+"""The gizmos of the 3-D view: one a session, shown on that session's views alone."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+import viser
+
+from rolling_panda import messages as m
+from server.scene_markers import quat_wxyz
+
+_NAME = "/gizmo"
+#: The gizmo follows the tool while nobody has dragged it; smaller movements (m, quaternion parts) are not sent.
+_FOLLOW = 1e-3
+
+
+@dataclass
+class _Gizmo:
+    pose: m.Pose
+    dragged: bool = False
+    handles: dict[int, viser.TransformControlsHandle] = field(default_factory=dict)
+
+
+class SceneGizmos:
+    """Shows gizmos and reports where they were dragged. Used from the server's loop and from viser's thread."""
+
+    def __init__(self, on_aim: Callable[[str, m.Pose], object]) -> None:
+        """`on_aim(owner, target)` is called on viser's thread when `owner` has dragged their gizmo."""
+        self._on_aim = on_aim
+        self._gizmos: dict[str, _Gizmo] = {}
+
+    def shown(self, owner: str) -> bool:
+        """Has this session a gizmo now?"""
+        return owner in self._gizmos
+
+    def show(self, owner: str, pose: m.Pose, clients: list[viser.ClientHandle]) -> None:
+        """Show the gizmo of `owner` at a pose in odom on these views."""
+        gizmo = self._gizmos.setdefault(owner, _Gizmo(pose))
+        for client in clients:
+            self.attach(owner, client)
+        self._place(gizmo, pose)
+
+    def attach(self, owner: str, client: viser.ClientHandle) -> None:
+        """Add the gizmo of `owner`, if it is shown, to a view that has just opened."""
+        gizmo = self._gizmos.get(owner)
+        if gizmo is None or client.client_id in gizmo.handles:
+            return
+        handle = client.scene.add_transform_controls(
+            _NAME,
+            scale=0.22,
+            line_width=3.0,
+            depth_test=False,
+            wxyz=quat_wxyz(gizmo.pose.quat_xyzw),
+            position=gizmo.pose.position,
+        )
+        gizmo.handles[client.client_id] = handle
+
+        async def dragged(event: viser.TransformControlsEvent) -> None:
+            x, y, z = (float(value) for value in event.target.position)
+            quaternion = np.array(event.target.wxyz)
+            qw, qx, qy, qz = (float(value) for value in quaternion / max(float(np.linalg.norm(quaternion)), 1e-9))
+            gizmo.pose = m.Pose((x, y, z), (qx, qy, qz, qw))
+            gizmo.dragged = True
+            self._on_aim(owner, gizmo.pose)
+
+        handle.on_update(dragged)
+
+    def detach(self, client_id: int) -> None:
+        """A view has closed."""
+        for gizmo in list(self._gizmos.values()):
+            gizmo.handles.pop(client_id, None)
+
+    def hide(self, owner: str) -> None:
+        """Remove the gizmo of `owner`."""
+        gizmo = self._gizmos.pop(owner, None)
+        if gizmo is not None:
+            for handle in list(gizmo.handles.values()):
+                handle.remove()
+
+    def follow(self, tool: m.Pose, holder: str | None) -> list[str]:
+        """Keep every gizmo that nobody has dragged at the tool, except that of `holder`; whose gizmos moved."""
+        moved = []
+        for owner, gizmo in list(self._gizmos.items()):
+            if owner != holder and not gizmo.dragged and _apart(gizmo.pose, tool) > _FOLLOW:
+                self._place(gizmo, tool)
+                moved.append(owner)
+        return moved
+
+    def reset(self, owner: str, tool: m.Pose) -> None:
+        """Bring a gizmo back to the tool."""
+        gizmo = self._gizmos.get(owner)
+        if gizmo is not None:
+            self._place(gizmo, tool)
+
+    def pose(self, owner: str) -> m.Pose | None:
+        """Where the gizmo of `owner` is in odom, or None without one."""
+        gizmo = self._gizmos.get(owner)
+        return None if gizmo is None else gizmo.pose
+
+    def _place(self, gizmo: _Gizmo, pose: m.Pose) -> None:
+        gizmo.pose, gizmo.dragged = pose, False
+        for handle in list(gizmo.handles.values()):
+            handle.position = pose.position
+            handle.wxyz = quat_wxyz(pose.quat_xyzw)
+
+
+def _apart(a: m.Pose, b: m.Pose) -> float:
+    return float(np.abs(np.array([*a.position, *a.quat_xyzw]) - np.array([*b.position, *b.quat_xyzw])).max())

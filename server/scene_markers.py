@@ -1,0 +1,52 @@
+"""Shapes of the 3-D view that stand for points: a cut marker, a selection ring, and the colour of each state."""
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from rolling_panda import messages as m
+
+Color = tuple[int, int, int]
+
+#: Also told apart by the list beside the view, which has words: colour is not the only sign.
+STATE_COLORS: dict[m.PointState, Color] = {
+    "PROPOSED": (255, 176, 32),
+    "ACCEPTED": (64, 148, 255),
+    "INTENT": (255, 64, 200),
+    "DONE": (56, 200, 96),
+    "FAILED_NOT_CUT": (240, 60, 50),
+    "UNKNOWN": (160, 96, 255),
+    "REJECTED": (130, 136, 142),
+}
+_DISC_RADIUS = 0.034
+_DISC_HEIGHT = 0.004
+_BALL_RADIUS = 0.016
+
+
+def cut_marker() -> trimesh.Trimesh:
+    """A disc in the cutting plane around a ball; the cane's tangent is z, the origin is the cut (m)."""
+    disc = trimesh.creation.cylinder(radius=_DISC_RADIUS, height=_DISC_HEIGHT, sections=24)
+    ball = trimesh.creation.icosphere(subdivisions=1, radius=_BALL_RADIUS)
+    return trimesh.util.concatenate([disc, ball])
+
+
+def selection_ring() -> trimesh.Trimesh:
+    """A ring around a cut marker, in the same frame."""
+    return trimesh.creation.torus(major_radius=0.052, minor_radius=0.004, major_sections=32, minor_sections=8)
+
+
+def quat_wxyz_of_axis(axis: m.UnitVector3) -> NDArray[np.float64]:
+    """The shortest rotation of z onto `axis`, as viser takes it: w, x, y, z."""
+    direction = np.array(axis) / max(float(np.linalg.norm(axis)), 1e-9)
+    w = 1.0 + direction[2]
+    if w < 1e-6:
+        return np.array([0.0, 1.0, 0.0, 0.0])
+    quaternion = np.array([w, -direction[1], direction[0], 0.0])
+    unit: NDArray[np.float64] = quaternion / np.linalg.norm(quaternion)
+    return unit
+
+
+def quat_wxyz(quat_xyzw: m.QuatXyzw) -> tuple[float, float, float, float]:
+    """Viser's order of the wire's quaternion."""
+    x, y, z, w = quat_xyzw
+    return (w, x, y, z)

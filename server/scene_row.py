@@ -1,0 +1,64 @@
+"""The row as triangles: all rods of a kind in one mesh."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rolling_panda import messages as m
+
+Color = tuple[int, int, int]
+
+#: Kinds that are drawn, their colour, and sides of their rods.
+_LOOKS: dict[m.WoodClass, tuple[Color, int]] = {
+    "post": ((150, 140, 125), 8),
+    "trunk": ((104, 78, 56), 8),
+    "cordon": ((116, 86, 60), 8),
+    "spur": ((130, 92, 60), 6),
+    "cane": ((178, 124, 74), 6),
+    "node": ((206, 156, 98), 5),
+    "wire": ((176, 182, 190), 4),
+}
+
+
+def drawn_kinds() -> tuple[m.WoodClass, ...]:
+    """Kinds of rods that have a look."""
+    return tuple(_LOOKS)
+
+
+def color_of(kind: m.WoodClass) -> Color:
+    """Colour of a kind, sRGB 0…255."""
+    return _LOOKS[kind][0]
+
+
+def rods_mesh(kind: m.WoodClass, capsules: list[m.Capsule]) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
+    """Vertices (V, 3) in odom (m) and faces (F, 3) of rods with flat ends.
+
+    Args:
+        kind: Decides how many sides a rod has.
+        capsules: At least one.
+    """
+    sides = _LOOKS[kind][1]
+    start, end = (np.array([getattr(c, name) for c in capsules]) for name in ("start", "end"))
+    radii = np.array([(c.start_radius, c.end_radius) for c in capsules])
+    axis = end - start
+    length = np.linalg.norm(axis, axis=1, keepdims=True)
+    axis = np.where(length > 1e-9, axis / np.maximum(length, 1e-9), [[0.0, 0.0, 1.0]])
+    aside = np.where(np.abs(axis[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
+    u = np.cross(axis, aside)
+    u /= np.linalg.norm(u, axis=1, keepdims=True)
+    v = np.cross(axis, u)
+    angle = np.linspace(0.0, 2 * np.pi, sides, endpoint=False)
+    around = np.cos(angle)[None, :, None] * u[:, None] + np.sin(angle)[None, :, None] * v[:, None]
+    bottom = start[:, None] + radii[:, :1, None] * around
+    top = end[:, None] + radii[:, 1:, None] * around
+    vertices = np.concatenate([bottom, top], axis=1)
+    faces = _prism(sides)[None] + (np.arange(len(capsules)) * 2 * sides)[:, None, None]
+    return vertices.reshape(-1, 3).astype(np.float32), faces.reshape(-1, 3).astype(np.uint32)
+
+
+def _prism(sides: int) -> NDArray[np.int64]:
+    i = np.arange(sides)
+    j = (i + 1) % sides
+    walls = np.concatenate([np.stack([i, j, j + sides], 1), np.stack([i, j + sides, i + sides], 1)])
+    fan = np.arange(1, sides - 1)
+    lid = np.stack([np.zeros_like(fan), fan, fan + 1], 1)
+    return np.concatenate([walls, lid[:, ::-1], lid + sides])

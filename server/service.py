@@ -1,0 +1,161 @@
+"""Puts the server together and runs it until the process is asked to end."""
+
+import asyncio
+import contextlib
+import secrets
+import socket
+import threading
+from collections.abc import Generator
+from pathlib import Path
+
+import uvicorn
+from starlette.types import ASGIApp
+
+from rolling_panda.config import load_section
+from rolling_panda.errors import InputError
+from rolling_panda.process import ProcessContext
+from rolling_panda.robot_model import RobotModel
+from rolling_panda.transport import Transport
+from server.app import create_app
+from server.config import ServerConfig
+from server.desk import Desk
+from server.event_log import EventLog
+from server.loop import Loop
+from server.page_view import PageView
+from server.robot_link import RobotLink
+from server.robot_meshes import robot_parts
+from server.scene import Scene
+from server.sessions import Sessions
+from server.teleop import TeleopHold
+
+_POLL_S = 0.05
+
+
+def run(context: ProcessContext) -> None:
+    """Serve until `context.stopping` is set.
+
+    Raises:
+        InputError: The port is taken, or the token file cannot be used.
+    """
+    config = load_section(context.config_path, "server", ServerConfig)
+    arguments = context.arguments
+    with listen(arguments.host, arguments.port) as door:
+        port = int(door.getsockname()[1])
+        sessions = Sessions(config.session_idle_s)
+        address = f"http://127.0.0.1:{port}"
+        token = _first_token(arguments.sign_in_token_file)
+        sessions.admit(token, "supervisor", "supervisor")
+        if arguments.sign_in_token_file is None:
+            print(f"Sign in once with this link: {address}/sign-in?token={token}", flush=True)
+        asyncio.run(serve(config, context.transport, sessions, door, address, context.stopping))
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """The page's socket, bound before anything else starts.
+
+    Raises:
+        InputError: The port is taken or may not be used.
+    """
+    door = socket.socket()
+    door.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        door.bind((host, port))
+        # Listening, since only that shows a port that another program has bound with the same option.
+        door.listen(64)
+    except (OSError, OverflowError) as error:
+        door.close()
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"cannot listen on {host}:{port}: {reason}. Choose another with --port.") from error
+    return door
+
+
+async def serve(
+    config: ServerConfig,
+    transport: Transport,
+    sessions: Sessions,
+    door: socket.socket,
+    address: str,
+    stopping: threading.Event,
+) -> None:
+    """Serve the page on `door` until `stopping` is set; `address` is how the page is reached on this machine."""
+    soon = asyncio.get_running_loop().call_soon_threadsafe
+    model = RobotModel()
+    scene = Scene(
+        model.model,
+        robot_parts(model.model),
+        # Called on viser's thread, and not before a page is served.
+        on_select=lambda owner, point_id: soon(desk.clicked, owner, point_id),
+        on_aim=lambda owner, target: soon(desk.teleop.aim, owner, target),
+        on_stranger=lambda: soon(desk.note, "warning", "refused a connection to the 3-D view from outside the page"),
+    )
+    link = RobotLink(transport)
+    port = int(door.getsockname()[1])
+    desk = Desk(
+        config,
+        link,
+        scene,
+        PageView(link, model),
+        sessions,
+        EventLog(config.log_lines),
+        TeleopHold(config),
+        address,
+        # Cookies do not know ports: two servers on one machine must not sign each other's people out.
+        f"rolling_panda_{port}",
+    )
+    origins = frozenset({f"http://127.0.0.1:{port}", f"http://localhost:{port}", *config.origins})
+    jobs = [asyncio.create_task(job) for job in Loop(desk).jobs()]
+    site = asyncio.create_task(_site(create_app(desk, origins), config, door, stopping))
+    try:
+        # A job that fails ends the server: a page that shows half the truth is worse than none.
+        await asyncio.wait([*jobs, site], return_when=asyncio.FIRST_COMPLETED)
+        for job in jobs:
+            if job.done():
+                job.result()
+    finally:
+        for session in desk.sessions.everyone():
+            session.ended.set()
+        for job in jobs:
+            job.cancel()
+        stopping.set()
+        await asyncio.gather(*jobs, site, return_exceptions=True)
+        scene.close()
+        link.close()
+
+
+class _Site(uvicorn.Server):
+    """Uvicorn without its own signal handlers: the process has its own."""
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Generator[None, None, None]:
+        yield
+
+
+async def _site(app: ASGIApp, config: ServerConfig, door: socket.socket, stopping: threading.Event) -> None:
+    site = _Site(
+        uvicorn.Config(
+            app,
+            log_level="error",
+            access_log=False,
+            lifespan="off",
+            server_header=False,
+            ws_max_size=config.max_body_bytes,
+            ws_per_message_deflate=False,
+            timeout_graceful_shutdown=1,
+        )
+    )
+    serving = asyncio.create_task(site.serve(sockets=[door]))
+    while not stopping.is_set() and not serving.done():
+        await asyncio.sleep(_POLL_S)
+    site.should_exit = True
+    await serving
+
+
+def _first_token(file: Path | None) -> str:
+    if file is None:
+        return secrets.token_urlsafe(32)
+    try:
+        token = file.read_text(encoding="ascii").strip()
+        file.unlink()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"cannot use the sign-in token file {file}: {error}") from error
+    return token

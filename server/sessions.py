@@ -1,0 +1,131 @@
+"""Who is signed in: single-use sign-in tokens, sessions in memory, and a growing delay after bad attempts.
+
+No clock here: `now` is seconds of a monotonic clock, given by the caller.
+"""
+
+import asyncio
+import hashlib
+import secrets
+from dataclasses import dataclass, field
+
+from rolling_panda.errors import InputError
+from rolling_panda.page_messages import Role
+
+_TOKEN_BYTES = 32
+_FREE_ATTEMPTS = 5
+_MAX_DELAY_S = 60.0
+
+
+class SignInError(InputError):
+    """A sign-in was refused; `wait_s` says for how long further ones are refused too."""
+
+    def __init__(self, reason: str, wait_s: float = 0.0) -> None:
+        """Keep the reason and the delay."""
+        super().__init__(reason)
+        self.wait_s = wait_s
+
+
+@dataclass(eq=False)
+class Session:
+    """One signed-in person or script.
+
+    Attributes:
+        session_id: The cookie's value; never logged.
+        user: Name for logs.
+        role: What they may do.
+        used_at: When the session was last used (s).
+        looked_at: When the session last fetched the robot's state by REST (s); -inf before.
+        ended: Set when the session is over; its sockets close.
+    """
+
+    session_id: str
+    user: str
+    role: Role
+    used_at: float
+    looked_at: float = float("-inf")
+    ended: asyncio.Event = field(default_factory=asyncio.Event)
+
+    @property
+    def may_operate(self) -> bool:
+        """True for roles that may move the robot."""
+        return self.role in ("operator", "supervisor")
+
+
+@dataclass(frozen=True)
+class _Invitation:
+    user: str
+    role: Role
+    expires_at: float
+
+
+class Sessions:
+    """Tokens and sessions. Only digests of tokens are kept."""
+
+    def __init__(self, idle_s: float) -> None:
+        """Nobody is signed in; a session unused for `idle_s` ends."""
+        self._idle_s = idle_s
+        self._invitations: dict[str, _Invitation] = {}
+        self._sessions: dict[str, Session] = {}
+        self._failures = 0
+        self._refuse_until = float("-inf")
+
+    def invite(self, user: str, role: Role, expires_at: float = float("inf")) -> str:
+        """A new sign-in token of 256 bits, good for one sign-in until `expires_at` (s)."""
+        token = secrets.token_urlsafe(_TOKEN_BYTES)
+        self.admit(token, user, role, expires_at)
+        return token
+
+    def admit(self, token: str, user: str, role: Role, expires_at: float = float("inf")) -> None:
+        """Accept `token`, made elsewhere, for one sign-in.
+
+        Raises:
+            InputError: The token is too short to be a secret.
+        """
+        if len(token) < 22:
+            raise InputError(f"the sign-in token has {len(token)} characters; it must have at least 22 (128 bits)")
+        self._invitations[_digest(token)] = _Invitation(user, role, expires_at)
+
+    def sign_in(self, token: str, now: float) -> Session:
+        """Use a token up and open a session.
+
+        Raises:
+            SignInError: Unknown, used or expired token, or too many bad attempts before this one.
+        """
+        if now < self._refuse_until:
+            wait = self._refuse_until - now
+            raise SignInError(f"too many bad sign-ins; try again in {wait:.0f} s", wait)
+        invitation = self._invitations.pop(_digest(token), None)
+        if invitation is None or now > invitation.expires_at:
+            self._failures += 1
+            if self._failures >= _FREE_ATTEMPTS:
+                self._refuse_until = now + min(2.0 ** (self._failures - _FREE_ATTEMPTS), _MAX_DELAY_S)
+            raise SignInError("this sign-in link has been used, has expired or is not from this server")
+        self._failures = 0
+        session = Session(secrets.token_urlsafe(_TOKEN_BYTES), invitation.user, invitation.role, now)
+        self._sessions[_digest(session.session_id)] = session
+        return session
+
+    def find(self, session_id: str, now: float) -> Session | None:
+        """The live session of a cookie value, marked as used now; None when there is none."""
+        session = self._sessions.get(_digest(session_id))
+        if session is None:
+            return None
+        if now - session.used_at > self._idle_s:
+            self.end(session)
+            return None
+        session.used_at = now
+        return session
+
+    def everyone(self) -> tuple[Session, ...]:
+        """Every live session."""
+        return tuple(self._sessions.values())
+
+    def end(self, session: Session) -> None:
+        """Sign out; safe to call twice."""
+        self._sessions.pop(_digest(session.session_id), None)
+        session.ended.set()
+
+
+def _digest(secret: str) -> str:
+    # Looking up a digest takes the same time whatever part of the secret was right.
+    return hashlib.sha256(secret.encode("utf-8", "surrogatepass")).hexdigest()

@@ -1,0 +1,91 @@
+"""The page's files, signing in and out, and what is open to everybody."""
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Request, Response
+from fastapi.responses import FileResponse, JSONResponse
+
+from rolling_panda import __version__
+from server import requests as body
+from server.desk import Desk, Result
+from server.operator_api import answer
+from server.sessions import Session, SignInError
+
+
+def _maybe_session(request: Request) -> Session | None:
+    session: Session | None = request.state.session
+    return session
+
+
+Visitor = Annotated[Session | None, Depends(_maybe_session)]
+
+
+def site_router(desk: Desk, web: Path) -> APIRouter:
+    """Routes outside the session; `web` is the folder of the page."""
+    router = APIRouter()
+
+    @router.get("/", include_in_schema=False)
+    def page(visitor: Visitor) -> Response:
+        return FileResponse(web / ("sign-in.html" if visitor is None else "index.html"))
+
+    @router.get("/sign-in", include_in_schema=False)
+    def sign_in_page() -> Response:
+        # Only shows a page: a browser that fetches links in advance must not use the token up.
+        return FileResponse(web / "sign-in.html")
+
+    @router.post("/api/sign-in", tags=["sessions"], responses={401: {"model": body.Outcome}})
+    async def sign_in(visitor: Visitor, request: body.SignIn) -> Response:
+        """Use up the token of a sign-in link; the answer sets the session cookie."""
+        try:
+            session = desk.sessions.sign_in(request.token, time.monotonic())
+        except SignInError as error:
+            desk.note("warning", f"sign-in refused: {error}")
+            if error.wait_s > 0:
+                refused = answer(Result(429, False, str(error)))
+                refused.headers["Retry-After"] = str(max(1, round(error.wait_s)))
+                return refused
+            return answer(Result(401, False, str(error)))
+        if visitor is not None:
+            desk.sign_out(visitor)
+        desk.note("info", f"{session.user} signed in ({session.role})")
+        signed_in = JSONResponse({"ok": True, "reason": ""})
+        signed_in.set_cookie(
+            desk.cookie,
+            session.session_id,
+            httponly=True,
+            samesite="strict",
+            secure=desk.address.startswith("https:"),
+            path="/",
+        )
+        return signed_in
+
+    @router.post("/api/sign-out", tags=["sessions"], responses={401: {"model": body.Outcome}})
+    async def sign_out(visitor: Visitor) -> Response:
+        """End this session; its pages close at once."""
+        if visitor is not None:
+            desk.sign_out(visitor)
+        signed_out = JSONResponse({"ok": True, "reason": ""})
+        signed_out.delete_cookie(desk.cookie, path="/", httponly=True, samesite="strict")
+        return signed_out
+
+    @router.get("/api/health", tags=["server"])
+    async def health() -> dict[str, str]:
+        """The server answers."""
+        return {"status": "ok"}
+
+    @router.get("/version", tags=["server"])
+    async def version() -> dict[str, str]:
+        """Version of the program."""
+        return {"name": "rolling-panda", "version": __version__}
+
+    @router.get("/camera/color.jpg", tags=["state"], response_class=Response)
+    async def camera() -> Response:
+        """The newest image of the eye-in-hand camera, JPEG."""
+        frame = desk.link.camera.peek()
+        if frame is None:
+            return answer(Result(404, False, "no camera image has come yet"))
+        return Response(frame.message.color_jpeg, media_type="image/jpeg")
+
+    return router

@@ -1,0 +1,112 @@
+"""Hold-to-run: whose gizmo the tool follows, and when the hold has ended. Pure: `now` is an argument."""
+
+from dataclasses import dataclass
+
+from rolling_panda import messages as m
+from rolling_panda.errors import InputError
+from server.config import ServerConfig
+
+#: The end of a hold is said this often, since a single message may be lost.
+_RELEASES = 5
+
+
+@dataclass
+class _Hold:
+    holder: str
+    user: str
+    renewed_at: float
+    target: m.Pose | None
+
+
+class TeleopHold:
+    """One holder at a time; the first wins.
+
+    A hold lives while it is renewed within `hold_timeout_s` and the holder has lately drawn a state of the robot that
+    is not older than `view_timeout_s`.
+    """
+
+    def __init__(self, config: ServerConfig) -> None:
+        """Nobody holds."""
+        self._config = config
+        self._hold: _Hold | None = None
+        self._ended: _Hold | None = None
+        self._releases = 0
+        self._sequence = 0
+        self._targets: dict[str, m.Pose] = {}
+        self._drawn_at: dict[str, float] = {}
+
+    @property
+    def holder(self) -> str | None:
+        """Key of who holds now."""
+        return None if self._hold is None else self._hold.holder
+
+    def drew(self, holder: str, state_made_at: float) -> None:
+        """`holder` has drawn the state that was made at this time (s)."""
+        self._drawn_at[holder] = state_made_at
+
+    def aim(self, holder: str, target: m.Pose) -> None:
+        """Set where this holder's gizmo is; the newest wins."""
+        self._targets[holder] = target
+        if self._hold is not None and self._hold.holder == holder:
+            self._hold.target = target
+
+    def hold(self, holder: str, user: str, now: float) -> None:
+        """Start or renew a hold.
+
+        Raises:
+            InputError: Somebody else holds, the holder's view is old, or there is no target.
+        """
+        self.expire(now)
+        if self._hold is not None and self._hold.holder != holder:
+            raise InputError(f"{self._hold.user} is holding the robot; wait until they let go")
+        age = now - self._drawn_at.get(holder, float("-inf"))
+        if age > self._config.view_timeout_s:
+            raise InputError("the view of the robot is not current; teleoperation needs one younger than 0.5 s")
+        if holder not in self._targets:
+            raise InputError("there is no target yet; show the gizmo first")
+        if self._hold is None:
+            self._hold = _Hold(holder, user, now, self._targets[holder])
+        self._hold.renewed_at = now
+
+    def release(self, holder: str) -> bool:
+        """End this holder's hold at once; True when they were holding."""
+        if self._hold is None or self._hold.holder != holder:
+            return False
+        self._ended, self._hold = self._hold, None
+        self._releases = _RELEASES
+        self._targets.pop(holder, None)
+        return True
+
+    def forget(self, holder: str) -> bool:
+        """The holder has gone: end the hold and drop what is known of it; True when they were holding."""
+        held = self.release(holder)
+        self._targets.pop(holder, None)
+        self._drawn_at.pop(holder, None)
+        return held
+
+    def expire(self, now: float) -> str | None:
+        """End a hold that was not renewed or whose holder no longer sees the robot; who that was, else None."""
+        hold = self._hold
+        if hold is None:
+            return None
+        seen_at = self._drawn_at.get(hold.holder, float("-inf"))
+        if now - hold.renewed_at <= self._config.hold_timeout_s and now - seen_at <= self._config.view_timeout_s:
+            return None
+        self.release(hold.holder)
+        return hold.holder
+
+    def due(self, now: float) -> m.TeleopTarget | None:
+        """What to publish at this tick: the held target, an end of hold, or nothing."""
+        self.expire(now)
+        if self._hold is not None and self._hold.target is not None:
+            self._sequence += 1
+            return _message(self._sequence, True, self._hold.user, self._hold.target)
+        if self._releases > 0 and self._ended is not None and self._ended.target is not None:
+            self._releases -= 1
+            self._sequence += 1
+            return _message(self._sequence, False, self._ended.user, self._ended.target)
+        return None
+
+
+def _message(sequence: int, hold: bool, user: str, target: m.Pose) -> m.TeleopTarget:
+    return m.TeleopTarget(sequence=sequence, hold=hold, user=user, target=target)

@@ -1,0 +1,103 @@
+"""What a browser may say to the 3-D view. Default-deny: a frame that is not one of these, exactly, is dropped.
+
+Viser trusts its client: it clicks disabled buttons, sets sliders beyond their ends, moves gizmos through their limits
+and opens public tunnels when told to. So each frame is decoded strictly, and what passes is encoded anew.
+"""
+
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta, Struct
+
+from rolling_panda.messages import Finite, Metre, Unit, Vector3
+
+_QuatWxyz = tuple[Unit, Unit, Unit, Unit]
+_Screen = tuple[Finite, Finite]
+_NodeName = Annotated[str, Meta(max_length=200)]
+_Owner = Annotated[str, Meta(max_length=100)]
+_Modifier = Annotated[str, Meta(max_length=40)]
+_Pixels = Annotated[int, Meta(ge=0, le=1 << 16)]
+
+
+class _ClientMessage(Struct, frozen=True, tag_field="type", forbid_unknown_fields=True):
+    """Root of the client's messages; the tag is viser's class name."""
+
+
+class ViewerCamera(_ClientMessage, frozen=True, tag="ViewerCameraMessage"):
+    """Where the view's camera is. Anybody who is signed in."""
+
+    wxyz: _QuatWxyz
+    position: Vector3
+    fov: Finite
+    near: Finite
+    far: Finite
+    image_height: _Pixels
+    image_width: _Pixels
+    look_at: Vector3
+    up_direction: Vector3
+
+
+class SceneNodeClick(_ClientMessage, frozen=True, tag="SceneNodeClickMessage"):
+    """A click on something in the scene."""
+
+    name: _NodeName
+    instance_index: int | None
+    ray_origin: Vector3
+    ray_direction: Vector3
+    screen_pos: _Screen
+    modifier: _Modifier | None
+    owner: _Owner = ""
+
+
+class GizmoUpdate(_ClientMessage, frozen=True, tag="TransformControlsUpdateMessage"):
+    """The gizmo was dragged to here."""
+
+    name: Literal["/gizmo"]
+    wxyz: _QuatWxyz
+    position: tuple[Metre, Metre, Metre]
+    owner: _Owner = ""
+
+
+class GizmoDragStart(_ClientMessage, frozen=True, tag="TransformControlsDragStartMessage"):
+    """The gizmo was grabbed."""
+
+    name: Literal["/gizmo"]
+    owner: _Owner = ""
+
+
+class GizmoDragEnd(_ClientMessage, frozen=True, tag="TransformControlsDragEndMessage"):
+    """The gizmo was let go."""
+
+    name: Literal["/gizmo"]
+    owner: _Owner = ""
+
+
+_Admitted = ViewerCamera | SceneNodeClick | GizmoUpdate | GizmoDragStart | GizmoDragEnd
+_DECODER: msgspec.msgpack.Decoder[_Admitted] = msgspec.msgpack.Decoder(_Admitted, strict=True)
+_ENCODER = msgspec.msgpack.Encoder()
+
+
+def admit(frame: bytes, may_operate: bool) -> bytes | None:
+    """The frame to pass on to viser, or None to drop it.
+
+    Args:
+        frame: One binary WebSocket frame from a browser.
+        may_operate: May this session point at things and drag the gizmo?
+    """
+    try:
+        message = _DECODER.decode(frame)
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
+        return None
+    if not may_operate and not isinstance(message, ViewerCamera):
+        return None
+    # Encoded anew, so that viser reads what was checked here and nothing else.
+    return _ENCODER.encode(message)
+
+
+def kind(frame: bytes) -> str:
+    """What a dropped frame said it was, for the log."""
+    try:
+        said = msgspec.msgpack.decode(frame)
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
+        return "not a message"
+    return str(said.get("type", "no type"))[:60] if isinstance(said, dict) else "not a message"

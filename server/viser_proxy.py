@@ -1,0 +1,122 @@
+"""The 3-D view on the page's own origin: its client page, and its WebSocket through the filter."""
+
+import asyncio
+import gzip
+import socket
+from collections.abc import Callable
+
+import websockets
+from fastapi import APIRouter, Request, Response
+from starlette.websockets import WebSocket, WebSocketDisconnect
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.typing import Subprotocol
+
+from server.scene import VIEW_VERSION, Scene, view_page
+from server.sessions import Session
+from server.viser_filter import admit, kind
+
+#: Viser's own panel and notices have nothing to say here, and would cover the view.
+_STYLE = b"<style>[data-floating-window],.mantine-Notifications-root{display:none!important}</style></head>"
+
+
+def viser_router(scene: Scene, on_drop: Callable[[Session, str], None]) -> APIRouter:
+    """Routes `/viser/` and the WebSocket `/viser`; `on_drop(session, kind)` hears of refused frames."""
+    router = APIRouter(include_in_schema=False)
+    page = view_page().replace(b"</head>", _STYLE, 1)
+    compressed = gzip.compress(page, 6)
+
+    @router.get("/viser/")
+    def view(request: Request) -> Response:
+        headers = {"Cache-Control": "private, no-cache", "ETag": f'"viser-{VIEW_VERSION}-{len(page)}"'}
+        if request.headers.get("if-none-match") == headers["ETag"]:
+            return Response(status_code=304, headers=headers)
+        if "gzip" in request.headers.get("accept-encoding", ""):
+            headers["Content-Encoding"] = "gzip"
+            return Response(compressed, media_type="text/html", headers=headers)
+        return Response(page, media_type="text/html", headers=headers)
+
+    @router.websocket("/viser")
+    async def link(websocket: WebSocket) -> None:
+        session: Session = websocket.state.session
+        offered = [Subprotocol(name) for name in websocket.scope.get("subprotocols", ())]
+        with socket.socket() as near:
+            near.setblocking(False)
+            near.bind(("127.0.0.1", 0))
+            port = int(near.getsockname()[1])
+            scene.door.expect(port, session.session_id)
+            try:
+                await asyncio.get_running_loop().sock_connect(near, ("127.0.0.1", scene.port))
+                async with connect(
+                    f"ws://127.0.0.1:{scene.port}/",
+                    sock=near,
+                    subprotocols=offered or None,
+                    compression=None,
+                    max_size=None,
+                    max_queue=4,
+                    proxy=None,
+                ) as upstream:
+                    await websocket.accept(subprotocol=upstream.subprotocol)
+                    await _relay(websocket, upstream, session, on_drop)
+            except (OSError, websockets.InvalidHandshake):
+                await websocket.close(1013, "the 3-D view is not running")
+            finally:
+                scene.door.forget(port)
+
+    return router
+
+
+async def _relay(
+    websocket: WebSocket, upstream: ClientConnection, session: Session, on_drop: Callable[[Session, str], None]
+) -> None:
+    """Carry frames both ways until either side closes or the session ends."""
+    legs = [
+        asyncio.create_task(_to_viser(websocket, upstream, session, on_drop)),
+        asyncio.create_task(_to_browser(websocket, upstream)),
+        asyncio.create_task(session.ended.wait()),
+    ]
+    try:
+        await asyncio.wait(legs, return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        for leg in legs:
+            leg.cancel()
+        await asyncio.gather(*legs, return_exceptions=True)
+    if session.ended.is_set():
+        await _close(websocket, 1008, "signed out")
+    elif upstream.close_code is not None:
+        # The client shows a version mismatch by this code, so it must arrive.
+        await _close(websocket, upstream.close_code, upstream.close_reason or "")
+
+
+async def _to_viser(
+    websocket: WebSocket, upstream: ClientConnection, session: Session, on_drop: Callable[[Session, str], None]
+) -> None:
+    try:
+        while True:
+            frame = await websocket.receive_bytes()
+            admitted = admit(frame, session.may_operate)
+            if admitted is None:
+                on_drop(session, kind(frame))
+            else:
+                await upstream.send(admitted)
+    except (WebSocketDisconnect, KeyError, websockets.ConnectionClosed):
+        # KeyError: a text frame, which viser's client never sends.
+        return
+
+
+async def _to_browser(websocket: WebSocket, upstream: ClientConnection) -> None:
+    try:
+        # Nothing is queued here: while a browser does not read, viser keeps only the newest of each message.
+        async for frame in upstream:
+            if isinstance(frame, bytes):
+                await websocket.send_bytes(frame)
+    except (websockets.ConnectionClosed, WebSocketDisconnect, RuntimeError):
+        return
+
+
+async def _close(websocket: WebSocket, code: int, reason: str) -> None:
+    # Codes that may not be sent say that the connection broke.
+    sendable = code if 1000 <= code <= 1003 or 1007 <= code <= 1014 else 1011
+    try:
+        await websocket.close(sendable, reason)
+    except RuntimeError:
+        return

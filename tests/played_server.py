@@ -1,0 +1,207 @@
+"""A server that a test plays: the page's files, its socket and its requests, without a network."""
+
+import mimetypes
+import time
+from dataclasses import dataclass, field
+from io import BytesIO
+from typing import Any
+
+import msgspec
+from PIL import Image, ImageDraw
+from playwright.sync_api import Page, Route, WebSocketRoute
+
+from rolling_panda import messages as m
+from rolling_panda import page_messages as p
+from rolling_panda.resources import resource
+
+ORIGIN = "http://panda.test"
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self' ws://panda.test; "
+    "frame-src 'self'; base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
+)
+VIEW = "<!doctype html><title>view</title><div id=root>3-D view</div><button>in the view</button>"
+ALLOWED = {
+    "IDLE": ("Arm",),
+    "READY": ("Start", "Home"),
+    "AUTO": ("Pause",),
+    "TELEOP": ("Pause",),
+    "PAUSED": ("Resume",),
+    "ESTOP_LATCHED": ("Reset",),
+}
+
+
+def controller(mode: m.Mode = "READY", **changes: Any) -> m.ControllerState:
+    points = ("AcceptPoint", "RejectPoint", "AcceptAll")
+    state = m.ControllerState(
+        header=m.Header(),
+        mode=mode,
+        phase="",
+        reason="armed by Ada",
+        allowed=(*ALLOWED.get(mode, ()), *points),
+        active_point_id="",
+        method="nullspace",
+        T_odom_tool=None,
+        T_odom_tool_desired=None,
+        position_error=0.0021,
+        rotation_error=0.012,
+        manipulability=0.083,
+        joint_margin=0.41,
+        tick_s=0.000142,
+        late_ticks=3,
+        queue=(),
+    )
+    return msgspec.structs.replace(state, **changes)
+
+
+def bridge(**changes: Any) -> m.BridgeState:
+    state = m.BridgeState(
+        header=m.Header(),
+        kind="sim",
+        epoch=1,
+        watchdog=False,
+        stop_id="",
+        stopped_by="",
+        cutter="open",
+        cut_id="",
+        outcome="",
+        real_time_factor=0.99,
+    )
+    return msgspec.structs.replace(state, **changes)
+
+
+def point(number: int, state: m.PointState, vine: int = 1, spur: int = 1, **changes: Any) -> p.PagePoint:
+    name = f"p{number}"
+    found = m.PruningPoint(
+        point_id=name,
+        revision=4,
+        position=(0.2 * number, 0.8, 0.9),
+        tangent=(0.0, 0.0, 1.0),
+        radius=0.004,
+        confidence=0.87,
+        nodes_seen=9,
+        nodes_kept=2,
+        vine=vine,
+        spur=spur,
+        reason="lowest cane of the spur: keeps two buds, cut above the second",
+    )
+    entry = m.QueueEntry(point_id=name, state=state, **changes)
+    return p.PagePoint(point=found, entry=entry, pixel=(60.0 + 45.0 * number, 90.0 + 11.0 * number))
+
+
+@dataclass
+class PlayedServer:
+    """Answers the page: a state for each ping, canned REST answers; keeps what the page sent."""
+
+    controller: m.ControllerState | None = field(default_factory=controller)
+    bridge: m.BridgeState | None = field(default_factory=bridge)
+    points: tuple[p.PagePoint, ...] = ()
+    abstained: tuple[str, ...] = ()
+    gone: dict[str, float] = field(default_factory=dict)
+    role: p.Role = "supervisor"
+    online: bool = True
+    silent: bool = False
+    answers: dict[str, tuple[int, Any]] = field(default_factory=dict)
+    posted: list[tuple[str, Any]] = field(default_factory=list)
+    said: list[p.FromPage] = field(default_factory=list)
+    sockets: list[WebSocketRoute] = field(default_factory=list)
+    number: int = 0
+    started: float = field(default_factory=time.time)
+    image: bytes = field(default_factory=lambda: camera_image())
+
+    def attach(self, page: Page) -> None:
+        page.route(f"{ORIGIN}/**", self.serve)
+        page.route_web_socket("**/ws", self.accept)
+
+    def serve(self, route: Route) -> None:
+        path = route.request.url.removeprefix(ORIGIN).split("?")[0]
+        if not self.online:
+            route.abort()
+        elif route.request.method == "POST":
+            self.posted.append((path, route.request.post_data_json))
+            status, body = self.answers.get(path, (200, {"ok": True, "reason": ""}))
+            route.fulfill(status=status, json=body)
+        elif path == "/api/me":
+            status, body = self.answers.get(path, (200, {"user": "Ada", "role": self.role}))
+            route.fulfill(status=status, json=body)
+        elif path == "/viser/":
+            route.fulfill(body=VIEW, content_type="text/html")
+        elif path == "/camera/color.jpg":
+            route.fulfill(body=self.image, content_type="image/jpeg")
+        else:
+            name = {"/": "index.html", "/sign-in": "sign-in.html"}.get(path, path.lstrip("/"))
+            file = resource(f"web/{name}")
+            kind = mimetypes.guess_type(name)[0] or "text/plain"
+            route.fulfill(body=file.read_bytes(), content_type=kind, headers={"content-security-policy": POLICY})
+
+    def accept(self, socket: WebSocketRoute) -> None:
+        if not self.online:
+            socket.close()
+            return
+        self.sockets.append(socket)
+        socket.on_message(lambda text: self.hear(socket, text))
+        self.send(socket, self.state())
+        self.send(socket, self.page_points())
+        self.send(socket, p.PageEvents(events=(self.event(1, "info", "signed in"),)))
+
+    def hear(self, socket: WebSocketRoute, text: str | bytes) -> None:
+        message = msgspec.json.decode(text, type=p.FromPage)
+        self.said.append(message)
+        if isinstance(message, p.Ping) and self.online and not self.silent:
+            self.send(socket, p.Pong(number=message.number))
+            self.send(socket, self.state())
+
+    def send(self, socket: WebSocketRoute, message: p.FromServer) -> None:
+        socket.send(msgspec.json.encode(message).decode())
+
+    def tell(self, message: p.FromServer) -> None:
+        self.send(self.sockets[-1], message)
+
+    def state(self) -> p.PageState:
+        self.number += 1
+        ages = {name: self.gone.get(name, 0.03) for name in m.PROCESSES}
+        rows = tuple(p.ProcessPresence(name, name not in self.gone, ages[name]) for name in m.PROCESSES)
+        return p.PageState(
+            number=self.number,
+            user="Ada",
+            role=self.role,
+            viewers=1,
+            processes=rows,
+            controller=self.controller,
+            controller_age_s=None if self.controller is None else ages["controller"],
+            bridge=self.bridge,
+            bridge_age_s=None if self.bridge is None else ages["bridge"],
+            joints=m.JointState(
+                header=m.Header(stamp=0.1 * self.number), sequence=self.number, position=(0.0,) * 9, velocity=(0.0,) * 9
+            ),
+            base=m.PlanarPose(x=0.021 * self.number),
+            camera_frame=1 + self.number // 5,
+        )
+
+    def page_points(self) -> p.PagePoints:
+        return p.PagePoints(
+            points=self.points,
+            abstained=self.abstained,
+            segmenter="simulated labels",
+            frames=12,
+            image_size=(480, 360),
+        )
+
+    def event(self, number: int, severity: m.Severity, text: str) -> p.PageEvent:
+        return p.PageEvent(number, self.started + 0.001 * number, "server", severity, text)
+
+    def holds(self) -> list[bool]:
+        return [message.hold for message in self.said if isinstance(message, p.Hold)]
+
+    def stops(self) -> list[Any]:
+        return [body for path, body in self.posted if path == "/api/stop"]
+
+
+def camera_image() -> bytes:
+    image = Image.new("RGB", (480, 360), (46, 58, 44))
+    draw = ImageDraw.Draw(image)
+    draw.rectangle((0, 250, 480, 275), fill=(92, 70, 50))
+    for x in range(60, 460, 55):
+        draw.line((x, 250, x + 18, 20), fill=(120, 88, 60), width=7)
+    out = BytesIO()
+    image.save(out, "JPEG")
+    return out.getvalue()

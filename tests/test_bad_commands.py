@@ -1,0 +1,73 @@
+"""Whatever else arrives where motion commands belong moves nothing, is counted, and can be read in the log."""
+
+import math
+import time
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import zenoh
+from live_robot import LiveRobot
+
+from bridge.sim import trace
+from rolling_panda.process import ROBOT_ID
+from rolling_panda.topics import MOTION, key
+
+FAST = [0.5] * 9
+
+
+def bad_commands(epoch: int, echo: int) -> dict[str, bytes]:
+    """Messages that would move the robot if any part of them were believed, by what is wrong with them."""
+    good: dict[str, Any] = {"type": "MotionCommand", "epoch": epoch, "sequence": 2**40, "echo": echo, "xi": FAST}
+
+    def spoilt(**changes: Any) -> bytes:
+        return msgspec.msgpack.encode(good | changes)
+
+    return {
+        "NaN": spoilt(xi=[math.nan, *FAST[1:]]),
+        "infinity": spoilt(xi=[math.inf, *FAST[1:]]),
+        "wrong length": spoilt(xi=FAST[:8]),
+        "a text": spoilt(xi=["fast", *FAST[1:]]),
+        "a truth value": spoilt(xi=[True, *FAST[1:]]),
+        "unknown field": spoilt(force=True),
+        "old sequence": spoilt(sequence=0),
+        "old epoch": spoilt(epoch=0),
+        "out of limits": spoilt(xi=[50.0, *FAST[1:]]),
+        "another type": spoilt(type="TeleopTarget"),
+        "not msgpack": b"\xc1 move",
+        "nothing": b"",
+    }
+
+
+def test_bad_commands_move_nothing_and_are_told(tmp_path: Path) -> None:
+    with LiveRobot(tmp_path) as robot:
+        robot.wait(lambda: robot.mode() == "IDLE", 30, "the controller")
+        robot.wait(lambda: robot.state()["bridge"] and not robot.state()["bridge"]["watchdog"], 20, "setpoints")
+
+        def more(known: int) -> int:
+            count = sum(row["count"] for row in robot.state()["bridge"]["rejections"])
+            return int(count) if count > known else 0
+
+        count = more(-1)
+        config = zenoh.Config()
+        config.insert_json5("mode", '"client"')
+        config.insert_json5("connect/endpoints", f'["{robot.endpoint}"]')
+        with zenoh.open(config) as session:
+            for name in bad_commands(0, 0):
+                state = robot.state()
+                bad = bad_commands(state["bridge"]["epoch"], state["joints"]["sequence"])
+                # Newest wins: a good command that comes within the same few milliseconds replaces a bad one unseen.
+                for _ in range(5):
+                    session.put(key(ROBOT_ID, MOTION.name), bad[name])
+                    time.sleep(0.013)
+                count = robot.wait(lambda known=count: more(known), 3, f"{name} to be counted")
+        rejections = robot.state()["bridge"]["rejections"]
+        assert all(row["topic"] == MOTION.name for row in rejections)
+        assert len(rejections) >= len(bad_commands(0, 0)), f"each kind has a reason of its own: {rejections}"
+        lines = [event["text"] for event in robot.client.get("/api/events").json()["events"]]
+        for row in rejections:
+            assert any(f"refused on {MOTION.name}: {row['reason'][:60]}" in line for line in lines), (row, lines)
+    rows = trace.read(robot.trace).rows
+    assert np.abs(rows["setpoint"]).max() == 0.0
+    assert np.ptp(rows["position"][:, :2], axis=0).max() < 1e-3

@@ -1,0 +1,158 @@
+"""The control loop over a real router; the test is the bridge and the server."""
+
+import socket
+import threading
+import time
+
+import msgspec
+import pytest
+
+from controller.config import ControllerConfig
+from controller.core import Controller
+from controller.loop import Loop
+from rolling_panda import intents
+from rolling_panda import messages as m
+from rolling_panda.config import RobotConfig, TransportConfig
+from rolling_panda.topics import (
+    BRIDGE,
+    CONTROLLER,
+    EVENT,
+    HEARTBEAT,
+    INTENT,
+    JOINTS,
+    MOTION,
+    ODOMETRY,
+    RELEASE,
+    STOP,
+)
+from rolling_panda.transport import Router, Transport
+
+CONFIG = ControllerConfig()
+
+
+class Rest:
+    """The other processes: joint states, odometry, the bridge's latch and the server's heartbeat."""
+
+    def __init__(self, endpoint):
+        self.bridge = Transport(TransportConfig(connect=(endpoint,)), "bridge", "rp1")
+        self.server = Transport(TransportConfig(connect=(endpoint,)), "server", "rp1")
+        self.perception = Transport(TransportConfig(connect=(endpoint,)), "perception", "rp1")
+        self.motion = self.bridge.feed(MOTION, 10000)
+        self.state = self.server.slot(CONTROLLER)
+        self.events = self.server.feed(EVENT, 1000)
+        self.stop = self.server.publisher(STOP)
+        self.releases = []
+        self.bridge.serve(RELEASE, self._release)
+        self.stop_id = ""
+        self.beats = True
+        self._senders = [self.bridge.publisher(topic) for topic in (JOINTS, ODOMETRY, BRIDGE)]
+        self._beat = self.server.publisher(HEARTBEAT)
+        self._sequence = 0
+
+    def _release(self, request):
+        self.releases.append(request)
+        self.stop_id = ""
+        return m.Answer(ok=True)
+
+    def tick(self):
+        self._sequence += 1
+        n, header = self._sequence, m.Header(time.monotonic(), "odom")
+        joints, odometry, bridge = self._senders
+        joints.put(m.JointState(header=header, sequence=n, position=(0.0, 0.0, *CONFIG.home), velocity=(0.0,) * 9))
+        odometry.put(m.Odometry(header=header, sequence=n, pose=m.PlanarPose(), linear=0.0, angular=0.0))
+        bridge.put(
+            m.BridgeState(
+                header=header,
+                kind="sim",
+                epoch=7,
+                watchdog=False,
+                stop_id=self.stop_id,
+                stopped_by="eve" if self.stop_id else "",
+                cutter="open",
+                cut_id="",
+                outcome="",
+                real_time_factor=1.0,
+            )
+        )
+        self._beat.put(m.Heartbeat(process="server", sequence=n if self.beats else 1))
+
+    def until(self, condition, limit_s=5.0):
+        end = time.monotonic() + limit_s
+        while not condition():
+            assert time.monotonic() < end, self.state.peek()
+            self.tick()
+            threading.Event().wait(0.01)
+
+    def mode(self):
+        newest = self.state.peek()
+        return None if newest is None else newest.message.mode
+
+    def close(self):
+        for transport in (self.bridge, self.server, self.perception):
+            transport.close()
+
+
+@pytest.fixture
+def rest():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    router = Router(TransportConfig(mode="router", connect=(), listen=(endpoint,)))
+    others = Rest(endpoint)
+    stopping = threading.Event()
+    with Transport(TransportConfig(connect=(endpoint,)), "controller", "rp1") as transport:
+        loop = Loop(Controller(CONFIG, RobotConfig()), transport, CONFIG.rate_hz)
+        thread = threading.Thread(target=loop.run, args=(stopping,))
+        thread.start()
+        yield others
+        stopping.set()
+        thread.join()
+    others.close()
+    router.close()
+
+
+def test_operator_is_answered_a_stop_latches_and_a_reset_releases_it(rest):
+    rest.until(lambda: rest.mode() == "IDLE" and len(rest.motion._queue) > 20)
+    commands = [received.message for received in rest.motion.drain()]
+    assert {command.epoch for command in commands} == {8}
+    numbers = [command.sequence for command in commands]
+    assert numbers == sorted(set(numbers))
+    assert all(command.xi == (0.0,) * 9 for command in commands)
+
+    assert "arm the robot first" in rest.server.call(INTENT, intents.Start(user="ada")).reason
+    rest.until(lambda: "Arm" in rest.state.peek().message.allowed)
+    assert rest.server.call(INTENT, intents.Arm(user="ada")).ok
+    rest.until(lambda: rest.mode() == "READY")
+
+    request = m.StopRequest(stop_id="s1", source="server", user="eve", reason="dog in the row")
+    rest.stop_id = "s1"
+    for _ in range(3):
+        rest.stop.put(request)
+    rest.until(lambda: rest.mode() == "ESTOP_LATCHED")
+    assert "dog in the row" in rest.state.peek().message.reason or "eve" in rest.state.peek().message.reason
+    rest.motion.drain()
+    rest.until(lambda: True)
+    assert rest.server.call(INTENT, intents.Reset(user="ada", reason="dog gone")).ok
+    rest.until(lambda: rest.mode() == "IDLE")
+    assert [release.stop_id for release in rest.releases] == ["s1"]
+    said = " ".join(received.message.text for received in rest.events.drain())
+    assert "dog gone" in said and "Start refused" in said
+
+
+def test_a_heartbeat_that_stands_still_is_no_sign_of_life(rest):
+    rest.until(lambda: rest.mode() == "IDLE" and "Arm" in rest.state.peek().message.allowed)
+    assert rest.server.call(INTENT, intents.Arm(user="ada")).ok
+    rest.until(lambda: rest.mode() == "READY" and "Home" in rest.state.peek().message.allowed)
+    rest.beats = False
+    rest.until(lambda: "Home" not in rest.state.peek().message.allowed)
+    assert "silent" in rest.server.call(INTENT, intents.Home(user="ada")).reason
+
+
+def test_what_is_no_intent_is_refused_and_logged(rest):
+    rest.until(lambda: rest.mode() == "IDLE")
+    bad = msgspec.msgpack.encode({"type": "Arm", "user": "ada", "and": "more"})
+    replies = rest.server._session.get("rp/rp1/v1/service/intent", payload=bad, timeout=2.0)
+    answers = [msgspec.msgpack.decode(reply.ok.payload.to_bytes()) for reply in replies if reply.ok is not None]
+    assert [answer["ok"] for answer in answers] == [False]
+    rest.until(lambda: any("refused on service/intent" in received.message.text for received in rest.events.drain()))
+    assert rest.mode() == "IDLE"

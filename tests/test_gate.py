@@ -1,0 +1,109 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bridge import gate as g
+from bridge.gate import Gate
+from rolling_panda.messages import MotionCommand
+from rolling_panda.robot_model import RobotModel
+
+LIMIT = RobotModel().limits.velocity
+REST = (0.0,) * 9
+MOVE = (1.0, 1.0, 0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def command(sequence: int, xi: tuple[float, ...] = MOVE, epoch: int = 1, echo: int = 1) -> MotionCommand:
+    return MotionCommand(epoch=epoch, sequence=sequence, echo=echo, xi=xi)  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def awake() -> Gate:
+    """A gate that has sent joint state 1 at t = 0 and has taken sequence 1 of epoch 1 at rest."""
+    gate = Gate(LIMIT, 0.2)
+    gate.sent(1, 0.0)
+    assert gate.refuse(command(1, REST), 0.0) is None
+    return gate
+
+
+def test_a_fresh_newer_command_passes(awake: Gate) -> None:
+    assert awake.refuse(command(2), 0.1) is None
+    assert (awake.epoch, awake.sequence) == (1, 2)
+
+
+@pytest.mark.parametrize(
+    ("message", "now", "reason"),
+    [
+        (command(1), 0.1, g.OLD_SEQUENCE),
+        (command(9, epoch=0), 0.1, g.OLD_EPOCH),
+        (command(2), 0.21, g.TOO_OLD),
+        (command(2, echo=7), 0.1, g.UNSENT_ECHO),
+        (command(2, (math.nan, *REST[1:])), 0.1, g.NOT_FINITE),
+        (command(2, (*REST[1:], math.inf)), 0.1, g.NOT_FINITE),
+        (command(2, (float(LIMIT[0]) * 1.001, *REST[1:])), 0.1, g.TOO_FAST),
+    ],
+)
+def test_a_refused_command_changes_nothing(awake: Gate, message: MotionCommand, now: float, reason: str) -> None:
+    assert awake.refuse(message, now) == reason
+    assert (awake.epoch, awake.sequence) == (1, 1)
+    assert awake.refuse(command(2), 0.1) is None
+
+
+def test_a_new_controller_starts_its_sequence_again_and_silences_the_old_one(awake: Gate) -> None:
+    assert awake.refuse(command(500), 0.1) is None
+    assert awake.refuse(command(1, epoch=2), 0.1) is None
+    assert awake.refuse(command(501), 0.1) == g.OLD_EPOCH
+
+
+def test_exactly_the_limit_passes(awake: Gate) -> None:
+    assert awake.refuse(command(2, tuple(float(v) for v in LIMIT)), 0.1) is None
+
+
+def test_after_a_standstill_only_rest_wakes(awake: Gate) -> None:
+    awake.require_rest()
+    assert awake.refuse(command(2), 0.1) == g.NOT_AT_REST
+    assert awake.refuse(command(3, REST), 0.1) is None
+    assert awake.refuse(command(4), 0.1) is None
+
+
+def test_a_state_sent_long_ago_is_too_old_and_not_unknown() -> None:
+    gate = Gate(LIMIT, 0.2)
+    for sequence in range(1, 1000):
+        gate.sent(sequence, sequence * 0.01)
+    assert gate.refuse(command(1, REST, echo=1), 9.99) == g.TOO_OLD
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(
+        st.tuples(
+            st.integers(0, 3),
+            st.integers(0, 12),
+            st.integers(0, 12),
+            st.lists(st.floats(-12.0, 12.0) | st.sampled_from([math.nan, math.inf, 1e308]), min_size=9, max_size=9),
+            st.floats(0.0, 0.1),
+        ),
+        max_size=40,
+    )
+)
+def test_whatever_comes_what_passes_is_newer_fresh_and_within_limits(
+    stream: list[tuple[int, int, int, list[float], float]],
+) -> None:
+    gate = Gate(LIMIT, 0.2)
+    sent: dict[int, float] = {}
+    passed = [(0, -1)]
+    now = 0.0
+    for tick, (epoch, sequence, echo, xi, wait) in enumerate(stream):
+        now += wait
+        if tick % 3 == 0:
+            sent[tick // 3] = now
+            gate.sent(tick // 3, now)
+        resting = gate.must_rest
+        if gate.refuse(command(sequence, tuple(xi), epoch, echo), now) is None:
+            assert (epoch, sequence) > passed[-1]
+            assert now - sent[echo] <= 0.2
+            assert np.all(np.abs(xi) <= LIMIT * (1 + 1e-6))
+            assert not resting or np.all(np.abs(xi) < 2e-3)
+            passed.append((epoch, sequence))

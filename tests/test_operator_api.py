@@ -1,0 +1,233 @@
+import threading
+
+import pytest
+from fake_wire import (
+    FakeWire,
+    bridge_state,
+    controller_state,
+    joints,
+    odometry,
+    pruning_point,
+    pruning_points,
+)
+from running_server import eventually, running_server
+
+from rolling_panda import intents, topics
+from rolling_panda import messages as m
+from rolling_panda.errors import ServiceError
+
+
+@pytest.fixture(scope="module")
+def running():
+    with running_server(FakeWire()) as server:
+        yield server
+
+
+@pytest.fixture
+def server(running):
+    running.wire.asked.clear()
+    for sent in running.wire.sent.values():
+        sent.clear()
+    running.wire.answer = lambda request: m.Answer(ok=True, reason="done")
+    return running
+
+
+@pytest.fixture
+def client(server):
+    with server.client(user="ann") as client:
+        yield client
+
+
+@pytest.mark.parametrize(
+    ("path", "body", "intent"),
+    [
+        ("points/p7/accept", {"revision": 3}, intents.AcceptPoint(user="ann", point_id="p7", revision=3)),
+        ("points/p7/reject", {"reason": "too high"}, intents.RejectPoint(user="ann", point_id="p7", reason="too high")),
+        ("points/p7/reject", {}, intents.RejectPoint(user="ann", point_id="p7")),
+        ("points/accept-all", {"confidence": 0.5}, intents.AcceptAll(user="ann", confidence=0.5)),
+        ("arm", None, intents.Arm(user="ann")),
+        ("start", {}, intents.Start(user="ann")),
+        ("pause", None, intents.Pause(user="ann")),
+        ("resume", None, intents.Resume(user="ann")),
+        ("home", None, intents.Home(user="ann")),
+        ("acknowledge", None, intents.Acknowledge(user="ann")),
+        ("reset", {"reason": "checked"}, intents.Reset(user="ann", reason="checked")),
+    ],
+)
+def test_each_request_becomes_its_intent(server, client, path, body, intent):
+    answer = client.post(f"/api/{path}", json=body)
+    assert (answer.status_code, answer.json()) == (200, {"ok": True, "reason": "done"})
+    assert server.wire.asked == [intent]
+
+
+def test_a_refusal_comes_with_its_reason_and_is_logged(server, client):
+    server.wire.answer = lambda request: m.Answer(ok=False, reason="arm first")
+    answer = client.post("/api/start")
+    assert (answer.status_code, answer.json()) == (409, {"ok": False, "reason": "arm first"})
+    texts = [event["text"] for event in client.get("/api/events").json()["events"]]
+    assert any("arm first" in text for text in texts)
+
+
+def test_a_dead_controller_is_said_in_one_sentence(server, client):
+    def dead(request):
+        raise ServiceError("service/intent did not answer within 1.0 s: is the controller running?")
+
+    server.wire.answer = dead
+    answer = client.post("/api/start")
+    assert answer.status_code == 503
+    assert "controller does not answer" in answer.json()["reason"]
+
+
+@pytest.mark.parametrize(
+    ("path", "body"),
+    [
+        ("points/p7/accept", {"revision": -1}),
+        ("points/p7/accept", {"revision": True}),
+        ("points/p7/accept", {"revision": 1.0}),
+        ("points/p7/accept", {}),
+        ("points/p7/accept", {"revision": 1, "extra": 1}),
+        ("points/p 7/accept", {"revision": 1}),
+        ("points/accept-all", {"confidence": 2}),
+        ("points/accept-all", {"confidence": "0.5"}),
+        ("reset", {"reason": ""}),
+        ("reset", {"reason": "x" * 501}),
+        ("teleop", {"hold": 1}),
+        ("teleop", {"hold": True, "target": {"position": [0, 0], "quat_xyzw": [0, 0, 0, 1]}}),
+        ("teleop", {"hold": True, "target": {"position": [0, 0, 0], "quat_xyzw": [0, 0, 0, 0.5]}}),
+    ],
+)
+def test_a_wrong_request_is_refused_and_asks_for_nothing(server, client, path, body):
+    answer = client.post(f"/api/{path}", json=body)
+    assert answer.status_code == 422
+    assert answer.json()["ok"] is False
+    assert answer.json()["reason"]
+    assert server.wire.asked == []
+
+
+@pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999"])
+def test_numbers_that_are_none_are_refused(server, client, number):
+    headers = {"content-type": "application/json"}
+    assert (
+        client.post("/api/points/accept-all", content=f'{{"confidence": {number}}}', headers=headers).status_code == 422
+    )
+    position = f"[{number}, 0, 0]"
+    body = f'{{"hold": true, "target": {{"position": {position}, "quat_xyzw": [0, 0, 0, 1]}}}}'
+    assert client.post("/api/teleop", content=body, headers=headers).status_code == 422
+    assert server.wire.sent[topics.TELEOP.name] == []
+
+
+@pytest.mark.parametrize("content", [b"{", b"[" * 60_000, b"\xff", b"[]", b"null"])
+def test_what_is_no_json_object_is_refused(server, client, content):
+    headers = {"content-type": "application/json"}
+    assert client.post("/api/reset", content=content, headers=headers).status_code in (400, 422)
+    assert server.wire.asked == []
+
+
+def test_stop_is_sent_several_times_and_confirmed_by_the_bridge(server, client):
+    sent = server.wire.sent[topics.STOP.name]
+
+    def latch():
+        eventually(lambda: sent)
+        server.wire.deliver(topics.BRIDGE, bridge_state(sent[0].stop_id))
+
+    bridge = threading.Thread(target=latch)
+    bridge.start()
+    answer = client.post("/api/stop", json={"reason": "branch"})
+    bridge.join()
+    assert (answer.status_code, answer.json()["ok"]) == (200, True)
+    eventually(lambda: len(sent) == 5)
+    assert {(stop.stop_id, stop.user, stop.reason) for stop in sent} == {(sent[0].stop_id, "ann", "branch")}
+
+
+def test_stop_goes_out_although_nothing_else_lives_and_says_that_nobody_confirmed_it(server, client):
+    server.wire.answer = None
+    answer = client.post("/api/stop", json={})
+    assert (answer.status_code, answer.json()["ok"]) == (503, False)
+    assert "emergency stop" in answer.json()["reason"]
+    assert len(server.wire.sent[topics.STOP.name]) == 5
+    assert server.wire.asked == []
+
+
+def test_a_viewer_may_stop_but_not_operate(server):
+    with server.client(role="viewer") as viewer:
+        assert viewer.post("/api/start").status_code == 403
+        assert viewer.post("/api/teleop", json={"hold": True}).status_code == 403
+        assert server.wire.asked == []
+        viewer.post("/api/stop", json={})
+        assert server.wire.sent[topics.STOP.name]
+
+
+def test_only_a_supervisor_may_release_a_stop_or_invite(server):
+    with server.client(role="operator") as operator:
+        assert operator.post("/api/reset", json={"reason": "please"}).status_code == 403
+        assert operator.post("/api/invite", json={"user": "x", "role": "supervisor"}).status_code == 403
+    assert server.wire.asked == []
+
+
+def test_an_invited_person_can_sign_in_with_their_role(server, client):
+    link = client.post("/api/invite", json={"user": "bob", "role": "viewer"}).json()["link"]
+    with server.visitor() as visitor:
+        visitor.headers["origin"] = server.address
+        assert visitor.post("/api/sign-in", json={"token": link.split("token=")[1]}).status_code == 200
+        assert visitor.get("/api/me").json() == {"user": "bob", "role": "viewer"}
+
+
+def test_state_and_points_are_what_the_robot_said_last(server, client):
+    wire = server.wire
+    wire.deliver(topics.JOINTS, joints())
+    wire.deliver(topics.ODOMETRY, odometry(x=0.25))
+    point = pruning_point("p9")
+    wire.deliver(topics.POINTS, pruning_points(point))
+    wire.deliver(topics.CONTROLLER, controller_state((m.QueueEntry("p9", "ACCEPTED", "next", "ann"),)))
+    state = eventually(lambda: (got := client.get("/api/state").json())["base"] and got)
+    assert state["base"]["x"] == 0.25
+    assert state["controller"]["mode"] == "READY"
+    assert state["role"] == "supervisor"
+    rows = eventually(lambda: client.get("/api/points").json()["points"])
+    assert [(row["point"]["point_id"], row["entry"]["state"]) for row in rows] == [("p9", "ACCEPTED")]
+
+
+def test_a_script_can_move_the_tool_only_while_it_looks(server, client):
+    target = {"position": [0.3, 0.5, 1.0], "quat_xyzw": [0, 0, 0, 1]}
+    assert client.post("/api/teleop", json={"hold": True, "target": target}).status_code == 409
+    eventually(lambda: client.get("/api/state").status_code == 200)
+    assert client.post("/api/teleop", json={"hold": True, "target": target}).status_code == 200
+    sent = server.wire.sent[topics.TELEOP.name]
+    eventually(lambda: any(message.hold for message in sent))
+    assert {message.target.position for message in sent if message.hold} == {(0.3, 0.5, 1.0)}
+    eventually(lambda: not sent[-1].hold)
+
+
+def test_letting_go_by_rest_ends_the_hold(server, client):
+    target = {"position": [0.3, 0.5, 1.0], "quat_xyzw": [0, 0, 0, 1]}
+    sent = server.wire.sent[topics.TELEOP.name]
+
+    def moving():
+        client.get("/api/state")
+        client.post("/api/teleop", json={"hold": True, "target": target})
+        return any(message.hold for message in sent)
+
+    eventually(moving)
+    assert client.post("/api/teleop", json={"hold": False}).json() == {"ok": True, "reason": "released"}
+    eventually(lambda: not sent[-1].hold)
+
+
+def test_openapi_describes_every_request_and_message(client):
+    document = client.get("/api/openapi.json").json()
+    for name in ("start", "stop", "teleop", "points/{point_id}/accept", "points/accept-all", "state", "sign-in"):
+        assert f"/api/{name}" in document["paths"]
+    assert "PageState" in document["components"]["schemas"]
+    references = set(_references(document))
+    assert {each.rsplit("/", 1)[-1] for each in references} <= set(document["components"]["schemas"])
+
+
+def _references(node):
+    if isinstance(node, dict):
+        for key, value in node.items():
+            if key == "$ref":
+                yield value
+            else:
+                yield from _references(value)
+    elif isinstance(node, list):
+        for value in node:
+            yield from _references(value)

@@ -1,0 +1,314 @@
+"""The operator's page in a real browser, with a server that the test plays."""
+
+import json
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+from operator_page import FLAGS
+from played_server import ORIGIN, PlayedServer, bridge, controller, point
+from playwright.sync_api import Browser, Page, expect, sync_playwright
+
+from rolling_panda import page_messages as p
+from rolling_panda.resources import resource
+
+pytestmark = pytest.mark.browser
+
+
+@pytest.fixture(scope="module")
+def browser(chromium_path: str) -> Iterator[Browser]:
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=chromium_path, args=list(FLAGS))
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture
+def server() -> PlayedServer:
+    return PlayedServer(
+        points=(
+            point(1, "PROPOSED"),
+            point(2, "ACCEPTED", user="Ada", reason="accepted by Ada"),
+            point(3, "DONE", spur=2, cut_id="c1"),
+        ),
+        abstained=("vine 1, spur 3: no node seen above the cordon",),
+    )
+
+
+@pytest.fixture
+def page(browser: Browser, server: PlayedServer) -> Iterator[Page]:
+    context = browser.new_context(viewport={"width": 1280, "height": 800}, locale="en-US")
+    page = context.new_page()
+    problems: list[str] = []
+    page.on("pageerror", lambda error: problems.append(str(error)))
+    page.on(
+        "console",
+        lambda message: problems.append(message.text) if "Content Security Policy" in message.text else None,
+    )
+    server.attach(page)
+    page.goto(f"{ORIGIN}/")
+    expect(page.locator("#mode")).to_have_attribute("data-mode", "READY")
+    expect(page.locator("rp-scene iframe")).to_have_class("loaded")
+    yield page
+    context.close()
+    assert problems == []
+
+
+def until(page: Page, condition: Callable[[], bool], seconds: float = 5.0) -> None:
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, "it did not happen in time"
+        page.wait_for_timeout(20)
+
+
+def test_shows_the_queue_by_vine_and_spur_and_selects(page: Page, server: PlayedServer) -> None:
+    expect(page.locator(".group h3")).to_have_text(["Vine 1 · spur 1", "Vine 1 · spur 2"])
+    row = page.locator('[data-point-id="p2"]')
+    expect(row).to_have_attribute("data-state", "ACCEPTED")
+    expect(row).to_contain_text("2/9 nodes · 8.0 mm · 87 %")
+    row.click()
+    until(page, lambda: p.Select(point_id="p2") in server.said)
+    expect(page.locator(".mark.selected")).to_have_attribute("data-state", "ACCEPTED")
+    server.tell(p.Selected(point_id="p3"))
+    expect(page.locator('[data-point-id="p3"]')).to_have_attribute("aria-current", "true")
+    page.locator(".mark").first.click()
+    until(page, lambda: p.Select(point_id="p1") in server.said)
+
+
+def test_accepts_and_rejects_with_buttons_and_keys(page: Page, server: PlayedServer) -> None:
+    page.locator('[data-point-id="p1"] button.accept').click()
+    until(page, lambda: ("/api/points/p1/accept", {"revision": 4}) in server.posted)
+    expect(page.locator('[data-point-id="p3"] button.accept')).to_be_disabled()
+    page.locator('[data-point-id="p1"]').focus()
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("r")
+    until(page, lambda: ("/api/points/p2/reject", {"reason": ""}) in server.posted)
+    page.locator("#least-confidence").select_option("0.7")
+    page.locator("#accept-all").click()
+    until(page, lambda: ("/api/points/accept-all", {"confidence": 0.7}) in server.posted)
+
+
+def test_only_what_the_controller_allows_is_enabled_and_the_rest_says_why(page: Page, server: PlayedServer) -> None:
+    expect(page.locator("#start")).to_be_enabled()
+    pause = page.locator("#pause")
+    expect(pause).to_be_disabled()
+    expect(pause).to_have_attribute("aria-description", "There is nothing to pause; the robot is in Ready")
+    server.role = "viewer"
+    expect(page.locator("#start")).to_have_attribute("title", "You are signed in as a viewer")
+    expect(page.locator("#stop")).to_be_enabled()
+
+
+def test_a_refusal_is_a_notice_and_a_line_of_the_log(page: Page, server: PlayedServer) -> None:
+    server.answers["/api/start"] = (409, {"ok": False, "reason": "the base has not settled"})
+    page.locator("#start").click()
+    words = "Start refused: the base has not settled"
+    expect(page.locator(".toast")).to_contain_text(words)
+    # The server logs what the controller refuses; what never reached it is logged by the page.
+    server.tell(p.PageEvents(events=(server.event(2, "warning", "Start by Ada refused"),)))
+    expect(page.locator("#log li").last).to_contain_text("Start by Ada refused")
+    server.answers["/api/home"] = (403, {"ok": False, "reason": "a viewer may look and stop, not operate"})
+    page.locator("#home").click()
+    expect(page.locator("#log li").last).to_contain_text("Home refused: a viewer may look and stop")
+    server.tell(p.PageEvents(events=(server.event(3, "info", "nothing to worry about"),)))
+    expect(page.locator("#log li").last).to_be_visible()
+    page.locator("#log-filter").select_option("error")
+    expect(page.locator("#log li").last).to_be_hidden()
+
+
+def test_space_stops_even_on_a_focused_button_and_inside_the_view(page: Page, server: PlayedServer) -> None:
+    page.locator("#start").focus()
+    page.keyboard.press("Space")
+    until(page, lambda: len(server.stops()) == 1)
+    assert server.stops() == [{"reason": "space bar"}]
+    page.frame_locator("rp-scene iframe").locator("button").focus()
+    page.keyboard.press("Space")
+    until(page, lambda: len(server.stops()) == 2)
+    page.locator("#stop").click()
+    until(page, lambda: len(server.stops()) == 3)
+    assert [path for path, _ in server.posted] == ["/api/stop"] * 3
+
+
+def test_a_stop_says_who_and_who_latched_it_and_is_reset_with_a_reason(page: Page, server: PlayedServer) -> None:
+    banner = page.locator("rp-stop-banner")
+    expect(banner).to_be_hidden()
+    server.bridge = bridge(stop_id="s1", stopped_by="Ada: space bar")
+    expect(banner).to_contain_text("Pressed by Ada: space bar")
+    expect(banner.locator('[data-by="bridge"]')).to_have_attribute("data-acknowledged", "true")
+    expect(banner.locator('[data-by="controller"]')).to_have_attribute("data-acknowledged", "false")
+    server.controller = controller("ESTOP_LATCHED", reason="stopped by Ada")
+    expect(banner.locator('[data-by="controller"]')).to_have_attribute("data-acknowledged", "true")
+    expect(page.locator("#reset")).to_be_disabled()
+    page.locator("#reset-reason").press_sequentially("row is clear")
+    page.locator("#reset").click()
+    until(page, lambda: ("/api/reset", {"reason": "row is clear"}) in server.posted)
+    assert server.stops() == [], "a space in the reason is a character"
+
+
+def test_a_stop_that_does_not_get_through_says_so(page: Page, server: PlayedServer) -> None:
+    server.answers["/api/stop"] = (503, {"ok": False, "reason": "no wire"})
+    page.locator("#stop").click()
+    expect(page.locator(".toast")).to_contain_text("Use the emergency stop on the robot")
+    assert len(server.stops()) == 2
+    server.answers["/api/stop"] = (500, {"ok": False, "reason": "something broke"})
+    page.locator("#stop").click()
+    until(page, lambda: len(server.stops()) == 6)
+
+
+def test_the_tool_moves_only_while_held(page: Page, server: PlayedServer) -> None:
+    expect(page.locator("#hold")).to_be_disabled()
+    page.locator("#teleop").click()
+    until(page, lambda: p.ShowGizmo(visible=True) in server.said)
+    page.locator("#hold").hover()
+    page.mouse.down()
+    until(page, lambda: len(server.holds()) >= 5)
+    page.mouse.up()
+    until(page, lambda: not server.holds()[-1])
+    count = len(server.holds())
+    assert server.holds() == [True] * (count - 1) + [False]
+    page.wait_for_timeout(200)
+    assert len(server.holds()) == count
+    sequences = [message.sequence for message in server.said if isinstance(message, p.Hold)]
+    assert sequences == sorted(set(sequences))
+
+
+@pytest.mark.parametrize("end", ["blur", "hidden", "mode", "link"])
+def test_a_hold_ends_when_the_operator_can_no_longer_mean_it(page: Page, server: PlayedServer, end: str) -> None:
+    page.locator("#teleop").click()
+    page.locator("h1").click()
+    page.keyboard.down("h")
+    until(page, lambda: server.holds()[-1:] == [True])
+    if end == "blur":
+        page.evaluate("window.dispatchEvent(new Event('blur'))")
+    elif end == "hidden":
+        page.evaluate(
+            "Object.defineProperty(document, 'hidden', {value: true});"
+            "document.dispatchEvent(new Event('visibilitychange'))"
+        )
+    elif end == "mode":
+        server.controller = controller("PAUSED", reason="perception gone")
+    else:
+        server.sockets[-1].close()
+        expect(page.locator("#hold")).not_to_have_class("held")
+        expect(page.locator("#teleop")).to_have_attribute("aria-pressed", "false")
+        return
+    until(page, lambda: not server.holds()[-1])
+    expect(page.locator("#hold")).not_to_have_class("held")
+
+
+def test_dragging_in_the_view_counts_as_holding(page: Page, server: PlayedServer) -> None:
+    box = page.locator("rp-scene iframe").bounding_box()
+    assert box is not None
+    page.mouse.move(box["x"] + 100, box["y"] + 100)
+    page.mouse.down()
+    page.mouse.up()
+    assert server.holds() == [], "nothing is held while Teleoperate is off"
+    page.locator("#teleop").click()
+    page.mouse.move(box["x"] + 100, box["y"] + 100)
+    page.mouse.down()
+    until(page, lambda: server.holds()[-1:] == [True])
+    page.mouse.up()
+    until(page, lambda: not server.holds()[-1])
+
+
+def test_a_gone_process_leaves_its_last_state_grey_and_aged(page: Page, server: PlayedServer) -> None:
+    server.gone = {"bridge": 3.2}
+    expect(page.locator('.presence[data-process="bridge"]')).to_have_attribute("data-present", "false")
+    note = page.locator("rp-telemetry .stale-note")
+    expect(note).to_contain_text("bridge gone — last state 3.")
+    expect(page.locator('[data-gauge="real-time-factor"] .value')).to_have_text("0.99")
+    server.gone = {}
+    expect(note).to_have_text("")
+
+
+def test_a_lost_link_is_said_and_mended_by_itself(page: Page, server: PlayedServer) -> None:
+    server.online = False
+    server.sockets[-1].close()
+    banner = page.locator("rp-link-banner")
+    expect(banner).to_contain_text("No link to the server")
+    expect(page.locator('[data-point-id="p1"]')).to_be_visible()
+    expect(page.locator("#start")).to_be_disabled()
+    server.online = True
+    expect(banner).to_be_hidden(timeout=10000)
+    expect(page.locator("#start")).to_be_enabled()
+    expect(page.locator("#log li")).to_have_count(1)
+
+
+def test_echoes_the_state_that_it_has_drawn(page: Page, server: PlayedServer) -> None:
+    until(page, lambda: any(isinstance(message, p.Ping) and message.rendered > 3 for message in server.said))
+
+
+def test_says_what_it_waits_for_before_there_is_anything(browser: Browser) -> None:
+    server = PlayedServer(controller=None, bridge=None, gone={"controller": 9.0, "bridge": 9.0, "perception": 9.0})
+    context = browser.new_context(locale="en-US")
+    page = context.new_page()
+    server.attach(page)
+    page.goto(f"{ORIGIN}/")
+    expect(page.locator("#mode")).to_have_text("No state yet")
+    expect(page.locator("rp-queue > .empty")).to_contain_text("No pruning point in 12 images so far")
+    expect(page.locator("#start")).to_be_disabled()
+    expect(page.locator("#stop")).to_be_enabled()
+    context.close()
+
+
+def test_the_sign_in_link_is_used_once_and_leaves_the_address(browser: Browser) -> None:
+    server = PlayedServer(answers={"/api/sign-in": (401, {"ok": False, "reason": "this token was used"})})
+    context = browser.new_context(locale="en-US")
+    page = context.new_page()
+    server.attach(page)
+    page.goto(f"{ORIGIN}/sign-in?token=secret")
+    expect(page.locator("#progress")).to_have_text("Not signed in: this token was used")
+    assert page.url == f"{ORIGIN}/sign-in"
+    assert server.posted == [("/api/sign-in", {"token": "secret"})]
+    del server.answers["/api/sign-in"]
+    page.locator("#token").fill("another")
+    page.get_by_role("button", name="Sign in").click()
+    expect(page.locator("#mode")).to_have_attribute("data-mode", "READY")
+    context.close()
+
+
+@pytest.mark.parametrize("size", [(1280, 800), (1024, 768)])
+def test_fits_the_screen_with_the_stop_on_top(page: Page, server: PlayedServer, size: tuple[int, int]) -> None:
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    server.bridge = bridge(stop_id="s1", stopped_by="Ada: stop button")
+    server.controller = controller("ESTOP_LATCHED")
+    expect(page.locator("rp-stop-banner")).to_be_visible()
+    overflow = page.evaluate("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]")
+    assert overflow[0] <= size[0]
+    assert overflow[1] <= size[1]
+    for selector in ("#stop", "#arm", "#start", "#pause", "#resume", "#home", "#acknowledge", "#teleop", "#hold"):
+        box = page.locator(selector).bounding_box()
+        assert box is not None
+        assert box["height"] >= 44
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= size[0]
+        middle = [box["x"] + box["width"] / 2, box["y"] + box["height"] / 2]
+        top = page.evaluate("([x, y]) => document.elementFromPoint(x, y)?.closest('button')?.id", middle)
+        assert f"#{top}" == selector, "nothing lies over it"
+
+
+def test_the_page_is_small_and_keeps_to_its_own_files() -> None:
+    folder = resource("web/index.html").parent
+    scripts = [*folder.glob("*.js"), *folder.glob("components/*.js")]
+    assert sum(script.stat().st_size for script in scripts) < 150_000
+    for file in [*scripts, *folder.glob("*.css"), *folder.glob("*.html")]:
+        text = file.read_text(encoding="utf-8")
+        assert len(text.splitlines()) <= 400, file.name
+        assert "innerHTML" not in text
+        assert "https://" not in text
+    for html in folder.glob("*.html"):
+        text = html.read_text(encoding="utf-8")
+        assert " style=" not in text
+        assert "<style" not in text
+        assert text.count("<script") == text.count(' src="')
+    assert json.loads((folder / "jsconfig.json").read_text(encoding="utf-8"))["compilerOptions"]["strict"] is True
+
+
+def test_a_busy_page_does_not_take_its_own_pause_for_a_lost_link(page: Page, server: PlayedServer) -> None:
+    page.evaluate("() => { const end = performance.now() + 3500; while (performance.now() < end); }")
+    page.wait_for_timeout(500)
+    assert len(server.sockets) == 1
+
+
+def test_a_silent_link_is_given_up_and_tried_again(page: Page, server: PlayedServer) -> None:
+    server.silent = True
+    until(page, lambda: len(server.sockets) > 1, seconds=10.0)

@@ -1,0 +1,106 @@
+import msgspec
+import numpy as np
+import pytest
+from fake_wire import ARM, HEADER, FakeWire, controller_state, joints, odometry, pruning_point, pruning_points
+
+from rolling_panda import messages as m
+from rolling_panda import topics
+from rolling_panda.robot_model import RobotModel, configuration
+from server.page_view import PageView, project
+from server.robot_link import RobotLink
+
+MODEL = RobotModel()
+
+
+@pytest.fixture
+def wire():
+    return FakeWire()
+
+
+@pytest.fixture
+def view(wire):
+    link = RobotLink(wire)
+    yield PageView(link, MODEL)
+    link.close()
+
+
+def frame(base=None, sequence=1):
+    return m.CameraFrame(
+        header=HEADER, sequence=sequence, intrinsics=m.Intrinsics(640, 480, 600.0, 600.0, 320.0, 240.0),
+        base=base or m.PlanarPose(), position=(0.0, 0.0, *ARM), color_jpeg=b"", depth_zlib=b"", depth_unit=1e-4,
+    )  # fmt: skip
+
+
+def in_camera(x, y, z):
+    camera = MODEL.pose(configuration(m.PlanarPose(), (0.0, 0.0, *ARM)), MODEL.camera_id)
+    return tuple(float(value) for value in camera.rotation @ np.array([x, y, z]) + camera.translation)
+
+
+def test_a_point_on_the_optical_axis_is_at_the_principal_point():
+    assert project([in_camera(0.0, 0.0, 0.8)], frame(), MODEL) == [(320.0, 240.0)]
+
+
+def test_right_and_down_in_the_camera_are_right_and_down_in_the_image():
+    assert project([in_camera(0.1, 0.05, 0.6)], frame(), MODEL) == [(420.0, 290.0)]
+
+
+def test_what_is_behind_or_beside_the_image_has_no_pixel():
+    places = [in_camera(0.0, 0.0, -0.5), in_camera(1.0, 0.0, 0.5)]
+    assert project(places, frame(), MODEL) == [None, None]
+    assert project(places, None, MODEL) == [None, None]
+
+
+def test_everything_ages_and_nothing_disappears(wire, view):
+    wire.deliver(topics.JOINTS, joints(), at=10.0)
+    wire.deliver(topics.ODOMETRY, odometry(x=0.5), at=10.0)
+    wire.deliver(topics.CONTROLLER, controller_state(), at=11.0)
+    state = view.state(1, 0, now=20.0)
+    assert state.base.x == 0.5
+    assert state.controller_age_s == pytest.approx(9.0)
+    assert state.bridge_age_s is None
+    ages = {row.process: row.age_s for row in state.processes}
+    assert ages["bridge"] == pytest.approx(10.0)
+    assert ages["perception"] is None
+
+
+def test_a_process_that_is_gone_is_shown_as_gone(wire, view):
+    wire.processes.discard("controller")
+    gone = {row.process for row in view.state(1, 0, now=0.0).processes if not row.present}
+    assert gone == {"controller"}
+
+
+def test_points_come_in_the_order_of_work_and_new_ones_last(wire, view):
+    wire.deliver(topics.POINTS, pruning_points(pruning_point("a"), pruning_point("b"), pruning_point("c")))
+    queue = (m.QueueEntry("c", "INTENT"), m.QueueEntry("a", "ACCEPTED"))
+    wire.deliver(topics.CONTROLLER, controller_state(queue))
+    rows = view.points(0.0).points
+    assert [row.point.point_id for row in rows] == ["c", "a", "b"]
+    assert rows[2].entry.state == "PROPOSED"
+
+
+def test_a_point_that_was_cut_off_stays_while_the_queue_knows_it(wire, view):
+    wire.deliver(topics.POINTS, pruning_points(pruning_point("a")))
+    wire.deliver(topics.CONTROLLER, controller_state((m.QueueEntry("a", "DONE"),)))
+    view.points(0.0)
+    wire.deliver(topics.POINTS, pruning_points())
+    assert [row.entry.state for row in view.points(0.0).points] == ["DONE"]
+    wire.deliver(topics.CONTROLLER, controller_state())
+    assert view.points(0.0).points == ()
+
+
+def test_the_same_points_are_the_same_object(wire, view):
+    wire.deliver(topics.POINTS, pruning_points(pruning_point("a")))
+    first = view.points(0.0)
+    wire.deliver(topics.POINTS, pruning_points(pruning_point("a")))
+    wire.deliver(topics.CONTROLLER, controller_state())
+    assert view.points(0.0) is first
+
+
+def test_a_count_of_frames_alone_is_renewed_only_now_and_then(wire, view):
+    counted = pruning_points(pruning_point("a"))
+    wire.deliver(topics.POINTS, counted)
+    first = view.points(100.0)
+    wire.deliver(topics.POINTS, msgspec.structs.replace(counted, frames=7))
+    assert view.points(101.0) is first
+    wire.deliver(topics.POINTS, msgspec.structs.replace(counted, frames=9))
+    assert view.points(106.0).frames == 9

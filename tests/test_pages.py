@@ -1,0 +1,247 @@
+import json
+import time
+
+import pytest
+from fake_wire import (
+    HEADER,
+    FakeWire,
+    controller_state,
+    joints,
+    odometry,
+    pruning_point,
+    pruning_points,
+)
+from running_server import PATIENCE_S, eventually, running_server
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+
+from rolling_panda import messages as m
+from rolling_panda import topics
+
+
+@pytest.fixture(scope="module")
+def server():
+    wire = FakeWire()
+    with running_server(wire) as running:
+        wire.deliver(topics.JOINTS, joints())
+        wire.deliver(topics.ODOMETRY, odometry())
+        yield running
+
+
+@pytest.fixture
+def open_page(server):
+    with server.client(user="ann") as client:
+        yield lambda: Page(server, client)
+
+
+@pytest.fixture
+def page(open_page):
+    with open_page() as page:
+        yield page
+
+
+class Page:
+    """The browser's side of `/ws`."""
+
+    def __init__(self, server, client):
+        headers = {"cookie": server.cookie(client)}
+        self.socket = connect(
+            server.socket_address + "/ws",
+            origin=server.address,
+            additional_headers=headers,
+            proxy=None,
+            close_timeout=0.5,
+        )
+        self.rendered = 0
+        self.sequence = 0
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.socket.close()
+
+    def say(self, kind, **fields):
+        self.socket.send(json.dumps({"type": kind, **fields}))
+
+    def hear(self, kind, patience_s=PATIENCE_S):
+        deadline = time.monotonic() + patience_s
+        while True:
+            message = json.loads(self.socket.recv(timeout=deadline - time.monotonic()))
+            if message["type"] == "PageState":
+                self.rendered = message["number"]
+            if message["type"] == kind:
+                return message
+
+    def hear_event(self, text):
+        while not any(text in event["text"] for event in self.hear("PageEvents")["events"]):
+            pass
+
+    def hold_until_sent(self, sent):
+        """Hold, as a page does with a pressed button, until the server has told the robot so."""
+
+        def told():
+            self.look()
+            self.hold(True)
+            return any(message.hold for message in sent)
+
+        eventually(told)
+
+    def hold(self, hold):
+        self.sequence += 1
+        self.say("Hold", sequence=self.sequence, hold=hold)
+
+    def look(self):
+        self.hear("PageState")
+        self.say("Ping", number=1, rendered=self.rendered)
+        self.hear("Pong")
+
+
+def test_a_page_gets_states_with_its_user_and_growing_numbers(page):
+    first, second = page.hear("PageState"), page.hear("PageState")
+    assert second["number"] > first["number"]
+    assert (second["user"], second["role"], second["viewers"]) == ("ann", "supervisor", 1)
+    assert first["bridge_age_s"] is None
+    assert {row["process"] for row in first["processes"]} == {"bridge", "controller", "perception", "server"}
+
+
+def test_a_ping_is_answered_with_its_number(page):
+    page.hear("PageState")
+    page.say("Ping", number=77, rendered=0)
+    assert page.hear("Pong")["number"] == 77
+
+
+def test_points_come_when_they_change_and_not_again(server, page):
+    server.wire.deliver(topics.POINTS, pruning_points(pruning_point("a"), pruning_point("b")))
+    queue = (m.QueueEntry("b", "ACCEPTED", "next", "ann"),)
+    server.wire.deliver(topics.CONTROLLER, controller_state(queue))
+    while len((points := page.hear("PagePoints"))["points"]) != 2:
+        pass
+    rows = [(row["point"]["point_id"], row["entry"]["state"]) for row in points["points"]]
+    assert rows == [("b", "ACCEPTED"), ("a", "PROPOSED")]
+    server.wire.deliver(topics.POINTS, pruning_points(pruning_point("a"), pruning_point("b")))
+    server.wire.deliver(topics.CONTROLLER, controller_state(queue))
+    with pytest.raises(TimeoutError):
+        page.hear("PagePoints", patience_s=0.5)
+
+
+def test_what_the_other_processes_log_reaches_the_page(server, page):
+    page.hear("PageEvents")
+    event = m.LogEvent(header=HEADER, process="bridge", severity="warning", text="watchdog")
+    server.wire.deliver(topics.EVENT, event)
+    (line,) = page.hear("PageEvents")["events"]
+    assert (line["process"], line["severity"], line["text"]) == ("bridge", "warning", "watchdog")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "{}",
+        "nonsense",
+        '{"type":"Ping","number":1}',
+        '{"type":"Ping","number":1,"rendered":0,"extra":1}',
+        '{"type":"Ping","number":NaN,"rendered":0}',
+        '{"type":"Hold","sequence":1,"hold":1}',
+        '{"type":"PageState"}',
+        '{"type":"Select","point_id":"' + "x" * 65 + '"}',
+        "[" * 10_000,
+    ],
+)
+def test_a_page_that_breaks_the_rules_is_closed(page, text):
+    page.hear("PageState")
+    page.socket.send(text)
+    with pytest.raises(ConnectionClosed) as caught:
+        page.hear("never")
+    assert caught.value.rcvd.code == 1008
+
+
+def test_a_frame_that_is_too_long_closes_the_socket(page):
+    with pytest.raises(ConnectionClosed) as caught:
+        page.socket.send("x" * 70_000)
+        page.hear("never")
+    assert caught.value.rcvd.code == 1009
+
+
+def test_the_tool_follows_while_the_page_holds_and_stops_when_it_falls_silent(server, page):
+    sent = server.wire.sent[topics.TELEOP.name]
+    sent.clear()
+    page.look()
+    page.say("ShowGizmo", visible=True)
+    page.hold_until_sent(sent)
+    eventually(lambda: not sent[-1].hold)
+    assert {message.user for message in sent if message.hold} == {"ann"}
+
+
+def test_letting_go_is_said_at_once(server, page):
+    sent = server.wire.sent[topics.TELEOP.name]
+    sent.clear()
+    page.look()
+    page.say("ShowGizmo", visible=True)
+    page.hold_until_sent(sent)
+    page.hold(False)
+    eventually(lambda: not sent[-1].hold)
+    page.hear_event("ann let go of the tool")
+
+
+def test_a_page_that_closes_ends_its_hold(server, open_page):
+    sent = server.wire.sent[topics.TELEOP.name]
+    sent.clear()
+    with open_page() as page:
+        page.look()
+        page.say("ShowGizmo", visible=True)
+        page.hold_until_sent(sent)
+    eventually(lambda: not sent[-1].hold)
+
+
+def test_a_page_that_has_not_drawn_the_robot_may_not_hold(server, page):
+    sent = server.wire.sent[topics.TELEOP.name]
+    sent.clear()
+    page.hear("PageState")
+    page.say("ShowGizmo", visible=True)
+    page.say("Hold", sequence=1, hold=True)
+    page.hear_event("the view of the robot is not current")
+    assert not any(message.hold for message in sent)
+
+
+def test_an_old_hold_that_arrives_late_is_ignored(server, page):
+    sent = server.wire.sent[topics.TELEOP.name]
+    page.look()
+    page.say("ShowGizmo", visible=True)
+    page.say("Hold", sequence=5, hold=False)
+    sent.clear()
+    page.say("Hold", sequence=4, hold=True)
+    page.say("Ping", number=9, rendered=0)
+    page.hear("Pong")
+    assert not any(message.hold for message in sent)
+
+
+def test_a_second_person_cannot_take_the_tool_from_the_holder(server, page):
+    sent = server.wire.sent[topics.TELEOP.name]
+    sent.clear()
+    with server.client(user="bob") as other, Page(server, other) as second:
+        for each in (page, second):
+            each.look()
+            each.say("ShowGizmo", visible=True)
+        page.hold_until_sent(sent)
+        page.hold(True)
+        second.hold(True)
+        second.hear_event("ann is holding")
+    assert {message.user for message in sent if message.hold} == {"ann"}
+
+
+def test_a_page_that_does_not_read_slows_nobody_down(server, open_page, page):
+    with open_page() as deaf:
+        for number in range(20):
+            deaf.say("Ping", number=number, rendered=0)
+            page.hear("PageState")
+        page.say("Ping", number=3, rendered=0)
+        assert page.hear("Pong")["number"] == 3
+
+
+def test_the_heartbeat_of_the_server_keeps_time(server):
+    beats = server.wire.sent[topics.HEARTBEAT.name]
+    beats.clear()
+    began = time.monotonic()
+    eventually(lambda: len(beats) >= 21)
+    assert time.monotonic() - began > 0.9
+    assert all(after.sequence == before.sequence + 1 for before, after in zip(beats, beats[1:], strict=False))

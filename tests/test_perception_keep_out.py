@@ -1,0 +1,49 @@
+"""Cuts keep away from wires."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from perception.frame import View
+from perception.keep_out import wire_near
+from rolling_panda import messages as m
+
+WIRE, CANE = m.WOOD_CLASSES.index("wire"), m.WOOD_CLASSES.index("cane")
+LENS = m.Intrinsics(width=320, height=240, fx=400.0, fy=400.0, cx=159.5, cy=119.5)
+CUT = np.array([0.0, 0.0, 0.8])
+
+
+def view(wire_row: int, wire_depth: float) -> View:
+    """A camera at the origin of odom, looking along z at a cane and one horizontal wire."""
+    depth = np.full((240, 320), 3.0, np.float32)
+    labels = np.zeros((240, 320), np.uint8)
+    depth[:, 158:162], labels[:, 158:162] = 0.8, CANE
+    hidden = slice(158, 162) if wire_depth > 0.8 else slice(0, 0)
+    keep = labels.copy(), depth.copy()
+    labels[wire_row], depth[wire_row] = WIRE, wire_depth
+    labels[wire_row, hidden], depth[wire_row, hidden] = keep[0][wire_row, hidden], keep[1][wire_row, hidden]
+    return View(
+        sequence=1, stamp=0.0, intrinsics=LENS, depth=depth, labels=labels, color_jpeg=b"", R=np.eye(3), t=np.zeros(3)
+    )
+
+
+@pytest.mark.parametrize(
+    ("above", "depth", "near"),
+    [(0.010, 0.80, True), (0.014, 0.81, True), (0.030, 0.80, False), (0.010, 0.70, True), (0.010, 1.5, False)],
+)
+def test_a_wire_beside_the_cut_or_in_the_way_keeps_the_blades_out(above: float, depth: float, near: bool) -> None:
+    seen = view(round(119.5 - above * 400 / 0.8), depth)
+    assert seen.labels is not None
+    assert wire_near(seen, seen.labels, CUT, 0.018) is near
+
+
+@given(x=st.floats(-3, 3), y=st.floats(-3, 3))
+def test_cuts_out_of_the_image_are_answered_too(x: float, y: float) -> None:
+    seen = view(100, 0.8)
+    assert seen.labels is not None
+    outside = replace(seen, labels=np.zeros_like(seen.labels))
+    assert outside.labels is not None
+    assert wire_near(outside, outside.labels, np.array([x, y, 0.8]), 0.018) is False

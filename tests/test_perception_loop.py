@@ -1,0 +1,125 @@
+import threading
+import time
+
+import pytest
+
+from perception.config import PerceptionConfig
+from perception.loop import Loop
+from perception.worker import Worker
+from rolling_panda import messages as m
+from rolling_panda.errors import MessageError
+from rolling_panda.topics import EVENT, HEARTBEAT, POINTS
+from rolling_panda.transport import Slot
+
+
+class Recorder:
+    def __init__(self):
+        self.sent = []
+
+    def put(self, message):
+        self.sent.append(message)
+
+
+class Wire:
+    """Stands where the transport is: one slot in, lists out."""
+
+    def __init__(self):
+        self.frames = Slot()
+        self.out = {topic.name: Recorder() for topic in (POINTS, HEARTBEAT, EVENT)}
+
+    def slot(self, topic):
+        return self.frames
+
+    def publisher(self, topic):
+        return self.out[topic.name]
+
+
+class Eyes:
+    """Perception that does what its frames say."""
+
+    withdrawn = ()
+
+    def __init__(self):
+        self.release = threading.Event()
+
+    def process(self, frame):
+        if frame == "hang":
+            self.release.wait(10.0)
+        if frame == "corrupt":
+            raise MessageError("frame 1: the depth image is corrupt")
+        return m.PruningPoints(header=m.Header(), segmenter="s", frames=1, points=())
+
+
+@pytest.fixture
+def parts():
+    wire, eyes = Wire(), Eyes()
+    yield wire, eyes, Loop(wire, PerceptionConfig(hang_s=1.0), eyes)
+    eyes.release.set()
+
+
+def turn_until(loop, done, now=0.0):
+    deadline = time.monotonic() + 5.0
+    while not done():
+        loop.turn(now)
+        assert time.monotonic() < deadline
+        time.sleep(0.001)
+
+
+def test_points_are_sent_when_they_are_new_and_again_at_two_hertz(parts):
+    wire, _, loop = parts
+    points = wire.out[POINTS.name].sent
+    wire.frames.store("frame", 0.0)
+    turn_until(loop, lambda: points)
+    for tick in range(1, 41):
+        loop.turn(tick / 20.0)
+    assert 4 <= len(points) - 1 <= 5
+    assert len({id(message) for message in points}) == 1
+
+
+def test_the_heartbeat_counts_turns_and_stops_counting_when_a_frame_hangs(parts):
+    wire, eyes, loop = parts
+    beats = wire.out[HEARTBEAT.name].sent
+    wire.frames.store("hang", 0.0)
+    for tick in range(60):
+        loop.turn(tick / 20.0)
+    counted = [beat.sequence for beat in beats]
+    assert counted[:21] == list(range(1, 22))
+    assert counted[-1] == counted[22] and beats[-1].status
+    assert any("1 s" in event.text for event in wire.out[EVENT.name].sent)
+    eyes.release.set()
+    turn_until(loop, lambda: beats[-1].sequence > counted[-1], now=3.1)
+
+
+def test_a_corrupt_frame_is_told_once_and_sends_no_points(parts):
+    wire, _, loop = parts
+    events = wire.out[EVENT.name].sent
+    wire.frames.store("corrupt", 0.0)
+    turn_until(loop, lambda: events)
+    wire.frames.store("corrupt", 0.1)
+    for _ in range(20):
+        loop.turn(0.2)
+        time.sleep(0.001)
+    assert [event.severity for event in events] == ["error"]
+    assert not wire.out[POINTS.name].sent
+
+
+def test_a_worker_hands_a_bug_to_its_owner():
+    worker = Worker(lambda job: 1 / job)
+    assert worker.submit(0, 0.0)
+    with pytest.raises(ZeroDivisionError):
+        deadline = time.monotonic() + 5.0
+        while time.monotonic() < deadline:
+            worker.poll()
+            time.sleep(0.001)
+
+
+def test_a_worker_takes_one_job_at_a_time():
+    go = threading.Event()
+    worker = Worker(lambda job: go.wait(5.0))
+    assert worker.submit(1, 10.0) and not worker.submit(2, 11.0)
+    assert worker.busy_for(11.5) == 1.5
+    go.set()
+    deadline = time.monotonic() + 5.0
+    while (done := worker.poll()) is None:
+        assert time.monotonic() < deadline
+    assert done.result is True and worker.busy_for(12.0) == 0.0

@@ -1,0 +1,146 @@
+import numpy as np
+import pytest
+
+from perception.config import TrackerConfig
+from perception.fragments import CANE
+from perception.frame import View
+from perception.numbering import RowNumbers, SpurNumber
+from perception.plant import Plant, Spur
+from perception.rule import Cut
+from perception.tracker import Proposal, Tracker
+from rolling_panda import messages as m
+
+CONFIG = TrackerConfig()
+UP = np.array([0.0, -1.0, 0.0])
+
+
+def view(cane=True, depth=0.8):
+    """A camera at the origin of odom that looks along z at one upright cane in the middle of the image."""
+    labels = np.zeros((120, 160), dtype=np.uint8)
+    image = np.full((120, 160), 3.0, dtype=np.float32)
+    if cane:
+        labels[:, 78:83] = CANE
+        image[:, 78:83] = depth
+    intrinsics = m.Intrinsics(160, 120, 200.0, 200.0, 79.5, 59.5)
+    return View(0, 0.0, intrinsics, image, labels, b"", np.eye(3), np.zeros(3))
+
+
+def proposal(x=0.0, y=0.0, z=0.8, spur=1, tangent=UP):
+    cut = Cut("spur cut", np.array([x, y, z]), tangent, 0.004, 0.9, 4, 2, "Because.")
+    return Proposal(cut, SpurNumber(1, spur))
+
+
+def feed(tracker, image, *proposals):
+    return tracker.update(image, image.labels, list(proposals))
+
+
+def test_a_point_shows_after_enough_frames_agree():
+    tracker = Tracker(CONFIG)
+    shown = [len(feed(tracker, view(), proposal()).points) for _ in range(CONFIG.hits)]
+    assert shown == [0] * (CONFIG.hits - 1) + [1]
+
+
+def test_noise_is_averaged_and_changes_neither_name_nor_revision():
+    tracker, rng = Tracker(CONFIG), np.random.default_rng(0)
+    names = set()
+    for _ in range(60):
+        x, y = rng.normal(0.0, 0.002, 2)
+        for point in feed(tracker, view(), proposal(x, y)).points:
+            names.add((point.point_id, point.revision))
+    assert len(names) == 1
+    (point,) = tracker.points()
+    assert np.linalg.norm(np.array(point.position) - [0.0, 0.0, 0.8]) < 0.004
+
+
+def test_a_point_that_moves_gets_a_new_revision():
+    tracker = Tracker(CONFIG)
+    for _ in range(5):
+        feed(tracker, view(), proposal())
+    for _ in range(40):
+        feed(tracker, view(), proposal(y=0.012))
+    (point,) = tracker.points()
+    assert point.revision > 1
+    assert point.position[1] == pytest.approx(0.012, abs=CONFIG.moved)
+
+
+def test_points_out_of_view_stay():
+    tracker = Tracker(CONFIG)
+    for _ in range(4):
+        feed(tracker, view(), proposal(x=0.0))
+    away = view()
+    for _ in range(20):
+        moved = View(0, 0.0, away.intrinsics, away.depth, away.labels, b"", away.R, np.array([5.0, 0.0, 0.0]))
+        feed(tracker, moved)
+    assert len(tracker.points()) == 1
+
+
+def test_a_point_hidden_by_something_nearer_stays():
+    tracker = Tracker(CONFIG)
+    for _ in range(4):
+        feed(tracker, view(), proposal())
+    hidden = view(cane=False)
+    hidden.depth[:] = 0.4
+    for _ in range(20):
+        feed(tracker, hidden)
+    assert len(tracker.points()) == 1
+
+
+def test_a_standing_cane_keeps_its_point_through_frames_without_proposal():
+    tracker = Tracker(CONFIG)
+    for _ in range(4):
+        feed(tracker, view(), proposal())
+    for _ in range(20):
+        feed(tracker, view())
+    assert len(tracker.points()) == 1
+
+
+def test_a_cut_cane_takes_its_point_away_and_says_so():
+    tracker = Tracker(CONFIG)
+    for _ in range(4):
+        feed(tracker, view(), proposal())
+    results = [feed(tracker, view(cane=False)) for _ in range(CONFIG.gone)]
+    assert [len(result.points) for result in results] == [1] * (CONFIG.gone - 1) + [0]
+    assert "has been cut" in results[-1].withdrawn[0]
+
+
+def test_a_spur_has_one_cut_of_a_kind_and_the_better_supported_one_wins():
+    tracker = Tracker(CONFIG)
+    for _ in range(4):
+        feed(tracker, view(), proposal(y=0.02))
+    (old,) = tracker.points()
+    withdrawn = []
+    for _ in range(12):
+        result = feed(tracker, view(), proposal(y=-0.07))
+        assert len(result.points) <= 1
+        withdrawn += result.withdrawn
+    (new,) = tracker.points()
+    assert new.point_id != old.point_id and new.position[1] == pytest.approx(-0.07)
+    assert len(withdrawn) == 1 and "elsewhere" in withdrawn[0]
+
+
+def test_spurs_keep_their_numbers_while_the_robot_drives_on():
+    along = np.array([1.0, 0.0, 0.0])
+    rng = np.random.default_rng(1)
+
+    def plant(*xs):
+        spurs = tuple(Spur(np.array([x, 0.85, 0.95]) + rng.normal(0.0, 0.003, 3), None, 0.0, ()) for x in xs)
+        return Plant(spurs, np.array([[0.45, 0.85, 0.7]]), ())
+
+    numbers = RowNumbers(CONFIG.spur_separation, CONFIG.vine_spacing)
+    first = numbers.number(plant(0.2, 0.32, 0.44), along)
+    assert first == (SpurNumber(1, 1), SpurNumber(1, 2), SpurNumber(1, 3))
+    for _ in range(10):
+        assert numbers.number(plant(0.32, 0.44, 0.6), along) == (*first[1:], SpurNumber(1, 4))
+    assert numbers.number(plant(2.2), along) == (SpurNumber(2, 1),)
+
+
+@pytest.mark.parametrize("distance", [0.12, 0.16, 0.20])
+def test_a_cane_too_near_to_be_measured_keeps_its_point(distance):
+    tracker = Tracker(CONFIG)
+    for _ in range(5):
+        feed(tracker, view(), proposal())
+    near = view(depth=0.0)
+    near.t[2] = 0.8 - distance
+    for _ in range(10):
+        result = feed(tracker, near)
+    assert len(result.points) == 1

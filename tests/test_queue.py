@@ -1,0 +1,132 @@
+import msgspec
+
+from controller.config import ControllerConfig
+from controller.queue import PointQueue
+from rolling_panda import messages as m
+
+POINT = m.PruningPoint(
+    point_id="a",
+    revision=3,
+    position=(1.0, 0.85, 1.0),
+    tangent=(0.0, 0.0, 1.0),
+    radius=0.004,
+    confidence=0.8,
+    nodes_seen=5,
+    nodes_kept=2,
+    vine=0,
+    spur=0,
+    reason="test",
+)
+
+
+def point(point_id="a", **changes):
+    return msgspec.structs.replace(POINT, point_id=point_id, **changes)
+
+
+def shown(*points):
+    return m.PruningPoints(header=m.Header(), segmenter="none", frames=1, points=points)
+
+
+def queue(*points):
+    q = PointQueue(ControllerConfig())
+    q.update(shown(*points))
+    return q
+
+
+def state(q, point_id="a"):
+    return q.get(point_id).state
+
+
+def test_acceptance_binds_what_the_operator_saw():
+    q = queue(point())
+    assert q.accept("a", 3, "ada") == ""
+    q.update(shown(point(revision=4, position=(1.0, 0.853, 1.0))))
+    assert state(q) == "ACCEPTED"
+    assert q.next().accepted.position == (1.0, 0.85, 1.0)
+    assert q.entries()[0].accepted_position == (1.0, 0.85, 1.0)
+    assert q.entries()[0].user == "ada"
+
+
+def test_accepting_an_old_view_is_refused():
+    q = queue(point())
+    assert "revision 2 was seen, it is 3 now" in q.accept("a", 2, "ada")
+    assert state(q) == "PROPOSED"
+
+
+def test_a_point_that_moved_or_turned_is_not_accepted_any_more():
+    for changes in ({"position": (1.0, 0.85, 1.006)}, {"tangent": (0.0, 0.5, 0.866)}):
+        q = queue(point())
+        q.accept("a", 3, "ada")
+        voided = q.update(shown(point(revision=4, **changes)))
+        assert len(voided) == 1 and "acceptance void" in voided[0]
+        assert state(q) == "PROPOSED" and q.next() is None
+        assert "accepted" in q.get("a").reason
+
+
+def test_a_point_that_vanished_is_not_cut_and_a_new_look_is_needed():
+    q = queue(point())
+    q.accept("a", 3, "ada")
+    assert "does not see it" in q.update(shown())[0]
+    assert q.next() is None
+    assert "does not see" in q.accept("a", 3, "ada")
+    q.update(shown(point()))
+    assert q.accept("a", 3, "ada") == ""
+
+
+def test_a_point_behind_the_blades_may_vanish():
+    q = queue(point())
+    q.accept("a", 3, "ada")
+    assert q.update(shown(), keep="a") == []
+    assert state(q) == "ACCEPTED"
+
+
+def test_a_proposal_that_vanished_leaves_the_queue():
+    q = queue(point(), point("b"))
+    q.update(shown(point("b")))
+    assert [e.point_id for e in q.entries()] == ["b"]
+
+
+def test_a_thick_cane_is_refused():
+    q = queue(point(radius=0.009))
+    assert "18 mm thick, the limit is 15 mm" in q.accept("a", 3, "ada")
+
+
+def test_order_of_work_is_along_the_row():
+    q = queue(point("far", position=(2.0, 0.8, 1.0)), point("near", position=(-0.5, 0.9, 1.0)), point("mid"))
+    assert [e.point_id for e in q.entries()] == ["near", "mid", "far"]
+    q.accept("far", 3, "ada")
+    assert q.next().point.point_id == "far"
+    q.accept("mid", 3, "ada")
+    assert q.next().point.point_id == "mid"
+
+
+def test_life_of_a_cut_point():
+    q = queue(point())
+    q.accept("a", 3, "ada")
+    q.intend("a", "cut-1")
+    assert (state(q), q.entries()[0].cut_id) == ("INTENT", "cut-1")
+    assert "INTENT" in q.reject("a", "ada", "no")
+    q.resolve("a", "DONE", "cut")
+    assert "is DONE" in q.accept("a", 3, "ada")
+    q.update(shown())
+    assert state(q) == "DONE"
+
+
+def test_an_unknown_or_failed_cut_waits_for_a_person():
+    for outcome in ("UNKNOWN", "FAILED_NOT_CUT"):
+        q = queue(point())
+        q.accept("a", 3, "ada")
+        q.intend("a", "cut-1")
+        q.resolve("a", outcome, "why")
+        assert q.next() is None
+        assert q.accept("a", 3, "eve") == ""
+
+
+def test_rejected_points_are_not_proposed_and_unknown_ones_are_named():
+    q = queue(point(), point("b", confidence=0.4))
+    assert q.reject("a", "ada", "keep this one") == ""
+    assert (q.entries()[0].state, q.entries()[0].reason) == ("REJECTED", "keep this one")
+    assert [p.point_id for p in q.proposed(0.0)] == ["b"]
+    assert q.proposed(0.5) == []
+    assert "'zz'" in q.accept("zz", 1, "ada")
+    assert "'zz'" in q.reject("zz", "ada", "")

@@ -1,0 +1,68 @@
+import argparse
+import threading
+
+import pytest
+from fake_wire import FakeWire
+
+from rolling_panda.errors import InputError
+from rolling_panda.process import ProcessContext
+from rolling_panda.resources import resource
+from server import service
+from server.__main__ import add_arguments
+from server.service import listen
+
+
+def test_a_port_in_use_is_one_clear_line():
+    with listen("127.0.0.1", 0) as taken:
+        port = taken.getsockname()[1]
+        with pytest.raises(InputError, match=rf"cannot listen on 127.0.0.1:{port}: .*--port"):
+            listen("127.0.0.1", port)
+
+
+def test_a_port_that_is_no_port_is_one_clear_line():
+    with pytest.raises(InputError, match="cannot listen"):
+        listen("127.0.0.1", 70_000)
+
+
+def context(*argv):
+    parser = argparse.ArgumentParser()
+    add_arguments(parser)
+    return ProcessContext(parser.parse_args(argv), resource("assets/config/sim.toml"), FakeWire(), threading.Event())
+
+
+@pytest.fixture
+def served(monkeypatch):
+    """Instead of serving, hand over what would have been served."""
+    seen = {}
+
+    async def serve(config, transport, sessions, door, address, stopping):
+        seen.update(sessions=sessions, address=address)
+
+    monkeypatch.setattr(service, "serve", serve)
+    return seen
+
+
+def test_the_token_file_is_used_and_deleted(served, tmp_path, capsys):
+    file = tmp_path / "token"
+    file.write_text("a" * 43)
+    service.run(context("--port", "0", "--sign-in-token-file", str(file)))
+    assert not file.exists()
+    assert served["sessions"].sign_in("a" * 43, 0.0).role == "supervisor"
+    assert "a" * 43 not in capsys.readouterr().out
+
+
+def test_without_a_file_one_link_is_printed_and_works(served, capsys):
+    service.run(context("--port", "0"))
+    link = capsys.readouterr().out.split()[-1]
+    address, token = link.split("/sign-in?token=")
+    assert address == served["address"]
+    assert served["sessions"].sign_in(token, 0.0).role == "supervisor"
+
+
+def test_a_weak_or_missing_token_is_refused(served, tmp_path):
+    with pytest.raises(InputError, match="token file"):
+        service.run(context("--port", "0", "--sign-in-token-file", str(tmp_path / "none")))
+    weak = tmp_path / "weak"
+    weak.write_text("1234")
+    with pytest.raises(InputError, match="128 bits"):
+        service.run(context("--port", "0", "--sign-in-token-file", str(weak)))

@@ -1,0 +1,125 @@
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+
+from benchmarks.kinematic_robot import KinematicRobot
+from controller.config import ControllerConfig
+from controller.core import Controller
+from controller.interface import Sample
+from rolling_panda import intents
+from rolling_panda import messages as m
+from rolling_panda.config import RobotConfig
+from rolling_panda.robot_model import pose_message
+
+CONFIG = ControllerConfig()
+
+
+def robot(armed=True):
+    r = KinematicRobot(Controller(CONFIG, RobotConfig()), CONFIG.home)
+    r.run(0.05)
+    if armed:
+        assert r.ask(intents.Arm(user="ada")).ok
+        r.run(0.05)
+    return r
+
+
+def tool(r):
+    return r.model.kinematics(r.q).T_odom_tool
+
+
+def hold(r, target, held=True):
+    r.teleop = m.TeleopTarget(sequence=1, hold=held, user="ada", target=pose_message(target))
+
+
+def moved(T, x, y, z, turn=0.0):
+    return pin.SE3(T.rotation @ pin.exp3(np.array([0, turn, 0])), T.translation + np.array([x, y, z]))
+
+
+def test_tool_follows_the_gizmo_within_its_speed():
+    r = robot()
+    target = moved(tool(r), 0.3, 0.1, 0.1, 0.3)
+    hold(r, target)
+    fastest, before = 0.0, tool(r).translation
+    for _ in range(800):
+        r.step()
+        after = tool(r).translation
+        fastest, before = max(fastest, float(np.linalg.norm(after - before)) / r.dt), after
+    assert r.state.mode == "TELEOP"
+    assert np.linalg.norm(tool(r).translation - target.translation) < 0.002
+    assert np.linalg.norm(pin.log3(tool(r).rotation.T @ target.rotation)) < 0.01
+    assert 0.1 < fastest <= 0.255
+
+
+def test_base_comes_along_when_the_gizmo_goes_far_and_stays_parallel_to_the_row():
+    r = robot()
+    target = moved(tool(r), 1.2, 0.1, 0.05)
+    hold(r, target)
+    r.run(15.0)
+    assert np.linalg.norm(tool(r).translation - target.translation) < 0.005
+    assert r.q[0] > 0.5
+    assert abs(r.q[2]) < 0.1
+
+
+def test_letting_go_stops_at_once_and_a_new_hold_goes_on():
+    r = robot()
+    target = moved(tool(r), 0.5, 0, 0)
+    hold(r, target)
+    r.run(1.0)
+    assert np.abs(r.xi).max() > 0.1
+    hold(r, target, held=False)
+    r.run(0.06)
+    assert r.state.mode == "READY"
+    r.run(0.29)
+    assert np.abs(r.xi).max() < 1e-2
+    hold(r, target)
+    r.run(0.2)
+    assert r.state.mode == "TELEOP"
+
+
+def test_silence_ends_the_hold(monkeypatch):
+    r = robot()
+    hold(r, moved(tool(r), 0.5, 0, 0))
+    r.run(1.0)
+    # The newest target stays what it is; only its age grows.
+    inputs, at = r.inputs, r.now
+    held = r.teleop
+
+    def silent():
+        return replace(inputs(), teleop=Sample(held, at))
+
+    monkeypatch.setattr(r, "inputs", silent)
+    r.run(0.5)
+    assert r.state.mode == "READY"
+    assert np.abs(r.xi).max() < 1e-3
+
+
+def test_a_hold_from_before_arming_moves_nothing():
+    r = robot(armed=False)
+    hold(r, moved(tool(r), 0.5, 0, 0))
+    r.run(0.2)
+    assert r.ask(intents.Arm(user="ada")).ok
+    r.run(0.5)
+    assert r.state.mode == "READY"
+    assert not np.any(r.record)
+
+
+def test_without_the_server_there_is_no_teleoperation():
+    r = robot()
+    hold(r, moved(tool(r), 0.5, 0, 0))
+    r.run(1.0)
+    r.server = False
+    r.run(0.4)
+    assert r.state.mode == "PAUSED" and "server" in r.state.reason
+    assert np.abs(r.xi).max() < 1e-2
+
+
+def test_joint_limits_hold_when_the_gizmo_is_out_of_reach():
+    r = robot()
+    hold(r, moved(tool(r), 0.0, 0.9, 1.5))
+    r.run(12.0)
+    arm = r.q[5:]
+    limits = r.model.limits
+    assert (arm > limits.lower[5:]).all() and (arm < limits.upper[5:]).all()
+    xi = np.array(r.record)
+    assert (np.abs(np.diff(xi, axis=0)) <= limits.acceleration * r.dt + 1e-9).all()

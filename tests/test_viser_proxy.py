@@ -1,0 +1,242 @@
+import json
+import time
+
+import msgspec
+import psutil
+import pytest
+import zstandard
+from fake_wire import FakeWire, joints, odometry, pruning_point, pruning_points
+from running_server import PATIENCE_S, eventually, running_server
+from test_viser_filter import CAMERA, CLICK, DRAG, FORGED, GRAB
+from viser import _messages
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+
+from rolling_panda import topics
+
+_PLACING = ("SetPositionMessage", "SetOrientationMessage")
+
+
+@pytest.fixture(scope="module")
+def server():
+    wire = FakeWire()
+    with running_server(wire) as running:
+        wire.deliver(topics.JOINTS, joints())
+        wire.deliver(topics.ODOMETRY, odometry())
+        wire.deliver(topics.POINTS, pruning_points(pruning_point("p1")))
+        with running.client() as client:
+            eventually(lambda: {"/robot/panda_joint1", "/points/p1"} <= drawn(running, client))
+        yield running
+
+
+def drawn(server, client):
+    """Names of what has been placed in the view."""
+    with open_view(server, client) as view:
+        return {message["name"] for message in hear(view, replayed) if message["type"] in _PLACING}
+
+
+def open_socket(server, client, path, **options):
+    return connect(
+        server.socket_address + path,
+        origin=server.address,
+        additional_headers={"cookie": server.cookie(client)},
+        proxy=None,
+        max_size=None,
+        **options,
+    )
+
+
+def open_view(server, client):
+    return open_socket(server, client, "/viser", subprotocols=["viser-v1.1.1"])
+
+
+def messages(frame):
+    """The messages in one frame from viser."""
+    size = int.from_bytes(frame[8:16], "little")
+    inner = zstandard.ZstdDecompressor().decompress(frame[16 : 16 + size], int.from_bytes(frame[:8], "little"))
+    return msgspec.msgpack.decode(inner)["messages"]
+
+
+def hear(view, condition, patience_s=PATIENCE_S):
+    """All messages until one fulfils `condition`."""
+    heard = []
+    deadline = time.monotonic() + patience_s
+    while not any(condition(message) for message in heard):
+        heard += messages(view.recv(timeout=deadline - time.monotonic()))
+    return heard
+
+
+def hear_selected(page):
+    while (message := json.loads(page.recv(timeout=PATIENCE_S)))["type"] != "Selected":
+        pass
+    return message["point_id"]
+
+
+def replayed(message):
+    return message["type"] == "ReplayDoneMessage"
+
+
+def say(view, message):
+    view.send(msgspec.msgpack.encode(message))
+
+
+def test_the_view_shows_the_robot_and_the_points(server):
+    with server.client() as client, open_view(server, client) as view:
+        assert view.subprotocol == "viser-v1.1.1"
+        names = {message.get("name") for message in hear(view, replayed)}
+        assert "/robot" in names
+        assert any("panda_joint7" in (name or "") for name in names)
+        assert "/points/p1" in names
+
+
+def test_every_movement_is_shown_and_nothing_is_sent_at_rest(server):
+    with server.client() as client, open_view(server, client) as view:
+        hear(view, replayed)
+        with pytest.raises(TimeoutError):
+            hear(view, lambda message: message["type"].startswith("Set"), patience_s=0.4)
+        for step in range(1, 11):
+            server.wire.deliver(topics.ODOMETRY, odometry(sequence=step, x=0.01 * step))
+            moved = [message for message in hear(view, places_robot) if message["type"].startswith("Set")]
+            assert {message["name"] for message in moved} == {"/robot"}
+            assert moved[0]["position"][0] == pytest.approx(0.01 * step)
+
+
+def places_robot(message):
+    return message["type"] == "SetPositionMessage" and message["name"] == "/robot"
+
+
+def test_a_click_on_a_point_selects_it_on_the_pages_of_that_session_alone(server):
+    with (
+        server.client() as client,
+        server.client() as other,
+        open_socket(server, client, "/ws") as page,
+        open_socket(server, other, "/ws") as other_page,
+        open_view(server, client) as view,
+    ):
+        hear(view, replayed)
+        say(view, CAMERA)
+        say(view, CLICK)
+        assert hear_selected(page) == "p1"
+        hear(view, lambda message: message.get("name") == "/selection")
+        kinds = [json.loads(other_page.recv(timeout=PATIENCE_S))["type"] for _ in range(5)]
+        assert "Selected" not in kinds
+
+
+def test_the_gizmo_is_on_the_holders_view_alone_and_its_drags_become_targets(server):
+    sent = server.wire.sent[topics.TELEOP.name]
+    with (
+        server.client(user="ann") as client,
+        server.client(user="bob") as other,
+        open_socket(server, client, "/ws") as page,
+        open_view(server, client) as view,
+        open_view(server, other) as other_view,
+    ):
+        for each in (view, other_view):
+            hear(each, replayed)
+            say(each, CAMERA)
+        page.send('{"type":"ShowGizmo","visible":true}')
+        (gizmo,) = [each for each in hear(view, is_gizmo) if is_gizmo(each)]
+        with pytest.raises(TimeoutError):
+            hear(other_view, is_gizmo, patience_s=0.4)
+        say(view, GRAB | {"owner": gizmo["owner"]})
+        say(view, DRAG | {"owner": gizmo["owner"], "position": [0.31, 0.52, 0.93]})
+        sequence = 0
+
+        def hold():
+            nonlocal sequence
+            message = json.loads(page.recv(timeout=PATIENCE_S))
+            if message["type"] == "PageState":
+                sequence += 1
+                page.send(json.dumps({"type": "Ping", "number": sequence, "rendered": message["number"]}))
+                page.send(json.dumps({"type": "Hold", "sequence": sequence, "hold": True}))
+            return any(each.hold and each.target.position == (0.31, 0.52, 0.93) for each in sent)
+
+        eventually(hold)
+        page.send(json.dumps({"type": "Hold", "sequence": sequence + 1, "hold": False}))
+        moved_back = [each for each in hear(view, places_gizmo) if places_gizmo(each)]
+        assert moved_back[-1]["position"] != [0.31, 0.52, 0.93]
+
+
+def places_gizmo(message):
+    return message["type"] == "SetPositionMessage" and message["name"] == "/gizmo"
+
+
+def is_gizmo(message):
+    return message["type"] == "TransformControlsMessage"
+
+
+def test_a_forged_message_never_reaches_viser_and_is_logged(server, monkeypatch):
+    reached = []
+    deserialize = _messages.Message.deserialize.__func__
+
+    def spy(cls, data):
+        message = deserialize(cls, data)
+        reached.append(type(message).__name__)
+        return message
+
+    monkeypatch.setattr(_messages.Message, "deserialize", classmethod(spy))
+    with server.client() as client, open_view(server, client) as view:
+        say(view, FORGED)
+        say(view, {"type": "ShareUrlRequest"})
+        say(view, CAMERA)
+        eventually(lambda: "ViewerCameraMessage" in reached)
+        texts = [event["text"] for event in client.get("/api/events").json()["events"]]
+    assert set(reached) == {"ViewerCameraMessage"}
+    assert any("GuiUpdateMessage" in text for text in texts)
+    assert any("ShareUrlRequest" in text for text in texts)
+
+
+def test_a_viewer_cannot_click(server):
+    with (
+        server.client(role="viewer") as client,
+        open_socket(server, client, "/ws") as page,
+        open_view(server, client) as view,
+    ):
+        hear(view, replayed)
+        say(view, CAMERA)
+        say(view, CLICK)
+        kinds = [json.loads(page.recv(timeout=PATIENCE_S))["type"] for _ in range(6)]
+        assert "Selected" not in kinds
+
+
+def test_another_version_of_the_view_is_told_so(server):
+    with server.client() as client, pytest.raises(ConnectionClosed) as caught:
+        with open_socket(server, client, "/viser", subprotocols=["viser-v0.0.1"]) as view:
+            view.recv(timeout=PATIENCE_S)
+    assert caught.value.rcvd.code == 1002
+    assert "mismatch" in caught.value.rcvd.reason.lower()
+
+
+def test_signing_out_closes_the_view(server):
+    with server.client() as client, open_view(server, client) as view:
+        hear(view, replayed)
+        client.post("/api/sign-out")
+        with pytest.raises(ConnectionClosed):
+            hear(view, lambda message: False, patience_s=1.0)
+
+
+def test_who_goes_around_the_proxy_is_thrown_out(server, view_port):
+    with pytest.raises(ConnectionClosed) as caught:
+        with connect(f"ws://127.0.0.1:{view_port}/", subprotocols=["viser-v1.1.1"], proxy=None) as view:
+            while True:
+                view.recv(timeout=PATIENCE_S)
+    assert caught.value.rcvd.code == 1008
+    with server.client() as client:
+        texts = [event["text"] for event in client.get("/api/events").json()["events"]]
+    assert any("outside the page" in text for text in texts)
+
+
+def test_the_client_page_is_compressed_and_kept_by_the_browser(server):
+    with server.client() as client:
+        first = client.get("/viser/")
+        assert first.headers["content-encoding"] == "gzip"
+        assert "</style></head>" in first.text
+        again = client.get("/viser/", headers={"if-none-match": first.headers["etag"]})
+        assert again.status_code == 304
+
+
+@pytest.fixture
+def view_port(server):
+    ours = {c.laddr.port for c in psutil.Process().net_connections("tcp") if c.status == psutil.CONN_LISTEN}
+    (port,) = ours - {int(server.address.rsplit(":", 1)[1])}
+    return port

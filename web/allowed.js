@@ -1,0 +1,62 @@
+// What the operator may ask for now, and why not.
+
+import { INTENTS } from "./messages.js";
+import { isLive, link, pageState, points, staleWords } from "./state.js";
+import { MODE_WORDS } from "./words.js";
+
+/** Where each request belongs, in words. @type {Readonly<Record<string, string>>} */
+const NEEDS = Object.freeze({
+  Arm: "Arming starts from Idle",
+  Start: "Starting needs Ready",
+  Pause: "There is nothing to pause",
+  Resume: "Resuming needs Paused",
+  Home: "Going home needs Ready",
+  Acknowledge: "There is nothing to acknowledge",
+  Reset: "There is no stop to reset",
+  AcceptPoint: "Points cannot be accepted",
+  AcceptAll: "Points cannot be accepted",
+  RejectPoint: "Points cannot be rejected",
+});
+
+/** Why this page can ask for nothing now; empty when it can. */
+export function whyNothing() {
+  const { status } = link.get();
+  if (status === "signed-out") return "You are not signed in";
+  if (status !== "open") return "There is no link to the server";
+  const state = pageState.get();
+  if (state === null) return "Waiting for the first state";
+  if (state.role === "viewer") return "You are signed in as a viewer";
+  return "";
+}
+
+/**
+ * Why a request would be refused now; empty when the controller would take it.
+ *
+ * @param {string} intent Name of the intent, as in `ControllerState.allowed`.
+ */
+export function whyNot(intent) {
+  const nothing = whyNothing();
+  if (nothing) return nothing;
+  const controller = pageState.get()?.controller ?? null;
+  if (controller === null || !isLive("controller")) return staleWords("controller") || "The controller is not there";
+  if (controller.allowed.includes(intent)) return "";
+  if (!INTENTS.includes(/** @type {any} */ (intent))) return `There is no ${intent}`;
+  if (intent === "Start" && controller.mode === "READY" && countOf("ACCEPTED") === 0) return "Accept a point first";
+  return `${NEEDS[intent]}; the robot is in ${MODE_WORDS[controller.mode]}`;
+}
+
+/** Why the tool cannot be moved by hand now; empty when it can. */
+export function whyNoTeleoperation() {
+  const nothing = whyNothing();
+  if (nothing) return nothing;
+  const controller = pageState.get()?.controller ?? null;
+  if (controller === null || !isLive("controller")) return staleWords("controller") || "The controller is not there";
+  if (!isLive("bridge")) return staleWords("bridge") || "The bridge is not there";
+  if (controller.mode === "READY" || controller.mode === "TELEOP") return "";
+  return `Teleoperation needs Ready; the robot is in ${MODE_WORDS[controller.mode]}`;
+}
+
+/** @param {import("./messages.js").PointState} state */
+export function countOf(state) {
+  return (points.get()?.points ?? []).filter((row) => row.entry.state === state).length;
+}

@@ -1,0 +1,23 @@
+// Starts the page: components, link, clock, keys.
+
+import "./components/rp-camera.js";
+import "./components/rp-controls.js";
+import "./components/rp-link-banner.js";
+import "./components/rp-log.js";
+import "./components/rp-mode.js";
+import "./components/rp-queue.js";
+import "./components/rp-scene.js";
+import "./components/rp-status-bar.js";
+import "./components/rp-stop.js";
+import "./components/rp-stop-banner.js";
+import "./components/rp-telemetry.js";
+import "./components/rp-teleoperation.js";
+import "./components/rp-toasts.js";
+import { now } from "./state.js";
+import { listenForSpace } from "./stop.js";
+import { guardHold, socket } from "./teleoperation.js";
+
+listenForSpace(window);
+guardHold();
+window.setInterval(() => now.set(performance.now()), 250);
+socket.open();

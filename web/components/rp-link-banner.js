@@ -1,0 +1,38 @@
+// The page has no link: what is shown is the last known state. It tries again by itself.
+
+import { element, setText } from "../element.js";
+import { icon } from "../icons.js";
+import { link, now, stateAge } from "../state.js";
+import { drawOn } from "../store.js";
+import { ageWords, counted } from "../words.js";
+
+class RpLinkBanner extends HTMLElement {
+  connectedCallback() {
+    this.hidden = true;
+    const title = element("h2");
+    const words = element("p");
+    const hint = element("p", { class: "hint" });
+    this.append(element("div", { class: "banner-head" }, icon("gone"), title), words, hint);
+    drawOn([link, now], () => {
+      const { status, attempts } = link.get();
+      const shown = status !== "open" && !(status === "connecting" && attempts === 0);
+      document.body.classList.toggle("no-link", shown);
+      if (this.hidden !== !shown) {
+        this.hidden = !shown;
+        this.setAttribute("role", shown ? "alert" : "none");
+      }
+      if (!shown) return;
+      const age = stateAge();
+      if (status === "signed-out") {
+        setText(title, "You are not signed in");
+        setText(words, "Open the sign-in link that the program printed when it started.");
+      } else {
+        setText(title, "No link to the server");
+        const old = age === null ? "" : `What you see is ${ageWords(age)} old. `;
+        setText(words, `${old}Trying again by itself (${counted(attempts, "try", "tries")} so far).`);
+      }
+      setText(hint, "The software stop may not reach the robot from here: use the emergency stop on the robot.");
+    });
+  }
+}
+customElements.define("rp-link-banner", RpLinkBanner);

@@ -1,0 +1,31 @@
+// What the robot is doing, and why.
+
+import { element, setText } from "../element.js";
+import { setIcon } from "../icons.js";
+import { isLive, link, now, pageState } from "../state.js";
+import { drawOn } from "../store.js";
+import { MODE_WORDS, PHASE_WORDS } from "../words.js";
+
+class RpMode extends HTMLElement {
+  connectedCallback() {
+    this.setAttribute("role", "status");
+    this.setAttribute("aria-label", "Mode");
+    const shape = element("span", { class: "shape" });
+    const word = element("span", { class: "word" });
+    const chip = element("span", { id: "mode", class: "chip mode", data: { mode: "" } }, shape, word);
+    const reason = element("span", { class: "mode-reason" });
+    this.append(chip, reason);
+    drawOn([pageState, link, now], () => {
+      const controller = pageState.get()?.controller ?? null;
+      const mode = controller?.mode ?? "";
+      chip.dataset.mode = mode;
+      chip.classList.toggle("stale", !isLive("controller"));
+      setIcon(shape, mode || "UNKNOWN");
+      const phase = controller ? PHASE_WORDS[controller.phase] : "";
+      setText(word, controller ? MODE_WORDS[controller.mode] + (phase ? ` · ${phase}` : "") : "No state yet");
+      setText(reason, controller?.reason ?? "");
+      reason.title = controller?.reason ?? "";
+    });
+  }
+}
+customElements.define("rp-mode", RpMode);

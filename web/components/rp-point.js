@@ -1,0 +1,118 @@
+// One row of the queue: a pruning point, why it is where it is, and what may be done with it.
+
+import { whyNot } from "../allowed.js";
+import { ask } from "../api.js";
+import { element, setEnabled, setText } from "../element.js";
+import { icon, setIcon } from "../icons.js";
+import { pageState, selected } from "../state.js";
+import { select } from "../teleoperation.js";
+import { POINT_WORDS, counted } from "../words.js";
+
+/** @typedef {import("../messages.js").PagePoint} PagePoint */
+/** @typedef {import("../messages.js").PointState} PointState */
+
+/** @type {ReadonlySet<PointState>} */
+const CAN_ACCEPT = new Set(/** @type {PointState[]} */ (["PROPOSED", "REJECTED", "FAILED_NOT_CUT", "UNKNOWN"]));
+/** @type {ReadonlySet<PointState>} */
+const CAN_REJECT = new Set(/** @type {PointState[]} */ (["PROPOSED", "ACCEPTED", "FAILED_NOT_CUT", "UNKNOWN"]));
+
+/** @param {PagePoint} row */
+export function whyNotAccept(row) {
+  if (!CAN_ACCEPT.has(row.entry.state)) return `It is ${POINT_WORDS[row.entry.state].toLowerCase()}`;
+  return whyNot("AcceptPoint");
+}
+
+/** @param {PagePoint} row */
+export function whyNotReject(row) {
+  if (!CAN_REJECT.has(row.entry.state)) return `It is ${POINT_WORDS[row.entry.state].toLowerCase()}`;
+  return whyNot("RejectPoint");
+}
+
+/** @param {PagePoint} row */
+export function accept(row) {
+  const id = encodeURIComponent(row.point.point_id);
+  return ask(`Accepting ${row.point.point_id}`, `/api/points/${id}/accept`, { revision: row.point.revision });
+}
+
+/** @param {PagePoint} row */
+export function reject(row) {
+  const id = encodeURIComponent(row.point.point_id);
+  return ask(`Rejecting ${row.point.point_id}`, `/api/points/${id}/reject`, { reason: "" });
+}
+
+export class RpPoint extends HTMLElement {
+  constructor() {
+    super();
+    /** @type {PagePoint|null} */
+    this.row = null;
+    this.shape = element("span", { class: "shape" });
+    this.word = element("span");
+    this.chip = element("span", { class: "chip point-state" }, this.shape, this.word);
+    this.place = element("span", { class: "point-name" });
+    this.facts = element("p", { class: "facts number" });
+    this.reason = element("p", { class: "reason" });
+    this.acceptButton = element(
+      "button",
+      { class: "accept", attributes: { type: "button" }, onclick: () => this.row && void accept(this.row) },
+      icon("DONE"),
+    );
+    this.rejectButton = element(
+      "button",
+      { class: "reject", attributes: { type: "button" }, onclick: () => this.row && void reject(this.row) },
+      icon("REJECTED"),
+    );
+  }
+
+  connectedCallback() {
+    if (this.childElementCount > 0) return;
+    this.setAttribute("role", "listitem");
+    this.append(
+      element(
+        "div",
+        { class: "point-text" },
+        element("div", { class: "point-head" }, this.chip, this.place),
+        this.facts,
+      ),
+      element("div", { class: "point-actions" }, this.acceptButton, this.rejectButton),
+      this.reason,
+    );
+    this.addEventListener("click", (event) => {
+      if (!(/** @type {Element} */ (event.target).closest("button"))) this.choose();
+    });
+    this.addEventListener("focus", () => this.choose());
+  }
+
+  choose() {
+    if (this.row) select(this.row.point.point_id);
+  }
+
+  /**
+   * @param {PagePoint} row
+   * @param {boolean} reachable Is this the row that the Tab key comes to?
+   */
+  show(row, reachable) {
+    this.row = row;
+    const { point, entry } = row;
+    this.dataset.pointId = point.point_id;
+    this.dataset.state = entry.state;
+    this.tabIndex = reachable ? 0 : -1;
+    const chosen = selected.get() === point.point_id;
+    this.setAttribute("aria-current", String(chosen));
+    this.classList.toggle("active", pageState.get()?.controller?.active_point_id === point.point_id);
+    setIcon(this.shape, entry.state);
+    setText(this.word, POINT_WORDS[entry.state]);
+    setText(this.place, point.point_id);
+    const thick = `${(2000 * point.radius).toFixed(1)} mm`;
+    const sure = `${Math.round(100 * point.confidence)} %`;
+    setText(this.facts, `${point.nodes_kept}/${point.nodes_seen} nodes · ${thick} · ${sure}`);
+    const kept = `Keeps ${point.nodes_kept} of ${counted(point.nodes_seen, "node")}`;
+    this.facts.title = `${kept}; the cane is ${thick} thick; confidence ${sure}`;
+    setText(this.reason, [entry.reason, point.reason].filter(Boolean).join(" · "));
+    this.reason.title = this.reason.textContent ?? "";
+    setEnabled(this.acceptButton, whyNotAccept(row), "Accept this cut (A)");
+    setEnabled(this.rejectButton, whyNotReject(row), "Reject this cut (R)");
+    this.acceptButton.setAttribute("aria-label", `Accept ${point.point_id}`);
+    this.rejectButton.setAttribute("aria-label", `Reject ${point.point_id}`);
+  }
+}
+customElements.define("rp-point", RpPoint);

@@ -1,0 +1,65 @@
+// The 3-D view, in a frame of the same origin. Its keys and drags are watched, because they do not reach this page.
+
+import { element } from "../element.js";
+import { link } from "../state.js";
+import { listenForSpace } from "../stop.js";
+import { listenForDrag, listenForHoldKey } from "../teleoperation.js";
+
+/** Below this width (px) the 3-D client lays its own panel over the view, as on a telephone. */
+const LEAST_WIDTH = 600;
+/** More pixels a way than this cost more than they show. */
+const LARGEST_RATIO = 1.5;
+
+class RpScene extends HTMLElement {
+  connectedCallback() {
+    const words = element("p", { text: "Loading the 3-D view…" });
+    const retry = element("button", { text: "Load it again", attributes: { type: "button" } });
+    retry.hidden = true;
+    const frame = element("iframe", { attributes: { title: "3-D view of the robot and the row", tabindex: "0" } });
+    const waiting = element("div", { class: "empty", attributes: { role: "status" } }, words, retry);
+    this.append(waiting, frame);
+
+    const load = () => {
+      words.textContent = "Loading the 3-D view…";
+      retry.hidden = true;
+      waiting.hidden = false;
+      frame.classList.remove("loaded");
+      // At a fixed resolution: changing it with the load, as the 3-D client does by itself, stalls a slow machine for
+      // seconds, and a stalled view ends a hold.
+      frame.src = `/viser/?fixedDpr=${Math.min(window.devicePixelRatio, LARGEST_RATIO)}`;
+    };
+    frame.addEventListener("load", () => {
+      const view = frame.contentWindow;
+      if (!view || !frame.getAttribute("src")) return;
+      const there = frame.contentDocument?.querySelector("#root, canvas") ?? null;
+      if (there === null) {
+        words.textContent = "The 3-D view did not load. Everything else works without it.";
+        retry.hidden = false;
+        return;
+      }
+      listenForSpace(view);
+      listenForHoldKey(view);
+      listenForDrag(view);
+      frame.classList.add("loaded");
+      waiting.hidden = true;
+    });
+    retry.addEventListener("click", load);
+    // In a narrow place the view is laid out at that width and shown smaller.
+    new ResizeObserver(() => {
+      const shrink = Math.min(1, Math.max(0.2, this.clientWidth / LEAST_WIDTH));
+      frame.style.setProperty("width", `${100 / shrink}%`);
+      frame.style.setProperty("height", `${100 / shrink}%`);
+      frame.style.setProperty("transform", `scale(${shrink})`);
+    }).observe(this);
+    // The frame's own link tries again only while it has the focus, so each new link of the page loads it anew.
+    let open = false;
+    const follow = () => {
+      const isOpen = link.get().status === "open";
+      if (isOpen && !open) load();
+      open = isOpen;
+    };
+    link.subscribe(follow);
+    follow();
+  }
+}
+customElements.define("rp-scene", RpScene);

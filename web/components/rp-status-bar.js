@@ -1,0 +1,81 @@
+// Who is signed in, which process is there, and how good the link is.
+
+import { post } from "../api.js";
+import { element, setText } from "../element.js";
+import { icon, setIcon } from "../icons.js";
+import { PROCESSES } from "../messages.js";
+import { isLive, link, now, pageState, processAge, roundTrip, say, stateAge } from "../state.js";
+import { drawOn } from "../store.js";
+import { ageWords } from "../words.js";
+
+class RpStatusBar extends HTMLElement {
+  connectedCallback() {
+    this.append(
+      element("h1", { class: "product" }, element("img", { attributes: { src: "icon.svg", alt: "" } }), "Rolling Panda"),
+      this.presence(),
+      this.linkChip(),
+      this.person(),
+    );
+  }
+
+  presence() {
+    const box = element("div", { class: "presences", attributes: { role: "group", "aria-label": "Processes" } });
+    for (const process of PROCESSES) {
+      const shape = element("span", { class: "shape" });
+      const age = element("span", { class: "age" });
+      const chip = element(
+        "span",
+        { class: "presence", data: { process, present: "false" } },
+        shape,
+        element("span", { text: process }),
+        age,
+      );
+      box.append(chip);
+      drawOn([pageState, link, now], () => {
+        const live = isLive(process);
+        // Without the server nothing is known of the others.
+        const unknown = process !== "server" && !isLive("server");
+        const seconds = processAge(process);
+        const since = seconds === null ? "not seen" : `gone ${ageWords(seconds)}`;
+        chip.dataset.present = unknown ? "unknown" : String(live);
+        setIcon(shape, unknown ? "UNKNOWN" : live ? "present" : "gone");
+        setText(age, live || unknown ? "" : since);
+        chip.title = unknown ? `${process}: not known without the server` : live ? `${process} is there` : `${process}: ${since}`;
+      });
+    }
+    return box;
+  }
+
+  linkChip() {
+    const words = element("span", { class: "number" });
+    const chip = element("span", { id: "link", class: "link" }, icon("link"), words);
+    drawOn([roundTrip, now, link, pageState], () => {
+      const age = stateAge();
+      const trip = roundTrip.get();
+      const open = link.get().status === "open";
+      chip.dataset.quality = !open || age === null || age > 1 ? "bad" : (trip ?? 0) > 200 || age > 0.5 ? "poor" : "good";
+      setText(words, open && trip !== null ? `${trip.toFixed(0)} ms · ${ageWords(age ?? 0)}` : "no link");
+      chip.title = "Round trip between this page and the server, and the age of the newest state";
+    });
+    return chip;
+  }
+
+  person() {
+    const name = element("span", { class: "user-name" });
+    const role = element("span", { class: "user-role" });
+    const leave = element("button", { id: "sign-out", class: "quiet", text: "Sign out", attributes: { type: "button" } });
+    leave.addEventListener("click", async () => {
+      const answer = await post("/api/sign-out");
+      if (answer.ok) location.replace("/");
+      else say("error", `Sign-out refused: ${answer.reason}`);
+    });
+    drawOn([pageState], () => {
+      const state = pageState.get();
+      setText(name, state?.user ?? "");
+      setText(role, state && state.role !== state.user ? `· ${state.role}` : "");
+      name.title = state ? `${state.viewers} page${state.viewers === 1 ? "" : "s"} open now` : "";
+    });
+    return element("div", { class: "person" }, name, role, leave);
+  }
+}
+customElements.define("rp-status-bar", RpStatusBar);

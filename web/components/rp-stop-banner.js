@@ -1,0 +1,85 @@
+// After a stop: who pressed it and why, who has latched it, and the way out with a reason.
+
+import { whyNot } from "../allowed.js";
+import { ask } from "../api.js";
+import { element, setEnabled, setText } from "../element.js";
+import { icon, setIcon } from "../icons.js";
+import { TEXT_MAX_LENGTH } from "../messages.js";
+import { isLive, link, now, pageState, staleWords } from "../state.js";
+import { drawOn } from "../store.js";
+import { stopProgress } from "../stop.js";
+
+class RpStopBanner extends HTMLElement {
+  connectedCallback() {
+    this.hidden = true;
+    const who = element("p", { class: "who" });
+    const bridge = acknowledgement("bridge");
+    const controller = acknowledgement("controller");
+    const reason = element("input", {
+      id: "reset-reason",
+      attributes: {
+        type: "text",
+        maxlength: String(TEXT_MAX_LENGTH),
+        placeholder: "Why is it safe to go on?",
+        "aria-label": "Reason for the reset",
+        autocomplete: "off",
+      },
+    });
+    const reset = element("button", { id: "reset", text: "Reset", attributes: { type: "submit" } });
+    const form = element("form", {}, reason, reset);
+    form.addEventListener("submit", async (event) => {
+      event.preventDefault();
+      if (await ask("Reset", "/api/reset", { reason: reason.value.trim() })) reason.value = "";
+    });
+    this.append(
+      element("div", { class: "banner-head" }, icon("ESTOP_LATCHED"), element("h2", { text: "Software stop" })),
+      who,
+      element("ul", { class: "acknowledgements" }, bridge.row, controller.row),
+      form,
+      element("p", { class: "hint", text: "The reset moves nothing: arm and start again afterwards." }),
+    );
+    const draw = () => {
+      const state = pageState.get();
+      const byBridge = (state?.bridge?.stop_id ?? "") !== "";
+      const byController = state?.controller?.mode === "ESTOP_LATCHED";
+      const asked = stopProgress.get() === "sending" || stopProgress.get() === "sent";
+      const shown = byBridge || byController || asked;
+      if (this.hidden !== !shown) {
+        this.hidden = !shown;
+        this.setAttribute("role", shown ? "alert" : "none");
+      }
+      if (!shown) return;
+      const told = state?.bridge?.stopped_by || (byController ? state?.controller?.reason : "") || "";
+      setText(who, told ? `Pressed by ${told}` : "Pressed on this page; waiting for the robot to say so");
+      bridge.show(byBridge);
+      controller.show(byController);
+      const why = whyNot("Reset") || (reason.value.trim() === "" ? "Write a reason first" : "");
+      setEnabled(reset, why, "Release the latched stop; nothing moves");
+    };
+    reason.addEventListener("input", draw);
+    drawOn([pageState, link, now, stopProgress], draw);
+    // "Sent" has served its purpose once the robot itself says that it is stopped.
+    pageState.subscribe((state) => {
+      const latched = state?.controller?.mode === "ESTOP_LATCHED" || (state?.bridge?.stop_id ?? "") !== "";
+      if (latched && stopProgress.get() !== "idle") stopProgress.set("idle");
+    });
+  }
+}
+
+/** @param {"bridge"|"controller"} process */
+function acknowledgement(process) {
+  const shape = element("span", { class: "shape" });
+  const words = element("span");
+  const row = element("li", { data: { acknowledged: "false", by: process } }, shape, words);
+  return {
+    row,
+    /** @param {boolean} latched */
+    show(latched) {
+      row.dataset.acknowledged = String(latched);
+      setIcon(shape, latched ? "present" : "warning");
+      const old = isLive(process) ? "" : ` (${staleWords(process)})`;
+      setText(words, `${process}: ${latched ? "stopped and latched" : "not confirmed yet"}${old}`);
+    },
+  };
+}
+customElements.define("rp-stop-banner", RpStopBanner);

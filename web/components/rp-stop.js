@@ -1,0 +1,40 @@
+// The software stop: always there, always on top, pressed with a finger, the mouse or the space bar.
+
+import { element, setText } from "../element.js";
+import { icon } from "../icons.js";
+import { drawOn } from "../store.js";
+import { stopProgress, stopRobot } from "../stop.js";
+
+/** @type {Readonly<Record<import("../stop.js").StopProgress, string>>} */
+const WORDS = Object.freeze({
+  idle: "Software stop",
+  sending: "Stopping…",
+  sent: "Software stop",
+  failed: "Not reached — press again",
+});
+
+class RpStop extends HTMLElement {
+  connectedCallback() {
+    const label = element("span", { class: "stop-label" });
+    const button = element(
+      "button",
+      {
+        id: "stop",
+        attributes: { type: "button", "aria-keyshortcuts": "Space", title: "Stops base and arm. Space bar does the same." },
+      },
+      icon("ESTOP_LATCHED"),
+      element("span", { class: "stop-words" }, label, element("small", { text: "space bar" })),
+    );
+    // On pressing down, not on letting go: a finger that slides off has still stopped the robot.
+    button.addEventListener("pointerdown", (event) => {
+      if (event.button === 0) void stopRobot("stop button");
+    });
+    // A click without a pointer: Enter, or an assistive tool.
+    button.addEventListener("click", (event) => {
+      if (event.detail === 0) void stopRobot("stop button");
+    });
+    this.append(button);
+    drawOn([stopProgress], () => setText(label, WORDS[stopProgress.get()]));
+  }
+}
+customElements.define("rp-stop", RpStop);

@@ -1,0 +1,42 @@
+// Short notices above the log. They are in the log as well.
+
+import { element } from "../element.js";
+import { icon } from "../icons.js";
+import { dismissToast, toasts } from "../state.js";
+import { drawOn } from "../store.js";
+
+class RpToasts extends HTMLElement {
+  connectedCallback() {
+    this.setAttribute("role", "status");
+    this.setAttribute("aria-live", "polite");
+    /** @type {Map<number, HTMLElement>} */
+    const shown = new Map();
+    drawOn([toasts], () => {
+      const wanted = new Set(toasts.get().map((toast) => toast.id));
+      for (const [id, node] of shown) {
+        if (wanted.has(id)) continue;
+        node.remove();
+        shown.delete(id);
+      }
+      for (const toast of toasts.get()) {
+        if (shown.has(toast.id)) continue;
+        const close = element("button", {
+          class: "quiet",
+          text: "×",
+          attributes: { type: "button", "aria-label": "Close notice" },
+          onclick: () => dismissToast(toast.id),
+        });
+        const node = element(
+          "div",
+          { class: "toast", data: { severity: toast.severity } },
+          icon(toast.severity),
+          element("span", { text: toast.text }),
+          close,
+        );
+        shown.set(toast.id, node);
+        this.append(node);
+      }
+    });
+  }
+}
+customElements.define("rp-toasts", RpToasts);

@@ -1,0 +1,71 @@
+// The software stop: one request, tried again until the server has it, whatever else the page is doing.
+
+import { post } from "./api.js";
+import { say } from "./state.js";
+import { signal } from "./store.js";
+
+/** @typedef {"idle"|"sending"|"sent"|"failed"} StopProgress */
+
+/** @type {import("./store.js").Signal<StopProgress>} */
+export const stopProgress = signal(/** @type {StopProgress} */ ("idle"));
+
+const TRIES = 4;
+/** The server has sent the stop, but the bridge has not confirmed it. */
+const UNCONFIRMED = 503;
+
+/** @param {string} reason */
+export async function stopRobot(reason) {
+  stopProgress.set("sending");
+  let refusal = "";
+  let unconfirmed = 0;
+  for (let attempt = 0; attempt < TRIES; attempt++) {
+    const answer = await post("/api/stop", { reason }, 1000);
+    if (answer.ok) {
+      stopProgress.set("sent");
+      return;
+    }
+    refusal = answer.reason;
+    if (answer.status === UNCONFIRMED) unconfirmed += 1;
+    if (answer.status === 401 || unconfirmed > 1) break;
+  }
+  stopProgress.set("failed");
+  const what = unconfirmed > 0 ? "is not confirmed" : "did not get through";
+  say("error", `The software stop ${what} (${refusal}). Use the emergency stop on the robot.`);
+}
+
+/**
+ * Make the space bar of a window stop the robot, even when a button there has the focus.
+ *
+ * @param {Window} target
+ */
+export function listenForSpace(target) {
+  const swallow = (/** @type {KeyboardEvent} */ event) => {
+    if (event.code !== "Space" || isTyping(event.target)) return false;
+    event.preventDefault();
+    event.stopImmediatePropagation();
+    return true;
+  };
+  target.addEventListener(
+    "keydown",
+    (event) => {
+      if (swallow(event) && !event.repeat) void stopRobot("space bar");
+    },
+    { capture: true },
+  );
+  // A button is pressed when the space bar comes up again.
+  target.addEventListener("keyup", swallow, { capture: true });
+}
+
+const TEXT_INPUTS = new Set(["text", "search", "email", "url", "password", "tel"]);
+
+/**
+ * Is this a place where a space is a character? Works across frames, where `instanceof` does not.
+ *
+ * @param {EventTarget|null} target
+ */
+export function isTyping(target) {
+  const node = /** @type {Partial<HTMLInputElement>|null} */ (target);
+  const name = node?.localName;
+  if (name === "textarea" || node?.isContentEditable === true) return true;
+  return name === "input" && TEXT_INPUTS.has(node?.type ?? "text") && !node?.readOnly && !node?.disabled;
+}

@@ -1,0 +1,97 @@
+// Moving the tool by hand: whether the gizmo is shown, and who holds.
+
+import { whyNoTeleoperation } from "./allowed.js";
+import { HoldToMove } from "./hold.js";
+import { Link } from "./socket.js";
+import { pageState, selected, showToast } from "./state.js";
+import { signal } from "./store.js";
+import { isTyping } from "./stop.js";
+
+const scheme = location.protocol === "https:" ? "wss" : "ws";
+export const socket = new Link(`${scheme}://${location.host}/ws`);
+
+/** Is the gizmo shown? */
+export const teleoperating = signal(false);
+
+export const hold = new HoldToMove(
+  (message) => socket.send(message),
+  () => whyNoTeleoperation() || (teleoperating.get() ? "" : "Switch on Teleoperate first"),
+);
+
+/** @param {boolean} on */
+export function setTeleoperating(on) {
+  if (on === teleoperating.get()) return;
+  if (!on) hold.releaseAll();
+  teleoperating.set(on);
+  socket.send({ type: "ShowGizmo", visible: on });
+}
+
+/** @param {string} pointId Empty = none. */
+export function select(pointId) {
+  if (pointId === selected.get()) return;
+  selected.set(pointId);
+  socket.send({ type: "Select", point_id: pointId });
+}
+
+/** Let go whenever the operator can no longer be holding on purpose. */
+export function guardHold() {
+  socket.onclose = () => {
+    hold.releaseAll();
+    teleoperating.set(false);
+  };
+  // The robot has left the modes in which a hand may move it: start over from the switch, not from a held button.
+  pageState.subscribe(() => {
+    if (teleoperating.get() && whyNoTeleoperation()) setTeleoperating(false);
+  });
+  document.addEventListener("visibilitychange", () => {
+    if (document.hidden) hold.releaseAll();
+  });
+  window.addEventListener("pagehide", () => hold.releaseAll());
+  window.addEventListener("blur", () => {
+    hold.release("button");
+    hold.release("key");
+  });
+  listenForHoldKey(window);
+}
+
+/**
+ * Hold with the H key of a window.
+ *
+ * @param {Window} target
+ */
+export function listenForHoldKey(target) {
+  target.addEventListener("keydown", (event) => {
+    if (event.code !== "KeyH" || event.repeat || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (isTyping(event.target)) return;
+    const why = hold.press("key");
+    if (why && teleoperating.get()) showToast("warning", why);
+  });
+  target.addEventListener("keyup", (event) => {
+    if (event.code === "KeyH") hold.release("key");
+  });
+}
+
+/**
+ * Dragging in the 3-D view counts as holding for as long as the pointer is down there.
+ *
+ * @param {Window} view
+ */
+export function listenForDrag(view) {
+  const release = () => hold.release("gizmo");
+  const options = { capture: true };
+  view.addEventListener(
+    "pointerdown",
+    (event) => {
+      if (teleoperating.get() && event.isPrimary && event.button === 0) hold.press("gizmo");
+    },
+    options,
+  );
+  view.addEventListener("pointerup", release, options);
+  view.addEventListener("pointercancel", release, options);
+  // A release outside the window is never reported; the next move tells.
+  view.addEventListener("pointermove", (event) => event.buttons === 0 && release(), options);
+  view.addEventListener("blur", () => {
+    hold.release("gizmo");
+    hold.release("key");
+  });
+}

@@ -1,0 +1,67 @@
+// Words and numbers for people.
+
+/** @type {Readonly<Record<import("./messages.js").PointState, string>>} */
+export const POINT_WORDS = Object.freeze({
+  PROPOSED: "Proposed",
+  ACCEPTED: "Accepted",
+  INTENT: "Cutting",
+  DONE: "Done",
+  FAILED_NOT_CUT: "Not cut",
+  UNKNOWN: "Unknown",
+  REJECTED: "Rejected",
+});
+
+/** @type {Readonly<Record<import("./messages.js").Mode, string>>} */
+export const MODE_WORDS = Object.freeze({
+  IDLE: "Idle",
+  READY: "Ready",
+  TELEOP: "Teleoperation",
+  AUTO: "Automatic",
+  PAUSED: "Paused",
+  PROTECTIVE_STOP: "Protective stop",
+  FAULT: "Fault",
+  ESTOP_LATCHED: "Stopped",
+});
+
+/** @type {Readonly<Record<import("./messages.js").Phase, string>>} */
+export const PHASE_WORDS = Object.freeze({
+  "": "",
+  APPROACH: "approach",
+  ADVANCE: "advance",
+  CUT: "cut",
+  RETREAT: "retreat",
+});
+
+/** @param {number} seconds */
+export function ageWords(seconds) {
+  if (seconds < 99.5) return `${seconds.toFixed(1)} s`;
+  if (seconds < 3600) return `${Math.floor(seconds / 60)} min`;
+  return `${Math.floor(seconds / 3600)} h`;
+}
+
+/** @param {number} metres */
+export function millimetres(metres) {
+  const value = metres * 1000;
+  return value.toFixed(Math.abs(value) < 99.95 ? 1 : 0);
+}
+
+/** @param {number} radians */
+export function degrees(radians) {
+  return (radians * (180 / Math.PI)).toFixed(1);
+}
+
+/**
+ * @param {number} count
+ * @param {string} one
+ * @param {string} [many]
+ */
+export function counted(count, one, many = `${one}s`) {
+  return `${count} ${count === 1 ? one : many}`;
+}
+
+const CLOCK = new Intl.DateTimeFormat("en-GB", { hour: "2-digit", minute: "2-digit", second: "2-digit" });
+
+/** @param {number} wallTime Seconds since 1970. */
+export function clockWords(wallTime) {
+  return CLOCK.format(new Date(wallTime * 1000));
+}
