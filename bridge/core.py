@@ -48,7 +48,11 @@ class BridgeOutputs:
 
 
 class BridgeCore:
-    """Stands between the wire and a robot. `now` is the bridge's own clock (s), and never goes back; one thread."""
+    """Stands between the wire and a robot; one thread. `now` is the robot's own time (s), and never goes back.
+
+    `clock` is the machine's, for the record and for the real-time factor, where it differs: a simulation that is too
+    slow loses time.
+    """
 
     def __init__(
         self,
@@ -86,6 +90,7 @@ class BridgeCore:
         self._shutter = Shutter(config.camera_moving_hz, config.camera_resting_hz, TICK_S)
         self._pace = Pace()
         self._ticks = 0
+        self._clock = 0.0
         self._desired: Array = np.zeros_like(limits.velocity)
         self._was_tripped = True
         self._measured = robot.read()
@@ -138,14 +143,15 @@ class BridgeCore:
         self._say("info", f"software stop released by {request.user}: {request.reason}")
         return m.Answer(ok=True)
 
-    def step(self, now: float) -> BridgeOutputs:
-        """Advance one tick of 1 ms."""
+    def step(self, now: float, clock: float | None = None) -> BridgeOutputs:
+        """Advance one tick of 1 ms; `clock` is `now` unless given."""
+        self._clock = now if clock is None else clock
         tripped = self._watch(now)
         stopped = bool(self._latch.stop_id)
         share = 0.0 if stopped else self._watchdog.trust(now)
         xi = self._limiter.step(share * self._desired, self._measured.position[2:])
         blades = not (stopped or tripped)
-        self.robot.write(Setpoint(xi, blades, self._gate.epoch, self._gate.sequence, now))
+        self.robot.write(Setpoint(xi, blades, self._gate.epoch, self._gate.sequence, self._clock))
         self._measured = self.robot.read()
         self._ticks += 1
         self._follow_cut()
@@ -249,7 +255,7 @@ class BridgeCore:
             cutter=self._measured.cutter,
             cut_id=self._cut_id,
             outcome=self._outcome,
-            real_time_factor=self._pace.factor(self._ticks * TICK_S, now),
+            real_time_factor=self._pace.factor(self._ticks * TICK_S, self._clock),
             rejections=self.refusals.counts(),
         )
 

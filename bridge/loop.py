@@ -1,4 +1,8 @@
-"""The bridge on the wire: take the newest commands, step in real time, publish what is due."""
+"""The bridge on the wire: take the newest commands, step in real time, publish what is due.
+
+A simulated robot stands still while nobody steps it. So its own time, which the watchdog and all ages run on, is the
+number of steps done: a machine that is suspended for a moment, or too slow, loses time and no more.
+"""
 
 import threading
 import time
@@ -22,6 +26,7 @@ class BridgeLoop:
         """Subscribe and announce."""
         self._core = core
         self._lock = threading.Lock()
+        self._start, self._ticks = time.monotonic(), 0
         transport.on_reject = core.refusals.log
         self._motion = transport.slot(topics.MOTION)
         self._cuts = transport.feed(topics.CUT, 32)
@@ -36,25 +41,32 @@ class BridgeLoop:
 
     def run(self, stopping: threading.Event) -> None:
         """Step in real time until `stopping` is set."""
-        begin, ticks = time.monotonic(), 0
+        begin = time.monotonic()
         while not stopping.wait(_WAKE_S):
-            now = time.monotonic()
-            due = int((now - begin) / TICK_S) - ticks
+            clock = time.monotonic()
+            due = int((clock - begin) / TICK_S) - self._ticks
             if due * TICK_S > _CATCH_UP_S:
                 begin += (due - _BURST) * TICK_S
-            due = min(due, _BURST)
-            ticks += due
-            for outputs in self._advance(due, now):
+            for outputs in self._advance(min(due, _BURST), clock):
                 self._publish(outputs)
 
-    def _advance(self, due: int, now: float) -> list[BridgeOutputs]:
+    @property
+    def _now(self) -> float:
+        """The robot's own time (s)."""
+        return self._start + self._ticks * TICK_S
+
+    def _advance(self, due: int, clock: float) -> list[BridgeOutputs]:
+        outputs = []
         with self._lock:
             motion = self._motion.take()
             if motion is not None:
-                self._core.on_motion(motion.message, motion.at)
+                self._core.on_motion(motion.message, self._now)
             for cut in self._cuts.drain():
-                self._core.on_cut(cut.message, now)
-            return [self._core.step(now) for _ in range(due)]
+                self._core.on_cut(cut.message, self._now)
+            for _ in range(due):
+                self._ticks += 1
+                outputs.append(self._core.step(self._now, clock))
+        return outputs
 
     def _publish(self, outputs: BridgeOutputs) -> None:
         if outputs.joints is not None:
@@ -72,8 +84,8 @@ class BridgeLoop:
 
     def _stop(self, request: m.StopRequest, at: float) -> None:
         with self._lock:
-            self._core.on_stop(request, at)
+            self._core.on_stop(request, self._now)
 
     def _release(self, request: m.ReleaseStop) -> m.Answer:
         with self._lock:
-            return self._core.on_release(request, time.monotonic())
+            return self._core.on_release(request, self._now)

@@ -13,6 +13,7 @@ from controller.interface import Inputs, Outputs, Sample
 from rolling_panda import intents
 from rolling_panda import messages as m
 from rolling_panda.errors import ServiceError
+from rolling_panda.loop_clock import LoopClock
 from rolling_panda.topics import (
     BRIDGE,
     CONTROLLER,
@@ -30,6 +31,8 @@ from rolling_panda.topics import (
 )
 from rolling_panda.transport import Msg, Slot, Transport
 
+#: The most that passes for the loop between two turns, in periods.
+_LONGEST_TURN = 5
 #: How long an operator's question waits for the loop (s); less than the service's timeout.
 _ANSWER_S = 0.8
 
@@ -40,6 +43,7 @@ class Loop:
     def __init__(self, controller: Controller, transport: Transport, rate_hz: float) -> None:
         """Subscribe and announce; nothing runs before `run`."""
         self._controller, self._transport, self._period = controller, transport, 1.0 / rate_hz
+        self._clock = LoopClock(time.monotonic(), _LONGEST_TURN * self._period)
         self._joints, self._odometry = transport.slot(JOINTS), transport.slot(ODOMETRY)
         self._bridge, self._points = transport.slot(BRIDGE), transport.slot(POINTS)
         self._teleop, self._stops = transport.slot(TELEOP), transport.feed(STOP, 32)
@@ -92,8 +96,9 @@ class Loop:
         due = time.monotonic()
         while not stopping.is_set():
             started = time.monotonic()
-            self._answer_waiting(started)
-            outputs = self._controller.step(self.update(), started)
+            now = self._clock.turn(started)
+            self._answer_waiting(now)
+            outputs = self._controller.step(self.update(), now)
             self._ticks.append(time.monotonic() - started)
             self.publish(outputs)
             self._publish_said()
@@ -113,7 +118,7 @@ class Loop:
             return None
         held = self._samples.get(name)
         if held is None or held.message is not received.message:
-            sample: Sample[Msg] = Sample(received.message, received.at)
+            sample: Sample[Msg] = Sample(received.message, self._clock.of(received.at))
             self._samples[name] = sample  # type: ignore[assignment]
             return sample
         return held  # type: ignore[return-value]
@@ -122,7 +127,7 @@ class Loop:
         last = self._beats.get(beat.process)
         # A beat whose number stands still comes from a loop that stands still.
         if last is None or last[0] != beat.sequence:
-            self._beats[beat.process] = (beat.sequence, at)
+            self._beats[beat.process] = (beat.sequence, self._clock.of(at))
 
     def _ask(self, intent: intents.Intent) -> m.Answer:
         """On a thread of the transport: hand the intent to the loop and wait for its answer."""
