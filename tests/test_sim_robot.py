@@ -82,6 +82,34 @@ def test_driving_into_a_post_is_a_contact_and_stops_the_base() -> None:
     assert sim.true_base().pose[0] < 0.25
 
 
+@pytest.mark.parametrize(
+    "arm",
+    [
+        pytest.param((2.8, 1.0, 0.0, -2.16, 0.0, 2.5, 0.0), id="tool onto the base"),
+        pytest.param((0.0, 0.0, 0.0, -3.0, 0.0, 0.1, 0.0), id="tool into the upper arm"),
+    ],
+)
+def test_the_robot_meeting_itself_is_a_contact(arm: tuple[float, ...]) -> None:
+    sim, touched = robot(), 0
+    for _ in range(7000):
+        away = np.array(arm) - sim.read().position[2:]
+        sim.write(setpoint(arm=tuple(np.clip(2.0 * away, -0.8, 0.8).tolist())))
+        touched += sim.self_contacts
+    assert touched > 0
+    assert sim.contacts == 0
+
+
+def test_a_wire_is_met_by_the_arm() -> None:
+    height = robot().true_tool()[2, 3] - 0.1
+    ahead = robot().true_tool()[1, 3] - 0.1
+    wire = Rod("wire", np.array([-1.0, ahead, height]), np.array([1.0, ahead, height]), 0.00125, 0.00125)
+    sim, touched = robot(Row((wire,))), 0
+    for _ in range(2000):
+        sim.write(setpoint(arm=(0.0, 0.4, 0.0, 0.0, 0.0, 0.0, 0.0)))
+        touched += sim.contacts
+    assert touched > 0
+
+
 def test_a_cut_severs_what_is_between_the_blades_and_the_trace_says_so(tmp_path: Path) -> None:
     tool = robot().true_tool()
     at, across = tool[:3, 3], tool[:3, 1]

@@ -5,9 +5,10 @@ Physics assumptions:
   track is exact and turning does not scrub.
 - The caster's fork and wheel are extra bodies; they take part in rolling and swivelling and trail as the real one.
 - The base stands on its three wheels with a free joint; nothing but friction keeps it in place.
-- Posts, trunks and cordons are rigid. Canes, spurs and wires are thin and give way: they are cut and seen, but collide
+- Posts, trunks, cordons and wires are rigid. Canes and spurs are thin and give way: they are cut and seen, but collide
   with nothing.
-- Links of the arm never meet each other; arm against base, floor and row do.
+- Arm, tool and base meet each other, the floor and the row. Pairs that touch in every posture, as the Panda's own
+  description lists them, are left out.
 """
 
 import xml.etree.ElementTree as ET
@@ -22,13 +23,13 @@ from bridge.sim.row import Row
 from rolling_panda.differential_drive import Array
 from rolling_panda.errors import ModelError
 from rolling_panda.resources import resource
-from rolling_panda.robot_model import assemble, panda_urdf
+from rolling_panda.robot_model import assemble, panda_description, panda_urdf
 
 STEP_S = 0.001
 WHEELS = ("wheel_left", "wheel_right")
 ARM = tuple(f"panda_joint{i}" for i in range(1, 8))
-SOLID = frozenset({"post", "trunk", "cordon"})
-_ROLLS, _MEETS_ROW, _MEETS_BASE = 1, 2, 4
+SOLID = frozenset({"post", "trunk", "cordon", "wire"})
+_ROLLS, _MEETS_ROW, _MEETS_BASE, _MEETS_ARM = 1, 2, 4, 8
 # Estimates: nobody published the caster's masses.
 _FORK_MASS, _CASTER_MASS = 0.6, 0.8
 _CASTER_RADIUS, _CASTER_TRAIL = 0.080, 0.060
@@ -53,7 +54,8 @@ class Plant:
         arm_v: Indices of the arm's joints in qvel (7).
         tool: Site of the tool frame.
         camera: Site of the camera's optical frame.
-        solid: Whether a geom is a post, trunk or cordon (ngeom).
+        solid: Whether a geom is a post, trunk, cordon or wire (ngeom).
+        rolling: Whether a geom is a tyre or the floor (ngeom).
     """
 
     model: Any
@@ -65,6 +67,7 @@ class Plant:
     tool: int
     camera: int
     solid: Any
+    rolling: Any
 
 
 def build_plant(row: Row) -> Plant:
@@ -88,6 +91,7 @@ def build_plant(row: Row) -> Plant:
     for name in (*WHEELS, *ARM):
         spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT).set_to_motor()
     _add_collisions(bodies, robot)
+    _exclude_neighbours(spec)
     for frame in ("tool", "camera"):
         _add_site(bodies, robot, frame)
     try:
@@ -113,6 +117,7 @@ def _plant(model: Any) -> Plant:
         int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, "tool")),
         int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, "camera")),
         np.array([name.startswith("row_") for name in names]),
+        np.array([name == "floor" or name.endswith("_tyre") for name in names]),
     )
 
 
@@ -234,8 +239,24 @@ def _add_collision(bodies: dict[int, Any], robot: Any, link: str, collision: Any
     body = bodies[robot.frames[robot.getFrameId(link)].parentJoint]
     geom = body.add_geom(type=kind, size=size, pos=T.translation, quat=_quat_wxyz(T.rotation))
     near_base = link in ("base_link", "panda_link1", "panda_link2")
-    geom.contype = _MEETS_ROW | (0 if near_base else _MEETS_BASE)
-    geom.conaffinity = _MEETS_BASE if link == "base_link" else 0
+    # Link 7 is the body of cutter and camera too, and stands beside link 5 in every posture.
+    meets_arm = link not in ("base_link", "panda_link7")
+    geom.contype = _MEETS_ROW | (0 if near_base else _MEETS_BASE) | (_MEETS_ARM if meets_arm else 0)
+    geom.conaffinity = _MEETS_BASE if link == "base_link" else _MEETS_ARM if meets_arm else 0
+
+
+def _exclude_neighbours(spec: Any) -> None:
+    """Leave out pairs of arm links that the Panda's description says touch always, by neighbourhood or by shape.
+
+    Its hand is not here: cutter and camera are part of the body of joint 7 and stand where the hand would. They may come
+    near to link 5, as the hand may not, so that pair stays in.
+    """
+    text = (panda_description() / "srdf" / "panda.srdf").read_text()
+    joint_of = {f"panda_link{i}": f"panda_joint{i}" for i in range(1, 8)}
+    for pair in ET.fromstring(text).iter("disable_collisions"):
+        one, other = joint_of.get(pair.get("link1", "")), joint_of.get(pair.get("link2", ""))
+        if one is not None and other is not None and (one, other) != ("panda_joint5", "panda_joint7"):
+            spec.add_exclude(bodyname1=one, bodyname2=other)
 
 
 def _add_site(bodies: dict[int, Any], robot: Any, frame: str) -> None:

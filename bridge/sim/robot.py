@@ -76,7 +76,7 @@ class SimulatedRobot:
         self._cutter = Cutter(config)
         self._heading = 0.0
         self._scenery: tuple[int, tuple[Capsule, ...]] = (-1, ())
-        self.contacts = 0
+        self.contacts = self.self_contacts = 0
 
     @property
     def time(self) -> float:
@@ -94,7 +94,7 @@ class SimulatedRobot:
         """One physics step of 1 ms."""
         data = self._data
         self._advance(setpoint.xi)
-        self.contacts = self._contacts_with_row() if data.ncon > _WHEELS_ON_FLOOR else 0
+        self.contacts, self.self_contacts = self._contacts() if data.ncon > _WHEELS_ON_FLOOR else (0, 0)
         if self._cutter.step(STEP_S, setpoint.blades):
             self._bite(setpoint)
         if self._trace is not None:
@@ -179,9 +179,12 @@ class SimulatedRobot:
         T[:3, 3] = self._data.site_xpos[site]
         return T
 
-    def _contacts_with_row(self) -> int:
-        touching = self._plant.solid[self._data.contact.geom]
-        return int(np.count_nonzero(touching.any(axis=1)))
+    def _contacts(self) -> tuple[int, int]:
+        """Contacts with the row, and of the robot with itself."""
+        geom = self._data.contact.geom
+        row = self._plant.solid[geom].any(axis=1)
+        itself = ~row & ~self._plant.rolling[geom].any(axis=1)
+        return int(np.count_nonzero(row)), int(np.count_nonzero(itself))
 
     def _bite(self, setpoint: Setpoint) -> None:
         tool = self.true_tool()
@@ -225,7 +228,8 @@ class SimulatedRobot:
         row["setpoint"] = setpoint.xi
         row["tool"] = self._data.site_xpos[self._plant.tool]
         row["epoch"], row["sequence"] = setpoint.epoch, setpoint.sequence
-        row["cutter"], row["contacts"] = CUTTER.index(self._cutter.state), self.contacts
+        row["cutter"] = CUTTER.index(self._cutter.state)
+        row["contacts"], row["self_contacts"] = self.contacts, self.self_contacts
         trace.commit()
 
 

@@ -30,7 +30,8 @@ ROW = np.dtype(
         ("epoch", "<u8"),  # token of the command that the setpoint follows from
         ("sequence", "<i8"),  # -1 before the first command
         ("cutter", "u1"),  # index in CUTTER
-        ("contacts", "<u2"),  # contacts of the robot with posts, trunks and cordons
+        ("contacts", "<u2"),  # contacts of the robot with posts, trunks, cordons and wires
+        ("self_contacts", "<u2"),  # contacts of arm and tool with each other and with the base
     ]
 )
 CUTTER = ("open", "closing", "opening", "jammed")
