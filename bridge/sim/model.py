@@ -248,8 +248,8 @@ def _add_collision(bodies: dict[int, Any], robot: Any, link: str, collision: Any
 def _exclude_neighbours(spec: Any) -> None:
     """Leave out pairs of arm links that the Panda's description says touch always, by neighbourhood or by shape.
 
-    Its hand is not here: cutter and camera are part of the body of joint 7 and stand where the hand would. They may come
-    near to link 5, as the hand may not, so that pair stays in.
+    Its hand is not here: cutter and camera are part of the body of joint 7 and stand where the hand would. They may
+    come near to link 5, as the hand may not, so that pair stays in.
     """
     text = (panda_description() / "srdf" / "panda.srdf").read_text()
     joint_of = {f"panda_link{i}": f"panda_joint{i}" for i in range(1, 8)}
