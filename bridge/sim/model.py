@@ -22,8 +22,8 @@ import pinocchio as pin
 from bridge.sim.row import Row
 from rolling_panda.differential_drive import Array
 from rolling_panda.errors import ModelError
-from rolling_panda.resources import resource
-from rolling_panda.robot_model import assemble, panda_description, panda_urdf
+from rolling_panda.resources import panda_description, resource
+from rolling_panda.robot_model import assemble, panda_urdf
 
 STEP_S = 0.001
 WHEELS = ("wheel_left", "wheel_right")
