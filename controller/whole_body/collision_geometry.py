@@ -1,0 +1,105 @@
+"""The robot's shape for collision checks: capsules, one sphere and one box in Coal, on Pinocchio's joints.
+
+- Arm: the cylinders with spherical ends of `panda_collision.urdf` (example-robot-data, after franka_description), taken
+  as capsules: radii 0.045 to 0.09 m, about 30 mm outside the links' meshes.
+- Tool: capsules around the shapes of `assets/urdf/tool.urdf`.
+- Base: the smallest box around body and wheels of `assets/urdf/base.urdf`, from the floor up, and a sphere around
+  every position of the caster's wheel.
+"""
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from rolling_panda.resources import resource
+from rolling_panda.robot_model import RobotModel, panda_urdf
+
+BASE, CASTER, GROUND, BLADES, CUTTER, CAMERA = "base", "caster", "ground", "blades", "cutter", "camera"
+#: The parts that the cutter brings to the vine.
+TOOL = (CUTTER, BLADES, CAMERA)
+_SEPARATOR = "#"
+#: Tool's capsules: part, link, centre (m), turn of the axis z about x and y (rad), radius and length of the axis (m).
+#: The camera's housing is 90 × 25 × 25 mm (data sheet), the handle 24 mm in radius, a blade 12 × 5 × 70 mm.
+_TOOL_CAPSULES = (
+    (CUTTER, "cutter_link", (0.0, 0.0, 0.061), (0.0, 0.0), 0.033, 0.102),
+    (BLADES, "cutter_link", (0.019, 0.0, 0.160), (0.0, 0.12), 0.0066, 0.070),
+    (BLADES, "cutter_link", (-0.019, 0.0, 0.160), (0.0, -0.12), 0.0066, 0.070),
+    (CAMERA, "camera_body_link", (0.0, 0.0, 0.0), (0.0, np.pi / 2), 0.020, 0.072),
+)
+#: The caster's wheel (radius 0.080, width 0.035, trail 0.060 m, vendor's mesh) in every direction it can turn to: its
+#: farthest point is (0.140, 0.0175, −0.02) m from the sphere's middle.
+_CASTER_RADIUS, _CASTER_HEIGHT = 0.145, 0.100
+
+
+def robot_geometry(robot: RobotModel) -> Any:
+    """Pinocchio's geometry model of arm, tool and base, without pairs; `part_of` reads the parts' names."""
+    geometry = pin.GeometryModel()
+    _add_base(geometry, robot)
+    _add_arm(geometry, robot)
+    for part, link, center, (roll, pitch), radius, length in _TOOL_CAPSULES:
+        T = pin.SE3(pin.rpy.rpyToMatrix(roll, pitch, 0.0), np.array(center))
+        _add(geometry, robot, part, link, pin.coal.Capsule(radius, length), T)
+    return geometry
+
+
+def add_ground(geometry: Any) -> int:
+    """Add the half-space below z = 0 of odom; returns its index."""
+    ground = pin.GeometryObject(GROUND, 0, pin.SE3.Identity(), pin.coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0))
+    return int(geometry.addGeometryObject(ground))
+
+
+def part_of(name: str) -> str:
+    """The part that a geometry object belongs to: `base`, `link5`, `camera`, …."""
+    return name.split(_SEPARATOR)[0]
+
+
+def bounding_radius(shape: Any) -> float:
+    """Radius (m) of the sphere about the origin of a capsule, sphere or box that encloses it."""
+    if isinstance(shape, pin.coal.Capsule):
+        return float(shape.halfLength + shape.radius)
+    if isinstance(shape, pin.coal.Sphere):
+        return float(shape.radius)
+    return float(np.linalg.norm(shape.halfSide))
+
+
+def _add(geometry: Any, robot: RobotModel, part: str, frame: str, shape: Any, T_frame_shape: Any) -> None:
+    at = robot.model.frames[robot.frame_id(frame)]
+    name = f"{part}{_SEPARATOR}{geometry.ngeoms}"
+    geometry.addGeometryObject(pin.GeometryObject(name, at.parentJoint, at.placement * T_frame_shape, shape))
+
+
+def _add_arm(geometry: Any, robot: RobotModel) -> None:
+    text = panda_urdf("panda_collision.urdf")
+    arm = pin.buildModelFromXML(text)
+    shapes = pin.buildGeomFromUrdfString(arm, text, pin.GeometryType.COLLISION)
+    for item in shapes.geometryObjects:
+        # The spheres are the ends of the capsules.
+        if isinstance(item.geometry, pin.coal.Cylinder):
+            frame = arm.frames[item.parentFrame]
+            cylinder = item.geometry
+            capsule = pin.coal.Capsule(cylinder.radius, 2 * cylinder.halfLength)
+            part = frame.name.removeprefix("panda_")
+            _add(geometry, robot, part, frame.name, capsule, frame.placement.actInv(item.placement))
+
+
+def _add_base(geometry: Any, robot: RobotModel) -> None:
+    text = resource("assets/urdf/base.urdf").read_text()
+    base = pin.buildModelFromXML(text)
+    data = base.createData()
+    shapes = pin.buildGeomFromUrdfString(base, text, pin.GeometryType.COLLISION)
+    placed = shapes.createData()
+    pin.updateGeometryPlacements(base, data, shapes, placed, pin.neutral(base))
+    signs = 2 * np.indices((2, 2, 2)).reshape(3, -1).T - 1
+    corners: list[Any] = []
+    for item, T in zip(shapes.geometryObjects, placed.oMg, strict=True):
+        item.geometry.computeLocalAABB()
+        corners += [T.act(item.geometry.aabb_local.max_ * sign) for sign in signs]
+    low, high = np.min(corners, axis=0), np.max(corners, axis=0)
+    low[2] = 0.0
+    box = pin.SE3(np.eye(3), (low + high) / 2)
+    _add(geometry, robot, BASE, "base_link", pin.coal.Box(*(high - low)), box)
+    caster = pin.SE3.Identity()
+    caster.translation[:2] = robot.model.frames[robot.frame_id("caster_pivot_link")].placement.translation[:2]
+    caster.translation[2] = _CASTER_HEIGHT
+    _add(geometry, robot, CASTER, "base_link", pin.coal.Sphere(_CASTER_RADIUS), caster)
