@@ -111,6 +111,36 @@ class TrackerConfig(Struct, frozen=True, forbid_unknown_fields=True):
     spur_separation: Positive = 0.045
 
 
+class ObstacleConfig(Struct, frozen=True, forbid_unknown_fields=True):
+    """What becomes an obstacle that the arm keeps away from.
+
+    Attributes:
+        nearest: Pixels nearer than this are not used (m).
+        farthest: The same for farther ones (m).
+        cell: Size of the cells in which points are gathered (m).
+        hits: Frames that must have shown a cell.
+        points: Pixels of one class used of a frame, about.
+        least: Cells that a rod needs.
+        shortest: Length that a rod needs (m).
+        apart: Posts and trunks farther apart than this along the row are two (m).
+        wire_apart: Wires farther apart than this in height are two (m).
+        piece: A cordon is cut into pieces of this length (m).
+        most: Rods kept at most.
+    """
+
+    nearest: Positive = 0.2
+    farthest: Positive = 2.0
+    cell: Positive = 0.02
+    hits: Hits = 3
+    points: Annotated[int, Meta(ge=10, le=100000)] = 4000
+    least: Annotated[int, Meta(ge=2, le=1000)] = 4
+    shortest: Positive = 0.05
+    apart: Positive = 0.15
+    wire_apart: Positive = 0.06
+    piece: Positive = 0.15
+    most: Annotated[int, Meta(ge=1, le=500)] = 200
+
+
 class PerceptionConfig(Struct, frozen=True, forbid_unknown_fields=True):
     """Section `[perception]`.
 
@@ -123,6 +153,7 @@ class PerceptionConfig(Struct, frozen=True, forbid_unknown_fields=True):
         rule: Where to cut.
         skeleton: Pixels to canes.
         tracker: Points over time.
+        obstacles: What the arm keeps away from.
     """
 
     rate_hz: Positive = 20.0
@@ -132,3 +163,4 @@ class PerceptionConfig(Struct, frozen=True, forbid_unknown_fields=True):
     rule: RuleConfig = RuleConfig()
     skeleton: SkeletonConfig = SkeletonConfig()
     tracker: TrackerConfig = TrackerConfig()
+    obstacles: ObstacleConfig = ObstacleConfig()

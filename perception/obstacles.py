@@ -1,0 +1,155 @@
+"""What stands in the robot's way: posts, trunks, cordons and wires as rods, gathered over all frames.
+
+The row is taken for what every trained row is: upright rods (posts, trunks) and rods along it (wires, cordons). Points of
+one class are told apart by where they are across the rod, and each group gets the line that fits it best.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perception.config import ObstacleConfig
+from perception.frame import View
+from perception.plant import Array
+from rolling_panda.messages import WOOD_CLASSES, Capsule, WoodClass
+
+#: How a class of rods stands: `upright`, `along` the row as one straight line, or along it in bent `pieces`.
+_SHAPES: dict[WoodClass, str] = {"post": "upright", "trunk": "upright", "cordon": "pieces", "wire": "along"}
+
+
+class ObstacleMap:
+    """Remembers where rods were seen, in cells of a few centimetres, and turns them into capsules."""
+
+    def __init__(self, config: ObstacleConfig) -> None:
+        """Start with nothing seen."""
+        self._config = config
+        self._seen: dict[WoodClass, _Cells] = {kind: _Cells(config.cell) for kind in _SHAPES}
+        self._capsules: tuple[Capsule, ...] = ()
+
+    def update(self, view: View, labels: NDArray[np.uint8]) -> tuple[Capsule, ...]:
+        """Take one frame in; everything known now.
+
+        Args:
+            view: The frame.
+            labels: H×W class indices.
+
+        Returns:
+            Rods in odom (m), each with the larger of the radii seen along it.
+        """
+        config, grown = self._config, False
+        for kind, cells in self._seen.items():
+            mask = labels == WOOD_CLASSES.index(kind)
+            mask &= (view.depth > config.nearest) & (view.depth < config.farthest)
+            rows, cols = np.nonzero(mask)
+            every = max(1, len(rows) // config.points)
+            rows, cols = rows[::every], cols[::every]
+            grown |= cells.add(view.points(rows, cols, view.depth[rows, cols]))
+        if grown:
+            away = view.R[:, 2]
+            self._capsules = tuple(
+                capsule
+                for kind, cells in self._seen.items()
+                for capsule in self._rods(kind, cells.often(config.hits), away)
+            )[: config.most]
+        return self._capsules
+
+    def _rods(self, kind: WoodClass, points: Array, away: Array) -> list[Capsule]:
+        config, shape = self._config, _SHAPES[kind]
+        if shape == "upright":
+            groups = _groups(points, 0, config.apart)
+        elif shape == "along":
+            groups = _groups(points, 2, config.wire_apart)
+        else:
+            groups = [points[np.floor(points[:, 0] / config.piece) == k] for k in _pieces(points, config.piece)]
+        rods = (_fit(group, away, thin=kind == "wire") for group in groups if len(group) >= config.least)
+        return [
+            Capsule(kind, _vector(rod.start), _vector(rod.end), rod.radius, rod.radius)
+            for rod in rods
+            if rod.length >= config.shortest
+        ]
+
+
+@dataclass(frozen=True)
+class _Rod:
+    start: Array
+    end: Array
+    radius: float
+
+    @property
+    def length(self) -> float:
+        return float(np.linalg.norm(self.end - self.start))
+
+
+class _Cells:
+    """Cells of a cubic grid with the mean of the points that fell into each."""
+
+    def __init__(self, size: float) -> None:
+        self._size = size
+        self._cells: dict[tuple[int, int, int], tuple[Array, int]] = {}
+
+    def add(self, points: Array) -> bool:
+        """Take the points of one frame; whether anything was among them."""
+        if len(points) == 0:
+            return False
+        keys, inverse, counts = np.unique(
+            np.floor(points / self._size).astype(int), axis=0, return_inverse=True, return_counts=True
+        )
+        sums = np.zeros((len(keys), 3))
+        np.add.at(sums, inverse.ravel(), points)
+        for key, mean in zip(keys.tolist(), sums / counts[:, None], strict=True):
+            old, times = self._cells.get(tuple(key), (mean, 0))
+            # A running mean over the frames, the noise of one frame being most of what there is.
+            self._cells[tuple(key)] = (old + (mean - old) / (times + 1), min(times + 1, 50))
+        return True
+
+    def often(self, hits: int) -> Array:
+        """Means of the cells seen in at least `hits` frames, N×3."""
+        means = [mean for mean, times in self._cells.values() if times >= hits]
+        return np.array(means) if means else np.zeros((0, 3))
+
+
+def _groups(points: Array, axis: int, apart: float) -> list[Array]:
+    """Points in groups between which there is a gap of `apart` along one axis."""
+    if len(points) == 0:
+        return []
+    points = points[np.argsort(points[:, axis])]
+    return np.split(points, np.nonzero(np.diff(points[:, axis]) > apart)[0] + 1)
+
+
+def _pieces(points: Array, piece: float) -> Array:
+    return np.unique(np.floor(points[:, 0] / piece))
+
+
+def _fit(points: Array, away: Array, thin: bool) -> _Rod:
+    """The line through a group of surface points, moved inwards from the side that was seen.
+
+    Args:
+        points: On the surface, N×3.
+        away: Direction of the camera's view (3): the axis lies behind the surface.
+        thin: True where the radius is less than the noise, so that the points are the axis.
+    """
+    middle = points.mean(axis=0)
+    _, _, axes = np.linalg.svd(points - middle, full_matrices=False)
+    along = axes[0]
+    reach = (points - middle) @ along
+    start, end = middle + reach.min() * along, middle + reach.max() * along
+    side = np.cross(along, away)
+    size = float(np.linalg.norm(side))
+    if thin or size < 1e-6:
+        return _Rod(start, end, _THIN)
+    spread = np.abs((points - middle) @ (side / size))
+    radius = float(np.clip(np.quantile(spread, 0.95), _THIN, 0.2))
+    inwards = np.cross(side, along) / size
+    inwards *= np.sign(float(inwards @ away)) or 1.0
+    # Of a half cylinder that is seen from one side, the mean of the surface lies π/4 of a radius before the axis.
+    return _Rod(start + 0.785 * radius * inwards, end + 0.785 * radius * inwards, radius)
+
+
+#: A wire's radius with its sag and the noise of the depth at arm's length (m).
+_THIN = 0.004
+
+
+def _vector(point: Array) -> tuple[float, float, float]:
+    x, y, z = (float(value) for value in point)
+    return x, y, z

@@ -1,0 +1,73 @@
+import math
+
+import numpy as np
+import pytest
+
+from benchmarks.perception_points import camera_frame, survey_arm
+from bridge.sim.camera import Camera
+from bridge.sim.camera_config import CameraConfig
+from bridge.sim.vineyard import grow
+from bridge.sim.vineyard_config import VineyardConfig
+from perception.config import ObstacleConfig
+from perception.frame import decode_frame
+from perception.obstacles import ObstacleMap
+from perception.segmenter import LabelImageSegmenter
+from rolling_panda import messages as m
+from rolling_panda.robot_model import RobotModel, configuration
+
+
+def distance(point, start, end):
+    """From a point to a segment (m)."""
+    span = end - start
+    share = np.clip((point - start) @ span / (span @ span), 0.0, 1.0)
+    return float(np.linalg.norm(point - start - share * span))
+
+
+@pytest.fixture(scope="module", params=[1, 104])
+def seen(request):
+    """The row's own rods, and what was made of four frames each from two places."""
+    model, row = RobotModel(), grow(VineyardConfig(), request.param)
+    camera, known = Camera(CameraConfig(), request.param), ObstacleMap(ObstacleConfig())
+    capsules: tuple[m.Capsule, ...] = ()
+    for x in (-0.4, 0.4):
+        base, position = m.PlanarPose(x), (0.0, 0.0, *survey_arm())
+        place = model.pose(configuration(base, position), model.camera_id).homogeneous
+        for k in range(4):
+            frame = camera_frame(camera.render(row, place, k), camera, base, position, k)
+            view = decode_frame(frame, model)
+            capsules = known.update(view, LabelImageSegmenter().segment(view))
+    return row, capsules
+
+
+def test_every_rod_found_lies_on_one_of_its_kind(seen):
+    row, capsules = seen
+    assert {"wire", "cordon", "trunk"} <= {capsule.kind for capsule in capsules}
+    for capsule in capsules:
+        same = [rod for _, rod in row.standing() if rod.kind == capsule.kind]
+        for share in np.linspace(0.0, 1.0, 7):
+            point = np.array(capsule.start) + share * (np.array(capsule.end) - np.array(capsule.start))
+            gap = min(distance(point, rod.start, rod.end) for rod in same)
+            # The ends of two arms that nearly meet may become one rod.
+            assert gap < 0.032, (capsule, gap)
+
+
+def test_the_wires_before_the_robot_are_all_there(seen):
+    row, capsules = seen
+    wires = [capsule for capsule in capsules if capsule.kind == "wire"]
+    config = VineyardConfig()
+    # The one 0.3 m above the cordon is the one that the arm works under.
+    height = config.cordon_height + config.wires[0]
+    near = [wire for wire in wires if abs(wire.start[2] - height) < 0.03]
+    assert sum(math.dist(wire.start, wire.end) for wire in near) > 1.0
+
+
+def test_nothing_seen_is_nothing_known():
+    assert ObstacleMap(ObstacleConfig()).update(blank_view(), np.zeros((48, 64), dtype=np.uint8)) == ()
+
+
+def blank_view():
+    camera = Camera(CameraConfig(width=64, height=48), 0)
+    model, base, position = RobotModel(), m.PlanarPose(), (0.0, 0.0, *survey_arm())
+    place = model.pose(configuration(base, position), model.camera_id).homogeneous
+    empty = grow(VineyardConfig(first_vine_x=500.0), 0)
+    return decode_frame(camera_frame(camera.render(empty, place, 0), camera, base, position, 0), model)
