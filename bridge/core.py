@@ -22,6 +22,7 @@ from bridge.watchdog import Watchdog
 from rolling_panda import messages as m
 from rolling_panda.differential_drive import Array, DifferentialDrive
 from rolling_panda.robot_model import Limits
+from rolling_panda.row_messages import Capsule, Scenery
 from rolling_panda.topics import BRIDGE, CUT, JOINTS, MOTION, ODOMETRY
 from rolling_panda.transport import Rejections
 
@@ -32,7 +33,7 @@ _STATE_TICKS = round(1 / BRIDGE.rate_hz / TICK_S)
 # Faster than this (rad/s) is motion that the camera should follow.
 _MOVING = 0.01
 
-SceneryOf = Callable[[], tuple[int, tuple[m.Capsule, ...]]]
+SceneryOf = Callable[[], tuple[int, tuple[Capsule, ...]]]
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class BridgeOutputs:
     odometry: m.Odometry | None = None
     state: m.BridgeState | None = None
     frame: m.CameraFrame | None = None
-    scenery: m.Scenery | None = None
+    scenery: Scenery | None = None
     events: tuple[m.LogEvent, ...] = ()
 
 
@@ -274,11 +275,11 @@ class BridgeCore:
             return False
         return self._ticks % self._scenery_ticks == 1 or self._scenery()[0] != self._scenery_revision
 
-    def _scenery_message(self, now: float) -> m.Scenery | None:
+    def _scenery_message(self, now: float) -> Scenery | None:
         if self._scenery is None:
             return None
         self._scenery_revision, capsules = self._scenery()
-        return m.Scenery(header=m.Header(now, "odom"), revision=self._scenery_revision, capsules=capsules)
+        return Scenery(header=m.Header(now, "odom"), revision=self._scenery_revision, capsules=capsules)
 
 
 def _actuated(values: Array) -> m.Actuated:

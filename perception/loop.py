@@ -9,6 +9,7 @@ from perception.pipeline import Perception
 from perception.worker import Worker
 from rolling_panda import messages as m
 from rolling_panda import topics
+from rolling_panda.row_messages import Obstacles
 from rolling_panda.transport import Transport
 
 
@@ -16,6 +17,7 @@ from rolling_panda.transport import Transport
 class _Result:
     points: m.PruningPoints
     withdrawn: tuple[str, ...]
+    obstacles: Obstacles
 
 
 class Loop:
@@ -32,14 +34,14 @@ class Loop:
         self._config = config
         self._frames = transport.slot(topics.CAMERA)
         self._points = transport.publisher(topics.POINTS)
+        self._obstacles = transport.publisher(topics.OBSTACLES)
         self._heartbeat = transport.publisher(topics.HEARTBEAT)
         self._events = transport.publisher(topics.EVENT)
-        self._worker: Worker[m.CameraFrame, _Result] = Worker(
-            lambda frame: _Result(perception.process(frame), perception.withdrawn)
-        )
+        self._worker: Worker[m.CameraFrame, _Result] = Worker(lambda frame: _result(perception, frame))
         self._newest: m.PruningPoints | None = None
+        self._in_the_way: Obstacles | None = None
         self._sequence = 0
-        self._sent = -1e9
+        self._sent = self._sent_obstacles = -1e9
         self._last_error = ""
         self._shown: frozenset[str] = frozenset()
         self._hanging = False
@@ -67,10 +69,13 @@ class Loop:
                 self._worker.submit(frame.message, now)
         if self._newest is not None and now - self._sent >= 1.0 / topics.POINTS.rate_hz:
             self._publish(now)
+        if self._in_the_way is not None and now - self._sent_obstacles >= 1.0 / topics.OBSTACLES.rate_hz:
+            self._obstacles.put(self._in_the_way)
+            self._sent_obstacles = now
         self._beat(now)
 
     def _take(self, result: _Result, now: float) -> None:
-        self._newest, self._last_error = result.points, ""
+        self._newest, self._in_the_way, self._last_error = result.points, result.obstacles, ""
         self._publish(now)
         shown = frozenset(point.point_id for point in result.points.points)
         if shown - self._shown:
@@ -103,3 +108,9 @@ class Loop:
 
     def _tell(self, severity: m.Severity, text: str, now: float) -> None:
         self._events.put(m.LogEvent(header=m.Header(now), process="perception", severity=severity, text=text[:500]))
+
+
+def _result(perception: Perception, frame: m.CameraFrame) -> _Result:
+    points = perception.process(frame)
+    obstacles = Obstacles(header=points.header, capsules=perception.obstacles)
+    return _Result(points, perception.withdrawn, obstacles)

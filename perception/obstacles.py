@@ -1,7 +1,7 @@
 """What stands in the robot's way: posts, trunks, cordons and wires as rods, gathered over all frames.
 
-The row is taken for what every trained row is: upright rods (posts, trunks) and rods along it (wires, cordons). Points of
-one class are told apart by where they are across the rod, and each group gets the line that fits it best.
+The row is taken for what every trained row is: upright rods (posts, trunks) and rods along it (wires, cordons). Points
+of one class are told apart by where they are across the rod, and each group gets the line that fits it best.
 """
 
 from dataclasses import dataclass
@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from perception.config import ObstacleConfig
 from perception.frame import View
 from perception.plant import Array
-from rolling_panda.messages import WOOD_CLASSES, Capsule, WoodClass
+from rolling_panda.messages import WOOD_CLASSES, WoodClass
+from rolling_panda.row_messages import Capsule
 
 #: How a class of rods stands: `upright`, `along` the row as one straight line, or along it in bent `pieces`.
 _SHAPES: dict[WoodClass, str] = {"post": "upright", "trunk": "upright", "cordon": "pieces", "wire": "along"}

@@ -10,6 +10,7 @@ from perception.frame import View, decode_frame
 from perception.keep_out import wire_near
 from perception.linking import link
 from perception.numbering import RowNumbers
+from perception.obstacles import ObstacleMap
 from perception.plant import Cane, Plant
 from perception.rule import decide
 from perception.segmenter import Segmenter
@@ -18,6 +19,7 @@ from perception.tracker import Proposal, Tracker
 from rolling_panda import messages as m
 from rolling_panda.errors import InputError
 from rolling_panda.robot_model import RobotModel
+from rolling_panda.row_messages import Capsule
 
 #: Every so many samples of a cane's axis go on the wire.
 _THIN_OUT = 4
@@ -45,8 +47,11 @@ class Perception:
         self._frames = 0
         self._abstained: tuple[str, ...] = ()
         self._canes: tuple[tuple[m.Vector3, ...], ...] = ()
+        self._map = ObstacleMap(config.obstacles)
         self.withdrawn: tuple[str, ...] = ()
         """What the last frame took away, with the reasons."""
+        self.obstacles: tuple[Capsule, ...] = ()
+        """What stands in the way, as far as it was seen."""
 
     def process(self, frame: m.CameraFrame) -> m.PruningPoints:
         """Take one frame in and tell everything held true now.
@@ -63,6 +68,7 @@ class Perception:
             labels = self._segmenter.segment(view)
         except InputError as error:
             return self._message(view, self._tracker.points(), (str(error),), ())
+        self.obstacles = self._map.update(view, labels)
         self._frames += 1
         if not self._is_survey(view, labels):
             # Too near or too far to read a whole spur; near enough to see whether the wood still stands.

@@ -357,27 +357,6 @@ class PruningPoints(Message, frozen=True, kw_only=True):
     canes: tuple[tuple[Vector3, ...], ...] = ()
 
 
-class Capsule(Struct, frozen=True, forbid_unknown_fields=True):
-    """A rod with round ends: axis from `start` to `end` (m), radii at both (m)."""
-
-    kind: WoodClass
-    start: Vector3
-    end: Vector3
-    start_radius: NonNegative
-    end_radius: NonNegative
-
-
-class Scenery(Message, frozen=True, kw_only=True):
-    """Simulated bridge → server: the row as it stands, for display only. Perception and control never subscribe.
-
-    `revision` grows whenever something was severed.
-    """
-
-    header: Header
-    revision: Count
-    capsules: tuple[Capsule, ...]
-
-
 # --- services --------------------------------------------------------------------------------------------------------
 
 

@@ -6,7 +6,7 @@ A key is `rp/<robot_id>/v1/<topic>`.
 from dataclasses import dataclass
 from typing import Any, Generic, Literal, TypeVar
 
-from rolling_panda import intents
+from rolling_panda import intents, row_messages
 from rolling_panda import messages as m
 
 Priority = Literal["REAL_TIME", "INTERACTIVE_HIGH", "DATA_LOW", "BACKGROUND"]
@@ -110,13 +110,18 @@ POINTS = Topic(
     "perception/points", m.PruningPoints, "perception", 2, "DATA_LOW", "DROP",
     "every pruning point held true now", latched=True,
 )
+OBSTACLES = Topic(
+    "perception/obstacles", row_messages.Obstacles, "perception", 1, "DATA_LOW", "DROP",
+    "posts, trunks, cordons and wires seen so far", latched=True,
+)
 SCENERY = Topic(
-    "scenery", m.Scenery, "bridge", 0.5, "BACKGROUND", "DROP",
+    "scenery", row_messages.Scenery, "bridge", 0.5, "BACKGROUND", "DROP",
     "the simulated row, for display only", latched=True,
 )
 
 TOPICS: tuple[Topic[Any], ...] = (
-    MOTION, CUT, STOP, TELEOP, JOINTS, ODOMETRY, BRIDGE, CONTROLLER, HEARTBEAT, EVENT, CAMERA, POINTS, SCENERY,
+    MOTION, CUT, STOP, TELEOP, JOINTS, ODOMETRY, BRIDGE, CONTROLLER, HEARTBEAT, EVENT, CAMERA, POINTS,
+    OBSTACLES, SCENERY,
 )
 
 

@@ -12,6 +12,7 @@ import viser
 from rolling_panda import messages as m
 from rolling_panda.differential_drive import Array
 from rolling_panda.page_messages import PagePoint
+from rolling_panda.row_messages import Capsule, Scenery
 from server.robot_meshes import Part
 from server.scene_door import SceneDoor
 from server.scene_gizmo import SceneGizmos
@@ -59,16 +60,16 @@ class Scene:
         self._marker = cut_marker()
         self._points: dict[str, tuple[PagePoint, viser.MeshHandle]] = {}
         self._canes: tuple[tuple[m.Vector3, ...], ...] = ()
-        self._rods: dict[str, list[m.Capsule]] = {}
+        self._rods: dict[str, list[Capsule]] = {}
         self._selected: dict[str, str] = {}
         self._draw_surroundings()
         self.robot = SceneRobot(self._server, model, parts)
         self._server.on_client_connect(self._on_client)
         self._server.on_client_disconnect(self._on_client_gone)
 
-    def show_row(self, scenery: m.Scenery) -> None:
+    def show_row(self, scenery: Scenery) -> None:
         """Draw the row; kinds of rods that did not change are not sent again."""
-        rods: dict[str, list[m.Capsule]] = {kind: [] for kind in drawn_kinds()}
+        rods: dict[str, list[Capsule]] = {kind: [] for kind in drawn_kinds()}
         for capsule in scenery.capsules:
             if capsule.kind in rods:
                 rods[capsule.kind].append(capsule)

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rolling_panda import messages as m
+from rolling_panda.row_messages import Capsule
 
 Color = tuple[int, int, int]
 
@@ -29,7 +30,7 @@ def color_of(kind: m.WoodClass) -> Color:
     return _LOOKS[kind][0]
 
 
-def rods_mesh(kind: m.WoodClass, capsules: list[m.Capsule]) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
+def rods_mesh(kind: m.WoodClass, capsules: list[Capsule]) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
     """Vertices (V, 3) in odom (m) and faces (F, 3) of rods with flat ends.
 
     Args:

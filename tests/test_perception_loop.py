@@ -8,7 +8,8 @@ from perception.loop import Loop
 from perception.worker import Worker
 from rolling_panda import messages as m
 from rolling_panda.errors import MessageError
-from rolling_panda.topics import EVENT, HEARTBEAT, POINTS
+from rolling_panda.row_messages import Capsule
+from rolling_panda.topics import EVENT, HEARTBEAT, OBSTACLES, POINTS
 from rolling_panda.transport import Slot
 
 
@@ -25,7 +26,7 @@ class Wire:
 
     def __init__(self):
         self.frames = Slot()
-        self.out = {topic.name: Recorder() for topic in (POINTS, HEARTBEAT, EVENT)}
+        self.out = {topic.name: Recorder() for topic in (POINTS, OBSTACLES, HEARTBEAT, EVENT)}
 
     def slot(self, topic):
         return self.frames
@@ -38,6 +39,7 @@ class Eyes:
     """Perception that does what its frames say."""
 
     withdrawn = ()
+    obstacles = (Capsule("wire", (0.0, 0.75, 1.2), (2.0, 0.75, 1.2), 0.004, 0.004),)
 
     def __init__(self):
         self.release = threading.Event()
@@ -74,6 +76,19 @@ def test_points_are_sent_when_they_are_new_and_again_at_two_hertz(parts):
         loop.turn(tick / 20.0)
     assert 4 <= len(points) - 1 <= 5
     assert len({id(message) for message in points}) == 1
+
+
+def test_obstacles_are_sent_once_a_second_from_the_first_frame_on(parts):
+    wire, eyes, loop = parts
+    obstacles = wire.out[OBSTACLES.name].sent
+    loop.turn(0.0)
+    assert not obstacles
+    wire.frames.store("frame", 0.0)
+    turn_until(loop, lambda: obstacles)
+    for tick in range(1, 62):
+        loop.turn(tick / 20.0)
+    assert len(obstacles) == 4
+    assert obstacles[-1].capsules == eyes.obstacles
 
 
 def test_the_heartbeat_counts_turns_and_stops_counting_when_a_frame_hangs(parts):

@@ -14,6 +14,7 @@ from perception.obstacles import ObstacleMap
 from perception.segmenter import LabelImageSegmenter
 from rolling_panda import messages as m
 from rolling_panda.robot_model import RobotModel, configuration
+from rolling_panda.row_messages import Capsule
 
 
 def distance(point, start, end):
@@ -28,7 +29,7 @@ def seen(request):
     """The row's own rods, and what was made of four frames each from two places."""
     model, row = RobotModel(), grow(VineyardConfig(), request.param)
     camera, known = Camera(CameraConfig(), request.param), ObstacleMap(ObstacleConfig())
-    capsules: tuple[m.Capsule, ...] = ()
+    capsules: tuple[Capsule, ...] = ()
     for x in (-0.4, 0.4):
         base, position = m.PlanarPose(x), (0.0, 0.0, *survey_arm())
         place = model.pose(configuration(base, position), model.camera_id).homogeneous

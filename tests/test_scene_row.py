@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 import trimesh
 
-from rolling_panda import messages as m
+from rolling_panda.row_messages import Capsule
 from server.scene_row import drawn_kinds, rods_mesh
 
 
 def rod(kind, start, end, radii=(0.01, 0.01)):
-    return m.Capsule(kind, start, end, *radii)
+    return Capsule(kind, start, end, *radii)
 
 
 @pytest.mark.parametrize("end", [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.3, 0.4, -0.5)])

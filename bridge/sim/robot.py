@@ -24,7 +24,7 @@ from bridge.sim.row import Row
 from bridge.sim.servo import VelocityServos
 from bridge.sim.trace import CUTTER, TraceWriter
 from rolling_panda.differential_drive import Array
-from rolling_panda.messages import Capsule
+from rolling_panda.row_messages import Capsule
 
 _SHOWN = frozenset({"post", "trunk", "cordon", "spur", "cane", "node", "wire"})
 _WHEELS_ON_FLOOR = 3

@@ -1,0 +1,38 @@
+"""Messages about what stands in the row: what is in the robot's way, and the simulator's own picture of it."""
+
+from msgspec import Struct
+
+from rolling_panda.messages import Count, Header, Message, NonNegative, Vector3, WoodClass
+
+
+class Capsule(Struct, frozen=True, forbid_unknown_fields=True):
+    """A rod with round ends: axis from `start` to `end` (m), radii at both (m)."""
+
+    kind: WoodClass
+    start: Vector3
+    end: Vector3
+    start_radius: NonNegative
+    end_radius: NonNegative
+
+
+class Scenery(Message, frozen=True, kw_only=True):
+    """Simulated bridge → server: the row as it stands, for display only. Perception and control never subscribe.
+
+    `revision` grows whenever something was severed.
+    """
+
+    header: Header
+    revision: Count
+    capsules: tuple[Capsule, ...]
+
+
+class Obstacles(Message, frozen=True, kw_only=True):
+    """Perception → controller: what stands in the way of base and arm, as far as it was seen.
+
+    Attributes:
+        header: `frame_id` is odom.
+        capsules: Posts, trunks, cordons and wires. Canes are not among them: they give way, and some are to be cut.
+    """
+
+    header: Header
+    capsules: tuple[Capsule, ...]
