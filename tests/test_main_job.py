@@ -4,6 +4,7 @@ import contextlib
 import math
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -72,6 +73,38 @@ def test_two_accepted_points_are_cut_where_they_were_accepted(tmp_path: Path, ch
         assert min(math.dist(accepted[point_id], piece["point"]) for piece in cuts[point_id]["severed"]) < 0.010
 
 
+@dataclass
+class Press:
+    """A press of the mouse on a button, timed by the browser when it received it, not when the page got round to it."""
+
+    page: Page
+    selector: str
+
+    def listen(self) -> None:
+        """Note when a real press arrives at the button; before whatever listens there itself."""
+        self.page.evaluate(
+            """(selector) => window.addEventListener("pointerdown", (event) => {
+                const at = performance.timeOrigin + event.timeStamp;
+                if (event.isTrusted && event.target.closest(selector)) window.pressedAt ??= at / 1000;
+            }, { capture: true })""",
+            self.selector,
+        )
+
+    def press(self) -> float:
+        """Press; when that was, on the machine's monotonic clock (s)."""
+        box = self.page.locator(self.selector).bounding_box()
+        assert box is not None
+        self.page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+        before = time.monotonic()
+        self.page.mouse.down()
+        after = time.monotonic()
+        self.page.mouse.up()
+        wall_ahead = time.time() - time.monotonic()
+        pressed = float(self.page.evaluate("window.pressedAt")) - wall_ahead
+        assert before - 0.01 < pressed < after + 0.01, "the browser's clock is not this machine's"
+        return pressed
+
+
 def test_stop_on_the_page_in_mid_approach_halts_base_and_arm_within_half_a_second(
     tmp_path: Path, chromium_path: str
 ) -> None:
@@ -79,11 +112,14 @@ def test_stop_on_the_page_in_mid_approach_halts_base_and_arm_within_half_a_secon
         with operator_page(chromium_path, robot.link("ada")) as page:
             # The last one in the row, so that the base has far to go.
             arm_and_accept(page, -1)
+            stop = Press(page, "#stop")
+            stop.listen()
             press_on(page, robot, robot.driving, "the base to drive")
-            # The page's own clock at the press; the machine's monotonic clock is what the trace has.
-            pressed = robot.clock()
-            page.locator("#stop").dispatch_event("pointerdown", {"bubbles": True, "isPrimary": True, "button": 0})
+            pressed = stop.press()
             page.wait_for_selector('#mode[data-mode="ESTOP_LATCHED"]', timeout=20_000)
             assert robot.state()["bridge"]["stop_id"]
             page.wait_for_timeout(1000)
-    assert trace.read(robot.trace).still_after(pressed) < 0.5
+    record = trace.read(robot.trace)
+    last = record.rows[record.rows["clock"] <= pressed][-1]
+    assert abs(last["base_velocity"][0]) > 0.02, "the base no longer drove when the button was pressed"
+    assert record.still_after(pressed) < 0.5
