@@ -10,6 +10,27 @@ Joint = Annotated[float, Meta(ge=-3.2, le=3.8)]
 ArmPosture = tuple[Joint, Joint, Joint, Joint, Joint, Joint, Joint]
 
 
+NotNegative = Annotated[float, Meta(ge=0.0, le=1.0)]
+
+
+class OdometryConfig(Struct, frozen=True, forbid_unknown_fields=True):
+    """How late and how noisy the base's odometry is; standard deviations of white noise.
+
+    Attributes:
+        delay_s: From the wheels to the wire (s).
+        position_noise: Of x and y (m).
+        heading_noise: Of the heading (rad).
+        linear_noise: Of the forward velocity (m/s).
+        angular_noise: Of the yaw rate (rad/s).
+    """
+
+    delay_s: NotNegative = 0.0
+    position_noise: NotNegative = 0.0
+    heading_noise: NotNegative = 0.0
+    linear_noise: NotNegative = 0.0
+    angular_noise: NotNegative = 0.0
+
+
 class BridgeConfig(Struct, frozen=True, forbid_unknown_fields=True):
     """What the bridge enforces, and the plant behind the simulated one. Units: s, m, rad, N.
 
@@ -31,6 +52,7 @@ class BridgeConfig(Struct, frozen=True, forbid_unknown_fields=True):
         camera_moving_hz: Pictures a second while the robot moves or just after the row has changed.
         camera_resting_hz: Pictures a second otherwise.
         scenery_s: Period of the display scenery.
+        odometry: Delay and noise of the simulated base's odometry.
     """
 
     start_arm: ArmPosture = (1.57, -1.2, 0.0, -2.6, 0.0, 1.9, 0.785)
@@ -49,3 +71,4 @@ class BridgeConfig(Struct, frozen=True, forbid_unknown_fields=True):
     camera_moving_hz: Positive = 2.0
     camera_resting_hz: Positive = 0.5
     scenery_s: Positive = 2.0
+    odometry: OdometryConfig = OdometryConfig()

@@ -15,12 +15,13 @@ from bridge.gate import Gate
 from bridge.interface import Measurement, Robot, Setpoint
 from bridge.latch import StopLatch
 from bridge.limiter import Limiter
+from bridge.odometer import Odometer
 from bridge.pace import Pace
 from bridge.refusals import Refusals
 from bridge.shutter import Shutter
 from bridge.watchdog import Watchdog
 from rolling_panda import messages as m
-from rolling_panda.differential_drive import Array, DifferentialDrive
+from rolling_panda.differential_drive import Array
 from rolling_panda.robot_model import Limits
 from rolling_panda.row_messages import Capsule, Scenery
 from rolling_panda.topics import BRIDGE, CUT, JOINTS, MOTION, ODOMETRY
@@ -60,7 +61,7 @@ class BridgeCore:
         robot: Robot,
         config: BridgeConfig,
         limits: Limits,
-        drive: DifferentialDrive,
+        odometer: Odometer,
         kind: Literal["sim", "real"],
         scenery: SceneryOf | None = None,
         rejections: Rejections | None = None,
@@ -71,7 +72,7 @@ class BridgeCore:
             robot: Simulated or real.
             config: Deadlines and rates.
             limits: Of the robot, over ξ.
-            drive: Geometry of the base, for the odometry.
+            odometer: Follows the wheels.
             kind: What the robot is, for people.
             scenery: Revision and rods to show; None on a real robot.
             rejections: Table of refusals shared with the transport.
@@ -79,7 +80,7 @@ class BridgeCore:
         self.robot = robot
         self.refusals = Refusals(rejections)
         self._kind = kind
-        self._drive = drive
+        self._odometer = odometer
         self._scenery = scenery
         self._scenery_ticks = round(config.scenery_s / TICK_S)
         self._scenery_revision = -1
@@ -95,8 +96,7 @@ class BridgeCore:
         self._desired: Array = np.zeros_like(limits.velocity)
         self._was_tripped = True
         self._measured = robot.read()
-        self._pose = np.zeros(3)
-        self._wheels = self._measured.position[:2].copy()
+        self._odometer.follow(self._measured.position[:2])
         self._cut_id = ""
         self._outcome: m.Outcome = ""
         self._events: list[tuple[m.Severity, str]] = []
@@ -194,12 +194,13 @@ class BridgeCore:
         joints = odometry = state = frame = None
         ticks = self._ticks
         if ticks % _JOINT_TICKS == 0:
-            self._integrate()
+            self._odometer.follow(self._measured.position[:2])
             joints = self._joint_state(now)
             self._gate.sent(joints.sequence, now)
             frame = self._frame(now)
             if ticks % _ODOMETRY_TICKS == 0:
-                odometry = self._odometry(now)
+                self._odometer.measure(ticks, now, self._measured.velocity[:2])
+            odometry = self._odometer.due(ticks)
         if self._state_due or ticks % _STATE_TICKS == 0:
             state = self._state(now)
             self._events += [("warning", line) for line in self.refusals.lines(now)]
@@ -217,11 +218,6 @@ class BridgeCore:
             ),
         )
 
-    def _integrate(self) -> None:
-        left, right = self._measured.position[:2] - self._wheels
-        self._pose = self._drive.integrate(self._pose, float(left), float(right))
-        self._wheels = self._measured.position[:2].copy()
-
     def _joint_state(self, now: float) -> m.JointState:
         return m.JointState(
             header=m.Header(now),
@@ -229,20 +225,6 @@ class BridgeCore:
             position=_actuated(self._measured.position),
             velocity=_actuated(self._measured.velocity),
         )
-
-    def _odometry(self, now: float) -> m.Odometry:
-        linear, angular = self._drive.twist(*(float(v) for v in self._measured.velocity[:2]))
-        return m.Odometry(
-            header=m.Header(now, "odom"),
-            sequence=self._ticks // _ODOMETRY_TICKS,
-            pose=self._planar(),
-            linear=linear,
-            angular=angular,
-        )
-
-    def _planar(self) -> m.PlanarPose:
-        x, y, phi = (float(value) for value in self._pose)
-        return m.PlanarPose(x, y, phi)
 
     def _state(self, now: float) -> m.BridgeState:
         self._state_due = False
@@ -266,7 +248,8 @@ class BridgeCore:
             self._shutter.wake(self._ticks)
         expose = self._shutter.due(self._ticks)
         if expose:
-            self._shutter.exposed(self._ticks, m.Header(now, "camera"), self._planar(), _actuated(measured.position))
+            header, posture = m.Header(now, "camera"), _actuated(measured.position)
+            self._shutter.exposed(self._ticks, header, self._odometer.pose, posture)
         picture = self.robot.capture(expose)
         return None if picture is None else self._shutter.frame(picture)
 

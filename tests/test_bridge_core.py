@@ -5,9 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridge.config import BridgeConfig
-from bridge.core import BridgeCore, BridgeOutputs
+from bridge.config import BridgeConfig, OdometryConfig
+from bridge.core import TICK_S, BridgeCore, BridgeOutputs
 from bridge.interface import Measurement, Setpoint
+from bridge.odometer import Odometer
 from bridge.picture import Picture
 from rolling_panda import messages as m
 from rolling_panda.robot_model import RobotModel
@@ -49,12 +50,16 @@ class IdealRobot:
         pass
 
 
+def odometer() -> Odometer:
+    return Odometer(MODEL.drive, OdometryConfig(), TICK_S)
+
+
 class Bench:
     """A core on an ideal robot, with a controller that repeats one velocity at 100 Hz for as long as it lives."""
 
     def __init__(self) -> None:
         self.robot = IdealRobot()
-        self.core = BridgeCore(self.robot, BridgeConfig(), MODEL.limits, MODEL.drive, "sim")
+        self.core = BridgeCore(self.robot, BridgeConfig(), MODEL.limits, odometer(), "sim")
         self.now = 0.0
         self.echo = self.sequence = 0
         self.epoch = 1

@@ -4,7 +4,8 @@ from pathlib import Path
 from typing import Literal
 
 from bridge.config import BridgeConfig
-from bridge.core import BridgeCore
+from bridge.core import TICK_S, BridgeCore
+from bridge.odometer import Odometer
 from bridge.sim.camera_config import CameraConfig
 from bridge.sim.photographer import InlinePhotographer, Photographer, ProcessPhotographer
 from bridge.sim.robot import SimulatedRobot
@@ -44,5 +45,6 @@ def simulated_bridge(
     photographer: Photographer = (
         InlinePhotographer(lens, seed) if camera == "inline" else ProcessPhotographer(lens, seed)
     )
+    odometer = Odometer(model.drive, config.odometry, TICK_S, seed)
     robot = SimulatedRobot(config, row, photographer, writer)
-    return BridgeCore(robot, config, model.limits, model.drive, "sim", robot.scenery, rejections)
+    return BridgeCore(robot, config, model.limits, odometer, "sim", robot.scenery, rejections)
