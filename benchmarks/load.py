@@ -9,21 +9,17 @@ import base64
 import json
 import os
 import platform
-import re
 import shutil
-import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import httpx
 import psutil
 
-from rolling_panda.errors import InputError
-from rolling_panda.launch import child_environment, python_command
+from benchmarks.demo_under_test import Demo
 
 _FLAGS = [
     "--no-sandbox",
@@ -51,66 +47,6 @@ class PageCost:
     bytes_per_s: float
     browser_cores: float
     demo_cores: float
-
-
-class Demo:
-    """A demo under measurement, and a script signed in to it."""
-
-    def __init__(self, port: int, seed: int) -> None:
-        """Start it and wait until detections have come.
-
-        Raises:
-            InputError: It did not come up; the text is what it said.
-        """
-        self._popen = subprocess.Popen(
-            python_command("rolling_panda", ["demo", "--port", str(port), "--seed", str(seed)]),
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            env=child_environment(),
-        )
-        self.tree = psutil.Process(self._popen.pid)
-        url = f"http://127.0.0.1:{port}"
-        self.client = httpx.Client(base_url=url, headers={"Origin": url}, timeout=10)
-        said = ""
-        assert self._popen.stdout is not None
-        for line in self._popen.stdout:
-            said += line
-            token = re.search(r"/sign-in\?token=(\S+)", line)
-            if token:
-                break
-        else:
-            raise InputError(f"the demo did not come up:\n{said}")
-        self.client.post("/api/sign-in", json={"token": token[1]}).raise_for_status()
-        self.wait(lambda: len(self.client.get("/api/points").json()["points"]) >= 2, 60.0)
-
-    def wait(self, condition: Callable[[], Any], limit_s: float) -> None:
-        """Poll until `condition()` holds.
-
-        Raises:
-            InputError: It did not within `limit_s`.
-        """
-        end = time.monotonic() + limit_s
-        while not condition():
-            if time.monotonic() > end:
-                raise InputError(f"the demo did not get there within {limit_s:.0f} s")
-            time.sleep(0.1)
-
-    def post(self, path: str, **body: Any) -> dict[str, Any]:
-        """Ask for something that must be granted."""
-        answer = self.client.post(f"/api/{path}", json=body)
-        answer.raise_for_status()
-        return dict(answer.json())
-
-    def mode(self) -> str:
-        """State of the supervision machine."""
-        return str(self.client.get("/api/state").json()["controller"]["mode"])
-
-    def close(self) -> None:
-        """End it as Ctrl-C does."""
-        self.client.close()
-        self._popen.terminate()
-        self._popen.wait(15)
 
 
 def cost(root: psutil.Process, seconds: float) -> Cost:
@@ -204,15 +140,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         else:
             print(f"one idle page, {arguments.seconds:.0f} s", flush=True)
             page = page_cost(demo, chromium, arguments.seconds, idle)
-        demo.post("arm")
-        demo.wait(lambda: demo.mode() == "READY", 20.0)
-        demo.post("points/accept-all", confidence=0.0)
-        demo.post("start")
+        demo.begin_work()
         time.sleep(3.0)
         print(f"moving, {arguments.seconds:.0f} s", flush=True)
         moving = cost(demo.tree, arguments.seconds)
         still_working = demo.mode() == "AUTO"
-        factor = demo.client.get("/api/state").json()["bridge"]["real_time_factor"]
+        factor = demo.state()["bridge"]["real_time_factor"]
     finally:
         demo.close()
     _show(idle, moving, page, factor, still_working)

@@ -5,6 +5,7 @@ from typing import Annotated
 from msgspec import Meta, Struct
 
 from rolling_panda.config import Positive
+from rolling_panda.topics import JOINTS
 
 Joint = Annotated[float, Meta(ge=-3.2, le=3.8)]
 ArmPosture = tuple[Joint, Joint, Joint, Joint, Joint, Joint, Joint]
@@ -49,6 +50,7 @@ class BridgeConfig(Struct, frozen=True, forbid_unknown_fields=True):
         blade_half_length: Reach of the blades to either side of the tool's origin, along its z.
         blade_half_thickness: Half the thickness of the blades, along its y.
         largest_diameter: Wood that is thicker jams the blades.
+        joints_hz: Joint states a second; the wire's table says what is usual.
         camera_moving_hz: Pictures a second while the robot moves or just after the row has changed.
         camera_resting_hz: Pictures a second otherwise.
         scenery_s: Period of the display scenery.
@@ -68,6 +70,7 @@ class BridgeConfig(Struct, frozen=True, forbid_unknown_fields=True):
     blade_half_length: Positive = 0.018
     blade_half_thickness: Positive = 0.0025
     largest_diameter: Positive = 0.025
+    joints_hz: Annotated[float, Meta(ge=50.0, le=1000.0)] = JOINTS.rate_hz
     camera_moving_hz: Positive = 2.0
     camera_resting_hz: Positive = 0.5
     scenery_s: Positive = 2.0

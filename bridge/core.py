@@ -18,17 +18,17 @@ from bridge.limiter import Limiter
 from bridge.odometer import Odometer
 from bridge.pace import Pace
 from bridge.refusals import Refusals
+from bridge.round_trip import RoundTrip
 from bridge.shutter import Shutter
 from bridge.watchdog import Watchdog
 from rolling_panda import messages as m
 from rolling_panda.differential_drive import Array
 from rolling_panda.robot_model import Limits
 from rolling_panda.row_messages import Capsule, Scenery
-from rolling_panda.topics import BRIDGE, CUT, JOINTS, MOTION, ODOMETRY
+from rolling_panda.topics import BRIDGE, CUT, MOTION, ODOMETRY
 from rolling_panda.transport import Rejections
 
 TICK_S = 0.001
-_JOINT_TICKS = round(1 / JOINTS.rate_hz / TICK_S)
 _ODOMETRY_TICKS = round(1 / ODOMETRY.rate_hz / TICK_S)
 _STATE_TICKS = round(1 / BRIDGE.rate_hz / TICK_S)
 # Faster than this (rad/s) is motion that the camera should follow.
@@ -92,6 +92,8 @@ class BridgeCore:
         self._shutter = Shutter(config.camera_moving_hz, config.camera_resting_hz, TICK_S)
         self._pace = Pace()
         self._ticks = 0
+        self._joint_ticks = round(1 / config.joints_hz / TICK_S)
+        self._round_trip = RoundTrip()
         self._clock = 0.0
         self._desired: Array = np.zeros_like(limits.velocity)
         self._was_tripped = True
@@ -102,13 +104,19 @@ class BridgeCore:
         self._events: list[tuple[m.Severity, str]] = []
         self._state_due = True
 
-    def on_motion(self, command: m.MotionCommand, now: float) -> None:
+    @property
+    def joints_s(self) -> float:
+        """Period of the joint states (s)."""
+        return self._joint_ticks * TICK_S
+
+    def on_motion(self, command: m.MotionCommand, now: float, clock: float | None = None) -> None:
         """Take a motion command received at `now`; a refused one is counted and changes nothing."""
         reason = self._gate.refuse(command, now)
         if reason is not None:
             self.refusals.add(MOTION.name, reason)
             return
         self._watchdog.feed(now)
+        self._round_trip.back(command.echo, self._clock if clock is None else clock)
         self._desired = np.array(command.xi)
 
     def on_cut(self, command: m.CutCommand, now: float) -> None:
@@ -193,10 +201,11 @@ class BridgeCore:
     def _outputs(self, now: float) -> BridgeOutputs:
         joints = odometry = state = frame = None
         ticks = self._ticks
-        if ticks % _JOINT_TICKS == 0:
+        if ticks % self._joint_ticks == 0:
             self._odometer.follow(self._measured.position[:2])
             joints = self._joint_state(now)
             self._gate.sent(joints.sequence, now)
+            self._round_trip.out(joints.sequence, self._clock)
             frame = self._frame(now)
             if ticks % _ODOMETRY_TICKS == 0:
                 self._odometer.measure(ticks, now, self._measured.velocity[:2])
@@ -221,13 +230,14 @@ class BridgeCore:
     def _joint_state(self, now: float) -> m.JointState:
         return m.JointState(
             header=m.Header(now),
-            sequence=self._ticks // _JOINT_TICKS,
+            sequence=self._ticks // self._joint_ticks,
             position=_actuated(self._measured.position),
             velocity=_actuated(self._measured.velocity),
         )
 
     def _state(self, now: float) -> m.BridgeState:
         self._state_due = False
+        self._round_trip.forget(self._clock)
         return m.BridgeState(
             header=m.Header(now),
             kind=self._kind,
@@ -239,6 +249,8 @@ class BridgeCore:
             cut_id=self._cut_id,
             outcome=self._outcome,
             real_time_factor=self._pace.factor(self._ticks * TICK_S, self._clock),
+            round_trip_s=self._round_trip.median,
+            round_trip_worst_s=self._round_trip.worst,
             rejections=self.refusals.counts(),
         )
 

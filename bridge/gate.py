@@ -16,8 +16,8 @@ NOT_AT_REST = "the first setpoint after a standstill must be zero"
 
 #: Speed below which a setpoint means rest (rad/s).
 _REST = 1e-3
-# 2 s of joint states at 100 Hz: what is older is too old whatever the configuration.
-_REMEMBERED = 200
+# 2 s of joint states at 1 kHz: what is older is too old whatever the configuration.
+_REMEMBERED = 2000
 # A controller that works exactly at the limit must not be refused for its last bit.
 _ROUNDING = 1.0 + 1e-9
 

@@ -31,7 +31,8 @@ class Inputs:
         present: Processes connected now.
         stops: Stop requests that came in since the last step.
         tick_s: Median time of one control step, measured by the loop (s).
-        late_ticks: Control periods missed, counted by the loop.
+        ticks: Control periods, counted by the loop.
+        late_ticks: Those of them that lasted more than half as long again as they should.
     """
 
     joints: Sample[m.JointState] | None = None
@@ -44,6 +45,7 @@ class Inputs:
     present: frozenset[str] = frozenset()
     stops: tuple[m.StopRequest, ...] = ()
     tick_s: float = 0.0
+    ticks: int = 0
     late_ticks: int = 0
 
 

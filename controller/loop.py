@@ -33,6 +33,8 @@ from rolling_panda.transport import Msg, Slot, Transport
 
 #: The most that passes for the loop between two turns, in periods.
 _LONGEST_TURN = 5
+#: A period that lasts this many times as long as it should is late.
+_LATE = 1.5
 #: How long an operator's question waits for the loop (s); less than the service's timeout.
 _ANSWER_S = 0.8
 
@@ -58,7 +60,7 @@ class Loop:
         self._state, self._event = transport.publisher(CONTROLLER), transport.publisher(EVENT)
         self._ticks: deque[float] = deque(maxlen=round(rate_hz))
         self._tick_s = 0.0
-        self._late = 0
+        self._count = self._late = 0
 
     def update(self) -> Inputs:
         """The newest of everything."""
@@ -74,6 +76,7 @@ class Loop:
             present=self._transport.present(),
             stops=tuple(stop.message for stop in self._stops.drain()),
             tick_s=self._tick_s,
+            ticks=self._count,
             late_ticks=self._late,
         )
 
@@ -92,10 +95,13 @@ class Loop:
             self._event.put(event)
 
     def run(self, stopping: threading.Event) -> None:
-        """Keep time until told to stop; a period that comes too late is counted and skipped, never made up for."""
-        due = time.monotonic()
+        """Keep time until told to stop; a period that lasts too long is counted, and none is made up for."""
+        due = began = time.monotonic()
         while not stopping.is_set():
             started = time.monotonic()
+            self._count += 1
+            self._late += started - began > _LATE * self._period
+            began = started
             now = self._clock.turn(started)
             self._answer_waiting(now)
             outputs = self._controller.step(self.update(), now)
@@ -107,9 +113,7 @@ class Loop:
             if wait > 0:
                 time.sleep(wait)
             else:
-                missed = int(-wait / self._period) + 1
-                self._late += missed
-                due += (missed - 1) * self._period
+                due += int(-wait / self._period) * self._period
 
     def _newest(self, name: str, slot: Slot[Msg]) -> Sample[Msg] | None:
         """The slot's sample; the same object as long as it holds the same message."""

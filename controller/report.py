@@ -60,6 +60,7 @@ def controller_state(
         manipulability=omega,
         joint_margin=0.0 if measured is None else margin(measured.q, robot.limits),
         tick_s=inputs.tick_s,
+        ticks=inputs.ticks,
         late_ticks=inputs.late_ticks,
         queue=queue,
     )

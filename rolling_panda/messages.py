@@ -184,6 +184,8 @@ class BridgeState(Message, frozen=True, kw_only=True):
         cut_id: The last cut asked for, empty when none.
         outcome: How that cut ended, empty while it goes on.
         real_time_factor: Simulated seconds a second; 1 on a real robot.
+        round_trip_s: From a joint state to the command that answers it, median over the last second; 0 without any.
+        round_trip_worst_s: The longest of them.
         rejections: Messages refused since the start, by reason.
     """
 
@@ -197,6 +199,8 @@ class BridgeState(Message, frozen=True, kw_only=True):
     cut_id: Annotated[str, Meta(max_length=64)]
     outcome: Outcome
     real_time_factor: NonNegative
+    round_trip_s: NonNegative = 0.0
+    round_trip_worst_s: NonNegative = 0.0
     rejections: tuple[RejectionCount, ...] = ()
 
 
@@ -228,7 +232,8 @@ class ControllerState(Message, frozen=True, kw_only=True):
         manipulability: ω of the arm.
         joint_margin: Least distance of an arm joint to its limit (rad).
         tick_s: Median time of one control step over the last second (s).
-        late_ticks: Control periods missed since the start.
+        ticks: Control periods since the start.
+        late_ticks: Those of them that lasted more than half as long again as they should.
         queue: Every point known, in the order of work.
     """
 
@@ -246,6 +251,7 @@ class ControllerState(Message, frozen=True, kw_only=True):
     manipulability: NonNegative
     joint_margin: Finite
     tick_s: NonNegative
+    ticks: Count
     late_ticks: Count
     queue: tuple[QueueEntry, ...]
 

@@ -47,6 +47,7 @@ def controller(mode: m.Mode = "READY", **changes: Any) -> m.ControllerState:
         manipulability=0.083,
         joint_margin=0.41,
         tick_s=0.000142,
+        ticks=1000,
         late_ticks=3,
         queue=(),
     )

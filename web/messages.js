@@ -105,7 +105,8 @@ export const TEXT_MAX_LENGTH = 500;
  * @property {number} manipulability ω of the arm.
  * @property {number} joint_margin Least distance of an arm joint to its limit (rad).
  * @property {number} tick_s Median time of one control step over the last second (s).
- * @property {number} late_ticks Control periods missed since the start.
+ * @property {number} ticks Control periods since the start.
+ * @property {number} late_ticks Those of them that lasted more than half as long again as they should.
  * @property {QueueEntry[]} queue Every point known, in the order of work.
  */
 
@@ -133,6 +134,8 @@ export const TEXT_MAX_LENGTH = 500;
  * @property {string} cut_id The last cut asked for, empty when none.
  * @property {Outcome} outcome How that cut ended, empty while it goes on.
  * @property {number} real_time_factor Simulated seconds a second; 1 on a real robot.
+ * @property {number} round_trip_s From a joint state to the command that answers it, median over the last second; 0 without any.
+ * @property {number} round_trip_worst_s The longest of them.
  * @property {RejectionCount[]} rejections Messages refused since the start, by reason.
  */
 

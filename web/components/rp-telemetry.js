@@ -88,7 +88,7 @@ const READINGS = Object.freeze([
     id: "late-ticks",
     label: "Late steps",
     unit: "",
-    about: "Control periods missed since the controller started",
+    about: "Control periods that came too late since the controller started",
     full: 100,
     write: (/** @type {number} */ value) => value.toFixed(0),
     read: (/** @type {PageState} */ state) => state.controller?.late_ticks ?? null,

@@ -1,0 +1,93 @@
+"""A running demo that is measured, and a script signed in to it as its operator."""
+
+import re
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import httpx
+import psutil
+
+from rolling_panda.errors import InputError
+from rolling_panda.launch import child_environment, python_command
+
+
+class Demo:
+    """A demo under measurement, and a script signed in to it."""
+
+    def __init__(self, port: int, seed: int, config: Path | None = None) -> None:
+        """Start it and wait until detections have come.
+
+        Args:
+            port: Of the page.
+            seed: Of the row.
+            config: TOML configuration; None takes the simulation's.
+
+        Raises:
+            InputError: It did not come up; the text is what it said.
+        """
+        words = ["demo", "--port", str(port), "--seed", str(seed)]
+        if config is not None:
+            words += ["--config", str(config)]
+        self._popen = subprocess.Popen(
+            python_command("rolling_panda", words),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            env=child_environment(),
+        )
+        self.tree = psutil.Process(self._popen.pid)
+        url = f"http://127.0.0.1:{port}"
+        self.client = httpx.Client(base_url=url, headers={"Origin": url}, timeout=10)
+        said = ""
+        assert self._popen.stdout is not None
+        for line in self._popen.stdout:
+            said += line
+            token = re.search(r"/sign-in\?token=(\S+)", line)
+            if token:
+                break
+        else:
+            raise InputError(f"the demo did not come up:\n{said}")
+        self.client.post("/api/sign-in", json={"token": token[1]}).raise_for_status()
+        self.wait(lambda: len(self.client.get("/api/points").json()["points"]) >= 2, 60.0)
+
+    def wait(self, condition: Callable[[], Any], limit_s: float) -> None:
+        """Poll until `condition()` holds.
+
+        Raises:
+            InputError: It did not within `limit_s`.
+        """
+        end = time.monotonic() + limit_s
+        while not condition():
+            if time.monotonic() > end:
+                raise InputError(f"the demo did not get there within {limit_s:.0f} s")
+            time.sleep(0.1)
+
+    def post(self, path: str, **body: Any) -> dict[str, Any]:
+        """Ask for something that must be granted."""
+        answer = self.client.post(f"/api/{path}", json=body)
+        answer.raise_for_status()
+        return dict(answer.json())
+
+    def state(self) -> dict[str, Any]:
+        """What the page would show now."""
+        return dict(self.client.get("/api/state").json())
+
+    def mode(self) -> str:
+        """State of the supervision machine."""
+        return str(self.state()["controller"]["mode"])
+
+    def begin_work(self) -> None:
+        """Arm, accept all that was detected, start."""
+        self.post("arm")
+        self.wait(lambda: self.mode() == "READY", 20.0)
+        self.post("points/accept-all", confidence=0.0)
+        self.post("start")
+
+    def close(self) -> None:
+        """End it as Ctrl-C does."""
+        self.client.close()
+        self._popen.terminate()
+        self._popen.wait(15)
