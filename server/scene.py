@@ -208,20 +208,24 @@ class Scene:
         scene.world_axes.visible = False
         sky = _SKY_TOP + np.linspace(0.0, 1.0, 64)[:, None, None] * (_SKY_BOTTOM - _SKY_TOP)
         scene.set_background_image(np.repeat(sky, 4, axis=1).astype(np.uint8), format="png")
-        scene.configure_environment_map("park", environment_intensity=0.45)
+        # Light from all sides is two colours here: a picture of a sky around the scene costs twice as much to draw.
+        scene.configure_environment_map(None)
         scene.configure_default_lights(enabled=False)
-        scene.add_light_directional("/light/sun", intensity=2.2, color=(255, 244, 228), position=(-3.0, -4.0, 6.0))
-        scene.add_light_directional("/light/sky", intensity=0.7, color=(200, 220, 255), position=(3.0, -2.0, 3.0))
-        ground = np.array([[-60.0, -60.0, -0.004], [60.0, -60.0, -0.004], [60.0, 60.0, -0.004], [-60.0, 60.0, -0.004]])
-        scene.add_mesh_simple("/ground", ground, np.array([[0, 1, 2], [0, 2, 3]]), color=(74, 82, 66))
+        scene.add_light_hemisphere("/light/sky", intensity=1.6, sky_color=(214, 226, 244), ground_color=(108, 108, 92))
+        scene.add_light_directional("/light/sun", intensity=2.6, color=(255, 244, 228), position=(-3.0, -4.0, 6.0))
+        # The ground is the grid's own plane: one thing to draw instead of two that fill the picture.
         scene.add_grid(
-            "/grid",
-            width=40.0,
-            height=40.0,
+            "/ground",
+            width=120.0,
+            height=120.0,
+            position=(0.0, 0.0, -0.004),
+            plane_color=(62, 69, 56),
+            plane_opacity=1.0,
             cell_size=0.5,
             section_size=1.0,
-            cell_color=(78, 86, 71),
-            section_color=(86, 94, 80),
-            fade_distance=14.0,
+            cell_color=(68, 76, 62),
+            section_color=(76, 84, 70),
+            fade_distance=50.0,
+            fade_strength=0.5,
             shadow_opacity=0.0,
         )

@@ -14,8 +14,9 @@ _LOOKS: dict[m.WoodClass, tuple[Color, int]] = {
     "trunk": ((104, 78, 56), 8),
     "cordon": ((116, 86, 60), 8),
     "spur": ((130, 92, 60), 6),
-    "cane": ((178, 124, 74), 6),
-    "node": ((206, 156, 98), 5),
+    # There are more than a thousand of each of these, a few pixels wide.
+    "cane": ((178, 124, 74), 4),
+    "node": ((206, 156, 98), 4),
     "wire": ((176, 182, 190), 4),
 }
 

@@ -16,13 +16,15 @@ from server.sessions import Session
 from server.viser_filter import admit, kind
 
 #: Viser's own panel and notices have nothing to say here, and would cover the view.
-_STYLE = b"<style>[data-floating-window],.mantine-Notifications-root{display:none!important}</style></head>"
+_STYLE = b"<style>[data-floating-window],.mantine-Notifications-root{display:none!important}</style>"
+#: The page's own file on how the view is drawn; it has to run before the client's scripts.
+_SCRIPT = b'<script src="/view.js"></script>'
 
 
 def viser_router(scene: Scene, on_drop: Callable[[Session, str], None]) -> APIRouter:
     """Routes `/viser/` and the WebSocket `/viser`; `on_drop(session, kind)` hears of refused frames."""
     router = APIRouter(include_in_schema=False)
-    page = view_page().replace(b"</head>", _STYLE, 1)
+    page = view_page().replace(b"<head>", b"<head>" + _SCRIPT + _STYLE, 1)
     compressed = gzip.compress(page, 6)
 
     @router.get("/viser/")

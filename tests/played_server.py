@@ -19,7 +19,10 @@ POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self' ws://panda.test; "
     "frame-src 'self'; base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
 )
-VIEW = "<!doctype html><title>view</title><div id=root>3-D view</div><button>in the view</button>"
+VIEW = (
+    "<!doctype html><title>view</title><script src=/view.js></script>"
+    "<div id=root>3-D view</div><button>in the view</button>"
+)
 ALLOWED = {
     "IDLE": ("Arm",),
     "READY": ("Start", "Home"),

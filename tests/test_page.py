@@ -210,6 +210,33 @@ def test_dragging_in_the_view_counts_as_holding(page: Page, server: PlayedServer
     until(page, lambda: not server.holds()[-1])
 
 
+@pytest.mark.parametrize(
+    ("renderer", "smooth", "ratio"),
+    [
+        ("ANGLE (Google, Vulkan 1.3.0 (SwiftShader Device (Subzero)), SwiftShader driver)", False, "1"),
+        ("ANGLE (Intel, Mesa Intel(R) UHD Graphics 620 (KBL GT2), OpenGL 4.6)", True, "1.5"),
+    ],
+)
+def test_the_view_costs_what_the_browser_can_draw(
+    browser: Browser, server: PlayedServer, renderer: str, smooth: bool, ratio: str
+) -> None:
+    context = browser.new_context(locale="en-US", device_scale_factor=2)
+    page = context.new_page()
+    page.add_init_script(
+        "const real = WebGL2RenderingContext.prototype.getParameter;"
+        "WebGL2RenderingContext.prototype.getParameter = function (name) {"
+        f"  return name === 0x9246 ? {json.dumps(renderer)} : real.call(this, name); }};"
+    )
+    server.attach(page)
+    page.goto(f"{ORIGIN}/")
+    expect(page.locator("rp-scene iframe")).to_have_class("loaded")
+    view = page.frames[1]
+    assert view.evaluate("new URLSearchParams(location.search).get('fixedDpr')") == ratio
+    drawn = "document.createElement('canvas').getContext('webgl2', {antialias: true}).getContextAttributes().antialias"
+    assert view.evaluate(drawn) is smooth
+    context.close()
+
+
 def test_a_gone_process_leaves_its_last_state_grey_and_aged(page: Page, server: PlayedServer) -> None:
     server.gone = {"bridge": 3.2}
     expect(page.locator('.presence[data-process="bridge"]')).to_have_attribute("data-present", "false")

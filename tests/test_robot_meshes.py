@@ -1,8 +1,10 @@
 import numpy as np
 import pytest
+import trimesh
 from running_server import parts
 
 from rolling_panda.robot_model import RobotModel
+from server.robot_meshes import simplified
 
 MODEL = RobotModel().model
 
@@ -12,8 +14,21 @@ def test_every_moving_body_has_a_look():
     assert seen == {"base_phi", "wheel_left", "wheel_right", *(f"panda_joint{number}" for number in range(1, 8))}
 
 
-def test_the_whole_robot_is_a_small_download():
-    assert sum(part.vertices.nbytes + part.faces.nbytes for part in parts()) < 4e6
+def test_the_whole_robot_is_little_to_download_and_to_draw():
+    assert sum(part.vertices.nbytes + part.faces.nbytes for part in parts()) < 1e6
+    assert sum(len(part.faces) for part in parts()) < 25_000
+
+
+def test_fewer_faces_keep_the_shape():
+    vertices = np.random.default_rng(0).normal(size=(3, 3))
+    ball = trimesh.creation.icosphere(subdivisions=6, radius=0.1)
+    fewer = simplified(ball.vertices, ball.faces)
+    assert len(fewer.faces) < len(ball.faces) / 10
+    assert np.linalg.norm(fewer.vertices, axis=1) == pytest.approx(0.1, abs=0.002)
+    assert fewer.volume == pytest.approx(ball.volume, rel=0.02)
+    assert simplified(vertices, np.array([[0, 1, 2]])).area == pytest.approx(
+        trimesh.Trimesh(vertices, [[0, 1, 2]]).area
+    )
 
 
 def test_the_base_has_its_size():

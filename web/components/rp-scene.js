@@ -7,8 +7,6 @@ import { listenForDrag, listenForHoldKey } from "../teleoperation.js";
 
 /** Below this width (px) the 3-D client lays its own panel over the view, as on a telephone. */
 const LEAST_WIDTH = 600;
-/** More pixels a way than this cost more than they show. */
-const LARGEST_RATIO = 1.5;
 
 class RpScene extends HTMLElement {
   connectedCallback() {
@@ -24,9 +22,7 @@ class RpScene extends HTMLElement {
       retry.hidden = true;
       waiting.hidden = false;
       frame.classList.remove("loaded");
-      // At a fixed resolution: changing it with the load, as the 3-D client does by itself, stalls a slow machine for
-      // seconds, and a stalled view ends a hold.
-      frame.src = `/viser/?fixedDpr=${Math.min(window.devicePixelRatio, LARGEST_RATIO)}`;
+      frame.src = "/viser/";
     };
     frame.addEventListener("load", () => {
       const view = frame.contentWindow;
