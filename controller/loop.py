@@ -7,6 +7,7 @@ import time
 from collections import deque
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
+from typing import Generic
 
 from controller.core import Controller
 from controller.interface import Inputs, Outputs, Sample
@@ -28,6 +29,7 @@ from rolling_panda.topics import (
     RELEASE,
     STOP,
     TELEOP,
+    Topic,
 )
 from rolling_panda.transport import Msg, Slot, Transport
 
@@ -39,6 +41,21 @@ _LATE = 1.5
 _ANSWER_S = 0.8
 
 
+class _Newest(Generic[Msg]):
+    """The newest message of a topic with its time on the loop's clock."""
+
+    def __init__(self, slot: Slot[Msg], clock: LoopClock) -> None:
+        self._slot, self._clock = slot, clock
+        self._held: Sample[Msg] | None = None
+
+    def sample(self) -> Sample[Msg] | None:
+        """None before the first; the same object as long as it holds the same message."""
+        received = self._slot.peek()
+        if received is not None and (self._held is None or self._held.message is not received.message):
+            self._held = Sample(received.message, self._clock.of(received.at))
+        return self._held
+
+
 class Loop:
     """Ties one `Controller` to the wire."""
 
@@ -46,10 +63,9 @@ class Loop:
         """Subscribe and announce; nothing runs before `run`."""
         self._controller, self._transport, self._period = controller, transport, 1.0 / rate_hz
         self._clock = LoopClock(time.monotonic(), _LONGEST_TURN * self._period)
-        self._joints, self._odometry = transport.slot(JOINTS), transport.slot(ODOMETRY)
-        self._bridge, self._points = transport.slot(BRIDGE), transport.slot(POINTS)
-        self._teleop, self._stops = transport.slot(TELEOP), transport.feed(STOP, 32)
-        self._samples: dict[str, Sample[m.Message]] = {}
+        self._joints, self._odometry = self._newest(JOINTS), self._newest(ODOMETRY)
+        self._bridge, self._points = self._newest(BRIDGE), self._newest(POINTS)
+        self._teleop, self._stops = self._newest(TELEOP), transport.feed(STOP, 32)
         self._beats: dict[m.Process, tuple[int, float]] = {}
         transport.subscribe(HEARTBEAT, self._on_heartbeat)
         self._intents: queue.SimpleQueue[tuple[intents.Intent, Future[m.Answer]]] = queue.SimpleQueue()
@@ -66,11 +82,11 @@ class Loop:
         """The newest of everything."""
         beats = self._beats
         return Inputs(
-            joints=self._newest("joints", self._joints),
-            odometry=self._newest("odometry", self._odometry),
-            bridge=self._newest("bridge", self._bridge),
-            points=self._newest("points", self._points),
-            teleop=self._newest("teleop", self._teleop),
+            joints=self._joints.sample(),
+            odometry=self._odometry.sample(),
+            bridge=self._bridge.sample(),
+            points=self._points.sample(),
+            teleop=self._teleop.sample(),
             server_seen=beats["server"][1] if "server" in beats else None,
             perception_seen=beats["perception"][1] if "perception" in beats else None,
             present=self._transport.present(),
@@ -115,17 +131,8 @@ class Loop:
             else:
                 due += int(-wait / self._period) * self._period
 
-    def _newest(self, name: str, slot: Slot[Msg]) -> Sample[Msg] | None:
-        """The slot's sample; the same object as long as it holds the same message."""
-        received = slot.peek()
-        if received is None:
-            return None
-        held = self._samples.get(name)
-        if held is None or held.message is not received.message:
-            sample: Sample[Msg] = Sample(received.message, self._clock.of(received.at))
-            self._samples[name] = sample  # type: ignore[assignment]
-            return sample
-        return held  # type: ignore[return-value]
+    def _newest(self, topic: Topic[Msg]) -> "_Newest[Msg]":
+        return _Newest(self._transport.slot(topic), self._clock)
 
     def _on_heartbeat(self, beat: m.Heartbeat, at: float) -> None:
         last = self._beats.get(beat.process)

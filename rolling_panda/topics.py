@@ -6,13 +6,15 @@ A key is `rp/<robot_id>/v1/<topic>`.
 from dataclasses import dataclass
 from typing import Any, Generic, Literal, TypeVar
 
+from msgspec import Struct
+
 from rolling_panda import intents, row_messages
 from rolling_panda import messages as m
 
 Priority = Literal["REAL_TIME", "INTERACTIVE_HIGH", "DATA_LOW", "BACKGROUND"]
 Congestion = Literal["DROP", "BLOCK"]
 Msg = TypeVar("Msg", bound=m.Message)
-Req = TypeVar("Req")
+Req = TypeVar("Req", bound=Struct)
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from types import TracebackType
 from typing import Any, Generic, Self, TypeVar
 
 import zenoh
+from msgspec import Struct
 
 from rolling_panda import messages as m
 from rolling_panda.codec import StrictDecoder, encode
@@ -22,7 +23,7 @@ from rolling_panda.errors import MessageError, ServiceError, TransportError
 from rolling_panda.topics import Service, Topic, key
 
 Msg = TypeVar("Msg", bound=m.Message)
-Req = TypeVar("Req")
+Req = TypeVar("Req", bound=Struct)
 _MAX_MESSAGE_BYTES = 8 << 20
 
 
@@ -255,7 +256,7 @@ class Transport(Onlooker):
             raise ServiceError(f"{service.name} takes {names}; got {type(request).__name__}")
         replies = self._session.get(
             key(self.robot_id, service.name),
-            payload=encode(request),  # type: ignore[arg-type]
+            payload=zenoh.ZBytes(encode(request)),
             timeout=service.timeout_s,
             priority=zenoh.Priority.REAL_TIME,
             express=True,

@@ -28,10 +28,22 @@ _ABOUT = (
 )
 
 
+class _Application(FastAPI):
+    """Describes the page's own messages too, which FastAPI does not know."""
+
+    def openapi(self) -> dict[str, Any]:
+        document = super().openapi()
+        _, messages = msgspec.json.schema_components(
+            (PageState, PagePoints, PageEvents), ref_template="#/components/schemas/{name}"
+        )
+        document.setdefault("components", {}).setdefault("schemas", {}).update(messages)
+        return document
+
+
 def create_app(desk: Desk, origins: frozenset[str]) -> ASGIApp:
     """The guarded application; `origins` are the exact origins that the page may have."""
     web = resource("web")
-    app = FastAPI(
+    app = _Application(
         title="Rolling Panda",
         version=__version__,
         description=_ABOUT,
@@ -50,17 +62,6 @@ def create_app(desk: Desk, origins: frozenset[str]) -> ASGIApp:
     app.mount("/", StaticFiles(directory=web), name="web")
     app.add_exception_handler(RequestValidationError, _invalid)
     app.add_exception_handler(HTTPException, _failed)
-    schema = app.openapi
-
-    def openapi() -> dict[str, Any]:
-        document = schema()
-        _, messages = msgspec.json.schema_components(
-            (PageState, PagePoints, PageEvents), ref_template="#/components/schemas/{name}"
-        )
-        document.setdefault("components", {}).setdefault("schemas", {}).update(messages)
-        return document
-
-    app.openapi = openapi  # type: ignore[method-assign]
     return Guard(
         app,
         desk.sessions,
