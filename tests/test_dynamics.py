@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from controller.whole_body.dynamics import Dynamics, basis_rate
+from controller.whole_body.dynamics import Dynamics, acceleration_of_q, basis_rate
 from rolling_panda.config import RobotConfig
 from rolling_panda.resources import resource
 from rolling_panda.robot_model import ARM_Q, RobotModel, panda_urdf
@@ -77,7 +77,7 @@ def test_acceleration_is_that_of_the_constrained_system_with_multipliers(seed):
     a = np.linalg.solve(KKT, np.concatenate([torque, -A_rate @ v]))[:12]
     acceleration = DYNAMICS.forward(q, xi, u, disturbance)
     np.testing.assert_allclose(acceleration, a[3:], rtol=1e-6, atol=1e-6)
-    np.testing.assert_allclose(S @ acceleration + basis_rate(S, v) @ xi, a, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(acceleration_of_q(S, v, acceleration), a, rtol=1e-6, atol=1e-6)
 
 
 @settings(max_examples=30)

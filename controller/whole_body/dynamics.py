@@ -70,7 +70,7 @@ class Dynamics:
         """Torques of the actuators u (9, Nm) that give this ξ̈ (9); without forming the matrices."""
         S = self._robot.drive.basis(float(q[2]))
         v = S @ xi
-        a = S @ acceleration + basis_rate(S, v) @ xi
+        a = acceleration_of_q(S, v, acceleration)
         torque: Array = S.T @ pin.rnea(self._robot.model, self._robot.data, q, v, a)
         return torque
 
@@ -86,3 +86,11 @@ def basis_rate(S: Array, v: Array) -> Array:
     rate = np.zeros((NQ, S.shape[1]))
     rate[0], rate[1] = -v[2] * S[1], v[2] * S[0]
     return rate
+
+
+def acceleration_of_q(S: Array, v: Array, acceleration: Array) -> Array:
+    """Acceleration q̈ = S ξ̈ + Ṡ ξ̇ (12), where Ṡ ξ̇ is the base's centripetal acceleration, from S, q̇ (12) and ξ̈ (9)."""
+    a: Array = S @ acceleration
+    a[0] -= v[2] * v[1]
+    a[1] += v[2] * v[0]
+    return a
