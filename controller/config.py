@@ -4,6 +4,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
+from controller.whole_body.hierarchy_config import HierarchyConfig
 from rolling_panda.config import Positive
 
 Gain = Annotated[float, Meta(ge=0.0, le=100.0)]
@@ -23,7 +24,8 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         base_speed: Limit of the base in automatic work and teleoperation (m/s).
         base_yaw_rate: Limit of the base's turning (rad/s).
         base_acceleration: Limit of the base (m/s²), kept low so that the stretched arm does not tip it.
-        base_braking: The same when the robot has to stop (m/s²).
+        base_yaw_acceleration: Limit of the base's turning up (rad/s²).
+        base_braking: Of the base when the robot has to stop (m/s²).
         arm_share: Share of the arm's rated velocity that is used.
         arm_acceleration_share: Share of the arm's rated acceleration that is used.
         tool_speed: Limit of the tool between cuts (m/s).
@@ -61,17 +63,21 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         hold_max_age_s: Teleoperation ends after this silence (s).
         teleop_speed: Limit of the tool in teleoperation (m/s).
         teleop_turn: The same for turning (rad/s).
+        teleop_base: What the base does in teleoperation: `free` keeps it parallel to the row, in `transit` the tool's
+            sideways motion steers it.
+        hierarchy: Of the method `hierarchy`.
     """
 
     home: ArmPosture = (-0.2784, -0.1128, -0.0354, -2.0055, 1.6759, 1.2124, -0.269)
     reach: ArmPosture = (-0.3, -1.2, 1.1, -1.7, 2.25, 2.4, 0.55)
-    method: Literal["nullspace"] = "nullspace"
+    method: Literal["hierarchy", "nullspace", "decoupled"] = "hierarchy"
     rate_hz: Positive = 100.0
     row_heading: float = 0.0
     row_distance: Positive = 0.75
     base_speed: Positive = 0.3
     base_yaw_rate: Positive = 0.2
     base_acceleration: Positive = 0.8
+    base_yaw_acceleration: Positive = 3.0
     base_braking: Positive = 1.5
     arm_share: Annotated[float, Meta(gt=0.0, le=1.0)] = 0.6
     arm_acceleration_share: Annotated[float, Meta(gt=0.0, le=1.0)] = 0.5
@@ -110,3 +116,5 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
     hold_max_age_s: Positive = 0.15
     teleop_speed: Positive = 0.25
     teleop_turn: Positive = 0.6
+    teleop_base: Literal["free", "transit"] = "free"
+    hierarchy: HierarchyConfig = HierarchyConfig()

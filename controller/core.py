@@ -52,8 +52,7 @@ class Controller:
         self._config, self._dt = config, 1.0 / config.rate_hz
         self._robot = RobotModel(robot_config)
         self._saturation = Saturation(self._robot, config, self._dt)
-        method = make_method(self._robot, config)
-        self._follower = Follower(self._robot, config, method, self._saturation, self._dt)
+        self._follower = Follower(config, make_method(self._robot, config, self._dt), self._dt)
         self._queue = PointQueue(config)
         search = PostureSearch(RobotModel(robot_config), config)
         self._sequence = CutSequence(config, search, self._follower, self._saturation, self._queue, run_id)

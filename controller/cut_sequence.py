@@ -341,10 +341,10 @@ class CutSequence:
         return now - self._started > 2.5 * self._motion.trajectory.duration + self._config.reach_timeout_s
 
     def _missed(self, what: str, tracking: Tracking) -> str:
-        braked = ", at a joint limit" if tracking.braked else ""
+        why = f": {tracking.reason}" if tracking.reason else ""
         return (
             f"{what} was not reached in time: {1e3 * tracking.position_error:.1f} mm and "
-            f"{np.degrees(tracking.rotation_error):.1f}° are missing{braked}"
+            f"{np.degrees(tracking.rotation_error):.1f}° are missing{why}"
         )
 
 

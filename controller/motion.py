@@ -1,4 +1,4 @@
-"""Following a planned motion of the tool, of the arm or of an operator's hand, within the limits."""
+"""Following a planned motion of the tool, of the arm or of an operator's hand."""
 
 import math
 from dataclasses import dataclass
@@ -10,9 +10,9 @@ import pinocchio as pin
 from controller.config import ControllerConfig
 from controller.trajectory import PoseTrajectory, Rates, quintic
 from controller.whole_body.saturation import Saturation
-from controller.whole_body.task import Demand, Method, Task
+from controller.whole_body.task import BaseMode, Demand, Method, Posture, Solution, ToolTask
 from rolling_panda.differential_drive import NXI, Array
-from rolling_panda.robot_model import ARM_Q, ARM_XI, Kinematics, RobotModel
+from rolling_panda.robot_model import ARM_Q, ARM_XI, Kinematics
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,8 @@ class Tracking:
         position_error: Of the tool against `desired` (m).
         rotation_error: The same (rad).
         manipulability: ω of the arm.
-        braked: True when the wanted velocity did not fit and the robot brakes.
+        feasible: False when what was wanted could not be done within the limits.
+        reason: Why not, in words; empty when it could.
         done: True when the motion's clock has run out.
     """
 
@@ -43,7 +44,8 @@ class Tracking:
     position_error: float
     rotation_error: float
     manipulability: float
-    braked: bool
+    feasible: bool
+    reason: str
     done: bool
 
 
@@ -60,6 +62,7 @@ class ToolMotion:
         speed: float,
         frozen: bool = False,
         slow_end: bool = False,
+        free_axis: bool = False,
     ) -> None:
         """Plan.
 
@@ -72,9 +75,11 @@ class ToolMotion:
             speed: Largest tool speed (m/s).
             frozen: True where only the arm moves.
             slow_end: True for the way to the cut: the last `slow_zone` is at `cut_speed`.
+            free_axis: True where the rotation about the tool's y does not matter.
         """
         self.q_start, self.q_goal = q_start, q_goal
-        self.frozen, self.speed = frozen, speed
+        self.base: BaseMode = "frozen" if frozen else "row"
+        self.speed, self.free_axis = speed, free_axis
         self._slow_end, self._config = slow_end, config
         travel = 0.0 if frozen else float(np.hypot(*(q_goal[:2] - q_start[:2])))
         # The base and the joints need their time too, with room for feedback.
@@ -88,12 +93,25 @@ class ToolMotion:
             max(base_s, arm_s),
             straight=True,
         )
-        self.time = 0.0
+        self.time, self.scale = 0.0, 1.0
 
     @property
     def done(self) -> bool:
         """True when the clock has reached the end."""
         return self.time >= self.trajectory.duration
+
+    def advance(self, scale: float, dt: float) -> None:
+        """Let the clock run at the rate `scale` for one period of `dt` (s)."""
+        self.scale = scale
+        self.time += dt * scale
+
+    def posture(self) -> Posture:
+        """Base and arm as they should be now: in a straight line from start to goal, heading as at the goal."""
+        progress = quintic(self.time, self.trajectory.duration)
+        span = self.q_goal - self.q_start
+        q, rate = self.q_start + span * progress.s, span * progress.rate
+        q[2], rate[2] = self.q_goal[2], 0.0
+        return Posture(q, rate, self.q_goal)
 
     def cap(self, T_odom_tool: Any) -> float:
         """Largest tool speed (m/s) at this tool pose."""
@@ -104,86 +122,65 @@ class ToolMotion:
 
 
 class Follower:
-    """Turns motions into velocities: the whole-body method, then the limits."""
+    """Turns motions into velocities by the whole-body method."""
 
-    def __init__(
-        self, robot: RobotModel, config: ControllerConfig, method: Method, saturation: Saturation, dt: float
-    ) -> None:
+    def __init__(self, config: ControllerConfig, method: Method, dt: float) -> None:
         """Bind the parts for a control period of `dt` (s)."""
-        self._robot, self._config, self._method, self._saturation, self._dt = robot, config, method, saturation, dt
-        self._to_twist = np.linalg.pinv(robot.drive.basis(0.0)[[0, 2], :2])
+        self._config, self._method, self._dt = config, method, dt
         self._gains = np.repeat([config.gain_position, config.gain_rotation], 3)
 
     def follow(self, motion: ToolMotion, robot: Measured) -> Tracking:
         """One period along a tool motion."""
         wanted = motion.trajectory.at(motion.time)
         pose = robot.kinematics.T_odom_tool
-        error = tool_error(pose, wanted.T_odom_tool)
-        progress = quintic(motion.time, motion.trajectory.duration)
-        span = motion.q_goal - motion.q_start
-        reference = motion.q_start + span * progress.s
-        posture = self._posture(robot.q, reference, span * progress.rate)
-        out = self._solve(
-            robot, wanted.twist + self._gains * error, posture, motion.frozen, motion.cap(pose), error, wanted
+        error = tool_error(pose, nearest_about_y(pose, wanted.T_odom_tool) if motion.free_axis else wanted.T_odom_tool)
+        out = self._method.solve(
+            Demand(
+                robot.q,
+                robot.kinematics,
+                robot.sent,
+                ToolTask(wanted.twist + self._gains * error, motion.free_axis),
+                motion.posture(),
+                motion.base,
+                motion.cap(pose),
+                motion.scale,
+            )
         )
-        motion.time += self._dt * out.scale
-        return out.tracking(motion.done)
+        motion.advance(out.scale, self._dt)
+        return _tracking(out, wanted.T_odom_tool, error, motion.done)
 
-    def seek(self, goal: Any, q_goal: Array, robot: Measured) -> Tracking:
-        """One period towards a pose that may move (teleoperation): proportional, at a bounded speed and turn."""
+    def seek(self, goal: Any, q_goal: Array, robot: Measured, base: BaseMode = "free") -> Tracking:
+        """One period towards a pose that may move (teleoperation): proportional, at a bounded speed and turn.
+
+        Args:
+            goal: T_odom_tool wanted (pin.SE3).
+            q_goal: Configuration (12) of which heading and arm posture are kept to.
+            robot: Measured robot.
+            base: What the base is for.
+        """
         error = tool_error(robot.kinematics.T_odom_tool, goal)
         twist = self._gains * error
         for part, bound in ((slice(0, 3), self._config.teleop_speed), (slice(3, 6), self._config.teleop_turn)):
             size = _length(twist[part])
             if size > bound:
                 twist[part] *= bound / size
-        # Only the heading is held: where along the row the base stands follows from the tool.
-        posture = self._posture(robot.q, np.concatenate([robot.q[:5], q_goal[ARM_Q]]), np.zeros(12))
-        wanted = _Wanted(goal)
-        return self._solve(robot, twist, posture, False, self._config.teleop_speed, error, wanted).tracking(False)
-
-    def _posture(self, q: Array, reference: Array, rate: Array) -> Array:
-        """Velocity over ξ (9) towards a posture: base along the row and parallel to it, arm joints to theirs."""
-        config = self._config
-        out = np.empty(NXI)
-        c, s = np.cos(config.row_heading), np.sin(config.row_heading)
-        along = c * (reference[0] - q[0]) + s * (reference[1] - q[1])
-        speed = config.gain_posture * along + c * rate[0] + s * rate[1]
-        speed = max(-config.base_speed, min(config.base_speed, speed))
-        turn = config.gain_heading * float(np.sin(config.row_heading - q[2]))
-        turn = max(-config.base_yaw_rate, min(config.base_yaw_rate, turn))
-        out[:2] = self._to_twist @ (speed, turn)
-        out[ARM_XI] = config.gain_posture * (reference[ARM_Q] - q[ARM_Q]) + rate[ARM_Q]
-        return out
-
-    def _solve(
-        self, robot: Measured, twist: Array, posture: Array, frozen: bool, cap: float, error: Array, wanted: Any
-    ) -> "_Solved":
-        k = robot.kinematics
-        solution = self._method.solve(Demand(robot.q, k, Task("tool", k.J_xi, twist), posture, frozen))
-        speed = _length(k.J_xi[:3] @ solution.xi)
-        share = min(1.0, cap / speed) if speed > 0.0 else 1.0
-        limited = self._saturation.apply(solution.xi * share, robot.q, robot.sent)
-        return _Solved(limited.xi, limited.scale * share, limited.braked, error, wanted, solution.manipulability)
+        posture = q_goal.copy()
+        posture[:2] = robot.q[:2]
+        demand = Demand(
+            robot.q,
+            robot.kinematics,
+            robot.sent,
+            ToolTask(twist, keep_path=False),
+            Posture(posture),
+            base,
+            self._config.teleop_speed,
+        )
+        return _tracking(self._method.solve(demand), goal, error, False)
 
 
-@dataclass(frozen=True)
-class _Wanted:
-    T_odom_tool: Any
-
-
-@dataclass(frozen=True)
-class _Solved:
-    xi: Array
-    scale: float
-    braked: bool
-    error: Array
-    wanted: Any
-    manipulability: float
-
-    def tracking(self, done: bool) -> Tracking:
-        position, rotation = _length(self.error[:3]), _length(self.error[3:])
-        return Tracking(self.xi, self.wanted.T_odom_tool, position, rotation, self.manipulability, self.braked, done)
+def _tracking(out: Solution, desired: Any, error: Array, done: bool) -> Tracking:
+    position, rotation = _length(error[:3]), _length(error[3:])
+    return Tracking(out.xi, desired, position, rotation, out.manipulability, out.feasible, out.reason, done)
 
 
 class ArmMotion:
@@ -216,6 +213,13 @@ def tool_error(T_odom_tool: Any, T_odom_goal: Any) -> Array:
     screw = pin.log6(T_odom_tool.actInv(T_odom_goal))
     R = T_odom_tool.rotation
     return np.concatenate([R @ screw.linear, R @ screw.angular])
+
+
+def nearest_about_y(T_odom_tool: Any, T_odom_goal: Any) -> Any:
+    """The goal (pin.SE3) turned about its own y axis until its orientation is nearest to the tool's."""
+    M = T_odom_goal.rotation.T @ T_odom_tool.rotation
+    angle = math.atan2(M[0, 2] - M[2, 0], M[0, 0] + M[2, 2])
+    return pin.SE3(T_odom_goal.rotation @ pin.exp3(np.array([0.0, angle, 0.0])), T_odom_goal.translation)
 
 
 def _length(vector: Array) -> float:

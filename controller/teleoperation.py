@@ -17,7 +17,7 @@ class Teleoperation:
     def __init__(self, config: ControllerConfig, follower: Follower) -> None:
         """Bind the parts."""
         self._config, self._follower = config, follower
-        self._posture: Array = np.concatenate([np.zeros(5), config.reach])
+        self._posture: Array = np.concatenate([[0.0, 0.0, config.row_heading, 0.0, 0.0], config.reach])
         self._goal: object = None
         self._target: m.Pose | None = None
         self.pressed = True
@@ -44,4 +44,4 @@ class Teleoperation:
 
     def step(self, robot: Measured) -> Tracking:
         """One period towards the target."""
-        return self._follower.seek(self._goal, self._posture, robot)
+        return self._follower.seek(self._goal, self._posture, robot, self._config.teleop_base)

@@ -9,7 +9,7 @@ from rolling_panda.robot_model import ARM_Q, RobotModel
 
 ROBOT, CONFIG, DT = RobotModel(), ControllerConfig(), 0.01
 SATURATION = Saturation(ROBOT, CONFIG, DT)
-FOLLOWER = Follower(ROBOT, CONFIG, make_method(ROBOT, CONFIG), SATURATION, DT)
+FOLLOWER = Follower(CONFIG, make_method(ROBOT, CONFIG, DT), DT)
 
 
 def start():
@@ -44,7 +44,7 @@ def test_path_is_kept_when_the_limits_slow_the_motion():
     goal = pin.SE3(T.rotation, T.translation + np.array([0.2, 0.15, 0.1]))
     hasty = ControllerConfig(tool_acceleration=50.0, tool_jerk=500.0, arm_share=0.15)
     saturation = Saturation(ROBOT, hasty, DT)
-    follower = Follower(ROBOT, hasty, make_method(ROBOT, hasty), saturation, DT)
+    follower = Follower(hasty, make_method(ROBOT, hasty, DT), DT)
     motion = ToolMotion(hasty, T, goal, q, q, 3.0)
     way = (goal.translation - T.translation) / np.linalg.norm(goal.translation - T.translation)
     steps, off = 0, 0.0

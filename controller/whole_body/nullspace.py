@@ -4,8 +4,9 @@
 
 with a damped pseudo-inverse weighted by W = diag(1/v_max²). The weights of the two wheels are expressed in the base's
 forward speed and yaw rate, so that turning, which moves a tool beside the base fastest, is not preferred to driving.
-Our addition to the paper is the posture velocity in the null space: base parallel to the row at the planned place
-along it, and the arm towards the planned posture.
+Our additions to the paper are the posture velocity in the null space (base parallel to the row at the planned place
+along it, and the arm towards the planned posture) and the limits: the answer is scaled in time until it fits. It knows
+neither collisions nor a tool with a free axis.
 """
 
 import math
@@ -14,12 +15,13 @@ import numpy as np
 from scipy.linalg.lapack import dposv
 
 from controller.config import ControllerConfig
+from controller.whole_body.actuation import Actuation
 from controller.whole_body.joint_limits import LimitRepulsion
 from controller.whole_body.manipulability import ArmManipulability
+from controller.whole_body.saturation import Saturation
 from controller.whole_body.task import Demand, Solution
-from rolling_panda.differential_drive import NXI
-from rolling_panda.errors import ControlError
-from rolling_panda.robot_model import ARM_XI, RobotModel
+from rolling_panda.differential_drive import NXI, Array
+from rolling_panda.robot_model import ARM_Q, ARM_XI, RobotModel
 
 
 class Nullspace:
@@ -27,17 +29,16 @@ class Nullspace:
 
     name = "nullspace"
 
-    def __init__(self, robot: RobotModel, config: ControllerConfig) -> None:
-        """Precompute the weights."""
+    def __init__(self, robot: RobotModel, config: ControllerConfig, dt: float) -> None:
+        """Precompute the weights and the limits for a control period of `dt` (s)."""
         self._config = config
+        self._saturation = Saturation(robot, config, dt)
+        self._wheels = Actuation(robot.drive).wheels
         self._manipulability = ArmManipulability()
         self._repulsion = LimitRepulsion(robot.limits, config.gain_limits, config.limit_zone)
-        R, mu = robot.drive.wheel_radius, robot.drive.half_track
-        # Columns: wheel speeds for unit forward speed and unit yaw rate.
-        wheels = np.array([[1.0 / R, -mu / R], [1.0 / R, mu / R]])
         rated = np.array([config.base_speed, config.base_yaw_rate]) ** 2
         self._inverse_weight = np.zeros((NXI, NXI))
-        self._inverse_weight[:2, :2] = wheels @ np.diag(rated) @ wheels.T
+        self._inverse_weight[:2, :2] = self._wheels @ np.diag(rated) @ self._wheels.T
         arm = (robot.limits.velocity[ARM_XI] * config.arm_share) ** 2
         self._inverse_weight[ARM_XI, ARM_XI] = np.diag(arm)
         self._frozen_weight = self._inverse_weight.copy()
@@ -45,23 +46,56 @@ class Nullspace:
         self._damping = np.eye(6) * config.damping**2
 
     def solve(self, demand: Demand) -> Solution:
-        """The velocities that answer the demand; not yet limited.
-
-        Args:
-            demand: Tool task, posture and configuration.
-        """
-        config, J = self._config, demand.tool.jacobian
-        W_inv = self._frozen_weight if demand.base_frozen else self._inverse_weight
+        """The actuator velocities that answer the demand; see `Method.solve`."""
+        if not demand.finite:
+            return self._brake(demand, "the demand holds a number that is not finite", 0.0)
         manipulability = self._manipulability.at(demand.kinematics.J)
+        wanted = self._wanted(demand, manipulability.gradient)
+        if wanted is None:
+            return self._brake(demand, "the velocity of the tool has no finite answer", manipulability.value)
+        linear = demand.kinematics.J_xi[:3] @ wanted
+        speed = math.sqrt(float(linear @ linear))
+        share = max(demand.speed_cap, 0.0) / speed if speed > demand.speed_cap else 1.0
+        limited = self._saturation.apply(wanted * share, demand.q, demand.sent)
+        reason = (
+            "the wanted velocity leaves a limit, for instance of a joint; the robot brakes" if limited.braked else ""
+        )
+        return Solution(limited.xi, limited.scale * share, manipulability.value, not limited.braked, reason)
+
+    def _wanted(self, demand: Demand, gradient: Array) -> Array | None:
+        """ξ̇ (9) before any limit; None where the equations have no finite answer."""
+        config, J = self._config, demand.kinematics.J_xi
+        frozen = demand.base == "frozen"
+        W_inv = self._frozen_weight if frozen else self._inverse_weight
         secondary = self._repulsion.at(demand.q)
-        secondary += config.gain_manipulability * manipulability.gradient
-        secondary += demand.posture
-        if demand.base_frozen:
+        secondary += config.gain_manipulability * gradient
+        secondary += self._posture(demand)
+        if frozen:
             secondary[:2] = 0.0
         WJt = W_inv @ J.T
         # J⁺b + (I − J⁺J)z = z + J⁺(b − J z): one factorisation, no projector.
-        residual = demand.tool.target - J @ secondary
-        _, multiplier, info = dposv(J @ WJt + self._damping, residual)
+        _, multiplier, info = dposv(J @ WJt + self._damping, demand.tool.twist - J @ secondary)
         if info != 0 or not math.isfinite(float(multiplier.sum())):
-            raise ControlError(f"the velocity of the {demand.tool.name} has no finite answer")
-        return Solution(secondary + WJt @ multiplier, manipulability.value)
+            return None
+        wanted: Array = secondary + WJt @ multiplier
+        return wanted
+
+    def _posture(self, demand: Demand) -> Array:
+        """Velocity over ξ (9) towards the posture: base along its heading and parallel to it, arm joints to theirs."""
+        config, q, reference, rate = self._config, demand.q, demand.posture.q, demand.posture.rate
+        out = np.empty(NXI)
+        c, s = math.cos(reference[2]), math.sin(reference[2])
+        speed = 0.0
+        if demand.base == "row":
+            along = c * (reference[0] - q[0]) + s * (reference[1] - q[1])
+            speed = config.gain_posture * along + c * rate[0] + s * rate[1]
+            speed = max(-config.base_speed, min(config.base_speed, speed))
+        turn = 0.0 if demand.base == "transit" else config.gain_heading * math.sin(reference[2] - q[2])
+        turn = max(-config.base_yaw_rate, min(config.base_yaw_rate, turn))
+        out[:2] = self._wheels @ (speed, turn)
+        out[ARM_XI] = config.gain_posture * (reference[ARM_Q] - q[ARM_Q]) + rate[ARM_Q]
+        return out
+
+    def _brake(self, demand: Demand, reason: str, manipulability: float) -> Solution:
+        sent = demand.sent if math.isfinite(float(demand.sent.sum())) else np.zeros(NXI)
+        return Solution(self._saturation.brake(sent), 0.0, manipulability, False, reason)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from controller.config import ControllerConfig
+from controller.whole_body.actuation import Actuation
 from rolling_panda.differential_drive import NXI, Array
 from rolling_panda.robot_model import ARM_Q, ARM_XI, RobotModel
 
@@ -36,12 +37,15 @@ class Saturation:
         self._lower = limits.lower[ARM_Q] + config.joint_margin
         self._upper = limits.upper[ARM_Q] - config.joint_margin
         self.velocity = limits.velocity * config.arm_share
-        wheel = (config.base_speed + 0.5 * config.base_yaw_rate * robot.drive.half_track) / robot.drive.wheel_radius
+        wheel = (config.base_speed + config.base_yaw_rate * robot.drive.half_track) / robot.drive.wheel_radius
         self.velocity[:2] = min(wheel, float(limits.velocity[0]))
         self.acceleration = limits.acceleration * config.arm_acceleration_share
         base = config.base_acceleration / robot.drive.wheel_radius
         self.acceleration[:2] = min(base, float(limits.acceleration[0]))
         self._step = self.acceleration * dt
+        # Rows that give v and ω in shares of their limits.
+        twist = Actuation(robot.drive).twist
+        self._base_shares = twist / np.array([[config.base_speed], [config.base_yaw_rate]])
         # What may stop the robot, and the most that the last gate lets through.
         self._stop_step = self._step.copy()
         braking = min(config.base_braking / robot.drive.wheel_radius, float(limits.acceleration[0]))
@@ -60,7 +64,8 @@ class Saturation:
         """
         upper, lower = self._box(q)
         # The box holds zero, so that of each pair of quotients the positive one counts.
-        demanded = max(float((wanted / upper).max()), float((wanted / lower).max()))
+        base = self._base_shares @ wanted[:2]
+        demanded = max(float((wanted / upper).max()), float((wanted / lower).max()), float(np.abs(base).max()))
         scale = 1.0 if demanded <= 1.0 else 1.0 / demanded
         aimed = wanted * scale
         change = aimed - sent

@@ -1,25 +1,52 @@
 """What a whole-body method is asked for, and what it answers."""
 
-from dataclasses import dataclass
-from typing import Protocol
+import math
+from dataclasses import dataclass, field
+from typing import Literal, Protocol
 
-from rolling_panda.differential_drive import Array
+import numpy as np
+
+from rolling_panda.differential_drive import NQ, NXI, Array
 from rolling_panda.robot_model import Kinematics
+
+BaseMode = Literal["row", "free", "transit", "frozen"]
+"""What the base is for.
+
+`row`: it follows the posture's place and heading, and the arm takes the rest. `free`: it keeps the posture's heading;
+where it stands follows from the tool. `transit`: the tool's sideways motion steers it, so the tool is kept ahead of the
+axle. `frozen`: it comes to rest and stays.
+"""
 
 
 @dataclass(frozen=True)
-class Task:
-    """A velocity wanted of some part of the robot.
+class ToolTask:
+    """First priority: a twist of the tool.
 
     Attributes:
-        name: For the log.
-        jacobian: J (k×9) over ξ̇.
-        target: J ξ̇ wanted (k).
+        twist: ẋ_d + K e (6): [v; ω] at the tool in odom's axes (m/s, rad/s).
+        free_axis: True leaves the rotation about the tool's y, the cane's axis, to the lower priorities.
+        keep_path: True slows down as a whole where the limits do not let the tool be as fast as asked; False answers
+            with the nearest possible twist.
     """
 
-    name: str
-    jacobian: Array
-    target: Array
+    twist: Array
+    free_axis: bool = False
+    keep_path: bool = True
+
+
+@dataclass(frozen=True)
+class Posture:
+    """Where base and arm should be, as far as the tool lets them.
+
+    Attributes:
+        q: Configuration wanted now (12); the wheels' entries are not used.
+        rate: Its rate (12).
+        goal: Configuration at the end of the motion (12); None where there is no end.
+    """
+
+    q: Array
+    rate: Array = field(default_factory=lambda: np.zeros(NQ))
+    goal: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -29,24 +56,70 @@ class Demand:
     Attributes:
         q: Configuration (12).
         kinematics: Of the tool at q.
-        tool: First priority: ẋ_d + K e.
-        posture: Velocity over ξ (9) wanted in the null space by posture tasks: our addition to the paper's c1 + c2.
-        base_frozen: True in the last centimetres, where only the arm moves.
+        sent: ξ̇ sent last (9).
+        tool: First priority.
+        posture: Last priority.
+        base: What the base is for.
+        speed_cap: Largest speed of the tool's origin (m/s).
+        scale: Rate of the motion's clock in the last period, 0…1.
     """
 
     q: Array
     kinematics: Kinematics
-    tool: Task
-    posture: Array
-    base_frozen: bool
+    sent: Array
+    tool: ToolTask
+    posture: Posture
+    base: BaseMode = "row"
+    speed_cap: float = math.inf
+    scale: float = 1.0
+
+    @property
+    def finite(self) -> bool:
+        """Whether every number that a method uses is finite."""
+        posture, k = self.posture, self.kinematics
+        total = float(self.q.sum() + self.sent.sum() + self.tool.twist.sum() + posture.q.sum() + posture.rate.sum())
+        return math.isfinite(total + float(k.J.sum())) and not math.isnan(self.speed_cap + self.scale)
 
 
 @dataclass(frozen=True)
 class Solution:
-    """What a method answers: ξ̇ before saturation (9) and the arm's manipulability."""
+    """What a method answers.
+
+    Attributes:
+        xi: ξ̇ to send (9), within every limit of velocity, acceleration and joint position.
+        scale: Rate of the motion's clock, 0…1.
+        manipulability: ω of the arm.
+        feasible: False when the demand could not be answered: the robot brakes, or a constraint gives way.
+        reason: Why not, in words; empty when it could.
+    """
 
     xi: Array
+    scale: float
     manipulability: float
+    feasible: bool = True
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Inequalities:
+    """Rows A ξ̇ ≥ lower that are kept before the tool's task: A (k×9), lower (k), and what each row is about."""
+
+    A: Array
+    lower: Array
+    names: tuple[str, ...]
+
+
+NO_ROWS = Inequalities(np.zeros((0, NXI)), np.zeros(0), ())
+
+
+class Guard(Protocol):
+    """A source of inequalities; stateless between calls."""
+
+    name: str
+
+    def rows(self, demand: Demand) -> Inequalities:
+        """What has to hold in this period."""
+        ...
 
 
 class Method(Protocol):
@@ -55,9 +128,5 @@ class Method(Protocol):
     name: str
 
     def solve(self, demand: Demand) -> Solution:
-        """The actuator velocities that answer the demand; not yet limited.
-
-        Raises:
-            ControlError: The demand has no answer, for example because it is not finite.
-        """
+        """The actuator velocities that answer the demand, within the limits. Raises nothing for any numbers in it."""
         ...

@@ -1,0 +1,39 @@
+"""The coordinates that the methods reckon in: ν = [v, ω, q̇₁…q̇₇], forward speed and yaw rate instead of the wheels.
+
+In ν the limits of the base are bounds of single entries, and a task of the base is a row with a single 1. ν and ξ̇ are
+one to one: θ̇_l = (v − μω)/R, θ̇_r = (v + μω)/R.
+"""
+
+import numpy as np
+
+from rolling_panda.differential_drive import Array, DifferentialDrive
+
+
+class Actuation:
+    """Conversion between ξ̇ and ν of one base."""
+
+    def __init__(self, drive: DifferentialDrive) -> None:
+        """Precompute both 2×2 maps."""
+        R, mu = drive.wheel_radius, drive.half_track
+        #: Wheel speeds [θ̇_l, θ̇_r] = wheels @ [v, ω].
+        self.wheels: Array = np.array([[1.0 / R, -mu / R], [1.0 / R, mu / R]])
+        #: [v, ω] = twist @ [θ̇_l, θ̇_r].
+        self.twist: Array = np.array([[R / 2, R / 2], [-R / (2 * mu), R / (2 * mu)]])
+
+    def nu(self, xi: Array) -> Array:
+        """ν (9) of ξ̇ (9)."""
+        out = xi.copy()
+        out[:2] = self.twist @ xi[:2]
+        return out
+
+    def xi(self, nu: Array) -> Array:
+        """ξ̇ (9) of ν (9)."""
+        out = nu.copy()
+        out[:2] = self.wheels @ nu[:2]
+        return out
+
+    def rows(self, A_xi: Array) -> Array:
+        """Rows over ν (k×9) of rows over ξ̇ (k×9), so that both have the same product with the same motion."""
+        out = A_xi.copy()
+        out[:, :2] = A_xi[:, :2] @ self.wheels
+        return out

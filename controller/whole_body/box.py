@@ -1,0 +1,114 @@
+"""The first level of the hierarchy: bounds of every actuator for one period, feasible by construction.
+
+An arm joint with the distance d to its limit, the braking deceleration a and the period dt may have the velocity v for
+which v dt + v²/2a ≤ d, that is v ≤ −a dt + √((a dt)² + 2 a d): after one period at v it can still stop. From a velocity
+inside this bound the next bound is within reach by braking at a, so that the bounds never empty. Half of the joint's
+acceleration is reckoned with for this; the rest is for the servo's lag.
+
+Outside every such guarantee (a start beyond a limit, a velocity above it) the bounds close to the strongest braking.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from controller.config import ControllerConfig
+from controller.whole_body.actuation import Actuation
+from rolling_panda.differential_drive import NXI, Array
+from rolling_panda.robot_model import ARM_Q, ARM_XI, RobotModel
+
+#: Rate at which a joint outside its limit comes back (1/s), and its largest velocity in doing so (rad/s).
+_RETURN, _RETURN_SPEED = 2.0, 0.2
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """lower ≤ ν ≤ upper (9), and the same for the two wheels' speeds (2)."""
+
+    lower: Array
+    upper: Array
+    wheel_lower: Array
+    wheel_upper: Array
+
+
+class Box:
+    """Makes the bounds from where the robot is and what was sent last."""
+
+    def __init__(self, robot: RobotModel, config: ControllerConfig, dt: float) -> None:
+        """Precompute for a control period of `dt` (s)."""
+        limits, mu, R = robot.limits, robot.drive.half_track, robot.drive.wheel_radius
+        self._actuation = Actuation(robot.drive)
+        self._low = limits.lower[ARM_Q] + config.joint_margin
+        self._high = limits.upper[ARM_Q] - config.joint_margin
+        acceleration = limits.acceleration[ARM_XI] * config.arm_acceleration_share
+        self._arm_step = acceleration * dt
+        self._brake = 0.5 * acceleration
+        self._brake_step = self._brake * dt
+        self._brake_square = self._brake_step**2
+        #: Largest ν (9).
+        self.speed: Array = np.empty(NXI)
+        self.speed[:2] = config.base_speed, config.base_yaw_rate
+        self.speed[ARM_XI] = limits.velocity[ARM_XI] * config.arm_share
+        self._arm_speed = self.speed[ARM_XI].copy()
+        self._wheel_speed = float(limits.velocity[0])
+        braking = min(max(config.base_braking, config.base_acceleration), float(limits.acceleration[0]) * R)
+        self._wheel_step = braking / R * dt
+        self._base_step = min(config.base_acceleration, braking) * dt, config.base_yaw_acceleration * dt
+        self._base_brake = braking * dt, max(braking / mu, config.base_yaw_acceleration) * dt
+
+    def at(self, q: Array, sent: Array) -> Bounds:
+        """The bounds at q (12) after ξ̇ `sent` (9)."""
+        lower, upper = np.empty(NXI), np.empty(NXI)
+        above, below = self._high - q[ARM_Q], q[ARM_Q] - self._low
+        most = np.minimum(self._arm_speed, self._stopping(above))
+        least = np.maximum(-self._arm_speed, -self._stopping(below))
+        if above.min() < 0.0 or below.min() < 0.0:
+            most = np.minimum(most, np.where(above < 0.0, np.maximum(_RETURN * above, -_RETURN_SPEED), np.inf))
+            least = np.maximum(least, np.where(below < 0.0, np.minimum(-_RETURN * below, _RETURN_SPEED), -np.inf))
+        arm = sent[ARM_XI]
+        slowest, fastest = arm - self._arm_step, arm + self._arm_step
+        # Both ends are moved into what can be reached, which keeps their order.
+        upper[ARM_XI] = np.maximum(np.minimum(most, fastest), slowest)
+        lower[ARM_XI] = np.minimum(np.maximum(least, slowest), fastest)
+        left, right = float(sent[0]), float(sent[1])
+        ramp = self.ramp(left, right)
+        wheels = [self._wheel(left, ramp[0]), self._wheel(right, ramp[1])]
+        twist, slower = self._actuation.twist @ sent[:2], self._actuation.twist @ ramp
+        for i in (0, 1):
+            lower[i], upper[i] = self._base(i, float(twist[i]), float(slower[i]))
+        return Bounds(lower, upper, np.array([wheels[0][0], wheels[1][0]]), np.array([wheels[0][1], wheels[1][1]]))
+
+    def ramp(self, left: float, right: float) -> tuple[float, float]:
+        """Wheel speeds after one period of braking along the same arc: what is always possible."""
+        largest = max(abs(left), abs(right)) / self._wheel_step
+        if largest <= 1.0:
+            return 0.0, 0.0
+        return left * (1.0 - 1.0 / largest), right * (1.0 - 1.0 / largest)
+
+    def brake(self, sent: Array) -> Array:
+        """ξ̇ (9) after one period of the strongest braking of every actuator."""
+        out = np.empty(NXI)
+        out[:2] = self.ramp(float(sent[0]), float(sent[1]))
+        arm = sent[ARM_XI]
+        out[ARM_XI] = np.sign(arm) * np.maximum(np.abs(arm) - self._arm_step, 0.0)
+        return out
+
+    def _stopping(self, distance: Array) -> Array:
+        room = np.maximum(distance, 0.0)
+        out: Array = np.sqrt(self._brake_square + 2.0 * self._brake * room) - self._brake_step
+        return out
+
+    def _wheel(self, sent: float, ramp: float) -> tuple[float, float]:
+        low = max(-self._wheel_speed, sent - self._wheel_step)
+        high = min(self._wheel_speed, sent + self._wheel_step)
+        return min(low, ramp), max(high, ramp)
+
+    def _base(self, i: int, sent: float, ramp: float) -> tuple[float, float]:
+        """Bounds of v (i = 0) or ω (1): braking may be stronger than speeding up, but not beyond standstill."""
+        step, brake, most = self._base_step[i], self._base_brake[i], float(self.speed[i])
+        low, high = sent - step, sent + step
+        if sent > 0.0:
+            low = min(low, max(0.0, sent - brake))
+        else:
+            high = max(high, min(0.0, sent + brake))
+        return min(max(-most, low), ramp), max(min(most, high), ramp)

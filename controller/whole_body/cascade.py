@@ -1,0 +1,243 @@
+"""Strict priorities as a cascade of two small dense quadratic programs.
+
+With the velocities scaled by their limits, x = ν/ν_max, and the QR factorisation Jᵀ = Q₁ R, every x is Q₁ y + Z z with
+Z spanning ker J: J x = Rᵀ y, whatever z is.
+
+1. Bounds and rows are constraints of both programs. Where they exclude each other, the rows (never the bounds) are
+   first moved by the least amount, in the sense of squares, that makes them possible.
+2. Tool: min ‖Rᵀ y − α b − c‖² + κ‖b‖² (1 − α)² + λ²‖y‖² + ε‖z − z_sent‖² over y, z, 0 ≤ α ≤ α_max.
+3. Null space: min ‖T x − t‖² over z alone, with y and α as found. The tool's velocity cannot change by it.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import daqp
+import numpy as np
+from scipy.linalg.lapack import dgeqrf, dorgqr, dsyev
+
+from rolling_panda.differential_drive import Array
+
+#: κ: a path is left by about this share of the velocity that is missing along it.
+_SLOWER = 1e-3
+#: ε: makes the first program's answer unique. Small against κ, so that the tool is not slowed to spare the null space,
+#: but not so small that joints race for a hundredth more of its speed.
+_IDLE = 3e-5
+#: Below this wanted velocity of the tool (in shares of its limits) there is nothing to scale.
+_NOTHING = 1e-5
+#: Slack from which on a row counts as given up.
+_GIVEN_UP = 1e-6
+_SETTINGS = {"primal_tol": 1e-10}
+_FREE = 1e30
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One period, over the n velocities that are free; k rows, of which the first `soft` may give way.
+
+    Attributes:
+        J: Of the tool's task (m×n), its rows scaled so that a velocity at the limit has length 1.
+        b: Wanted J ν − c (m), scaled likewise; the part that may be slowed.
+        c: What has to be made good whatever the speed (m), scaled likewise.
+        speed: Largest ν (n).
+        sent: The last ν (n).
+        lower: Of ν (n).
+        upper: Of ν (n).
+        A: Rows over ν (k×n).
+        A_lower: Of A ν (k); −inf where there is none.
+        A_upper: Of A ν (k); inf where there is none.
+        soft: Number of rows that may give way.
+        T: Rows of the null-space tasks (…×n), weighted.
+        t: Their targets, weighted.
+        scale: Largest α.
+        keep_path: False fixes α at 1.
+    """
+
+    J: Array
+    b: Array
+    c: Array
+    speed: Array
+    sent: Array
+    lower: Array
+    upper: Array
+    A: Array
+    A_lower: Array
+    A_upper: Array
+    soft: int
+    T: Array
+    t: Array
+    scale: float
+    keep_path: bool
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What the cascade found.
+
+    Attributes:
+        nu: Velocities (n).
+        scale: α.
+        slack: By how much each soft row was moved, in its unit; None where none was.
+        holds: Index of the bound (0…n−1) or row (n…) that holds the tool back the most; −1 for none.
+    """
+
+    nu: Array
+    scale: float
+    slack: Array | None
+    holds: int
+
+
+class Cascade:
+    """Solves problems. `damping` is λ² at a singularity, `damping_from` the singular value where it begins."""
+
+    def __init__(self, damping: float, damping_from: float) -> None:
+        """Bind the settings."""
+        self._damping, self._damping_from = damping, damping_from
+        self._senses: dict[int, Array] = {}
+        self._triangles: dict[int, Array] = {}
+
+    def solve(self, p: Problem) -> Answer | None:
+        """The velocities, or None where the solver found none."""
+        m, n = p.J.shape
+        k = p.A.shape[0]
+        Q, R = self._factor(p.J * p.speed)
+        # Rows over [y, z]: first the bounds of x, then the others.
+        rows = np.empty((n + k, 1 + n))
+        rows[:, 0] = 0.0
+        rows[:n, 1:] = Q
+        low, high = np.empty(1 + n + k), np.empty(1 + n + k)
+        low[1 : 1 + n], high[1 : 1 + n] = p.lower / p.speed, p.upper / p.speed
+        slack = None
+        if k:
+            A = p.A * p.speed
+            rows[n:, 1:] = A @ Q
+            low[1 + n :], high[1 + n :] = p.A_lower, p.A_upper
+        found = self._tool(p, Q, R, rows, low, high)
+        if found is None:
+            slack = self._give_way(rows[:, 1:], low[1:], high[1:], n, p.soft)
+            if slack is None:
+                return None
+            low[1 + n : 1 + n + p.soft] -= slack
+            found = self._tool(p, Q, R, rows, low, high)
+            if found is None:
+                return None
+        v, scale, multipliers = found
+        z = self._null_space(p, Q, m, v, rows[:, 1:], low[1:], high[1:])
+        x = Q[:, :m] @ v[1 : 1 + m] + Q[:, m:] @ z
+        nu = np.minimum(np.maximum(x * p.speed, p.lower), p.upper)
+        holds = -1
+        if scale < 1.0:
+            strength = np.abs(multipliers[1:])
+            holds = int(strength.argmax())
+        return Answer(nu, scale, slack, holds)
+
+    def _factor(self, J: Array) -> tuple[Array, Array]:
+        """Q (n×n, orthogonal) and R (m×m, upper) with Jᵀ = Q[:, :m] R."""
+        m, n = J.shape
+        qr, tau, _, _ = dgeqrf(J.T)
+        R = qr[:m] * self._triangle(m)
+        full = np.zeros((n, n), order="F")
+        full[:, :m] = qr
+        Q, _, _ = dorgqr(full, tau)
+        return Q, R
+
+    def _tool(
+        self, p: Problem, Q: Array, R: Array, rows: Array, low: Array, high: Array
+    ) -> tuple[Array, float, Array] | None:
+        """The variables [α‖b‖, y, z], α, and the constraints' multipliers."""
+        m, n = p.J.shape
+        H, f = np.zeros((1 + n, 1 + n)), np.zeros(1 + n)
+        size = math.sqrt(float(p.b @ p.b))
+        tool = R @ R.T
+        H[1 : 1 + m, 1 : 1 + m] = tool
+        damping = self._damped(tool)
+        H.ravel()[(1 + m) * (2 + n) :: 2 + n] = _IDLE
+        f[1 + m :] = (-_IDLE * (p.sent / p.speed)) @ Q[:, m:]
+        if damping > 0.0:
+            H.ravel()[2 + n : (1 + m) * (2 + n) : 2 + n] += damping
+        share = p.scale if p.keep_path else 1.0
+        scaled = p.keep_path and size > _NOTHING
+        if scaled:
+            # α‖b‖ instead of α: a small b must not make the program badly conditioned.
+            way = p.b / size
+            H[0, 0] = 1.0 + _SLOWER
+            H[0, 1 : 1 + m] = H[1 : 1 + m, 0] = -(R @ way)
+            f[0] = float(way @ p.c) - _SLOWER * size
+            f[1 : 1 + m] = -(R @ p.c)
+            low[0], high[0] = 0.0, p.scale * size
+        else:
+            H[0, 0] = 1.0
+            f[1 : 1 + m] = -(R @ (share * p.b + p.c))
+            low[0], high[0] = -1.0, 1.0
+        v, _, flag, info = daqp.solve(H, f, rows, high, low, self._sense(len(high)), **_SETTINGS)
+        if flag < 1 or not math.isfinite(float(v.sum())):
+            return None
+        scale = min(max(float(v[0]) / size, 0.0), 1.0) if scaled else share
+        return v, scale, info["lam"]
+
+    def _null_space(self, p: Problem, Q: Array, m: int, v: Array, rows: Array, low: Array, high: Array) -> Array:
+        """The null-space part z that serves the lower tasks best."""
+        n = p.J.shape[1]
+        y, z = v[1 : 1 + m], v[1 + m :]
+        if n == m:
+            return z
+        Z = Q[:, m:]
+        A = p.T @ (Z * p.speed[:, None])
+        rest = p.T @ ((Q[:, :m] @ y) * p.speed) - p.t
+        H = A.T @ A
+        H.ravel()[:: n - m + 1] += 1e-8
+        fixed = rows[:, :m] @ y
+        free = np.ascontiguousarray(rows[:, m:])
+        # The first program's z is possible; its last digits must not say otherwise.
+        at = free @ z
+        lower, upper = np.minimum(low - fixed, at), np.maximum(high - fixed, at)
+        found, _, flag, _ = daqp.solve(H, rest @ A, free, upper, lower, self._sense(len(upper)), **_SETTINGS)
+        return found if flag >= 1 and math.isfinite(float(found.sum())) else z
+
+    def _give_way(self, rows: Array, low: Array, high: Array, n: int, soft: int) -> Array | None:
+        """By how much each soft row's lower bound has to come down, least squares, with all else hard."""
+        if not soft:
+            return None
+        size = n + soft
+        H = np.eye(size)
+        H.ravel()[: n * size : size + 1] = 1e-8
+        A = np.zeros((len(rows), size))
+        A[:, :n] = rows
+        A[n : n + soft, n:] = np.eye(soft)
+        lower = np.concatenate([np.full(n, -_FREE), np.zeros(soft), low])
+        upper = np.concatenate([np.full(size, _FREE), high])
+        v, _, flag, _ = daqp.solve(H, np.zeros(size), A, upper, lower, self._sense(len(upper)), **_SETTINGS)
+        if flag < 1 or not math.isfinite(float(v.sum())):
+            return None
+        slack: Array = np.maximum(v[n:], 0.0)
+        slack[slack > 0.0] += 1e-9
+        return slack
+
+    def _damped(self, tool: Array) -> float:
+        """λ², from the smallest eigenvalue σ² of J Jᵀ."""
+        values, _, info = dsyev(tool, compute_v=0)
+        if info != 0:
+            return self._damping
+        near = max(float(values[0]), 0.0) / self._damping_from**2
+        return self._damping * (1.0 - near) if near < 1.0 else 0.0
+
+    def _sense(self, count: int) -> Any:
+        found = self._senses.get(count)
+        if found is None:
+            found = self._senses[count] = np.zeros(count, dtype=np.int32)
+        return found
+
+    def _triangle(self, m: int) -> Array:
+        found = self._triangles.get(m)
+        if found is None:
+            found = self._triangles[m] = np.triu(np.ones((m, m)))
+        return found
+
+
+def given_up(slack: Array | None) -> int:
+    """Index of the row that was moved the most, −1 where none was by more than rounding."""
+    if slack is None or not len(slack):
+        return -1
+    worst = int(slack.argmax())
+    return worst if float(slack[worst]) > _GIVEN_UP else -1

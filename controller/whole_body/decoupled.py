@@ -1,0 +1,76 @@
+"""Method `decoupled`: drive, stop, then reach. The baseline that whole-body control is compared with.
+
+While the base is not at the posture's goal it turns towards it, drives there and turns into the goal's heading, with
+the arm still; the motion's clock runs on. Then the base stands and the arm alone takes the tool to where it should be,
+by the damped pseudo-inverse of `nullspace`. Both within the same limits as the other methods.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from controller.config import ControllerConfig
+from controller.whole_body.actuation import Actuation
+from controller.whole_body.nullspace import Nullspace
+from controller.whole_body.saturation import Saturation
+from controller.whole_body.task import Demand, Solution
+from rolling_panda.differential_drive import NXI
+from rolling_panda.robot_model import RobotModel
+
+#: The base is at its goal: along and across (m), heading (rad). What is missing, the arm makes good.
+_NEAR, _TURNED = 0.02, 0.02
+#: Heading error above which the base turns on the spot (rad).
+_ASTRAY = 0.15
+_GAIN = 2.0
+
+
+class Decoupled:
+    """Base first, arm second, never both."""
+
+    name = "decoupled"
+
+    def __init__(self, robot: RobotModel, config: ControllerConfig, dt: float) -> None:
+        """Bind the parts for a control period of `dt` (s)."""
+        self._config = config
+        self._arm = Nullspace(robot, config, dt)
+        self._saturation = Saturation(robot, config, dt)
+        self._wheels = Actuation(robot.drive).wheels
+
+    def solve(self, demand: Demand) -> Solution:
+        """The actuator velocities that answer the demand; see `Method.solve`."""
+        reach = self._arm.solve(replace(demand, base="frozen"))
+        goal = demand.posture.goal
+        if demand.base == "frozen" or goal is None or not demand.finite:
+            return reach
+        v, omega = self._drive(demand, float(goal[0]), float(goal[1]), float(goal[2]))
+        driving = v != 0.0 or omega != 0.0
+        still = not demand.sent[:2].any()
+        if not driving and still and not demand.posture.rate[:2].any():
+            return reach
+        wanted = np.zeros(NXI)
+        wanted[:2] = self._wheels @ (v, omega)
+        limited = self._saturation.apply(wanted, demand.q, demand.sent)
+        # The tool's path means nothing while the base carries the tool along; its end is what is reached for later.
+        return Solution(limited.xi, 1.0, reach.manipulability)
+
+    def _drive(self, demand: Demand, x: float, y: float, phi: float) -> tuple[float, float]:
+        """Forward speed and yaw rate towards a base pose; both 0 at it."""
+        config = self._config
+        dx, dy = x - float(demand.q[0]), y - float(demand.q[1])
+        c, s = math.cos(float(demand.q[2])), math.sin(float(demand.q[2]))
+        ahead, aside = c * dx + s * dy, c * dy - s * dx
+        distance = math.hypot(dx, dy)
+        if distance > _NEAR:
+            # Forwards or backwards, whichever needs less turning.
+            way = 1.0 if ahead >= 0.0 else -1.0
+            astray = math.atan2(way * aside, way * ahead)
+            omega = max(-config.base_yaw_rate, min(config.base_yaw_rate, _GAIN * astray))
+            if abs(astray) > _ASTRAY:
+                return 0.0, omega
+            braking = math.sqrt(config.base_acceleration * distance)
+            return way * min(config.base_speed, braking, _GAIN * distance), omega
+        turn = math.remainder(phi - float(demand.q[2]), math.tau)
+        if abs(turn) > _TURNED:
+            return 0.0, max(-config.base_yaw_rate, min(config.base_yaw_rate, _GAIN * turn))
+        return 0.0, 0.0

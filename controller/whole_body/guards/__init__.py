@@ -1,0 +1,1 @@
+"""Inequalities that come before the tool's task, one source a file."""

@@ -1,0 +1,232 @@
+"""Method `hierarchy`: hard limits, then the tool, then posture; docs/control.md has the equations.
+
+What the base and the joints can do in one period is feasible by construction (`box.py`). Guards (`guards/`) add rows
+that come before the tool. The tool's task is answered exactly or slowed along its path, and everything else happens in
+its null space (`tasks/`) by two quadratic programs (`cascade.py`).
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from controller.config import ControllerConfig
+from controller.whole_body.actuation import Actuation
+from controller.whole_body.box import Bounds, Box
+from controller.whole_body.cascade import Answer, Cascade, Problem, given_up
+from controller.whole_body.guards.axle import AxleAhead
+from controller.whole_body.manipulability import ArmManipulability, Manipulability
+from controller.whole_body.task import Demand, Guard, Inequalities, Solution
+from controller.whole_body.tasks.arm_posture import ArmPosture
+from controller.whole_body.tasks.base_reference import BaseReference
+from controller.whole_body.tasks.joint_centre import JointCentre
+from controller.whole_body.tasks.manipulability import ClimbManipulability
+from controller.whole_body.tasks.smoothness import Smoothness
+from controller.whole_body.tasks.task import SecondaryTask
+from rolling_panda.differential_drive import NXI, Array
+from rolling_panda.robot_model import ARM_XI, RobotModel
+
+#: A clock slower than this stands still.
+_HELD = 1e-2
+_NOWHERE = Manipulability(0.0, np.zeros(NXI))
+_ALL, _ARM = slice(0, NXI), ARM_XI
+_BOUND_NAMES = ("the base's speed", "the base's turning", *(f"joint {i}" for i in range(1, 8)))
+
+
+class Hierarchy:
+    """Strict priorities with hard inequalities."""
+
+    name = "hierarchy"
+
+    def __init__(self, robot: RobotModel, config: ControllerConfig, dt: float, guards: Sequence[Guard] = ()) -> None:
+        """Bind the parts.
+
+        Args:
+            robot: Its model.
+            config: Of the controller.
+            dt: Control period (s).
+            guards: Inequalities beside the axle's, for instance of collisions.
+        """
+        settings = config.hierarchy
+        self._actuation = Actuation(robot.drive)
+        self._box = Box(robot, config, dt)
+        self._cascade = Cascade(settings.damping, settings.damping_from)
+        self._manipulability = ArmManipulability()
+        self._climb = ClimbManipulability(
+            settings.manipulability, config.gain_manipulability, settings.good_manipulability
+        )
+        self.guards: tuple[Guard, ...] = (AxleAhead(settings.axle_ahead, settings.axle_rate), *guards)
+        self._rise = settings.clock_rise * dt
+        turn = 1.0 / config.tool_turn
+        self._weight = np.repeat([1.0 / config.tool_speed, turn], 3)
+        self._weight_column = self._weight[:, None]
+        self._stack(self.secondary_tasks(robot, config))
+
+    def secondary_tasks(self, robot: RobotModel, config: ControllerConfig) -> Sequence[SecondaryTask]:
+        """The tasks of the null space; their weights are in `[controller.hierarchy]`."""
+        weights, speed = config.hierarchy, self._box.speed
+        return (
+            BaseReference(weights.base_place, weights.base_heading, config.gain_posture, config.gain_heading, speed),
+            ArmPosture(weights.arm_posture, config.gain_posture, speed),
+            self._climb,
+            JointCentre(weights.joint_centre, config.gain_limits, config.limit_zone, robot.limits, speed),
+            Smoothness(weights.smoothness, self._actuation, speed),
+        )
+
+    def solve(self, demand: Demand) -> Solution:
+        """The actuator velocities that answer the demand; see `Method.solve`."""
+        if not demand.finite:
+            return self._brake(demand, "the demand holds a number that is not finite", _NOWHERE)
+        bounds = self._box.at(demand.q, demand.sent)
+        self._climb.now = manipulability = self._manipulability.at(demand.kinematics.J)
+        free = _ARM if demand.base == "frozen" else _ALL
+        base = self._actuation.twist @ self._box.ramp(float(demand.sent[0]), float(demand.sent[1]))
+        for task, jacobian, target in self._tasks:
+            task.write(demand, jacobian, target)
+        names, A, A_lower = self._inequalities(demand)
+        J, wanted = self._tool(demand)
+        share = _share(demand)
+        problem = self._problem(demand, bounds, free, base, J, wanted * share, A, A_lower, share)
+        answer = self._cascade.solve(problem)
+        if answer is None:
+            return self._brake(demand, "no velocity satisfies the limits; the robot brakes", manipulability)
+        return self._solution(demand, answer, free, base, bounds, share, names, manipulability)
+
+    # --- parts of the problem ----------------------------------------------------------------------------------------
+
+    def _stack(self, tasks: Sequence[SecondaryTask]) -> None:
+        """Give every task its place in one stack of rows."""
+        total = sum(task.rows for task in tasks)
+        self._T, self._t = np.zeros((total, NXI)), np.zeros(total)
+        places = []
+        at = 0
+        for task in tasks:
+            rows = slice(at, at + task.rows)
+            places.append((task, self._T[rows], self._t[rows]))
+            at += task.rows
+        self._tasks = tuple(places)
+
+    def _tool(self, demand: Demand) -> tuple[Array, Array]:
+        """J over ν and the wanted twist, weighted by the tool's limits."""
+        J = self._actuation.rows(demand.kinematics.J_xi)
+        twist = demand.tool.twist
+        if demand.tool.free_axis:
+            R = demand.kinematics.T_odom_tool.rotation[:, ::2].T
+            J = np.concatenate([J[:3], R @ J[3:]])
+            return J * self._weight_column[:5], np.concatenate([twist[:3], R @ twist[3:]]) * self._weight[:5]
+        J *= self._weight_column
+        return J, twist * self._weight
+
+    def _inequalities(self, demand: Demand) -> tuple[tuple[str, ...], Array, Array]:
+        """Rows of the guards over ν."""
+        found: list[Inequalities] = [rows for guard in self.guards if len((rows := guard.rows(demand)).lower)]
+        if not found:
+            return (), np.zeros((0, NXI)), np.zeros(0)
+        if len(found) == 1:
+            return found[0].names, self._actuation.rows(found[0].A), found[0].lower
+        A = self._actuation.rows(np.concatenate([rows.A for rows in found]))
+        return sum((rows.names for rows in found), ()), A, np.concatenate([rows.lower for rows in found])
+
+    def _problem(
+        self,
+        demand: Demand,
+        bounds: Bounds,
+        free: slice,
+        base: Array,
+        J: Array,
+        b: Array,
+        A: Array,
+        A_lower: Array,
+        share: float,
+    ) -> Problem:
+        tool, speed = demand.tool, self._box.speed
+        rise = min(1.0, (max(demand.scale, 0.0) + self._rise) / share) if share > 0.0 else 1.0
+        T, t = self._T, self._t
+        c = np.zeros(len(b))
+        if free is _ARM:
+            # What the base still has to do until it rests is made good by the arm.
+            if base.any():
+                c = -(J[:, :2] @ base)
+                t = t - T[:, :2] @ base
+                A_lower = A_lower - A[:, :2] @ base
+            J, T, A, speed = J[:, free], T[:, free], A[:, free], speed[free]
+            upper = np.full(len(A_lower), math.inf)
+            return Problem(
+                J,
+                b,
+                c,
+                speed,
+                demand.sent[free],
+                bounds.lower[free],
+                bounds.upper[free],
+                A,
+                A_lower,
+                upper,
+                len(upper),
+                T,
+                t,
+                rise,
+                tool.keep_path,
+            )
+        k, sent = len(A_lower), self._actuation.nu(demand.sent)
+        rows, lower, upper = np.zeros((2 + k, NXI)), np.empty(2 + k), np.empty(2 + k)
+        rows[:k] = A
+        rows[k:, :2] = self._actuation.wheels
+        lower[:k], upper[:k] = A_lower, math.inf
+        lower[k:], upper[k:] = bounds.wheel_lower, bounds.wheel_upper
+        return Problem(
+            J, b, c, speed, sent, bounds.lower, bounds.upper, rows, lower, upper, k, T, t, rise, tool.keep_path
+        )
+
+    # --- the answer --------------------------------------------------------------------------------------------------
+
+    def _solution(
+        self,
+        demand: Demand,
+        answer: Answer,
+        free: slice,
+        base: Array,
+        bounds: Bounds,
+        share: float,
+        names: tuple[str, ...],
+        manipulability: Manipulability,
+    ) -> Solution:
+        nu = np.empty(NXI)
+        nu[:2] = base
+        nu[free] = answer.nu
+        xi = self._actuation.xi(nu)
+        xi[:2] = np.minimum(np.maximum(xi[:2], bounds.wheel_lower), bounds.wheel_upper)
+        scale = answer.scale * share
+        worst = given_up(answer.slack)
+        if worst >= 0:
+            return Solution(xi, scale, manipulability.value, False, _too_near(names, worst))
+        if answer.scale < _HELD and demand.tool.keep_path:
+            what = _holder(answer.holds, free, names)
+            return Solution(xi, scale, manipulability.value, False, f"{what} holds the tool back")
+        return Solution(xi, scale, manipulability.value)
+
+    def _brake(self, demand: Demand, reason: str, manipulability: Manipulability) -> Solution:
+        """The strongest braking of every actuator; from a velocity that is not a number, rest."""
+        sent = demand.sent
+        if not math.isfinite(float(sent.sum())):
+            return Solution(np.zeros(NXI), 0.0, manipulability.value, False, reason)
+        return Solution(self._box.brake(sent), 0.0, manipulability.value, False, reason)
+
+
+def _share(demand: Demand) -> float:
+    """How much of the wanted twist the speed cap allows, 0…1."""
+    linear = demand.tool.twist[:3]
+    speed = math.sqrt(float(linear @ linear))
+    return max(demand.speed_cap, 0.0) / speed if speed > demand.speed_cap else 1.0
+
+
+def _too_near(names: tuple[str, ...], worst: int) -> str:
+    return f"{names[worst]} cannot be kept: the robot gives way as little as it can"
+
+
+def _holder(index: int, free: slice, names: tuple[str, ...]) -> str:
+    bounds = _BOUND_NAMES[free]
+    if 0 <= index < len(bounds):
+        return bounds[index]
+    row = index - len(bounds)
+    return names[row] if 0 <= row < len(names) else "a limit of the wheels"

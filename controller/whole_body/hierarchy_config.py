@@ -1,0 +1,41 @@
+"""Settings of the method `hierarchy`, section `[controller.hierarchy]`."""
+
+from typing import Annotated
+
+from msgspec import Meta, Struct
+
+from rolling_panda.config import Positive
+
+Weight = Annotated[float, Meta(ge=0.0, le=1e4)]
+
+
+class HierarchyConfig(Struct, frozen=True, forbid_unknown_fields=True):
+    """Weights among the tasks of the null space (each against a velocity in shares of its limit), and damping.
+
+    Attributes:
+        base_heading: Weight of the base's heading.
+        base_place: Weight of the base's place along its heading.
+        arm_posture: Weight of the arm's posture.
+        manipulability: Weight of the climb to more manipulability.
+        joint_centre: Weight, at the limit, of the way back to the middle of a joint; 0 outside `limit_zone`.
+        smoothness: Weight against changes of velocity.
+        good_manipulability: ω of the arm from which on it is not raised.
+        damping: λ² where the smallest singular value of the scaled Jacobian is 0.
+        damping_from: Singular value below which damping begins.
+        clock_rise: Largest rise of the rate of a motion's clock (1/s).
+        axle_ahead: Least distance of the tool ahead of the axle in transit (m).
+        axle_rate: Rate at which that distance may be used up (1/s).
+    """
+
+    base_heading: Weight = 4.0
+    base_place: Weight = 4.0
+    arm_posture: Weight = 1.0
+    manipulability: Weight = 1.0
+    joint_centre: Weight = 10.0
+    smoothness: Weight = 0.2
+    good_manipulability: Positive = 0.08
+    damping: Weight = 0.01
+    damping_from: Positive = 0.2
+    clock_rise: Positive = 4.0
+    axle_ahead: Positive = 0.25
+    axle_rate: Positive = 2.0

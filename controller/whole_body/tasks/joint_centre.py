@@ -1,0 +1,37 @@
+"""Joints near a limit go back towards their middle."""
+
+import numpy as np
+
+from controller.whole_body.task import Demand
+from rolling_panda.differential_drive import Array
+from rolling_panda.robot_model import ARM_Q, ARM_XI, Limits
+
+
+class JointCentre:
+    """q̇ = ±gain · depth in the zone before a limit; the row's weight grows from 0 at its edge to 1 at the limit."""
+
+    name = "joint centre"
+    rows = 7
+
+    def __init__(self, weight: float, gain: float, zone: float, limits: Limits, speed: Array) -> None:
+        """Precompute the zones' edges.
+
+        Args:
+            weight: At the limit, against the other tasks.
+            gain: Velocity out of the zone by depth in it (1/s).
+            zone: Its width (rad).
+            limits: Of the robot.
+            speed: Largest ν (9).
+        """
+        self._gain, self._zone = gain, zone
+        self._low, self._high = limits.lower[ARM_Q] + zone, limits.upper[ARM_Q] - zone
+        self._share = weight**0.5 / speed[ARM_XI]
+        self._diagonal = np.arange(7), np.arange(2, 9)
+
+    def write(self, demand: Demand, jacobian: Array, target: Array) -> None:
+        """Write the rows."""
+        arm = demand.q[ARM_Q]
+        depth = np.maximum(self._low - arm, 0.0) - np.maximum(arm - self._high, 0.0)
+        share = np.abs(depth) * self._share / self._zone
+        jacobian[self._diagonal] = share
+        target[:] = share * (self._gain * depth)
