@@ -9,17 +9,22 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Self
 
+import msgspec
+
 from bridge.core import TICK_S, BridgeOutputs
 from bridge.sim.build import simulated_bridge
+from bridge.sim.robot import SimulatedRobot
 from controller.config import ControllerConfig
 from controller.core import Controller
 from controller.interface import Inputs, Outputs, Sample
+from controller.motion import Tracking
 from perception.config import PerceptionConfig
 from perception.pipeline import Perception
 from perception.segmenter import LabelImageSegmenter
 from rolling_panda import intents
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig, load_section
+from rolling_panda.differential_drive import Array
 from rolling_panda.resources import resource
 
 _CONTROL_TICKS = 10
@@ -30,18 +35,31 @@ _PERCEPTION_S = 0.15
 class ClosedLoop:
     """A simulated robot with an operator who is always present. `now` is simulated time (s)."""
 
-    def __init__(self, seed: int, trace: Path | None = None, config_path: Path | None = None) -> None:
+    def __init__(
+        self,
+        seed: int,
+        trace: Path | None = None,
+        config_path: Path | None = None,
+        method: str | None = None,
+        watch: Callable[["ClosedLoop", Tracking], None] | None = None,
+    ) -> None:
         """Grow the row and stand the robot beside it.
 
         Args:
             seed: Of the row and of the camera's noise.
             trace: File for the record of what was actuated.
             config_path: TOML configuration; None takes the simulation's.
+            method: Whole-body method; None takes the configured one.
+            watch: Called after each control period in which the tool follows a trajectory.
         """
         path = config_path or resource("assets/config/sim.toml")
         self.bridge = simulated_bridge(path, seed, trace)
         robot = load_section(path, "robot", RobotConfig)
-        self.controller = Controller(load_section(path, "controller", ControllerConfig), robot)
+        config = load_section(path, "controller", ControllerConfig)
+        if method is not None:
+            config = msgspec.structs.replace(config, method=method)
+        self.controller = Controller(config, robot)
+        self._watch = watch
         self.perception = Perception(load_section(path, "perception", PerceptionConfig), LabelImageSegmenter())
         self.now = 0.0
         self.inputs = Inputs(present=frozenset(m.PROCESSES))
@@ -58,6 +76,9 @@ class ClosedLoop:
         if self._ticks % _CONTROL_TICKS == 0:
             self.inputs = replace(self.inputs, server_seen=self.now, perception_seen=self.now)
             self._send(self.controller.step(self.inputs, self.now))
+            tracking = self.controller.tracking
+            if self._watch is not None and tracking is not None and tracking.desired is not None:
+                self._watch(self, tracking)
             self.inputs = replace(self.inputs, stops=())
 
     def run(self, seconds: float) -> None:
@@ -89,6 +110,13 @@ class ClosedLoop:
         """Entries of the queue in these states, in the order of work; all without states."""
         entries = () if self.state is None else self.state.queue
         return (entry for entry in entries if not states or entry.state in states)
+
+    def true_tool(self) -> Array:
+        """Where the simulated tool really is (3, m, world): ground truth, for judging alone."""
+        robot = self.bridge.robot
+        assert isinstance(robot, SimulatedRobot)
+        position: Array = robot.true_tool()[:3, 3]
+        return position
 
     def close(self) -> None:
         """Close the trace."""

@@ -1,8 +1,12 @@
-"""`rolling-panda bench row`: accept what was detected, cut it in physics, judge by the simulator's own trace."""
+"""`rolling-panda bench row`: accept what was detected, cut it in physics, judge by the simulator's own trace.
+
+Several methods work on the same accepted points: a seed's row looks the same to each before the first cut.
+"""
 
 import argparse
 import json
 import math
+import os
 import platform
 import sys
 import tempfile
@@ -11,8 +15,12 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+import numpy as np
+
 from benchmarks.closed_loop import ClosedLoop
 from bridge.sim import trace
+from controller.motion import Tracking
+from controller.whole_body.registry import METHODS
 from rolling_panda import intents
 from rolling_panda import messages as m
 
@@ -20,19 +28,31 @@ from rolling_panda import messages as m
 RIGHT_PLACE = 0.010
 _ENDED: tuple[m.PointState, ...] = ("DONE", "FAILED_NOT_CUT", "UNKNOWN")
 _SURVEY_S = 6.0
-_LIMIT_S = 90.0
+_LIMIT_S = 120.0
 
 
 @dataclass(frozen=True)
 class Cut:
-    """One accepted point: how it ended, the distance from it to what was severed (m; None when nothing was)."""
+    """One accepted point and how it ended.
 
+    Attributes:
+        method: Whole-body method.
+        seed: Of the row.
+        point_id: Its name.
+        state: How it ended.
+        reason: Why, in words.
+        distance: From the accepted point to what was severed (m); None when nothing was.
+        tool_error: From the accepted point to the middle of the blades as they closed (m); None when they did not.
+        duration_s: Since the cut before it, or since the start (s, simulated).
+    """
+
+    method: str
     seed: int
     point_id: str
     state: str
     reason: str
     distance: float | None
-    severed: int
+    tool_error: float | None
     duration_s: float
 
     @property
@@ -41,40 +61,93 @@ class Cut:
         return self.distance is not None and self.distance <= RIGHT_PLACE
 
 
-def cut_row(seed: int, points: int) -> list[Cut]:
+@dataclass(frozen=True)
+class RowRun:
+    """One row worked off by one method.
+
+    Attributes:
+        method: Whole-body method.
+        seed: Of the row.
+        cuts: The accepted points.
+        work_s: From the start to the end of the last one (s, simulated).
+        path_rms: Of the true tool against its trajectory, over all followed motion (m).
+        contacts: Physics steps in which the robot met posts, trunks, cordons or wires.
+        self_contacts: Physics steps in which it met itself.
+        stops: Times it stopped by itself.
+    """
+
+    method: str
+    seed: int
+    cuts: tuple[Cut, ...]
+    work_s: float
+    path_rms: float
+    contacts: int
+    self_contacts: int
+    stops: int
+
+
+def cut_row(seed: int, points: int, method: str) -> RowRun:
     """Survey from the start posture, accept up to `points` of what was detected, work through them.
 
-    Returns:
-        One row for each accepted point; a refused acceptance is not among them, as an operator sees the refusal.
+    A refused acceptance is not among the cuts, as an operator sees the refusal.
     """
+    errors: list[float] = []
+
+    def watch(loop: ClosedLoop, tracking: Tracking) -> None:
+        if loop.controller.mode == "AUTO":
+            errors.append(float(np.linalg.norm(loop.true_tool() - tracking.desired.translation)))
+
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "trace"
-        loop = ClosedLoop(seed, path)
-        loop.run(_SURVEY_S)
-        loop.ask(intents.Arm(user="bench"))
-        loop.ask(intents.AcceptAll(user="bench"))
-        loop.run(0.2)
-        proposed = {point.point_id: point for point in loop.inputs.points.message.points} if loop.inputs.points else {}
-        accepted = [entry for entry in loop.queue("ACCEPTED")]
-        for entry in accepted[points:]:
-            loop.ask(intents.RejectPoint(user="bench", point_id=entry.point_id, reason="not in this run"))
-        accepted = accepted[:points]
-        loop.ask(intents.Start(user="bench"))
-        durations = _work(loop, [entry.point_id for entry in accepted])
-        ends = {entry.point_id: entry for entry in loop.queue()}
-        loop.close()
+        with ClosedLoop(seed, path, method=method, watch=watch) as loop:
+            accepted = _accept(loop, points)
+            loop.ask(intents.Start(user="bench"))
+            begin = loop.now
+            durations = _work(loop, [entry.point_id for entry in accepted])
+            work_s = sum(durations.values()) if durations else loop.now - begin
+            ends = {entry.point_id: entry for entry in loop.queue()}
+            stops = sum("PROTECTIVE_STOP" in event.text for event in loop.events)
         record = trace.read(path)
-    severed = {event["point_id"]: event["severed"] for event in record.events if event["event"] == "cut"}
-    rows = []
+    events = {event["point_id"]: event for event in record.events if event["event"] == "cut"}
+    cuts = []
     for entry in accepted:
-        where = entry.accepted_position or proposed[entry.point_id].position
-        pieces = severed.get(entry.point_id, [])
-        distance = min((math.dist(piece["point"], where) for piece in pieces), default=None)
+        event, where = events.get(entry.point_id), entry.accepted_position
+        assert where is not None
+        pieces = [] if event is None else event["severed"]
         end = ends[entry.point_id]
-        rows.append(
-            Cut(seed, entry.point_id, end.state, end.reason, distance, len(pieces), durations.get(entry.point_id, 0.0))
+        cuts.append(
+            Cut(
+                method=method,
+                seed=seed,
+                point_id=entry.point_id,
+                state=end.state,
+                reason=end.reason,
+                distance=min((math.dist(piece["point"], where) for piece in pieces), default=None),
+                tool_error=None if event is None else math.dist(event["blade"], where),
+                duration_s=durations.get(entry.point_id, 0.0),
+            )
         )
-    return rows
+    return RowRun(
+        method=method,
+        seed=seed,
+        cuts=tuple(cuts),
+        work_s=work_s,
+        path_rms=math.sqrt(float(np.mean(np.square(errors)))) if errors else 0.0,
+        contacts=int(np.count_nonzero(record.rows["contacts"])),
+        self_contacts=int(np.count_nonzero(record.rows["self_contacts"])),
+        stops=stops,
+    )
+
+
+def _accept(loop: ClosedLoop, points: int) -> list[m.QueueEntry]:
+    loop.run(_SURVEY_S)
+    loop.ask(intents.Arm(user="bench"))
+    loop.ask(intents.AcceptAll(user="bench"))
+    loop.run(0.2)
+    accepted = list(loop.queue("ACCEPTED"))
+    for entry in accepted[points:]:
+        loop.ask(intents.RejectPoint(user="bench", point_id=entry.point_id, reason="not in this run"))
+    return accepted[:points]
 
 
 def _work(loop: ClosedLoop, todo: list[str]) -> dict[str, float]:
@@ -100,42 +173,76 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the benchmark; returns the exit code."""
     parser = argparse.ArgumentParser(prog="rolling-panda bench row", description=__doc__)
     parser.add_argument("--seed", type=int, default=0, help="first seed (default: 0)")
-    parser.add_argument("--count", type=int, default=10, help="seeds to run (default: 10)")
+    parser.add_argument("--count", type=int, default=10, help="rows to work off (default: 10)")
     parser.add_argument("--points", type=int, default=4, help="most points accepted in a row (default: 4)")
+    parser.add_argument(
+        "--method",
+        action="append",
+        choices=tuple(METHODS),
+        help="whole-body method; may be given several times (default: all of them)",
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows and the summary here")
     arguments = parser.parse_args(argv)
-    cuts: list[Cut] = []
-    print(f"{'seed':>4} {'accepted':>8} {'right':>6} {'s a cut':>8} {'× real time':>11}")
+    methods = arguments.method or list(METHODS)
+    runs: list[RowRun] = []
+    print(f"{'method':<10} {'seed':>4} {'accepted':>8} {'right':>6} {'s a cut':>8} {'contacts':>8} {'× real time':>11}")
     for seed in range(arguments.seed, arguments.seed + arguments.count):
-        begin = time.perf_counter()
-        rows = cut_row(seed, arguments.points)
-        simulated = sum(row.duration_s for row in rows) + _SURVEY_S
-        speed = simulated / (time.perf_counter() - begin)
-        right = sum(row.right for row in rows)
-        each = sum(row.duration_s for row in rows) / max(len(rows), 1)
-        print(f"{seed:>4} {len(rows):>8} {right:>6} {each:>8.1f} {speed:>11.1f}", flush=True)
-        for row in rows:
-            if not row.right:
-                print(f"       {row.point_id}: {row.state}, {row.reason or 'no reason'}; distance {row.distance}")
-        cuts += rows
-    summary = summarise(cuts)
-    print(", ".join(f"{name} {value}" for name, value in summary.items()))
+        for method in methods:
+            begin = time.perf_counter()
+            run = cut_row(seed, arguments.points, method)
+            runs.append(run)
+            _tell(run, (run.work_s + _SURVEY_S) / (time.perf_counter() - begin))
+    print()
+    summary = {method: summarise([run for run in runs if run.method == method]) for method in methods}
+    names = list(next(iter(summary.values())))
+    print(f"{'':<18}" + "".join(f"{method:>12}" for method in methods))
+    for name in names:
+        print(f"{name:<18}" + "".join(f"{summary[method][name]:>12}" for method in methods))
     if arguments.json is not None:
-        document = {"machine": platform.platform(), "summary": summary, "results": [asdict(cut) for cut in cuts]}
+        document = {
+            "machine": f"{platform.platform()}, {os.cpu_count()} cores",
+            "summary": summary,
+            "results": [asdict(run) for run in runs],
+        }
         arguments.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
     return 0
 
 
-def summarise(cuts: list[Cut]) -> dict[str, float | int]:
-    """Share severed at the right place, seconds a cut and distance, over all accepted points."""
-    durations = sorted(cut.duration_s for cut in cuts if cut.right)
-    distances = sorted(cut.distance for cut in cuts if cut.distance is not None)
+def _tell(run: RowRun, speed: float) -> None:
+    right = sum(cut.right for cut in run.cuts)
+    each = run.work_s / max(len(run.cuts), 1)
+    contacts = f"{run.contacts}+{run.self_contacts}"
+    print(
+        f"{run.method:<10} {run.seed:>4} {len(run.cuts):>8} {right:>6} {each:>8.1f} {contacts:>8} {speed:>11.1f}",
+        flush=True,
+    )
+    for cut in run.cuts:
+        if not cut.right:
+            print(f"       {cut.point_id}: {cut.state}, {cut.reason or 'no reason'}; distance {cut.distance}")
+
+
+def summarise(runs: list[RowRun]) -> dict[str, float | int]:
+    """Share severed at the right place, seconds a cut, distances and contacts, over all rows of one method."""
+    cuts = [cut for run in runs for cut in run.cuts]
+    durations = [cut.duration_s for cut in cuts if cut.right]
+    distances = [cut.distance for cut in cuts if cut.distance is not None]
+    tool = [cut.tool_error for cut in cuts if cut.tool_error is not None]
+
+    def quantile(values: list[float], share: float, digits: int) -> float:
+        return round(float(np.quantile(values, share)), digits) if values else 0.0
+
     return {
         "accepted": len(cuts),
         "right_place": round(sum(cut.right for cut in cuts) / max(len(cuts), 1), 3),
-        "cut_s_median": round(durations[len(durations) // 2], 1) if durations else 0.0,
-        "distance_m_median": round(distances[len(distances) // 2], 4) if distances else 0.0,
-        "distance_m_max": round(distances[-1], 4) if distances else 0.0,
+        "cut_s_mean": round(sum(run.work_s for run in runs) / max(len(cuts), 1), 2),
+        "cut_s_median": quantile(durations, 0.5, 2),
+        "distance_mm_median": quantile([1e3 * d for d in distances], 0.5, 2),
+        "distance_mm_max": quantile([1e3 * d for d in distances], 1.0, 2),
+        "tool_mm_p95": quantile([1e3 * d for d in tool], 0.95, 2),
+        "path_mm_rms": round(1e3 * math.sqrt(float(np.mean([run.path_rms**2 for run in runs]))), 2) if runs else 0.0,
+        "contact_steps": sum(run.contacts for run in runs),
+        "self_contact_steps": sum(run.self_contacts for run in runs),
+        "stops": sum(run.stops for run in runs),
     }
 
 

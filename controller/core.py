@@ -78,6 +78,11 @@ class Controller:
         """Mode of the supervision machine."""
         return self._state.mode
 
+    @property
+    def tracking(self) -> Tracking | None:
+        """Of the motion that the last step followed; None while nothing was followed."""
+        return self._tracking
+
     def step(self, inputs: Inputs, now: float) -> Outputs:
         """One control period.
 
