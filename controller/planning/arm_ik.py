@@ -39,7 +39,7 @@ class ArmIk:
         """Read the dimensions.
 
         Raises:
-            ModelError: The model's arm has other offsets than a Panda.
+            ModelError: The arm has other offsets than a Panda, or does not stand above the middle of the axle.
         """
         placements = [robot.model.jointPlacements[robot.model.getJointId(f"panda_joint{i}")] for i in range(1, 8)]
         neutral = np.zeros(12)
@@ -55,6 +55,10 @@ class ArmIk:
         self.lower, self.upper = limits.lower[ARM_Q], limits.upper[ARM_Q]
         if not np.isclose(-placements[4].translation[0], self._a) or min(self._d1, self._d3, self._d5) <= 0.0:
             raise ModelError("the arm's joint offsets are not a Panda's; the closed form does not fit it")
+        if np.abs(self.mount[:2]).max() > 1e-9:
+            raise ModelError(
+                f"the arm stands at {self.mount[:2]} m in the base; planning needs it above the axle's middle"
+            )
 
     @property
     def shoulder(self) -> Array:
@@ -67,6 +71,11 @@ class ArmIk:
         """Longest distance from shoulder to wrist (m)."""
         return float(np.hypot(self._d3, self._a) + np.hypot(self._d5, self._a))
 
+    def wrist(self, R: Array, p: Array, q7: Array) -> Array:
+        """Where the axes of joints 5 and 6 meet (N×3, m) for poses of the flange and last joints, in any frame."""
+        point: Array = p - self._flange * R[:, :, 2] - self._a7 * _x6(R, q7)
+        return point
+
     def solve(self, R: Array, p: Array, q7: Array) -> ArmPostures:
         """All postures with these poses of the flange and these last joints; joint limits are not looked at.
 
@@ -75,11 +84,10 @@ class ArmIk:
             p: Its position (N×3, m).
             q7: Last joint (N, rad).
         """
-        x7, y7, z7 = R[:, :, 0], R[:, :, 1], R[:, :, 2]
-        x6 = np.cos(q7)[:, None] * x7 - np.sin(q7)[:, None] * y7
-        y6 = -z7
-        O7 = p - self._flange * z7
-        W = O7 - self._a7 * x6
+        z7 = R[:, :, 2]
+        x6, y6 = _x6(R, q7), -z7
+        W = self.wrist(R, p, q7)
+        O7 = W + self._a7 * x6
         v = np.array([0.0, 0.0, self._d1]) - W
         L2 = np.maximum(_dot(v, v), _TINY)
         L = np.sqrt(L2)
@@ -163,6 +171,12 @@ class _Half:
 def wrapped(angle: Array) -> Array:
     """The same angles in −π…π."""
     return np.arctan2(np.sin(angle), np.cos(angle))
+
+
+def _x6(R: Array, q7: Array) -> Array:
+    """The x axis of joint 6's frame (N×3): that of the flange, turned back by the last joint."""
+    x6: Array = np.cos(q7)[:, None] * R[:, :, 0] - np.sin(q7)[:, None] * R[:, :, 1]
+    return x6
 
 
 def _acos(cosine: Array) -> Array:

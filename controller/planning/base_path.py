@@ -20,6 +20,7 @@ _NEAR, _ITERATIONS, _NUDGE = 1e-11, 12, 1e-6
 _NO_DRIVE = 1e-9
 #: Shares of a turn that fall together with the drive.
 _BLENDS = ((1.0, 1.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.5), (0.0, 0.0))
+_STRAIGHT = ((0.0, 0.0),)
 
 
 @dataclass(frozen=True)
@@ -62,23 +63,30 @@ class BasePlanner:
         best: Array = np.where(distance < _NO_DRIVE, only_turn, np.minimum(*ways))
         return best
 
-    def motions(self, start: Array, goal: Array) -> list[BaseMotion]:
-        """Motions from a base pose (3) to another (3), the quickest first; never empty."""
+    def motions(self, start: Array, goal: Array, blends: tuple[tuple[float, float], ...] = _BLENDS) -> list[BaseMotion]:
+        """Motions from a base pose (3) to another (3), the quickest first.
+
+        Args:
+            start: Base pose.
+            goal: Base pose.
+            blends: Shares of the first and of the second turn that fall together with the drive, to be tried; without
+                overlap, (0, 0), there always is a motion.
+        """
         start, goal = self._axle(start, -1.0), self._axle(goal, -1.0)
-        found = [motion for motion in self._ways(start, goal) if motion is not None]
+        found = [motion for motion in self._ways(start, goal, blends) if motion is not None]
         return sorted(found, key=lambda motion: len(motion.wheels))
 
     def via(self, points: list[Array]) -> BaseMotion:
-        """The quickest motions from pose to pose, one after the other, at rest at each."""
+        """From pose to pose along straight lines, at rest at each, by the quickest motions that do not blend."""
         at, wheels, poses = points[0], [np.empty((0, 2))], [points[0][None]]
         for point in points[1:]:
-            part = self.motions(at, point)[0]
+            part = self.motions(at, point, _STRAIGHT)[0]
             at = part.poses[-1]
             wheels.append(part.wheels)
             poses.append(part.poses[1:])
         return BaseMotion(np.vstack(wheels), np.vstack(poses))
 
-    def _ways(self, start: Array, goal: Array) -> Iterator[BaseMotion | None]:
+    def _ways(self, start: Array, goal: Array, blends: tuple[tuple[float, float], ...]) -> Iterator[BaseMotion | None]:
         dx, dy = goal[:2] - start[:2]
         distance = math.hypot(dx, dy)
         total = _wrap(goal[2] - start[2])
@@ -89,7 +97,7 @@ class BasePlanner:
         for direction in (1.0, -1.0):
             first = _wrap(math.atan2(direction * dy, direction * dx) - start[2])
             second = _wrap(goal[2] - start[2] - first)
-            for blend in _BLENDS:
+            for blend in blends:
                 yield self._shoot(start, goal, first, direction * distance, first + second, blend)
 
     def _shoot(

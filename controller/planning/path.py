@@ -1,0 +1,201 @@
+"""From a configuration to a tool pose: a stand, a way for the base and one for the arm, put together and looked over.
+
+Stands are tried from the best on. Base and arm move at the same time where that is clear; where it is not, one after
+the other, then with the arm folded while the base drives, and round what is in the way.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from controller.planning.arm_path import ArmPath, ArmPathPlanner, Blocked
+from controller.planning.base_path import BaseMotion, BasePlanner
+from controller.planning.goal import GoalChooser, Stand
+from controller.planning.limits import PlanLimits
+from controller.planning.plan import Plan, Wait, arm_samples, assemble, orders
+from controller.whole_body.collision import Clearance, CollisionModel
+from rolling_panda.differential_drive import Array
+from rolling_panda.robot_model import ARM_Q, RobotModel
+
+#: Arm folded over the base for driving among obstacles.
+_FOLDED = np.array([0.0, -1.2, 0.0, -2.7, 0.0, 1.9, 0.785])
+#: How far beside what is in the way the base goes round it (m).
+_ROUND = (0.75, 1.1, 1.6)
+#: Body of the base: rear, front and half width (m, vendor's mesh).
+_OUTLINE = (-0.523, 0.190, 0.290)
+#: Motions of the base that are tried between two poses.
+_WAYS = 2
+#: Between rows that are looked at, distances may fall below the clearance by this much (m).
+_BETWEEN = 0.005
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A plan and what it is like.
+
+    Attributes:
+        plan: The motion.
+        stand: Where it ends.
+        clearance: Least distance along it (m), and between what.
+    """
+
+    plan: Plan
+    stand: Stand
+    clearance: Clearance
+
+
+@dataclass(frozen=True)
+class Refused:
+    """No plan, and why, in words."""
+
+    reason: str
+
+
+class PathPlanner:
+    """Plans motions to tool poses. Uses its robot model's work space: one instance a thread."""
+
+    def __init__(self, robot: RobotModel, collision: CollisionModel, limits: PlanLimits, seed: int = 0) -> None:
+        """Bind the parts.
+
+        Args:
+            robot: The model that `collision` uses.
+            collision: The robot among obstacles; they may be replaced between plans.
+            limits: Of planned motions.
+            seed: Of everything that is sampled.
+        """
+        self._robot, self._collision, self._limits = robot, collision, limits
+        self._base, self._arm = BasePlanner(robot.drive, limits), ArmPathPlanner(collision, limits, seed)
+        self._goals = GoalChooser(robot, collision, limits, seed)
+
+    def plan(
+        self, q: Array, T_odom_tool: Any, free_axis: bool = False, base_fixed: bool = False, together: bool = True
+    ) -> Planned | Refused:
+        """A motion from rest at a configuration to rest with the tool at a pose.
+
+        Args:
+            q: Configuration (12) at the start. It may be outside joint limits or too near to something; the motion then
+                leads out of that first.
+            T_odom_tool: Goal (pin.SE3).
+            free_axis: True where the rotation about the tool's y does not matter.
+            base_fixed: True where only the arm may move.
+            together: False to drive first, stop, and then reach.
+        """
+        if not (np.isfinite(q).all() and np.isfinite(T_odom_tool.homogeneous).all()):
+            return Refused("the start or the goal is not finite; give numbers")
+        found = self._goals.find(q, T_odom_tool, free_axis, base_fixed)
+        reason = found.reason
+        for stand in found.stands:
+            planned = self.to_stand(q, stand, together)
+            if isinstance(planned, Planned):
+                return planned
+            reason = (
+                f"{len(found.stands)} postures at the goal are clear, but none is reached; the last: {planned.reason}"
+            )
+        return Refused(reason)
+
+    def to_stand(self, q: Array, stand: Stand, together: bool = True) -> Planned | Refused:
+        """A motion from rest at a configuration (12) to rest at a stand."""
+        reason = ""
+        for base, arm, wait in self._candidates(q, stand.q, together):
+            if isinstance(arm, Blocked):
+                reason = reason or arm.reason
+                continue
+            plan = assemble(self._robot, q, base, arm, self._limits, wait)
+            least = self._look(plan)
+            if least is None:
+                return Planned(plan, stand, self._least(plan))
+            reason = (
+                f"on the way {least.pair[0]} comes within {1e3 * least.distance:.0f} mm of {least.pair[1]}, "
+                f"{1e3 * self._limits.clearance:.0f} mm are kept"
+            )
+        return Refused(reason)
+
+    def _candidates(self, q: Array, goal: Array, together: bool) -> Iterator[tuple[BaseMotion, Array | Blocked, Wait]]:
+        """Base motion, arm samples and order, the quickest kinds first."""
+        directs = self._base.motions(q[:3], goal[:3])[:_WAYS]
+        there = self._timed(np.concatenate([goal[:5], q[ARM_Q]]), goal[ARM_Q])
+        if isinstance(there, Blocked):
+            yield directs[0], there, Wait()
+        else:
+            for wait in list(orders(directs[0], there))[0 if together else 1 : 3 if together else 2]:
+                yield directs[0], there, wait
+        if not self._collision.obstacles:
+            return
+        folded = _FOLDED.copy()
+        folded[0] = np.clip(q[5], -1.5, 1.5)
+        fold, unfold = self._timed(q, folded), self._timed(np.concatenate([goal[:5], folded]), goal[ARM_Q])
+        for base in [*directs, *self._round(q[:3], goal[:3])]:
+            if self._runs_into(base):
+                continue
+            if isinstance(fold, Blocked) or isinstance(unfold, Blocked):
+                yield base, fold if isinstance(fold, Blocked) else unfold, Wait()
+                return
+            rows = [fold, np.broadcast_to(folded, (len(base.wheels), 7)), unfold[1:]]
+            yield base, np.vstack(rows), Wait(base=len(fold) - 1)
+
+    def _timed(self, q: Array, arm: Array) -> Array | Blocked:
+        found = self._arm.find(q, arm)
+        return arm_samples(found, self._limits) if isinstance(found, ArmPath) else found
+
+    def _round(self, start: Array, goal: Array) -> Iterator[BaseMotion]:
+        """Ways that leave the straight line to either side, in its middle and where obstacles stand beside it."""
+        line = goal[:2] - start[:2]
+        length = float(np.hypot(*line))
+        if length < 1e-6:
+            return
+        along = line / length
+        aside = np.array([-along[1], along[0]])
+        heading = float(np.arctan2(along[1], along[0]))
+        shares = {0.5} | {
+            round(float(np.clip((np.array(o.start[:2]) - start[:2]) @ along / length, 0.1, 0.9)), 1)
+            for o in self._collision.obstacles
+            if abs(float((np.array(o.start[:2]) - start[:2]) @ aside)) < 1.0
+        }
+        for far in _ROUND:
+            for side in (far, -far):
+                for share in sorted(shares, key=lambda s: abs(s - 0.5))[:3]:
+                    point = start[:2] + share * line + side * aside
+                    yield self._base.via([start, np.array([*point, heading]), goal])
+
+    def _runs_into(self, base: BaseMotion) -> bool:
+        """Whether the body's outline goes over the foot of an obstacle; cheap, and says nothing of what is above it."""
+        feet = [(*min(o.start, o.end, key=lambda end: end[2])[:2], o.radius) for o in self._collision.obstacles]
+        x, y, radius = np.array(feet).T
+        poses = base.poses[::5, :, None]
+        c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+        ahead = c * (x - poses[:, 0]) + s * (y - poses[:, 1])
+        left = -s * (x - poses[:, 0]) + c * (y - poses[:, 1])
+        over = (ahead > _OUTLINE[0] - radius) & (ahead < _OUTLINE[1] + radius) & (np.abs(left) < _OUTLINE[2] + radius)
+        low = np.array([min(o.start[2], o.end[2]) for o in self._collision.obstacles]) < 0.3
+        return bool((over & low).any())
+
+    def _look(self, plan: Plan) -> Clearance | None:
+        """The first place on the way that is too near, None where none is. Skips as far as nothing can have happened.
+
+        A start that is too near may get 2 mm nearer while it gets away.
+        """
+        looks, row, last = plan.looks(), 0, len(plan.t) - 1
+        needed = self._limits.clearance - _BETWEEN
+        been_clear = False
+        start = self._collision.least(plan.q[0]).distance
+        while True:
+            least = self._collision.least(plan.q[row])
+            been_clear = been_clear or least.distance >= needed
+            if least.distance < (needed if been_clear else min(needed, start - 0.002)):
+                return least
+            if row == last:
+                return None
+            row = min(last, looks.after(row, least.distance - needed))
+
+    def _least(self, plan: Plan) -> Clearance:
+        """The least distance of a plan, to a few millimetres."""
+        looks, row, last = plan.looks(), 0, len(plan.t) - 1
+        least = self._collision.least(plan.q[0])
+        while row < last:
+            # Rows from which the least so far cannot be undercut by more than _BETWEEN are skipped.
+            here = self._collision.least(plan.q[row])
+            least = min(least, here, key=lambda clearance: clearance.distance)
+            row = looks.after(row, here.distance - least.distance + _BETWEEN)
+        return min(least, self._collision.least(plan.q[last]), key=lambda clearance: clearance.distance)
