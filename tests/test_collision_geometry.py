@@ -42,7 +42,9 @@ def test_capsules_enclose_the_meshes_of_the_arm_in_any_posture(seed):
     for link in links:
         mesh = trimesh.load(str(panda_description() / "meshes" / "collision" / f"{link}.stl"))
         gap = outside(placed(f"panda_{link}", np.asarray(mesh.vertices), q), links, q)
-        assert gap.max() < 0.012, f"{link} sticks out by {gap.max() * 1e3:.0f} mm"
+        # The foot, which stands on the deck and does not move, has corners that stick out by 11 mm.
+        most = 0.012 if link == "link0" else 0.0
+        assert gap.max() < most, f"{link} sticks out by {gap.max() * 1e3:.0f} mm"
 
 
 def test_capsules_enclose_the_tool_as_it_is_drawn():

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controller.whole_body.obstacle import Obstacle, axes
+from controller.whole_body.obstacle import Axes, Obstacle
 from rolling_panda.errors import InputError
 
 
@@ -14,16 +14,16 @@ def test_gap_of_a_sphere_is_that_of_the_nearest_point_of_the_axis(seed):
     obstacle = Obstacle("wire", "wire", tuple(start), tuple(end), 0.01)
     along = start + np.linspace(0.0, 1.0, 4001)[:, None] * (end - start)
     expected = np.linalg.norm(along - center, axis=1).min() - 0.2 - 0.01
-    assert axes((obstacle,)).gaps(center[None], np.array([0.2]))[0, 0] == pytest.approx(expected, abs=1e-6)
+    assert Axes((obstacle,)).gaps(center[None], np.array([0.2]))[0, 0] == pytest.approx(expected, abs=1e-6)
 
 
 def test_an_axis_without_length_is_a_ball():
     ball = Obstacle("head", "trunk", (1.0, 0.0, 0.0), (1.0, 0.0, 0.0), 0.1)
-    assert axes((ball,)).gaps(np.zeros((1, 3)), np.array([0.2]))[0, 0] == pytest.approx(0.7)
+    assert Axes((ball,)).gaps(np.zeros((1, 3)), np.array([0.2]))[0, 0] == pytest.approx(0.7)
 
 
 def test_no_obstacles_have_no_gaps():
-    assert axes(()).gaps(np.zeros((4, 3)), np.ones(4)).shape == (4, 0)
+    assert Axes(()).gaps(np.zeros((4, 3)), np.ones(4)).shape == (4, 0)
 
 
 @pytest.mark.parametrize(

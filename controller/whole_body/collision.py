@@ -17,7 +17,7 @@ import pinocchio as pin
 
 from controller.whole_body.collision_geometry import BLADES, add_ground, bounding_radius, part_of, robot_geometry
 from controller.whole_body.collision_pairs import self_pairs
-from controller.whole_body.obstacle import Obstacle, axes
+from controller.whole_body.obstacle import Axes, Obstacle
 from rolling_panda.differential_drive import NQ, NXI, Array
 from rolling_panda.errors import ControlError, InputError
 from rolling_panda.robot_model import Kinematics, RobotModel
@@ -123,7 +123,7 @@ class CollisionModel:
         if len({obstacle.name for obstacle in obstacles}) < len(obstacles):
             raise InputError("two obstacles have the same name; each needs its own")
         self._obstacles = tuple(obstacles)
-        self._axes = axes(self._obstacles)
+        self._axes = Axes(self._obstacles)
         self._slot_of: dict[int, int] = {}
         self._free = list(range(self._slots))
         self.allow(*self._allowed)

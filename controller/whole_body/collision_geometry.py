@@ -1,7 +1,7 @@
 """The robot's shape for collision checks: capsules, one sphere and one box in Coal, on Pinocchio's joints.
 
 - Arm: the cylinders with spherical ends of `panda_collision.urdf` (example-robot-data, after franka_description), taken
-  as capsules: radii 0.045 to 0.09 m, about 30 mm outside the links' meshes.
+  as capsules: radii 0.045 to 0.09 m. In any posture the meshes of the moving links are inside them, by 6 to 32 mm.
 - Tool: capsules around the shapes of `assets/urdf/tool.urdf`.
 - Base: the smallest box around body and wheels of `assets/urdf/base.urdf`, from the floor up, and a sphere around
   every position of the caster's wheel.

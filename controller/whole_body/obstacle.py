@@ -43,35 +43,25 @@ class Obstacle:
             )
 
 
-@dataclass(frozen=True)
 class Axes:
-    """The axes of n obstacles as arrays.
+    """The axes of n obstacles as arrays, for the distances of many spheres from all of them at once."""
 
-    Attributes:
-        start: (n×3, m).
-        along: From start to end (n×3, m).
-        inverse_square: 1/|along|² (n), 0 for spheres.
-        radius: (n, m).
-    """
-
-    start: Array
-    along: Array
-    inverse_square: Array
-    radius: Array
+    def __init__(self, obstacles: tuple[Obstacle, ...]) -> None:
+        """Precompute what does not depend on the spheres."""
+        start = np.array([o.start for o in obstacles], dtype=np.float64).reshape(-1, 3)
+        along = np.array([o.end for o in obstacles], dtype=np.float64).reshape(-1, 3) - start
+        self._square = np.sum(along * along, axis=1)
+        self._inverse = np.where(self._square > _POINT, 1.0 / np.maximum(self._square, _POINT), 0.0)
+        self._start_T, self._along_T = start.T.copy(), along.T.copy()
+        self._offset, self._from_origin = np.sum(start * along, axis=1), np.sum(start * start, axis=1)
+        self._radius = np.array([o.radius for o in obstacles], dtype=np.float64)
 
     def gaps(self, centers: Array, radii: Array) -> Array:
         """Gaps (g×n, m) between g spheres and the n obstacles; negative where they overlap."""
-        offset = centers[:, None, :] - self.start
-        t = np.clip(np.einsum("gnk,nk->gn", offset, self.along) * self.inverse_square, 0.0, 1.0)
-        offset -= t[:, :, None] * self.along
-        gaps: Array = np.sqrt(np.einsum("gnk,gnk->gn", offset, offset)) - radii[:, None] - self.radius
+        # |c − s − t a|² with t = (c − s)·a / a², written out so that it takes two products of small matrices.
+        shadow = centers @ self._along_T - self._offset
+        t = np.minimum(np.maximum(shadow * self._inverse, 0.0), 1.0)
+        square = np.sum(centers * centers, axis=1)[:, None] - 2.0 * (centers @ self._start_T) + self._from_origin
+        square += t * (t * self._square - 2.0 * shadow)
+        gaps: Array = np.sqrt(np.maximum(square, 0.0)) - radii[:, None] - self._radius
         return gaps
-
-
-def axes(obstacles: tuple[Obstacle, ...]) -> Axes:
-    """The obstacles' axes."""
-    start = np.array([o.start for o in obstacles], dtype=np.float64).reshape(-1, 3)
-    along = np.array([o.end for o in obstacles], dtype=np.float64).reshape(-1, 3) - start
-    square = np.einsum("nk,nk->n", along, along)
-    inverse = np.where(square > _POINT, 1.0 / np.maximum(square, _POINT), 0.0)
-    return Axes(start, along, inverse, np.array([o.radius for o in obstacles], dtype=np.float64))
