@@ -122,6 +122,7 @@ class Desk:
         key = session.session_id
         if not session.may_operate:
             return self._refuse_hold(session, f"a {session.role} may look and stop, not operate", 403)
+        self.end_lapsed_hold(now)
         was_holding = self.teleop.holder == key
         try:
             self.teleop.hold(key, session.user, now)
@@ -138,6 +139,13 @@ class Desk:
         if self.teleop.release(session.session_id):
             self.held_out(session.session_id)
             self.note("info", f"{session.user} let go of the tool")
+
+    def end_lapsed_hold(self, now: float) -> None:
+        """End the hold of whoever no longer renews it or no longer sees the robot."""
+        ended = self.teleop.expire(now)
+        if ended is not None:
+            self.note("info", "the hold ended: it was not renewed, or the page no longer sees the robot")
+            self.held_out(ended)
 
     def held_out(self, owner: str) -> None:
         """A hold has ended: the gizmo goes back to the tool, and aims there."""

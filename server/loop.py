@@ -62,10 +62,7 @@ class Loop:
 
     async def _teleop(self, now: float) -> None:
         desk = self._desk
-        ended = desk.teleop.expire(now)
-        if ended is not None:
-            desk.note("info", "the hold ended: it was not renewed, or the page no longer sees the robot")
-            desk.held_out(ended)
+        desk.end_lapsed_hold(now)
         target = desk.teleop.due(now)
         if target is not None:
             desk.link.teleop(target)

@@ -9,6 +9,8 @@ import viser
 from rolling_panda import messages as m
 from server.scene_markers import quat_wxyz
 
+#: Length of the gizmo's arrows, seen from the side (CSS px).
+GIZMO_PX = 110.0
 _NAME = "/gizmo"
 #: The gizmo follows the tool while nobody has dragged it; smaller movements (m, quaternion parts) are not sent.
 _FOLLOW = 1e-3
@@ -47,8 +49,10 @@ class SceneGizmos:
             return
         handle = client.scene.add_transform_controls(
             _NAME,
-            scale=0.22,
-            line_width=3.0,
+            # As large on the screen (px) from near and far, so that a finger can take it.
+            fixed=True,
+            scale=GIZMO_PX,
+            line_width=4.0,
             depth_test=False,
             wxyz=quat_wxyz(gizmo.pose.quat_xyzw),
             position=gizmo.pose.position,

@@ -17,6 +17,7 @@ from websockets.sync.client import connect
 
 from rolling_panda import messages as m
 from rolling_panda import topics
+from server.config import ServerConfig
 
 
 @pytest.fixture(scope="module")
@@ -170,6 +171,26 @@ def test_the_tool_follows_while_the_page_holds_and_stops_when_it_falls_silent(se
     page.hold_until_sent(sent)
     eventually(lambda: not sent[-1].hold)
     assert {message.user for message in sent if message.hold} == {"ann"}
+
+
+def test_a_hold_that_was_renewed_too_late_begins_anew_from_the_tool():
+    wire = FakeWire()
+    # So seldom that the late renewal itself is what ends the hold.
+    with running_server(wire, ServerConfig(teleop_rate_hz=0.2)) as server, server.client(user="ann") as client:
+        wire.deliver(topics.JOINTS, joints())
+        wire.deliver(topics.ODOMETRY, odometry())
+        with Page(server, client) as page:
+            page.look()
+            page.say("ShowGizmo", visible=True)
+            page.hold(True)
+            page.hear_event("ann holds the tool")
+            time.sleep(0.3)
+            page.look()
+            page.hold(True)
+            page.hear_event("ann holds the tool")
+        told = [event["text"] for event in client.get("/api/events").json()["events"]]
+    assert not any("refused" in text for text in told), told
+    assert sum("not renewed" in text for text in told) == 1
 
 
 def test_letting_go_is_said_at_once(server, page):
