@@ -9,6 +9,7 @@ from collections.abc import Sequence
 BENCHMARKS = {
     "tick": ("benchmarks.tick", "time of one control step"),
     "row": ("benchmarks.row", "cuts in simulated rows, end to end"),
+    "reach": ("benchmarks.reach", "tool poses anywhere around the robot: reached, limits, manipulability"),
     "load": ("benchmarks.load", "processor, memory and traffic of the demo"),
     "live": ("benchmarks.live", "the running demo: control periods on time, round trip, tool error"),
     "perception": ("benchmarks.perception_points", "pruning points against the truth of simulated rows"),

@@ -97,7 +97,7 @@ def judge(
     omega = [arm_omega(robot.kinematics(row).J) for row in q]
     margin = np.minimum(q[:, ARM_Q] - limits.lower[ARM_Q], limits.upper[ARM_Q] - q[:, ARM_Q])
     return Quality(
-        reached=position <= POSITION and rotation <= ROTATION,
+        reached=bool(position <= POSITION and rotation <= ROTATION),
         position_error=position,
         rotation_error=rotation,
         duration=float(done.t[-1]),

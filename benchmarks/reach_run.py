@@ -20,7 +20,7 @@ from controller.planning.path import PathPlanner, Refused
 from controller.trajectory import PoseTrajectory, Rates
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.registry import make_method
-from controller.whole_body.task import Demand, Method, Posture, ToolTask
+from controller.whole_body.task import Demand, Method, Posture, Solution, ToolTask
 from rolling_panda.differential_drive import NXI, Array
 from rolling_panda.robot_model import RobotModel
 
@@ -31,8 +31,9 @@ LIMIT_S, DT = 30.0, 0.01
 #: The base's vendor's planner: 0.8 m/s, 0.6 rad/s.
 BASE = BaseBounds(0.8, 0.6)
 _GAIN = 3.0
-#: A motion ends early when the tool is this much nearer than has to be and everything is at rest (rad/s).
-_BETTER, _REST = 0.1, 1e-4
+#: A motion ends when the tool is nearer than this share of the tolerance and every joint and wheel as good as at rest
+#: (rad/s), so that it may stop within one period.
+_BETTER, _REST = 0.2, 0.02
 
 
 @dataclass(frozen=True)
@@ -132,11 +133,11 @@ class _Loop:
     def __init__(self, robot: RobotModel, q: Array) -> None:
         self.q, self.xi, self.time = q.copy(), np.zeros(NXI), 0.0
         self._drive = robot.drive
-        self._rows, self._sent = [q.copy()], [np.zeros(0)]
-        self._sent.clear()
+        self._rows: list[Array] = [q.copy()]
+        self._sent: list[Array] = []
         self._infeasible, self._reason = 0, ""
 
-    def take(self, solution: Any) -> None:
+    def take(self, solution: Solution) -> None:
         """One period with what the method sends."""
         if not solution.feasible:
             self._infeasible, self._reason = self._infeasible + 1, solution.reason
