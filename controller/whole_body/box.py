@@ -8,9 +8,8 @@ acceleration is reckoned with for this; the rest is for the servo's lag.
 Outside every such guarantee (a start beyond a limit, a velocity above it) the bounds close to the strongest braking.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
+from msgspec import Struct
 
 from controller.config import ControllerConfig
 from controller.whole_body.actuation import Actuation
@@ -21,8 +20,7 @@ from rolling_panda.robot_model import ARM_Q, ARM_XI, RobotModel
 _RETURN, _RETURN_SPEED = 2.0, 0.2
 
 
-@dataclass(frozen=True)
-class Bounds:
+class Bounds(Struct, frozen=True):
     """lower ≤ ν ≤ upper (9), and the same for the two wheels' speeds (2)."""
 
     lower: Array
@@ -37,19 +35,19 @@ class Box:
     def __init__(self, robot: RobotModel, config: ControllerConfig, dt: float) -> None:
         """Precompute for a control period of `dt` (s)."""
         limits, mu, R = robot.limits, robot.drive.half_track, robot.drive.wheel_radius
-        self._actuation = Actuation(robot.drive)
-        self._low = limits.lower[ARM_Q] + config.joint_margin
-        self._high = limits.upper[ARM_Q] - config.joint_margin
-        acceleration = limits.acceleration[ARM_XI] * config.arm_acceleration_share
+        self._twist: list[list[float]] = Actuation(robot.drive).twist.tolist()
+        # Both ends of a joint as upper ends: of q, and of −q.
+        self._ends = np.concatenate([limits.upper[ARM_Q], -limits.lower[ARM_Q]]) - config.joint_margin
+        acceleration = np.tile(limits.acceleration[ARM_XI] * config.arm_acceleration_share, 2)
         self._arm_step = acceleration * dt
-        self._brake = 0.5 * acceleration
-        self._brake_step = self._brake * dt
-        self._brake_square = self._brake_step**2
+        self._brake_step = 0.5 * self._arm_step
+        self._brake_square, self._brake_twice = self._brake_step**2, acceleration
+        self._q, self._sent = np.empty(14), np.empty(14)
         #: Largest ν (9).
         self.speed: Array = np.empty(NXI)
         self.speed[:2] = config.base_speed, config.base_yaw_rate
         self.speed[ARM_XI] = limits.velocity[ARM_XI] * config.arm_share
-        self._arm_speed = self.speed[ARM_XI].copy()
+        self._arm_speed = np.tile(self.speed[ARM_XI], 2)
         self._wheel_speed = float(limits.velocity[0])
         braking = min(max(config.base_braking, config.base_acceleration), float(limits.acceleration[0]) * R)
         self._wheel_step = braking / R * dt
@@ -58,25 +56,29 @@ class Box:
 
     def at(self, q: Array, sent: Array) -> Bounds:
         """The bounds at q (12) after ξ̇ `sent` (9)."""
+        here, arm = self._q, self._sent
+        here[:7] = q[ARM_Q]
+        here[7:] = -here[:7]
+        arm[:7] = sent[ARM_XI]
+        arm[7:] = -arm[:7]
+        room = self._ends - here
+        most = np.sqrt(self._brake_square + self._brake_twice * np.maximum(room, 0.0)) - self._brake_step
+        most = np.minimum(most, self._arm_speed)
+        if float(room.min()) < 0.0:
+            most = np.minimum(most, np.where(room < 0.0, np.maximum(_RETURN * room, -_RETURN_SPEED), np.inf))
+        # Every end is moved into what can be reached, which keeps their order.
+        most = np.maximum(np.minimum(most, arm + self._arm_step), arm - self._arm_step)
         lower, upper = np.empty(NXI), np.empty(NXI)
-        above, below = self._high - q[ARM_Q], q[ARM_Q] - self._low
-        most = np.minimum(self._arm_speed, self._stopping(above))
-        least = np.maximum(-self._arm_speed, -self._stopping(below))
-        if above.min() < 0.0 or below.min() < 0.0:
-            most = np.minimum(most, np.where(above < 0.0, np.maximum(_RETURN * above, -_RETURN_SPEED), np.inf))
-            least = np.maximum(least, np.where(below < 0.0, np.minimum(-_RETURN * below, _RETURN_SPEED), -np.inf))
-        arm = sent[ARM_XI]
-        slowest, fastest = arm - self._arm_step, arm + self._arm_step
-        # Both ends are moved into what can be reached, which keeps their order.
-        upper[ARM_XI] = np.maximum(np.minimum(most, fastest), slowest)
-        lower[ARM_XI] = np.minimum(np.maximum(least, slowest), fastest)
+        upper[ARM_XI] = most[:7]
+        lower[ARM_XI] = -most[7:]
         left, right = float(sent[0]), float(sent[1])
-        ramp = self.ramp(left, right)
-        wheels = [self._wheel(left, ramp[0]), self._wheel(right, ramp[1])]
-        twist, slower = self._actuation.twist @ sent[:2], self._actuation.twist @ ramp
-        for i in (0, 1):
-            lower[i], upper[i] = self._base(i, float(twist[i]), float(slower[i]))
-        return Bounds(lower, upper, np.array([wheels[0][0], wheels[1][0]]), np.array([wheels[0][1], wheels[1][1]]))
+        slower_left, slower_right = self.ramp(left, right)
+        low, high = zip(self._wheel(left, slower_left), self._wheel(right, slower_right), strict=True)
+        (half, _), (_, turn) = self._twist
+        v, omega = half * (left + right), turn * (right - left)
+        lower[0], upper[0] = self._base(0, v, half * (slower_left + slower_right))
+        lower[1], upper[1] = self._base(1, omega, turn * (slower_right - slower_left))
+        return Bounds(lower, upper, np.array(low), np.array(high))
 
     def ramp(self, left: float, right: float) -> tuple[float, float]:
         """Wheel speeds after one period of braking along the same arc: what is always possible."""
@@ -90,12 +92,7 @@ class Box:
         out = np.empty(NXI)
         out[:2] = self.ramp(float(sent[0]), float(sent[1]))
         arm = sent[ARM_XI]
-        out[ARM_XI] = np.sign(arm) * np.maximum(np.abs(arm) - self._arm_step, 0.0)
-        return out
-
-    def _stopping(self, distance: Array) -> Array:
-        room = np.maximum(distance, 0.0)
-        out: Array = np.sqrt(self._brake_square + 2.0 * self._brake * room) - self._brake_step
+        out[ARM_XI] = np.sign(arm) * np.maximum(np.abs(arm) - self._arm_step[:7], 0.0)
         return out
 
     def _wheel(self, sent: float, ramp: float) -> tuple[float, float]:

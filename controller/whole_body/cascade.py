@@ -7,15 +7,17 @@ Z spanning ker J: J x = Rᵀ y, whatever z is.
    first moved by the least amount, in the sense of squares, that makes them possible.
 2. Tool: min ‖Rᵀ y − α b − c‖² + κ‖b‖² (1 − α)² + λ²‖y‖² + ε‖z − z_sent‖² over y, z, 0 ≤ α ≤ α_max.
 3. Null space: min ‖T x − t‖² over z alone, with y and α as found. The tool's velocity cannot change by it.
+
+Where the optimum without any inequality satisfies them all, it is the optimum of both programs, and they are not run.
 """
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import daqp
 import numpy as np
-from scipy.linalg.lapack import dgeqrf, dorgqr, dsyev
+from msgspec import Struct
+from scipy.linalg.lapack import dgeqrf, dorgqr, dposv, dsyev, dtrtri
 
 from rolling_panda.differential_drive import Array
 
@@ -32,8 +34,7 @@ _SETTINGS = {"primal_tol": 1e-10}
 _FREE = 1e30
 
 
-@dataclass(frozen=True)
-class Problem:
+class Problem(Struct, frozen=True):
     """One period, over the n velocities that are free; k rows, of which the first `soft` may give way.
 
     Attributes:
@@ -71,8 +72,7 @@ class Problem:
     keep_path: bool
 
 
-@dataclass(frozen=True)
-class Answer:
+class Answer(Struct, frozen=True):
     """What the cascade found.
 
     Attributes:
@@ -96,12 +96,17 @@ class Cascade:
         self._damping, self._damping_from = damping, damping_from
         self._senses: dict[int, Array] = {}
         self._triangles: dict[int, Array] = {}
+        self._ridges: dict[int, Array] = {}
+        self._fulls: dict[int, Array] = {}
 
     def solve(self, p: Problem) -> Answer | None:
         """The velocities, or None where the solver found none."""
         m, n = p.J.shape
         k = p.A.shape[0]
         Q, R = self._factor(p.J * p.speed)
+        nu = self._unlimited(p, Q, R)
+        if nu is not None:
+            return Answer(nu, 1.0, None, -1)
         # Rows over [y, z]: first the bounds of x, then the others.
         rows = np.empty((n + k, 1 + n))
         rows[:, 0] = 0.0
@@ -137,10 +142,36 @@ class Cascade:
         m, n = J.shape
         qr, tau, _, _ = dgeqrf(J.T)
         R = qr[:m] * self._triangle(m)
-        full = np.zeros((n, n), order="F")
+        full = self._full(n)
         full[:, :m] = qr
         Q, _, _ = dorgqr(full, tau)
         return Q, R
+
+    def _unlimited(self, p: Problem, Q: Array, R: Array) -> Array | None:
+        """ν that answers everything, or None where an inequality or damping has a say."""
+        m, n = p.J.shape
+        inverse, info = dtrtri(R)
+        # 1/‖R⁻¹‖ is no larger than the smallest singular value.
+        if info != 0 or float(np.vdot(inverse, inverse)) * self._damping_from**2 > 1.0:
+            return None
+        if p.keep_path and p.scale < 1.0:
+            return None
+        scaled = Q * p.speed[:, None]
+        nu: Array = scaled[:, :m] @ ((p.b + p.c) @ inverse)
+        if n > m:
+            A = p.T @ scaled[:, m:]
+            _, z, info = dposv(A.T @ A + self._ridge(n - m), (p.t - p.T @ nu) @ A)
+            if info != 0:
+                return None
+            nu += scaled[:, m:] @ z
+        # Comparisons with NaN are false.
+        if not float(np.minimum(nu - p.lower, p.upper - nu).min()) >= 0.0:
+            return None
+        if len(p.A_lower):
+            moved = p.A @ nu
+            if not float(np.minimum(moved - p.A_lower, p.A_upper - moved).min()) >= 0.0:
+                return None
+        return nu
 
     def _tool(
         self, p: Problem, Q: Array, R: Array, rows: Array, low: Array, high: Array
@@ -185,8 +216,7 @@ class Cascade:
         Z = Q[:, m:]
         A = p.T @ (Z * p.speed[:, None])
         rest = p.T @ ((Q[:, :m] @ y) * p.speed) - p.t
-        H = A.T @ A
-        H.ravel()[:: n - m + 1] += 1e-8
+        H = A.T @ A + self._ridge(n - m)
         fixed = rows[:, :m] @ y
         free = np.ascontiguousarray(rows[:, m:])
         # The first program's z is possible; its last digits must not say otherwise.
@@ -226,6 +256,19 @@ class Cascade:
         found = self._senses.get(count)
         if found is None:
             found = self._senses[count] = np.zeros(count, dtype=np.int32)
+        return found
+
+    def _ridge(self, size: int) -> Array:
+        """What makes the null space's program definite where no task has a say."""
+        found = self._ridges.get(size)
+        if found is None:
+            found = self._ridges[size] = 1e-8 * np.eye(size)
+        return found
+
+    def _full(self, n: int) -> Array:
+        found = self._fulls.get(n)
+        if found is None:
+            found = self._fulls[n] = np.zeros((n, n), order="F")
         return found
 
     def _triangle(self, m: int) -> Array:

@@ -197,13 +197,13 @@ class CollisionModel:
         if not near:
             return Dampers(np.zeros((0, NXI)), np.zeros(0), ())
         # ḋ = n·(v_b − v_a): the wrench of a unit force along n at the nearest points, which is the same for both sides.
-        wrench = np.empty((len(near), 6))
-        wrench[:, :3] = n = np.array([self._normals[p] for p in near])
-        at = np.array([results[p].getNearestPoint1() for p in near])
-        wrench[:, 3] = at[:, 1] * n[:, 2] - at[:, 2] * n[:, 1]
-        wrench[:, 4] = at[:, 2] * n[:, 0] - at[:, 0] * n[:, 2]
-        wrench[:, 5] = at[:, 0] * n[:, 1] - at[:, 1] * n[:, 0]
-        over_q = (wrench @ robot.data.J) * self._moves[near]
+        # Plain numbers: for a few pairs that is faster than arrays.
+        wrenches = []
+        for p in near:
+            nx, ny, nz = self._normals[p].tolist()
+            x, y, z = results[p].getNearestPoint1().tolist()
+            wrenches.append((nx, ny, nz, y * nz - z * ny, z * nx - x * nz, x * ny - y * nx))
+        over_q = (np.array(wrenches) @ robot.data.J) * self._moves[near]
         distance = np.array([results[p].min_distance for p in near])
         return Dampers(over_q @ kinematics.S, distance, tuple(self._pair(p) for p in near))
 

@@ -9,6 +9,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from msgspec import Struct
 
 from controller.config import ControllerConfig
 from controller.whole_body.actuation import Actuation
@@ -29,8 +30,17 @@ from rolling_panda.robot_model import ARM_XI, RobotModel
 #: A clock slower than this stands still.
 _HELD = 1e-2
 _NOWHERE = Manipulability(0.0, np.zeros(NXI))
-_ALL, _ARM = slice(0, NXI), ARM_XI
+_ALL = slice(0, NXI)
 _BOUND_NAMES = ("the base's speed", "the base's turning", *(f"joint {i}" for i in range(1, 8)))
+
+
+class _Rows(Struct, frozen=True):
+    """Rows over ν: lower ≤ A ν ≤ upper. The last two, without a name, are the wheels'."""
+
+    A: Array
+    lower: Array
+    upper: Array
+    names: tuple[str, ...]
 
 
 class Hierarchy:
@@ -56,6 +66,9 @@ class Hierarchy:
             settings.manipulability, config.gain_manipulability, settings.good_manipulability
         )
         self.guards: tuple[Guard, ...] = (AxleAhead(settings.axle_ahead, settings.axle_rate), *guards)
+        self._nothing = np.zeros(6)
+        self._wheel_rows = np.zeros((2, NXI))
+        self._wheel_rows[:, :2] = self._actuation.wheels
         self._rise = settings.clock_rise * dt
         turn = 1.0 / config.tool_turn
         self._weight = np.repeat([1.0 / config.tool_speed, turn], 3)
@@ -79,18 +92,16 @@ class Hierarchy:
             return self._brake(demand, "the demand holds a number that is not finite", _NOWHERE)
         bounds = self._box.at(demand.q, demand.sent)
         self._climb.now = manipulability = self._manipulability.at(demand.kinematics.J)
-        free = _ARM if demand.base == "frozen" else _ALL
         base = self._actuation.twist @ self._box.ramp(float(demand.sent[0]), float(demand.sent[1]))
         for task, jacobian, target in self._tasks:
             task.write(demand, jacobian, target)
-        names, A, A_lower = self._inequalities(demand)
+        rows = self._inequalities(demand, bounds)
         J, wanted = self._tool(demand)
         share = _share(demand)
-        problem = self._problem(demand, bounds, free, base, J, wanted * share, A, A_lower, share)
-        answer = self._cascade.solve(problem)
+        answer = self._cascade.solve(self._problem(demand, bounds, rows, J, wanted * share, share, base))
         if answer is None:
             return self._brake(demand, "no velocity satisfies the limits; the robot brakes", manipulability)
-        return self._solution(demand, answer, free, base, bounds, share, names, manipulability)
+        return self._solution(demand, answer, base, bounds, share, rows.names, manipulability)
 
     # --- parts of the problem ----------------------------------------------------------------------------------------
 
@@ -102,6 +113,7 @@ class Hierarchy:
         at = 0
         for task in tasks:
             rows = slice(at, at + task.rows)
+            task.begin(self._T[rows])
             places.append((task, self._T[rows], self._t[rows]))
             at += task.rows
         self._tasks = tuple(places)
@@ -117,66 +129,47 @@ class Hierarchy:
         J *= self._weight_column
         return J, twist * self._weight
 
-    def _inequalities(self, demand: Demand) -> tuple[tuple[str, ...], Array, Array]:
-        """Rows of the guards over ν."""
-        found: list[Inequalities] = [rows for guard in self.guards if len((rows := guard.rows(demand)).lower)]
-        if not found:
-            return (), np.zeros((0, NXI)), np.zeros(0)
-        if len(found) == 1:
-            return found[0].names, self._actuation.rows(found[0].A), found[0].lower
-        A = self._actuation.rows(np.concatenate([rows.A for rows in found]))
-        return sum((rows.names for rows in found), ()), A, np.concatenate([rows.lower for rows in found])
+    def _inequalities(self, demand: Demand, bounds: Bounds) -> _Rows:
+        """Rows of the guards, then those of the wheels, over ν."""
+        names: tuple[str, ...] = ()
+        found: list[Inequalities] = []
+        for guard in self.guards:
+            rows = guard.rows(demand)
+            if rows.names:
+                found.append(rows)
+                names += rows.names
+        k = len(names)
+        A, lower, upper = np.empty((k + 2, NXI)), np.empty(k + 2), np.empty(k + 2)
+        at = 0
+        for rows in found:
+            end = at + len(rows.names)
+            A[at:end], lower[at:end] = rows.A, rows.lower
+            at = end
+        A[:k, :2] = A[:k, :2] @ self._actuation.wheels
+        A[k:], upper[:k] = self._wheel_rows, math.inf
+        lower[k:], upper[k:] = bounds.wheel_lower, bounds.wheel_upper
+        return _Rows(A, lower, upper, names)
 
     def _problem(
-        self,
-        demand: Demand,
-        bounds: Bounds,
-        free: slice,
-        base: Array,
-        J: Array,
-        b: Array,
-        A: Array,
-        A_lower: Array,
-        share: float,
+        self, demand: Demand, bounds: Bounds, rows: _Rows, J: Array, b: Array, share: float, base: Array
     ) -> Problem:
-        tool, speed = demand.tool, self._box.speed
+        keep_path, speed, k = demand.tool.keep_path, self._box.speed, len(rows.names)
         rise = min(1.0, (max(demand.scale, 0.0) + self._rise) / share) if share > 0.0 else 1.0
-        T, t = self._T, self._t
-        c = np.zeros(len(b))
-        if free is _ARM:
-            # What the base still has to do until it rests is made good by the arm.
-            if base.any():
-                c = -(J[:, :2] @ base)
-                t = t - T[:, :2] @ base
-                A_lower = A_lower - A[:, :2] @ base
-            J, T, A, speed = J[:, free], T[:, free], A[:, free], speed[free]
-            upper = np.full(len(A_lower), math.inf)
-            return Problem(
-                J,
-                b,
-                c,
-                speed,
-                demand.sent[free],
-                bounds.lower[free],
-                bounds.upper[free],
-                A,
-                A_lower,
-                upper,
-                len(upper),
-                T,
-                t,
-                rise,
-                tool.keep_path,
-            )
-        k, sent = len(A_lower), self._actuation.nu(demand.sent)
-        rows, lower, upper = np.zeros((2 + k, NXI)), np.empty(2 + k), np.empty(2 + k)
-        rows[:k] = A
-        rows[k:, :2] = self._actuation.wheels
-        lower[:k], upper[:k] = A_lower, math.inf
-        lower[k:], upper[k:] = bounds.wheel_lower, bounds.wheel_upper
-        return Problem(
-            J, b, c, speed, sent, bounds.lower, bounds.upper, rows, lower, upper, k, T, t, rise, tool.keep_path
-        )
+        T, t, A, low, high = self._T, self._t, rows.A, rows.lower, rows.upper
+        c = self._nothing[: len(b)]
+        if demand.base != "frozen":
+            sent = self._actuation.nu(demand.sent)
+            return Problem(J, b, c, speed, sent, bounds.lower, bounds.upper, A, low, high, k, T, t, rise, keep_path)
+        # What the base still has to do until it rests is made good by the arm; the wheels' rows have no say then.
+        A, low, high = A[:k], low[:k], high[:k]
+        if base.any():
+            c = -(J[:, :2] @ base)
+            t = t - T[:, :2] @ base
+            low = low - A[:, :2] @ base
+        J, T, A = J[:, ARM_XI], T[:, ARM_XI], A[:, ARM_XI]
+        lower, upper = bounds.lower[ARM_XI], bounds.upper[ARM_XI]
+        sent, speed = demand.sent[ARM_XI], speed[ARM_XI]
+        return Problem(J, b, c, speed, sent, lower, upper, A, low, high, k, T, t, rise, keep_path)
 
     # --- the answer --------------------------------------------------------------------------------------------------
 
@@ -184,13 +177,13 @@ class Hierarchy:
         self,
         demand: Demand,
         answer: Answer,
-        free: slice,
         base: Array,
         bounds: Bounds,
         share: float,
         names: tuple[str, ...],
         manipulability: Manipulability,
     ) -> Solution:
+        free = ARM_XI if demand.base == "frozen" else _ALL
         nu = np.empty(NXI)
         nu[:2] = base
         nu[free] = answer.nu

@@ -25,6 +25,12 @@ class HierarchyConfig(Struct, frozen=True, forbid_unknown_fields=True):
         clock_rise: Largest rise of the rate of a motion's clock (1/s).
         axle_ahead: Least distance of the tool ahead of the axle in transit (m).
         axle_rate: Rate at which that distance may be used up (1/s).
+        collisions: Whether distances to itself, the ground and obstacles are kept.
+        collision_distance: d_s, kept between any two parts that are watched (m).
+        collision_influence: d_i, nearer than which they approach more slowly (m).
+        collision_speed: ξ, fastest approach at d_i (m/s), and fastest parting below d_s.
+        collision_braking: Deceleration that an approach reckons with (m/s²).
+        tipping: Whether the wheels and the caster are kept on the ground.
     """
 
     base_heading: Weight = 4.0
@@ -39,3 +45,9 @@ class HierarchyConfig(Struct, frozen=True, forbid_unknown_fields=True):
     clock_rise: Positive = 4.0
     axle_ahead: Positive = 0.25
     axle_rate: Positive = 2.0
+    collisions: bool = True
+    collision_distance: Positive = 0.015
+    collision_influence: Positive = 0.08
+    collision_speed: Positive = 0.25
+    collision_braking: Positive = 0.5
+    tipping: bool = True

@@ -15,10 +15,9 @@ from rolling_panda.differential_drive import NXI, Array
 from rolling_panda.robot_model import ARM_Q, ARM_XI, RobotModel
 
 _REGULAR = 1e-9
-#: [j, i] is 1 where j ≥ i, j > i and j < i: summing columns j for each i.
-_FROM = np.tril(np.ones((7, 7)))
-_AFTER = np.tril(np.ones((7, 7)), -1)
-_BEFORE = np.triu(np.ones((7, 7)), 1)
+_ONES, _NONE = np.ones((7, 7)), np.zeros((7, 7))
+#: [j, i] is 1 where j ≥ i, j > i and (in the right half) j < i: summing columns j for each i.
+_SUMS = np.block([[np.tril(_ONES), _NONE], [np.tril(_ONES, -1), _NONE], [_NONE, np.triu(_ONES, 1)]])
 
 
 @dataclass(frozen=True)
@@ -31,6 +30,10 @@ class Manipulability:
 
 class ArmManipulability:
     """Computes ω and its gradient from the joints' axes, which the Jacobian's columns hold."""
+
+    def __init__(self) -> None:
+        """Make the work space."""
+        self._a, self._b = np.empty((5, 21)), np.empty((5, 21))
 
     def at(self, J: Array) -> Manipulability:
         """ω and gradient from the tool's Jacobian J (6×12) of the current configuration.
@@ -47,14 +50,16 @@ class ArmManipulability:
             return Manipulability(0.0, gradient)
         # tr(J⁺ ∂_iJ) = Σ_j g_j · ∂_i v_j + h_j · ∂_i ω_j with (g, h) the columns of (J⁺)ᵀ.
         v, w = arm[:3], arm[3:]
-        g, h = pinv_T[:3], pinv_T[3:]
-        crossed = _cross(np.hstack((v, w, g)), np.hstack((g, h, w)))
-        vg, wh, gw = crossed[:, :7], crossed[:, 7:14], crossed[:, 14:]
+        a, b = self._a, self._b
+        a[:3, :7], a[:3, 7:14], a[:3, 14:] = v, w, pinv_T[:3]
+        b[:3, :7], b[:3, 7:14], b[:3, 14:] = pinv_T[:3], pinv_T[3:], w
+        # With the first two rows repeated below the third, a cross product is two products of shifted rows.
+        a[3:], b[3:] = a[:2], b[:2]
+        crossed = a[1:4] * b[2:5] - a[2:5] * b[1:4]
         # Σ_{j ≥ i} (ω_i × v_j)·g_j = ω_i · Σ_{j ≥ i} v_j × g_j, and so on: sums over j are products with a triangle.
         # Σ_{j < i} (ω_j × v_i)·g_j = v_i · Σ_{j < i} g_j × ω_j.
-        tail = vg @ _FROM + wh @ _AFTER
-        head = gw @ _BEFORE
-        gradient[ARM_XI] = value * (w * tail + v * head).sum(axis=0)
+        summed = crossed @ _SUMS
+        gradient[ARM_XI] = value * (w * summed[:, :7] + v * summed[:, 7:]).sum(axis=0)
         return Manipulability(value, gradient)
 
 
@@ -75,12 +80,3 @@ def arm_hessian(robot: RobotModel, q: Array) -> Array:
     pin.computeJointKinematicHessians(robot.model, robot.data, q)
     raw: Any = pin.getFrameKinematicHessian(robot.model, robot.data, robot.tool_id, pin.LOCAL_WORLD_ALIGNED)
     return np.asarray(raw).ravel().reshape((6, nv, nv), order="F")
-
-
-def _cross(a: Array, b: Array) -> Array:
-    """Cross products of the columns of two 3×n arrays, without numpy.cross's overhead."""
-    out = np.empty_like(a)
-    out[0] = a[1] * b[2] - a[2] * b[1]
-    out[1] = a[2] * b[0] - a[0] * b[2]
-    out[2] = a[0] * b[1] - a[1] * b[0]
-    return out

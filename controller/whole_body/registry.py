@@ -1,24 +1,32 @@
 """Whole-body methods by name."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from controller.config import ControllerConfig
+from controller.whole_body.collision import CollisionModel
 from controller.whole_body.decoupled import Decoupled
+from controller.whole_body.guards.collision import CollisionGuard
+from controller.whole_body.guards.tipping import TippingGuard
 from controller.whole_body.hierarchy import Hierarchy
 from controller.whole_body.nullspace import Nullspace
-from controller.whole_body.task import Method
+from controller.whole_body.task import Guard, Method
+from controller.whole_body.tipping import Tipping
 from rolling_panda.errors import ConfigError
 from rolling_panda.robot_model import RobotModel
 
-METHODS: dict[str, Callable[[RobotModel, ControllerConfig, float], Method]] = {
-    Hierarchy.name: Hierarchy,
-    Nullspace.name: Nullspace,
-    Decoupled.name: Decoupled,
-}
+Maker = Callable[[RobotModel, ControllerConfig, float, CollisionModel | None], Method]
 
 
-def make_method(robot: RobotModel, config: ControllerConfig, dt: float) -> Method:
-    """The configured method for a control period of `dt` (s).
+def make_method(
+    robot: RobotModel, config: ControllerConfig, dt: float, collision: CollisionModel | None = None
+) -> Method:
+    """The configured method.
+
+    Args:
+        robot: Its model.
+        config: Of the controller.
+        dt: Control period (s).
+        collision: What knows the obstacles, on the same `robot`; None makes one without obstacles where it is needed.
 
     Raises:
         ConfigError: There is no method of that name; the text lists those there are.
@@ -27,4 +35,26 @@ def make_method(robot: RobotModel, config: ControllerConfig, dt: float) -> Metho
         make = METHODS[config.method]
     except KeyError:
         raise ConfigError(f"no whole-body method {config.method!r}; known are {', '.join(METHODS)}") from None
-    return make(robot, config, dt)
+    return make(robot, config, dt, collision)
+
+
+def guards(robot: RobotModel, config: ControllerConfig, dt: float, collision: CollisionModel | None) -> Sequence[Guard]:
+    """The inequalities that the configuration asks for."""
+    settings, out = config.hierarchy, list[Guard]()
+    if settings.collisions:
+        out.append(CollisionGuard(collision or CollisionModel(robot), settings, dt))
+    if settings.tipping:
+        out.append(TippingGuard(Tipping(robot), dt))
+    return out
+
+
+def _hierarchy(robot: RobotModel, config: ControllerConfig, dt: float, collision: CollisionModel | None) -> Method:
+    return Hierarchy(robot, config, dt, guards(robot, config, dt, collision))
+
+
+#: The methods that know no inequalities beyond the limits leave the collision model alone.
+METHODS: dict[str, Maker] = {
+    Hierarchy.name: _hierarchy,
+    Nullspace.name: lambda robot, config, dt, _: Nullspace(robot, config, dt),
+    Decoupled.name: lambda robot, config, dt, _: Decoupled(robot, config, dt),
+}

@@ -76,9 +76,12 @@ class Demand:
     @property
     def finite(self) -> bool:
         """Whether every number that a method uses is finite."""
-        posture, k = self.posture, self.kinematics
-        total = float(self.q.sum() + self.sent.sum() + self.tool.twist.sum() + posture.q.sum() + posture.rate.sum())
-        return math.isfinite(total + float(k.J.sum())) and not math.isnan(self.speed_cap + self.scale)
+        posture, J = self.posture, self.kinematics.J
+        # A square that overflows belongs to a number that is of no use either.
+        total = float(np.vdot(self.q, self.q) + np.vdot(self.sent, self.sent) + np.vdot(J, J))
+        total += float(np.vdot(self.tool.twist, self.tool.twist) + np.vdot(posture.q, posture.q))
+        total += float(np.vdot(posture.rate, posture.rate))
+        return math.isfinite(total) and not math.isnan(self.speed_cap + self.scale)
 
 
 @dataclass(frozen=True)

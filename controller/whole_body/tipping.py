@@ -71,9 +71,12 @@ class Tipping:
             [[-1.0, 0.0], _inner_normal(left, pivot, _CASTER_TRAIL), _inner_normal(right, pivot, _CASTER_TRAIL)]
         )
 
-        self._kept = np.sum(self.normals * self.points, axis=1) + margin
+        kept = np.sum(self.normals * self.points, axis=1) + margin
+        self._edges: list[tuple[float, float, float]] = [
+            (float(n[0]), float(n[1]), float(k)) for n, k in zip(self.normals, kept, strict=True)
+        ]
 
-    def rows(self, q: Array, xi: Array, dt: float = 0.0) -> TippingRows:
+    def rows(self, q: Array, xi: Array, dt: float = 0.0, S: Array | None = None) -> TippingRows:
         """The bound on ξ̈ at q (12) and ξ̇ (9).
 
         Args:
@@ -81,19 +84,23 @@ class Tipping:
             xi: ξ̇ (9).
             dt: Time (s) that the acceleration is kept for: the speed of the base at its end counts as well, since in a
                 bend the robot is pressed outwards by its speed and not by its acceleration.
+            S: S(q) where it is known already (12×9).
         """
         data = self._robot.data
-        S = self._robot.drive.basis(float(q[2]))
+        if S is None:
+            S = self._robot.drive.basis(float(q[2]))
         pressed = self._pressed(q, xi, S)
-        c, s = math.cos(q[2]), math.sin(q[2])
+        at_x, at_y, phi = q[:3].tolist()
+        c, s = math.cos(phi), math.sin(phi)
         x, y, z = data.com[0].tolist()
-        x, y = x - float(q[0]), y - float(q[1])
-        reach = self.normals @ (c * x + s * y, c * y - s * x) - self._kept
-        # L ḣ + weight · reach is the condition above.
-        L = np.zeros((3, 6))
-        L[:, :2] = n = self.normals @ ((c, s), (-s, c))
-        L[:, :2] *= -z
-        L[:, 2], L[:, 3], L[:, 4] = reach, n[:, 1], -n[:, 0]
+        x, y = c * (x - at_x) + s * (y - at_y), c * (y - at_y) - s * (x - at_x)
+        # L ḣ + weight · reach is the condition above; plain numbers, since arrays of three cost more than they save.
+        entries = []
+        for nx, ny, kept in self._edges:
+            n_x, n_y, reach = c * nx - s * ny, s * nx + c * ny, nx * x + ny * y - kept
+            entries.append((-z * n_x, -z * n_y, reach, n_y, -n_x, 0.0))
+        L = np.array(entries)
+        reach = L[:, 2]
         matrix, value = (L @ data.Ag) @ S, L @ pressed + self._weight * reach
         if dt > 0.0:
             for wheel in range(2):

@@ -22,10 +22,12 @@ class ArmPosture:
             speed: Largest ν (9).
         """
         self._gain, self._share = gain, weight**0.5 / speed[ARM_XI]
-        self._J = np.diag(self._share)
+
+    def begin(self, jacobian: Array) -> None:
+        """Each joint has a row of its own."""
+        jacobian[:, ARM_XI] = np.diag(self._share)
 
     def write(self, demand: Demand, jacobian: Array, target: Array) -> None:
-        """Write the rows."""
+        """Write the targets."""
         posture = demand.posture
-        jacobian[:, ARM_XI] = self._J
         target[:] = self._share * (posture.rate[ARM_Q] + self._gain * (posture.q[ARM_Q] - demand.q[ARM_Q]))

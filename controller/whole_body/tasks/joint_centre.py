@@ -23,15 +23,19 @@ class JointCentre:
             limits: Of the robot.
             speed: Largest ν (9).
         """
-        self._gain, self._zone = gain, zone
+        self._gain = gain
         self._low, self._high = limits.lower[ARM_Q] + zone, limits.upper[ARM_Q] - zone
-        self._share = weight**0.5 / speed[ARM_XI]
-        self._diagonal = np.arange(7), np.arange(2, 9)
+        self._scale = weight**0.5 / speed[ARM_XI] / zone
+        self._diagonal = np.zeros(7)
+
+    def begin(self, jacobian: Array) -> None:
+        """Keep a view of the diagonal, where each joint's entry is."""
+        self._diagonal = np.einsum("ii->i", jacobian[:, ARM_XI])
 
     def write(self, demand: Demand, jacobian: Array, target: Array) -> None:
         """Write the rows."""
         arm = demand.q[ARM_Q]
         depth = np.maximum(self._low - arm, 0.0) - np.maximum(arm - self._high, 0.0)
-        share = np.abs(depth) * self._share / self._zone
-        jacobian[self._diagonal] = share
+        share = np.abs(depth) * self._scale
+        self._diagonal[:] = share
         target[:] = share * (self._gain * depth)

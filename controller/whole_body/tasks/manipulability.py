@@ -26,6 +26,9 @@ class ClimbManipulability:
         #: Of the arm in this period; the method sets it before `write`.
         self.now: Manipulability | None = None
 
+    def begin(self, jacobian: Array) -> None:
+        """Nothing is the same in every posture."""
+
     def write(self, demand: Demand, jacobian: Array, target: Array) -> None:
         """Write the row."""
         now = self.now

@@ -16,9 +16,11 @@ class Smoothness:
     def __init__(self, weight: float, actuation: Actuation, speed: Array) -> None:
         """Scale by the largest speeds `speed` (9, ν)."""
         self._share, self._actuation = weight**0.5 / speed, actuation
-        self._J = np.diag(self._share)
+
+    def begin(self, jacobian: Array) -> None:
+        """Each actuator has a row of its own."""
+        jacobian[:] = np.diag(self._share)
 
     def write(self, demand: Demand, jacobian: Array, target: Array) -> None:
-        """Write the rows."""
-        jacobian[:] = self._J
+        """Write the targets."""
         target[:] = self._share * self._actuation.nu(demand.sent)

@@ -17,6 +17,10 @@ class SecondaryTask(Protocol):
     name: str
     rows: int
 
+    def begin(self, jacobian: Array) -> None:
+        """Write what is the same in every period. Called once, with all zeros."""
+        ...
+
     def write(self, demand: Demand, jacobian: Array, target: Array) -> None:
         """Write √weight · J (rows×9, over ν) and √weight · target (rows).
 
