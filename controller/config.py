@@ -33,9 +33,11 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         tool_acceleration: Of planned motions (m/s²).
         tool_jerk: Of planned motions (m/s³).
         cut_speed: Limit in the last `slow_zone` before the cut (m/s).
-        slow_zone: Length of it (m).
+        slow_zone: Length of it (m): with the blades' reach the canes are entered inside it.
+        slow_braking: How the tool slows down to that (m/s²).
+        blend: Share of the shorter of two legs that overlaps with the other, where the tool rounds the corner.
         advance_speed: Limit along the approach line (m/s).
-        stand_off: Distance of the stand-off from the cut (m).
+        stand_off: Distance of the stand-off from the cut (m); from there on only the arm moves.
         clearance: Distance kept from the canes between cuts (m).
         position_tolerance: The tool is in place to cut (m).
         rotation_tolerance: The same for its direction (rad).
@@ -83,11 +85,13 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
     arm_acceleration_share: Annotated[float, Meta(gt=0.0, le=1.0)] = 0.5
     tool_speed: Positive = 0.3
     tool_turn: Positive = 0.8
-    tool_acceleration: Positive = 0.6
-    tool_jerk: Positive = 4.0
+    tool_acceleration: Positive = 1.0
+    tool_jerk: Positive = 10.0
     cut_speed: Positive = 0.03
-    slow_zone: Positive = 0.04
-    advance_speed: Positive = 0.1
+    slow_zone: Positive = 0.025
+    slow_braking: Positive = 0.3
+    blend: Annotated[float, Meta(ge=0.0, le=0.5)] = 0.4
+    advance_speed: Positive = 0.25
     stand_off: Positive = 0.15
     clearance: Positive = 0.22
     position_tolerance: Positive = 0.0015

@@ -1,21 +1,23 @@
 """The work on accepted points: find a posture, travel, approach, advance, cut, retreat, and on to the next.
 
 Between cuts the tool keeps `clearance` from the canes; into them and out of them it moves on one straight line with
-the base standing still.
+the base standing still. The posture for the next cut is looked for while the blades close, so that the way out of one
+cut flows into the way to the next.
 """
 
-from collections.abc import Generator
+import math
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any
 
 import numpy as np
 
 from controller.config import ControllerConfig
 from controller.cut_pose import escape_pose
-from controller.motion import Follower, Measured, ToolMotion, Tracking
+from controller.motion import Follower, Measured, Tracking
+from controller.next_cut import NextCut
 from controller.queue import PointQueue
 from controller.reach import CutPlan, PostureSearch, Unreachable
+from controller.tool_motion import Leg, ToolMotion
 from controller.whole_body.saturation import Saturation
 from rolling_panda import messages as m
 from rolling_panda.differential_drive import Array
@@ -24,8 +26,6 @@ from rolling_panda.differential_drive import Array
 _REPEAT_S = 0.05
 #: Between motions without an end to hold: near enough to go on (m).
 _NEAR = 0.02
-#: At the stand-off before going in (m, rad).
-_STAND_OFF_NEAR, _STAND_OFF_TURN = 0.004, 0.035
 
 
 class Stage(Enum):
@@ -34,8 +34,7 @@ class Stage(Enum):
     REST = "rest"
     ESCAPE = "getting clear of the canes"
     SEARCH = "looking for a posture"
-    TRAVEL = "on the way"
-    APPROACH = "to the stand-off"
+    TRAVEL = "on the way to the stand-off"
     ADVANCE = "straight in"
     CUT = "cutting"
     RETREAT = "straight back"
@@ -46,7 +45,6 @@ _PHASES: dict[Stage, m.Phase] = {
     Stage.ESCAPE: "RETREAT",
     Stage.SEARCH: "APPROACH",
     Stage.TRAVEL: "APPROACH",
-    Stage.APPROACH: "APPROACH",
     Stage.ADVANCE: "ADVANCE",
     Stage.CUT: "CUT",
     Stage.RETREAT: "RETREAT",
@@ -97,7 +95,7 @@ class CutSequence:
         run_id: str,
     ) -> None:
         """Bind the parts. `run_id` makes the cut ids of this start unlike those of any other."""
-        self._config, self._search, self._follower = config, search, follower
+        self._config, self._follower = config, follower
         self._saturation, self._queue, self._run_id = saturation, queue, run_id
         heading = config.row_heading
         self._left = np.array([-np.sin(heading), np.cos(heading), 0.0])
@@ -106,7 +104,7 @@ class CutSequence:
         self._events: list[str] = []
         self._motion: ToolMotion | None = None
         self._plan: CutPlan | None = None
-        self._finding: Generator[None, None, CutPlan | Unreachable] | None = None
+        self._coming = NextCut(search, queue, config.search_steps)
         self._forget()
 
     @property
@@ -158,7 +156,7 @@ class CutSequence:
             now: Monotonic time (s).
         """
         self._events = []
-        if self._stage in (Stage.SEARCH, Stage.TRAVEL, Stage.APPROACH, Stage.ADVANCE):
+        if self._stage in (Stage.SEARCH, Stage.TRAVEL, Stage.ADVANCE):
             self._check_acceptance(robot)
         work = _STEPS[self._stage](self, robot, now)
         return work if not self._events else _with(work, tuple(self._events))
@@ -172,7 +170,7 @@ class CutSequence:
             depth = float(pose.translation @ self._left) - limit - 0.03
             if depth <= 0.0:
                 return self._next(robot)
-            self._go(robot, escape_pose(pose, self._left, depth), robot.q, self._config.advance_speed, frozen=True)
+            self._go(robot, Leg(escape_pose(pose, self._left, depth), robot.q, self._config.advance_speed, math.inf))
         tracking = self._track(robot)
         if self._over(tracking, now, _NEAR):
             return self._next(robot)
@@ -183,55 +181,28 @@ class CutSequence:
     def _next(self, robot: Measured) -> Work:
         """Choose the next point and look for a posture; stand still while looking."""
         self._forget()
-        ticket = self._queue.next()
-        if ticket is None or ticket.accepted is None:
+        if not self._coming.look(robot.q):
             return Work(self._saturation.ramp(robot.sent), finished=True)
-        self._point_id, self._stage = ticket.point.point_id, Stage.SEARCH
-        self._finding = self._search.find(
-            np.array(ticket.accepted.position), np.array(ticket.accepted.tangent), robot.q
-        )
+        self._point_id, self._stage = self._coming.point_id, Stage.SEARCH
         return Work(self._saturation.ramp(robot.sent))
 
     def _find(self, robot: Measured, now: float) -> Work:
-        xi = self._saturation.ramp(robot.sent)
-        if self._finding is not None:
-            found = _advance(self._finding, self._config.search_steps)
-            if found is None:
-                return Work(xi)
-            self._finding = None
-            if isinstance(found, Unreachable):
-                return self._fail(robot, f"not reachable: {found.reason}")
-            self._plan = found
-        if np.any(robot.sent):
+        xi, coming = self._saturation.ramp(robot.sent), self._coming
+        coming.step()
+        if isinstance(coming.found, Unreachable):
+            return self._fail(robot, f"not reachable: {coming.found.reason}")
+        if coming.found is None or np.any(robot.sent):
             return Work(xi)
-        assert self._plan is not None
+        self._plan = coming.found
         self._stage = Stage.TRAVEL
-        self._go(robot, self._plan.poses.clear, self._plan.q_clear, self._config.tool_speed)
+        self._go(robot, *self._way_to(self._plan), slow_end=True)
         return Work(xi)
 
     def _travel(self, robot: Measured, now: float) -> Work:
         tracking = self._track(robot)
-        if self._over(tracking, now, _NEAR):
-            assert self._plan is not None
-            self._stage = Stage.APPROACH
-            self._go(robot, self._plan.poses.stand_off, self._plan.q_stand_off, self._config.tool_speed)
-        elif self._late(now):
-            return self._fail(robot, self._missed("the way to it", tracking))
-        return Work(tracking.xi, tracking)
-
-    def _approach(self, robot: Measured, now: float) -> Work:
-        tracking = self._track(robot)
-        if self._over(tracking, now, _STAND_OFF_NEAR, _STAND_OFF_TURN, self._config.settle_s):
-            assert self._plan is not None
+        assert self._motion is not None
+        if self._motion.leg == self._motion.legs - 1:
             self._stage = Stage.ADVANCE
-            self._go(
-                robot,
-                self._plan.poses.cut,
-                _at_base(self._plan.q_cut, robot.q),
-                self._config.advance_speed,
-                frozen=True,
-                slow_end=True,
-            )
         elif self._late(now):
             return self._fail(robot, self._missed("the stand-off", tracking))
         return Work(tracking.xi, tracking)
@@ -257,6 +228,8 @@ class CutSequence:
         if cut is None:
             self._retreat_from(robot)
             return Work(tracking.xi, tracking)
+        if self._coming.look(robot.q):
+            self._coming.step()
         if now - cut.asked_at < _REPEAT_S:
             return Work(tracking.xi, tracking)
         cut.asked_at = now
@@ -264,6 +237,12 @@ class CutSequence:
 
     def _retreat(self, robot: Measured, now: float) -> Work:
         tracking = self._track(robot)
+        assert self._motion is not None
+        plan = self._coming.found
+        if self._motion.leg > 0 and isinstance(plan, CutPlan):
+            # Out of the canes, and the way to the next one has begun.
+            self._plan, self._point_id, self._stage = plan, self._coming.point_id, Stage.TRAVEL
+            return Work(tracking.xi, tracking)
         if not self._over(tracking, now, _NEAR):
             if not self._late(now):
                 return Work(tracking.xi, tracking)
@@ -281,7 +260,7 @@ class CutSequence:
     def _forget(self) -> None:
         self._stage = Stage.REST
         self._point_id = ""
-        self._motion = self._plan = self._finding = None
+        self._motion = self._plan = None
         self._started: float | None = None
         self._in_place_since: float | None = None
 
@@ -300,9 +279,19 @@ class CutSequence:
     def _retreat_from(self, robot: Measured) -> None:
         assert self._plan is not None
         self._stage = Stage.RETREAT
-        self._go(
-            robot, self._plan.poses.clear, _at_base(self._plan.q_clear, robot.q), self._config.tool_speed, frozen=True
-        )
+        back = Leg(self._plan.poses.clear, _at_base(self._plan.q_clear, robot.q), self._config.tool_speed, math.inf)
+        ticket, plan = self._queue.get(self._point_id), self._coming.found
+        unsure = ticket is not None and ticket.state == "UNKNOWN"
+        onwards = self._way_to(plan) if isinstance(plan, CutPlan) and self._coming.stands and not unsure else ()
+        if not onwards:
+            self._coming.forget()
+        self._go(robot, back, *onwards, slow_end=bool(onwards))
+
+    def _way_to(self, plan: CutPlan) -> tuple[Leg, Leg]:
+        """Clear of the canes to before the next cut, then straight in past the stand-off."""
+        config, poses = self._config, plan.poses
+        clear = Leg(poses.clear, plan.q_clear, config.tool_speed)
+        return clear, Leg(poses.cut, plan.q_cut, config.advance_speed, config.stand_off)
 
     def _fail(self, robot: Measured, reason: str) -> Work:
         self._queue.resolve(self._point_id, "FAILED_NOT_CUT", reason)
@@ -311,12 +300,11 @@ class CutSequence:
         self._stage = Stage.ESCAPE
         return Work(self._saturation.ramp(robot.sent))
 
-    def _go(
-        self, robot: Measured, goal: Any, q_goal: Array, speed: float, frozen: bool = False, slow_end: bool = False
-    ) -> None:
-        # From where the tool is, not from where it should be: a stage begins at rest.
+    def _go(self, robot: Measured, *legs: Leg, slow_end: bool = False) -> None:
+        # From where the tool is, not from where it should be: a motion begins at rest.
+        flows = self._follower.flows
         self._motion = ToolMotion(
-            self._config, robot.kinematics.T_odom_tool, goal, robot.q, q_goal, speed, frozen, slow_end
+            self._config, robot.kinematics.T_odom_tool, robot.q, legs, slow_end=slow_end, flows=flows
         )
         self._started = self._in_place_since = None
 
@@ -338,7 +326,7 @@ class CutSequence:
     def _late(self, now: float) -> bool:
         if self._started is None or self._motion is None:
             return False
-        return now - self._started > 2.5 * self._motion.trajectory.duration + self._config.reach_timeout_s
+        return now - self._started > 2.5 * self._motion.duration + self._config.reach_timeout_s
 
     def _missed(self, what: str, tracking: Tracking) -> str:
         why = f": {tracking.reason}" if tracking.reason else ""
@@ -358,22 +346,10 @@ _STEPS = {
     Stage.ESCAPE: CutSequence._escape,
     Stage.SEARCH: CutSequence._find,
     Stage.TRAVEL: CutSequence._travel,
-    Stage.APPROACH: CutSequence._approach,
     Stage.ADVANCE: CutSequence._advance,
     Stage.CUT: CutSequence._cutting,
     Stage.RETREAT: CutSequence._retreat,
 }
-
-
-def _advance(search: Generator[None, None, CutPlan | Unreachable], iterations: int) -> CutPlan | Unreachable | None:
-    """Run a search for some iterations; its result, or None while it goes on."""
-    for _ in range(iterations):
-        try:
-            next(search)
-        except StopIteration as end:
-            result: CutPlan | Unreachable = end.value
-            return result
-    return None
 
 
 def _at_base(q_goal: Array, q: Array) -> Array:

@@ -1,10 +1,13 @@
 """Bringing the arm back to its survey posture with the base still: first straight out of the canes, then by joints."""
 
+import math
+
 import numpy as np
 
 from controller.config import ControllerConfig
 from controller.cut_pose import escape_pose
-from controller.motion import ArmMotion, Follower, Measured, ToolMotion
+from controller.motion import ArmMotion, Follower, Measured
+from controller.tool_motion import Leg, ToolMotion
 from controller.whole_body.saturation import Saturation
 from rolling_panda.differential_drive import Array
 from rolling_panda.robot_model import ARM_Q
@@ -36,9 +39,8 @@ class Homing:
             if self._out is None and depth > 0.0:
                 pose = robot.kinematics.T_odom_tool
                 goal = escape_pose(pose, self._left, depth)
-                self._out = ToolMotion(
-                    self._config, pose, goal, robot.q, robot.q, self._config.advance_speed, frozen=True
-                )
+                out = Leg(goal, robot.q, self._config.advance_speed, math.inf)
+                self._out = ToolMotion(self._config, pose, robot.q, [out])
             if self._out is not None:
                 tracking = self._follower.follow(self._out, robot)
                 if not tracking.done or tracking.position_error > _CLEAR:

@@ -8,7 +8,8 @@ import numpy as np
 import pinocchio as pin
 
 from controller.config import ControllerConfig
-from controller.trajectory import PoseTrajectory, Rates, quintic
+from controller.tool_motion import ToolMotion
+from controller.trajectory import Rates, quintic
 from controller.whole_body.saturation import Saturation
 from controller.whole_body.task import BaseMode, Demand, Method, Posture, Solution, ToolTask
 from rolling_panda.differential_drive import NXI, Array
@@ -49,78 +50,6 @@ class Tracking:
     done: bool
 
 
-class ToolMotion:
-    """A straight tool motion with the posture that goes with it; its clock advances as far as the limits let it."""
-
-    def __init__(
-        self,
-        config: ControllerConfig,
-        start: Any,
-        goal: Any,
-        q_start: Array,
-        q_goal: Array,
-        speed: float,
-        frozen: bool = False,
-        slow_end: bool = False,
-        free_axis: bool = False,
-    ) -> None:
-        """Plan.
-
-        Args:
-            config: Of the controller.
-            start: T_odom_tool at the beginning (pin.SE3).
-            goal: T_odom_tool at the end (pin.SE3).
-            q_start: Configuration (12) at the beginning.
-            q_goal: Configuration (12) wanted at the end, for the null space.
-            speed: Largest tool speed (m/s).
-            frozen: True where only the arm moves.
-            slow_end: True for the way to the cut: the last `slow_zone` is at `cut_speed`.
-            free_axis: True where the rotation about the tool's y does not matter.
-        """
-        self.q_start, self.q_goal = q_start, q_goal
-        self.base: BaseMode = "frozen" if frozen else "row"
-        self.speed, self.free_axis = speed, free_axis
-        self._slow_end, self._config = slow_end, config
-        travel = 0.0 if frozen else float(np.hypot(*(q_goal[:2] - q_start[:2])))
-        # The base and the joints need their time too, with room for feedback.
-        base_s = Rates(0.8 * config.base_speed, 0.5 * config.base_acceleration, 10.0).duration(travel)
-        arm_s = Rates(0.9, 2.0, 20.0).duration(float(np.abs(q_goal[ARM_Q] - q_start[ARM_Q]).max()))
-        self.trajectory = PoseTrajectory(
-            start,
-            goal,
-            Rates(speed, config.tool_acceleration, config.tool_jerk),
-            Rates(config.tool_turn, 3.0 * config.tool_acceleration, 3.0 * config.tool_jerk),
-            max(base_s, arm_s),
-            straight=True,
-        )
-        self.time, self.scale = 0.0, 1.0
-
-    @property
-    def done(self) -> bool:
-        """True when the clock has reached the end."""
-        return self.time >= self.trajectory.duration
-
-    def advance(self, scale: float, dt: float) -> None:
-        """Let the clock run at the rate `scale` for one period of `dt` (s)."""
-        self.scale = scale
-        self.time += dt * scale
-
-    def posture(self) -> Posture:
-        """Base and arm as they should be now: in a straight line from start to goal, heading as at the goal."""
-        progress = quintic(self.time, self.trajectory.duration)
-        span = self.q_goal - self.q_start
-        q, rate = self.q_start + span * progress.s, span * progress.rate
-        q[2], rate[2] = self.q_goal[2], 0.0
-        return Posture(q, rate, self.q_goal)
-
-    def cap(self, T_odom_tool: Any) -> float:
-        """Largest tool speed (m/s) at this tool pose."""
-        if not self._slow_end:
-            return self.speed * 1.2
-        left = _length(self.trajectory.goal.translation - T_odom_tool.translation)
-        return self._config.cut_speed + 1.5 * max(0.0, left - self._config.slow_zone)
-
-
 class Follower:
     """Turns motions into velocities by the whole-body method."""
 
@@ -129,9 +58,14 @@ class Follower:
         self._config, self._method, self._dt = config, method, dt
         self._gains = np.repeat([config.gain_position, config.gain_rotation], 3)
 
+    @property
+    def flows(self) -> bool:
+        """Whether the legs of a way may flow into each other."""
+        return self._method.flows
+
     def follow(self, motion: ToolMotion, robot: Measured) -> Tracking:
         """One period along a tool motion."""
-        wanted = motion.trajectory.at(motion.time)
+        wanted = motion.desired()
         pose = robot.kinematics.T_odom_tool
         error = tool_error(pose, nearest_about_y(pose, wanted.T_odom_tool) if motion.free_axis else wanted.T_odom_tool)
         out = self._method.solve(

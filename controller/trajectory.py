@@ -97,9 +97,10 @@ class PoseTrajectory:
         else:
             screw = pin.log6(start.actInv(goal))
             self._linear, self._angular = screw.linear, screw.angular
+        self.length = float(np.linalg.norm(self._linear))
         # Along a screw, the tool's origin moves at the length of the body's linear velocity: the length of its arc.
         self.duration = max(
-            translation.duration(float(np.linalg.norm(self._linear))),
+            translation.duration(self.length),
             rotation.duration(float(np.linalg.norm(self._angular))),
             at_least,
             1e-3,

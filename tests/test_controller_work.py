@@ -118,7 +118,7 @@ def test_tool_goes_in_slowly_and_never_sweeps_through_the_canes():
         off = min(np.hypot(after[0] - p.position[0], after[2] - p.position[2]) for p in shown)
         if off > 0.02:
             deepest_away = max(deepest_away, after[1])
-        if 0.75 - after[1] < 0.03 and after[1] > before[1]:
+        if 0.75 - after[1] < 0.02 and after[1] > before[1]:
             fastest_near = max(fastest_near, np.linalg.norm(after - before) / r.dt)
         assert r.now < 60
     assert deepest_away < 0.75 - 0.2

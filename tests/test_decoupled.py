@@ -1,7 +1,8 @@
 import numpy as np
 
 from controller.config import ControllerConfig
-from controller.motion import Follower, Measured, ToolMotion
+from controller.motion import Follower, Measured
+from controller.tool_motion import Leg, ToolMotion
 from controller.whole_body.decoupled import Decoupled
 from controller.whole_body.saturation import Saturation
 from rolling_panda.robot_model import ARM_Q, RobotModel
@@ -15,9 +16,8 @@ def run(q_goal, seconds):
     q = np.zeros(12)
     q[ARM_Q] = CONFIG.home
     follower = Follower(CONFIG, Decoupled(ROBOT, CONFIG, DT), DT)
-    motion = ToolMotion(
-        CONFIG, ROBOT.pose(q, ROBOT.tool_id), ROBOT.pose(q_goal, ROBOT.tool_id), q, q_goal, CONFIG.tool_speed
-    )
+    leg = Leg(ROBOT.pose(q_goal, ROBOT.tool_id), q_goal, CONFIG.tool_speed)
+    motion = ToolMotion(CONFIG, ROBOT.pose(q, ROBOT.tool_id), q, [leg])
     sent, record = np.zeros(9), []
     for _ in range(round(seconds / DT)):
         tracking = follower.follow(motion, Measured(q, ROBOT.kinematics(q), sent))

@@ -2,7 +2,8 @@ import numpy as np
 import pinocchio as pin
 
 from controller.config import ControllerConfig
-from controller.motion import ArmMotion, Follower, Measured, ToolMotion, tool_error
+from controller.motion import ArmMotion, Follower, Measured, tool_error
+from controller.tool_motion import Leg, ToolMotion
 from controller.whole_body.registry import make_method
 from controller.whole_body.saturation import Saturation
 from rolling_panda.robot_model import ARM_Q, RobotModel
@@ -45,7 +46,7 @@ def test_path_is_kept_when_the_limits_slow_the_motion():
     hasty = ControllerConfig(tool_acceleration=50.0, tool_jerk=500.0, arm_share=0.15)
     saturation = Saturation(ROBOT, hasty, DT)
     follower = Follower(hasty, make_method(ROBOT, hasty, DT), DT)
-    motion = ToolMotion(hasty, T, goal, q, q, 3.0)
+    motion = ToolMotion(hasty, T, q, [Leg(goal, q, 3.0)])
     way = (goal.translation - T.translation) / np.linalg.norm(goal.translation - T.translation)
     steps, off = 0, 0.0
     while steps < 1500:
@@ -57,7 +58,7 @@ def test_path_is_kept_when_the_limits_slow_the_motion():
         off = max(off, np.linalg.norm(np.cross(ROBOT.pose(q, ROBOT.tool_id).translation - T.translation, way)))
         if tracking.done and tracking.position_error < 1e-3:
             break
-    assert steps * DT > 2.0 * motion.trajectory.duration
+    assert steps * DT > 2.0 * motion.duration
     assert tracking.position_error < 1e-3
     assert off < 0.005
 

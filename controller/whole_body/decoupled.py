@@ -29,6 +29,7 @@ class Decoupled:
     """Base first, arm second, never both."""
 
     name = "decoupled"
+    flows = False
 
     def __init__(self, robot: RobotModel, config: ControllerConfig, dt: float) -> None:
         """Bind the parts for a control period of `dt` (s)."""

@@ -47,6 +47,7 @@ class Hierarchy:
     """Strict priorities with hard inequalities."""
 
     name = "hierarchy"
+    flows = True
 
     def __init__(self, robot: RobotModel, config: ControllerConfig, dt: float, guards: Sequence[Guard] = ()) -> None:
         """Bind the parts.

@@ -28,6 +28,7 @@ class Nullspace:
     """One damped weighted pseudo-inverse, secondary velocities in its null space."""
 
     name = "nullspace"
+    flows = True
 
     def __init__(self, robot: RobotModel, config: ControllerConfig, dt: float) -> None:
         """Precompute the weights and the limits for a control period of `dt` (s)."""

@@ -126,9 +126,13 @@ class Guard(Protocol):
 
 
 class Method(Protocol):
-    """A whole-body method; stateless between calls."""
+    """A whole-body method; stateless between calls.
+
+    `flows` is False where base and tool have to come to rest between the legs of a way.
+    """
 
     name: str
+    flows: bool
 
     def solve(self, demand: Demand) -> Solution:
         """The actuator velocities that answer the demand, within the limits. Raises nothing for any numbers in it."""

@@ -1,0 +1,60 @@
+"""Looks ahead: which accepted point comes next, and a posture to cut it from, found a few iterations a period."""
+
+from collections.abc import Generator
+
+import numpy as np
+
+from controller.queue import PointQueue, Ticket
+from controller.reach import CutPlan, PostureSearch, Unreachable
+from rolling_panda.differential_drive import Array
+
+
+class NextCut:
+    """The search for one point's plan. `look` for the next point, `step` each period, read `found`."""
+
+    def __init__(self, search: PostureSearch, queue: PointQueue, iterations: int) -> None:
+        """Look at nothing yet; `iterations` of the search are done a period."""
+        self._search, self._queue, self._iterations = search, queue, iterations
+        self.forget()
+
+    def forget(self) -> None:
+        """Drop what was looked at."""
+        self._ticket: Ticket | None = None
+        self._finding: Generator[None, None, CutPlan | Unreachable] | None = None
+        self.found: CutPlan | Unreachable | None = None
+
+    @property
+    def point_id(self) -> str:
+        """The point looked at; empty when none."""
+        return "" if self._ticket is None else self._ticket.point.point_id
+
+    def look(self, q: Array) -> bool:
+        """Begin with the next accepted point, from configuration q (12), unless it is looked at already.
+
+        Returns:
+            False when no point is accepted.
+        """
+        ticket = self._queue.next()
+        if ticket is None or ticket.accepted is None:
+            self.forget()
+            return False
+        if not self.stands:
+            self._ticket, self.found = ticket, None
+            self._finding = self._search.find(np.array(ticket.accepted.position), np.array(ticket.accepted.tangent), q)
+        return True
+
+    @property
+    def stands(self) -> bool:
+        """Whether what is looked at is still the next point, accepted as it was."""
+        ticket, following = self._ticket, self._queue.next()
+        return ticket is not None and following is not None and following.accepted is ticket.accepted
+
+    def step(self) -> None:
+        """Search for one period."""
+        for _ in range(self._iterations):
+            if self._finding is None:
+                return
+            try:
+                next(self._finding)
+            except StopIteration as end:
+                self.found, self._finding = end.value, None

@@ -1,0 +1,172 @@
+"""A planned motion of the tool with the posture that goes with it: straight legs that flow into each other."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from controller.config import ControllerConfig
+from controller.trajectory import PoseTrajectory, Rates, ToolState, quintic
+from controller.whole_body.task import BaseMode, Posture
+from rolling_panda.differential_drive import Array
+from rolling_panda.robot_model import ARM_Q
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A straight way of the tool.
+
+    Attributes:
+        goal: T_odom_tool at its end (pin.SE3).
+        q_goal: Configuration (12) wanted at its end, for the null space.
+        speed: Largest tool speed (m/s).
+        frozen_within: Distance to its goal within which only the arm moves (m); infinite: on the whole leg.
+    """
+
+    goal: Any
+    q_goal: Array
+    speed: float
+    frozen_within: float = 0.0
+
+
+@dataclass(frozen=True)
+class _Timed:
+    """A leg in its place: from rest to rest, its time counted from `begin` (s)."""
+
+    begin: float
+    trajectory: PoseTrajectory
+    span: Array
+    frozen_within: float
+
+    @property
+    def end(self) -> float:
+        return self.begin + self.trajectory.duration
+
+
+class ToolMotion:
+    """Legs one after the other; a leg begins while the one before it still comes to rest.
+
+    Each leg is a quintic from rest to rest. Where two overlap, their motions add up, so that the tool rounds the corner
+    between them without stopping; velocity and acceleration stay continuous. The clock advances as far as the limits
+    let it.
+    """
+
+    def __init__(
+        self,
+        config: ControllerConfig,
+        start: Any,
+        q_start: Array,
+        legs: Sequence[Leg],
+        slow_end: bool = False,
+        free_axis: bool = False,
+        flows: bool = True,
+    ) -> None:
+        """Plan.
+
+        Args:
+            config: Of the controller.
+            start: T_odom_tool at the beginning (pin.SE3).
+            q_start: Configuration (12) at the beginning.
+            legs: At least one.
+            slow_end: True for the way to the cut: the last `slow_zone` is at `cut_speed`.
+            free_axis: True where the rotation about the tool's y does not matter.
+            flows: False makes every leg end at rest before the next one begins.
+        """
+        self._config, self._slow_end, self.free_axis = config, slow_end, free_axis
+        self._start, self._q_start, self._legs = start, q_start, _timed(config, start, q_start, legs, flows)
+        self.goal, self.q_goal, self.speed = legs[-1].goal, legs[-1].q_goal, max(leg.speed for leg in legs)
+        self.legs = len(legs)
+        self.duration = max(leg.end for leg in self._legs)
+        self.time, self.scale = 0.0, 1.0
+
+    @property
+    def done(self) -> bool:
+        """True when the clock has reached the end."""
+        return self.time >= self.duration
+
+    @property
+    def leg(self) -> int:
+        """Number of the leg that has begun last."""
+        return max(i for i, leg in enumerate(self._legs) if i == 0 or self.time >= leg.begin)
+
+    @property
+    def base(self) -> BaseMode:
+        """What the base is for now."""
+        leg = self._legs[self.leg]
+        if leg.frozen_within <= 0.0:
+            return "row"
+        left = 1.0 - quintic(self.time - leg.begin, leg.trajectory.duration).s
+        return "frozen" if left * leg.trajectory.length <= leg.frozen_within else "row"
+
+    def advance(self, scale: float, dt: float) -> None:
+        """Let the clock run at the rate `scale` for one period of `dt` (s)."""
+        self.scale = scale
+        self.time += dt * scale
+
+    def desired(self) -> ToolState:
+        """Where the tool should be now, and its twist."""
+        position, R, twist = self._start.translation.copy(), self._start.rotation, np.zeros(6)
+        for leg in self._legs:
+            if self.time <= leg.begin:
+                break
+            state = leg.trajectory.at(self.time - leg.begin)
+            begin = leg.trajectory.start
+            # What the leg would do alone, carried along by the legs before it.
+            turned = R @ begin.rotation.T
+            position += state.T_odom_tool.translation - begin.translation
+            twist[:3] += state.twist[:3]
+            twist[3:] += turned @ state.twist[3:]
+            R = turned @ state.T_odom_tool.rotation
+        return ToolState(pin.SE3(R, position), twist)
+
+    def posture(self) -> Posture:
+        """Base and arm as they should be now: straight from leg to leg, heading as at the goal."""
+        q, rate = self._q_start.copy(), np.zeros(len(self._q_start))
+        for leg in self._legs:
+            if self.time <= leg.begin:
+                break
+            progress = quintic(self.time - leg.begin, leg.trajectory.duration)
+            q += leg.span * progress.s
+            rate += leg.span * progress.rate
+        q[2], rate[2] = self.q_goal[2], 0.0
+        return Posture(q, rate, self.q_goal)
+
+    def cap(self, T_odom_tool: Any) -> float:
+        """Largest tool speed (m/s) at this tool pose."""
+        if not self._slow_end:
+            return self.speed * 1.2
+        config = self._config
+        away = float(np.linalg.norm(self.goal.translation - T_odom_tool.translation)) - config.slow_zone
+        return float(np.sqrt(config.cut_speed**2 + 2.0 * config.slow_braking * max(away, 0.0)))
+
+
+def _timed(
+    config: ControllerConfig, start: Any, q_start: Array, legs: Sequence[Leg], flows: bool
+) -> tuple[_Timed, ...]:
+    out: list[_Timed] = []
+    for leg in legs:
+        span = leg.q_goal - q_start
+        travel = 0.0 if leg.frozen_within == math.inf else float(np.hypot(*span[:2]))
+        # The base and the joints need their time too, with room for feedback.
+        base_s = Rates(0.8 * config.base_speed, 0.5 * config.base_acceleration, 10.0).duration(travel)
+        arm_s = Rates(0.9, 2.0, 20.0).duration(float(np.abs(span[ARM_Q]).max()))
+        trajectory = PoseTrajectory(
+            start,
+            leg.goal,
+            Rates(leg.speed, config.tool_acceleration, config.tool_jerk),
+            Rates(config.tool_turn, 3.0 * config.tool_acceleration, 3.0 * config.tool_jerk),
+            max(base_s, arm_s),
+            straight=True,
+        )
+        begin = 0.0
+        if out:
+            before = out[-1]
+            begin = before.end
+            if flows:
+                begin -= config.blend * min(before.trajectory.duration, trajectory.duration)
+        out.append(_Timed(begin, trajectory, span, leg.frozen_within))
+        start, q_start = leg.goal, leg.q_goal
+    return tuple(out)

@@ -1,0 +1,90 @@
+import math
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from controller.config import ControllerConfig
+from controller.tool_motion import Leg, ToolMotion
+
+CONFIG = ControllerConfig()
+turns = st.tuples(*[st.floats(-1.2, 1.2)] * 3)
+places = st.tuples(*[st.floats(-0.4, 0.4)] * 3)
+
+
+def pose(place, turn):
+    return pin.SE3(pin.exp3(np.array(turn)), np.array(place))
+
+
+def motion(corners, frozen=False, **changes):
+    """Through these poses; the posture's first arm joint counts the legs."""
+    legs = []
+    for number, corner in enumerate(corners[1:]):
+        q = np.zeros(12)
+        q[5] = number + 1.0
+        legs.append(Leg(corner, q, CONFIG.tool_speed, math.inf if frozen and number == 0 else 0.0))
+    return ToolMotion(CONFIG, corners[0], np.zeros(12), legs, **changes)
+
+
+def at(path, time):
+    path.time = time
+    return path.desired()
+
+
+@given(st.lists(st.tuples(places, turns), min_size=2, max_size=4))
+def test_it_begins_and_ends_at_rest_where_it_should(corners):
+    corners = [pose(*corner) for corner in corners]
+    path = motion(corners)
+    first, last = at(path, 0.0), at(path, path.duration)
+    for state, corner in ((first, corners[0]), (last, corners[-1])):
+        np.testing.assert_allclose(state.T_odom_tool.homogeneous, corner.homogeneous, atol=1e-9)
+        np.testing.assert_allclose(state.twist, 0.0, atol=1e-12)
+    assert path.done and path.posture().q[5] == pytest.approx(len(corners) - 1.0)
+
+
+@given(st.lists(st.tuples(places, turns), min_size=3, max_size=4), st.floats(0.02, 0.98))
+def test_the_twist_is_the_rate_of_the_pose_also_round_corners(corners, share):
+    path, dt = motion([pose(*corner) for corner in corners]), 1e-5
+    time = share * path.duration
+    now, before, after = at(path, time), at(path, time - dt), at(path, time + dt)
+    np.testing.assert_allclose(
+        now.twist[:3], (after.T_odom_tool.translation - before.T_odom_tool.translation) / (2 * dt), atol=1e-4
+    )
+    turned = pin.log3(after.T_odom_tool.rotation @ before.T_odom_tool.rotation.T) / (2 * dt)
+    np.testing.assert_allclose(now.twist[3:], turned, atol=1e-4)
+
+
+def test_a_corner_is_rounded_without_stopping_and_not_cut_by_much():
+    corners = [pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), pose((0.0, -0.22, 0.0), (0.0, 0.0, 0.0))]
+    corners.append(pose((0.3, -0.22, 0.0), (0.0, 0.0, 0.0)))
+    path = motion(corners)
+    times = np.linspace(0.0, path.duration, 400)[1:-1]
+    states = [at(path, time) for time in times]
+    speeds = np.array([np.linalg.norm(state.twist[:3]) for state in states])
+    middle = (times > 0.1 * path.duration) & (times < 0.9 * path.duration)
+    assert speeds[middle].min() > 0.02
+    # Out of the canes before it goes sideways: half of the clearance is left behind when 2 cm are done along the row.
+    sideways = next(state for state in states if state.T_odom_tool.translation[0] > 0.02)
+    assert sideways.T_odom_tool.translation[1] < -0.17
+    slow = motion(corners[:1] + corners[1:2]).duration + motion(corners[1:]).duration
+    assert path.duration < 0.85 * slow
+
+
+def test_the_base_is_frozen_for_the_frozen_leg_only():
+    corners = [pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), pose((0.0, -0.2, 0.0), (0.0, 0.0, 0.0))]
+    corners.append(pose((0.4, -0.2, 0.0), (0.0, 0.0, 0.0)))
+    path = motion(corners, frozen=True)
+    path.time = 0.2
+    assert (path.leg, path.base) == (0, "frozen")
+    path.time = 0.9 * path.duration
+    assert (path.leg, path.base) == (1, "row")
+
+
+def test_the_last_stretch_to_a_cut_is_slow():
+    goal = pose((0.0, 0.15, 0.0), (0.0, 0.0, 0.0))
+    path = motion([pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), goal], slow_end=True)
+    inside = pose((0.0, 0.15 - 0.9 * CONFIG.slow_zone, 0.0), (0.0, 0.0, 0.0))
+    assert path.cap(inside) == pytest.approx(CONFIG.cut_speed)
+    assert path.cap(pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))) > 0.2
