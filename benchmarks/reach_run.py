@@ -19,6 +19,7 @@ from controller.planning.limits import plan_limits
 from controller.planning.path import PathPlanner, Refused
 from controller.trajectory import PoseTrajectory, Rates
 from controller.whole_body.collision import CollisionModel
+from controller.whole_body.hierarchy_config import HierarchyConfig
 from controller.whole_body.registry import make_method
 from controller.whole_body.task import Demand, Method, Posture, Solution, ToolTask
 from rolling_panda.differential_drive import NXI, Array
@@ -31,6 +32,8 @@ LIMIT_S, DT = 30.0, 0.01
 #: The base's vendor's planner: 0.8 m/s, 0.6 rad/s.
 BASE = BaseBounds(0.8, 0.6)
 _GAIN = 3.0
+#: What has not arrived this long before the time is over stops (s).
+_STOPPING_S = 0.8
 #: A motion ends when the tool is nearer than this share of the tolerance and every joint and wheel as good as at rest
 #: (rad/s), so that it may stop within one period.
 _BETTER, _REST = 0.2, 0.02
@@ -90,7 +93,10 @@ class Runner:
             kinematics = self.robot.kinematics(loop.q)
             if follower.done and _arrived(goal_error(kinematics.T_odom_tool, goal, free), loop.xi):
                 break
-            loop.take(follower.step(loop.q, kinematics, loop.xi))
+            if loop.time > LIMIT_S - _STOPPING_S:
+                loop.stop()
+            else:
+                loop.take(follower.step(loop.q, kinematics, loop.xi))
         return loop.outcome(planned_s)
 
     def _straight(self, q: Array, goal: Any, free: bool, base_fixed: bool) -> Outcome:
@@ -107,6 +113,9 @@ class Runner:
             kinematics = self.robot.kinematics(loop.q)
             if clock >= trajectory.duration and _arrived(goal_error(kinematics.T_odom_tool, goal, free), loop.xi):
                 break
+            if loop.time > LIMIT_S - _STOPPING_S:
+                loop.stop()
+                continue
             wanted = trajectory.at(clock)
             error = _GAIN * tool_error(kinematics.T_odom_tool, wanted.T_odom_tool)
             solution = self._method.solve(
@@ -132,7 +141,7 @@ class _Loop:
 
     def __init__(self, robot: RobotModel, q: Array) -> None:
         self.q, self.xi, self.time = q.copy(), np.zeros(NXI), 0.0
-        self._drive = robot.drive
+        self._drive, self._slowing = robot.drive, 0.5 * DT * robot.limits.acceleration
         self._rows: list[Array] = [q.copy()]
         self._sent: list[Array] = []
         self._infeasible, self._reason = 0, ""
@@ -141,13 +150,21 @@ class _Loop:
         """One period with what the method sends."""
         if not solution.feasible:
             self._infeasible, self._reason = self._infeasible + 1, solution.reason
-        self.xi = solution.xi
+        self._move(solution.xi)
+
+    def _move(self, xi: Array) -> None:
+        self.xi = xi
         self.q = self.q.copy()
         self.q[:3] = self._drive.integrate(self.q[:3], float(self.xi[0] * DT), float(self.xi[1] * DT))
         self.q[3:] += self.xi * DT
         self.time += DT
         self._rows.append(self.q)
         self._sent.append(self.xi)
+
+    def stop(self) -> None:
+        """One period of slowing down along the same direction, at half of the rated accelerations."""
+        largest = float((np.abs(self.xi) / self._slowing).max())
+        self._move(np.zeros(NXI) if largest <= 1.0 else self.xi * (1.0 - 1.0 / largest))
 
     def outcome(self, planned_s: float) -> Outcome:
         """What was done."""
@@ -171,6 +188,9 @@ def bench_config(method: MethodName) -> ControllerConfig:
         # 4√2 m in 30 s with the quintic's peak at 1.875 of the mean.
         tool_speed=0.8,
         tool_turn=1.0,
+        # The plan has chosen its postures: in the null space nothing else is wanted, and where it leads past a
+        # singularity, damping would only lead off it.
+        hierarchy=HierarchyConfig(manipulability=0.0, joint_centre=0.0, damping=1e-5),
     )
 
 

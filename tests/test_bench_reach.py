@@ -135,6 +135,17 @@ def test_goals_anywhere_are_reached_without_breaking_a_limit(free_axis, tmp_path
     assert t[-1] == pytest.approx(rows[3].quality.duration)
 
 
+@pytest.mark.parametrize("height", [1.47, 1.485])
+def test_goals_near_the_end_of_the_reach_are_kept_to_although_the_arm_is_almost_straight(height):
+    target = reach_targets.Target(
+        reach_targets.Start((0.0, 0.0, 0.0), reach_targets.HOME),
+        reach_targets.Goal((3.0, 1.0, height), (0.0, 0.7071068, 0.0, 0.7071068)),
+    )
+    (row,) = reach.run([target], "hierarchy", 0, 1)
+    assert row.quality.reached and row.quality.violations.total == 0
+    assert row.quality.omega_least < 0.04
+
+
 def test_driving_first_takes_longer_and_a_straight_screw_reaches_less():
     targets = reach_targets.draw(21, 4, "none")
     by_method = {method: reach.run(targets, method, 0, 1) for method in ("hierarchy", "decoupled", "nullspace")}

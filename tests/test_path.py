@@ -109,6 +109,14 @@ def test_base_and_arm_move_at_once_unless_told_not_to():
     assert decoupled.duration > together.duration + 0.5
 
 
+def test_the_arm_waits_in_the_better_posture_while_the_base_drives():
+    goal = pose(4.0, 0.0, 0.9)
+    good, poor = start(), start((0.0, 0.9, 0.0, -0.5, 0.0, 1.4, 0.8))
+    late, early = check(PLANNER.plan(good, goal), good, goal), check(PLANNER.plan(poor, goal), poor, goal)
+    assert not late.xi[: len(late.t) // 3, ARM_XI].any() and late.xi[-50:, ARM_XI].any()
+    assert early.xi[:10, ARM_XI].any() and not early.xi[-50:, ARM_XI].any()
+
+
 @pytest.mark.parametrize("goal", [pose(-0.9, 0.0, 0.9, yaw=np.pi), pose(-0.3, 0.0, 0.5), pose(0.0, 0.0, 0.6, tilt=0.6)])
 def test_goals_behind_close_to_and_over_the_base_are_reached(goal):
     plan = check(PLANNER.plan(start(), goal), start(), goal)

@@ -16,6 +16,7 @@ from controller.planning.goal import GoalChooser, Stand
 from controller.planning.limits import PlanLimits
 from controller.planning.plan import Plan, Wait, arm_samples, assemble, orders
 from controller.whole_body.collision import Clearance, CollisionModel
+from controller.whole_body.manipulability import arm_omega
 from rolling_panda.differential_drive import Array
 from rolling_panda.robot_model import ARM_Q, RobotModel
 
@@ -98,7 +99,9 @@ class PathPlanner:
     def to_stand(self, q: Array, stand: Stand, together: bool = True) -> Planned | Refused:
         """A motion from rest at a configuration (12) to rest at a stand."""
         reason = ""
-        for base, arm, wait in self._candidates(q, stand.q, together):
+        # The arm spends the time of the drive in the better of its two postures.
+        late = arm_omega(self._robot.kinematics(q).J) > stand.omega
+        for base, arm, wait in self._candidates(q, stand.q, together, late):
             if isinstance(arm, Blocked):
                 reason = reason or arm.reason
                 continue
@@ -112,14 +115,16 @@ class PathPlanner:
             )
         return Refused(reason)
 
-    def _candidates(self, q: Array, goal: Array, together: bool) -> Iterator[tuple[BaseMotion, Array | Blocked, Wait]]:
+    def _candidates(
+        self, q: Array, goal: Array, together: bool, late: bool
+    ) -> Iterator[tuple[BaseMotion, Array | Blocked, Wait]]:
         """Base motion, arm samples and order, the quickest kinds first."""
         directs = self._base.motions(q[:3], goal[:3])[:_WAYS]
         there = self._timed(np.concatenate([goal[:5], q[ARM_Q]]), goal[ARM_Q])
         if isinstance(there, Blocked):
             yield directs[0], there, Wait()
         else:
-            for wait in list(orders(directs[0], there))[0 if together else 1 : 3 if together else 2]:
+            for wait in list(orders(directs[0], there, late))[0 if together else 1 : 3 if together else 2]:
                 yield directs[0], there, wait
         if not self._collision.obstacles:
             return

@@ -117,9 +117,16 @@ class Wait:
     arm: int = 0
 
 
-def orders(base: BaseMotion, arm: Array) -> Iterator[Wait]:
-    """Ways to put a base motion and an arm motion together: at once, the base first, the arm first."""
-    yield Wait()
+def orders(base: BaseMotion, arm: Array, late: bool) -> Iterator[Wait]:
+    """Ways to put a base motion and an arm motion together: at once, the base first, the arm first.
+
+    Args:
+        base: Motion of the base.
+        arm: Postures of the arm (n×7).
+        late: True to let the arm end together with the base, not begin with it.
+    """
+    waits = len(base.wheels) - len(arm) + 1
+    yield Wait(base=max(-waits, 0), arm=max(waits, 0)) if late else Wait()
     yield Wait(arm=len(base.wheels))
     yield Wait(base=len(arm) - 1)
 
