@@ -1,6 +1,5 @@
 """The main job as a person does it: real processes, real wire, real browser, judged by the simulator's own trace."""
 
-import contextlib
 import math
 import time
 from collections.abc import Callable
@@ -10,7 +9,7 @@ from pathlib import Path
 import pytest
 from live_robot import LiveRobot
 from operator_page import operator_page
-from playwright.sync_api import Page, TimeoutError
+from playwright.sync_api import Page
 
 from bridge.sim import trace
 
@@ -21,12 +20,7 @@ def arm_and_accept(page: Page, *places: int) -> list[str]:
     """Wait for detections, arm, accept those at these places of the queue on the page; their ids."""
     page.wait_for_selector('[data-point-id][data-state="PROPOSED"]', timeout=90_000)
     page.click("#arm")
-    try:
-        page.wait_for_selector('#mode[data-mode="READY"]', timeout=15_000)
-    except TimeoutError:
-        # A robot whose setpoints have only just begun refuses, and says so; a person presses again.
-        page.click("#arm")
-        page.wait_for_selector('#mode[data-mode="READY"]', timeout=40_000)
+    page.wait_for_selector('#mode[data-mode="READY"]', timeout=15_000)
     rows = page.locator('[data-point-id][data-state="PROPOSED"]').all()
     chosen = [str(rows[place].get_attribute("data-point-id")) for place in places]
     for point_id in chosen:
@@ -35,22 +29,19 @@ def arm_and_accept(page: Page, *places: int) -> list[str]:
     return chosen
 
 
-def press_on(page: Page, robot: LiveRobot, condition: Callable[[], object], what: str) -> None:
-    """Wait for `condition()`, starting the work and, where the robot has stopped by itself, starting it again.
+def start(page: Page, robot: LiveRobot, condition: Callable[[], object], what: str) -> None:
+    """Start the work and wait for `condition()`, with nobody there to help should it stop by itself."""
+    page.click("#start")
+    robot.wait(lambda: robot.mode() == "AUTO", 10, "the work to start")
 
-    A machine that stands still for 0.2 s under a browser that draws in software stops the robot, as it must. An
-    operator then acknowledges, resumes and starts; so does this, with the page's own buttons.
-    """
-    buttons = {"PROTECTIVE_STOP": "#acknowledge", "PAUSED": "#resume", "READY": "#start"}
-    deadline = time.monotonic() + 240
-    while not condition():
-        assert time.monotonic() < deadline, f"waited for {what}\n{robot.logs()}"
-        button = buttons.get(robot.mode())
-        if button is not None:
-            with contextlib.suppress(TimeoutError):
-                page.click(button, timeout=3_000)
-                page.wait_for_timeout(1_000)
-        time.sleep(0.05)
+    def met() -> bool:
+        if condition():
+            return True
+        mode = robot.mode()
+        assert mode in ("AUTO", "READY"), f"stopped by itself: {mode}, waiting for {what}\n{robot.logs()}"
+        return False
+
+    robot.wait(met, 120, what)
 
 
 def ended(robot: LiveRobot, chosen: list[str]) -> bool:
@@ -64,7 +55,7 @@ def test_two_accepted_points_are_cut_where_they_were_accepted(tmp_path: Path, ch
         with operator_page(chromium_path, robot.link("ada")) as page:
             chosen = arm_and_accept(page, 0, 1)
             accepted = {row["entry"]["point_id"]: row["entry"]["accepted_position"] for row in robot.points()}
-            press_on(page, robot, lambda: ended(robot, chosen), "both points to end")
+            start(page, robot, lambda: ended(robot, chosen), "both points to end")
             for point_id in chosen:
                 page.wait_for_selector(f'[data-point-id="{point_id}"][data-state="DONE"]', timeout=40_000)
     cuts = {event["point_id"]: event for event in trace.read(robot.trace).events if event["event"] == "cut"}
@@ -114,7 +105,7 @@ def test_stop_on_the_page_in_mid_approach_halts_base_and_arm_within_half_a_secon
             arm_and_accept(page, -1)
             stop = Press(page, "#stop")
             stop.listen()
-            press_on(page, robot, robot.driving, "the base to drive")
+            start(page, robot, robot.driving, "the base to drive")
             pressed = stop.press()
             page.wait_for_selector('#mode[data-mode="ESTOP_LATCHED"]', timeout=20_000)
             assert robot.state()["bridge"]["stop_id"]
