@@ -293,7 +293,7 @@ def test_the_sign_in_link_is_used_once_and_leaves_the_address(browser: Browser) 
     context.close()
 
 
-@pytest.mark.parametrize("size", [(1280, 800), (1024, 768)])
+@pytest.mark.parametrize("size", [(1280, 800), (1024, 768), (820, 1180)])
 def test_fits_the_screen_with_the_stop_on_top(page: Page, server: PlayedServer, size: tuple[int, int]) -> None:
     page.set_viewport_size({"width": size[0], "height": size[1]})
     server.bridge = bridge(stop_id="s1", stopped_by="Ada: stop button")
@@ -302,6 +302,9 @@ def test_fits_the_screen_with_the_stop_on_top(page: Page, server: PlayedServer, 
     overflow = page.evaluate("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]")
     assert overflow[0] <= size[0]
     assert overflow[1] <= size[1]
+    view = page.locator("rp-scene").bounding_box()
+    assert view is not None
+    assert min(view["width"], view["height"]) >= 300, "there is room to see the robot"
     for selector in ("#stop", "#arm", "#start", "#pause", "#resume", "#home", "#acknowledge", "#teleop", "#hold"):
         box = page.locator(selector).bounding_box()
         assert box is not None
