@@ -26,6 +26,7 @@ from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig, load_section
 from rolling_panda.differential_drive import Array
 from rolling_panda.resources import resource
+from rolling_panda.row_messages import Obstacles
 
 _CONTROL_TICKS = 10
 # A frame takes perception about this long, so its points come later by as much.
@@ -140,7 +141,9 @@ class ClosedLoop:
         if outputs.frame is not None:
             self._seen = self.now + _PERCEPTION_S, self.perception.process(outputs.frame)
         if self._seen is not None and self.now >= self._seen[0]:
-            self.inputs = replace(self.inputs, points=Sample(self._seen[1], self.now))
+            points = self._seen[1]
+            obstacles = Obstacles(header=points.header, capsules=self.perception.obstacles)
+            self.inputs = replace(self.inputs, points=Sample(points, self.now), obstacles=Sample(obstacles, self.now))
             self._seen = None
         self.events.extend(outputs.events)
 

@@ -10,6 +10,7 @@ from rolling_panda import intents
 from rolling_panda import messages as m
 from rolling_panda.differential_drive import NXI, Array
 from rolling_panda.robot_model import ARM_Q, RobotModel
+from rolling_panda.row_messages import Capsule, Obstacles
 
 _ALL = frozenset({"bridge", "controller", "perception", "server"})
 Nine = tuple[float, float, float, float, float, float, float, float, float]
@@ -33,6 +34,7 @@ class KinematicRobot:
         outcome: How a cut ends.
         server: False takes the server away.
         perception: False takes perception away.
+        obstacles: What stands around.
         record: Velocities commanded (9 each).
     """
 
@@ -45,6 +47,7 @@ class KinematicRobot:
     perception: bool = True
     frozen_sensors: bool = False
     teleop: m.TeleopTarget | None = None
+    obstacles: tuple[Capsule, ...] = ()
     record: list[Array] = field(default_factory=list)
     cuts: list[tuple[str, Array]] = field(default_factory=list)
     events: list[str] = field(default_factory=list)
@@ -61,6 +64,7 @@ class KinematicRobot:
         self._sequence, self._epoch = 0, 0
         self._cut_id, self._cut_at = "", 0.0
         self._points: Sample[m.PruningPoints] | None = None
+        self._told: Sample[Obstacles] | None = None
         self._stops: tuple[m.StopRequest, ...] = ()
         self._joints: Sample[m.JointState] | None = None
         self._odometry: Sample[m.Odometry] | None = None
@@ -88,12 +92,20 @@ class KinematicRobot:
             odometry=self._odometry,
             bridge=Sample(self._bridge(), self.now),
             points=self._points,
+            obstacles=self._around(),
             teleop=None if self.teleop is None else Sample(self.teleop, self.now),
             server_seen=seen,
             perception_seen=seen,
             present=present,
             stops=stops,
         )
+
+    def _around(self) -> Sample[Obstacles] | None:
+        if not self.obstacles:
+            return None
+        if self._told is None or self._told.message.capsules is not self.obstacles:
+            self._told = Sample(Obstacles(header=m.Header(self.now, "odom"), capsules=self.obstacles), self.now)
+        return self._told
 
     def step(self) -> Outputs:
         """One control period: controller first, then the robot."""

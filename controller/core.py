@@ -18,7 +18,9 @@ from controller.queue import PointQueue
 from controller.reach import PostureSearch
 from controller.report import controller_state
 from controller.stop_latch import StopLatch
+from controller.surroundings import Surroundings
 from controller.teleoperation import Teleoperation
+from controller.whole_body.collision import CollisionModel
 from controller.whole_body.registry import make_method
 from controller.whole_body.saturation import Saturation
 from rolling_panda import intents
@@ -52,7 +54,9 @@ class Controller:
         self._config, self._dt = config, 1.0 / config.rate_hz
         self._robot = RobotModel(robot_config)
         self._saturation = Saturation(self._robot, config, self._dt)
-        self._follower = Follower(config, make_method(self._robot, config, self._dt), self._dt)
+        self._surroundings = Surroundings(CollisionModel(self._robot))
+        method = make_method(self._robot, config, self._dt, self._surroundings.model)
+        self._follower = Follower(config, method, self._dt)
         self._queue = PointQueue(config)
         search = PostureSearch(RobotModel(robot_config), config)
         self._sequence = CutSequence(config, search, self._follower, self._saturation, self._queue, run_id)
@@ -137,6 +141,7 @@ class Controller:
         if inputs.joints is not None and inputs.odometry is not None:
             q = configuration_now(inputs.joints.message, inputs.odometry.message, self._robot.drive)
             self._measured = Measured(q, self._robot.kinematics(q), self._sent)
+        self._surroundings.take(inputs.obstacles)
         if bridge is not None:
             for text in self._sequence.watch(bridge, now):
                 self._say("info", text)

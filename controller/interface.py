@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from rolling_panda import messages as m
+from rolling_panda.row_messages import Obstacles
 
 Msg = TypeVar("Msg", bound=m.Message)
 
@@ -25,6 +26,7 @@ class Inputs:
         odometry: Base from its wheels.
         bridge: Latch, watchdog and cutter.
         points: What perception holds true.
+        obstacles: What perception sees standing in the way.
         teleop: Where the held gizmo is.
         server_seen: When the server's newest heartbeat came in (s).
         perception_seen: The same of perception.
@@ -39,6 +41,7 @@ class Inputs:
     odometry: Sample[m.Odometry] | None = None
     bridge: Sample[m.BridgeState] | None = None
     points: Sample[m.PruningPoints] | None = None
+    obstacles: Sample[Obstacles] | None = None
     teleop: Sample[m.TeleopTarget] | None = None
     server_seen: float | None = None
     perception_seen: float | None = None

@@ -24,6 +24,7 @@ from rolling_panda.topics import (
     INTENT,
     JOINTS,
     MOTION,
+    OBSTACLES,
     ODOMETRY,
     POINTS,
     RELEASE,
@@ -65,6 +66,7 @@ class Loop:
         self._clock = LoopClock(time.monotonic(), _LONGEST_TURN * self._period)
         self._joints, self._odometry = self._newest(JOINTS), self._newest(ODOMETRY)
         self._bridge, self._points = self._newest(BRIDGE), self._newest(POINTS)
+        self._obstacles = self._newest(OBSTACLES)
         self._teleop, self._stops = self._newest(TELEOP), transport.feed(STOP, 32)
         self._beats: dict[m.Process, tuple[int, float]] = {}
         transport.subscribe(HEARTBEAT, self._on_heartbeat)
@@ -86,6 +88,7 @@ class Loop:
             odometry=self._odometry.sample(),
             bridge=self._bridge.sample(),
             points=self._points.sample(),
+            obstacles=self._obstacles.sample(),
             teleop=self._teleop.sample(),
             server_seen=beats["server"][1] if "server" in beats else None,
             perception_seen=beats["perception"][1] if "perception" in beats else None,
