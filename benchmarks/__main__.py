@@ -10,6 +10,7 @@ BENCHMARKS = {
     "tick": ("benchmarks.tick", "time of one control step"),
     "row": ("benchmarks.row", "cuts in simulated rows, end to end"),
     "reach": ("benchmarks.reach", "tool poses anywhere around the robot: reached, limits, manipulability"),
+    "arm": ("benchmarks.arm", "the arm alone between random poses, beside published figures"),
     "load": ("benchmarks.load", "processor, memory and traffic of the demo"),
     "live": ("benchmarks.live", "the running demo: control periods on time, round trip, tool error"),
     "perception": ("benchmarks.perception_points", "pruning points against the truth of simulated rows"),

@@ -15,6 +15,7 @@ from benchmarks.reach_judge import POSITION, ROTATION, BaseBounds, Trajectory, g
 from controller.config import ControllerConfig
 from controller.motion import tool_error
 from controller.planning.follow import PlanFollower
+from controller.planning.goal import GOOD_OMEGA
 from controller.planning.limits import plan_limits
 from controller.planning.path import PathPlanner, Refused
 from controller.trajectory import PoseTrajectory, Rates
@@ -78,12 +79,14 @@ class Runner:
         planning = RobotModel()
         self._planner = PathPlanner(planning, CollisionModel(planning), limits, seed)
 
-    def run(self, q: Array, goal: Any, free: bool, base_fixed: bool = False) -> Outcome:
-        """From rest at a configuration (12) towards a tool pose (pin.SE3)."""
+    def run(self, q: Array, goal: Any, free: bool, base_fixed: bool = False, good_omega: float = GOOD_OMEGA) -> Outcome:
+        """From rest at a configuration (12) towards a tool pose (pin.SE3); see `PathPlanner.plan`."""
         if self._method_name == "nullspace":
             return self._straight(q, goal, free, base_fixed)
         began = time.process_time()
-        planned = self._planner.plan(q, goal, free, base_fixed, together=self._method_name == "hierarchy")
+        planned = self._planner.plan(
+            q, goal, free, base_fixed, together=self._method_name != "decoupled", good_omega=good_omega
+        )
         planned_s = time.process_time() - began
         if isinstance(planned, Refused):
             return Outcome(Trajectory(np.zeros(1), q[None], np.zeros((1, NXI))), 0, planned_s, planned.reason, True)

@@ -27,7 +27,9 @@ _SAMPLES = {False: 2048, True: 4096}
 _NEAREST = 0.25
 #: Share of the samples that leave the base where it is.
 _STAY = 0.1
-_GOOD_MARGIN, _GOOD_OMEGA = 0.35, 0.08
+_GOOD_MARGIN = 0.35
+#: Manipulability of the arm from which on more is worth no time, unless asked for.
+GOOD_OMEGA = 0.08
 #: Penalties (s) for a posture without any margin or manipulability.
 _MARGIN_COST, _OMEGA_COST = 4.0, 4.0
 _LEAST_OMEGA = 0.01
@@ -85,7 +87,14 @@ class GoalChooser:
             for v, a, j in zip(limits.arm_velocity, limits.arm_acceleration, limits.arm_jerk, strict=True)
         ]
 
-    def find(self, q: Array, T_odom_tool: Any, free_axis: bool = False, base_fixed: bool = False) -> Stands:
+    def find(
+        self,
+        q: Array,
+        T_odom_tool: Any,
+        free_axis: bool = False,
+        base_fixed: bool = False,
+        good_omega: float = GOOD_OMEGA,
+    ) -> Stands:
         """Configurations with the tool at a pose.
 
         Args:
@@ -93,8 +102,9 @@ class GoalChooser:
             T_odom_tool: Goal (pin.SE3).
             free_axis: True where the rotation about the tool's y does not matter.
             base_fixed: True where only the arm may move.
+            good_omega: Manipulability from which on more is worth no time.
         """
-        found = self._postures(q, T_odom_tool, free_axis, base_fixed)
+        found = self._postures(q, T_odom_tool, free_axis, base_fixed, good_omega)
         if isinstance(found, str):
             return Stands((), found)
         clear: list[Stand] = []
@@ -122,7 +132,7 @@ class GoalChooser:
             f"something; the best leaves {1e3 * nearest:.0f} mm between {nearest_pair[0]} and {nearest_pair[1]}",
         )
 
-    def _postures(self, q: Array, goal: Any, free_axis: bool, base_fixed: bool) -> "_Postures | str":
+    def _postures(self, q: Array, goal: Any, free_axis: bool, base_fixed: bool, good_omega: float) -> "_Postures | str":
         """Every sample's postures inside the joint limits, or why there is none."""
         u = self._samples[free_axis]
         n, ik, limits = len(u), self._ik, self._limits
@@ -165,7 +175,7 @@ class GoalChooser:
         margin = ik.margin(arm)
         time = self._time(q, base, arm)
         cost = time + _MARGIN_COST * np.maximum(0.0, 1.0 - margin / _GOOD_MARGIN) ** 2
-        cost += _OMEGA_COST * np.maximum(0.0, 1.0 - omega / _GOOD_OMEGA) ** 2
+        cost += _OMEGA_COST * (good_omega / GOOD_OMEGA * np.maximum(0.0, 1.0 - omega / good_omega)) ** 2
         return _Postures(base, arm, omega, margin, time, cost)
 
     def _headings(

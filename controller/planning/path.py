@@ -12,7 +12,7 @@ import numpy as np
 
 from controller.planning.arm_path import ArmPath, ArmPathPlanner, Blocked
 from controller.planning.base_path import BaseMotion, BasePlanner
-from controller.planning.goal import GoalChooser, Stand
+from controller.planning.goal import GOOD_OMEGA, GoalChooser, Stand
 from controller.planning.limits import PlanLimits
 from controller.planning.plan import Plan, Wait, arm_samples, assemble, orders
 from controller.whole_body.collision import Clearance, CollisionModel
@@ -71,7 +71,13 @@ class PathPlanner:
         self._goals = GoalChooser(robot, collision, limits, seed)
 
     def plan(
-        self, q: Array, T_odom_tool: Any, free_axis: bool = False, base_fixed: bool = False, together: bool = True
+        self,
+        q: Array,
+        T_odom_tool: Any,
+        free_axis: bool = False,
+        base_fixed: bool = False,
+        together: bool = True,
+        good_omega: float = GOOD_OMEGA,
     ) -> Planned | Refused:
         """A motion from rest at a configuration to rest with the tool at a pose.
 
@@ -82,10 +88,11 @@ class PathPlanner:
             free_axis: True where the rotation about the tool's y does not matter.
             base_fixed: True where only the arm may move.
             together: False to drive first, stop, and then reach.
+            good_omega: Manipulability at the goal from which on more is worth no time.
         """
         if not (np.isfinite(q).all() and np.isfinite(T_odom_tool.homogeneous).all()):
             return Refused("the start or the goal is not finite; give numbers")
-        found = self._goals.find(q, T_odom_tool, free_axis, base_fixed)
+        found = self._goals.find(q, T_odom_tool, free_axis, base_fixed, good_omega)
         reason = found.reason
         for stand in found.stands:
             planned = self.to_stand(q, stand, together)
