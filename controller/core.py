@@ -60,7 +60,7 @@ class Controller:
         self._queue = PointQueue(config)
         search = PostureSearch(RobotModel(robot_config), config)
         self._sequence = CutSequence(config, search, self._follower, self._saturation, self._queue, run_id)
-        self._teleoperation = Teleoperation(config, self._follower)
+        self._teleoperation = Teleoperation(config, self._follower, self._robot.drive)
         self._stops = StopLatch()
         self._operator = Operator(self._queue)
         self._homing: Homing | None = None
@@ -181,7 +181,7 @@ class Controller:
                 self._teleoperation.refuse()
                 self._say("warning", f"teleoperation refused: {why}")
             else:
-                self._event(Event.HOLD, now, f"{self._teleoperation.user} moves the tool")
+                self._event(Event.HOLD, now, f"{self._teleoperation.user} moves the robot")
 
     def _cause(self) -> str:
         """Why a PROTECTIVE_STOP or FAULT could not be left now; empty when its cause is gone."""

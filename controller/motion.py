@@ -11,7 +11,7 @@ from controller.config import ControllerConfig
 from controller.tool_motion import ToolMotion
 from controller.trajectory import Rates, quintic
 from controller.whole_body.saturation import Saturation
-from controller.whole_body.task import BaseMode, Demand, Method, Posture, Solution, ToolTask
+from controller.whole_body.task import ActuatorTask, BaseMode, Demand, Method, Posture, Solution, ToolTask
 from rolling_panda.differential_drive import NXI, Array
 from rolling_panda.robot_model import ARM_Q, ARM_XI, Kinematics
 
@@ -83,6 +83,25 @@ class Follower:
         motion.advance(out.scale, self._dt)
         return _tracking(out, wanted.T_odom_tool, error, motion.done)
 
+    def jog(self, xi: Array, robot: Measured) -> Tracking:
+        """One period of the actuators' own velocities ξ̇ (9, rad/s), within the limits and clear of obstacles."""
+        demand = Demand(robot.q, robot.kinematics, robot.sent, ActuatorTask(xi), Posture(robot.q), "free")
+        return _tracking(self._method.solve(demand), None, np.zeros(6), False)
+
+    def carry(self, goal: Any, linear: float, angular: float, robot: Measured) -> Tracking:
+        """One period with the tool kept to a pose while the base moves under it, as far as the arm allows.
+
+        Args:
+            goal: T_odom_tool wanted (pin.SE3).
+            linear: Forward velocity of the base (m/s).
+            angular: Its yaw rate (rad/s).
+            robot: Measured robot.
+        """
+        rate = np.zeros(len(robot.q))
+        heading = float(robot.q[2])
+        rate[:3] = linear * math.cos(heading), linear * math.sin(heading), angular
+        return self._towards(goal, Posture(robot.q, rate), robot, "row")
+
     def seek(self, goal: Any, q_goal: Array, robot: Measured, base: BaseMode = "free") -> Tracking:
         """One period towards a pose that may move (teleoperation): proportional, at a bounded speed and turn.
 
@@ -92,20 +111,23 @@ class Follower:
             robot: Measured robot.
             base: What the base is for.
         """
+        posture = q_goal.copy()
+        posture[:2] = robot.q[:2]
+        return self._towards(goal, Posture(posture), robot, base)
+
+    def _towards(self, goal: Any, posture: Posture, robot: Measured, base: BaseMode) -> Tracking:
         error = tool_error(robot.kinematics.T_odom_tool, goal)
         twist = self._gains * error
         for part, bound in ((slice(0, 3), self._config.teleop_speed), (slice(3, 6), self._config.teleop_turn)):
             size = _length(twist[part])
             if size > bound:
                 twist[part] *= bound / size
-        posture = q_goal.copy()
-        posture[:2] = robot.q[:2]
         demand = Demand(
             robot.q,
             robot.kinematics,
             robot.sent,
             ToolTask(twist, keep_path=False),
-            Posture(posture),
+            posture,
             base,
             self._config.teleop_speed,
         )

@@ -1,4 +1,6 @@
-"""Hold-to-run: the tool follows the gizmo only while it is held."""
+"""Hold-to-run: the robot does what the operator holds it to, and only while they hold."""
+
+from typing import Any
 
 import numpy as np
 
@@ -6,42 +8,62 @@ from controller.config import ControllerConfig
 from controller.interface import Sample
 from controller.motion import Follower, Measured, Tracking
 from rolling_panda import messages as m
-from rolling_panda.differential_drive import Array
+from rolling_panda.differential_drive import NXI, Array, DifferentialDrive
 from rolling_panda.errors import ModelError
-from rolling_panda.robot_model import placement
+from rolling_panda.robot_model import ARM_XI, placement
 
 
 class Teleoperation:
-    """Watches the hold and follows its target. A hold must be pressed anew after anything else has ended it."""
+    """Watches the hold and follows it. A hold must be pressed anew after anything else has ended it."""
 
-    def __init__(self, config: ControllerConfig, follower: Follower) -> None:
+    def __init__(self, config: ControllerConfig, follower: Follower, drive: DifferentialDrive) -> None:
         """Bind the parts."""
-        self._config, self._follower = config, follower
+        self._config, self._follower, self._drive = config, follower, drive
         self._posture: Array = np.concatenate([[0.0, 0.0, config.row_heading, 0.0, 0.0], config.reach])
-        self._goal: object = None
-        self._target: m.Pose | None = None
+        self._message: m.TeleopTarget | None = None
+        self._goal: Any = None
         self.pressed = True
         self.user = ""
 
     def holding(self, teleop: Sample[m.TeleopTarget] | None, now: float) -> bool:
-        """Whether the operator holds now: the newest target says so and is fresh."""
+        """Whether the operator holds now: the newest demand says so, is fresh, and is one that can be followed."""
         held = teleop is not None and teleop.message.hold and now - teleop.at <= self._config.hold_max_age_s
         if teleop is None or not held:
             self.pressed = True
             return False
-        if teleop.message.target is not self._target:
-            self._target = teleop.message.target
-            try:
-                self._goal = placement(self._target)
-            except ModelError:
-                self._goal = None
-        self.user = teleop.message.user
-        return self._goal is not None
+        message = teleop.message
+        if message is not self._message:
+            self._message, self._goal = message, None
+            if message.target is not None:
+                try:
+                    self._goal = placement(message.target)
+                except ModelError:
+                    self._message = None
+        self.user = message.user
+        return self._message is not None and _means_something(message)
 
     def refuse(self) -> None:
         """What is held now counts no more; it must be released first."""
         self.pressed = False
 
     def step(self, robot: Measured) -> Tracking:
-        """One period towards the target."""
-        return self._follower.seek(self._goal, self._posture, robot, self._config.teleop_base)
+        """One period of what is held."""
+        message = self._message
+        assert message is not None
+        xi = np.zeros(NXI)
+        if message.joints is not None:
+            xi[ARM_XI] = message.joints
+            return self._follower.jog(xi, robot)
+        if self._goal is None:
+            assert message.base is not None
+            xi[:2] = self._drive.wheels(message.base.linear, message.base.angular)
+            return self._follower.jog(xi, robot)
+        if message.base is None:
+            return self._follower.seek(self._goal, self._posture, robot, self._config.teleop_base)
+        return self._follower.carry(self._goal, message.base.linear, message.base.angular, robot)
+
+
+def _means_something(message: m.TeleopTarget) -> bool:
+    """Either a tool target or a base velocity or both, or joint velocities alone."""
+    tool_or_base = message.target is not None or message.base is not None
+    return tool_or_base != (message.joints is not None)

@@ -18,6 +18,7 @@ from server import requests as body
 from server.desk import Desk, Result
 from server.page_view import addressed
 from server.sessions import Session
+from server.teleop import Aim
 
 PointId = Annotated[str, body.POINT_ID]
 
@@ -107,15 +108,22 @@ def operator_router(desk: Desk) -> APIRouter:
 
     @router.post("/teleop", tags=["teleoperation"])
     async def teleop(session: Caller, request: body.Teleop) -> Response:
-        """Hold the tool to a target (T_odom_tool) for the next 150 ms; repeat to keep holding.
+        """Hold the robot to a tool target (T_odom_tool), a base velocity or joint velocities for the next 150 ms.
+
+        Repeat to keep holding.
 
         Only while the caller also fetches `GET /api/state` at least twice a second: who does not look may not move.
         """
         if not request.hold:
             desk.let_go(session)
             return answer(Result(200, True, "released"))
-        if request.target is not None:
-            desk.teleop.aim(session.session_id, m.Pose(request.target.position, request.target.quat_xyzw))
+        aim = Aim(
+            None if request.target is None else m.Pose(request.target.position, request.target.quat_xyzw),
+            None if request.base is None else m.BaseVelocity(request.base.linear, request.base.angular),
+            request.joints,
+        )
+        if aim != Aim():
+            desk.teleop.want(session.session_id, aim)
         return answer(desk.hold(session, time.monotonic()))
 
     @router.get("/state", tags=["state"], responses=_schema("PageState"))

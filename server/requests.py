@@ -3,7 +3,7 @@
 from typing import Annotated, Any
 
 from fastapi import Path
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from rolling_panda.page_messages import Role
 
@@ -78,11 +78,44 @@ class Target(_JsonTuples):
         return value
 
 
-class Teleop(_Body):
-    """Hold, and where to; without a target the last one stays."""
+class BaseVelocity(_Body):
+    """Forward velocity (m/s) and yaw rate (rad/s)."""
+
+    linear: Annotated[float, Field(ge=-2.0, le=2.0)]
+    angular: Annotated[float, Field(ge=-4.0, le=4.0)]
+
+
+_JointVelocity = Annotated[float, Field(ge=-10.0, le=10.0)]
+
+
+class Teleop(_JsonTuples):
+    """Hold, and what for; with none of the three the last demand stays.
+
+    `target`: the tool goes there. With `base` too: the tool keeps to it while the base moves. `base` alone: the base
+    drives, the arm stands. `joints` alone (rad/s): joints turn, the base stands.
+    """
 
     hold: bool
     target: Target | None = None
+    base: BaseVelocity | None = None
+    joints: (
+        tuple[
+            _JointVelocity,
+            _JointVelocity,
+            _JointVelocity,
+            _JointVelocity,
+            _JointVelocity,
+            _JointVelocity,
+            _JointVelocity,
+        ]
+        | None
+    ) = None
+
+    @model_validator(mode="after")
+    def _fits(self) -> "Teleop":
+        if self.joints is not None and (self.target is not None or self.base is not None):
+            raise ValueError("joints are turned alone: leave out target and base")
+        return self
 
 
 class Invite(_Body):

@@ -10,12 +10,21 @@ from server.config import ServerConfig
 _RELEASES = 5
 
 
+@dataclass(frozen=True)
+class Aim:
+    """What a holder wants of the robot, as in `TeleopTarget`."""
+
+    target: m.Pose | None = None
+    base: m.BaseVelocity | None = None
+    joints: m.ArmVelocities | None = None
+
+
 @dataclass
 class _Hold:
     holder: str
     user: str
     renewed_at: float
-    target: m.Pose | None
+    aim: Aim
 
 
 class TeleopHold:
@@ -32,7 +41,7 @@ class TeleopHold:
         self._ended: _Hold | None = None
         self._releases = 0
         self._sequence = 0
-        self._targets: dict[str, m.Pose] = {}
+        self._aims: dict[str, Aim] = {}
         self._drawn_at: dict[str, float] = {}
 
     @property
@@ -46,9 +55,13 @@ class TeleopHold:
 
     def aim(self, holder: str, target: m.Pose) -> None:
         """Set where this holder's gizmo is; the newest wins."""
-        self._targets[holder] = target
+        self.want(holder, Aim(target))
+
+    def want(self, holder: str, aim: Aim) -> None:
+        """Set what this holder wants; the newest wins."""
+        self._aims[holder] = aim
         if self._hold is not None and self._hold.holder == holder:
-            self._hold.target = target
+            self._hold.aim = aim
 
     def hold(self, holder: str, user: str, now: float) -> None:
         """Start or renew a hold.
@@ -62,10 +75,10 @@ class TeleopHold:
         age = now - self._drawn_at.get(holder, float("-inf"))
         if age > self._config.view_timeout_s:
             raise InputError("the view of the robot is not current; teleoperation needs one younger than 0.5 s")
-        if holder not in self._targets:
+        if holder not in self._aims:
             raise InputError("there is no target yet; show the gizmo first")
         if self._hold is None:
-            self._hold = _Hold(holder, user, now, self._targets[holder])
+            self._hold = _Hold(holder, user, now, self._aims[holder])
         self._hold.renewed_at = now
 
     def release(self, holder: str) -> bool:
@@ -74,13 +87,13 @@ class TeleopHold:
             return False
         self._ended, self._hold = self._hold, None
         self._releases = _RELEASES
-        self._targets.pop(holder, None)
+        self._aims.pop(holder, None)
         return True
 
     def forget(self, holder: str) -> bool:
         """The holder has gone: end the hold and drop what is known of it; True when they were holding."""
         held = self.release(holder)
-        self._targets.pop(holder, None)
+        self._aims.pop(holder, None)
         self._drawn_at.pop(holder, None)
         return held
 
@@ -98,15 +111,21 @@ class TeleopHold:
     def due(self, now: float) -> m.TeleopTarget | None:
         """What to publish at this tick: the held target, an end of hold, or nothing."""
         self.expire(now)
-        if self._hold is not None and self._hold.target is not None:
-            self._sequence += 1
-            return _message(self._sequence, True, self._hold.user, self._hold.target)
-        if self._releases > 0 and self._ended is not None and self._ended.target is not None:
+        if self._hold is not None:
+            return self._message(True, self._hold)
+        if self._releases > 0 and self._ended is not None:
             self._releases -= 1
-            self._sequence += 1
-            return _message(self._sequence, False, self._ended.user, self._ended.target)
+            return self._message(False, self._ended)
         return None
 
-
-def _message(sequence: int, hold: bool, user: str, target: m.Pose) -> m.TeleopTarget:
-    return m.TeleopTarget(sequence=sequence, hold=hold, user=user, target=target)
+    def _message(self, holds: bool, hold: _Hold) -> m.TeleopTarget:
+        self._sequence += 1
+        aim = hold.aim
+        return m.TeleopTarget(
+            sequence=self._sequence,
+            hold=holds,
+            user=hold.user,
+            target=aim.target,
+            base=aim.base,
+            joints=aim.joints,
+        )

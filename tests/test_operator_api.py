@@ -198,6 +198,24 @@ def test_a_script_can_move_the_tool_only_while_it_looks(server, client):
     eventually(lambda: not sent[-1].hold)
 
 
+def test_base_and_joints_can_be_moved_too_but_not_together(server, client):
+    sent = server.wire.sent[topics.TELEOP.name]
+
+    def moving(**wanted):
+        client.get("/api/state")
+        assert client.post("/api/teleop", json={"hold": True, **wanted}).status_code == 200
+        return sent and sent[-1].hold and sent[-1]
+
+    base = eventually(lambda: moving(base={"linear": 0.1, "angular": -0.2}))
+    assert (base.target, base.base, base.joints) == (None, m.BaseVelocity(0.1, -0.2), None)
+    jog = eventually(lambda: (got := moving(joints=[0, 0, 0.1, 0, 0, 0, 0])) and got.joints and got)
+    assert jog.joints == (0, 0, 0.1, 0, 0, 0, 0) and jog.base is None
+    both = {"hold": True, "joints": [0] * 7, "base": {"linear": 0.1, "angular": 0.0}}
+    assert client.post("/api/teleop", json=both).status_code == 422
+    fast = {"hold": True, "base": {"linear": 5.0, "angular": 0.0}}
+    assert client.post("/api/teleop", json=fast).status_code == 422
+
+
 def test_letting_go_by_rest_ends_the_hold(server, client):
     target = {"position": [0.3, 0.5, 1.0], "quat_xyzw": [0, 0, 0, 1]}
     sent = server.wire.sent[topics.TELEOP.name]

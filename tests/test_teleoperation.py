@@ -1,7 +1,9 @@
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 import pinocchio as pin
+import pytest
 
 from benchmarks.kinematic_robot import KinematicRobot
 from controller.config import ControllerConfig
@@ -15,8 +17,9 @@ from rolling_panda.robot_model import pose_message
 CONFIG = ControllerConfig()
 
 
-def robot(armed=True):
-    r = KinematicRobot(Controller(CONFIG, RobotConfig()), CONFIG.home)
+def robot(armed=True, method=CONFIG.method):
+    config = msgspec.structs.replace(CONFIG, method=method)
+    r = KinematicRobot(Controller(config, RobotConfig()), CONFIG.home)
     r.run(0.05)
     if armed:
         assert r.ask(intents.Arm(user="ada")).ok
@@ -123,3 +126,63 @@ def test_joint_limits_hold_when_the_gizmo_is_out_of_reach():
     assert (arm > limits.lower[5:]).all() and (arm < limits.upper[5:]).all()
     xi = np.array(r.record)
     assert (np.abs(np.diff(xi, axis=0)) <= limits.acceleration * r.dt + 1e-9).all()
+
+
+def held(r, **wanted):
+    r.teleop = m.TeleopTarget(sequence=1, hold=True, user="ada", **wanted)
+
+
+@pytest.mark.parametrize("method", ["hierarchy", "nullspace"])
+def test_joints_are_turned_alone_and_stop_before_their_limits(method):
+    r = robot(method=method)
+    before = r.q.copy()
+    held(r, joints=(0.0, 0.0, 0.0, 0.0, 0.0, 0.3, 0.0))
+    r.run(1.0)
+    turned = r.q - before
+    assert 0.2 < turned[10] < 0.3
+    assert np.abs(np.delete(turned, 10)).max() < 1e-6
+    r.run(20.0)
+    assert r.q[10] < r.model.limits.upper[10]
+    assert r.state.mode == "TELEOP"
+
+
+def test_a_joint_velocity_beyond_the_limits_is_slowed_not_refused():
+    r = robot()
+    held(r, joints=(0.0, 0.0, 0.0, 0.0, 9.0, 0.0, 9.0))
+    r.run(0.5)
+    fastest = np.abs(np.array(r.record)).max(axis=0)
+    assert (fastest <= r.model.limits.velocity + 1e-9).all()
+    assert fastest[8] > 0.5 and np.isclose(fastest[6], fastest[8], rtol=0.05), "both slowed alike"
+
+
+def test_the_base_is_driven_with_the_arm_still():
+    r = robot()
+    arm = r.q[5:].copy()
+    held(r, base=m.BaseVelocity(0.2, 0.0))
+    r.run(2.0)
+    assert 0.25 < r.q[0] < 0.42
+    assert np.abs(r.q[5:] - arm).max() < 1e-6
+    held(r, base=m.BaseVelocity(0.0, 0.15))
+    r.run(2.0)
+    assert 0.15 < r.q[2] < 0.31
+
+
+def test_the_base_moves_under_a_tool_that_stays():
+    r = robot()
+    start = tool(r)
+    held(r, target=pose_message(start), base=m.BaseVelocity(-0.1, 0.0))
+    r.run(1.5)
+    assert r.q[0] < -0.08
+    assert np.linalg.norm(tool(r).translation - start.translation) < 0.003
+    assert np.linalg.norm(pin.log3(tool(r).rotation.T @ start.rotation)) < 0.01
+    # As far as the arm allows: the tool comes first.
+    r.run(20.0)
+    assert np.linalg.norm(tool(r).translation - start.translation) < 0.01
+
+
+def test_a_demand_for_nothing_or_for_two_things_moves_nothing():
+    for wanted in ({}, {"joints": (0.2,) * 7, "base": m.BaseVelocity(0.1, 0.0)}):
+        r = robot()
+        held(r, **wanted)
+        r.run(0.3)
+        assert r.state.mode == "READY" and not np.any(r.record)

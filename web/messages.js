@@ -47,6 +47,8 @@ export const TEXT_MAX_LENGTH = 500;
 
 /** @typedef {"background"|"ground"|"post"|"trunk"|"cordon"|"spur"|"cane"|"node"|"wire"} WoodClass */
 
+/** @typedef {[number, number, number, number, number, number, number]} ArmVelocities */
+
 /** @typedef {"viewer"|"operator"|"supervisor"} Role */
 
 /**

@@ -17,7 +17,7 @@ from controller.whole_body.box import Bounds, Box
 from controller.whole_body.cascade import Answer, Cascade, Problem, given_up
 from controller.whole_body.guards.axle import AxleAhead
 from controller.whole_body.manipulability import ArmManipulability, Manipulability
-from controller.whole_body.task import Demand, Guard, Inequalities, Solution
+from controller.whole_body.task import ActuatorTask, Demand, Guard, Inequalities, Solution
 from controller.whole_body.tasks.arm_posture import ArmPosture
 from controller.whole_body.tasks.base_reference import BaseReference
 from controller.whole_body.tasks.joint_centre import JointCentre
@@ -67,7 +67,7 @@ class Hierarchy:
             settings.manipulability, config.gain_manipulability, settings.good_manipulability
         )
         self.guards: tuple[Guard, ...] = (AxleAhead(settings.axle_ahead, settings.axle_rate), *guards)
-        self._nothing = np.zeros(6)
+        self._nothing = np.zeros(NXI)
         self._wheel_rows = np.zeros((2, NXI))
         self._wheel_rows[:, :2] = self._actuation.wheels
         self._rise = settings.clock_rise * dt
@@ -120,7 +120,9 @@ class Hierarchy:
         self._tasks = tuple(places)
 
     def _tool(self, demand: Demand) -> tuple[Array, Array]:
-        """J over ν and the wanted twist, weighted by the tool's limits."""
+        """J over ν and what is wanted of J ν, weighted by the limits of the tool or of the actuators themselves."""
+        if isinstance(demand.tool, ActuatorTask):
+            return np.diag(1.0 / self._box.speed), self._actuation.nu(demand.tool.xi) / self._box.speed
         J = self._actuation.rows(demand.kinematics.J_xi)
         twist = demand.tool.twist
         if demand.tool.free_axis:
@@ -209,6 +211,8 @@ class Hierarchy:
 
 def _share(demand: Demand) -> float:
     """How much of the wanted twist the speed cap allows, 0…1."""
+    if isinstance(demand.tool, ActuatorTask):
+        return 1.0
     linear = demand.tool.twist[:3]
     speed = math.sqrt(float(linear @ linear))
     return max(demand.speed_cap, 0.0) / speed if speed > demand.speed_cap else 1.0

@@ -19,7 +19,7 @@ from controller.whole_body.actuation import Actuation
 from controller.whole_body.joint_limits import LimitRepulsion
 from controller.whole_body.manipulability import ArmManipulability
 from controller.whole_body.saturation import Saturation
-from controller.whole_body.task import Demand, Solution
+from controller.whole_body.task import ActuatorTask, Demand, Solution
 from rolling_panda.differential_drive import NXI, Array
 from rolling_panda.robot_model import ARM_Q, ARM_XI, RobotModel
 
@@ -65,6 +65,8 @@ class Nullspace:
 
     def _wanted(self, demand: Demand, gradient: Array) -> Array | None:
         """ξ̇ (9) before any limit; None where the equations have no finite answer."""
+        if isinstance(demand.tool, ActuatorTask):
+            return demand.tool.xi
         config, J = self._config, demand.kinematics.J_xi
         frozen = demand.base == "frozen"
         W_inv = self._frozen_weight if frozen else self._inverse_weight

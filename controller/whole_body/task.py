@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import ClassVar, Literal, Protocol
 
 import numpy as np
 
@@ -35,6 +35,18 @@ class ToolTask:
 
 
 @dataclass(frozen=True)
+class ActuatorTask:
+    """First priority instead of the tool's: the actuators' own velocities, slowed as a whole where they do not fit.
+
+    Attributes:
+        xi: ξ̇ wanted (9, rad/s).
+    """
+
+    xi: Array
+    keep_path: ClassVar[bool] = True
+
+
+@dataclass(frozen=True)
 class Posture:
     """Where base and arm should be, as far as the tool lets them.
 
@@ -57,7 +69,7 @@ class Demand:
         q: Configuration (12).
         kinematics: Of the tool at q.
         sent: ξ̇ sent last (9).
-        tool: First priority.
+        tool: First priority: the tool's twist, or the actuators' own velocities.
         posture: Last priority.
         base: What the base is for.
         speed_cap: Largest speed of the tool's origin (m/s).
@@ -67,7 +79,7 @@ class Demand:
     q: Array
     kinematics: Kinematics
     sent: Array
-    tool: ToolTask
+    tool: ToolTask | ActuatorTask
     posture: Posture
     base: BaseMode = "row"
     speed_cap: float = math.inf
@@ -76,10 +88,11 @@ class Demand:
     @property
     def finite(self) -> bool:
         """Whether every number that a method uses is finite."""
-        posture, J = self.posture, self.kinematics.J
+        posture, J, tool = self.posture, self.kinematics.J, self.tool
+        wanted = tool.twist if isinstance(tool, ToolTask) else tool.xi
         # A square that overflows belongs to a number that is of no use either.
         total = float(np.vdot(self.q, self.q) + np.vdot(self.sent, self.sent) + np.vdot(J, J))
-        total += float(np.vdot(self.tool.twist, self.tool.twist) + np.vdot(posture.q, posture.q))
+        total += float(np.vdot(wanted, wanted) + np.vdot(posture.q, posture.q))
         total += float(np.vdot(posture.rate, posture.rate))
         return math.isfinite(total) and not math.isnan(self.speed_cap + self.scale)
 
