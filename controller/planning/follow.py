@@ -48,7 +48,7 @@ class PlanFollower:
     @property
     def done(self) -> bool:
         """True when the clock has reached the plan's end; the tool may still be coming."""
-        return self.time >= self._plan.duration
+        return self.time >= self._plan.duration - 1e-6 * self._dt
 
     def step(self, q: Array, kinematics: Kinematics, sent: Array) -> Solution:
         """One period: what to send.
