@@ -234,6 +234,13 @@ def test_the_view_costs_what_the_browser_can_draw(
     assert view.evaluate("new URLSearchParams(location.search).get('fixedDpr')") == ratio
     drawn = "document.createElement('canvas').getContext('webgl2', {antialias: true}).getContextAttributes().antialias"
     assert view.evaluate(drawn) is smooth
+    frames = view.evaluate(
+        "new Promise((done) => { let count = 0; const draw = () => { count += 1; requestAnimationFrame(draw); };"
+        "  requestAnimationFrame(draw); cancelAnimationFrame(requestAnimationFrame(() => { count += 1000; }));"
+        "  setTimeout(() => done(count), 1500); })"
+    )
+    assert (frames > 25) is smooth, f"{frames} pictures in 1.5 s"
+    assert 5 < frames < 1000
     context.close()
 
 

@@ -5,6 +5,8 @@
   const LARGEST_RATIO = 1.5;
   /** Without a graphics card every pixel is work. With fewer than this the canes become dashes. */
   const LARGEST_RATIO_IN_SOFTWARE = 1;
+  /** Time between two pictures drawn in software (ms). The page's buttons share the thread that waits for them. */
+  const PACE_IN_SOFTWARE = 80;
 
   const plainContext = HTMLCanvasElement.prototype.getContext;
 
@@ -36,5 +38,43 @@
       return plainContext.call(this, kind, kind.startsWith("webgl") ? { ...options, antialias: false } : options);
     };
     HTMLCanvasElement.prototype.getContext = /** @type {any} */ (getContext);
+    paceFrames(PACE_IN_SOFTWARE);
+  }
+
+  /**
+   * Let pictures be drawn no more often than this, so that a press is handled between two of them.
+   *
+   * @param {number} pace In ms.
+   */
+  function paceFrames(pace) {
+    const plainRequest = window.requestAnimationFrame.bind(window);
+    const plainCancel = window.cancelAnimationFrame.bind(window);
+    /** @type {Map<number, { timer: number, frame: number }>} */
+    const waiting = new Map();
+    let issued = 0;
+    let drawn = -pace;
+    window.requestAnimationFrame = (callback) => {
+      const number = ++issued;
+      const entry = { timer: 0, frame: 0 };
+      waiting.set(number, entry);
+      entry.timer = window.setTimeout(
+        () => {
+          entry.frame = plainRequest((now) => {
+            waiting.delete(number);
+            drawn = performance.now();
+            callback(now);
+          });
+        },
+        Math.max(0, drawn + pace - performance.now()),
+      );
+      return number;
+    };
+    window.cancelAnimationFrame = (number) => {
+      const entry = waiting.get(number);
+      if (!entry) return;
+      window.clearTimeout(entry.timer);
+      plainCancel(entry.frame);
+      waiting.delete(number);
+    };
   }
 }
