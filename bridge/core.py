@@ -222,7 +222,7 @@ class BridgeCore:
             frame,
             scenery,
             tuple(
-                m.LogEvent(header=m.Header(now), process="bridge", severity=severity, text=text)
+                m.LogEvent(header=m.Header(now), process="bridge", severity=severity, text=text[:500])
                 for severity, text in events
             ),
         )

@@ -127,7 +127,9 @@ class Controller:
         if refused:
             self._say("warning", f"{intent.user}: {what} refused: {refused}")
             return m.Answer(ok=False, reason=refused[:500])
-        self._say("info", f"{intent.user}: {self._operator.told(intent)}")
+        told = self._operator.told(intent)
+        if told:
+            self._say("info", f"{intent.user}: {told}")
         return m.Answer(ok=True)
 
     # --- inputs and supervision --------------------------------------------------------------------------------------
@@ -292,7 +294,7 @@ class Controller:
                 return "no point is accepted"
             return safety.perception(self._health, self._config)
         if isinstance(intent, intents.Home) and mode != "READY":
-            return f"the arm is brought home in READY; the robot is in {mode}"
+            return f"the arm is brought home in READY; the mode is {mode}"
         return ""
 
     def _do(self, intent: intents.Intent, now: float) -> str:

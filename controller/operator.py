@@ -23,16 +23,15 @@ class Operator:
         return f"{type(intent).__name__} is not something this controller does"
 
     def told(self, intent: intents.Intent) -> str:
-        """The log's words for what was done."""
+        """The log's words for what was done; empty where the change of mode that comes of it is logged."""
         if isinstance(intent, intents.AcceptPoint):
             return f"accepted {intent.point_id}, revision {intent.revision}"
         if isinstance(intent, intents.RejectPoint):
             return f"rejected {intent.point_id}{f': {intent.reason}' if intent.reason else ''}"
         if isinstance(intent, intents.AcceptAll):
-            return f"accepted {self._accepted} points of confidence {intent.confidence:.2f} and more"
-        if isinstance(intent, intents.Reset):
-            return f"Reset: {intent.reason}"
-        return type(intent).__name__
+            points = "1 point" if self._accepted == 1 else f"{self._accepted} points"
+            return f"accepted {points} of confidence {intent.confidence:.2f} and more"
+        return "home" if isinstance(intent, intents.Home) else ""
 
     def _accept_all(self, intent: intents.AcceptAll) -> str:
         points = self._queue.proposed(intent.confidence)

@@ -79,9 +79,11 @@ class Loop:
         self._publish(now)
         shown = frozenset(point.point_id for point in result.points.points)
         if shown - self._shown:
-            self._tell("info", f"{len(shown - self._shown)} new pruning points, {len(shown)} in all", now)
+            new = len(shown - self._shown)
+            self._tell("info", f"{new} new pruning point{'' if new == 1 else 's'}, {len(shown)} in all", now)
         for text in result.withdrawn:
-            self._tell("warning", text, now)
+            # Mostly since it was cut. Where somebody had accepted it, the controller warns.
+            self._tell("info", text, now)
         self._shown = shown
 
     def _refuse(self, reason: str, now: float) -> None:

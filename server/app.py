@@ -7,14 +7,15 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
+from starlette.routing import Match, Mount
 from starlette.staticfiles import StaticFiles
-from starlette.types import ASGIApp
+from starlette.types import ASGIApp, Scope
 
 from rolling_panda import __version__
 from rolling_panda.page_messages import PageEvents, PagePoints, PageState
 from rolling_panda.resources import resource
 from server.desk import Desk, Result
-from server.guard import Guard
+from server.guard import Guard, is_protected
 from server.operator_api import answer, operator_router
 from server.pages import pages_router
 from server.sessions import Session
@@ -23,7 +24,8 @@ from server.viser_proxy import viser_router
 
 _ABOUT = (
     "Everything that the page can do. Sign in with `POST /api/sign-in` and the token of a sign-in link, keep the "
-    "cookie, and send an `Origin` header with the server's own address on every POST. "
+    "cookie, and send an `Origin` header with the server's own address on every POST. A link signs in once; "
+    "`POST /api/invite` makes another one for a script. Requests without fields do not read their body. "
     "Units are SI; frames follow REP-105."
 )
 
@@ -40,6 +42,13 @@ class _Application(FastAPI):
         return document
 
 
+class _PageFiles(Mount):
+    """The page's files. Under the paths of the API there are none, so what is asked there is not theirs to refuse."""
+
+    def matches(self, scope: Scope) -> tuple[Match, Scope]:
+        return (Match.NONE, {}) if is_protected(scope["path"]) else super().matches(scope)
+
+
 def create_app(desk: Desk, origins: frozenset[str]) -> ASGIApp:
     """The guarded application; `origins` are the exact origins that the page may have."""
     web = resource("web")
@@ -50,6 +59,7 @@ def create_app(desk: Desk, origins: frozenset[str]) -> ASGIApp:
         openapi_url="/api/openapi.json",
         docs_url=None,
         redoc_url=None,
+        redirect_slashes=False,
     )
 
     def dropped(session: Session, kind: str) -> None:
@@ -59,7 +69,7 @@ def create_app(desk: Desk, origins: frozenset[str]) -> ASGIApp:
     app.include_router(operator_router(desk))
     app.include_router(pages_router(desk))
     app.include_router(viser_router(desk.scene, dropped))
-    app.mount("/", StaticFiles(directory=web), name="web")
+    app.router.routes.append(_PageFiles("/", StaticFiles(directory=web), name="web"))
     app.add_exception_handler(RequestValidationError, _invalid)
     app.add_exception_handler(HTTPException, _failed)
     return Guard(

@@ -85,7 +85,7 @@ class Desk:
             self.teleop.drew(session.session_id, self._made_at[-1][1])
 
     async def ask(self, session: Session, intent: intents.Intent) -> Result:
-        """Ask the controller, and log why it refused."""
+        """Ask the controller, which logs what it does or why it refuses."""
         name = type(intent).__name__
         if not session.may_operate:
             return Result(403, False, f"a {session.role} may look and stop, not operate")
@@ -94,10 +94,7 @@ class Desk:
         except ServiceError as error:
             self.note("error", f"{name} by {session.user}: no answer from the controller")
             return Result(503, False, f"The controller does not answer: {error}")
-        if not answer.ok:
-            self.note("warning", f"{name} by {session.user} refused: {answer.reason}")
-            return Result(409, False, answer.reason)
-        return Result(200, True, answer.reason)
+        return Result(200 if answer.ok else 409, answer.ok, answer.reason)
 
     async def stop(self, session: Session, reason: str) -> Result:
         """Send the software stop at once and wait for the bridge to confirm its latch."""

@@ -13,7 +13,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from server.sessions import Session, Sessions
 
-_PUBLIC = frozenset({"/api/sign-in", "/api/health"})
+_PUBLIC = frozenset({"/api/sign-in", "/api/health", "/api/openapi.json"})
+#: Requests whose body only labels them: one that is too long is left out, and the request goes on.
+_LABELLED = frozenset({"/api/stop"})
 _PROTECTED = ("/api", "/camera", "/viser", "/ws")
 _SAFE_METHODS = frozenset({"GET", "HEAD"})
 
@@ -71,10 +73,12 @@ class Guard:
             await _refuse(with_headers, 403, "this request does not come from the page of this server (Origin)")
             return
         session = self.session(scope)
-        if session is None and path not in _PUBLIC and _is_protected(path):
+        if session is None and path not in _PUBLIC and is_protected(path):
             await _refuse(with_headers, 401, "sign in first: open the sign-in link of this server")
             return
         body = await _read_body(receive, self._max_body)
+        if body is None and path in _LABELLED:
+            body = b""
         if body is None:
             await _refuse(with_headers, 413, f"a request body has at most {self._max_body} bytes")
             return
@@ -125,7 +129,8 @@ class _Replay:
         return {"type": "http.request", "body": body, "more_body": False}
 
 
-def _is_protected(path: str) -> bool:
+def is_protected(path: str) -> bool:
+    """Does this path need a session, unless it is one of the few public ones?"""
     return any(path == root or path.startswith(root + "/") for root in _PROTECTED)
 
 
@@ -158,4 +163,4 @@ def _add_headers(headers: MutableHeaders, path: str) -> None:
     headers["Referrer-Policy"] = "same-origin"
     headers["Cross-Origin-Opener-Policy"] = "same-origin"
     headers["Cross-Origin-Resource-Policy"] = "same-origin"
-    headers.setdefault("Cache-Control", "no-store" if _is_protected(path) else "no-cache")
+    headers.setdefault("Cache-Control", "no-store" if is_protected(path) else "no-cache")

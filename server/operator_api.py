@@ -1,7 +1,7 @@
 """REST for everything an operator can do, so that a script can be the operator.
 
 A script signs in as a page does: `POST /api/sign-in` with a single-use token, keep the cookie, and send an `Origin`
-header with the server's own address on every POST.
+header with the server's own address on every POST. `POST /api/invite` makes the token of another one.
 """
 
 import time
@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import msgspec
 from fastapi import APIRouter, Depends, HTTPException, Query, Request, Response
 from fastapi.responses import JSONResponse
+from pydantic import BaseModel
 
 from rolling_panda import intents
 from rolling_panda import messages as m
@@ -94,10 +95,13 @@ def operator_router(desk: Desk) -> APIRouter:
         """Acknowledge a protective stop or a fault whose cause has gone."""
         return await ask(session, intents.Acknowledge(user=session.user))
 
-    @router.post("/stop", tags=["mode"])
-    async def stop(session: Caller, request: body.Stop) -> Response:
-        """Software stop, by every role. It goes straight to bridge and controller; 503 = the bridge did not confirm."""
-        return answer(await desk.stop(session, request.reason))
+    @router.post("/stop", tags=["mode"], openapi_extra=_described(body.Stop))
+    async def stop(session: Caller, request: Request) -> Response:
+        """Software stop, by every role. It goes straight to bridge and controller; 503 = the bridge did not confirm.
+
+        Without a body, or with one that cannot be read, it stops all the same.
+        """
+        return answer(await desk.stop(session, body.Stop.read(await request.body()).reason))
 
     @router.post("/reset", tags=["mode"])
     async def reset(session: Caller, request: body.Reset) -> Response:
@@ -169,6 +173,11 @@ def answer(result: Result) -> JSONResponse:
 
 def _json(message: msgspec.Struct) -> Response:
     return Response(msgspec.json.encode(message), media_type="application/json")
+
+
+def _described(kind: type[BaseModel]) -> dict[str, Any]:
+    """The body of a request that reads it by itself, for the description."""
+    return {"requestBody": {"content": {"application/json": {"schema": kind.model_json_schema()}}}}
 
 
 def _schema(name: str) -> dict[int | str, dict[str, Any]]:

@@ -1,5 +1,6 @@
 """Bodies of the REST requests: strict, bounded, no unknown field, no NaN."""
 
+import json
 from typing import Annotated, Any
 
 from fastapi import Path
@@ -9,6 +10,8 @@ from rolling_panda.page_messages import Role
 
 #: As `rolling_panda.messages.Name`.
 POINT_ID: Any = Path(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9_.:\-]+$")
+#: Leaves room for who stopped the robot in a log line of 500 characters.
+STOP_REASON_LENGTH = 400
 _Text = Annotated[str, Field(max_length=500)]
 _Metre = Annotated[float, Field(ge=-1e4, le=1e4)]
 _Unit = Annotated[float, Field(ge=-1.001, le=1.001)]
@@ -52,9 +55,20 @@ class AcceptAll(_Body):
 
 
 class Stop(_Body):
-    """Why."""
+    """Why, for the log. The stop never fails over it: what is too long is cut, what cannot be read is left out."""
 
-    reason: _Text = "software stop"
+    reason: str = "software stop"
+
+    @classmethod
+    def read(cls, content: bytes) -> "Stop":
+        """The stop that a body asks for, whatever it holds."""
+        try:
+            told = json.loads(content)["reason"]
+        except (ValueError, RecursionError, LookupError, TypeError):
+            return cls()
+        # A lone surrogate is JSON, but no text that could be sent on.
+        text = told.encode(errors="replace").decode() if isinstance(told, str) else ""
+        return cls(reason=text[:STOP_REASON_LENGTH]) if text else cls()
 
 
 class Reset(_Body):

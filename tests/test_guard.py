@@ -40,7 +40,7 @@ def test_a_socket_without_a_session_is_refused(server, path):
 
 
 @pytest.mark.parametrize(
-    "path", ["/api/state", "/api/points", "/api/events", "/api/me", "/camera/color.jpg", "/viser/", "/api/openapi.json"]
+    "path", ["/api/state", "/api/points", "/api/events", "/api/me", "/camera/color.jpg", "/viser/"]
 )
 def test_reading_needs_a_session(server, path):
     with server.visitor() as visitor:
@@ -55,10 +55,16 @@ def test_health_and_version_are_open(server):
         assert visitor.get("/version").json()["name"] == "rolling-panda"
 
 
+def test_the_description_is_open_but_only_to_be_read(server):
+    with server.visitor() as visitor:
+        assert visitor.get("/api/openapi.json").status_code == 200
+        assert visitor.post("/api/openapi.json", headers={"origin": "http://elsewhere.test"}).status_code == 403
+
+
 def test_a_long_body_is_refused_however_it_is_sent(server):
     with server.client() as client:
-        assert client.post("/api/stop", content=b"x" * 70_000).status_code == 413
-        assert client.post("/api/stop", content=iter([b"x" * 40_000, b"x" * 40_000])).status_code == 413
+        assert client.post("/api/arm", content=b"x" * 70_000).status_code == 413
+        assert client.post("/api/arm", content=iter([b"x" * 40_000, b"x" * 40_000])).status_code == 413
 
 
 def test_every_answer_has_the_headers_that_keep_browsers_strict(server):

@@ -1,5 +1,7 @@
+import json
 import threading
 
+import msgspec
 import pytest
 from fake_wire import (
     FakeWire,
@@ -60,12 +62,12 @@ def test_each_request_becomes_its_intent(server, client, path, body, intent):
     assert server.wire.asked == [intent]
 
 
-def test_a_refusal_comes_with_its_reason_and_is_logged(server, client):
+def test_a_refusal_comes_with_its_reason_and_is_left_to_the_controller_to_log(server, client):
     server.wire.answer = lambda request: m.Answer(ok=False, reason="arm first")
     answer = client.post("/api/start")
     assert (answer.status_code, answer.json()) == (409, {"ok": False, "reason": "arm first"})
     texts = [event["text"] for event in client.get("/api/events").json()["events"]]
-    assert any("arm first" in text for text in texts)
+    assert not any("arm first" in text for text in texts)
 
 
 def test_a_dead_controller_is_said_in_one_sentence(server, client):
@@ -146,6 +148,55 @@ def test_stop_goes_out_although_nothing_else_lives_and_says_that_nobody_confirme
     assert "emergency stop" in answer.json()["reason"]
     assert len(server.wire.sent[topics.STOP.name]) == 5
     assert server.wire.asked == []
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"{",
+        b"[]",
+        b"null",
+        b"\xff",
+        b"[" * 60_000,
+        b'{"reason": 7}',
+        b'{"reason": null}',
+        b'{"extra": 1}',
+        b'{"reason": ""}',
+    ],
+)
+def test_a_stop_whose_body_cannot_be_read_stops(server, client, content):
+    client.post("/api/stop", content=content, headers={"content-type": "application/json"})
+    assert {stop.reason for stop in server.wire.sent[topics.STOP.name]} == {"software stop"}
+
+
+@pytest.mark.parametrize("body", [{"reason": "x" * 501}, {"reason": "x" * 9000, "extra": 1}])
+def test_a_stop_with_too_long_a_reason_stops_with_its_beginning(server, client, body):
+    client.post("/api/stop", json=body)
+    (reason,) = {stop.reason for stop in server.wire.sent[topics.STOP.name]}
+    assert reason == "x" * len(reason) and 100 < len(reason) <= 500
+
+
+def test_a_stop_with_a_body_that_no_request_may_have_stops(server, client):
+    assert client.post("/api/stop", json={"reason": "x" * 70_000}).status_code == 503
+    assert server.wire.sent[topics.STOP.name]
+    assert client.post("/api/reset", json={"reason": "x" * 70_000}).status_code == 413
+
+
+@pytest.mark.parametrize("reason", ["\ud800", "\x00", "🍇" * 600])
+def test_what_a_stop_says_can_be_sent_on(server, client, reason):
+    client.post("/api/stop", content=json.dumps({"reason": reason}))
+    for stop in server.wire.sent[topics.STOP.name]:
+        assert msgspec.msgpack.decode(msgspec.msgpack.encode(stop), type=m.StopRequest) == stop
+    assert server.wire.sent[topics.STOP.name]
+
+
+def test_what_does_not_exist_is_not_found_and_what_exists_says_its_methods(client):
+    for path in ("/api/nonsense", "/api", "/camera/depth", "/api/stop/"):
+        assert client.post(path).status_code == 404, path
+        assert client.get(path).status_code == 404, path
+    assert client.post("/api/state").status_code == 405
+    assert client.get("/nothing.js").status_code == 404
 
 
 def test_a_viewer_may_stop_but_not_operate(server):
@@ -230,11 +281,13 @@ def test_letting_go_by_rest_ends_the_hold(server, client):
     eventually(lambda: not sent[-1].hold)
 
 
-def test_openapi_describes_every_request_and_message(client):
-    document = client.get("/api/openapi.json").json()
+def test_openapi_describes_every_request_and_message_to_everybody(server):
+    with server.visitor() as visitor:
+        document = visitor.get("/api/openapi.json").json()
     for name in ("start", "stop", "teleop", "points/{point_id}/accept", "points/accept-all", "state", "sign-in"):
         assert f"/api/{name}" in document["paths"]
     assert "PageState" in document["components"]["schemas"]
+    assert "reason" in str(document["paths"]["/api/stop"]["post"]["requestBody"])
     references = set(_references(document))
     assert {each.rsplit("/", 1)[-1] for each in references} <= set(document["components"]["schemas"])
 

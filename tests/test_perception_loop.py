@@ -118,6 +118,18 @@ def test_a_corrupt_frame_is_told_once_and_sends_no_points(parts):
     assert not wire.out[POINTS.name].sent
 
 
+def test_new_points_and_points_that_were_cut_are_no_warnings(parts):
+    wire, eyes, loop = parts
+    events = wire.out[EVENT.name].sent
+    point = m.PruningPoint("p1", 1, (0.3, 0.8, 1.0), (0.0, 0.0, 1.0), 0.004, 0.9, 5, 2, 0, 0, "two nodes stay")
+    eyes.process = lambda frame: m.PruningPoints(header=m.Header(), segmenter="s", frames=1, points=(point,))
+    eyes.withdrawn = ("p2 withdrawn: it has been cut",)
+    wire.frames.store("frame", 0.0)
+    turn_until(loop, lambda: len(events) == 2)
+    assert [event.text for event in events] == ["1 new pruning point, 1 in all", "p2 withdrawn: it has been cut"]
+    assert {event.severity for event in events} == {"info"}
+
+
 def test_a_worker_hands_a_bug_to_its_owner():
     worker = Worker(lambda job: 1 / job)
     assert worker.submit(0, 0.0)
