@@ -142,7 +142,8 @@ class Controller:
         self._health = _health(inputs, self._epoch, now)
         if inputs.joints is not None and inputs.odometry is not None:
             q = configuration_now(inputs.joints.message, inputs.odometry.message, self._robot.drive)
-            self._measured = Measured(q, self._robot.kinematics(q), self._sent)
+            wheels = np.array(inputs.joints.message.velocity[:2])
+            self._measured = Measured(q, self._robot.kinematics(q), self._sent, wheels)
         self._surroundings.take(inputs.obstacles)
         if bridge is not None:
             for text in self._sequence.watch(bridge, now):

@@ -18,11 +18,29 @@ from rolling_panda.robot_model import ARM_Q, ARM_XI, Kinematics
 
 @dataclass(frozen=True)
 class Measured:
-    """The robot in one control period: q (12), tool kinematics at q, and the velocity sent last (9)."""
+    """The robot in one control period.
+
+    Attributes:
+        q: Configuration (12).
+        kinematics: Of the tool at q.
+        sent: ξ̇ sent last (9, rad/s).
+        wheels: Measured velocities of the wheels (2, rad/s); None takes them for what was sent.
+    """
 
     q: Array
     kinematics: Kinematics
     sent: Array
+    wheels: Array | None = None
+
+    def behind(self) -> Array:
+        """Twist of the tool (6) that the base owes: what its wheels were told beyond what they do."""
+        if self.wheels is None:
+            return _NOTHING
+        owed: Array = self.kinematics.J_xi[:, :2] @ (self.sent[:2] - self.wheels)
+        return owed
+
+
+_NOTHING = np.zeros(6)
 
 
 @dataclass(frozen=True)
@@ -73,7 +91,7 @@ class Follower:
                 robot.q,
                 robot.kinematics,
                 robot.sent,
-                ToolTask(wanted.twist + self._gains * error, motion.free_axis),
+                ToolTask(wanted.twist + self._gains * error + robot.behind(), motion.free_axis),
                 motion.posture(),
                 motion.base,
                 motion.cap(pose),
