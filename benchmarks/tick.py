@@ -3,26 +3,37 @@
 import argparse
 import gc
 import json
+import platform
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
-
-import numpy as np
+from typing import Any
 
 from benchmarks.kinematic_robot import KinematicRobot
+from benchmarks.peers.run import run_peers
+from benchmarks.tick_parts import Recorder, Times, measure_parts, obstacles
 from controller.config import ControllerConfig
 from controller.core import Controller
+from controller.whole_body.collision import CollisionModel
+from controller.whole_body.registry import make_method
+from controller.whole_body.task import Demand, Method
 from rolling_panda import intents
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
+from rolling_panda.robot_model import RobotModel
 
 #: Places along the row (m) worked on, one after the other; enough for the steps asked for, again and again.
 _SPACING, _COUNT = 0.25, 8
 
 
-def measure(steps: int) -> list[float]:
-    """Durations (s) of `steps` control steps in AUTO, phases of travel, approach, advance, cut and retreat mixed."""
+def measure(steps: int) -> tuple[list[float], list[Demand]]:
+    """Durations (s) of `steps` control steps in AUTO, phases of travel, approach, advance, cut and retreat mixed.
+
+    Returns:
+        The durations, and what the whole-body method was asked for in a run that was not timed.
+    """
     durations: list[float] = []
     while len(durations) < steps:
         robot = _working()
@@ -38,7 +49,23 @@ def measure(steps: int) -> list[float]:
             durations.append(ended - started)
             robot.take(out)
         gc.unfreeze()
-    return durations
+    return durations, recorded(steps)
+
+
+def recorded(steps: int) -> list[Demand]:
+    """What the whole-body method is asked for in automatic work beside a row of obstacles."""
+    config, robot_model = ControllerConfig(), RobotModel()
+    collision = CollisionModel(robot_model)
+    collision.set_obstacles(obstacles())
+    recorder = Recorder(make_method(robot_model, config, 1.0 / config.rate_hz, collision))
+    demands: list[Demand] = []
+    while len(demands) < steps:
+        recorder.demands.clear()
+        robot = _working(recorder)
+        while len(demands) + len(recorder.demands) < steps and (robot.now < 1.0 or robot.controller.mode == "AUTO"):
+            robot.step()
+        demands += recorder.demands
+    return demands[:steps]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -46,28 +73,48 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="rolling-panda bench tick", description=__doc__)
     parser.add_argument("--json", type=Path, help="write the figures here")
     parser.add_argument("--steps", type=int, default=5000, help="control steps measured (default: %(default)s)")
+    parser.add_argument("--peers", action="store_true", help="also Pink, mink, PlaCo and TSID on the same problems")
+    parser.add_argument(
+        "--environments",
+        type=Path,
+        metavar="DIR",
+        help="virtual environments of the peers: DIR/pin-pink, DIR/mink, DIR/placo, DIR/tsid (default: this one)",
+    )
     arguments = parser.parse_args(argv)
     if arguments.steps < 1:
         parser.error("--steps must be at least 1")
-    micros = np.array(measure(arguments.steps)) * 1e6
-    figures = {
-        "median_us": round(float(np.median(micros)), 1),
-        "p99_us": round(float(np.percentile(micros, 99)), 1),
-        "max_us": round(float(micros.max()), 1),
-        "steps": len(micros),
-    }
+    durations, demands = measure(arguments.steps)
+    whole, parts = Times.of(durations), measure_parts(demands)
+    figures: dict[str, Any] = {**asdict(whole), "steps": len(durations), "machine": platform.platform()}
+    figures["parts"] = {name: asdict(times) for name, times in parts.items()}
     print(
-        f"one control step: median {figures['median_us']} us, p99 {figures['p99_us']} us, max {figures['max_us']} us, "
-        f"over {figures['steps']} steps"
+        f"one control step: median {whole.median_us} us, p99 {whole.p99_us} us, max {whole.max_us} us, "
+        f"over {len(durations)} steps"
     )
+    print(f"\n{'one whole-body step, by part':<30}{'median':>9}{'p99':>9}{'max us':>9}")
+    for name, times in parts.items():
+        print(f"{name:<30}{times.median_us:>9}{times.p99_us:>9}{times.max_us:>9}")
+    if arguments.peers:
+        figures["peers"] = run_peers(demands, ControllerConfig(), arguments.environments)
+        print(f"\n{'peers on the same problems':<30}{'median':>9}{'p99':>9}{'max us':>9}")
+        for peer in figures["peers"]:
+            print(_line(peer))
     if arguments.json is not None:
         arguments.json.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
     return 0
 
 
-def _working() -> KinematicRobot:
+def _line(peer: dict[str, Any]) -> str:
+    if "absent" in peer:
+        return f"{peer['name']:<30}absent: {peer['absent']}"
+    title = f"{peer['name']} {peer['version']}"
+    failed = f"  without an answer: {peer['failed']}" if peer["failed"] else ""
+    return f"{title:<30}{peer['median_us']:>9}{peer['p99_us']:>9}{peer['max_us']:>9}  {peer['note']}{failed}"
+
+
+def _working(method: Method | None = None) -> KinematicRobot:
     config = ControllerConfig()
-    robot = KinematicRobot(Controller(config, RobotConfig()), config.home)
+    robot = KinematicRobot(Controller(config, RobotConfig(), method=method), config.home)
     robot.step()
     robot.show(
         tuple(

@@ -23,6 +23,7 @@ from controller.teleoperation import Teleoperation
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.registry import make_method
 from controller.whole_body.saturation import Saturation
+from controller.whole_body.task import Method
 from rolling_panda import intents
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
@@ -39,13 +40,16 @@ class Controller:
     `step` it at the configured rate; `answer` operators between steps, on the same thread.
     """
 
-    def __init__(self, config: ControllerConfig, robot_config: RobotConfig, run_id: str = "cut") -> None:
+    def __init__(
+        self, config: ControllerConfig, robot_config: RobotConfig, run_id: str = "cut", method: Method | None = None
+    ) -> None:
         """Build the robot's model and start in IDLE.
 
         Args:
             config: Section `[controller]`.
             robot_config: Section `[robot]`.
             run_id: Makes this start's cut ids unlike any other's; letters, digits, `_.:-`.
+            method: Whole-body method in place of the configured one.
 
         Raises:
             ConfigError: There is no such method.
@@ -55,7 +59,7 @@ class Controller:
         self._robot = RobotModel(robot_config)
         self._saturation = Saturation(self._robot, config, self._dt)
         self._surroundings = Surroundings(CollisionModel(self._robot))
-        method = make_method(self._robot, config, self._dt, self._surroundings.model)
+        method = method or make_method(self._robot, config, self._dt, self._surroundings.model)
         self._follower = Follower(config, method, self._dt)
         self._queue = PointQueue(config)
         search = PostureSearch(RobotModel(robot_config), config)

@@ -9,7 +9,7 @@ from controller.config import ControllerConfig
 from controller.whole_body.hierarchy import Hierarchy
 from controller.whole_body.hierarchy_config import HierarchyConfig
 from controller.whole_body.saturation import Saturation
-from controller.whole_body.task import Demand, Inequalities, Posture, ToolTask
+from controller.whole_body.task import ActuatorTask, Demand, Inequalities, Posture, ToolTask
 from rolling_panda.robot_model import ARM_Q, ARM_XI, RobotModel
 
 ROBOT, CONFIG, DT = RobotModel(), ControllerConfig(), 0.01
@@ -355,3 +355,16 @@ def test_jerk_of_the_arm_is_inside_the_data_sheet_at_the_control_rate():
     """A change of acceleration takes at most from one limit to the other: 2 a/dt, below 500 a, which is rated."""
     rated = 500.0 * LIMITS.acceleration[ARM_XI]
     assert (2.0 * LIMITS.acceleration[ARM_XI] / DT <= rated).all()
+
+
+@pytest.mark.parametrize("base", MODES)
+def test_velocities_of_the_actuators_are_sent_as_asked_except_to_a_frozen_base(base):
+    q = home()
+    wanted = np.array([0.4, 0.5, 0.1, -0.1, 0.2, 0.0, 0.3, 0.0, -0.1])
+
+    def make(sent):
+        return dataclasses.replace(demand(q, sent=sent, base=base), tool=ActuatorTask(wanted))
+
+    out = settled(METHOD, make)
+    np.testing.assert_allclose(out.xi[ARM_XI], wanted[ARM_XI], atol=1e-6)
+    np.testing.assert_allclose(out.xi[:2], 0.0 if base == "frozen" else wanted[:2], atol=1e-6)

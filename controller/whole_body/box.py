@@ -64,7 +64,7 @@ class Box:
         room = self._ends - here
         most = np.sqrt(self._brake_square + self._brake_twice * np.maximum(room, 0.0)) - self._brake_step
         most = np.minimum(most, self._arm_speed)
-        if float(room.min()) < 0.0:
+        if min(room.tolist()) < 0.0:
             most = np.minimum(most, np.where(room < 0.0, np.maximum(_RETURN * room, -_RETURN_SPEED), np.inf))
         # Every end is moved into what can be reached, which keeps their order.
         most = np.maximum(np.minimum(most, arm + self._arm_step), arm - self._arm_step)

@@ -164,12 +164,11 @@ class Cascade:
             if info != 0:
                 return None
             nu += scaled[:, m:] @ z
-        # Comparisons with NaN are false.
-        if not float(np.minimum(nu - p.lower, p.upper - nu).min()) >= 0.0:
+        if not math.isfinite(float(nu @ nu)) or min(np.minimum(nu - p.lower, p.upper - nu).tolist()) < 0.0:
             return None
         if len(p.A_lower):
             moved = p.A @ nu
-            if not float(np.minimum(moved - p.A_lower, p.A_upper - moved).min()) >= 0.0:
+            if min(np.minimum(moved - p.A_lower, p.A_upper - moved).tolist()) < 0.0:
                 return None
         return nu
 

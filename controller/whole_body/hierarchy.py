@@ -30,7 +30,7 @@ from rolling_panda.robot_model import ARM_XI, RobotModel
 #: A clock slower than this stands still.
 _HELD = 1e-2
 _NOWHERE = Manipulability(0.0, np.zeros(NXI))
-_ALL = slice(0, NXI)
+_ALL, _ARM = slice(0, NXI), ARM_XI
 _BOUND_NAMES = ("the base's speed", "the base's turning", *(f"joint {i}" for i in range(1, 8)))
 
 
@@ -122,7 +122,11 @@ class Hierarchy:
     def _tool(self, demand: Demand) -> tuple[Array, Array]:
         """J over ν and what is wanted of J ν, weighted by the limits of the tool or of the actuators themselves."""
         if isinstance(demand.tool, ActuatorTask):
-            return np.diag(1.0 / self._box.speed), self._actuation.nu(demand.tool.xi) / self._box.speed
+            # Of a frozen base nothing can be wanted; its rows would only outnumber the arm's joints.
+            wanted = _ARM if demand.base == "frozen" else _ALL
+            return np.diag(1.0 / self._box.speed)[wanted], (self._actuation.nu(demand.tool.xi) / self._box.speed)[
+                wanted
+            ]
         J = self._actuation.rows(demand.kinematics.J_xi)
         twist = demand.tool.twist
         if demand.tool.free_axis:

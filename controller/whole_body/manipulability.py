@@ -15,6 +15,7 @@ from rolling_panda.differential_drive import NXI, Array
 from rolling_panda.robot_model import ARM_Q, ARM_XI, RobotModel
 
 _REGULAR = 1e-9
+_THREE = np.ones(3)
 _ONES, _NONE = np.ones((7, 7)), np.zeros((7, 7))
 #: [j, i] is 1 where j ≥ i, j > i and (in the right half) j < i: summing columns j for each i.
 _SUMS = np.block([[np.tril(_ONES), _NONE], [np.tril(_ONES, -1), _NONE], [_NONE, np.triu(_ONES, 1)]])
@@ -59,7 +60,7 @@ class ArmManipulability:
         # Σ_{j ≥ i} (ω_i × v_j)·g_j = ω_i · Σ_{j ≥ i} v_j × g_j, and so on: sums over j are products with a triangle.
         # Σ_{j < i} (ω_j × v_i)·g_j = v_i · Σ_{j < i} g_j × ω_j.
         summed = crossed @ _SUMS
-        gradient[ARM_XI] = value * (w * summed[:, :7] + v * summed[:, 7:]).sum(axis=0)
+        gradient[ARM_XI] = _THREE @ (w * summed[:, :7] + v * summed[:, 7:]) * value
         return Manipulability(value, gradient)
 
 

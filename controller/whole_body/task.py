@@ -90,11 +90,9 @@ class Demand:
         """Whether every number that a method uses is finite."""
         posture, J, tool = self.posture, self.kinematics.J, self.tool
         wanted = tool.twist if isinstance(tool, ToolTask) else tool.xi
+        all_of_it = np.concatenate((self.q, self.sent, wanted, posture.q, posture.rate, J.ravel("K")))
         # A square that overflows belongs to a number that is of no use either.
-        total = float(np.vdot(self.q, self.q) + np.vdot(self.sent, self.sent) + np.vdot(J, J))
-        total += float(np.vdot(wanted, wanted) + np.vdot(posture.q, posture.q))
-        total += float(np.vdot(posture.rate, posture.rate))
-        return math.isfinite(total) and not math.isnan(self.speed_cap + self.scale)
+        return math.isfinite(float(np.vdot(all_of_it, all_of_it))) and not math.isnan(self.speed_cap + self.scale)
 
 
 @dataclass(frozen=True)
