@@ -55,6 +55,13 @@ def lead(method, twist, seconds, base="row", keep_path=True, arm=CONFIG.home):
     return way
 
 
+def least_share(q):
+    """The least distance between any two parts as a share of what is kept between them."""
+    near = COLLISION.distances(q, 0.1)
+    kept = [SETTINGS.blade_distance if "blades" in pair else SETTINGS.collision_distance for pair in near.pairs]
+    return min((d / k for d, k in zip(near.distance, kept, strict=True)), default=100.0)
+
+
 @pytest.fixture
 def post():
     COLLISION.set_obstacles([Obstacle("post 1", "post", (0.5, 0.75, 0.0), (0.5, 0.75, 1.8), 0.05)])
@@ -65,9 +72,8 @@ def post():
 @pytest.mark.parametrize("keep_path", [True, False])
 def test_a_tool_led_into_a_post_stops_before_it(post, keep_path):
     way = lead(GUARDED, [0, 0.3, 0, 0, 0, 0], 4.0, keep_path=keep_path)
-    clear = [COLLISION.least(q).distance for q, _ in way[::5]]
-    assert min(clear) > 0.8 * SETTINGS.collision_distance
-    assert clear[-1] < SETTINGS.collision_influence
+    assert min(least_share(q) for q, _ in way[::5]) > 0.8
+    assert COLLISION.least(way[-1][0]).distance < SETTINGS.collision_influence
     assert all(out.feasible or "post 1" in out.reason for _, out in way)
     blind = lead(BLIND, [0, 0.3, 0, 0, 0, 0], 4.0, keep_path=keep_path)
     assert min(COLLISION.least(q).distance for q, _ in blind[::5]) < -0.01
@@ -80,8 +86,7 @@ def test_what_holds_the_tool_before_a_post_is_named(post):
 
 def test_a_tool_led_into_its_own_base_stops_before_it():
     way = lead(GUARDED, [-0.1, 0, -0.3, 0, 0, 0], 6.0, base="frozen", keep_path=False)
-    clear = [COLLISION.least(q).distance for q, _ in way[::5]]
-    assert min(clear) > 0.8 * SETTINGS.collision_distance
+    assert min(least_share(q) for q, _ in way[::5]) > 0.8
     blind = lead(BLIND, [-0.1, 0, -0.3, 0, 0, 0], 6.0, base="frozen", keep_path=False)
     assert min(COLLISION.least(q).distance for q, _ in blind[::5]) < 0.0
 
@@ -91,12 +96,11 @@ def test_a_robot_that_something_was_put_upon_moves_out_of_it():
     q = np.zeros(12)
     q[ARM_Q] = CONFIG.home
     tool = ROBOT.pose(q, ROBOT.tool_id).translation
-    COLLISION.set_obstacles([Obstacle("bird", "cane", tuple(tool + [0, 0.03, 0]), tuple(tool + [0, 0.03, 0]), 0.01)])
+    COLLISION.set_obstacles([Obstacle("bird", "cane", tuple(tool + [0, 0.02, 0]), tuple(tool + [0, 0.02, 0]), 0.01)])
     try:
-        before = COLLISION.least(q).distance
-        assert before < SETTINGS.collision_distance
+        assert least_share(q) < 1.0
         way = lead(GUARDED, np.zeros(6), 2.0, base="frozen")
-        assert COLLISION.least(way[-1][0]).distance > 0.9 * SETTINGS.collision_distance
+        assert least_share(way[-1][0]) > 0.9
     finally:
         COLLISION.set_obstacles(())
 

@@ -27,6 +27,7 @@ class HierarchyConfig(Struct, frozen=True, forbid_unknown_fields=True):
         axle_rate: Rate at which that distance may be used up (1/s).
         collisions: Whether distances to itself, the ground and obstacles are kept.
         collision_distance: d_s, kept between any two parts that are watched (m).
+        blade_distance: The same for the blades (m), which work near wires that nothing else may come near to.
         collision_influence: d_i, nearer than which they approach more slowly (m).
         collision_speed: ξ, fastest approach at d_i (m/s), and fastest parting below d_s.
         collision_braking: Deceleration that an approach reckons with (m/s²).
@@ -47,6 +48,7 @@ class HierarchyConfig(Struct, frozen=True, forbid_unknown_fields=True):
     axle_rate: Positive = 2.0
     collisions: bool = True
     collision_distance: Positive = 0.015
+    blade_distance: Positive = 0.004
     collision_influence: Positive = 0.08
     collision_speed: Positive = 0.25
     collision_braking: Positive = 0.5

@@ -5,12 +5,14 @@ For each pair of parts nearer than d_i, with n the direction between their neare
 ḋ ≥ −min( ξ (d − d_s)/(d_i − d_s), −a dt + √((a dt)² + 2 a (d − d_s)) )
 
 The first term is Faverjon and Tournassoud's velocity damper. The second lets a pair approach only as fast as it can
-still stop, after one more period, with the deceleration a. Nearer than d_s, the pair has to part.
+still stop, after one more period, with the deceleration a. Nearer than d_s, the pair has to part. The blades have a
+d_s of their own.
 """
 
 import numpy as np
 
 from controller.whole_body.collision import CollisionModel
+from controller.whole_body.collision_geometry import BLADES
 from controller.whole_body.hierarchy_config import HierarchyConfig
 from controller.whole_body.task import NO_ROWS, Demand, Inequalities
 from rolling_panda.errors import ControlError
@@ -25,7 +27,8 @@ class CollisionGuard:
         """Guard what `model` watches, for a control period of `dt` (s)."""
         self.model = model
         self._influence, self._distance = config.collision_influence, config.collision_distance
-        self._slope = config.collision_speed / (config.collision_influence - config.collision_distance)
+        self._blades = config.blade_distance
+        self._speed = config.collision_speed
         self._part = config.collision_speed
         self._brake = config.collision_braking
         self._step = config.collision_braking * dt
@@ -39,8 +42,9 @@ class CollisionGuard:
             near = self.model.dampers(demand.q, self._influence)
         if not near.pairs:
             return NO_ROWS
-        room = near.distance - self._distance
+        kept = np.array([self._blades if BLADES in pair else self._distance for pair in near.pairs])
+        room = near.distance - kept
         stopping = np.sqrt(self._step**2 + 2.0 * self._brake * np.maximum(room, 0.0)) - self._step
-        approach = np.minimum(self._slope * room, stopping)
+        approach = np.minimum(self._speed * room / (self._influence - kept), stopping)
         names = tuple(f"the distance of {a} to {b}" for a, b in near.pairs)
         return Inequalities(near.normal_jacobian, np.minimum(-approach, self._part), names)
