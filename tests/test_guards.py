@@ -96,7 +96,8 @@ def test_a_robot_that_something_was_put_upon_moves_out_of_it():
     q = np.zeros(12)
     q[ARM_Q] = CONFIG.home
     tool = ROBOT.pose(q, ROBOT.tool_id).translation
-    COLLISION.set_obstacles([Obstacle("bird", "cane", tuple(tool + [0, 0.02, 0]), tuple(tool + [0, 0.02, 0]), 0.01)])
+    perch = tuple(tool + [0.005, 0, 0])
+    COLLISION.set_obstacles([Obstacle("bird", "cane", perch, perch, 0.01)])
     try:
         assert least_share(q) < 1.0
         way = lead(GUARDED, np.zeros(6), 2.0, base="frozen")
