@@ -112,8 +112,12 @@ class ToolMotion:
         for leg in self._legs:
             if self.time <= leg.begin:
                 break
+            begin, goal = leg.trajectory.start, leg.trajectory.goal
+            if self.time >= leg.end:
+                position += goal.translation - begin.translation
+                R = R @ begin.rotation.T @ goal.rotation
+                continue
             state = leg.trajectory.at(self.time - leg.begin)
-            begin = leg.trajectory.start
             # What the leg would do alone, carried along by the legs before it.
             turned = R @ begin.rotation.T
             position += state.T_odom_tool.translation - begin.translation
@@ -139,8 +143,8 @@ class ToolMotion:
         if not self._slow_end:
             return self.speed * 1.2
         config = self._config
-        away = float(np.linalg.norm(self.goal.translation - T_odom_tool.translation)) - config.slow_zone
-        return float(np.sqrt(config.cut_speed**2 + 2.0 * config.slow_braking * max(away, 0.0)))
+        away = math.dist(self.goal.translation, T_odom_tool.translation) - config.slow_zone
+        return math.sqrt(config.cut_speed**2 + 2.0 * config.slow_braking * max(away, 0.0))
 
 
 def _timed(
