@@ -182,13 +182,23 @@ class Controller:
         holding = self._teleoperation.holding(self._inputs.teleop, now)
         if self._state.mode == "TELEOP" and not holding:
             self._event(Event.RELEASE, now, "the hold was released")
-        elif self._state.mode == "READY" and holding and self._homing is None and self._teleoperation.pressed:
-            why = safety.sensors(self._health, self._config) or safety.supervision(self._health, self._config, True)
+        elif self._state.mode == "READY" and holding and self._teleoperation.pressed:
+            why = self._busy() or safety.sensors(self._health, self._config)
+            why = why or safety.supervision(self._health, self._config, True)
             if why:
                 self._teleoperation.refuse()
                 self._say("warning", f"teleoperation refused: {why}")
             else:
                 self._event(Event.HOLD, now, f"{self._teleoperation.user} moves the robot")
+
+    def _busy(self) -> str:
+        """What has to end before a motion may begin; empty when nothing."""
+        if self._homing is not None:
+            return "the arm is being brought home; wait until it is there"
+        bridge = self._inputs.bridge
+        if self._sequence.cutting or (bridge is not None and bridge.message.cutter == "closing"):
+            return "the blades are closing; wait until the cut has ended"
+        return ""
 
     def _cause(self) -> str:
         """Why a PROTECTIVE_STOP or FAULT could not be left now; empty when its cause is gone."""
@@ -278,7 +288,7 @@ class Controller:
         """Why an intent would not be taken now, apart from its own content; empty when it would."""
         mode = self._state.mode
         event = _EVENTS.get(type(intent))
-        if event is not None:
+        if event is not None and not (event is Event.PAUSE and self._homing is not None):
             refused = modes.step(self._state, event, now).refused
             if refused:
                 return refused
@@ -289,11 +299,9 @@ class Controller:
             if self._health.watchdog:
                 return "the bridge's watchdog holds the robot: wait until it takes commands"
         if isinstance(intent, intents.Start | intents.Home):
-            why = safety.supervision(self._health, self._config, False)
+            why = safety.supervision(self._health, self._config, False) or self._busy()
             if why:
                 return why
-            if self._homing is not None:
-                return "the arm is being brought home; wait until it is there"
         if isinstance(intent, intents.Start):
             if self._queue.next() is None:
                 return "no point is accepted"
@@ -307,6 +315,11 @@ class Controller:
         if isinstance(intent, intents.Reset):
             bridge = self._inputs.bridge
             return self._stops.ask_release(intent, bridge.message if bridge is not None else None, now)
+        if isinstance(intent, intents.Pause) and self._homing is not None:
+            self._homing = None
+            self._state = replace(self._state, reason=f"bringing the arm home was stopped by {intent.user}")
+            self._say("info", self._state.reason)
+            return ""
         event = _EVENTS.get(type(intent))
         if event is not None:
             refused = self._event(event, now, f"{event.value} by {intent.user}")

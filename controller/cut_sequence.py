@@ -104,6 +104,7 @@ class CutSequence:
         self._events: list[str] = []
         self._motion: ToolMotion | None = None
         self._plan: CutPlan | None = None
+        self._accepted: m.PruningPoint | None = None
         self._coming = NextCut(search, queue, config.search_steps)
         self._forget()
 
@@ -122,9 +123,16 @@ class CutSequence:
         """Point that the tool hides from the camera now, empty when none."""
         return self._point_id if self._stage in (Stage.ADVANCE, Stage.CUT, Stage.RETREAT) else ""
 
+    @property
+    def cutting(self) -> bool:
+        """Whether a cut has been asked for and how it ends is not known yet: the blades may be closing."""
+        return self._cut is not None
+
     def begin(self) -> None:
         """Start with getting the tool clear of the canes."""
         self._forget()
+        # Since a plan was made the robot may have been moved by hand.
+        self._coming.forget()
         self._stage = Stage.ESCAPE
 
     def abort(self) -> None:
@@ -183,7 +191,7 @@ class CutSequence:
         self._forget()
         if not self._coming.look(robot.q):
             return Work(self._saturation.ramp(robot.sent), finished=True)
-        self._point_id, self._stage = self._coming.point_id, Stage.SEARCH
+        self._point_id, self._accepted, self._stage = self._coming.point_id, self._coming.accepted, Stage.SEARCH
         return Work(self._saturation.ramp(robot.sent))
 
     def _find(self, robot: Measured, now: float) -> Work:
@@ -241,7 +249,8 @@ class CutSequence:
         plan = self._coming.found
         if self._motion.leg > 0 and isinstance(plan, CutPlan):
             # Out of the canes, and the way to the next one has begun.
-            self._plan, self._point_id, self._stage = plan, self._coming.point_id, Stage.TRAVEL
+            self._plan, self._stage = plan, Stage.TRAVEL
+            self._point_id, self._accepted = self._coming.point_id, self._coming.accepted
             return Work(tracking.xi, tracking)
         if not self._over(tracking, now, _NEAR):
             if not self._late(now):
@@ -260,6 +269,7 @@ class CutSequence:
     def _forget(self) -> None:
         self._stage = Stage.REST
         self._point_id = ""
+        self._accepted = None
         self._motion = self._plan = None
         self._started: float | None = None
         self._in_place_since: float | None = None
@@ -267,8 +277,12 @@ class CutSequence:
     def _check_acceptance(self, robot: Measured) -> None:
         ticket = self._queue.get(self._point_id)
         if ticket is not None and ticket.state == "ACCEPTED":
-            return
-        why = ticket.reason if ticket is not None else "the point has gone"
+            # The plan is for one acceptance: of what was accepted anew it knows nothing.
+            if ticket.accepted is self._accepted:
+                return
+            why = "it was accepted anew"
+        else:
+            why = ticket.reason if ticket is not None else "the point has gone"
         self._events.append(f"{self._point_id}: left: {why}")
         if self._stage is Stage.ADVANCE:
             self._retreat_from(robot)

@@ -7,6 +7,7 @@ import numpy as np
 from controller.queue import PointQueue, Ticket
 from controller.reach import CutPlan, PostureSearch, Unreachable
 from rolling_panda.differential_drive import Array
+from rolling_panda.messages import PruningPoint
 
 
 class NextCut:
@@ -27,6 +28,11 @@ class NextCut:
     def point_id(self) -> str:
         """The point looked at; empty when none."""
         return "" if self._ticket is None else self._ticket.point.point_id
+
+    @property
+    def accepted(self) -> PruningPoint | None:
+        """The point looked at as it was accepted, which is what the plan is for; None when none."""
+        return None if self._ticket is None else self._ticket.accepted
 
     def look(self, q: Array) -> bool:
         """Begin with the next accepted point, from configuration q (12), unless it is looked at already.
