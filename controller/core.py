@@ -253,7 +253,10 @@ class Controller:
         if self._homing is None:
             return self._saturation.ramp(self._sent)
         xi = self._homing.step(robot)
-        if self._homing.done:
+        if self._homing.blocked:
+            self._say("warning", f"bringing the arm home was stopped: {self._homing.blocked}")
+            self._homing = None
+        elif self._homing.done:
             self._homing = None
             self._state = replace(self._state, reason="the arm is home")
             self._say("info", "the arm is home")
@@ -327,7 +330,7 @@ class Controller:
                 self._sequence.begin()
             return refused
         if isinstance(intent, intents.Home):
-            self._homing = Homing(self._config, self._follower, self._saturation, self._dt)
+            self._homing = Homing(self._config, self._follower, self._dt)
             self._state = replace(self._state, reason="the arm is being brought home")
             return ""
         return self._operator.points(intent)

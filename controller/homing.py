@@ -8,12 +8,13 @@ from controller.config import ControllerConfig
 from controller.cut_pose import escape_pose
 from controller.motion import ArmMotion, Follower, Measured
 from controller.tool_motion import Leg, ToolMotion
-from controller.whole_body.saturation import Saturation
 from rolling_panda.differential_drive import Array
 from rolling_panda.robot_model import ARM_Q
 
 #: The posture is reached (rad).
 _NEAR = 0.01
+#: A clock that runs slower than this for so long (s) has met something.
+_HELD, _PATIENCE_S = 0.02, 1.5
 #: Near enough to the place clear of the canes to go on (m).
 _CLEAR = 0.02
 
@@ -21,15 +22,18 @@ _CLEAR = 0.02
 class Homing:
     """One way home; `step` it until `done`, drop it to stop."""
 
-    def __init__(self, config: ControllerConfig, follower: Follower, saturation: Saturation, dt: float) -> None:
+    def __init__(self, config: ControllerConfig, follower: Follower, dt: float) -> None:
         """Bind the parts for a control period of `dt` (s)."""
-        self._config, self._follower, self._saturation, self._dt = config, follower, saturation, dt
+        self._config, self._follower, self._dt = config, follower, dt
         self._goal = np.array(config.home)
         heading = config.row_heading
         self._left = np.array([-np.sin(heading), np.cos(heading), 0.0])
         self._out: ToolMotion | None = None
         self._in: ArmMotion | None = None
+        self._held_s = 0.0
         self.done = False
+        #: Why the arm does not get home, in words; empty while it may.
+        self.blocked = ""
 
     def step(self, robot: Measured) -> Array:
         """One period: ξ̇ to send (9)."""
@@ -46,6 +50,9 @@ class Homing:
                 if not tracking.done or tracking.position_error > _CLEAR:
                     return tracking.xi
             self._in = ArmMotion(self._config, robot.q[ARM_Q].copy(), self._goal)
-        xi = self._in.step(robot, self._saturation, self._dt)
+        tracking = self._in.step(robot, self._follower, self._dt)
+        self._held_s = self._held_s + self._dt if tracking.scale < _HELD else 0.0
+        if self._held_s > _PATIENCE_S:
+            self.blocked = tracking.reason or "something holds the arm back"
         self.done = self._in.done and float(np.abs(robot.q[ARM_Q] - self._goal).max()) < _NEAR
-        return xi
+        return tracking.xi

@@ -10,7 +10,6 @@ import pinocchio as pin
 from controller.config import ControllerConfig
 from controller.tool_motion import ToolMotion
 from controller.trajectory import Rates, quintic
-from controller.whole_body.saturation import Saturation
 from controller.whole_body.task import ActuatorTask, BaseMode, Demand, Method, Posture, Solution, ToolTask
 from rolling_panda.differential_drive import NXI, Array
 from rolling_panda.robot_model import ARM_Q, ARM_XI, Kinematics
@@ -56,6 +55,7 @@ class Tracking:
         feasible: False when what was wanted could not be done within the limits.
         reason: Why not, in words; empty when it could.
         done: True when the motion's clock has run out.
+        scale: Rate of the motion's clock, 0…1.
     """
 
     xi: Array
@@ -66,6 +66,7 @@ class Tracking:
     feasible: bool
     reason: str
     done: bool
+    scale: float = 1.0
 
 
 class Follower:
@@ -154,7 +155,7 @@ class Follower:
 
 def _tracking(out: Solution, desired: Any, error: Array, done: bool) -> Tracking:
     position, rotation = _length(error[:3]), _length(error[3:])
-    return Tracking(out.xi, desired, position, rotation, out.manipulability, out.feasible, out.reason, done)
+    return Tracking(out.xi, desired, position, rotation, out.manipulability, out.feasible, out.reason, done, out.scale)
 
 
 class ArmMotion:
@@ -172,14 +173,14 @@ class ArmMotion:
         """True when the clock has reached the end."""
         return self.time >= self.duration
 
-    def step(self, robot: Measured, saturation: Saturation, dt: float) -> Array:
-        """One period: ξ̇ to send (9)."""
+    def step(self, robot: Measured, follower: Follower, dt: float) -> Tracking:
+        """One period of `dt` (s); what holds the joints back slows the motion's clock."""
         progress = quintic(self.time, self.duration)
         xi = np.zeros(NXI)
         xi[ARM_XI] = self._span * progress.rate + self._gain * (self._start + self._span * progress.s - robot.q[ARM_Q])
-        limited = saturation.apply(xi, robot.q, robot.sent)
-        self.time += dt * limited.scale
-        return limited.xi
+        tracking = follower.jog(xi, robot)
+        self.time += dt * tracking.scale
+        return tracking
 
 
 def tool_error(T_odom_tool: Any, T_odom_goal: Any) -> Array:

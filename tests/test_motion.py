@@ -68,7 +68,7 @@ def test_arm_motion_ends_at_its_goal_with_the_base_still():
     goal = np.array(CONFIG.reach)
     motion = ArmMotion(CONFIG, q[ARM_Q].copy(), goal)
     for _ in range(1000):
-        sent = motion.step(measured(q, sent), SATURATION, DT)
+        sent = motion.step(measured(q, sent), FOLLOWER, DT).xi
         q = integrate(q, sent)
     assert motion.done
     np.testing.assert_allclose(q[ARM_Q], goal, atol=1e-3)
