@@ -2,11 +2,7 @@
 
 import { link, say, showToast } from "./state.js";
 
-/**
- * `status` 0: the server was not reached. `link` is what an invitation is answered with.
- *
- * @typedef {{ ok: boolean, reason: string, status: number, link?: string }} Answer
- */
+/** @typedef {{ ok: boolean, reason: string, status: number }} Answer `status` 0: the server was not reached. */
 
 /**
  * @param {string} path
@@ -64,7 +60,7 @@ export async function isSignedIn() {
 
 /**
  * @param {Response} response
- * @returns {Promise<{ ok: boolean, reason: string, link?: string }>}
+ * @returns {Promise<{ ok: boolean, reason: string }>}
  */
 async function answerOf(response) {
   /** @type {any} */
@@ -75,7 +71,7 @@ async function answerOf(response) {
     // An answer without JSON still has its status to tell.
   }
   const reason = typeof body?.reason === "string" ? body.reason : detailOf(body);
-  if (response.ok) return { ok: body?.ok !== false, reason, link: typeof body?.link === "string" ? body.link : "" };
+  if (response.ok) return { ok: body?.ok !== false, reason };
   return { ok: false, reason: reason || STATUS_WORDS[response.status] || `the server answered ${response.status}` };
 }
 

@@ -56,15 +56,14 @@ export function setText(node, text) {
 }
 
 /**
- * Enable a button, or grey it and say why. Not the `disabled` attribute: a button that has it swallows the press, and a
- * finger would never learn the reason (`greyed.js`).
+ * Enable a button, or disable it and say why.
  *
  * @param {HTMLButtonElement} button
  * @param {string} why Empty when it may be pressed.
  * @param {string} [hint] What it does, shown while it may be pressed.
  */
 export function setEnabled(button, why, hint = "") {
-  button.setAttribute("aria-disabled", String(why !== ""));
+  button.disabled = why !== "";
   const words = why || hint;
   if (button.title !== words) button.title = words;
   if (words) button.setAttribute("aria-description", words);
