@@ -11,6 +11,7 @@ from rolling_panda import messages as m
 from rolling_panda.differential_drive import NXI, Array
 from rolling_panda.robot_model import ARM_Q, RobotModel
 from rolling_panda.row_messages import Capsule, Obstacles
+from rolling_panda.teleop_messages import TeleopTarget
 
 _ALL = frozenset({"bridge", "controller", "perception", "server"})
 Nine = tuple[float, float, float, float, float, float, float, float, float]
@@ -46,7 +47,7 @@ class KinematicRobot:
     server: bool = True
     perception: bool = True
     frozen_sensors: bool = False
-    teleop: m.TeleopTarget | None = None
+    teleop: TeleopTarget | None = None
     obstacles: tuple[Capsule, ...] = ()
     record: list[Array] = field(default_factory=list)
     cuts: list[tuple[str, Array]] = field(default_factory=list)

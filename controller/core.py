@@ -14,6 +14,7 @@ from controller.interface import Inputs, Outputs
 from controller.modes import Event
 from controller.motion import Follower, Measured, Tracking
 from controller.operator import Operator
+from controller.permission import EVENTS, Situation, allowed, refusal
 from controller.queue import PointQueue
 from controller.reach import PostureSearch
 from controller.report import controller_state
@@ -70,7 +71,7 @@ class Controller:
         self._homing: Homing | None = None
         self._state = modes.boot()
         self._inputs = Inputs()
-        self._health = _health(self._inputs, None, 0.0)
+        self._health = safety.health(self._inputs, None, 0.0)
         self._measured: Measured | None = None
         self._tracking: Tracking | None = None
         self._sent: Array = np.zeros(NXI)
@@ -124,7 +125,7 @@ class Controller:
             now: Monotonic time (s).
         """
         self._now = now
-        refused = self._refusal(intent, now)
+        refused = refusal(intent, now, self._situation())
         if not refused:
             refused = self._do(intent, now)
         what = type(intent).__name__
@@ -143,7 +144,7 @@ class Controller:
         bridge = inputs.bridge.message if inputs.bridge is not None else None
         if bridge is not None and self._epoch is None:
             self._epoch = bridge.epoch + 1
-        self._health = _health(inputs, self._epoch, now)
+        self._health = safety.health(inputs, self._epoch, now)
         if inputs.joints is not None and inputs.odometry is not None:
             q = configuration_now(inputs.joints.message, inputs.odometry.message, self._robot.drive)
             wheels = np.array(inputs.joints.message.velocity[:2])
@@ -287,31 +288,15 @@ class Controller:
 
     # --- operator ----------------------------------------------------------------------------------------------------
 
-    def _refusal(self, intent: intents.Intent, now: float) -> str:
-        """Why an intent would not be taken now, apart from its own content; empty when it would."""
-        mode = self._state.mode
-        event = _EVENTS.get(type(intent))
-        if event is not None and not (event is Event.PAUSE and self._homing is not None):
-            refused = modes.step(self._state, event, now).refused
-            if refused:
-                return refused
-        if isinstance(intent, intents.Arm | intents.Start | intents.Home):
-            why = safety.sensors(self._health, self._config)
-            if why:
-                return why
-            if self._health.watchdog:
-                return "the bridge's watchdog holds the robot: wait until it takes commands"
-        if isinstance(intent, intents.Start | intents.Home):
-            why = safety.supervision(self._health, self._config, False) or self._busy()
-            if why:
-                return why
-        if isinstance(intent, intents.Start):
-            if self._queue.next() is None:
-                return "no point is accepted"
-            return safety.perception(self._health, self._config)
-        if isinstance(intent, intents.Home) and mode != "READY":
-            return f"the arm is brought home in READY; the mode is {mode}"
-        return ""
+    def _situation(self) -> Situation:
+        return Situation(
+            config=self._config,
+            state=self._state,
+            health=self._health,
+            homing=self._homing is not None,
+            busy=self._busy(),
+            work=self._queue.next() is not None,
+        )
 
     def _do(self, intent: intents.Intent, now: float) -> str:
         """Do what was not refused; returns what the content itself is refused for."""
@@ -323,7 +308,7 @@ class Controller:
             self._state = replace(self._state, reason=f"bringing the arm home was stopped by {intent.user}")
             self._say("info", self._state.reason)
             return ""
-        event = _EVENTS.get(type(intent))
+        event = EVENTS.get(type(intent))
         if event is not None:
             refused = self._event(event, now, f"{event.value} by {intent.user}")
             if isinstance(intent, intents.Start) and not refused:
@@ -338,9 +323,6 @@ class Controller:
     # --- report ------------------------------------------------------------------------------------------------------
 
     def _report(self, now: float) -> m.ControllerState:
-        allowed = tuple(
-            kind.__name__ for kind, probe in _PROBES.items() if probe is None or not self._refusal(probe, now)
-        )
         return controller_state(
             config=self._config,
             robot=self._robot,
@@ -349,7 +331,7 @@ class Controller:
             active=self._sequence.active,
             measured=self._measured,
             tracking=self._tracking,
-            allowed=allowed,
+            allowed=allowed(now, self._situation()),
             inputs=self._inputs,
             queue=self._queue.entries(),
             now=now,
@@ -359,43 +341,3 @@ class Controller:
         self._events.append(
             m.LogEvent(header=m.Header(self._now), process="controller", severity=severity, text=text[:500])
         )
-
-
-_EVENTS: dict[type[intents.Intent], Event] = {
-    intents.Arm: Event.ARM,
-    intents.Start: Event.START,
-    intents.Pause: Event.PAUSE,
-    intents.Resume: Event.RESUME,
-    intents.Acknowledge: Event.ACKNOWLEDGE,
-    intents.Reset: Event.RESET,
-}
-#: One intent of each type, to ask whether it would be taken; None where only its content can be refused.
-_PROBES: dict[type[intents.Intent], intents.Intent | None] = {
-    intents.Arm: intents.Arm(user=""),
-    intents.AcceptPoint: None,
-    intents.RejectPoint: None,
-    intents.AcceptAll: None,
-    intents.Start: intents.Start(user=""),
-    intents.Pause: intents.Pause(user=""),
-    intents.Resume: intents.Resume(user=""),
-    intents.Home: intents.Home(user=""),
-    intents.Acknowledge: intents.Acknowledge(user=""),
-    intents.Reset: intents.Reset(user="", reason="-"),
-}
-
-
-def _health(inputs: Inputs, epoch: int | None, now: float) -> safety.Health:
-    def age(at: float | None) -> float:
-        return math.inf if at is None else now - at
-
-    bridge = inputs.bridge
-    return safety.Health(
-        joints=age(inputs.joints.at if inputs.joints is not None else None),
-        odometry=age(inputs.odometry.at if inputs.odometry is not None else None),
-        bridge=age(bridge.at if bridge is not None else None),
-        server=age(inputs.server_seen),
-        perception=age(inputs.perception_seen),
-        present=inputs.present,
-        watchdog=bridge is not None and bridge.message.watchdog,
-        overruled=bridge is not None and epoch is not None and bridge.message.epoch > epoch,
-    )

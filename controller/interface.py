@@ -5,6 +5,7 @@ from typing import Generic, TypeVar
 
 from rolling_panda import messages as m
 from rolling_panda.row_messages import Obstacles
+from rolling_panda.teleop_messages import TeleopTarget
 
 Msg = TypeVar("Msg", bound=m.Message)
 
@@ -42,7 +43,7 @@ class Inputs:
     bridge: Sample[m.BridgeState] | None = None
     points: Sample[m.PruningPoints] | None = None
     obstacles: Sample[Obstacles] | None = None
-    teleop: Sample[m.TeleopTarget] | None = None
+    teleop: Sample[TeleopTarget] | None = None
     server_seen: float | None = None
     perception_seen: float | None = None
     present: frozenset[str] = frozenset()

@@ -1,9 +1,11 @@
 """What the freshness of the inputs demands: pure checks, each with its reason in words."""
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
 from controller.config import ControllerConfig
+from controller.interface import Inputs
 from rolling_panda.messages import Mode
 
 Action = Literal["none", "pause", "protect", "fault"]
@@ -32,6 +34,31 @@ class Health:
     present: frozenset[str]
     watchdog: bool
     overruled: bool
+
+
+def health(inputs: Inputs, epoch: int | None, now: float) -> Health:
+    """How fresh the inputs are.
+
+    Args:
+        inputs: Newest of everything.
+        epoch: Of this controller, None before the first bridge state.
+        now: Monotonic time (s).
+    """
+
+    def age(at: float | None) -> float:
+        return math.inf if at is None else now - at
+
+    bridge = inputs.bridge
+    return Health(
+        joints=age(inputs.joints.at if inputs.joints is not None else None),
+        odometry=age(inputs.odometry.at if inputs.odometry is not None else None),
+        bridge=age(bridge.at if bridge is not None else None),
+        server=age(inputs.server_seen),
+        perception=age(inputs.perception_seen),
+        present=inputs.present,
+        watchdog=bridge is not None and bridge.message.watchdog,
+        overruled=bridge is not None and epoch is not None and bridge.message.epoch > epoch,
+    )
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,10 @@ import numpy as np
 from controller.config import ControllerConfig
 from controller.interface import Sample
 from controller.motion import Follower, Measured, Tracking
-from rolling_panda import messages as m
 from rolling_panda.differential_drive import NXI, Array, DifferentialDrive
 from rolling_panda.errors import ModelError
 from rolling_panda.robot_model import ARM_XI, placement
+from rolling_panda.teleop_messages import TeleopTarget
 
 
 class Teleoperation:
@@ -20,12 +20,12 @@ class Teleoperation:
         """Bind the parts."""
         self._config, self._follower, self._drive = config, follower, drive
         self._posture: Array = np.concatenate([[0.0, 0.0, config.row_heading, 0.0, 0.0], config.reach])
-        self._message: m.TeleopTarget | None = None
+        self._message: TeleopTarget | None = None
         self._goal: Any = None
         self.pressed = True
         self.user = ""
 
-    def holding(self, teleop: Sample[m.TeleopTarget] | None, now: float) -> bool:
+    def holding(self, teleop: Sample[TeleopTarget] | None, now: float) -> bool:
         """Whether the operator holds now: the newest demand says so, is fresh, and is one that can be followed."""
         held = teleop is not None and teleop.message.hold and now - teleop.at <= self._config.hold_max_age_s
         if teleop is None or not held:
@@ -63,7 +63,7 @@ class Teleoperation:
         return self._follower.carry(self._goal, message.base.linear, message.base.angular, robot)
 
 
-def _means_something(message: m.TeleopTarget) -> bool:
+def _means_something(message: TeleopTarget) -> bool:
     """Either a tool target or a base velocity or both, or joint velocities alone."""
     tool_or_base = message.target is not None or message.base is not None
     return tool_or_base != (message.joints is not None)

@@ -58,12 +58,6 @@ class Message(Struct, frozen=True, kw_only=True, tag=True, forbid_unknown_fields
     """Root of the wire messages: a map with a `type` tag; unknown fields are refused."""
 
 
-JointVelocity = Annotated[float, Meta(ge=-10.0, le=10.0)]
-ArmVelocities = tuple[
-    JointVelocity, JointVelocity, JointVelocity, JointVelocity, JointVelocity, JointVelocity, JointVelocity
-]
-
-
 class Header(Struct, frozen=True, forbid_unknown_fields=True):
     """Who measured when: `stamp` is the sender's monotonic clock (s), for differences only, in frame `frame_id`."""
 
@@ -121,37 +115,6 @@ class StopRequest(Message, frozen=True, kw_only=True):
     source: Name
     user: Text
     reason: Text
-
-
-class BaseVelocity(Struct, frozen=True, forbid_unknown_fields=True):
-    """Forward velocity (m/s) and yaw rate (rad/s) of the base."""
-
-    linear: Annotated[float, Meta(ge=-2.0, le=2.0)]
-    angular: Annotated[float, Meta(ge=-4.0, le=4.0)]
-
-
-class TeleopTarget(Message, frozen=True, kw_only=True):
-    """Server → controller while the operator holds: what the robot should do.
-
-    A `target` alone is followed by the tool, with base and arm together. With `base` beside it, the tool keeps to the
-    target while the base moves under it, as far as the arm allows. `base` alone drives with the arm still, `joints`
-    alone turns joints with the base still.
-
-    Attributes:
-        sequence: Strictly increasing within a hold.
-        hold: False ends the hold at once; silence ends it too.
-        user: Who holds.
-        target: Desired T_odom_tool in odom.
-        base: Velocity of the base.
-        joints: Velocities of the arm's joints (7, rad/s).
-    """
-
-    sequence: Count
-    hold: bool
-    user: Text
-    target: Pose | None = None
-    base: BaseVelocity | None = None
-    joints: ArmVelocities | None = None
 
 
 # --- state -----------------------------------------------------------------------------------------------------------

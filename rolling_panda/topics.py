@@ -8,7 +8,7 @@ from typing import Any, Generic, Literal, TypeVar
 
 from msgspec import Struct
 
-from rolling_panda import intents, row_messages
+from rolling_panda import intents, row_messages, teleop_messages
 from rolling_panda import messages as m
 
 Priority = Literal["REAL_TIME", "INTERACTIVE_HIGH", "DATA_LOW", "BACKGROUND"]
@@ -77,7 +77,7 @@ STOP = Topic(
     "software stop, sent several times", express=True,
 )
 TELEOP = Topic(
-    "operator/teleop", m.TeleopTarget, "server", 30, "REAL_TIME", "DROP",
+    "operator/teleop", teleop_messages.TeleopTarget, "server", 30, "REAL_TIME", "DROP",
     "where the held gizmo is", express=True,
 )
 JOINTS = Topic(

@@ -15,6 +15,7 @@ from pydantic import BaseModel
 from rolling_panda import intents
 from rolling_panda import messages as m
 from rolling_panda.page_messages import PageEvents
+from rolling_panda.teleop_messages import BaseVelocity
 from server import requests as body
 from server.desk import Desk, Result
 from server.page_view import addressed
@@ -123,7 +124,7 @@ def operator_router(desk: Desk) -> APIRouter:
             return answer(Result(200, True, "released"))
         aim = Aim(
             None if request.target is None else m.Pose(request.target.position, request.target.quat_xyzw),
-            None if request.base is None else m.BaseVelocity(request.base.linear, request.base.angular),
+            None if request.base is None else BaseVelocity(request.base.linear, request.base.angular),
             request.joints,
         )
         if aim != Aim():

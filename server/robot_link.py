@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from rolling_panda import intents, topics
 from rolling_panda import messages as m
 from rolling_panda.page_messages import ProcessPresence
+from rolling_panda.teleop_messages import TeleopTarget
 from rolling_panda.transport import Transport
 
 _STOP_REPEATS = 5
@@ -80,7 +81,7 @@ class RobotLink:
         threading.Thread(target=send, name="stop", daemon=True).start()
         return request.stop_id
 
-    def teleop(self, target: m.TeleopTarget) -> None:
+    def teleop(self, target: TeleopTarget) -> None:
         """Publish where the held gizmo is."""
         self._teleop.put(target)
 

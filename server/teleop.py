@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from rolling_panda import messages as m
 from rolling_panda.errors import InputError
+from rolling_panda.teleop_messages import ArmVelocities, BaseVelocity, TeleopTarget
 from server.config import ServerConfig
 
 #: The end of a hold is said this often, since a single message may be lost.
@@ -15,8 +16,8 @@ class Aim:
     """What a holder wants of the robot, as in `TeleopTarget`."""
 
     target: m.Pose | None = None
-    base: m.BaseVelocity | None = None
-    joints: m.ArmVelocities | None = None
+    base: BaseVelocity | None = None
+    joints: ArmVelocities | None = None
 
 
 @dataclass
@@ -108,7 +109,7 @@ class TeleopHold:
         self.release(hold.holder)
         return hold.holder
 
-    def due(self, now: float) -> m.TeleopTarget | None:
+    def due(self, now: float) -> TeleopTarget | None:
         """What to publish at this tick: the held target, an end of hold, or nothing."""
         self.expire(now)
         if self._hold is not None:
@@ -118,10 +119,10 @@ class TeleopHold:
             return self._message(False, self._ended)
         return None
 
-    def _message(self, holds: bool, hold: _Hold) -> m.TeleopTarget:
+    def _message(self, holds: bool, hold: _Hold) -> TeleopTarget:
         self._sequence += 1
         aim = hold.aim
-        return m.TeleopTarget(
+        return TeleopTarget(
             sequence=self._sequence,
             hold=holds,
             user=hold.user,

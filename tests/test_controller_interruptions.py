@@ -9,6 +9,7 @@ from rolling_panda import intents
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
 from rolling_panda.robot_model import ARM_Q
+from rolling_panda.teleop_messages import BaseVelocity, TeleopTarget
 
 CONFIG = ControllerConfig()
 
@@ -117,7 +118,7 @@ def test_nothing_begins_to_move_while_the_blades_close():
     assert r.ask(intents.Resume(user="ada")).ok
     for intent in (intents.Start(user="ada"), intents.Home(user="ada")):
         assert "blades" in r.ask(intent).reason
-    r.teleop = m.TeleopTarget(sequence=1, hold=True, user="ada", base=m.BaseVelocity(0.3, 0.0))
+    r.teleop = TeleopTarget(sequence=1, hold=True, user="ada", base=BaseVelocity(0.3, 0.0))
     # The cut ends, but what was held before moves nothing.
     r.run(1.0)
     assert r.state.mode == "READY" and abs(r.q[0]) < 0.3 and np.abs(r.xi).max() < 1e-3
@@ -148,7 +149,7 @@ def test_a_pause_stops_the_way_home():
 
 def test_a_hold_pressed_on_the_way_home_moves_nothing_when_the_arm_is_there():
     r = homing()
-    r.teleop = m.TeleopTarget(sequence=1, hold=True, user="ada", base=m.BaseVelocity(0.2, 0.0))
+    r.teleop = TeleopTarget(sequence=1, hold=True, user="ada", base=BaseVelocity(0.2, 0.0))
     r.run(6.0)
     assert r.state.mode == "READY" and r.state.reason == "the arm is home"
     assert abs(r.q[0]) < 1e-3

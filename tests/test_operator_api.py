@@ -17,6 +17,7 @@ from running_server import eventually, running_server
 from rolling_panda import intents, topics
 from rolling_panda import messages as m
 from rolling_panda.errors import ServiceError
+from rolling_panda.teleop_messages import BaseVelocity
 
 
 @pytest.fixture(scope="module")
@@ -258,7 +259,7 @@ def test_base_and_joints_can_be_moved_too_but_not_together(server, client):
         return sent and sent[-1].hold and sent[-1]
 
     base = eventually(lambda: moving(base={"linear": 0.1, "angular": -0.2}))
-    assert (base.target, base.base, base.joints) == (None, m.BaseVelocity(0.1, -0.2), None)
+    assert (base.target, base.base, base.joints) == (None, BaseVelocity(0.1, -0.2), None)
     jog = eventually(lambda: (got := moving(joints=[0, 0, 0.1, 0, 0, 0, 0])) and got.joints and got)
     assert jog.joints == (0, 0, 0.1, 0, 0, 0, 0) and jog.base is None
     both = {"hold": True, "joints": [0] * 7, "base": {"linear": 0.1, "angular": 0.0}}

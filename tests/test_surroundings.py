@@ -12,6 +12,7 @@ from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
 from rolling_panda.robot_model import RobotModel, pose_message
 from rolling_panda.row_messages import Capsule, Obstacles
+from rolling_panda.teleop_messages import TeleopTarget
 
 CONFIG = ControllerConfig()
 HOME = np.concatenate([np.zeros(5), CONFIG.home])
@@ -46,7 +47,7 @@ def test_a_post_in_the_way_of_the_held_tool_is_not_met() -> None:
     robot.run(0.05)
     behind = tool.translation + 0.5 * tool.rotation[:, 2]
     target = pose_message(pin.SE3(tool.rotation, behind))
-    robot.teleop = m.TeleopTarget(sequence=1, hold=True, user="ada", target=target)
+    robot.teleop = TeleopTarget(sequence=1, hold=True, user="ada", target=target)
     judge = Surroundings(CollisionModel(RobotModel()))
     judge.take(told(*robot.obstacles))
     least = 1.0

@@ -10,9 +10,9 @@ from controller.config import ControllerConfig
 from controller.core import Controller
 from controller.interface import Sample
 from rolling_panda import intents
-from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
 from rolling_panda.robot_model import pose_message
+from rolling_panda.teleop_messages import BaseVelocity, TeleopTarget
 
 CONFIG = ControllerConfig()
 
@@ -32,7 +32,7 @@ def tool(r):
 
 
 def hold(r, target, held=True):
-    r.teleop = m.TeleopTarget(sequence=1, hold=held, user="ada", target=pose_message(target))
+    r.teleop = TeleopTarget(sequence=1, hold=held, user="ada", target=pose_message(target))
 
 
 def moved(T, x, y, z, turn=0.0):
@@ -129,7 +129,7 @@ def test_joint_limits_hold_when_the_gizmo_is_out_of_reach():
 
 
 def held(r, **wanted):
-    r.teleop = m.TeleopTarget(sequence=1, hold=True, user="ada", **wanted)
+    r.teleop = TeleopTarget(sequence=1, hold=True, user="ada", **wanted)
 
 
 @pytest.mark.parametrize("method", ["hierarchy", "nullspace"])
@@ -158,11 +158,11 @@ def test_a_joint_velocity_beyond_the_limits_is_slowed_not_refused():
 def test_the_base_is_driven_with_the_arm_still():
     r = robot()
     arm = r.q[5:].copy()
-    held(r, base=m.BaseVelocity(0.2, 0.0))
+    held(r, base=BaseVelocity(0.2, 0.0))
     r.run(2.0)
     assert 0.25 < r.q[0] < 0.42
     assert np.abs(r.q[5:] - arm).max() < 1e-6
-    held(r, base=m.BaseVelocity(0.0, 0.15))
+    held(r, base=BaseVelocity(0.0, 0.15))
     r.run(2.0)
     assert 0.15 < r.q[2] < 0.31
 
@@ -170,7 +170,7 @@ def test_the_base_is_driven_with_the_arm_still():
 def test_the_base_moves_under_a_tool_that_stays():
     r = robot()
     start = tool(r)
-    held(r, target=pose_message(start), base=m.BaseVelocity(-0.1, 0.0))
+    held(r, target=pose_message(start), base=BaseVelocity(-0.1, 0.0))
     r.run(1.5)
     assert r.q[0] < -0.08
     assert np.linalg.norm(tool(r).translation - start.translation) < 0.003
@@ -181,7 +181,7 @@ def test_the_base_moves_under_a_tool_that_stays():
 
 
 def test_a_demand_for_nothing_or_for_two_things_moves_nothing():
-    for wanted in ({}, {"joints": (0.2,) * 7, "base": m.BaseVelocity(0.1, 0.0)}):
+    for wanted in ({}, {"joints": (0.2,) * 7, "base": BaseVelocity(0.1, 0.0)}):
         r = robot()
         held(r, **wanted)
         r.run(0.3)

@@ -47,9 +47,9 @@ export const TEXT_MAX_LENGTH = 500;
 
 /** @typedef {"background"|"ground"|"post"|"trunk"|"cordon"|"spur"|"cane"|"node"|"wire"} WoodClass */
 
-/** @typedef {[number, number, number, number, number, number, number]} ArmVelocities */
-
 /** @typedef {"viewer"|"operator"|"supervisor"} Role */
+
+/** @typedef {[number, number, number, number, number, number, number]} ArmVelocities */
 
 /**
  * Is a process connected, and how old is its last word (s; None before the first).

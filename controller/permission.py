@@ -1,0 +1,90 @@
+"""Whether what an operator asks would be done now, and if not, why."""
+
+from dataclasses import dataclass
+
+from controller import modes, safety
+from controller.config import ControllerConfig
+from controller.modes import Event
+from rolling_panda import intents
+
+#: What an intent is to the machine of modes.
+EVENTS: dict[type[intents.Intent], Event] = {
+    intents.Arm: Event.ARM,
+    intents.Start: Event.START,
+    intents.Pause: Event.PAUSE,
+    intents.Resume: Event.RESUME,
+    intents.Acknowledge: Event.ACKNOWLEDGE,
+    intents.Reset: Event.RESET,
+}
+#: One intent of each type, to ask whether it would be taken; None where only its content can be refused.
+_PROBES: dict[type[intents.Intent], intents.Intent | None] = {
+    intents.Arm: intents.Arm(user=""),
+    intents.AcceptPoint: None,
+    intents.RejectPoint: None,
+    intents.AcceptAll: None,
+    intents.Start: intents.Start(user=""),
+    intents.Pause: intents.Pause(user=""),
+    intents.Resume: intents.Resume(user=""),
+    intents.Home: intents.Home(user=""),
+    intents.Acknowledge: intents.Acknowledge(user=""),
+    intents.Reset: intents.Reset(user="", reason="-"),
+}
+
+
+@dataclass(frozen=True)
+class Situation:
+    """What a permission depends on.
+
+    Attributes:
+        config: Of the controller.
+        state: Of the machine of modes.
+        health: Freshness of the inputs.
+        homing: True while the arm is brought home.
+        busy: What has to end before a motion may begin; empty when nothing.
+        work: Whether a point is accepted.
+    """
+
+    config: ControllerConfig
+    state: modes.State
+    health: safety.Health
+    homing: bool
+    busy: str
+    work: bool
+
+
+def refusal(intent: intents.Intent, now: float, situation: Situation) -> str:
+    """Why an intent would not be taken now, apart from its own content; empty when it would.
+
+    Args:
+        intent: What is asked.
+        now: Monotonic time (s).
+        situation: Of the robot.
+    """
+    config, health, mode = situation.config, situation.health, situation.state.mode
+    event = EVENTS.get(type(intent))
+    if event is not None and not (event is Event.PAUSE and situation.homing):
+        refused = modes.step(situation.state, event, now).refused
+        if refused:
+            return refused
+    if isinstance(intent, intents.Arm | intents.Start | intents.Home):
+        why = safety.sensors(health, config)
+        if why:
+            return why
+        if health.watchdog:
+            return "the bridge's watchdog holds the robot: wait until it takes commands"
+    if isinstance(intent, intents.Start | intents.Home):
+        why = safety.supervision(health, config, False) or situation.busy
+        if why:
+            return why
+    if isinstance(intent, intents.Start):
+        return safety.perception(health, config) if situation.work else "no point is accepted"
+    if isinstance(intent, intents.Home) and mode != "READY":
+        return f"the arm is brought home in READY; the mode is {mode}"
+    return ""
+
+
+def allowed(now: float, situation: Situation) -> tuple[str, ...]:
+    """Types of the intents that would be taken now."""
+    return tuple(
+        kind.__name__ for kind, probe in _PROBES.items() if probe is None or not refusal(probe, now, situation)
+    )
