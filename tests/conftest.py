@@ -1,6 +1,8 @@
 """What tests share."""
 
+import os
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -10,6 +12,20 @@ from playwright.sync_api import sync_playwright
 # A time limit for each example would judge how busy the machine is, not the code.
 settings.register_profile("rolling-panda", deadline=None)
 settings.load_profile("rolling-panda")
+
+
+@pytest.fixture(autouse=True)
+def ordinary_scheduling(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """A process's `main` that is called in the tests' own process leaves their scheduling as it is.
+
+    Otherwise every program that a later test starts would inherit real-time priority, a browser for instance, and keep
+    the processor from the server that it waits for.
+    """
+    for module in ("process", "router"):
+        monkeypatch.setattr(f"rolling_panda.{module}.take_priority", lambda role: None)
+    before = os.sched_getscheduler(0), os.getpriority(os.PRIO_PROCESS, 0)
+    yield
+    assert (os.sched_getscheduler(0), os.getpriority(os.PRIO_PROCESS, 0)) == before, "a test changed its own priority"
 
 
 @pytest.fixture(scope="session")
