@@ -86,7 +86,7 @@ def measure_parts(demands: Sequence[Demand]) -> dict[str, Times]:
     parts: dict[str, Callable[[Demand], object]] = {
         "kinematics": lambda d: robot.kinematics(d.q),
         "manipulability and gradient": lambda d: manipulability.at(d.kinematics.J),
-        "bounds": lambda d: box.at(d.q, d.sent),
+        "bounds": lambda d: box.at(d.q, d.sent, d.sent_before),
         **{guard.name: guard.rows for guard in rows},
     }
     times: dict[str, list[float]] = {name: [] for name in (*parts, "step", "step without guards", "nullspace step")}

@@ -1,8 +1,9 @@
-"""The last bound before the actuators: velocity, acceleration and joint position, whatever was asked for."""
+"""The last bound before the actuators: velocity, acceleration, jerk and joint position, whatever was asked for."""
 
 import numpy as np
 
 from rolling_panda.differential_drive import Array
+from rolling_panda.jerk_limit import largest_rise
 from rolling_panda.robot_model import ARM_Q, ARM_XI, Limits
 
 # Share of the acceleration that braking ahead of a joint's limit counts on: the servos lag.
@@ -28,13 +29,17 @@ class Limiter:
         self._lower = limits.lower[ARM_Q] + joint_margin
         self._upper = limits.upper[ARM_Q] - joint_margin
         self._braking = 2 * _BRAKING * acceleration[ARM_XI]
+        self._arm_change = self._change[ARM_XI]
+        self._jerk = limits.jerk[ARM_XI] * dt * dt
+        self._last = np.zeros_like(self._jerk)
         self.sent = np.zeros_like(self._velocity)
 
     def step(self, desired: Array, arm: Array) -> Array:
         """What to send on now.
 
         Towards a limit a joint may only be as fast as half its acceleration can still stop; beyond the limit it may
-        only come back. Where that asks for more braking than the joint can do, it brakes as hard as it can.
+        only come back. Where that asks for more braking than the joint can do, it brakes as hard as it can. A joint
+        comes to its goal with an acceleration that has died away, in as many periods as its jerk takes.
 
         Args:
             desired: ξ̇ asked for (9, rad/s), finite.
@@ -48,5 +53,12 @@ class Limiter:
         towards_upper = np.sqrt(self._braking * np.maximum(self._upper - arm, 0.0))
         towards_lower = -np.sqrt(self._braking * np.maximum(arm - self._lower, 0.0))
         goal[ARM_XI] = np.minimum(np.maximum(goal[ARM_XI], towards_lower), towards_upper)
-        self.sent = self.sent + np.minimum(np.maximum(goal - self.sent, -self._change), self._change)
+        missing = goal - self.sent
+        change = np.minimum(np.maximum(missing, -self._change), self._change)
+        arm_missing, jerk, last = missing[ARM_XI], self._jerk, self._last
+        wanted = np.copysign(largest_rise(np.abs(arm_missing), jerk), arm_missing)
+        wanted = np.minimum(np.maximum(wanted, last - jerk), last + jerk)
+        self._last = np.minimum(np.maximum(wanted, -self._arm_change), self._arm_change)
+        change[ARM_XI] = self._last
+        self.sent = self.sent + change
         return self.sent

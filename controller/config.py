@@ -28,6 +28,7 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         base_braking: Of the base when the robot has to stop (m/s²).
         arm_share: Share of the arm's rated velocity that is used.
         arm_acceleration_share: Share of the arm's rated acceleration that is used.
+        arm_jerk_share: Share of the arm's rated jerk that is used; braking for a reason may use all of it.
         tool_speed: Limit of the tool between cuts (m/s).
         tool_turn: Limit of the tool's turning (rad/s).
         tool_acceleration: Of planned motions (m/s²).
@@ -83,6 +84,7 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
     base_braking: Positive = 1.5
     arm_share: Annotated[float, Meta(gt=0.0, le=1.0)] = 0.6
     arm_acceleration_share: Annotated[float, Meta(gt=0.0, le=1.0)] = 0.5
+    arm_jerk_share: Annotated[float, Meta(gt=0.0, le=1.0)] = 0.5
     tool_speed: Positive = 0.3
     tool_turn: Positive = 0.8
     tool_acceleration: Positive = 1.0

@@ -75,6 +75,7 @@ class Controller:
         self._measured: Measured | None = None
         self._tracking: Tracking | None = None
         self._sent: Array = np.zeros(NXI)
+        self._before: Array = self._sent
         self._epoch: int | None = None
         self._sequence_number = 0
         self._points_seen: object = None
@@ -148,7 +149,7 @@ class Controller:
         if inputs.joints is not None and inputs.odometry is not None:
             q = configuration_now(inputs.joints.message, inputs.odometry.message, self._robot.drive)
             wheels = np.array(inputs.joints.message.velocity[:2])
-            self._measured = Measured(q, self._robot.kinematics(q), self._sent, wheels)
+            self._measured = Measured(q, self._robot.kinematics(q), self._sent, wheels, self._before)
         self._surroundings.take(inputs.obstacles)
         if bridge is not None:
             for text in self._sequence.watch(bridge, now):
@@ -265,18 +266,18 @@ class Controller:
 
     def _checked(self, xi: Array) -> Array:
         """The last gate: what is not finite or outside the limits is not sent; the robot brakes instead."""
-        if self._saturation.admits(xi, self._sent):
-            return xi
-        self._say("error", "a velocity outside the limits was not sent; the robot brakes")
-        return self._saturation.brake(self._sent)
+        if not self._saturation.admits(xi, self._sent):
+            self._say("error", "a velocity outside the limits was not sent; the robot brakes")
+            xi = self._saturation.brake(self._sent)
+        return self._saturation.smooth(xi, self._sent, self._before)
 
     def _motion(self, xi: Array) -> m.MotionCommand | None:
         joints = self._inputs.joints
         latched_and_still = self._state.mode == "ESTOP_LATCHED" and not np.any(xi)
         if self._epoch is None or joints is None or latched_and_still or self._health.overruled:
-            self._sent = np.zeros(NXI)
+            self._sent = self._before = np.zeros(NXI)
             return None
-        self._sent = xi
+        self._sent, self._before = xi, self._sent
         self._sequence_number += 1
         a, b, c, d, e, f, g, h, i = xi.tolist()
         return m.MotionCommand(

@@ -24,12 +24,14 @@ class Measured:
         kinematics: Of the tool at q.
         sent: ξ̇ sent last (9, rad/s).
         wheels: Measured velocities of the wheels (2, rad/s); None takes them for what was sent.
+        before: ξ̇ sent in the period before the last (9, rad/s); None where nothing accelerates.
     """
 
     q: Array
     kinematics: Kinematics
     sent: Array
     wheels: Array | None = None
+    before: Array | None = None
 
     def behind(self) -> Array:
         """Twist of the tool (6) that the base owes: what its wheels were told beyond what they do."""
@@ -97,6 +99,7 @@ class Follower:
                 motion.base,
                 motion.cap(pose),
                 motion.scale,
+                robot.before,
             )
         )
         motion.advance(out.scale, self._dt)
@@ -104,7 +107,8 @@ class Follower:
 
     def jog(self, xi: Array, robot: Measured) -> Tracking:
         """One period of the actuators' own velocities ξ̇ (9, rad/s), within the limits and clear of obstacles."""
-        demand = Demand(robot.q, robot.kinematics, robot.sent, ActuatorTask(xi), Posture(robot.q), "free")
+        task, posture = ActuatorTask(xi), Posture(robot.q)
+        demand = Demand(robot.q, robot.kinematics, robot.sent, task, posture, "free", before=robot.before)
         return _tracking(self._method.solve(demand), None, np.zeros(6), False)
 
     def carry(self, goal: Any, linear: float, angular: float, robot: Measured) -> Tracking:
@@ -149,6 +153,7 @@ class Follower:
             posture,
             base,
             self._config.teleop_speed,
+            before=robot.before,
         )
         return _tracking(self._method.solve(demand), goal, error, False)
 

@@ -43,6 +43,7 @@ class RobotConfig(Struct, frozen=True, forbid_unknown_fields=True):
         wheel_velocity: Limit of each wheel (rad/s).
         wheel_acceleration: Limit of each wheel (rad/s²).
         arm_acceleration: Limit of each arm joint (rad/s²).
+        arm_jerk: Limit of each arm joint (rad/s³).
     """
 
     rho: Annotated[float, Meta(ge=-1.0, le=1.0)] = 0.0
@@ -56,6 +57,15 @@ class RobotConfig(Struct, frozen=True, forbid_unknown_fields=True):
         15.0,
         20.0,
         20.0,
+    )
+    arm_jerk: tuple[Positive, Positive, Positive, Positive, Positive, Positive, Positive] = (
+        7500.0,
+        3750.0,
+        5000.0,
+        6250.0,
+        7500.0,
+        10000.0,
+        10000.0,
     )
 
 

@@ -24,12 +24,13 @@ _MESH_ROOT = "package://example-robot-data/robots/panda_description"
 
 @dataclass(frozen=True)
 class Limits:
-    """What the robot can do. Positions over q (12; the base and wheels are unbounded), rates over ξ (9)."""
+    """What the robot can do. Positions over q (12), the others over ξ (9); where there is no limit it is infinite."""
 
     lower: Array
     upper: Array
     velocity: Array
     acceleration: Array
+    jerk: Array
 
 
 @dataclass(frozen=True)
@@ -150,4 +151,5 @@ def _limits(model: Any, config: RobotConfig) -> Limits:
     lower[:5], upper[:5] = -np.inf, np.inf
     velocity = np.concatenate([[config.wheel_velocity] * 2, model.velocityLimit[ARM_Q]])
     acceleration = np.array([config.wheel_acceleration, config.wheel_acceleration, *config.arm_acceleration])
-    return Limits(lower, upper, velocity, acceleration)
+    jerk = np.array([np.inf, np.inf, *config.arm_jerk])
+    return Limits(lower, upper, velocity, acceleration, jerk)

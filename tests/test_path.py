@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from controller.planning.limits import RATED_JERK, plan_limits
+from controller.planning.limits import plan_limits
 from controller.planning.path import PathPlanner, Planned, Refused
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.obstacle import Obstacle
@@ -56,7 +56,7 @@ def check(planned, q, goal, free=False):
     acceleration = np.diff(np.vstack([still, plan.xi]), axis=0) / dt
     assert (np.abs(acceleration) <= limits.acceleration).all()
     jerk = np.diff(np.vstack([still, acceleration, still]), axis=0) / dt
-    assert (np.abs(jerk[:, ARM_XI]) <= RATED_JERK).all()
+    assert (np.abs(jerk[:, ARM_XI]) <= ROBOT.limits.jerk[ARM_XI]).all()
     tool = ROBOT.pose(plan.q[-1], ROBOT.tool_id)
     np.testing.assert_allclose(plan.T_odom_tool[-1], tool.homogeneous, atol=1e-9)
     assert np.linalg.norm(tool.translation - goal.translation) < 1e-6

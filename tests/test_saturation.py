@@ -90,3 +90,15 @@ def test_what_is_not_finite_is_not_admitted():
         xi = np.zeros(9)
         xi[4] = bad
         assert not SATURATION.admits(xi, np.zeros(9))
+
+
+def test_what_is_sent_keeps_the_rated_jerk():
+    """At 1 kHz from speeding up to braking the change of acceleration takes its periods; what is in reach is sent."""
+    saturation = Saturation(ROBOT, ControllerConfig(), 0.001)
+    step, jerk = saturation.acceleration * 0.001, ROBOT.limits.jerk * 1e-6
+    before, sent = np.zeros(9), step
+    out = saturation.smooth(np.zeros(9), sent, before)
+    np.testing.assert_allclose(out[2:], (sent + np.maximum(step - jerk, -step))[2:])
+    np.testing.assert_array_equal(out[:2], [0.0, 0.0])
+    near = sent + step - 0.5 * jerk
+    np.testing.assert_allclose(saturation.smooth(near, sent, before)[2:], near[2:], atol=1e-15)

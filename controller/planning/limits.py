@@ -45,10 +45,6 @@ class PlanLimits:
         )
 
 
-#: The Panda's jerk limits (rad/s³, data sheet).
-RATED_JERK = np.array([7500.0, 3750.0, 5000.0, 6250.0, 7500.0, 10000.0, 10000.0])
-
-
 def plan_limits(
     robot: RobotModel,
     base_speed: float,
@@ -77,7 +73,7 @@ def plan_limits(
         arm_velocity=robot.limits.velocity[ARM_XI] * arm_share,
         arm_acceleration=robot.limits.acceleration[ARM_XI] * arm_acceleration_share,
         # A fiftieth: the acceleration still rises within a tenth of a second, which shakes nothing.
-        arm_jerk=0.02 * RATED_JERK,
+        arm_jerk=0.02 * robot.limits.jerk[ARM_XI],
         lower=robot.limits.lower[ARM_Q] + joint_margin,
         upper=robot.limits.upper[ARM_Q] - joint_margin,
         dt=dt,

@@ -5,6 +5,10 @@ which v dt + v²/2a ≤ d, that is v ≤ −a dt + √((a dt)² + 2 a d): after 
 inside this bound the next bound is within reach by braking at a, so that the bounds never empty. Half of the joint's
 acceleration is reckoned with for this; the rest is for the servo's lag.
 
+The acceleration may change by j dt in a period. So a joint comes to the bound above as `jerk_limit.py` says, which in
+turn never asks for more than j dt: the bound falls by no more than b dt in a period, so that against it the velocity
+rises by what it changes by plus b dt.
+
 Outside every such guarantee (a start beyond a limit, a velocity above it) the bounds close to the strongest braking.
 """
 
@@ -14,6 +18,7 @@ from msgspec import Struct
 from controller.config import ControllerConfig
 from controller.whole_body.actuation import Actuation
 from rolling_panda.differential_drive import NXI, Array
+from rolling_panda.jerk_limit import largest_rise
 from rolling_panda.robot_model import ARM_Q, ARM_XI, RobotModel
 
 #: Rate at which a joint outside its limit comes back (1/s), and its largest velocity in doing so (rad/s).
@@ -42,7 +47,9 @@ class Box:
         self._arm_step = acceleration * dt
         self._brake_step = 0.5 * self._arm_step
         self._brake_square, self._brake_twice = self._brake_step**2, acceleration
-        self._q, self._sent = np.empty(14), np.empty(14)
+        self._jerk_step = np.tile(limits.jerk[ARM_XI] * config.arm_jerk_share, 2) * dt * dt
+        self._jerk_most = limits.jerk[ARM_XI] * dt * dt
+        self._q, self._sent, self._change = np.empty(14), np.empty(14), np.empty(14)
         #: Largest ν (9).
         self.speed: Array = np.empty(NXI)
         self.speed[:2] = config.base_speed, config.base_yaw_rate
@@ -54,23 +61,29 @@ class Box:
         self._base_step = min(config.base_acceleration, braking) * dt, config.base_yaw_acceleration * dt
         self._base_brake = braking * dt, max(braking / mu, config.base_yaw_acceleration) * dt
 
-    def at(self, q: Array, sent: Array) -> Bounds:
-        """The bounds at q (12) after ξ̇ `sent` (9)."""
-        here, arm = self._q, self._sent
+    def at(self, q: Array, sent: Array, before: Array) -> Bounds:
+        """The bounds at q (12) after ξ̇ `sent` (9), and `before` (9) in the period before that."""
+        here, arm, change = self._q, self._sent, self._change
         here[:7] = q[ARM_Q]
         here[7:] = -here[:7]
         arm[:7] = sent[ARM_XI]
         arm[7:] = -arm[:7]
+        np.subtract(arm[:7], before[ARM_XI], out=change[:7])
+        change[7:] = -change[:7]
+        np.minimum(np.maximum(change, -self._arm_step, out=change), self._arm_step, out=change)
         room = self._ends - here
         most = np.sqrt(self._brake_square + self._brake_twice * np.maximum(room, 0.0)) - self._brake_step
-        most = np.minimum(most, self._arm_speed)
         if min(room.tolist()) < 0.0:
             most = np.minimum(most, np.where(room < 0.0, np.maximum(_RETURN * room, -_RETURN_SPEED), np.inf))
+        jerk, brake = self._jerk_step, self._brake_step
+        rise = np.minimum(largest_rise(most - arm + brake, jerk) - brake, largest_rise(self._arm_speed - arm, jerk))
         # Every end is moved into what can be reached, which keeps their order.
-        most = np.maximum(np.minimum(most, arm + self._arm_step), arm - self._arm_step)
+        rise = np.minimum(rise, np.minimum(self._arm_step, change + jerk))
+        most = arm + np.maximum(rise, np.maximum(-self._arm_step, change - jerk))
         lower, upper = np.empty(NXI), np.empty(NXI)
         upper[ARM_XI] = most[:7]
-        lower[ARM_XI] = -most[7:]
+        # Only a state far outside every bound can make the ends contradict each other.
+        lower[ARM_XI] = np.minimum(-most[7:], most[:7])
         left, right = float(sent[0]), float(sent[1])
         slower_left, slower_right = self.ramp(left, right)
         low, high = zip(self._wheel(left, slower_left), self._wheel(right, slower_right), strict=True)
@@ -87,12 +100,14 @@ class Box:
             return 0.0, 0.0
         return left * (1.0 - 1.0 / largest), right * (1.0 - 1.0 / largest)
 
-    def brake(self, sent: Array) -> Array:
-        """ξ̇ (9) after one period of the strongest braking of every actuator."""
+    def brake(self, sent: Array, before: Array) -> Array:
+        """ξ̇ (9) after one period of the strongest braking of every actuator, at the arm's rated jerk."""
         out = np.empty(NXI)
         out[:2] = self.ramp(float(sent[0]), float(sent[1]))
-        arm = sent[ARM_XI]
-        out[ARM_XI] = np.sign(arm) * np.maximum(np.abs(arm) - self._arm_step[:7], 0.0)
+        arm, most, step = sent[ARM_XI], self._jerk_most, self._arm_step[:7]
+        last = np.minimum(np.maximum(arm - before[ARM_XI], -step), step)
+        change = np.sign(arm) * np.maximum(np.abs(arm) - step, 0.0) - arm
+        out[ARM_XI] = arm + np.minimum(np.maximum(change, last - most), last + most)
         return out
 
     def _wheel(self, sent: float, ramp: float) -> tuple[float, float]:

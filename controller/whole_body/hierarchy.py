@@ -91,7 +91,7 @@ class Hierarchy:
         """The actuator velocities that answer the demand; see `Method.solve`."""
         if not demand.finite:
             return self._brake(demand, "the demand holds a number that is not finite", _NOWHERE)
-        bounds = self._box.at(demand.q, demand.sent)
+        bounds = self._box.at(demand.q, demand.sent, demand.sent_before)
         self._climb.now = manipulability = self._manipulability.at(demand.kinematics.J)
         base = self._actuation.twist @ self._box.ramp(float(demand.sent[0]), float(demand.sent[1]))
         for task, jacobian, target in self._tasks:
@@ -207,10 +207,10 @@ class Hierarchy:
 
     def _brake(self, demand: Demand, reason: str, manipulability: Manipulability) -> Solution:
         """The strongest braking of every actuator; from a velocity that is not a number, rest."""
-        sent = demand.sent
-        if not math.isfinite(float(sent.sum())):
+        sent, before = demand.sent, demand.sent_before
+        if not math.isfinite(float(sent.sum() + before.sum())):
             return Solution(np.zeros(NXI), 0.0, manipulability.value, False, reason)
-        return Solution(self._box.brake(sent), 0.0, manipulability.value, False, reason)
+        return Solution(self._box.brake(sent, before), 0.0, manipulability.value, False, reason)
 
 
 def _share(demand: Demand) -> float:

@@ -1,4 +1,4 @@
-"""Limits of what is sent: velocity, acceleration against the last sent command, and braking before a joint limit."""
+"""Limits of what is sent: velocity, acceleration and jerk against what was sent last, and braking before a limit."""
 
 from dataclasses import dataclass
 
@@ -50,6 +50,7 @@ class Saturation:
         self._stop_step = self._step.copy()
         braking = min(config.base_braking / robot.drive.wheel_radius, float(limits.acceleration[0]))
         self._stop_step[:2] = np.maximum(braking * dt, self._step[:2])
+        self._jerk_step = limits.jerk * dt * dt
         self._most, self._least = self.velocity, -self.velocity
         self._brake = 0.5 * self.acceleration[ARM_XI]
         self._brake_step = self._brake * dt
@@ -84,6 +85,18 @@ class Saturation:
             (np.abs(xi) <= self.velocity + 2 * _SLACK).all()
             and (np.abs(xi - sent) <= self._stop_step * (1 + 1e-9) + _SLACK).all()
         )
+
+    def smooth(self, xi: Array, sent: Array, before: Array) -> Array:
+        """The velocity (9) nearest to `xi` that the arm's rated jerk lets follow.
+
+        Args:
+            xi: ξ̇ (9) within the acceleration of `sent`, so that the answer is as well.
+            sent: ξ̇ (9) sent last.
+            before: ξ̇ (9) sent in the period before that.
+        """
+        last, step = sent - before, self._jerk_step
+        smoothed: Array = sent + np.minimum(np.maximum(xi - sent, last - step), last + step)
+        return smoothed
 
     def brake(self, sent: Array) -> Array:
         """The velocity (9) after one period of the greatest deceleration of every actuator."""

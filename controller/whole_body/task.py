@@ -74,6 +74,7 @@ class Demand:
         base: What the base is for.
         speed_cap: Largest speed of the tool's origin (m/s).
         scale: Rate of the motion's clock in the last period, 0…1.
+        before: ξ̇ sent in the period before the last (9); None where nothing accelerates.
     """
 
     q: Array
@@ -84,13 +85,19 @@ class Demand:
     base: BaseMode = "row"
     speed_cap: float = math.inf
     scale: float = 1.0
+    before: Array | None = None
+
+    @property
+    def sent_before(self) -> Array:
+        """ξ̇ sent in the period before the last (9)."""
+        return self.sent if self.before is None else self.before
 
     @property
     def finite(self) -> bool:
         """Whether every number that a method uses is finite."""
         posture, J, tool = self.posture, self.kinematics.J, self.tool
         wanted = tool.twist if isinstance(tool, ToolTask) else tool.xi
-        all_of_it = np.concatenate((self.q, self.sent, wanted, posture.q, posture.rate, J.ravel("K")))
+        all_of_it = np.concatenate((self.q, self.sent, self.sent_before, wanted, posture.q, posture.rate, J.ravel("K")))
         # A square that overflows belongs to a number that is of no use either.
         return math.isfinite(float(np.vdot(all_of_it, all_of_it))) and not math.isnan(self.speed_cap + self.scale)
 

@@ -1,0 +1,25 @@
+"""Coming to a limit with bounded jerk, in discrete time.
+
+Something that may still rise by `room`, and whose rise per period may only fall by `step` from one period to the next,
+rises in all by β + (β − step) + (β − 2 step) + … That stays within the room where
+
+    β ≤ √(2 step · room) − step/2,    or    β ≤ min(room, step), since then the next rise may already be nothing.
+
+Whoever keeps to the greater of the two can keep to it in the next period as well: the room is then smaller by β, and
+β − step is inside the bound of that room (or nothing, which always is). So the bound never asks for more than `step`.
+"""
+
+import numpy as np
+
+from rolling_panda.differential_drive import Array
+
+
+def largest_rise(room: Array, step: Array) -> Array:
+    """The greatest rise in this period from which the limit is still kept.
+
+    Args:
+        room: What is left up to the limit (n); where it is negative, it is the answer or less: back inside at once.
+        step: By how much the rise may change from one period to the next (n), positive.
+    """
+    rise: Array = np.maximum(np.sqrt(2.0 * step * np.maximum(room, 0.0)) - 0.5 * step, np.minimum(room, step))
+    return rise
