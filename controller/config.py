@@ -7,6 +7,7 @@ from msgspec import Meta, Struct
 from controller.whole_body.hierarchy_config import HierarchyConfig
 from rolling_panda.config import Positive
 
+NotNegative = Annotated[float, Meta(ge=0.0, le=0.2)]
 Gain = Annotated[float, Meta(ge=0.0, le=100.0)]
 ArmPosture = tuple[float, float, float, float, float, float, float]
 
@@ -38,15 +39,17 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         slow_braking: How the tool slows down to that (m/s²).
         blend: Share of the shorter of two legs that overlaps with the other, where the tool rounds the corner.
         advance_speed: Limit along the approach line (m/s).
-        stand_off: Distance of the stand-off from the cut (m); from there on only the arm moves.
+        stand_off: Distance of the stand-off from the cut (m), from where the approach is straight.
+        arm_only: Distance to a cut (m) within which only the arm moves, on the way in and out.
         clearance: Distance kept from the canes between cuts (m).
         position_tolerance: The tool is in place to cut (m).
         rotation_tolerance: The same for its direction (rad).
-        settle_s: Time in tolerance before it counts (s).
+        settle_speed: Slower than this the tool counts as at rest there (m/s).
         reach_timeout_s: A motion that has not ended this long after its planned end has failed (s).
         cut_timeout_s: A cut without outcome for this long is UNKNOWN (s).
         largest_radius: Canes thicker than this are refused (m).
         moved_tolerance: A point that moved further than this after acceptance is not cut (m).
+        arm_lag_s: By which the arm follows late (s): its servos' lag and half a period.
         gain_position: Of the tool's position error (1/s).
         gain_rotation: Of the tool's rotation error (1/s).
         gain_posture: Of the null-space posture (1/s).
@@ -85,26 +88,28 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
     arm_share: Annotated[float, Meta(gt=0.0, le=1.0)] = 0.6
     arm_acceleration_share: Annotated[float, Meta(gt=0.0, le=1.0)] = 0.5
     arm_jerk_share: Annotated[float, Meta(gt=0.0, le=1.0)] = 0.5
-    tool_speed: Positive = 0.3
-    tool_turn: Positive = 0.8
-    tool_acceleration: Positive = 1.0
-    tool_jerk: Positive = 10.0
+    tool_speed: Positive = 0.7
+    tool_turn: Positive = 1.5
+    tool_acceleration: Positive = 3.0
+    tool_jerk: Positive = 50.0
     cut_speed: Positive = 0.03
     slow_zone: Positive = 0.025
-    slow_braking: Positive = 0.3
+    slow_braking: Positive = 1.2
     blend: Annotated[float, Meta(ge=0.0, le=0.5)] = 0.4
-    advance_speed: Positive = 0.25
+    advance_speed: Positive = 0.7
     stand_off: Positive = 0.15
+    arm_only: Positive = 0.05
+    arm_lag_s: NotNegative = 0.025
     clearance: Positive = 0.22
     position_tolerance: Positive = 0.0015
     rotation_tolerance: Positive = 0.0175
-    settle_s: Positive = 0.1
+    settle_speed: Positive = 0.005
     reach_timeout_s: Positive = 6.0
     cut_timeout_s: Positive = 3.0
     largest_radius: Positive = 0.0075
     moved_tolerance: Positive = 0.005
-    gain_position: Gain = 3.0
-    gain_rotation: Gain = 3.0
+    gain_position: Gain = 5.0
+    gain_rotation: Gain = 5.0
     gain_posture: Gain = 1.0
     gain_heading: Gain = 0.8
     gain_manipulability: Gain = 0.2

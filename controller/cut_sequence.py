@@ -8,8 +8,10 @@ cut flows into the way to the next.
 import math
 from dataclasses import dataclass
 from enum import Enum
+from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 from controller.config import ControllerConfig
 from controller.cut_pose import escape_pose
@@ -21,6 +23,7 @@ from controller.tool_motion import Leg, ToolMotion
 from controller.whole_body.saturation import Saturation
 from rolling_panda import messages as m
 from rolling_panda.differential_drive import Array
+from rolling_panda.robot_model import ARM_Q
 
 #: A cut command is repeated this often until the bridge has seen it (s).
 _REPEAT_S = 0.05
@@ -203,7 +206,7 @@ class CutSequence:
             return Work(xi)
         self._plan = coming.found
         self._stage = Stage.TRAVEL
-        self._go(robot, *self._way_to(self._plan), slow_end=True)
+        self._go(robot, *self._way_to(self._plan, robot.kinematics.T_odom_tool, robot.q), slow_end=True)
         return Work(xi)
 
     def _travel(self, robot: Measured, now: float) -> Work:
@@ -218,7 +221,9 @@ class CutSequence:
     def _advance(self, robot: Measured, now: float) -> Work:
         tracking = self._track(robot)
         config = self._config
-        if self._over(tracking, now, config.position_tolerance, config.rotation_tolerance, config.settle_s):
+        there = self._over(tracking, now, config.position_tolerance, config.rotation_tolerance)
+        # Where it comes to rest, not where it passes by.
+        if there and float(np.linalg.norm(robot.kinematics.J_xi[:3] @ tracking.xi)) < config.settle_speed:
             self._cuts += 1
             self._cut = _Cut(self._point_id, f"{self._run_id}-{self._cuts}", now + config.cut_timeout_s)
             self._queue.intend(self._point_id, self._cut.cut_id)
@@ -272,7 +277,6 @@ class CutSequence:
         self._accepted = None
         self._motion = self._plan = None
         self._started: float | None = None
-        self._in_place_since: float | None = None
 
     def _check_acceptance(self, robot: Measured) -> None:
         ticket = self._queue.get(self._point_id)
@@ -293,19 +297,31 @@ class CutSequence:
     def _retreat_from(self, robot: Measured) -> None:
         assert self._plan is not None
         self._stage = Stage.RETREAT
-        back = Leg(self._plan.poses.clear, _at_base(self._plan.q_clear, robot.q), self._config.tool_speed, math.inf)
+        arm_only = self._config.arm_only if self._follower.flows else math.inf
+        clear, q_clear = self._plan.poses.clear, _at_base(self._plan.q_clear, robot.q)
+        back = Leg(clear, q_clear, self._config.tool_speed, frozen_until=arm_only)
         ticket, plan = self._queue.get(self._point_id), self._coming.found
         unsure = ticket is not None and ticket.state == "UNKNOWN"
-        onwards = self._way_to(plan) if isinstance(plan, CutPlan) and self._coming.stands and not unsure else ()
+        stands = isinstance(plan, CutPlan) and self._coming.stands and not unsure
+        onwards = self._way_to(plan, clear, q_clear) if stands and isinstance(plan, CutPlan) else ()
         if not onwards:
             self._coming.forget()
         self._go(robot, back, *onwards, slow_end=bool(onwards))
 
-    def _way_to(self, plan: CutPlan) -> tuple[Leg, Leg]:
-        """Clear of the canes to before the next cut, then straight in past the stand-off."""
+    def _way_to(self, plan: CutPlan, T_odom_tool: Any, q: Array) -> tuple[Leg, ...]:
+        """From a pose of the tool (pin.SE3) at q (12): clear of the canes to before the next cut, then straight in."""
         config, poses = self._config, plan.poses
-        clear = Leg(poses.clear, plan.q_clear, config.tool_speed)
-        return clear, Leg(poses.cut, plan.q_cut, config.advance_speed, config.stand_off)
+        if self._follower.flows:
+            clear = Leg(poses.clear, plan.q_clear, config.tool_speed)
+            return clear, Leg(poses.cut, plan.q_cut, config.advance_speed, config.arm_only)
+        # The base takes the arm along as it is; then the arm alone does the rest.
+        q_there = _at_base(q, plan.q_clear)
+        carried = _base_pose(q_there) * _base_pose(q).inverse() * T_odom_tool
+        return (
+            Leg(carried, q_there, config.tool_speed),
+            Leg(poses.clear, plan.q_clear, config.tool_speed, math.inf),
+            Leg(poses.cut, plan.q_cut, config.advance_speed, math.inf),
+        )
 
     def _fail(self, robot: Measured, reason: str) -> Work:
         self._queue.resolve(self._point_id, "FAILED_NOT_CUT", reason)
@@ -320,22 +336,17 @@ class CutSequence:
         self._motion = ToolMotion(
             self._config, robot.kinematics.T_odom_tool, robot.q, legs, slow_end=slow_end, flows=flows
         )
-        self._started = self._in_place_since = None
+        self._started = None
 
     def _track(self, robot: Measured) -> Tracking:
         assert self._motion is not None
         return self._follower.follow(self._motion, robot)
 
-    def _over(self, tracking: Tracking, now: float, near: float, turn: float = 0.2, settle_s: float = 0.0) -> bool:
-        """Whether the motion has run out and the tool has been in place for `settle_s`."""
+    def _over(self, tracking: Tracking, now: float, near: float, turn: float = 0.2) -> bool:
+        """Whether the motion has run out and the tool is in place."""
         if self._started is None:
             self._started = now
-        if not tracking.done or tracking.position_error > near or tracking.rotation_error > turn:
-            self._in_place_since = None
-            return False
-        if self._in_place_since is None:
-            self._in_place_since = now
-        return now - self._in_place_since >= settle_s
+        return tracking.done and tracking.position_error <= near and tracking.rotation_error <= turn
 
     def _late(self, now: float) -> bool:
         if self._started is None or self._motion is None:
@@ -366,11 +377,15 @@ _STEPS = {
 }
 
 
-def _at_base(q_goal: Array, q: Array) -> Array:
-    """The goal's arm posture with the base where it stands."""
-    out = q.copy()
-    out[5:] = q_goal[5:]
+def _at_base(q_arm: Array, q_base: Array) -> Array:
+    """The arm posture of one configuration (12) with the base of another."""
+    out = q_base.copy()
+    out[ARM_Q] = q_arm[ARM_Q]
     return out
+
+
+def _base_pose(q: Array) -> Any:
+    return pin.SE3(pin.exp3(np.array([0.0, 0.0, q[2]])), np.array([q[0], q[1], 0.0]))
 
 
 def _with(work: Work, events: tuple[str, ...]) -> Work:

@@ -86,7 +86,7 @@ class Follower:
 
     def follow(self, motion: ToolMotion, robot: Measured) -> Tracking:
         """One period along a tool motion."""
-        wanted = motion.desired()
+        wanted, config = motion.desired(), self._config
         pose = robot.kinematics.T_odom_tool
         error = tool_error(pose, nearest_about_y(pose, wanted.T_odom_tool) if motion.free_axis else wanted.T_odom_tool)
         out = self._method.solve(
@@ -94,7 +94,11 @@ class Follower:
                 robot.q,
                 robot.kinematics,
                 robot.sent,
-                ToolTask(wanted.twist + self._gains * error + robot.behind(), motion.free_axis),
+                ToolTask(
+                    # Ahead by the servos' lag, so that the velocity is what is wanted when they have it.
+                    wanted.twist + config.arm_lag_s * motion.scale * wanted.acceleration + self._gains * error + robot.behind(),
+                    motion.free_axis,
+                ),
                 motion.posture(),
                 motion.base,
                 motion.cap(pose),

@@ -9,10 +9,15 @@ import numpy as np
 import pinocchio as pin
 
 from controller.config import ControllerConfig
-from controller.trajectory import PoseTrajectory, Rates, ToolState, quintic
+from controller.trajectory import PoseTrajectory, Rates, ToolState, quintic, quintic_time
 from controller.whole_body.task import BaseMode, Posture
 from rolling_panda.differential_drive import Array
 from rolling_panda.robot_model import ARM_Q
+
+#: What is reckoned with for the arm's joints on a leg (rad/s, rad/s², rad/s³).
+_ARM = Rates(1.3, 4.0, 60.0)
+#: By how much the base's time may be too short (s).
+_ROOM_S = 0.02
 
 
 @dataclass(frozen=True)
@@ -24,12 +29,14 @@ class Leg:
         q_goal: Configuration (12) wanted at its end, for the null space.
         speed: Largest tool speed (m/s).
         frozen_within: Distance to its goal within which only the arm moves (m); infinite: on the whole leg.
+        frozen_until: Distance from its beginning until which only the arm moves (m).
     """
 
     goal: Any
     q_goal: Array
     speed: float
     frozen_within: float = 0.0
+    frozen_until: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -39,19 +46,31 @@ class _Timed:
     begin: float
     trajectory: PoseTrajectory
     span: Array
-    frozen_within: float
+    leg: Leg
 
     @property
     def end(self) -> float:
         return self.begin + self.trajectory.duration
+
+    def free(self, until: float) -> tuple[float, float] | None:
+        """When the base may move (s), `until` at the latest; None when it may not."""
+        length, arm_until, within = self.trajectory.length, self.leg.frozen_until, self.leg.frozen_within
+        begin, end, duration = self.begin, self.end, self.trajectory.duration
+        if arm_until + within > 0.0:
+            if arm_until + within >= length:
+                return None
+            begin += duration * quintic_time(arm_until / length)
+            end -= duration * (1.0 - quintic_time(1.0 - within / length))
+        return (begin, min(end, until)) if begin < min(end, until) else None
 
 
 class ToolMotion:
     """Legs one after the other; a leg begins while the one before it still comes to rest.
 
     Each leg is a quintic from rest to rest. Where two overlap, their motions add up, so that the tool rounds the corner
-    between them without stopping; velocity and acceleration stay continuous. The clock advances as far as the limits
-    let it.
+    between them without stopping; velocity and acceleration stay continuous. The base has a quintic of its own, from
+    when it may move for the first time to when it may for the last: under way while the arm alone follows the tool's
+    path. The clock advances as far as the limits let it.
     """
 
     def __init__(
@@ -78,6 +97,8 @@ class ToolMotion:
         self._config, self._slow_end, self.free_axis = config, slow_end, free_axis
         self._start, self._q_start, self._legs = start, q_start, _timed(config, start, q_start, legs, flows)
         self.goal, self.q_goal, self.speed = legs[-1].goal, legs[-1].q_goal, max(leg.speed for leg in legs)
+        self._free = _free(self._legs)
+        self._base_span = self.q_goal[:2] - q_start[:2]
         self.legs = len(legs)
         self.duration = max(leg.end for leg in self._legs)
         self.time, self.scale = 0.0, 1.0
@@ -95,11 +116,7 @@ class ToolMotion:
     @property
     def base(self) -> BaseMode:
         """What the base is for now."""
-        leg = self._legs[self.leg]
-        if leg.frozen_within <= 0.0:
-            return "row"
-        left = 1.0 - quintic(self.time - leg.begin, leg.trajectory.duration).s
-        return "frozen" if left * leg.trajectory.length <= leg.frozen_within else "row"
+        return "row" if self._free is not None and self._free[0] <= self.time < self._free[1] else "frozen"
 
     def advance(self, scale: float, dt: float) -> None:
         """Let the clock run at the rate `scale` for one period of `dt` (s)."""
@@ -107,8 +124,9 @@ class ToolMotion:
         self.time += dt * scale
 
     def desired(self) -> ToolState:
-        """Where the tool should be now, and its twist."""
-        position, R, twist = self._start.translation.copy(), self._start.rotation, np.zeros(6)
+        """Where the tool should be now, its twist and the rate of that."""
+        position, R = self._start.translation.copy(), self._start.rotation
+        twist, acceleration = np.zeros(6), np.zeros(6)
         for leg in self._legs:
             if self.time <= leg.begin:
                 break
@@ -121,13 +139,16 @@ class ToolMotion:
             # What the leg would do alone, carried along by the legs before it.
             turned = R @ begin.rotation.T
             position += state.T_odom_tool.translation - begin.translation
+            turning = turned @ state.twist[3:]
+            acceleration[:3] += state.acceleration[:3]
+            acceleration[3:] += turned @ state.acceleration[3:] + np.cross(twist[3:], turning)
             twist[:3] += state.twist[:3]
-            twist[3:] += turned @ state.twist[3:]
+            twist[3:] += turning
             R = turned @ state.T_odom_tool.rotation
-        return ToolState(pin.SE3(R, position), twist)
+        return ToolState(pin.SE3(R, position), twist, acceleration)
 
     def posture(self) -> Posture:
-        """Base and arm as they should be now: straight from leg to leg, heading as at the goal."""
+        """Base and arm as they should be now: the arm straight from leg to leg, heading as at the goal."""
         q, rate = self._q_start.copy(), np.zeros(len(self._q_start))
         for leg in self._legs:
             if self.time <= leg.begin:
@@ -135,6 +156,12 @@ class ToolMotion:
             progress = quintic(self.time - leg.begin, leg.trajectory.duration)
             q += leg.span * progress.s
             rate += leg.span * progress.rate
+        if self._free is None:
+            q[:2], rate[:2] = self._q_start[:2], 0.0
+        else:
+            progress = quintic(self.time - self._free[0], self._free[1] - self._free[0])
+            q[:2] = self._q_start[:2] + self._base_span * progress.s
+            rate[:2] = self._base_span * progress.rate
         q[2], rate[2] = self.q_goal[2], 0.0
         return Posture(q, rate, self.q_goal)
 
@@ -150,19 +177,42 @@ class ToolMotion:
 def _timed(
     config: ControllerConfig, start: Any, q_start: Array, legs: Sequence[Leg], flows: bool
 ) -> tuple[_Timed, ...]:
+    """The legs in their places, with time enough for the base between them."""
+    travel = float(np.hypot(*(legs[-1].q_goal[:2] - q_start[:2])))
+    # With room for feedback.
+    base_s = Rates(0.8 * config.base_speed, 0.75 * config.base_acceleration, 10.0).duration(travel)
+    # The leg that waits for the base: where the tool's line matters least.
+    waits = next((i for i, leg in enumerate(legs) if leg.frozen_until == leg.frozen_within == 0.0), None)
+    extra = 0.0
+    while True:
+        timed = _placed(config, start, q_start, legs, flows, waits, extra)
+        free = _free(timed)
+        if waits is None or free is None or free[1] - free[0] >= base_s - _ROOM_S:
+            return timed
+        # A leg that grows overlaps with more of its neighbours, so that this converges from below.
+        extra = timed[waits].trajectory.duration + base_s - (free[1] - free[0])
+
+
+def _placed(
+    config: ControllerConfig,
+    start: Any,
+    q_start: Array,
+    legs: Sequence[Leg],
+    flows: bool,
+    waits: int | None,
+    at_least: float,
+) -> tuple[_Timed, ...]:
     out: list[_Timed] = []
-    for leg in legs:
+    for number, leg in enumerate(legs):
         span = leg.q_goal - q_start
-        travel = 0.0 if leg.frozen_within == math.inf else float(np.hypot(*span[:2]))
-        # The base and the joints need their time too, with room for feedback.
-        base_s = Rates(0.8 * config.base_speed, 0.5 * config.base_acceleration, 10.0).duration(travel)
-        arm_s = Rates(0.9, 2.0, 20.0).duration(float(np.abs(span[ARM_Q]).max()))
+        # The joints need their time too, with room for feedback.
+        arm_s = _ARM.duration(float(np.abs(span[ARM_Q]).max()))
         trajectory = PoseTrajectory(
             start,
             leg.goal,
             Rates(leg.speed, config.tool_acceleration, config.tool_jerk),
             Rates(config.tool_turn, 3.0 * config.tool_acceleration, 3.0 * config.tool_jerk),
-            max(base_s, arm_s),
+            max(arm_s, at_least) if number == waits else arm_s,
             straight=True,
         )
         begin = 0.0
@@ -171,6 +221,13 @@ def _timed(
             begin = before.end
             if flows:
                 begin -= config.blend * min(before.trajectory.duration, trajectory.duration)
-        out.append(_Timed(begin, trajectory, span, leg.frozen_within))
+        out.append(_Timed(begin, trajectory, span, leg))
         start, q_start = leg.goal, leg.q_goal
     return tuple(out)
+
+
+def _free(legs: tuple[_Timed, ...]) -> tuple[float, float] | None:
+    """From when to when the base may move (s). Of two legs that overlap the later one says."""
+    ends = (*(leg.begin for leg in legs[1:]), math.inf)
+    times = [free for leg, end in zip(legs, ends, strict=True) if (free := leg.free(end)) is not None]
+    return (times[0][0], times[-1][1]) if times else None

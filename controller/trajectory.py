@@ -58,12 +58,22 @@ def quintic(time: float, duration: float) -> Progress:
     )
 
 
+def quintic_time(s: float) -> float:
+    """The share of the duration, 0…1, after which the quintic has come to the share `s` of its way."""
+    low, high = 0.0, 1.0
+    for _ in range(30):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if quintic(middle, 1.0).s < s else (low, middle)
+    return 0.5 * (low + high)
+
+
 @dataclass(frozen=True)
 class ToolState:
-    """Where the tool should be (T_odom_tool, pin.SE3) and its twist [v; ω] (6) at the tool, in odom's axes."""
+    """Where the tool should be (T_odom_tool, pin.SE3), and its twist [v; ω] (6) at the tool with its rate (6)."""
 
     T_odom_tool: Any
     twist: Array
+    acceleration: Array
 
 
 class PoseTrajectory:
@@ -107,14 +117,20 @@ class PoseTrajectory:
         )
 
     def at(self, time: float) -> ToolState:
-        """Pose and twist at `time` (s) of the motion's own clock."""
+        """Pose, twist and its rate at `time` (s) of the motion's own clock, in odom's axes."""
         progress = quintic(time, self.duration)
         placement = self._placement(progress.s)
         if progress.rate == 0.0:
-            return ToolState(placement, np.zeros(6))
+            return ToolState(placement, np.zeros(6), np.zeros(6))
         R = placement.rotation
         linear = self._linear if self._straight else R @ self._linear
-        return ToolState(placement, np.concatenate([linear, R @ self._angular]) * progress.rate)
+        angular = R @ self._angular
+        way = np.concatenate([linear, angular])
+        acceleration = way * progress.acceleration
+        if not self._straight:
+            # Along a screw the velocity turns with the tool.
+            acceleration[:3] += np.cross(angular, linear) * progress.rate**2
+        return ToolState(placement, way * progress.rate, acceleration)
 
     def _placement(self, s: float) -> Any:
         if self._straight:

@@ -1,7 +1,7 @@
 """Method `decoupled`: drive, stop, then reach. The baseline that whole-body control is compared with.
 
 While the base is not at the posture's goal it turns towards it, drives there and turns into the goal's heading, with
-the arm still; the motion's clock runs on. Then the base stands and the arm alone takes the tool to where it should be,
+the arm still; the motion's clock waits for it. Then the base stands and the arm alone takes the tool to where it should be,
 by the damped pseudo-inverse of `nullspace`. Both within the same limits as the other methods.
 """
 
@@ -22,7 +22,9 @@ from rolling_panda.robot_model import RobotModel
 _NEAR, _TURNED = 0.02, 0.02
 #: Heading error above which the base turns on the spot (rad).
 _ASTRAY = 0.15
-_GAIN = 2.0
+_GAIN, _DRIVE_GAIN = 2.0, 4.0
+#: The posture's base is at its goal (m).
+_ARRIVED = 1e-3
 
 
 class Decoupled:
@@ -52,8 +54,9 @@ class Decoupled:
         wanted = np.zeros(NXI)
         wanted[:2] = self._wheels @ (v, omega)
         limited = self._saturation.apply(wanted, demand.q, demand.sent)
-        # The tool's path means nothing while the base carries the tool along; its end is what is reached for later.
-        return Solution(limited.xi, 1.0, reach.manipulability)
+        # While the base carries the tool along the clock runs, but not past what the base has still to do.
+        ahead = math.hypot(float(goal[0] - demand.posture.q[0]), float(goal[1] - demand.posture.q[1])) > _ARRIVED
+        return Solution(limited.xi, float(ahead or still and not driving), reach.manipulability)
 
     def _drive(self, demand: Demand, x: float, y: float, phi: float) -> tuple[float, float]:
         """Forward speed and yaw rate towards a base pose; both 0 at it."""
@@ -70,7 +73,7 @@ class Decoupled:
             if abs(astray) > _ASTRAY:
                 return 0.0, omega
             braking = math.sqrt(config.base_acceleration * distance)
-            return way * min(config.base_speed, braking, _GAIN * distance), omega
+            return way * min(config.base_speed, braking, _DRIVE_GAIN * distance), omega
         turn = math.remainder(phi - float(demand.q[2]), math.tau)
         if abs(turn) > _TURNED:
             return 0.0, max(-config.base_yaw_rate, min(config.base_yaw_rate, _GAIN * turn))

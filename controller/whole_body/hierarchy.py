@@ -29,6 +29,8 @@ from rolling_panda.robot_model import ARM_XI, RobotModel
 
 #: A clock slower than this stands still.
 _HELD = 1e-2
+#: Velocities of the tool that weigh the same (m/s, rad/s): what damping is measured in, whatever speed is planned.
+_SPEED, _TURN = 0.3, 0.8
 _NOWHERE = Manipulability(0.0, np.zeros(NXI))
 _ALL, _ARM = slice(0, NXI), ARM_XI
 _BOUND_NAMES = ("the base's speed", "the base's turning", *(f"joint {i}" for i in range(1, 8)))
@@ -71,8 +73,7 @@ class Hierarchy:
         self._wheel_rows = np.zeros((2, NXI))
         self._wheel_rows[:, :2] = self._actuation.wheels
         self._rise = settings.clock_rise * dt
-        turn = 1.0 / config.tool_turn
-        self._weight = np.repeat([1.0 / config.tool_speed, turn], 3)
+        self._weight = np.repeat([1.0 / _SPEED, 1.0 / _TURN], 3)
         self._weight_column = self._weight[:, None]
         self._stack(self.secondary_tasks(robot, config))
 
