@@ -77,6 +77,7 @@ class Follower:
     def __init__(self, config: ControllerConfig, method: Method, dt: float) -> None:
         """Bind the parts for a control period of `dt` (s)."""
         self._config, self._method, self._dt = config, method, dt
+        self._J_before: Array | None = None
         self._gains = np.repeat([config.gain_position, config.gain_rotation], 3)
 
     @property
@@ -86,7 +87,8 @@ class Follower:
 
     def follow(self, motion: ToolMotion, robot: Measured) -> Tracking:
         """One period along a tool motion."""
-        wanted, config = motion.desired(), self._config
+        wanted = motion.desired()
+        lead = self._lead(motion.scale * wanted.acceleration, robot)
         pose = robot.kinematics.T_odom_tool
         error = tool_error(pose, nearest_about_y(pose, wanted.T_odom_tool) if motion.free_axis else wanted.T_odom_tool)
         out = self._method.solve(
@@ -94,11 +96,7 @@ class Follower:
                 robot.q,
                 robot.kinematics,
                 robot.sent,
-                ToolTask(
-                    # Ahead by the servos' lag, so that the velocity is what is wanted when they have it.
-                    wanted.twist + config.arm_lag_s * motion.scale * wanted.acceleration + self._gains * error + robot.behind(),
-                    motion.free_axis,
-                ),
+                ToolTask(wanted.twist + lead + self._gains * error + robot.behind(), motion.free_axis),
                 motion.posture(),
                 motion.base,
                 motion.cap(pose),
@@ -108,6 +106,13 @@ class Follower:
         )
         motion.advance(out.scale, self._dt)
         return _tracking(out, wanted.T_odom_tool, error, motion.done)
+
+    def _lead(self, acceleration: Array, robot: Measured) -> Array:
+        """Twist (6) that is wanted beforehand, so that the servos have what is wanted when it is: τ (ẍ − J̇ ξ̇)."""
+        J, self._J_before = self._J_before, robot.kinematics.J_xi
+        drift = _NOTHING if J is None else (robot.kinematics.J_xi - J) @ robot.sent / self._dt
+        lead: Array = self._config.arm_lag_s * (acceleration - drift)
+        return lead
 
     def jog(self, xi: Array, robot: Measured) -> Tracking:
         """One period of the actuators' own velocities ξ̇ (9, rad/s), within the limits and clear of obstacles."""

@@ -1,3 +1,4 @@
+import msgspec
 import numpy as np
 import pinocchio as pin
 
@@ -97,3 +98,26 @@ def test_the_arm_makes_good_what_the_base_owes():
     trusting, told = peak_error_along_the_row(False), peak_error_along_the_row(True)
     assert told < 0.6 * trusting
     assert told < 0.005
+
+
+def peak_error_with_a_lag(lag: float, reckoned: float) -> float:
+    """Of the tool on 0.3 m (m), every joint following with a first-order lag (s)."""
+    config = msgspec.structs.replace(CONFIG, arm_lag_s=reckoned)
+    follower = Follower(config, make_method(ROBOT, config, DT), DT)
+    q, sent, xi, peak = start(), np.zeros(9), np.zeros(9), 0.0
+    T = ROBOT.pose(q, ROBOT.tool_id)
+    goal = pin.SE3(T.rotation, T.translation + np.array([0.1, -0.2, 0.2]))
+    motion = ToolMotion(config, T, q, [Leg(goal, q, 0.4)])
+    while not motion.done:
+        kinematics = ROBOT.kinematics(q)
+        tracking = follower.follow(motion, Measured(q, kinematics, sent))
+        sent = tracking.xi
+        peak = max(peak, tracking.position_error)
+        for _ in range(10):
+            xi = xi + (sent - xi) * (1.0 - np.exp(-DT / 10 / lag))
+            q = integrate(q, xi / 10)
+    return peak
+
+
+def test_the_servos_lag_is_reckoned_with():
+    assert peak_error_with_a_lag(0.02, 0.025) < 0.1 * peak_error_with_a_lag(0.02, 0.0)

@@ -56,6 +56,14 @@ def test_the_twist_is_the_rate_of_the_pose_also_round_corners(corners, share):
     np.testing.assert_allclose(now.twist[3:], turned, atol=1e-4)
 
 
+@given(st.lists(st.tuples(places, turns), min_size=3, max_size=4), st.floats(0.02, 0.98))
+def test_the_acceleration_is_the_rate_of_the_twist_also_round_corners(corners, share):
+    path, dt = motion([pose(*corner) for corner in corners]), 1e-5
+    time = share * path.duration
+    now, before, after = at(path, time), at(path, time - dt), at(path, time + dt)
+    np.testing.assert_allclose(now.acceleration, (after.twist - before.twist) / (2 * dt), atol=2e-3)
+
+
 def test_a_corner_is_rounded_without_stopping_and_not_cut_by_much():
     corners = [pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), pose((0.0, -0.22, 0.0), (0.0, 0.0, 0.0))]
     corners.append(pose((0.3, -0.22, 0.0), (0.0, 0.0, 0.0)))
@@ -80,6 +88,44 @@ def test_the_base_is_frozen_for_the_frozen_leg_only():
     assert (path.leg, path.base) == (0, "frozen")
     path.time = 0.9 * path.duration
     assert (path.leg, path.base) == (1, "row")
+
+
+def out_over_and_in(along, base, arm_only=0.05):
+    """Out of one cut and into the next, `along` (m) the row, the base by `base` (m) farther."""
+    q_out, q_goal = np.zeros(12), np.zeros(12)
+    q_goal[0] = base
+    out = pose((0.0, -0.22, 0.0), (0.0, 0.0, 0.0))
+    over, cut = pose((along, -0.22, 0.0), (0.0, 0.0, 0.0)), pose((along, 0.0, 0.0), (0.0, 0.0, 0.0))
+    legs = [
+        Leg(out, q_out, CONFIG.tool_speed, frozen_until=arm_only),
+        Leg(over, q_goal, CONFIG.tool_speed),
+        Leg(cut, q_goal, CONFIG.tool_speed, frozen_within=arm_only),
+    ]
+    return ToolMotion(CONFIG, pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), np.zeros(12), legs)
+
+
+@given(st.floats(-1.5, 1.5))
+def test_between_cuts_the_base_is_on_its_way_whenever_the_tool_is_not_at_a_cut(along):
+    path = out_over_and_in(along, along)
+    places, base_speed, dt = [], [], path.duration / 500
+    for path.time in np.arange(501) * dt:
+        near = min(abs(path.desired().T_odom_tool.translation[1]), 1.0) < 0.05 - 1e-6
+        assert path.base == ("frozen" if near else path.base)
+        posture = path.posture()
+        if near:
+            assert posture.rate[0] == pytest.approx(0.0, abs=1e-9)
+        places.append(posture.q[0])
+        base_speed.append(abs(posture.rate[0]))
+    assert places[0] == 0.0 and places[-1] == pytest.approx(along)
+    assert max(base_speed) <= CONFIG.base_speed
+    assert np.abs(np.diff(base_speed)).max() / dt <= 1.1 * CONFIG.base_acceleration
+
+
+def test_a_short_way_of_the_base_costs_no_time():
+    standing = out_over_and_in(0.12, 0.0).duration
+    assert out_over_and_in(0.12, 0.1).duration < 1.15 * standing
+    # The whole way with the arm still in front of each cut takes longer.
+    assert out_over_and_in(0.12, 0.1, arm_only=0.2).duration > 1.3 * standing
 
 
 def test_the_last_stretch_to_a_cut_is_slow():

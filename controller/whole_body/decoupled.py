@@ -1,8 +1,8 @@
 """Method `decoupled`: drive, stop, then reach. The baseline that whole-body control is compared with.
 
 While the base is not at the posture's goal it turns towards it, drives there and turns into the goal's heading, with
-the arm still; the motion's clock waits for it. Then the base stands and the arm alone takes the tool to where it should be,
-by the damped pseudo-inverse of `nullspace`. Both within the same limits as the other methods.
+the arm still; the motion's clock waits for it. Then the base stands and the arm alone takes the tool to where it
+should be, by the damped pseudo-inverse of `nullspace`. Both within the same limits as the other methods.
 """
 
 import math
