@@ -22,6 +22,7 @@ from benchmarks import reach_targets
 from benchmarks.reach_judge import Quality, judge
 from benchmarks.reach_run import BASE, METHODS, MethodName, Runner
 from benchmarks.reach_targets import Target
+from benchmarks.wilson import interval
 from controller.planning.arm_ik import ArmIk
 from rolling_panda.errors import RollingPandaError
 
@@ -81,7 +82,7 @@ def summarise(rows: Sequence[Row]) -> dict[str, Any]:
     possible = sum(not row.beyond_reach for row in rows)
     moved = [row.quality for row in rows if row.quality.duration > 0.0] or [row.quality for row in rows]
     done = [row.quality for row in rows if row.quality.reached] or moved
-    low, high = _interval(reached, len(rows))
+    low, high = interval(reached, len(rows))
 
     def broken(kind: str) -> dict[str, float]:
         counts = [getattr(quality.violations, kind) for quality in moved]
@@ -241,13 +242,6 @@ def _flat(row: Row) -> dict[str, Any]:
     fields: dict[str, Any] = asdict(row)
     quality: dict[str, Any] = fields.pop("quality")
     return fields | quality
-
-
-def _interval(k: int, n: int) -> tuple[float, float]:
-    """Wilson's 95 % interval of a share."""
-    z, p = 1.96, k / n
-    middle, half = p + z * z / (2 * n), z * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
-    return (middle - half) / (1 + z * z / n), (middle + half) / (1 + z * z / n)
 
 
 def _make(folder: Path) -> None:

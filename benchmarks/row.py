@@ -18,11 +18,16 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.closed_loop import ClosedLoop
+from benchmarks.row_stages import LIMITS, STAGES, StageClock
+from benchmarks.wilson import interval
 from bridge.sim import trace
+from controller.config import ControllerConfig
 from controller.motion import Tracking
 from controller.whole_body.registry import METHODS
 from rolling_panda import intents
 from rolling_panda import messages as m
+from rolling_panda.config import load_section
+from rolling_panda.resources import resource
 
 #: A cut is at the right place when the cane was severed within this of the accepted point (m).
 RIGHT_PLACE = 0.010
@@ -74,6 +79,8 @@ class RowRun:
         contacts: Physics steps in which the robot met posts, trunks, cordons or wires.
         self_contacts: Physics steps in which it met itself.
         stops: Times it stopped by itself.
+        stages: Seconds by stage (simulated).
+        limits: Seconds under way between cuts by what held the motion back.
     """
 
     method: str
@@ -84,6 +91,8 @@ class RowRun:
     contacts: int
     self_contacts: int
     stops: int
+    stages: dict[str, float]
+    limits: dict[str, float]
 
 
 def cut_row(seed: int, points: int, method: str) -> RowRun:
@@ -92,9 +101,11 @@ def cut_row(seed: int, points: int, method: str) -> RowRun:
     A refused acceptance is not among the cuts, as an operator sees the refusal.
     """
     errors: list[float] = []
+    clock = StageClock(load_section(resource("assets/config/sim.toml"), "controller", ControllerConfig))
 
     def watch(loop: ClosedLoop, tracking: Tracking) -> None:
         if loop.controller.mode == "AUTO":
+            clock.note(loop, tracking)
             errors.append(float(np.linalg.norm(loop.true_tool() - tracking.desired.translation)))
 
     with tempfile.TemporaryDirectory() as folder:
@@ -103,6 +114,7 @@ def cut_row(seed: int, points: int, method: str) -> RowRun:
             accepted = _accept(loop, points)
             loop.ask(intents.Start(user="bench"))
             begin = loop.now
+            clock.begin(begin)
             durations = _work(loop, [entry.point_id for entry in accepted])
             work_s = sum(durations.values()) if durations else loop.now - begin
             ends = {entry.point_id: entry for entry in loop.queue()}
@@ -136,6 +148,8 @@ def cut_row(seed: int, points: int, method: str) -> RowRun:
         contacts=int(np.count_nonzero(record.rows["contacts"])),
         self_contacts=int(np.count_nonzero(record.rows["self_contacts"])),
         stops=stops,
+        stages=clock.stages,
+        limits=clock.limits,
     )
 
 
@@ -181,7 +195,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         choices=tuple(METHODS),
         help="whole-body method; may be given several times (default: all of them)",
     )
+    parser.add_argument("--stages", action="store_true", help="say where the time of a cut goes")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows and the summary here")
+    parser.add_argument("--plot", type=Path, metavar="FILE", help="draw the time of a cut by method and stage (PNG)")
     arguments = parser.parse_args(argv)
     methods = arguments.method or list(METHODS)
     runs: list[RowRun] = []
@@ -198,6 +214,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     print(f"{'':<18}" + "".join(f"{method:>12}" for method in methods))
     for name in names:
         print(f"{name:<18}" + "".join(f"{summary[method][name]:>12}" for method in methods))
+    if arguments.stages:
+        _tell_stages({method: [run for run in runs if run.method == method] for method in methods})
+    if arguments.plot is not None:
+        # Drawing is for development; without its library the rest works.
+        from benchmarks.row_plot import draw
+
+        draw({method: mean_stages([run for run in runs if run.method == method]) for method in methods}, arguments.plot)
     if arguments.json is not None:
         document = {
             "machine": f"{platform.platform()}, {os.cpu_count()} cores",
@@ -221,6 +244,26 @@ def _tell(run: RowRun, speed: float) -> None:
             print(f"       {cut.point_id}: {cut.state}, {cut.reason or 'no reason'}; distance {cut.distance}")
 
 
+def mean_stages(runs: list[RowRun]) -> dict[str, float]:
+    """Seconds a cut by stage, over all rows of one method."""
+    return {stage: _mean(runs, "stages", stage) for stage in STAGES}
+
+
+def _tell_stages(runs: dict[str, list[RowRun]]) -> None:
+    for title, field, names in (
+        ("s a cut by stage", "stages", STAGES),
+        ("s a cut under way, by what held it", "limits", LIMITS),
+    ):
+        print(f"\n{title:<36}" + "".join(f"{method:>12}" for method in runs))
+        for name in names:
+            print(f"{name:<36}" + "".join(f"{_mean(done, field, name):>12.2f}" for done in runs.values()))
+
+
+def _mean(runs: list[RowRun], field: str, name: str) -> float:
+    cuts = sum(len(run.cuts) for run in runs)
+    return sum(float(getattr(run, field)[name]) for run in runs) / max(cuts, 1)
+
+
 def summarise(runs: list[RowRun]) -> dict[str, float | int]:
     """Share severed at the right place, seconds a cut, distances and contacts, over all rows of one method."""
     cuts = [cut for run in runs for cut in run.cuts]
@@ -231,9 +274,14 @@ def summarise(runs: list[RowRun]) -> dict[str, float | int]:
     def quantile(values: list[float], share: float, digits: int) -> float:
         return round(float(np.quantile(values, share)), digits) if values else 0.0
 
+    right = sum(cut.right for cut in cuts)
+    low, high = interval(right, len(cuts))
     return {
         "accepted": len(cuts),
-        "right_place": round(sum(cut.right for cut in cuts) / max(len(cuts), 1), 3),
+        "right": right,
+        "right_place": round(right / max(len(cuts), 1), 3),
+        "right_place_low": round(low, 3),
+        "right_place_high": round(high, 3),
         "cut_s_mean": round(sum(run.work_s for run in runs) / max(len(cuts), 1), 2),
         "cut_s_median": quantile(durations, 0.5, 2),
         "distance_mm_median": quantile([1e3 * d for d in distances], 0.5, 2),
