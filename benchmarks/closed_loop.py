@@ -16,6 +16,7 @@ from bridge.sim.build import simulated_bridge
 from bridge.sim.robot import SimulatedRobot
 from controller.config import ControllerConfig
 from controller.core import Controller
+from controller.estimate import configuration_now
 from controller.interface import Inputs, Outputs, Sample
 from controller.motion import Tracking
 from perception.config import PerceptionConfig
@@ -26,6 +27,7 @@ from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig, load_section
 from rolling_panda.differential_drive import Array
 from rolling_panda.resources import resource
+from rolling_panda.robot_model import RobotModel
 from rolling_panda.row_messages import Obstacles
 
 _CONTROL_TICKS = 10
@@ -60,6 +62,7 @@ class ClosedLoop:
         if method is not None:
             config = msgspec.structs.replace(config, method=method)
         self.controller = Controller(config, robot)
+        self._drive = RobotModel(robot).drive
         self._watch = watch
         self.perception = Perception(load_section(path, "perception", PerceptionConfig), LabelImageSegmenter())
         self.now = 0.0
@@ -118,6 +121,12 @@ class ClosedLoop:
         assert isinstance(robot, SimulatedRobot)
         position: Array = robot.true_tool()[:3, 3]
         return position
+
+    def configuration(self) -> Array:
+        """Configuration (12) as measured now; needs a joint state and an odometry."""
+        joints, odometry = self.inputs.joints, self.inputs.odometry
+        assert joints is not None and odometry is not None
+        return configuration_now(joints.message, odometry.message, self._drive)
 
     def close(self) -> None:
         """Close the trace."""

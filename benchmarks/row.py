@@ -14,13 +14,16 @@ import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from benchmarks.cane_touches import CaneTouches
 from benchmarks.closed_loop import ClosedLoop
 from benchmarks.row_stages import LIMITS, STAGES, StageClock
 from benchmarks.wilson import interval
 from bridge.sim import trace
+from bridge.sim.robot import SimulatedRobot
 from controller.config import ControllerConfig
 from controller.motion import Tracking
 from controller.whole_body.registry import METHODS
@@ -34,6 +37,8 @@ RIGHT_PLACE = 0.010
 _ENDED: tuple[m.PointState, ...] = ("DONE", "FAILED_NOT_CUT", "UNKNOWN")
 _SURVEY_S = 6.0
 _LIMIT_S = 120.0
+#: Periods between two looks at what touches a cane.
+_LOOK_EVERY = 4
 
 
 @dataclass(frozen=True)
@@ -81,6 +86,8 @@ class RowRun:
         stops: Times it stopped by itself.
         stages: Seconds by stage (simulated).
         limits: Seconds under way between cuts by what held the motion back.
+        canes_touched: Canes, not the ones cut, that a part of the robot other than the blades overlapped with, and
+            which parts these were.
     """
 
     method: str
@@ -93,6 +100,7 @@ class RowRun:
     stops: int
     stages: dict[str, float]
     limits: dict[str, float]
+    canes_touched: dict[str, str]
 
 
 def cut_row(seed: int, points: int, method: str) -> RowRun:
@@ -103,9 +111,15 @@ def cut_row(seed: int, points: int, method: str) -> RowRun:
     errors: list[float] = []
     clock = StageClock(load_section(resource("assets/config/sim.toml"), "controller", ControllerConfig))
 
+    touches = CaneTouches()
+
     def watch(loop: ClosedLoop, tracking: Tracking) -> None:
         if loop.controller.mode == "AUTO":
             clock.note(loop, tracking)
+            if len(errors) % _LOOK_EVERY == 0:
+                robot = loop.bridge.robot
+                assert isinstance(robot, SimulatedRobot)
+                touches.look(loop.configuration(), robot.row.standing(), robot.row.revision)
             errors.append(float(np.linalg.norm(loop.true_tool() - tracking.desired.translation)))
 
     with tempfile.TemporaryDirectory() as folder:
@@ -150,7 +164,18 @@ def cut_row(seed: int, points: int, method: str) -> RowRun:
         stops=stops,
         stages=clock.stages,
         limits=clock.limits,
+        canes_touched=_spared(touches, record.events),
     )
+
+
+def _spared(touches: CaneTouches, events: Sequence[dict[str, Any]]) -> dict[str, str]:
+    """What was touched, but for the canes that were cut."""
+    cut = {(piece["vine"], piece["spur"], piece["cane"]) for event in events for piece in event.get("severed", ())}
+    return {
+        f"vine {vine}, spur {spur}, cane {cane}": ", ".join(sorted(parts))
+        for (vine, spur, cane), parts in sorted(touches.touched.items())
+        if (vine, spur, cane) not in cut
+    }
 
 
 def _accept(loop: ClosedLoop, points: int) -> list[m.QueueEntry]:
@@ -290,6 +315,7 @@ def summarise(runs: list[RowRun]) -> dict[str, float | int]:
         "path_mm_rms": round(1e3 * math.sqrt(float(np.mean([run.path_rms**2 for run in runs]))), 2) if runs else 0.0,
         "contact_steps": sum(run.contacts for run in runs),
         "self_contact_steps": sum(run.self_contacts for run in runs),
+        "canes_touched": sum(len(run.canes_touched) for run in runs),
         "stops": sum(run.stops for run in runs),
     }
 
