@@ -7,6 +7,7 @@ import numpy as np
 
 from controller import modes, safety
 from controller.config import ControllerConfig
+from controller.cut_clearance import CutClearance
 from controller.cut_sequence import CutSequence
 from controller.estimate import configuration_now
 from controller.homing import Homing
@@ -63,7 +64,8 @@ class Controller:
         method = method or make_method(self._robot, config, self._dt, self._surroundings.model)
         self._follower = Follower(config, method, self._dt)
         self._queue = PointQueue(config)
-        search = PostureSearch(RobotModel(robot_config), config)
+        self._clearance = CutClearance(RobotModel(robot_config), config)
+        search = PostureSearch(RobotModel(robot_config), config, self._clearance.admits)
         self._sequence = CutSequence(config, search, self._follower, self._saturation, self._queue, run_id)
         self._teleoperation = Teleoperation(config, self._follower, self._robot.drive)
         self._stops = StopLatch()
@@ -151,6 +153,7 @@ class Controller:
             wheels = np.array(inputs.joints.message.velocity[:2])
             self._measured = Measured(q, self._robot.kinematics(q), self._sent, wheels, self._before)
         self._surroundings.take(inputs.obstacles)
+        self._clearance.take(inputs.obstacles)
         if bridge is not None:
             for text in self._sequence.watch(bridge, now):
                 self._say("info", text)

@@ -3,7 +3,7 @@
 The search is a generator that yields once an iteration, so that a control period pays for a few iterations only.
 """
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from typing import Any
 
@@ -69,9 +69,17 @@ class _Posture:
 class PostureSearch:
     """Finds cut plans. Has its own robot model, so that a search may rest while control goes on."""
 
-    def __init__(self, robot: RobotModel, config: ControllerConfig) -> None:
-        """Remember the model and the row's direction."""
-        self._robot, self._config = robot, config
+    def __init__(
+        self, robot: RobotModel, config: ControllerConfig, admits: Callable[[CutPlan], bool] = lambda _: True
+    ) -> None:
+        """Remember the model and the row's direction.
+
+        Args:
+            robot: Model of its own.
+            config: Of the controller.
+            admits: Whether a plan will do for other reasons than reach; what it refuses is passed over.
+        """
+        self._robot, self._config, self._admits = robot, config, admits
         c, s = np.cos(config.row_heading), np.sin(config.row_heading)
         self._along, self._left = np.array([c, s, 0.0]), np.array([-s, c, 0.0])
         self._base_id = robot.frame_id("base_link")
@@ -93,6 +101,7 @@ class PostureSearch:
             q: Configuration (12) now: the base keeps its distance to the row.
         """
         best: CutPlan | None = None
+        self._passed_over = False
         seeds = (np.array(self._config.reach), np.array(self._config.home))
         base = np.array([q[0], q[1], 0.0])
         lateral = float(base @ self._left)
@@ -145,7 +154,11 @@ class PostureSearch:
         omega = min(stand_off.omega, cut.omega, clear.omega)
         if margin < _LEAST_MARGIN or omega < _LEAST_OMEGA:
             return None
-        return CutPlan(poses, clear.q, stand_off.q, cut.q, margin, omega)
+        plan = CutPlan(poses, clear.q, stand_off.q, cut.q, margin, omega)
+        if self._admits(plan):
+            return plan
+        self._passed_over = True
+        return None
 
     def _solve(self, q: Array, goal: Any, posture: Array) -> Generator[None, None, _Posture | None]:
         """Damped least squares for the arm alone, inside its limits, pulled towards `posture` in the null space."""
@@ -171,6 +184,8 @@ class PostureSearch:
         return None
 
     def _why(self, position: Array, lateral: float) -> str:
+        if self._passed_over:
+            return "every posture that reaches it comes too near to something that stands around it"
         distance = float(position @ self._left) - lateral
         return (
             f"no posture of the arm reaches it: it is {distance:.2f} m beside the robot's path and "

@@ -58,7 +58,7 @@ def lead(method, twist, seconds, base="row", keep_path=True, arm=CONFIG.home):
 def least_share(q):
     """The least distance between any two parts as a share of what is kept between them."""
     near = COLLISION.distances(q, 0.1)
-    kept = [SETTINGS.blade_distance if "blades" in pair else SETTINGS.collision_distance for pair in near.pairs]
+    kept = [SETTINGS.kept(pair) for pair in near.pairs]
     return min((d / k for d, k in zip(near.distance, kept, strict=True)), default=100.0)
 
 

@@ -28,6 +28,7 @@ class HierarchyConfig(Struct, frozen=True, forbid_unknown_fields=True):
         collisions: Whether distances to itself, the ground and obstacles are kept.
         collision_distance: d_s, kept between any two parts that are watched (m).
         blade_distance: The same for the blades (m), which work near wires that nothing else may come near to.
+        cutter_distance: The same for the cutter's body (m), whose capsule is 9 mm larger than it.
         collision_influence: d_i, nearer than which they approach more slowly (m).
         collision_speed: ξ, fastest approach at d_i (m/s), and fastest parting below d_s.
         collision_braking: Deceleration that an approach reckons with (m/s²).
@@ -49,7 +50,13 @@ class HierarchyConfig(Struct, frozen=True, forbid_unknown_fields=True):
     collisions: bool = True
     collision_distance: Positive = 0.015
     blade_distance: Positive = 0.004
+    cutter_distance: Positive = 0.008
     collision_influence: Positive = 0.08
     collision_speed: Positive = 0.25
     collision_braking: Positive = 0.5
     tipping: bool = True
+
+    def kept(self, pair: tuple[str, str]) -> float:
+        """d_s of a pair of parts, by their names (m): of the tool's parts the smaller one of the two."""
+        own = {"blades": self.blade_distance, "cutter": self.cutter_distance}
+        return min(own.get(part, self.collision_distance) for part in pair)

@@ -5,14 +5,13 @@ For each pair of parts nearer than d_i, with n the direction between their neare
 ḋ ≥ −min( ξ (d − d_s)/(d_i − d_s), −a dt + √((a dt)² + 2 a (d − d_s)) )
 
 The first term is Faverjon and Tournassoud's velocity damper. The second lets a pair approach only as fast as it can
-still stop, after one more period, with the deceleration a. Nearer than d_s, the pair has to part. The blades have a
-d_s of their own.
+still stop, after one more period, with the deceleration a. Nearer than d_s, the pair has to part. The blades and the
+cutter's body have a d_s of their own.
 """
 
 import numpy as np
 
 from controller.whole_body.collision import CollisionModel
-from controller.whole_body.collision_geometry import BLADES
 from controller.whole_body.hierarchy_config import HierarchyConfig
 from controller.whole_body.task import NO_ROWS, Demand, Inequalities
 from rolling_panda.errors import ControlError
@@ -26,8 +25,7 @@ class CollisionGuard:
     def __init__(self, model: CollisionModel, config: HierarchyConfig, dt: float) -> None:
         """Guard what `model` watches, for a control period of `dt` (s)."""
         self.model = model
-        self._influence, self._distance = config.collision_influence, config.collision_distance
-        self._blades = config.blade_distance
+        self._influence, self._kept = config.collision_influence, config.kept
         self._speed = config.collision_speed
         self._part = config.collision_speed
         self._brake = config.collision_braking
@@ -42,7 +40,7 @@ class CollisionGuard:
             near = self.model.dampers(demand.q, self._influence)
         if not near.pairs:
             return NO_ROWS
-        kept = np.array([self._blades if BLADES in pair else self._distance for pair in near.pairs])
+        kept = np.array([self._kept(pair) for pair in near.pairs])
         room = near.distance - kept
         stopping = np.sqrt(self._step**2 + 2.0 * self._brake * np.maximum(room, 0.0)) - self._step
         approach = np.minimum(self._speed * room / (self._influence - kept), stopping)

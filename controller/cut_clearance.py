@@ -1,0 +1,38 @@
+"""Whether a cut can be made without coming nearer to anything than the robot will go."""
+
+from controller.config import ControllerConfig
+from controller.interface import Sample
+from controller.reach import CutPlan
+from controller.surroundings import Surroundings
+from controller.whole_body.collision import CollisionModel
+from rolling_panda.robot_model import RobotModel
+from rolling_panda.row_messages import Obstacles
+
+#: Kept on top of the distance below which nothing goes (m): close to that the robot only creeps.
+_ROOM = 0.003
+
+
+class CutClearance:
+    """Looks at plans before they are followed. Has its own robot model, as the search for them does."""
+
+    def __init__(self, robot: RobotModel, config: ControllerConfig) -> None:
+        """Nothing is known to stand around yet."""
+        self._settings = config.hierarchy
+        self._surroundings = Surroundings(CollisionModel(robot))
+
+    def take(self, obstacles: Sample[Obstacles] | None) -> None:
+        """Take the newest message; one that was taken before costs nothing."""
+        self._surroundings.take(obstacles)
+
+    def admits(self, plan: CutPlan) -> bool:
+        """Whether the robot is far enough from itself and all else at the cut, the stand-off and clear of the canes."""
+        settings = self._settings
+        if not settings.collisions:
+            return True
+        within = settings.collision_distance + _ROOM
+        for q in (plan.q_cut, plan.q_stand_off, plan.q_clear):
+            near = self._surroundings.model.distances(q, within)
+            for distance, pair in zip(near.distance.tolist(), near.pairs, strict=True):
+                if distance < settings.kept(pair) + _ROOM:
+                    return False
+        return True
