@@ -14,6 +14,7 @@ BENCHMARKS = {
     "load": ("benchmarks.load", "processor, memory and traffic of the demo"),
     "live": ("benchmarks.live", "the running demo: control periods on time, round trip, tool error"),
     "perception": ("benchmarks.perception_points", "pruning points against the truth of simulated rows"),
+    "plots": ("benchmarks.plots", "pictures of what the others wrote with --json"),
 }
 
 

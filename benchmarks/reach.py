@@ -1,7 +1,6 @@
 """`rolling-panda bench reach`: tool poses anywhere around the robot, by a kinematic robot under closed-loop control."""
 
 import argparse
-import json
 import math
 import os
 import platform
@@ -19,15 +18,19 @@ from typing import Any
 import numpy as np
 
 from benchmarks import reach_targets
-from benchmarks.reach_judge import Quality, judge
+from benchmarks.documents import one_row_a_line
+from benchmarks.reach_judge import Quality, Trajectory, judge
 from benchmarks.reach_run import BASE, METHODS, MethodName, Runner
 from benchmarks.reach_targets import Target
 from benchmarks.wilson import interval
 from controller.planning.arm_ik import ArmIk
+from controller.whole_body.manipulability import arm_omega
 from rolling_panda.errors import RollingPandaError
 
 #: Targets that one process is given at a time.
 _BATCH = 4
+#: Targets whose ω is written along the way, every so many rows.
+_SAMPLED, _SAMPLE_EVERY = 8, 10
 _runner: Runner | None = None
 
 
@@ -37,19 +40,23 @@ class Row:
 
     Attributes:
         target: Its index.
+        distance: Of the goal from the base at the start, along the ground (m).
         quality: Judgement of the motion.
         infeasible_ticks: Control periods in which the method could not do all that was asked.
         planned_s: Processor time of planning (s).
         beyond_reach: True where geometry alone proves that no posture from anywhere has the tool there.
         reason: Why it was refused or what was in the way; empty where nothing was.
+        omega: Times (s) and ω of the arm on the way, for the first targets; empty for the others.
     """
 
     target: int
+    distance: float
     quality: Quality
     infeasible_ticks: int
     planned_s: float
     beyond_reach: bool
     reason: str
+    omega: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -149,9 +156,10 @@ def _run(arguments: argparse.Namespace) -> int:
             "method": arguments.method,
             "targets": str(arguments.targets or f"drawn: seed {arguments.seed}, free axis {arguments.free_axis}"),
             "summary": summary,
+            "samples": [{"target": row.target, "t": row.omega[0], "omega": row.omega[1]} for row in rows[:_SAMPLED]],
             "results": [_flat(row) for row in rows],
         }
-        arguments.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+        arguments.json.write_text(one_row_a_line(document), encoding="utf-8")
     return 0
 
 
@@ -196,7 +204,15 @@ def _row(runner: Runner, index: int, target: Target, folder: Path | None) -> Row
     reason = outcome.reason
     if not quality.reached and not reason:
         reason = "the motion ended or ran out of time before the tool was there"
-    return Row(index, quality, outcome.infeasible, outcome.planned_s, beyond, reason)
+    distance = math.dist(target.T_odom_goal.translation[:2], target.q[:2])
+    omega = _omega(runner, done) if index < _SAMPLED else ((), ())
+    return Row(index, distance, quality, outcome.infeasible, outcome.planned_s, beyond, reason, omega)
+
+
+def _omega(runner: Runner, done: Trajectory) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    rows = range(0, len(done.t), _SAMPLE_EVERY)
+    values = [arm_omega(runner.robot.kinematics(done.q[row]).J) for row in rows]
+    return tuple(round(float(done.t[row]), 3) for row in rows), tuple(round(value, 5) for value in values)
 
 
 def _print(method: str, rows: Sequence[Row], summary: dict[str, Any], seconds: float) -> None:
@@ -240,6 +256,7 @@ def _kind(reason: str) -> str:
 
 def _flat(row: Row) -> dict[str, Any]:
     fields: dict[str, Any] = asdict(row)
+    del fields["omega"]
     quality: dict[str, Any] = fields.pop("quality")
     return fields | quality
 

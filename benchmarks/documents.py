@@ -1,0 +1,33 @@
+"""How benchmarks write what they found: JSON that people can read and compare line by line."""
+
+import json
+from typing import Any
+
+
+def one_row_a_line(document: dict[str, Any]) -> str:
+    """JSON text with each key, and each row of a list, on one line; numbers to six digits."""
+    parts = []
+    for key, value in document.items():
+        if isinstance(value, list):
+            rows = ",\n".join(f"  {_line(row)}" for row in value)
+            parts.append(f" {json.dumps(key)}: [\n{rows}\n ]")
+        elif isinstance(value, dict):
+            rows = ",\n".join(f"  {json.dumps(name)}: {_line(entry)}" for name, entry in value.items())
+            parts.append(f" {json.dumps(key)}: {{\n{rows}\n }}")
+        else:
+            parts.append(f" {json.dumps(key)}: {_line(value)}")
+    return "{\n" + ",\n".join(parts) + "\n}\n"
+
+
+def _line(value: Any) -> str:
+    return json.dumps(_rounded(value), ensure_ascii=False)
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, float):
+        return float(f"{value:.6g}")
+    if isinstance(value, dict):
+        return {name: _rounded(entry) for name, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_rounded(entry) for entry in value]
+    return value
