@@ -13,7 +13,7 @@ BENCHMARKS = {
     "arm": ("benchmarks.arm", "the arm alone between random poses, beside published figures"),
     "load": ("benchmarks.load", "processor, memory and traffic of the demo"),
     "live": ("benchmarks.live", "the running demo: control periods on time, round trip, tool error"),
-    "perception": ("benchmarks.perception_points", "pruning points against the truth of simulated rows"),
+    "perception": ("benchmarks.perception", "surveys of unseen rows, every pruning point judged"),
     "plots": ("benchmarks.plots", "pictures of what the others wrote with --json"),
 }
 

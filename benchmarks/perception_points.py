@@ -8,7 +8,6 @@ import json
 import statistics
 import time
 import tomllib
-import zlib
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -17,6 +16,7 @@ import msgspec
 import numpy as np
 from msgspec import Struct
 
+from bridge.picture import encode_picture
 from bridge.sim.camera import Camera, RgbdImage
 from bridge.sim.camera_config import CameraConfig
 from bridge.sim.row import Array, Row
@@ -30,7 +30,6 @@ from rolling_panda import messages as m
 from rolling_panda.resources import resource
 from rolling_panda.robot_model import RobotModel, configuration
 
-DEPTH_UNIT = 0.001
 #: A spur is in view when its stub and its cut are this far inside the image (px).
 _MARGIN = 12.0
 
@@ -92,18 +91,18 @@ class Score:
 def camera_frame(
     image: RgbdImage, camera: Camera, base: m.PlanarPose, position: m.Actuated, sequence: int
 ) -> m.CameraFrame:
-    """What the bridge would send for an image, without colour."""
-    counts = np.round(image.depth / DEPTH_UNIT).astype("<u2")
+    """What the bridge would send for an image."""
+    picture = encode_picture(camera.intrinsics, image.color, image.depth, image.labels)
     return m.CameraFrame(
         header=m.Header(float(sequence), "camera"),
         sequence=sequence,
         intrinsics=camera.intrinsics,
         base=base,
         position=position,
-        color_jpeg=b"",
-        depth_zlib=zlib.compress(counts.tobytes(), 1),
-        depth_unit=DEPTH_UNIT,
-        labels_zlib=zlib.compress(image.labels.tobytes(), 1),
+        color_jpeg=picture.color_jpeg,
+        depth_zlib=picture.depth_zlib,
+        depth_unit=picture.depth_unit,
+        labels_zlib=picture.labels_zlib,
     )
 
 

@@ -2,11 +2,12 @@
 
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from perception.config import PerceptionConfig
 from perception.loop import Loop
 from perception.pipeline import Perception
-from perception.segmenter import LabelImageSegmenter
+from perception.segmenter_choice import choose_segmenter
 from rolling_panda.config import RobotConfig, load_section
 from rolling_panda.process import ProcessContext, run_process
 from rolling_panda.robot_model import RobotModel
@@ -21,7 +22,8 @@ def run(context: ProcessContext) -> None:
     """Work until `context.stopping` is set."""
     config = load_section(context.config_path, "perception", PerceptionConfig)
     model = RobotModel(load_section(context.config_path, "robot", RobotConfig))
-    Loop(context.transport, config, Perception(config, LabelImageSegmenter(), model)).run(context.stopping)
+    segmenter = choose_segmenter(config.segmenter, Path(config.weights) if config.weights else None, config.threads)
+    Loop(context.transport, config, Perception(config, segmenter, model)).run(context.stopping)
 
 
 if __name__ == "__main__":

@@ -21,6 +21,8 @@ _WIDTH_STEP, _WIDTH_NOISE = 0.01, 0.001
 _TAPER = 0.42
 #: Where a cane shows too little to measure its radius (m): that of a common cane.
 _FALLBACK_RADIUS = 0.004
+#: Consecutive samples of an axis nearer than this make no direction (m).
+_STANDSTILL = 1e-5
 #: A piece of cane without pixels is hidden where it is at least this long (m); half a node.
 _HIDDEN = 0.006
 
@@ -84,6 +86,10 @@ def _measure(view: View, wood: Wood, members: Index, line: Array, config: Skelet
     width_arc, width = _widths(view, wood, members, along, line, stations)
     radius = float(np.clip(np.median(width) / 2, 0.001, 0.05)) if len(width) else _FALLBACK_RADIUS
     axis = _smooth(line, stations, along, wood.points[members], config.smoothing)
+    steps = np.linalg.norm(np.diff(axis, axis=0), axis=1)
+    # Scattered pixels of a speck give no line.
+    if not np.isfinite(axis).all() or steps.min() < _STANDSTILL:
+        return None
     axis = _to_axis(view, axis, radius)
     return Centreline(
         axis=axis,

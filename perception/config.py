@@ -1,6 +1,6 @@
 """What perception may be told: the pruning rule's numbers, what counts as seen, and how points are tracked."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
@@ -13,7 +13,9 @@ class RuleConfig(Struct, frozen=True, forbid_unknown_fields=True):
     """The spur-pruning rule. Lengths along the cane in metres.
 
     Attributes:
+        system: How the vines are trained: `spur` (cordon) or `guyot`.
         nodes_kept: Count nodes that stay on the new spur; the basal bud is not counted.
+        fruiting_nodes: The same on a Guyot vine's new cane.
         keeper_diameter: The lowest cane at least this thick becomes the new spur, else the thickest (m).
         offset: Cut this far past the last kept node (m).
         short_internode: Where the next node is nearer than this, cut midway instead (m).
@@ -31,7 +33,9 @@ class RuleConfig(Struct, frozen=True, forbid_unknown_fields=True):
         wire_distance: No cut is proposed nearer to a wire than this (m).
     """
 
+    system: Literal["spur", "guyot"] = "spur"
     nodes_kept: Annotated[int, Meta(ge=1, le=5)] = 2
+    fruiting_nodes: Annotated[int, Meta(ge=3, le=20)] = 8
     keeper_diameter: Positive = 0.006
     offset: Positive = 0.020
     short_internode: Positive = 0.040
@@ -150,6 +154,10 @@ class PerceptionConfig(Struct, frozen=True, forbid_unknown_fields=True):
         survey_nearest: A frame with the cordon nearer than this is no survey: it shows parts of spurs only, so that it
             may confirm that wood has gone and propose nothing (m).
         survey_farthest: The same for a cordon farther away, where canes are too thin in the image (m).
+        segmenter: Says which pixel shows what: `network`, or `labels`, the simulated camera's own, for comparison.
+        weights: ONNX file for the network; empty takes the one that is shipped.
+        threads: Of the network.
+        fuse: Whether the rule is applied to what all frames have shown of a spur, or to each frame alone.
         rule: Where to cut.
         skeleton: Pixels to canes.
         tracker: Points over time.
@@ -160,6 +168,10 @@ class PerceptionConfig(Struct, frozen=True, forbid_unknown_fields=True):
     hang_s: Positive = 3.0
     survey_nearest: Positive = 0.55
     survey_farthest: Positive = 1.1
+    segmenter: Literal["network", "labels"] = "labels"
+    weights: str = ""
+    threads: Annotated[int, Meta(ge=1, le=64)] = 1
+    fuse: bool = False
     rule: RuleConfig = RuleConfig()
     skeleton: SkeletonConfig = SkeletonConfig()
     tracker: TrackerConfig = TrackerConfig()

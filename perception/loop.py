@@ -1,7 +1,10 @@
 """The process's loop: newest frame in, points out, one heartbeat a turn."""
 
+import queue
 import threading
 import time
+from concurrent.futures import Future
+from concurrent.futures import TimeoutError as FutureTimeoutError
 from dataclasses import dataclass
 
 from perception.config import PerceptionConfig
@@ -9,6 +12,7 @@ from perception.pipeline import Perception
 from perception.worker import Worker
 from rolling_panda import messages as m
 from rolling_panda import topics
+from rolling_panda.plant_requests import PlantRequest
 from rolling_panda.row_messages import Obstacles
 from rolling_panda.transport import Transport
 
@@ -18,6 +22,17 @@ class _Result:
     points: m.PruningPoints
     withdrawn: tuple[str, ...]
     obstacles: Obstacles
+
+
+@dataclass(frozen=True)
+class _Asked:
+    request: PlantRequest
+    answer: Future[m.Answer]
+
+
+_Job = m.CameraFrame | _Asked
+#: How long an operator's question waits for the worker (s); less than the service's timeout.
+_ANSWER_S = 1.8
 
 
 class Loop:
@@ -37,7 +52,9 @@ class Loop:
         self._obstacles = transport.publisher(topics.OBSTACLES)
         self._heartbeat = transport.publisher(topics.HEARTBEAT)
         self._events = transport.publisher(topics.EVENT)
-        self._worker: Worker[m.CameraFrame, _Result] = Worker(lambda frame: _result(perception, frame))
+        self._worker: Worker[_Job, _Result] = Worker(lambda job: _work(perception, job))
+        self._asked: queue.SimpleQueue[_Asked] = queue.SimpleQueue()
+        transport.serve(topics.PLANT, self._ask)
         self._newest: m.PruningPoints | None = None
         self._in_the_way: Obstacles | None = None
         self._sequence = 0
@@ -64,8 +81,9 @@ class Loop:
         elif done is not None:
             self._refuse(str(done.error), now)
         if self._worker.busy_for(now) == 0.0:
-            frame = self._frames.take()
-            if frame is not None:
+            if not self._asked.empty():
+                self._worker.submit(self._asked.get(), now)
+            elif (frame := self._frames.take()) is not None:
                 self._worker.submit(frame.message, now)
         if self._newest is not None and now - self._sent >= 1.0 / topics.POINTS.rate_hz:
             self._publish(now)
@@ -73,6 +91,16 @@ class Loop:
             self._obstacles.put(self._in_the_way)
             self._sent_obstacles = now
         self._beat(now)
+
+    def _ask(self, request: PlantRequest) -> m.Answer:
+        """On a thread of the transport: waits until the worker has come to it."""
+        asked = _Asked(request, Future())
+        self._asked.put(asked)
+        try:
+            return asked.answer.result(_ANSWER_S)
+        except FutureTimeoutError:
+            asked.answer.cancel()
+            return m.Answer(ok=False, reason="perception is busy with a frame; nothing was done, ask again")
 
     def _take(self, result: _Result, now: float) -> None:
         self._newest, self._in_the_way, self._last_error = result.points, result.obstacles, ""
@@ -112,7 +140,13 @@ class Loop:
         self._events.put(m.LogEvent(header=m.Header(now), process="perception", severity=severity, text=text[:500]))
 
 
-def _result(perception: Perception, frame: m.CameraFrame) -> _Result:
-    points = perception.process(frame)
+def _work(perception: Perception, job: _Job) -> _Result:
+    if isinstance(job, _Asked):
+        # What nobody waits for any more must not be done.
+        if job.answer.set_running_or_notify_cancel():
+            job.answer.set_result(perception.answer(job.request))
+        points = perception.points()
+    else:
+        points = perception.process(job)
     obstacles = Obstacles(header=points.header, capsules=perception.obstacles)
     return _Result(points, perception.withdrawn, obstacles)

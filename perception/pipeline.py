@@ -1,29 +1,38 @@
 """Camera frames in, pruning points out."""
 
+import dataclasses
+
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
+from perception.by_hand import near_wire, point_by_hand
 from perception.centreline import centrelines
-from perception.config import PerceptionConfig
+from perception.config import PerceptionConfig, RuleConfig
 from perception.fragments import find_fragments, find_wood
 from perception.frame import View, decode_frame
 from perception.keep_out import wire_near
 from perception.linking import link
+from perception.mending import mended
 from perception.numbering import RowNumbers
 from perception.obstacles import ObstacleMap
 from perception.plant import Cane, Plant
-from perception.rule import decide
+from perception.plant_map import PlantMap
+from perception.rules import apply_rule
 from perception.segmenter import Segmenter
 from perception.topology import build_plant
-from perception.tracker import Proposal, Tracker
+from perception.tracker import Proposal, Tracked, Tracker
 from rolling_panda import messages as m
 from rolling_panda.errors import InputError
+from rolling_panda.plant_requests import AddPoint, AddPointInImage, PlantRequest, SetRule
 from rolling_panda.robot_model import RobotModel
 from rolling_panda.row_messages import Capsule
 
 #: Every so many samples of a cane's axis go on the wire.
 _THIN_OUT = 4
 _CORDON = m.WOOD_CLASSES.index("cordon")
+#: Frames that may be clicked.
+_EYES = 8
 #: Fewer pixels of cordon say nothing about how far the row is.
 _LEAST_CORDON = 200
 
@@ -46,8 +55,13 @@ class Perception:
         self._numbers = RowNumbers(config.tracker.spur_separation, config.tracker.vine_spacing)
         self._frames = 0
         self._abstained: tuple[str, ...] = ()
+        self._told: tuple[str, ...] = ()
+        self._stamp = 0.0
+        self._eyes: dict[int, View] = {}
         self._canes: tuple[tuple[m.Vector3, ...], ...] = ()
         self._map = ObstacleMap(config.obstacles)
+        self.known = PlantMap()
+        """The vines as known from all frames."""
         self.withdrawn: tuple[str, ...] = ()
         """What the last frame took away, with the reasons."""
         self.obstacles: tuple[Capsule, ...] = ()
@@ -63,6 +77,7 @@ class Perception:
             MessageError: The frame is corrupt; nothing changes.
         """
         view = decode_frame(frame, self._model)
+        self._remember(view)
         self.withdrawn = ()
         try:
             labels = self._segmenter.segment(view)
@@ -73,26 +88,100 @@ class Perception:
         if not self._is_survey(view, labels):
             # Too near or too far to read a whole spur; near enough to see whether the wood still stands.
             tracked = self._tracker.update(view, labels, [])
-            self.withdrawn = tracked.withdrawn
+            self._take(tracked)
             return self._message(view, tracked.points, (*tracked.withdrawn, *self._abstained), self._canes)
         plant = perceive(view, labels, self._config)
         numbers = self._numbers.number(plant, view.R[:, 0])
+        self.known.update(plant, numbers)
+        fused = {spur.number: spur.as_spur() for spur in self.known.spurs} if self._config.fuse else {}
         proposals, abstained = [], []
         for spur, number in zip(plant.spurs, numbers, strict=True):
-            decision = decide(spur, self._config.rule, plant.beside(spur))
+            decision = apply_rule(fused.get(number, spur), self._config.rule, plant.beside(spur))
             place = f"vine {number.vine}, spur {number.spur}"
             for cut in decision.cuts:
                 if wire_near(view, labels, cut.position, self._config.rule.wire_distance):
-                    near = round(self._config.rule.wire_distance * 1000)
-                    abstained.append(f"{place}: a wire passes within {near} mm of the cut; cut this one by hand")
+                    abstained.append(_beside_wire(place, self._config.rule))
                 else:
                     proposals.append(Proposal(cut, number))
             abstained += [f"{place}: {reason}" for reason in decision.abstained]
         tracked = self._tracker.update(view, labels, proposals)
-        self.withdrawn = tracked.withdrawn
+        self._take(tracked)
         self._abstained = tuple(abstained)
         self._canes = tuple(_polyline(cane) for spur in plant.spurs for cane in spur.canes)
         return self._message(view, tracked.points, (*tracked.withdrawn, *abstained), self._canes)
+
+    def answer(self, request: PlantRequest) -> m.Answer:
+        """Do what an operator asks for; a refusal changes nothing."""
+        if isinstance(request, SetRule):
+            return self._set_rule(request)
+        if isinstance(request, AddPoint):
+            origin, direction = np.array(request.origin), np.array(request.direction)
+        elif isinstance(request, AddPointInImage):
+            eye = self._eyes.get(request.sequence)
+            if eye is None:
+                return m.Answer(ok=False, reason="that picture is not among the newest ones any more; click again")
+            k = eye.intrinsics
+            row, col = request.v * k.height - 0.5, request.u * k.width - 0.5
+            origin = eye.t
+            direction = eye.points([row], [col], [1.0])[0] - eye.t
+        else:
+            return m.Answer(ok=False, reason=f"perception cannot do {type(request).__name__}")
+        direction = direction / np.linalg.norm(direction)
+        rule = self._config.rule
+        found = point_by_hand(self.known, origin, direction, rule, self.obstacles, request.user)
+        if isinstance(found, str):
+            return m.Answer(ok=False, reason=found)
+        return m.Answer(ok=True, reason=self._tracker.add(Proposal(*found)).point_id)
+
+    def points(self) -> m.PruningPoints:
+        """Everything held true now, without a new frame."""
+        return m.PruningPoints(
+            header=m.Header(self._stamp, "odom"),
+            segmenter=self._segmenter.name,
+            frames=self._frames,
+            points=self._tracker.points(),
+            abstained=self._told,
+            canes=self._canes,
+        )
+
+    def _set_rule(self, request: SetRule) -> m.Answer:
+        rule = replace(
+            self._config.rule,
+            system=request.system,
+            nodes_kept=request.nodes_kept,
+            fruiting_nodes=request.fruiting_nodes,
+            keeper_diameter=request.keeper_diameter,
+            offset=request.offset,
+        )
+        self._config = replace(self._config, rule=rule)
+        spurs = {known.number: known.as_spur() for known in self.known.spurs}
+        proposals, abstained = [], []
+        for number, spur in spurs.items():
+            beside = [cane.axis for other in spurs.values() if other is not spur for cane in other.canes]
+            decision = apply_rule(spur, rule, np.concatenate([np.zeros((0, 3)), *beside]))
+            place = f"vine {number.vine}, spur {number.spur}"
+            abstained += [f"{place}: {reason}" for reason in decision.abstained]
+            for cut in decision.cuts:
+                if near_wire(self.obstacles, cut.position, rule.wire_distance):
+                    abstained.append(_beside_wire(place, rule))
+                else:
+                    proposals.append(Proposal(cut, number))
+        self._tracker.restart(proposals)
+        self._abstained = self._told = tuple(text[:500] for text in abstained)
+        return m.Answer(ok=True, reason=f"{len(proposals)} points by the new rule")
+
+    def _take(self, tracked: Tracked) -> None:
+        self.withdrawn = tracked.withdrawn
+        for place in tracked.severed:
+            self.known.sever(place)
+
+    def _remember(self, view: View) -> None:
+        """Keep the cameras' places of the newest frames, for clicks into them; not their images."""
+        self._stamp = view.stamp
+        nothing = np.zeros((0, 0), np.float32)
+        self._eyes[view.sequence] = dataclasses.replace(view, depth=nothing, labels=None, color_jpeg=b"")
+        while len(self._eyes) > _EYES:
+            del self._eyes[next(iter(self._eyes))]
 
     def _is_survey(self, view: View, labels: NDArray[np.uint8]) -> bool:
         """Whether the frame looks at the cordon from where spurs can be read as a whole."""
@@ -109,14 +198,19 @@ class Perception:
         abstained: tuple[str, ...],
         canes: tuple[tuple[m.Vector3, ...], ...],
     ) -> m.PruningPoints:
+        self._told = tuple(text[:500] for text in abstained)
         return m.PruningPoints(
             header=m.Header(view.stamp, "odom"),
             segmenter=self._segmenter.name,
             frames=self._frames,
             points=points,
-            abstained=tuple(text[:500] for text in abstained),
+            abstained=self._told,
             canes=canes,
         )
+
+
+def _beside_wire(place: str, rule: RuleConfig) -> str:
+    return f"{place}: a wire passes within {round(rule.wire_distance * 1000)} mm of the cut; cut this one by hand"
 
 
 def perceive(view: View, labels: "np.ndarray[tuple[int, ...], np.dtype[np.uint8]]", config: PerceptionConfig) -> Plant:
@@ -127,6 +221,7 @@ def perceive(view: View, labels: "np.ndarray[tuple[int, ...], np.dtype[np.uint8]
         labels: H×W class indices.
         config: Section `[perception]`.
     """
+    view = mended(view, labels, config.skeleton)
     wood = find_wood(view, labels, config.skeleton)
     fragments = find_fragments(wood, view.depth.shape, config.skeleton)
     seen = np.zeros(view.depth.shape, dtype=bool)

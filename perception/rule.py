@@ -13,7 +13,7 @@ import numpy as np
 from perception.config import RuleConfig
 from perception.plant import Array, Cane, Node, Spur
 
-CutKind = Literal["spur cut", "renewal cut"]
+CutKind = Literal["spur cut", "renewal cut", "cane cut", "by hand"]
 
 
 @dataclass(frozen=True)
@@ -21,11 +21,12 @@ class Cut:
     """One proposed cut.
 
     Attributes:
-        kind: Shortening of the keeper, or removal of the stub beyond it.
+        kind: Shortening of the keeper, removal of the stub beyond it, tipping of the cane that will fruit
+            (Guyot), or what a person asked for.
         position: On the axis of the wood (3, m, odom).
         tangent: Unit vector along the wood, away from the cordon (3, odom).
         radius: Of the wood (m).
-        confidence: 0…1, the product of the shares explained in `_confidence`.
+        confidence: 0…1, the product of the shares explained in `cut_confidence`.
         nodes_seen: Count nodes seen on the keeper.
         nodes_kept: Count nodes that stay.
         reason: One sentence for a grower.
@@ -189,14 +190,14 @@ def _shorten(spur: Spur, keeper: _Keeper, config: RuleConfig) -> Cut | str:
         position=cane.at(arc),
         tangent=cane.tangent(arc),
         radius=cane.radius,
-        confidence=_confidence(cane, arc, keeper.certainty, config),
+        confidence=cut_confidence(cane, arc, keeper.certainty, config),
         nodes_seen=len(nodes),
         nodes_kept=kept,
         reason=f"Spur cut on {keeper.why}: {where} past node {kept}, so that {kept} nodes and the basal bud stay.",
     )
 
 
-def _confidence(cane: Cane, arc: float, choice: float, config: RuleConfig) -> float:
+def cut_confidence(cane: Cane, arc: float, choice: float, config: RuleConfig) -> float:
     """Share of the way to the cut that was seen × how large the kept nodes were seen × how clear the choice was."""
     hidden = sum(max(0.0, min(span.end, arc) - span.start) for span in cane.hidden) + cane.base_gap
     seen = float(np.clip(1.0 - hidden / arc, 0.0, 1.0))

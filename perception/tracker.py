@@ -38,10 +38,17 @@ class Proposal:
 
 @dataclass(frozen=True)
 class Tracked:
-    """What the tracker holds true: points to show, and what it withdrew in this frame, with the reason."""
+    """What the tracker holds true.
+
+    Attributes:
+        points: To show.
+        withdrawn: What it withdrew in this frame, with the reason.
+        severed: Where wood was found cut in this frame (3, m, odom).
+    """
 
     points: tuple[m.PruningPoint, ...]
     withdrawn: tuple[str, ...]
+    severed: tuple[Array, ...] = ()
 
 
 @dataclass
@@ -95,9 +102,42 @@ class Tracker:
                 keep.append(track)
             elif track.shown is not None and reason:
                 withdrawn.append(f"{track.point_id} (vine {track.number.vine}, spur {track.number.spur}) {reason}")
-        self._tracks = keep
+        before, self._tracks = self._tracks, keep
         self._show(supported)
-        return Tracked(self.points(), tuple(withdrawn))
+        severed = tuple(t.position for t in before if t not in keep and t.gone >= self._config.gone)
+        return Tracked(self.points(), tuple(withdrawn), severed)
+
+    def add(self, proposal: Proposal) -> m.PruningPoint:
+        """Show a cut at once that needs no second look, since a person placed it."""
+        cut = proposal.cut
+        self._named += 1
+        track = _Track(f"p{self._named}", proposal.number, cut, cut.position, cut.tangent, cut.radius)
+        track.shown = self._message(track)
+        self._tracks.append(track)
+        return track.shown
+
+    def restart(self, proposals: list[Proposal]) -> None:
+        """Show these, and what persons placed, instead of all else: the rule has changed, the vines have not.
+
+        What stays where it was keeps its name.
+        """
+        old = [track for track in self._tracks if track.cut.kind != "by hand"]
+        self._tracks = [track for track in self._tracks if track.cut.kind == "by hand"]
+        for proposal in proposals:
+            same = [
+                track
+                for track in old
+                if track.cut.kind == proposal.cut.kind
+                and float(np.linalg.norm(track.position - proposal.cut.position)) < self._config.moved
+            ]
+            if same:
+                track = same[0]
+                old.remove(track)
+                track.cut = proposal.cut
+                track.shown = self._message(track)
+                self._tracks.append(track)
+            else:
+                self.add(proposal)
 
     def points(self) -> tuple[m.PruningPoint, ...]:
         """The points shown, in the order in which they were first seen."""

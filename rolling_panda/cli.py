@@ -19,6 +19,8 @@ FORWARDED = {
     "controller": ("controller", "whole-body control and the supervision state machine"),
     "perception": ("perception", "camera frames to pruning points"),
     "server": ("server", "the operator's page and its REST interface"),
+    "perceive": ("perception.perceive", "classes and pruning points of one photograph"),
+    "vineyard": ("bridge.sim.vineyard_command", "grow a simulated row, write and picture it"),
     "bench": ("benchmarks", "measurements: time of a control step, cuts in simulated rows"),
 }
 

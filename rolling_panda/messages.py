@@ -39,7 +39,9 @@ Phase = Literal["", "APPROACH", "ADVANCE", "CUT", "RETREAT"]
 PointState = Literal["PROPOSED", "ACCEPTED", "INTENT", "DONE", "FAILED_NOT_CUT", "UNKNOWN", "REJECTED"]
 Severity = Literal["info", "warning", "error"]
 Outcome = Literal["", "DONE", "FAILED_NOT_CUT", "UNKNOWN"]
-WoodClass = Literal["background", "ground", "post", "trunk", "cordon", "spur", "cane", "node", "wire"]
+WoodClass = Literal[
+    "background", "ground", "post", "trunk", "cordon", "spur", "cane", "node", "wire", "hose", "old cut"
+]
 #: Index = value in a label image.
 WOOD_CLASSES: tuple[WoodClass, ...] = (
     "background",
@@ -51,6 +53,8 @@ WOOD_CLASSES: tuple[WoodClass, ...] = (
     "cane",
     "node",
     "wire",
+    "hose",
+    "old cut",
 )
 
 

@@ -8,7 +8,7 @@ from typing import Any, Generic, Literal, TypeVar
 
 from msgspec import Struct
 
-from rolling_panda import intents, row_messages, teleop_messages
+from rolling_panda import intents, plant_requests, row_messages, teleop_messages
 from rolling_panda import messages as m
 
 Priority = Literal["REAL_TIME", "INTERACTIVE_HIGH", "DATA_LOW", "BACKGROUND"]
@@ -138,7 +138,12 @@ INTENT: Service[intents.Intent] = Service(
 RELEASE: Service[m.ReleaseStop] = Service(
     "service/release", (m.ReleaseStop,), "bridge", 0.5, "release a latched stop",
 )
-SERVICES: tuple[Service[Any], ...] = (INTENT, RELEASE)
+PLANT: Service[plant_requests.PlantRequest] = Service(
+    "service/plant",
+    (plant_requests.SetRule, plant_requests.AddPoint, plant_requests.AddPointInImage),
+    "perception", 2.0, "another pruning rule, or a point by hand",
+)
+SERVICES: tuple[Service[Any], ...] = (INTENT, RELEASE, PLANT)
 # fmt: on
 
 

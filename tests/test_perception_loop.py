@@ -8,8 +8,9 @@ from perception.loop import Loop
 from perception.worker import Worker
 from rolling_panda import messages as m
 from rolling_panda.errors import MessageError
+from rolling_panda.plant_requests import SetRule
 from rolling_panda.row_messages import Capsule
-from rolling_panda.topics import EVENT, HEARTBEAT, OBSTACLES, POINTS
+from rolling_panda.topics import EVENT, HEARTBEAT, OBSTACLES, PLANT, POINTS
 from rolling_panda.transport import Slot
 
 
@@ -31,6 +32,10 @@ class Wire:
     def slot(self, topic):
         return self.frames
 
+    def serve(self, service, answer):
+        assert service is PLANT
+        self.ask = answer
+
     def publisher(self, topic):
         return self.out[topic.name]
 
@@ -43,6 +48,12 @@ class Eyes:
 
     def __init__(self):
         self.release = threading.Event()
+
+    def answer(self, request):
+        return m.Answer(ok=True, reason=f"kept {request.nodes_kept}")
+
+    def points(self):
+        return m.PruningPoints(header=m.Header(), segmenter="s", frames=7, points=())
 
     def process(self, frame):
         if frame == "hang":
@@ -150,3 +161,33 @@ def test_a_worker_takes_one_job_at_a_time():
     while (done := worker.poll()) is None:
         assert time.monotonic() < deadline
     assert done.result is True and worker.busy_for(12.0) == 0.0
+
+
+def turns(loop, until, start=0.0):
+    """Turn the loop until something holds, for at most five seconds."""
+    limit = time.monotonic() + 5.0
+    while not until() and time.monotonic() < limit:
+        loop.turn(start)
+        time.sleep(0.005)
+    assert until()
+
+
+def test_a_request_is_answered_between_frames_and_its_points_are_sent_at_once(parts):
+    wire, _, loop = parts
+    said = []
+    asking = threading.Thread(target=lambda: said.append(wire.ask(SetRule(user="Ada", nodes_kept=3))))
+    asking.start()
+    turns(loop, lambda: wire.out[POINTS.name].sent)
+    asking.join(5.0)
+    assert said == [m.Answer(ok=True, reason="kept 3")]
+    assert wire.out[POINTS.name].sent[-1].frames == 7
+
+
+def test_a_request_that_waits_too_long_is_not_done_later(parts, monkeypatch):
+    wire, eyes, loop = parts
+    monkeypatch.setattr("perception.loop._ANSWER_S", 0.05)
+    done = []
+    monkeypatch.setattr(eyes, "answer", lambda request: done.append(request) or m.Answer(ok=True))
+    assert not wire.ask(SetRule(user="Ada")).ok
+    turns(loop, lambda: wire.out[POINTS.name].sent)
+    assert done == []

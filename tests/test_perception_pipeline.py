@@ -10,11 +10,13 @@ from bridge.sim.camera_config import CameraConfig
 from bridge.sim.vineyard import grow
 from bridge.sim.vineyard_config import VineyardConfig
 from perception.config import PerceptionConfig
+from perception.frame import decode_frame
 from perception.pipeline import Perception
 from perception.segmenter import LabelImageSegmenter
 from rolling_panda import messages as m
 from rolling_panda.codec import StrictDecoder, encode
 from rolling_panda.errors import MessageError
+from rolling_panda.plant_requests import AddPoint, AddPointInImage, SetRule
 from rolling_panda.robot_model import RobotModel, configuration
 
 
@@ -65,14 +67,13 @@ def test_the_same_frames_give_the_same_points_and_they_fit_the_wire(model, frame
 
 
 def test_a_corrupt_frame_changes_nothing(model, frames):
-    seen = perception(model)
+    seen, undisturbed = perception(model), perception(model)
     for frame in frames[:3]:
-        before = seen.process(frame)
+        seen.process(frame)
+        undisturbed.process(frame)
     with pytest.raises(MessageError):
         seen.process(msgspec.structs.replace(frames[3], depth_zlib=frames[3].depth_zlib[:-9]))
-    after = seen.process(frames[3])
-    assert after.frames == 4
-    assert [point.position for point in after.points] == [point.position for point in before.points]
+    assert seen.process(frames[3]) == undisturbed.process(frames[3])
 
 
 def test_without_labels_it_abstains_with_the_reason(model, frames):
@@ -86,3 +87,64 @@ def test_an_empty_view_gives_no_points(model, frames):
     blank = zlib.compress(bytes(k.width * k.height))
     result = perception(model).process(msgspec.structs.replace(frames[0], labels_zlib=blank))
     assert result.points == () and result.canes == ()
+
+
+def shown(model, frames):
+    seen = perception(model)
+    for frame in frames:
+        result = seen.process(frame)
+    assert result.points
+    return seen, result.points
+
+
+def test_another_rule_changes_the_points_at_once_and_back_again(model, frames):
+    seen, before = shown(model, frames)
+    answer = seen.answer(SetRule(user="Ada", nodes_kept=1))
+    assert answer.ok and "points by the new rule" in answer.reason
+    fewer = seen.points().points
+    assert fewer and all(point.nodes_kept == 1 for point in fewer)
+    # One node lower on the same canes.
+    low = {(point.vine, point.spur): point.position[2] for point in fewer}
+    for point in before:
+        if (point.vine, point.spur) in low and "Spur cut" in point.reason:
+            assert point.position[2] - low[point.vine, point.spur] > 0.04
+    assert seen.answer(SetRule(user="Ada")).ok
+    after = np.array([point.position for point in seen.points().points])
+    for point in before:
+        assert np.linalg.norm(after - point.position, axis=1).min() < 0.006
+
+
+def test_frames_after_another_rule_follow_it(model, frames):
+    seen, _ = shown(model, frames)
+    seen.answer(SetRule(user="Ada", nodes_kept=1))
+    for frame in frames:
+        result = seen.process(frame)
+    assert result.points and all(point.nodes_kept == 1 for point in result.points)
+
+
+def test_a_click_into_the_picture_adds_a_point_that_stays(model, frames):
+    seen, before = shown(model, frames)
+    view = decode_frame(frames[-1], model)
+    k = view.intrinsics
+    u, v, _ = view.pixels(np.array(before[0].position) + 0.02 * np.array(before[0].tangent))[0]
+    click = AddPointInImage(
+        user="Ada", sequence=frames[-1].sequence, u=float((u + 0.5) / k.width), v=float((v + 0.5) / k.height)
+    )
+    answer = seen.answer(click)
+    assert answer.ok, answer.reason
+    added = {point.point_id: point for point in seen.process(frames[0]).points}[answer.reason]
+    beyond = np.array(before[0].position) + 0.02 * np.array(before[0].tangent)
+    assert np.linalg.norm(np.array(added.position) - beyond) < 0.006
+    assert added.reason.startswith("Placed by Ada") and added.radius == pytest.approx(before[0].radius, abs=0.001)
+    assert seen.answer(SetRule(user="Ada", nodes_kept=1)).ok
+    assert answer.reason in {point.point_id for point in seen.points().points}, "another rule does not take it away"
+
+
+def test_clicks_that_mean_no_cane_are_refused(model, frames):
+    seen, before = shown(model, frames)
+    sky = seen.answer(AddPointInImage(user="Ada", sequence=frames[-1].sequence, u=0.5, v=0.99))
+    old = seen.answer(AddPointInImage(user="Ada", sequence=999, u=0.5, v=0.5))
+    away = seen.answer(AddPoint(user="Ada", origin=(0.0, 0.0, 1.0), direction=(0.0, -1.0, 0.0)))
+    assert not (sky.ok or old.ok or away.ok)
+    assert "no known cane" in sky.reason and "newest" in old.reason
+    assert seen.points().points == before

@@ -1,8 +1,9 @@
 """The table of what is on the wire is complete and consistent."""
 
-from rolling_panda import intents, row_messages, teleop_messages
+from rolling_panda import intents, plant_requests, row_messages, teleop_messages
 from rolling_panda import messages as m
 from rolling_panda import topics as t
+from rolling_panda.plant_requests import PlantRequest
 
 
 def test_names_are_unique_and_keys_carry_robot_and_version() -> None:
@@ -14,10 +15,14 @@ def test_names_are_unique_and_keys_carry_robot_and_version() -> None:
 def test_every_message_is_on_the_wire_once() -> None:
     carried = [topic.message for topic in t.TOPICS] + [r for s in t.SERVICES for r in s.requests] + [m.Answer]
     assert len(carried) == len(set(carried))
-    modules = (m, row_messages, teleop_messages, intents)
+    modules = (m, row_messages, teleop_messages, intents, plant_requests)
     defined = [value for module in modules for value in vars(module).values()]
-    known = {kind for kind in defined if isinstance(kind, type) and issubclass(kind, m.Message | intents.Intent)}
-    assert set(carried) == known - {m.Message, intents.Intent}
+    known = {
+        kind
+        for kind in defined
+        if isinstance(kind, type) and issubclass(kind, m.Message | intents.Intent | PlantRequest)
+    }
+    assert set(carried) == known - {m.Message, intents.Intent, PlantRequest}
 
 
 def test_senders_and_servers_are_processes() -> None:

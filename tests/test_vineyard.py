@@ -47,7 +47,8 @@ def test_a_longer_row_begins_like_a_shorter_one():
 def test_the_shipped_configuration_grows_a_row_of_everything():
     config = load_section(Path(resource("assets/config/sim.toml")), "vineyard", VineyardConfig)
     row = grow(config, 0)
-    assert {rod.kind for _, rod in row.standing()} == {"post", "trunk", "cordon", "spur", "cane", "node", "wire"}
+    wood = {"trunk", "cordon", "spur", "cane", "node", "old cut"}
+    assert {rod.kind for _, rod in row.standing()} == wood | {"post", "wire", "hose"}
     assert len(row.rods) < 5000
 
 
@@ -58,7 +59,7 @@ def test_every_rod_hangs_on_its_parent_which_comes_first(seed):
     for index, rod in row.standing():
         assert rod.parent < index
         if rod.parent < 0:
-            assert rod.kind in ("post", "wire", "trunk")
+            assert rod.kind in ("post", "wire", "trunk", "hose")
             continue
         parent = row.rods[rod.parent]
         assert parent is not None

@@ -45,7 +45,7 @@ export const TEXT_MAX_LENGTH = 500;
 
 /** @typedef {""|"DONE"|"FAILED_NOT_CUT"|"UNKNOWN"} Outcome */
 
-/** @typedef {"background"|"ground"|"post"|"trunk"|"cordon"|"spur"|"cane"|"node"|"wire"} WoodClass */
+/** @typedef {"background"|"ground"|"post"|"trunk"|"cordon"|"spur"|"cane"|"node"|"wire"|"hose"|"old cut"} WoodClass */
 
 /** @typedef {"viewer"|"operator"|"supervisor"} Role */
 

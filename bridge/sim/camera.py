@@ -6,8 +6,9 @@ import numpy as np
 
 from bridge.sim.camera_color import Bytes, Palette
 from bridge.sim.camera_config import CameraConfig
-from bridge.sim.camera_depth import measured_depth
-from bridge.sim.camera_mesh import Floats, RodMesh
+from bridge.sim.camera_depth import measured_depth, miscalibration
+from bridge.sim.camera_image import photographed
+from bridge.sim.camera_mesh import Floats, Indices, RodMesh
 from bridge.sim.row import Array, Row
 from rolling_panda.messages import WOOD_CLASSES
 
@@ -21,12 +22,15 @@ class RgbdImage:
     Attributes:
         color: H×W×3, RGB.
         depth: H×W, along the optical axis (m), with the sensor's noise; 0 where there is none.
-        labels: H×W, index in `WOOD_CLASSES` of what the pixel really shows, without error.
+        labels: H×W, index in `WOOD_CLASSES` of what the pixel really shows, without error; the rows behind are
+            background.
+        rods: H×W, index in `Row.rods` of what the pixel shows, -1 elsewhere: for judges only.
     """
 
     color: Bytes
     depth: Floats
     labels: Bytes
+    rods: Indices
 
 
 class Camera:
@@ -42,7 +46,8 @@ class Camera:
         self.config = config or CameraConfig()
         self.intrinsics = self.config.intrinsics()
         self._seed = seed
-        self._palette = Palette(seed)
+        self._palette = Palette(seed, self.config.appearance)
+        self._turn = miscalibration(self.config.calibration_angle, seed).astype(np.float32)
         k = self.intrinsics
         u, v = np.meshgrid((np.arange(k.width) - k.cx) / k.fx, (np.arange(k.height) - k.cy) / k.fy)
         # Directions reach to depth 1, so the distance a ray comes back with is the depth itself.
@@ -62,7 +67,7 @@ class Camera:
         if row is not self._row:
             self._mesh, self._row = RodMesh(row), row
         eye = T_world_camera[:3, 3].astype(np.float32)
-        rays = self._rays @ T_world_camera[:3, :3].T.astype(np.float32)
+        rays: Floats = self._rays @ (T_world_camera[:3, :3].astype(np.float32) @ self._turn).T
         hits = self._mesh.first_hits(np.broadcast_to(eye, rays.shape).copy(), rays)
         depth = hits.distance
         down = rays[:, 2] < -1e-6
@@ -72,7 +77,8 @@ class Camera:
         on_rod = (hits.rod >= 0) & ~on_ground
         labels = np.zeros(len(rays), np.uint8)
         labels[on_ground] = _GROUND
-        labels[on_rod] = self._mesh.kind[hits.rod[on_rod]]
+        own = on_rod & (hits.rod < self._mesh.reachable)
+        labels[own] = self._mesh.kind[hits.rod[own]]
         color = np.empty((len(rays), 3), np.float32)
         color[on_ground] = self._ground_color(eye, rays[on_ground], depth[on_ground])
         rods = hits.rod[on_rod]
@@ -82,10 +88,13 @@ class Camera:
         color[sky] = self._palette.sky(rays[sky, 2] / self._lengths[sky])
         shape = (self.intrinsics.height, self.intrinsics.width)
         rng = np.random.default_rng([self._seed, frame])
+        seen_width = np.full(len(rays), np.inf, np.float32)
+        seen_width[on_rod] = self._mesh.width[rods] * np.float32(self.intrinsics.fx) / depth[on_rod]
         return RgbdImage(
-            np.clip(color, 0.0, 255.0).astype(np.uint8).reshape(*shape, 3),
-            measured_depth(self.config, self.intrinsics.fx, depth.reshape(shape), rng),
+            photographed(self.config, color.reshape(*shape, 3), rng.spawn(1)[0]),
+            measured_depth(self.config, self.intrinsics.fx, depth.reshape(shape), seen_width.reshape(shape), rng),
             labels.reshape(shape),
+            np.where(own, hits.rod, np.int32(-1)).reshape(shape),
         )
 
     def _ground_color(self, eye: Floats, rays: Floats, depth: Floats) -> Floats:

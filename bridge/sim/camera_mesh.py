@@ -29,14 +29,19 @@ class RodMesh:
 
     def __init__(self, row: Row) -> None:
         """Mesh every standing rod."""
-        standing = list(row.standing())
+        # The rods of the rows behind are numbered on from those of this row.
+        standing = [*row.standing(), *enumerate(row.backdrop, len(row.rods))]
+        count = len(row.rods) + len(row.backdrop)
         self.revision = row.revision
-        self.kind = np.zeros(len(row.rods), np.uint8)
-        self.start = np.zeros((len(row.rods), 3), np.float32)
-        self.axis = np.zeros((len(row.rods), 3), np.float32)
+        self.reachable = len(row.rods)
+        self.kind = np.zeros(count, np.uint8)
+        self.start = np.zeros((count, 3), np.float32)
+        self.axis = np.zeros((count, 3), np.float32)
+        self.width = np.zeros(count, np.float32)
         for index, rod in standing:
             self.kind[index] = WOOD_CLASSES.index(rod.kind)
             self.start[index] = rod.start
+            self.width[index] = rod.start_radius + rod.end_radius
             self.axis[index] = (rod.end - rod.start) / max(float(np.linalg.norm(rod.end - rod.start)), 1e-9)
         thin = [(i, rod) for i, rod in standing if max(rod.start_radius, rod.end_radius) < _THICK]
         thick = [(i, rod) for i, rod in standing if max(rod.start_radius, rod.end_radius) >= _THICK]

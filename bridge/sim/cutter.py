@@ -12,7 +12,7 @@ from rolling_panda.differential_drive import Array
 from rolling_panda.messages import Outcome
 
 Mask = NDArray[np.bool_]
-_SOFT = frozenset({"cane", "spur", "node"})
+_SOFT = frozenset({"cane", "spur", "node", "old cut"})
 _IGNORED = frozenset({"background", "ground"})
 
 

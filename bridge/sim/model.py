@@ -28,7 +28,7 @@ from rolling_panda.robot_model import assemble, panda_urdf
 STEP_S = 0.001
 WHEELS = ("wheel_left", "wheel_right")
 ARM = tuple(f"panda_joint{i}" for i in range(1, 8))
-SOLID = frozenset({"post", "trunk", "cordon", "wire"})
+SOLID = frozenset({"post", "trunk", "cordon", "wire", "hose"})
 _ROLLS, _MEETS_ROW, _MEETS_BASE, _MEETS_ARM = 1, 2, 4, 8
 # Estimates: nobody published the caster's masses.
 _FORK_MASS, _CASTER_MASS = 0.6, 0.8

@@ -26,7 +26,7 @@ from bridge.sim.trace import CUTTER, TraceWriter
 from rolling_panda.differential_drive import Array
 from rolling_panda.row_messages import Capsule
 
-_SHOWN = frozenset({"post", "trunk", "cordon", "spur", "cane", "node", "wire"})
+_SHOWN = frozenset({"post", "trunk", "cordon", "spur", "cane", "node", "wire", "hose", "old cut"})
 _WHEELS_ON_FLOOR = 3
 _SETTLING_STEPS = 200
 # Torque of the servos (N·m): URDF of the base, data sheet of the Panda.

@@ -53,10 +53,12 @@ class Row:
     Attributes:
         rods: All rods ever; one that has gone is None.
         revision: Grows with every cut.
+        backdrop: Rods of the rows behind: they are seen and never reached.
     """
 
     rods: tuple[Rod | None, ...]
     revision: int = 0
+    backdrop: tuple[Rod, ...] = ()
 
     def standing(self) -> Iterable[tuple[int, Rod]]:
         """Index and rod of what still stands."""
@@ -85,4 +87,4 @@ class Row:
                     gone.add(child)
         rods = [None if i in gone else rod for i, rod in enumerate(self.rods)]
         rods[index] = replace(cut, end=point, end_radius=radius)
-        return Row(tuple(rods), self.revision + 1)
+        return Row(tuple(rods), self.revision + 1, self.backdrop)

@@ -1,7 +1,8 @@
-"""Grows a row of cordon-trained, spur-pruned vines: the same seed always gives the same row.
+"""Grows a row of vines in winter: the same seed always gives the same row.
 
-The row runs along +x. Trunks stand on the ground, two cordon arms leave each at the fruiting wire, spurs of two-year
-wood stand on the arms, and one-year canes grow upright from the spurs through the wires.
+The row runs along +x. Cordon-trained vines carry two permanent arms at the fruiting wire, spurs of two-year wood stand
+on the arms, and one-year canes grow upright from the spurs through the wires. Guyot vines carry one cane of last year
+instead (`bridge.sim.vineyard_guyot`).
 """
 
 import numpy as np
@@ -9,13 +10,14 @@ import numpy as np
 from bridge.sim.row import Array, Rod, Row
 from bridge.sim.vineyard_cane import Growth, grow_cane, towards, uniform
 from bridge.sim.vineyard_config import VineyardConfig
+from bridge.sim.vineyard_guyot import guyot_vine
+from bridge.sim.vineyard_surroundings import backdrop, hose, posts_and_wires, ties, wounds
 
 _TRUNK_RODS, _ARM_PIECE = 6, 0.12
-_UP = np.array([0.0, 0.0, 1.0])
 
 
 def grow(config: VineyardConfig, seed: int) -> Row:
-    """A row with `config.vines` vines, posts and wires, in the world frame.
+    """A row with `config.vines` vines, posts, wires and hose, in the world frame.
 
     Parents stand before their children. A vine depends on the seed and its own number only, so a longer row begins
     like a shorter one.
@@ -29,26 +31,16 @@ def grow(config: VineyardConfig, seed: int) -> Row:
     """
     config.check()
     growth = Growth(config)
-    _frame(growth)
+    posts_and_wires(growth)
+    hose(growth)
     for vine in range(config.vines):
+        first = len(growth.rods)
         _vine(growth, np.random.default_rng([seed, vine]), vine)
-    return Row(tuple(growth.rods))
-
-
-def _frame(growth: Growth) -> None:
-    config = growth.config
-    y, first = config.row_distance, config.first_vine_x - config.vine_spacing / 2
-    last = first + config.vines * config.vine_spacing
-    pitch = config.vines_per_post * config.vine_spacing
-    # A post at the row's start, then one after every few vines, and one at its end.
-    for x in [*np.arange(first, last - 1e-6, pitch), last]:
-        foot, top = np.array([x, y, 0.0]), np.array([x, y, config.post_height])
-        growth.add(Rod("post", foot, top, config.post_radius, config.post_radius))
-    under = -config.cordon_radius[1] - config.wire_radius
-    for above in (under, *config.wires):
-        z = config.cordon_height + above
-        ends = np.array([[first, y, z], [last, y, z]])
-        growth.add(Rod("wire", ends[0], ends[1], config.wire_radius, config.wire_radius))
+        # What stands beside the wood is drawn from a stream of its own, so that the wood does not depend on it.
+        rng = np.random.default_rng([seed, vine, 1])
+        wounds(growth, rng, first)
+        ties(growth, rng, first)
+    return Row(tuple(growth.rods), backdrop=backdrop(config, seed))
 
 
 def _vine(growth: Growth, rng: np.random.Generator, vine: int) -> None:
@@ -61,6 +53,9 @@ def _vine(growth: Growth, rng: np.random.Generator, vine: int) -> None:
     parent = -1
     for k in range(_TRUNK_RODS):
         parent = growth.add(Rod("trunk", points[k], points[k + 1], radii[k], radii[k + 1], parent, vine))
+    if config.training == "guyot":
+        guyot_vine(growth, rng, vine, parent, head)
+        return
     sites: list[tuple[int, Array]] = []
     for side in (-1.0, 1.0):
         sites += _arm(growth, rng, vine, parent, head, side)

@@ -58,6 +58,7 @@ def grow_cane(
     upright = towards(np.array([lean[0], lean[1], 1.0]))
     bend = rng.normal(0.0, 0.12, 2)
     zigzag = float(rng.choice([-1.0, 1.0])) * _ZIGZAG
+    lean_over = uniform(rng.spawn(1)[0], config.cane_droop) * towards(lean)
     point, here = origin, 0.0
     middle = bark + uniform(rng, config.basal)
     while True:
@@ -71,7 +72,9 @@ def grow_cane(
             share = min(1.0, max(0.0, (here + piece / 2 - bark) / length))
             turned = np.exp(-max(0.0, here + piece / 2 - bark) / _TURNING)
             direction = turned * leave + (1.0 - turned) * upright
-            direction = direction + [bend[0] * share + zigzag * (1.0 - turned), bend[1] * share * 0.5, 0.0]
+            side = zigzag * (1.0 - turned)
+            over = lean_over * share**2
+            direction = direction + [bend[0] * share + side + over[0], bend[1] * share * 0.5 + over[1], 0.0]
             beyond = point + piece * towards(direction)
             ends = [_radius(config, base, (s - bark) / length) * swelling for s in (here, here + piece)]
             parent = growth.add(Rod(kind, point, beyond, ends[0], ends[1], parent, *place))

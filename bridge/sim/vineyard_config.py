@@ -1,6 +1,6 @@
 """Numbers of the row that the simulation grows: spreads of spur-pruned, vertically shoot-positioned vineyards."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
@@ -9,12 +9,15 @@ from rolling_panda.errors import ConfigError
 
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 Metres = Annotated[float, Meta(ge=-1e3, le=1e3)]
+Count = Annotated[int, Meta(ge=0, le=100)]
 
 
 class VineyardConfig(Struct, frozen=True, forbid_unknown_fields=True):
     """What `grow` draws from. Pairs are the lower and upper end of a spread; all lengths in metres, angles in radians.
 
     Attributes:
+        training: `cordon`: two permanent arms with spurs. `guyot`: one cane of last year laid along the wire, and a
+            spur of two nodes beside it.
         row_distance: The row runs along +x at this y.
         first_vine_x: Trunk of vine 0.
         vines: How many vines.
@@ -43,8 +46,19 @@ class VineyardConfig(Struct, frozen=True, forbid_unknown_fields=True):
         internode: Between the middles of two nodes.
         node_length: Of the swelling.
         node_swelling: Radius of the swelling over the cane's radius there.
+        cane_droop: How far a cane's tip leans over under its weight.
+        guyot_nodes: Shoots on the cane that was laid down.
+        guyot_radius: Of that cane at its tip and at the head.
+        old_cut: Height of the old wound on the tip of a stub.
+        old_cuts_a_vine: Old wounds on trunk and arms, at least and at most.
+        ties_a_vine: Ties that hold arms to the wire, at least and at most.
+        hose_height: Of the drip hose above the ground; 0 for a row without.
+        hose_radius: Of the drip hose.
+        rows_behind: Rows seen behind this one.
+        row_spacing: Between two rows.
     """
 
+    training: Literal["cordon", "guyot"] = "cordon"
     row_distance: Metres = 0.75
     first_vine_x: Metres = 0.5
     vines: Annotated[int, Meta(ge=1, le=100)] = 3
@@ -73,6 +87,16 @@ class VineyardConfig(Struct, frozen=True, forbid_unknown_fields=True):
     internode: tuple[Positive, Positive] = (0.06, 0.10)
     node_length: tuple[Positive, Positive] = (0.010, 0.014)
     node_swelling: tuple[Positive, Positive] = (1.35, 1.5)
+    cane_droop: tuple[Share, Share] = (0.0, 0.15)
+    guyot_nodes: Annotated[int, Meta(ge=3, le=20)] = 8
+    guyot_radius: tuple[Positive, Positive] = (0.0045, 0.007)
+    old_cut: tuple[Positive, Positive] = (0.004, 0.010)
+    old_cuts_a_vine: tuple[Count, Count] = (2, 6)
+    ties_a_vine: tuple[Count, Count] = (2, 4)
+    hose_height: Annotated[float, Meta(ge=0.0, le=3.0)] = 0.5
+    hose_radius: Positive = 0.008
+    rows_behind: Annotated[int, Meta(ge=0, le=5)] = 1
+    row_spacing: Positive = 2.5
 
     def check(self) -> None:
         """Refuse what no vine could be.

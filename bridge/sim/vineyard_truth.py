@@ -87,7 +87,8 @@ def judge(row: Row) -> tuple[SpurTruth, ...]:
             stubs[rod.vine, rod.spur] = index
         elif rod.cane >= 0:
             chains.setdefault((rod.vine, rod.spur), {}).setdefault(rod.cane, []).append((index, rod))
-    return tuple(_judge_spur(row, stubs[place], place, chains[place]) for place in sorted(chains))
+    # Shoots of a Guyot vine stand on no stub (`bridge.sim.vineyard_truth_guyot`).
+    return tuple(_judge_spur(row, stubs[place], place, chains[place]) for place in sorted(chains) if place in stubs)
 
 
 def _judge_spur(
@@ -109,37 +110,44 @@ def _judge_spur(
         keeper=keeper,
         diameter=diameters[keeper],
         nodes=np.array(middles).reshape(-1, 3),
-        cut=_shortening(chains[keeper]),
+        cut=shortening(chains[keeper], KEPT_NODES),
         renewal=_renewal(stub_index, stub, along[keeper], along[beyond[0]]) if beyond else None,
         surplus=tuple(cane for cane in upwards if along[cane] < along[keeper]),
     )
 
 
-def _shortening(chain: list[tuple[int, Rod]]) -> RightCut | None:
+def shortening(chain: list[tuple[int, Rod]], kept: int) -> RightCut | None:
+    """Where a cane is cut so that so many count nodes stay; None where it has fewer.
+
+    Args:
+        chain: Its rods with their indices, base first.
+        kept: Count nodes that stay.
+    """
     nodes = [k for k, (_, rod) in enumerate(chain) if rod.kind == "node"]
-    if len(nodes) <= KEPT_NODES:
+    if len(nodes) <= kept:
         return None
-    last = nodes[KEPT_NODES]
+    last = nodes[kept]
     index, rod = chain[last + 1]
     half = _length(chain[last][1]) / 2
     length = _length(rod)
     best, least, most = BEST_PAST - half, LEAST_PAST - half, MOST_PAST - half
-    if len(nodes) > KEPT_NODES + 1:
-        following = _length(chain[nodes[KEPT_NODES + 1]][1]) / 2
+    if len(nodes) > kept + 1:
+        following = _length(chain[nodes[kept + 1]][1]) / 2
         if half + length + following < SHORT_INTERNODE:
             best = (half + length + following) / 2 - half
     least, most = max(least, 0.0), min(most, length)
-    return _cut(index, rod, least, min(max(best, least), most), most)
+    return stretch(index, rod, least, min(max(best, least), most), most)
 
 
 def _renewal(index: int, stub: Rod, keeper: float, following: float) -> RightCut:
     least, most = keeper + _STUB_MARGIN, following - _STUB_MARGIN
     if most < least:
         least = most = (keeper + following) / 2
-    return _cut(index, stub, least, (least + most) / 2, most)
+    return stretch(index, stub, least, (least + most) / 2, most)
 
 
-def _cut(index: int, rod: Rod, least: float, best: float, most: float) -> RightCut:
+def stretch(index: int, rod: Rod, least: float, best: float, most: float) -> RightCut:
+    """The right stretch of a rod, by distances from its start (m)."""
     tangent = (rod.end - rod.start) / _length(rod)
     points = [rod.start + distance * tangent for distance in (least, best, most)]
     return RightCut(index, points[0], points[1], points[2], tangent)

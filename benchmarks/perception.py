@@ -1,0 +1,187 @@
+"""`rolling-panda bench perception`: surveys of rows that nobody has seen, and the judge's opinion of every point.
+
+The robot drives along rows of up to three vines in its survey posture; every frame goes through perception as it would
+on the wire. All figures are on accepted points, that is, on every point shown; what perception abstained from is told
+apart.
+"""
+
+import argparse
+import json
+import os
+import platform
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from benchmarks.intervals import Figure, quantile, share
+from benchmarks.perception_judge import JudgedPoint, RowJudge
+from benchmarks.perception_points import camera_frame, survey_arm
+from bridge.sim.camera import Camera
+from bridge.sim.camera_config import CameraConfig
+from bridge.sim.vineyard import grow
+from bridge.sim.vineyard_config import VineyardConfig
+from perception.config import PerceptionConfig
+from perception.pipeline import Perception
+from perception.segmenter_choice import SEGMENTERS, choose_segmenter
+from rolling_panda import messages as m
+from rolling_panda.errors import RollingPandaError
+from rolling_panda.robot_model import RobotModel, configuration
+
+#: Vines of a row, and the way between two frames (m).
+ROW_VINES, STEP = 3, 0.15
+#: The camera stands so far ahead of the base in the survey posture (m), and begins before the first trunk.
+_CAMERA_AHEAD = 0.5
+
+
+@dataclass
+class Survey:
+    """What came of one or more rows.
+
+    Attributes:
+        points: Every point shown at the end.
+        spurs: Spurs in view: seed, vine, spur, how visible, and whether they got a point, and a right one.
+        frame_ms: Time of each frame through segmentation, plant model and rule, on a wall clock.
+        abstained: The reasons told at the end.
+    """
+
+    points: list[JudgedPoint] = field(default_factory=list)
+    spurs: list[dict[str, int | bool | str]] = field(default_factory=list)
+    frame_ms: list[float] = field(default_factory=list)
+    abstained: list[str] = field(default_factory=list)
+
+
+def survey_row(
+    seed: int, vines: int, perception: Perception, model: RobotModel, camera_config: CameraConfig, into: Survey
+) -> None:
+    """Drive along one row.
+
+    Args:
+        seed: Of row and camera.
+        vines: How many.
+        perception: Fresh; it knows no row yet.
+        model: For the camera's place.
+        camera_config: Of the camera.
+        into: Takes the result.
+    """
+    config = VineyardConfig(vines=vines)
+    row = grow(config, seed)
+    camera = Camera(camera_config, seed)
+    opinion = RowJudge(row, seed)
+    position = msgspec.convert((0.0, 0.0, *survey_arm()), m.Actuated)
+    first = config.first_vine_x - config.vine_spacing / 2
+    last = first + vines * config.vine_spacing
+    points: tuple[m.PruningPoint, ...] = ()
+    reasons: dict[str, None] = {}
+    for sequence, x in enumerate(np.arange(first, last + STEP, STEP) - _CAMERA_AHEAD):
+        base = m.PlanarPose(float(x), 0.0, 0.0)
+        place = model.pose(configuration(base, position), model.camera_id).homogeneous
+        image = camera.render(row, place, sequence)
+        frame = camera_frame(image, camera, base, position, sequence)
+        opinion.look(image, camera.intrinsics, place)
+        began = time.perf_counter()
+        result = perception.process(frame)
+        into.frame_ms.append(1000 * (time.perf_counter() - began))
+        points = result.points
+        reasons.update(dict.fromkeys(result.abstained))
+    judged = [opinion.point(point) for point in points]
+    into.points += judged
+    into.abstained += list(reasons)
+    for vine, spur in opinion.spurs():
+        own = [p for p in judged if (p.vine, p.spur, p.kind) == (vine, spur, "spur cut")]
+        into.spurs.append(
+            {
+                "seed": seed,
+                "vine": vine,
+                "spur": spur,
+                "visibility": opinion.visibility(vine, spur),
+                "point": bool(own),
+                "right": any(p.right for p in own),
+            }
+        )
+
+
+def summarise(survey: Survey, visibility: str | None = None) -> dict[str, Figure]:
+    """The figures, for all spurs or for those of one class of visibility."""
+    chosen = [p for p in survey.points if visibility in (None, p.visibility)]
+    cuts = [p for p in chosen if p.kind == "spur cut"]
+    renewals = [p for p in chosen if p.kind == "renewal cut"]
+    on_cane = [p for p in cuts if p.right_cane]
+    along = [abs(p.along_error) for p in on_cane if p.along_error is not None]
+    spurs = [s for s in survey.spurs if visibility in (None, s["visibility"])]
+    # A spur that was hidden all along is no spur that one could have found.
+    visible = [s for s in spurs if s["visibility"] == (visibility or "clear")]
+    return {
+        "right_cane": share(len(on_cane), len(cuts)),
+        "along_error_median_m": quantile(along, 0.5),
+        "along_error_p95_m": quantile(along, 0.95),
+        "node_count_right": share(sum(p.nodes_left == 2 for p in on_cane), len(on_cane)),
+        "plane_within_15_deg": share(sum((p.plane_error or 0.0) <= 15.0 for p in on_cane), len(on_cane)),
+        "right": share(sum(p.right for p in cuts), len(cuts)),
+        "renewal_right": share(sum(p.right for p in renewals), len(renewals)),
+        "abstained": share(sum(not s["point"] for s in visible), len(visible)),
+        "recall": share(sum(bool(s["right"]) for s in visible), len(visible)),
+        "frame_ms_median": quantile(survey.frame_ms, 0.5),
+    }
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the benchmark; returns the exit code."""
+    parser = argparse.ArgumentParser(prog="rolling-panda bench perception", description=__doc__)
+    parser.add_argument("--seed", type=int, default=100, help="of the first row (default: %(default)s)")
+    parser.add_argument("--vines", type=int, default=12, help="vines to survey (default: %(default)s)")
+    parser.add_argument(
+        "--segmenter", choices=SEGMENTERS, default="network", help="what tells classes (default: %(default)s)"
+    )
+    parser.add_argument("--weights", type=Path, help="ONNX file for the network (default: the one that is shipped)")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write summary and results here")
+    words = parser.parse_args(argv)
+    if words.seed < 0 or words.vines < 1:
+        parser.error(f"--seed {words.seed} --vines {words.vines}: give a seed of 0 or more and at least one vine")
+    model, survey = RobotModel(), Survey()
+    try:
+        for number, done in enumerate(range(0, words.vines, ROW_VINES)):
+            segmenter = choose_segmenter(words.segmenter, words.weights)
+            perception = Perception(PerceptionConfig(), segmenter, model)
+            seed, vines = words.seed + number, min(ROW_VINES, words.vines - done)
+            before = len(survey.points)
+            survey_row(seed, vines, perception, model, CameraConfig(), survey)
+            new = survey.points[before:]
+            print(f"seed {seed}: {vines} vines, {len(new)} points, {sum(p.right for p in new)} right", flush=True)
+    except RollingPandaError as error:
+        print(f"rolling-panda bench perception: {error}", file=sys.stderr)
+        return 1
+    summary = summarise(survey)
+    for name, figure in summary.items():
+        print(_line(name, figure))
+    if words.json is not None:
+        document = {
+            "machine": f"{platform.platform()}, {os.cpu_count()} cores",
+            "seed": words.seed,
+            "vines": words.vines,
+            "segmenter": words.segmenter,
+            "summary": {name: asdict(figure) for name, figure in summary.items()},
+            "by_visibility": {
+                kind: {name: asdict(figure) for name, figure in summarise(survey, kind).items()}
+                for kind in ("clear", "partly", "hidden")
+            },
+            "results": [asdict(point) for point in survey.points],
+            "spurs": survey.spurs,
+            "abstained": survey.abstained,
+        }
+        words.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    return 0
+
+
+def _line(name: str, figure: Figure) -> str:
+    if figure.value is None:
+        return f"{name:24} –"
+    return f"{name:24} {figure.value:8.4f}   95 % {figure.low:.4f} … {figure.high:.4f}   n {figure.n}"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

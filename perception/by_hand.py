@@ -1,0 +1,91 @@
+"""A point where a person wants it: snapped to the nearest known cane, with everything that a found one has."""
+
+import numpy as np
+
+from perception.config import RuleConfig
+from perception.numbering import SpurNumber
+from perception.plant import Array
+from perception.plant_map import KnownSpur, PlantMap
+from perception.rule import Cut, count_nodes
+from rolling_panda.row_messages import Capsule
+
+#: A click this far beside a cane means it (m).
+_BESIDE = 0.025
+#: Buds keep this distance from the blades (m).
+_FROM_NODE = 0.010
+
+
+def point_by_hand(
+    known: PlantMap,
+    origin: Array,
+    direction: Array,
+    config: RuleConfig,
+    obstacles: tuple[Capsule, ...],
+    user: str,
+) -> tuple[Cut, SpurNumber] | str:
+    """The cut on the cane that a line of sight passes nearest, or why there is none.
+
+    Args:
+        known: The vines.
+        origin: Where the line begins (3, m, odom).
+        direction: Unit vector along it (3, odom).
+        config: The rule's numbers.
+        obstacles: Wires among them are kept away from.
+        user: Who placed it.
+    """
+    found = _nearest(known, origin, direction)
+    if found is None:
+        return f"no known cane within {1000 * _BESIDE:.0f} mm of there; click on a cane that is drawn"
+    spur, number, arc = found
+    cane = spur.canes[number].as_cane()
+    if arc > cane.length:
+        return "the cane has been cut there already"
+    position = cane.at(arc)
+    nodes = count_nodes(cane, config)
+    gaps = [abs(node.arc - arc) for node in cane.nodes]
+    if gaps and min(gaps) < _FROM_NODE:
+        return f"{1000 * min(gaps):.0f} mm from a node: the blades need {1000 * _FROM_NODE:.0f} mm"
+    if 2 * cane.radius > config.largest_diameter:
+        return f"the cane is {2000 * cane.radius:.0f} mm thick, more than the shears may cut"
+    if near_wire(obstacles, position, config.wire_distance):
+        return f"a wire passes within {1000 * config.wire_distance:.0f} mm of there; cut this one by hand"
+    below = [node for node in nodes if node.arc < arc]
+    where = f"{1000 * (arc - below[-1].arc):.0f} mm past node {len(below)}" if below else "below the first node"
+    cut = Cut(
+        kind="by hand",
+        position=position,
+        tangent=cane.tangent(arc),
+        radius=cane.radius,
+        confidence=1.0,
+        nodes_seen=len(nodes),
+        nodes_kept=len(below),
+        reason=f"Placed by {user}: {where} on this cane.",
+    )
+    return cut, spur.number
+
+
+def near_wire(obstacles: tuple[Capsule, ...], position: Array, distance: float) -> bool:
+    """Whether a known wire is within `distance` (m) of a place (3, m, odom)."""
+    return any(_distance(rod, position) < distance for rod in obstacles if rod.kind == "wire")
+
+
+def _nearest(known: PlantMap, origin: Array, direction: Array) -> tuple[KnownSpur, int, float] | None:
+    best: tuple[float, KnownSpur, int, float] | None = None
+    for spur in known.spurs:
+        for number, cane in enumerate(spur.canes):
+            # Closer than the axis's samples are apart.
+            arcs = np.arange(float(cane.best.arc[0]), cane.best.length, 0.001)
+            axis = np.stack([np.interp(arcs, cane.best.arc, cane.best.axis[:, i]) for i in range(3)], axis=1)
+            ahead = (axis - origin) @ direction
+            gaps = np.linalg.norm(axis - origin - ahead[:, None] * direction, axis=1)
+            gaps[ahead <= 0.0] = np.inf
+            k = int(np.argmin(gaps))
+            if gaps[k] < _BESIDE and (best is None or gaps[k] < best[0]):
+                best = float(gaps[k]), spur, number, float(arcs[k])
+    return None if best is None else best[1:]
+
+
+def _distance(rod: Capsule, point: Array) -> float:
+    start, axis = np.array(rod.start), np.array(rod.end) - np.array(rod.start)
+    share = float(np.clip((point - start) @ axis / max(float(axis @ axis), 1e-12), 0.0, 1.0))
+    return float(np.linalg.norm(point - start - share * axis))

@@ -1,0 +1,57 @@
+"""Depth of thin wood, mended: a pixel on a cane whose depth its neighbours on canes do not share gets theirs.
+
+Along the edge of a cane a stereo camera gives the depth of what is behind or beside it, a mixture, or nothing. Left as
+it is, a cane five pixels wide would lose its width, and scattered points would bend its axis.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perception.config import SkeletonConfig
+from perception.frame import View
+from rolling_panda.messages import WOOD_CLASSES
+
+_THIN = tuple(WOOD_CLASSES.index(kind) for kind in ("cane", "node", "spur"))
+#: So many of the eight neighbours must share a pixel's depth.
+_SUPPORT = 3
+#: Half the side of the window whose supported pixels stand in (px).
+_REACH = 2
+
+
+def mended(view: View, labels: NDArray[np.uint8], config: SkeletonConfig) -> View:
+    """The frame with the depth of canes, nodes and spurs mended; what has no supported neighbour loses its depth.
+
+    Args:
+        view: The frame.
+        labels: H×W class indices.
+        config: Range, and what counts as a step in depth.
+    """
+    wood = np.isin(labels, _THIN)
+    depth = np.where(wood & (view.depth > config.nearest) & (view.depth < config.farthest), view.depth, np.float32(0.0))
+    rows, cols = np.nonzero(wood)
+    height, width = labels.shape
+    padded = np.pad(depth, _REACH)
+    own = depth[rows, cols]
+    support = np.zeros(len(rows), dtype=np.int8)
+    for dr in (-1, 0, 1):
+        for dc in (-1, 0, 1):
+            if dr or dc:
+                beside = padded[rows + _REACH + dr, cols + _REACH + dc]
+                support += (beside > 0.0) & (np.abs(beside - own) < config.depth_step)
+    good = (own > 0.0) & (support >= _SUPPORT)
+    trusted = np.zeros((height + 2 * _REACH, width + 2 * _REACH), np.float32)
+    trusted[rows[good] + _REACH, cols[good] + _REACH] = own[good]
+    bad_rows, bad_cols = rows[~good], cols[~good]
+    offsets = np.arange(2 * _REACH + 1)
+    window = trusted[bad_rows[:, None, None] + offsets[:, None], bad_cols[:, None, None] + offsets[None, :]]
+    found = np.sort(window.reshape(len(bad_rows), -1), axis=1)
+    count = np.count_nonzero(found, axis=1)
+    # Zeros come first in order: the middle of what is behind them.
+    middle = found.shape[1] - count + (count - 1) // 2
+    out = view.depth.copy()
+    out[bad_rows, bad_cols] = np.where(
+        count > 0, found[np.arange(len(found)), np.minimum(middle, found.shape[1] - 1)], np.float32(0.0)
+    )
+    return replace(view, depth=out)

@@ -1,0 +1,144 @@
+"""`rolling-panda perceive IMAGE`: classes and pruning points of one photograph.
+
+Writes classes.png (indices as in `WOOD_CLASSES`, with a palette), overlay.png and points.json. With a depth image the
+points have places in the camera's frame; without, they are pixels, and lengths rest on the thickness of a common cane.
+"""
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from msgspec.structs import replace
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw
+
+from perception.config import PerceptionConfig, RuleConfig
+from perception.network_segmenter import NetworkSegmenter
+from perception.photograph import R_LEVEL, Photograph, load_photograph
+from perception.segmenter_choice import SHIPPED
+from perception.still import Still, StillPoint, read_still
+from rolling_panda.errors import InputError, RollingPandaError
+from rolling_panda.messages import WOOD_CLASSES
+from rolling_panda.resources import resource
+
+#: One colour a class, for the palette of classes.png and the overlay.
+COLORS = (
+    (30, 30, 34),
+    (110, 120, 70),
+    (170, 140, 110),
+    (120, 70, 40),
+    (160, 60, 160),
+    (240, 140, 30),
+    (80, 200, 90),
+    (240, 220, 60),
+    (90, 190, 240),
+    (40, 80, 160),
+    (230, 60, 60),
+)
+_TINT = 0.45
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command; returns the exit code."""
+    parser = argparse.ArgumentParser(prog="rolling-panda perceive", description=__doc__)
+    parser.add_argument("image", type=Path, metavar="IMAGE", help="photograph of a vine in winter")
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the three files")
+    parser.add_argument("--depth", type=Path, metavar="FILE", help="16-bit PNG or .npy, as large as the image")
+    parser.add_argument("--depth-unit", type=float, default=0.001, metavar="M", help="metres a count (default: 0.001)")
+    parser.add_argument("--intrinsics", type=Path, metavar="FILE", help="JSON: width, height, fx, fy, cx, cy")
+    parser.add_argument("--weights", type=Path, metavar="FILE", help="your own network (default: the shipped one)")
+    parser.add_argument("--system", choices=("spur", "guyot"), default="spur", help="how the vine is trained")
+    parser.add_argument("--nodes-kept", type=int, default=2, help="count nodes that stay on a spur (default: 2)")
+    parser.add_argument("--offset", type=float, default=0.020, help="cut so far past the last one (m, default: 0.02)")
+    words = parser.parse_args(argv)
+    try:
+        rule = _rule(words.system, words.nodes_kept, words.offset)
+        if not words.depth_unit > 0.0:
+            raise InputError(f"--depth-unit {words.depth_unit}: give the metres a count, more than 0")
+        segmenter = NetworkSegmenter(words.weights or resource(SHIPPED))
+        photograph = load_photograph(words.image, words.depth, words.intrinsics, words.depth_unit)
+        labels = segmenter.classify(photograph.color, photograph.depth)
+        still = read_still(photograph, labels, replace(PerceptionConfig(), rule=rule))
+        words.out.mkdir(parents=True, exist_ok=True)
+        _write(words.out, words.image, photograph, labels, still, segmenter.name)
+    except (RollingPandaError, OSError) as error:
+        print(f"rolling-panda perceive: {error}", file=sys.stderr)
+        return 1
+    print(f"{len(still.points)} points on {still.spurs} spurs; scale: {still.scale}")
+    for text in still.abstained:
+        print(f"abstained: {text}")
+    return 0
+
+
+def _rule(system: Literal["spur", "guyot"], nodes_kept: int, offset: float) -> RuleConfig:
+    if not 1 <= nodes_kept <= 5:
+        raise InputError(f"--nodes-kept {nodes_kept}: 1 to 5 count nodes can stay")
+    if not 0.005 <= offset <= 0.05:
+        raise InputError(f"--offset {offset}: give 0.005 to 0.05 m")
+    return replace(RuleConfig(), system=system, nodes_kept=nodes_kept, offset=offset)
+
+
+def _write(
+    out: Path, image: Path, photograph: Photograph, labels: NDArray[np.uint8], still: Still, segmenter: str
+) -> None:
+    mask = Image.fromarray(labels, mode="P")
+    mask.putpalette([value for color in COLORS for value in color])
+    share = photograph.size[0] / labels.shape[1]
+    mask.resize(photograph.size, Image.Resampling.NEAREST).save(out / "classes.png")
+    tint = np.array(COLORS, np.float32)[labels]
+    shown = np.where(labels[..., None] > 1, (1 - _TINT) * photograph.color + _TINT * tint, photograph.color)
+    overlay = Image.fromarray(shown.astype(np.uint8)).resize(photograph.size, Image.Resampling.BILINEAR)
+    draw = ImageDraw.Draw(overlay)
+    for number, point in enumerate(still.points, 1):
+        _mark(draw, point, number, share)
+    overlay.save(out / "overlay.png")
+    document = {
+        "image": image.name,
+        "size": list(photograph.size),
+        "segmenter": segmenter,
+        "classes": list(WOOD_CLASSES),
+        "scale": still.scale,
+        "intrinsics": "assumed" if photograph.assumed else "given",
+        "spurs": still.spurs,
+        "canes": still.canes,
+        "points": [_point(point, photograph, share) for point in still.points],
+        "abstained": list(still.abstained),
+    }
+    (out / "points.json").write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+
+
+def _mark(draw: ImageDraw.ImageDraw, point: StillPoint, number: int, share: float) -> None:
+    (u, v), (x, y) = ((np.array(p) + 0.5) * share for p in (point.pixel, point.beyond))
+    length = max(float(np.hypot(x - u, y - v)), 1e-6)
+    # The blade's line, square to the wood.
+    du, dv = -(y - v) / length * 12 * max(share, 1.0), (x - u) / length * 12 * max(share, 1.0)
+    draw.line((u - du, v - dv, u + du, v + dv), fill=(230, 30, 30), width=max(2, round(2 * share)))
+    draw.text((u + abs(du) + 3, v - 6), str(number), fill=(230, 30, 30))
+
+
+def _point(point: StillPoint, photograph: Photograph, share: float) -> dict[str, Any]:
+    cut = point.cut
+    metric = photograph.depth is not None
+    pixel = (np.array(point.pixel) + 0.5) * share - 0.5
+    along = np.array(point.beyond) - np.array(point.pixel)
+    return {
+        "kind": cut.kind,
+        "spur": point.spur,
+        "pixel": [round(float(value), 1) for value in pixel],
+        "direction": [round(float(value), 4) for value in along / max(float(np.linalg.norm(along)), 1e-9)],
+        "position": [round(float(value), 5) for value in cut.position @ R_LEVEL] if metric else None,
+        "tangent": [round(float(value), 5) for value in cut.tangent @ R_LEVEL] if metric else None,
+        "radius": round(cut.radius, 5) if metric else None,
+        "confidence": round(cut.confidence, 3),
+        "nodes_seen": cut.nodes_seen,
+        "nodes_kept": cut.nodes_kept,
+        "reason": cut.reason,
+    }
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,68 @@
+"""The Guyot rule: of a spur's two canes the lower one becomes the next spur, the upper one the cane that will fruit."""
+
+import numpy as np
+from msgspec.structs import replace
+
+from perception.config import RuleConfig
+from perception.plant import Array, Cane, Spur
+from perception.rule import Cut, Decision, count_nodes, cut_arc, cut_confidence
+
+#: What the rule never proposes: last year's cane cannot be followed to its head from the front.
+_OLD_CANE = "last year's cane is left for a person"
+
+
+def decide_guyot(spur: Spur, config: RuleConfig, beside: Array | None = None) -> Decision:
+    """Apply the rule to one spur.
+
+    Args:
+        spur: With the canes that were followed to it.
+        config: The rule's numbers.
+        beside: Axis points of cane that is not this spur's, N×3 in odom (m).
+    """
+    if spur.doubt:
+        return Decision(abstained=(spur.doubt,))
+    if len(spur.canes) != 2:
+        return Decision(
+            abstained=(f"{len(spur.canes)} canes seen on the spur, and the Guyot rule is about two: left for a person",)
+        )
+    lower, upper = sorted(spur.canes, key=lambda cane: float(cane.base[2]))
+    if float(upper.base[2] - lower.base[2]) < config.height_doubt:
+        return Decision(abstained=("two canes leave the spur at about the same height, so which is the lower is open",))
+    cuts, abstained = [], [_OLD_CANE]
+    for cane, other, kept, kind in (
+        (lower, upper, config.nodes_kept, "spur cut"),
+        (upper, lower, config.fruiting_nodes, "cane cut"),
+    ):
+        result = _cut(cane, kept, kind, config)
+        if isinstance(result, Cut):
+            near = other.axis if beside is None else np.concatenate([other.axis, beside])
+            if float(np.linalg.norm(near - result.position, axis=1).min()) < config.crossing:
+                result = "another cane passes so close to the cut that the shears would take it too"
+        if isinstance(result, Cut):
+            cuts.append(result)
+        else:
+            abstained.append(result)
+    return Decision(tuple(cuts), tuple(abstained))
+
+
+def _cut(cane: Cane, kept: int, kind: str, config: RuleConfig) -> Cut | str:
+    rule = replace(config, nodes_kept=kept)
+    arc = cut_arc(cane, rule)
+    if isinstance(arc, str):
+        return arc
+    if 2 * cane.radius > config.largest_diameter:
+        return f"the cane is {2000 * cane.radius:.0f} mm thick, more than the shears may cut"
+    nodes = count_nodes(cane, config)
+    past = 1000 * (arc - nodes[kept - 1].arc)
+    lower = kind == "spur cut"
+    becomes = "the lower of two canes, the next spur" if lower else "the upper of two canes, which will fruit"
+    return Cut(
+        kind="spur cut" if lower else "cane cut",
+        position=cane.at(arc),
+        tangent=cane.tangent(arc),
+        radius=cane.radius,
+        confidence=cut_confidence(cane, arc, 1.0, rule),
+        nodes_seen=len(nodes),
+        nodes_kept=kept,
+        reason=f"Guyot, on {becomes}: {past:.0f} mm past node {kept}.",
+    )

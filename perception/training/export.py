@@ -1,0 +1,77 @@
+"""Writes a trained network as ONNX, with its classes inside and its card beside it."""
+
+import json
+from io import BytesIO
+from pathlib import Path
+
+import onnx
+import torch
+
+from perception.network_input import CHANNELS
+from perception.training.fit import BATCH, CROP, Trainer
+from perception.training.network import Labeller
+from perception.training.scenes import TRAINING_SEED, VALIDATION_SEED, VIEWS
+from perception.training.score import Confusion
+from rolling_panda.messages import WOOD_CLASSES
+
+_OPSET = 17
+
+
+def write_network(path: Path, trainer: Trainer, rows: int, with_depth: Confusion, without: Confusion) -> None:
+    """Write the network and its card.
+
+    Args:
+        path: ONNX file; the card is the same name with .md.
+        trainer: Trained.
+        rows: That were rendered for it.
+        with_depth: How it did on the rows held out.
+        without: The same with the depth taken away.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    buffer = BytesIO()
+    labeller = Labeller(trainer.network.to(memory_format=torch.contiguous_format)).eval()
+    torch.onnx.export(
+        labeller,
+        (torch.zeros(1, CHANNELS, 64, 64),),
+        buffer,
+        input_names=["image"],
+        output_names=["classes"],
+        dynamic_axes={"image": {2: "height", 3: "width"}, "classes": {1: "height", 2: "width"}},
+        opset_version=_OPSET,
+        dynamo=False,
+    )
+    model = onnx.load_from_string(buffer.getvalue())
+    onnx.helper.set_model_props(model, {"classes": json.dumps(list(WOOD_CLASSES))})
+    onnx.checker.check_model(model)
+    onnx.save(model, str(path))
+    path.with_suffix(".md").write_text(_card(path, trainer, rows, with_depth, without), encoding="utf-8")
+
+
+def _card(path: Path, trainer: Trainer, rows: int, with_depth: Confusion, without: Confusion) -> str:
+    parameters = sum(weight.numel() for weight in trainer.network.parameters())
+    overlap, found, blind = with_depth.overlap(), with_depth.found(), without.overlap()
+    table = "\n".join(f"| {name} | {overlap[name]:.3f} | {found[name]:.3f} | {blind[name]:.3f} |" for name in overlap)
+    seeds = f"seeds {TRAINING_SEED} to {TRAINING_SEED + rows - 1}"
+    options = f"--seed {trainer.seed} --rows {rows} --steps {trainer.steps}"
+    return f"""# {path.name}
+
+Tells the class of every pixel of a picture of a vine in winter, for `perception`.
+
+- Input: `image`, 1×{CHANNELS}×H×W, H and W multiples of 16: red, green, blue from -1 to 1, and 0.2 m / depth, 0 without
+  depth.
+- Output: `classes`, 1×H×W, indices in this order: {", ".join(WOOD_CLASSES)}.
+- Size: {parameters:,} parameters, {path.stat().st_size / 1024:.0f} KiB.
+- Data: {rows * VIEWS} pictures of {rows} rendered rows ({seeds}); no photograph.
+- Training: {trainer.steps} steps of {BATCH} crops of {CROP}×{CROP} pixels, one thread.
+- Command: `python -m perception.training {options} --out {path.name}`.
+
+Scores on {VIEWS * 6} pictures of 6 other rows (seeds from {VALIDATION_SEED}). Overlap is intersection over union, found
+is the share of the class's pixels that were given it.
+
+| class | overlap | found | overlap without depth |
+|---|---|---|---|
+{table}
+
+Limits: all that it has seen was rendered. Leaves, weeds, snow, wet bark, people and machines were not in it. It has not
+been scored on photographs.
+"""

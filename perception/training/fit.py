@@ -1,0 +1,117 @@
+"""Fits the network: crops of the pictures, varied once more, in a fixed order for a given seed."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from perception.network_input import CHANNELS, network_input
+from perception.training.network import Network
+from perception.training.scenes import Scenes
+from rolling_panda.messages import WOOD_CLASSES, WoodClass
+
+#: Side of a crop and crops a step.
+CROP, BATCH = 256, 8
+_PEAK_RATE = 3e-3
+#: Small things count for more than their pixels.
+_WEIGHTS: dict[WoodClass, float] = {
+    "background": 0.4,
+    "ground": 0.3,
+    "spur": 2.0,
+    "cane": 1.5,
+    "node": 3.0,
+    "wire": 1.5,
+    "old cut": 2.0,
+}
+
+
+@dataclass(frozen=True)
+class Progress:
+    """After one step: its number from 1, and the loss."""
+
+    step: int
+    loss: float
+
+
+class Trainer:
+    """Weights, optimiser and random state; can be put away and taken up again with the same result."""
+
+    def __init__(self, seed: int, steps: int) -> None:
+        """Fresh weights.
+
+        Args:
+            seed: Of weights, crops and variations.
+            steps: How many there will be: the rate of learning falls to nothing over them.
+        """
+        torch.manual_seed(seed)
+        self.network = Network(CHANNELS, len(WOOD_CLASSES)).to(memory_format=torch.channels_last)
+        self._optimiser = torch.optim.AdamW(self.network.parameters(), _PEAK_RATE, weight_decay=1e-4)
+        self._schedule = torch.optim.lr_scheduler.OneCycleLR(self._optimiser, _PEAK_RATE, total_steps=steps)
+        self._loss = nn.CrossEntropyLoss(torch.tensor([_WEIGHTS.get(kind, 1.0) for kind in WOOD_CLASSES]))
+        self.seed = seed
+        self.steps, self.step = steps, 0
+
+    def run(self, scenes: Scenes, until: int) -> Iterator[Progress]:
+        """Train up to a step."""
+        self.network.train()
+        while self.step < min(until, self.steps):
+            images, labels = _batch(scenes, np.random.default_rng([self.seed, self.step]))
+            with torch.autocast("cpu", torch.bfloat16):
+                logits = self.network(images)
+            loss: Tensor = self._loss(logits.float(), labels)
+            self._optimiser.zero_grad()
+            loss.backward()
+            self._optimiser.step()
+            self._schedule.step()
+            self.step += 1
+            yield Progress(self.step, float(loss.detach()))
+
+    def state(self) -> dict[str, object]:
+        """Everything that `restore` needs."""
+        return {
+            "step": self.step,
+            "network": self.network.state_dict(),
+            "optimiser": self._optimiser.state_dict(),
+            "schedule": self._schedule.state_dict(),
+        }
+
+    def restore(self, state: dict[str, object]) -> None:
+        """Go on from where `state` was taken; seed and steps must be the same as then."""
+        step = state["step"]
+        assert isinstance(step, int)
+        self.step = step
+        self.network.load_state_dict(state["network"])
+        self._optimiser.load_state_dict(state["optimiser"])
+        self._schedule.load_state_dict(state["schedule"])
+
+
+def _batch(scenes: Scenes, rng: np.random.Generator) -> tuple[Tensor, Tensor]:
+    images, labels = [], []
+    count, height, width = scenes.labels.shape
+    for _ in range(BATCH):
+        n = int(rng.integers(count))
+        y, x = int(rng.integers(height - CROP + 1)), int(rng.integers(width - CROP + 1))
+        window = (n, slice(y, y + CROP), slice(x, x + CROP))
+        color, depth, truth = scenes.color[window], scenes.depth[window], scenes.labels[window]
+        images.append(_varied(color, depth, rng))
+        labels.append(truth)
+        if rng.random() < 0.5:
+            images[-1], labels[-1] = images[-1][:, :, ::-1], labels[-1][:, ::-1]
+    stacked = torch.from_numpy(np.ascontiguousarray(np.stack(images))).to(memory_format=torch.channels_last)
+    return stacked, torch.from_numpy(np.stack(labels).astype(np.int64))
+
+
+def _varied(color: NDArray[np.uint8], depth: NDArray[np.float16], rng: np.random.Generator) -> NDArray[np.float32]:
+    """Another exposure, white balance, contrast and saturation; sometimes no depth at all, or depth a little off."""
+    bright = color.astype(np.float32) * np.exp(rng.normal(0.0, 0.2) + rng.normal(0.0, 0.06, 3)).astype(np.float32)
+    grey = bright.mean(axis=2, keepdims=True)
+    bright = grey + np.float32(rng.uniform(0.4, 1.3)) * (bright - grey)
+    bright = (bright - 110.0) * np.float32(rng.uniform(0.7, 1.3)) + 110.0
+    image = network_input(
+        np.clip(bright, 0.0, 255.0).astype(np.uint8), None if rng.random() < 0.12 else depth.astype(np.float32)
+    )
+    image[3] *= np.float32(np.exp(rng.normal(0.0, 0.05)))
+    return image

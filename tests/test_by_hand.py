@@ -1,0 +1,52 @@
+"""Points that a person places."""
+
+import numpy as np
+import pytest
+from test_plant_map import NUMBER, cane, known, plant
+
+from perception.by_hand import point_by_hand
+from perception.config import RuleConfig
+from rolling_panda.row_messages import Capsule
+
+RULE = RuleConfig()
+MAP = known(*[plant(cane(), cane(x=0.06))] * 3)
+TOWARDS = np.array([0.0, 1.0, 0.0])
+
+
+def place(x, height, known_map=MAP, obstacles=()):
+    return point_by_hand(known_map, np.array([x, -0.7, height]), TOWARDS, RULE, obstacles, "Ada")
+
+
+def test_a_click_beside_a_cane_snaps_to_its_axis_and_counts_its_nodes():
+    cut, number = place(0.008, 0.95 + 0.22)
+    np.testing.assert_allclose(cut.position, [0.0, 0.0, 1.17], atol=1e-3)
+    np.testing.assert_allclose(cut.tangent, [0.0, 0.0, 1.0], atol=1e-9)
+    # The bud at 20 mm is the basal one and is not counted.
+    assert (cut.kind, cut.nodes_kept, cut.nodes_seen, number) == ("by hand", 2, 3, NUMBER)
+    assert cut.reason == "Placed by Ada: 40 mm past node 2 on this cane." and cut.radius == pytest.approx(0.004)
+
+
+def test_the_nearer_of_two_canes_is_meant():
+    cut, _ = place(0.05, 1.17)
+    assert cut.position[0] == pytest.approx(0.06)
+
+
+@pytest.mark.parametrize(
+    ("x", "height", "says"),
+    [(0.3, 1.17, "no known cane"), (0.0, 0.95 + 0.185, "from a node"), (0.0, 2.0, "no known cane")],
+)
+def test_where_no_cut_can_be_there_is_a_reason(x, height, says):
+    assert says in place(x, height)
+
+
+def test_a_wire_a_thick_cane_and_a_cut_one_are_refused():
+    wire = Capsule("wire", (-1.0, 0.0, 1.18), (1.0, 0.0, 1.18), 0.002, 0.002)
+    assert "wire" in place(0.0, 1.17, obstacles=(wire,))
+    assert "thick" in place(0.0, 1.17, known(plant(cane(radius=0.009))))
+    cut = known(*[plant(cane())] * 3)
+    cut.sever(np.array([0.0, 0.0, 1.10]))
+    assert "cut there already" in place(0.0, 1.17, cut)
+
+
+def test_a_cane_behind_the_viewer_is_not_meant():
+    assert "no known cane" in point_by_hand(MAP, np.array([0.0, 0.7, 1.17]), TOWARDS, RULE, (), "Ada")
