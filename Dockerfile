@@ -34,12 +34,17 @@ LABEL org.opencontainers.image.title="Rolling Panda" \
       org.opencontainers.image.licenses="BSD-3-Clause"
 RUN useradd --system --uid 10001 --no-create-home --shell /usr/sbin/nologin panda
 COPY --from=install /app /app
+# The control code as machine code: made once here, kept in a folder that a container can write to, since the code is made
+# again on a processor of another kind.
+ENV NUMBA_CACHE_DIR=/var/cache/rolling-panda
+RUN install --directory --owner 10001 --group 10001 $NUMBA_CACHE_DIR
 # MuJoCo computes here and draws nothing, so it needs no OpenGL. One thread of linear algebra a process: see launch.py.
 ENV PATH=/app/bin:$PATH \
     PYTHONUNBUFFERED=1 \
     PYTHONDONTWRITEBYTECODE=1 \
     MUJOCO_GL=disable
 USER 10001:10001
+RUN python -c "import controller.core"
 WORKDIR /tmp
 STOPSIGNAL SIGTERM
 ENTRYPOINT ["rolling-panda"]

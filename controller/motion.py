@@ -6,10 +6,12 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from msgspec import Struct
 
+from controller.compiled import MATRIX, NOTHING, NUMBER, VECTOR, compiled
 from controller.config import ControllerConfig
 from controller.tool_motion import ToolMotion
-from controller.trajectory import Rates, quintic
+from controller.trajectory import Rates, ToolState, quintic
 from controller.whole_body.task import ActuatorTask, BaseMode, Demand, Method, Posture, Solution, ToolTask
 from rolling_panda.differential_drive import NXI, Array
 from rolling_panda.robot_model import ARM_Q, ARM_XI, Kinematics
@@ -44,8 +46,7 @@ class Measured:
 _NOTHING = np.zeros(6)
 
 
-@dataclass(frozen=True)
-class Tracking:
+class Tracking(Struct, frozen=True):
     """What following a motion gave.
 
     Attributes:
@@ -88,7 +89,6 @@ class Follower:
     def follow(self, motion: ToolMotion, robot: Measured) -> Tracking:
         """One period along a tool motion."""
         wanted = motion.desired()
-        lead = self._lead(motion.scale * wanted.acceleration, robot)
         pose = robot.kinematics.T_odom_tool
         error = tool_error(pose, nearest_about_y(pose, wanted.T_odom_tool) if motion.free_axis else wanted.T_odom_tool)
         out = self._method.solve(
@@ -96,7 +96,7 @@ class Follower:
                 robot.q,
                 robot.kinematics,
                 robot.sent,
-                ToolTask(wanted.twist + lead + self._gains * error + robot.behind(), motion.free_axis),
+                ToolTask(self._twist(wanted, motion.scale, error, robot) + robot.behind(), motion.free_axis),
                 motion.posture(),
                 motion.base,
                 motion.cap(pose),
@@ -107,12 +107,24 @@ class Follower:
         motion.advance(out.scale, self._dt)
         return _tracking(out, wanted.T_odom_tool, error, motion.done)
 
-    def _lead(self, acceleration: Array, robot: Measured) -> Array:
-        """Twist (6) that is wanted beforehand, so that the servos have what is wanted when it is: τ (ẍ − J̇ ξ̇)."""
-        J, self._J_before = self._J_before, robot.kinematics.J_xi
-        drift = _NOTHING if J is None else (robot.kinematics.J_xi - J) @ robot.sent / self._dt
-        lead: Array = self._config.arm_lag_s * (acceleration - drift)
-        return lead
+    def _twist(self, wanted: ToolState, scale: float, error: Array, robot: Measured) -> Array:
+        """Twist (6) to ask for: the wanted one, what makes good the error, and a lead for the servos' lag."""
+        J, twist = robot.kinematics.J_xi, np.empty(6)
+        before, self._J_before = J if self._J_before is None else self._J_before, J
+        _ask(
+            wanted.twist,
+            wanted.acceleration,
+            scale,
+            J,
+            before,
+            robot.sent,
+            self._config.arm_lag_s,
+            self._dt,
+            self._gains,
+            error,
+            twist,
+        )
+        return twist
 
     def jog(self, xi: Array, robot: Measured) -> Tracking:
         """One period of the actuators' own velocities ξ̇ (9, rad/s), within the limits and clear of obstacles."""
@@ -168,7 +180,8 @@ class Follower:
 
 
 def _tracking(out: Solution, desired: Any, error: Array, done: bool) -> Tracking:
-    position, rotation = _length(error[:3]), _length(error[3:])
+    vx, vy, vz, wx, wy, wz = error.tolist()
+    position, rotation = math.hypot(vx, vy, vz), math.hypot(wx, wy, wz)
     return Tracking(out.xi, desired, position, rotation, out.manipulability, out.feasible, out.reason, done, out.scale)
 
 
@@ -199,9 +212,53 @@ class ArmMotion:
 
 def tool_error(T_odom_tool: Any, T_odom_goal: Any) -> Array:
     """Twist (6, odom's axes, at the tool) that takes the tool to the goal in one second: the SE(3) logarithm."""
-    screw = pin.log6(T_odom_tool.actInv(T_odom_goal))
-    R = T_odom_tool.rotation
-    return np.concatenate([R @ screw.linear, R @ screw.angular])
+    error = np.empty(6)
+    _turned(T_odom_tool.rotation, pin.log6(T_odom_tool.actInv(T_odom_goal)).vector, error)
+    return error
+
+
+@compiled(NOTHING(VECTOR, VECTOR, NUMBER, MATRIX, MATRIX, VECTOR, NUMBER, NUMBER, VECTOR, VECTOR, VECTOR))
+def _ask(
+    wanted: Array,
+    acceleration: Array,
+    scale: float,
+    J: Array,
+    J_before: Array,
+    sent: Array,
+    lag: float,
+    dt: float,
+    gains: Array,
+    error: Array,
+    twist: Array,
+) -> None:
+    """Twist = ẋ_d + K e + τ (ẍ_d − J̇ ξ̇): wanted beforehand, so that the servos have what is wanted when it is.
+
+    Args:
+        wanted: ẋ_d (6).
+        acceleration: Its rate at full speed (6), which counts with `scale`.
+        scale: Rate of the motion's clock.
+        J: J_ξ now (6×9).
+        J_before: J_ξ a period ago (6×9).
+        sent: ξ̇ (9).
+        lag: τ (s).
+        dt: Period (s).
+        gains: K (6).
+        error: e (6).
+        twist: Written (6).
+    """
+    for i in range(6):
+        drift = 0.0
+        for j in range(9):
+            drift += (J[i, j] - J_before[i, j]) * sent[j] / dt
+        twist[i] = wanted[i] + gains[i] * error[i] + lag * (scale * acceleration[i] - drift)
+
+
+@compiled(NOTHING(MATRIX, VECTOR, VECTOR))
+def _turned(R: Array, screw: Array, twist: Array) -> None:
+    """Both halves of a screw (6), turned by R (3×3) and written into twist (6)."""
+    for i in range(3):
+        for half in (0, 3):
+            twist[half + i] = R[i, 0] * screw[half] + R[i, 1] * screw[half + 1] + R[i, 2] * screw[half + 2]
 
 
 def nearest_about_y(T_odom_tool: Any, T_odom_goal: Any) -> Any:

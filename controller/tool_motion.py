@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from controller.compiled import NOTHING, NUMBER, VECTOR, compiled
 from controller.config import ControllerConfig
 from controller.trajectory import PoseTrajectory, Rates, ToolState, quintic, quintic_time
 from controller.whole_body.task import BaseMode, Posture
@@ -97,6 +98,7 @@ class ToolMotion:
         self._config, self._slow_end, self.free_axis = config, slow_end, free_axis
         self._start, self._q_start, self._legs = start, q_start, _timed(config, start, q_start, legs, flows)
         self.goal, self.q_goal, self.speed = legs[-1].goal, legs[-1].q_goal, max(leg.speed for leg in legs)
+        self._goal_place = self.goal.translation.tolist()
         self._free = _free(self._legs)
         self._base_span = self.q_goal[:2] - q_start[:2]
         self.legs = len(legs)
@@ -125,26 +127,12 @@ class ToolMotion:
 
     def desired(self) -> ToolState:
         """Where the tool should be now, its twist and the rate of that."""
-        position, R = self._start.translation.copy(), self._start.rotation
+        position, R = self._start.translation.copy(), np.array(self._start.rotation, order="C")
         twist, acceleration = np.zeros(6), np.zeros(6)
         for leg in self._legs:
             if self.time <= leg.begin:
                 break
-            begin, goal = leg.trajectory.start, leg.trajectory.goal
-            if self.time >= leg.end:
-                position += goal.translation - begin.translation
-                R = R @ begin.rotation.T @ goal.rotation
-                continue
-            state = leg.trajectory.at(self.time - leg.begin)
-            # What the leg would do alone, carried along by the legs before it.
-            turned = R @ begin.rotation.T
-            position += state.T_odom_tool.translation - begin.translation
-            turning = turned @ state.twist[3:]
-            acceleration[:3] += state.acceleration[:3]
-            acceleration[3:] += turned @ state.acceleration[3:] + np.cross(twist[3:], turning)
-            twist[:3] += state.twist[:3]
-            twist[3:] += turning
-            R = turned @ state.T_odom_tool.rotation
+            leg.trajectory.add(self.time - leg.begin, position, R, twist, acceleration)
         return ToolState(pin.SE3(R, position), twist, acceleration)
 
     def posture(self) -> Posture:
@@ -154,8 +142,7 @@ class ToolMotion:
             if self.time <= leg.begin:
                 break
             progress = quintic(self.time - leg.begin, leg.trajectory.duration)
-            q += leg.span * progress.s
-            rate += leg.span * progress.rate
+            _go_along(leg.span, progress.s, progress.rate, q, rate)
         if self._free is None:
             q[:2], rate[:2] = self._q_start[:2], 0.0
         else:
@@ -170,8 +157,16 @@ class ToolMotion:
         if not self._slow_end:
             return self.speed * 1.2
         config = self._config
-        away = math.dist(self.goal.translation, T_odom_tool.translation) - config.slow_zone
+        away = math.dist(self._goal_place, T_odom_tool.translation.tolist()) - config.slow_zone
         return math.sqrt(config.cut_speed**2 + 2.0 * config.slow_braking * max(away, 0.0))
+
+
+@compiled(NOTHING(VECTOR, NUMBER, NUMBER, VECTOR, VECTOR))
+def _go_along(span: Array, s: float, rate: float, q: Array, q_rate: Array) -> None:
+    """Add s · span to q and rate · span to its rate (12 each)."""
+    for i in range(len(span)):
+        q[i] += s * span[i]
+        q_rate[i] += rate * span[i]
 
 
 def _timed(

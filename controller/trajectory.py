@@ -10,8 +10,11 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from msgspec import Struct
 
+from controller.compiled import NOTHING, NUMBER, PACKED, VECTOR, compiled
 from rolling_panda.differential_drive import Array
+from rolling_panda.errors import InputError
 
 #: Peaks of s' , s'' and s''' of s = 10τ³ − 15τ⁴ + 6τ⁵ over τ in 0…1.
 PEAK_VELOCITY, PEAK_ACCELERATION, PEAK_JERK = 1.875, 5.7735, 60.0
@@ -35,8 +38,7 @@ class Rates:
         )
 
 
-@dataclass(frozen=True)
-class Progress:
+class Progress(Struct, frozen=True):
     """Share of a motion done, 0…1, and its first two derivatives by time (1/s, 1/s²)."""
 
     s: float
@@ -67,8 +69,7 @@ def quintic_time(s: float) -> float:
     return 0.5 * (low + high)
 
 
-@dataclass(frozen=True)
-class ToolState:
+class ToolState(Struct, frozen=True):
     """Where the tool should be (T_odom_tool, pin.SE3), and its twist [v; ω] (6) at the tool with its rate (6)."""
 
     T_odom_tool: Any
@@ -132,8 +133,66 @@ class PoseTrajectory:
             acceleration[:3] += np.cross(angular, linear) * progress.rate**2
         return ToolState(placement, way * progress.rate, acceleration)
 
+    def add(self, time: float, position: Array, R: Array, twist: Array, acceleration: Array) -> None:
+        """Carry a straight motion along with another: what it does alone by `time` (s) comes on top of that one.
+
+        Args:
+            time: Of the motion's own clock (s).
+            position: Of the tool (3), without this motion; changed.
+            R: Its rotation (3×3), changed.
+            twist: Its twist (6), changed.
+            acceleration: The rate of that (6), changed.
+
+        Raises:
+            InputError: The motion is not straight.
+        """
+        if not self._straight:
+            raise InputError("a motion along a screw cannot be carried along; plan it with straight=True")
+        at = quintic(time, self.duration)
+        _add(self._linear, self._angular, at.s, at.rate, at.acceleration, position, R, twist, acceleration)
+
     def _placement(self, s: float) -> Any:
         if self._straight:
             turn = pin.exp3(self._angular * s)
             return pin.SE3(self.start.rotation @ turn, self.start.translation + s * self._linear)
         return self.start * pin.exp6(pin.Motion(self._linear * s, self._angular * s))
+
+
+@compiled(NOTHING(VECTOR, VECTOR, NUMBER, NUMBER, NUMBER, VECTOR, PACKED, VECTOR, VECTOR))
+def _add(
+    linear: Array,
+    angular: Array,
+    s: float,
+    rate: float,
+    acceleration: float,
+    position: Array,
+    R: Array,
+    twist: Array,
+    change: Array,
+) -> None:
+    """See `PoseTrajectory.add`: position += s · linear, R ← R exp(s · angular), and the derivatives of both.
+
+    The axis is R · angular throughout, and turns with what carries it: its rate is ω × (R · angular).
+    """
+    axis, turning = np.zeros(3), np.zeros(3)
+    angle = s * math.sqrt(angular[0] ** 2 + angular[1] ** 2 + angular[2] ** 2)
+    # exp(a) = 1 + sin α/α [a] + (1 − cos α)/α² [a]², with its limits at no turn (Rodrigues).
+    first = math.sin(angle) / angle if angle > 1e-9 else 1.0
+    second = 2.0 * (math.sin(0.5 * angle) / angle) ** 2 if angle > 1e-9 else 0.5
+    for i in range(3):
+        axis[i] = R[i, 0] * angular[0] + R[i, 1] * angular[1] + R[i, 2] * angular[2]
+        turning[i] = rate * axis[i]
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        change[i] += acceleration * linear[i]
+        change[3 + i] += acceleration * axis[i] + twist[3 + j] * turning[k] - twist[3 + k] * turning[j]
+    for i in range(3):
+        position[i] += s * linear[i]
+        twist[i] += rate * linear[i]
+        twist[3 + i] += turning[i]
+        # Rows of R times [a] are their cross products with a.
+        x, y, z = R[i, 0], R[i, 1], R[i, 2]
+        a, b, c = s * angular[0], s * angular[1], s * angular[2]
+        once = (y * c - z * b, z * a - x * c, x * b - y * a)
+        R[i, 0] += first * once[0] + second * (once[1] * c - once[2] * b)
+        R[i, 1] += first * once[1] + second * (once[2] * a - once[0] * c)
+        R[i, 2] += first * once[2] + second * (once[0] * b - once[1] * a)

@@ -45,9 +45,10 @@ class DifferentialDrive:
         c, s = math.cos(phi), math.sin(phi)
         half, turn = self.wheel_radius / 2, self.wheel_radius / (2 * self.half_track)
         S = _ACTUATED.copy()
-        S[0, :2] = half * c + turn * self.rho * s, half * c - turn * self.rho * s
-        S[1, :2] = half * s - turn * self.rho * c, half * s + turn * self.rho * c
-        S[2, :2] = -turn, turn
+        # One by one, which is faster than two at once.
+        S[0, 0], S[0, 1] = half * c + turn * self.rho * s, half * c - turn * self.rho * s
+        S[1, 0], S[1, 1] = half * s - turn * self.rho * c, half * s + turn * self.rho * c
+        S[2, 0], S[2, 1] = -turn, turn
         return S
 
     def twist(self, wheel_left: float, wheel_right: float) -> tuple[float, float]:
@@ -66,10 +67,11 @@ class DifferentialDrive:
         Exact for constant wheel speeds: the axle centre follows an arc.
         """
         distance, angle = self.twist(turned_left, turned_right)
-        x, y, phi = pose
-        x, y = x - self.rho * np.cos(phi), y - self.rho * np.sin(phi)
-        # Chord of the arc: sinc keeps the straight line exact.
-        chord = distance * np.sinc(angle / (2 * np.pi))
-        x, y = x + chord * np.cos(phi + angle / 2), y + chord * np.sin(phi + angle / 2)
+        x, y, phi = pose.tolist()
+        x, y = x - self.rho * math.cos(phi), y - self.rho * math.sin(phi)
+        # Chord of the arc.
+        half = angle / 2
+        chord = distance * math.sin(half) / half if half != 0.0 else distance
+        x, y = x + chord * math.cos(phi + half), y + chord * math.sin(phi + half)
         phi += angle
-        return np.array([x + self.rho * np.cos(phi), y + self.rho * np.sin(phi), phi])
+        return np.array([x + self.rho * math.cos(phi), y + self.rho * math.sin(phi), phi])

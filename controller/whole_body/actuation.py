@@ -6,6 +6,7 @@ one to one: θ̇_l = (v − μω)/R, θ̇_r = (v + μω)/R.
 
 import numpy as np
 
+from controller.compiled import NOTHING, PACKED, VECTOR, compiled
 from rolling_panda.differential_drive import Array, DifferentialDrive
 
 
@@ -22,14 +23,14 @@ class Actuation:
 
     def nu(self, xi: Array) -> Array:
         """ν (9) of ξ̇ (9)."""
-        out = xi.copy()
-        out[:2] = self.twist @ xi[:2]
+        out = np.empty(len(xi))
+        _convert(self.twist, xi, out)
         return out
 
     def xi(self, nu: Array) -> Array:
         """ξ̇ (9) of ν (9)."""
-        out = nu.copy()
-        out[:2] = self.wheels @ nu[:2]
+        out = np.empty(len(nu))
+        _convert(self.wheels, nu, out)
         return out
 
     def rows(self, A_xi: Array) -> Array:
@@ -37,3 +38,11 @@ class Actuation:
         out = A_xi.copy()
         out[:, :2] = A_xi[:, :2] @ self.wheels
         return out
+
+
+@compiled(NOTHING(PACKED, VECTOR, VECTOR))
+def _convert(base: Array, before: Array, after: Array) -> None:
+    """The first two entries by the 2×2 map `base`, the others as they are."""
+    after[:] = before
+    for i in range(2):
+        after[i] = base[i, 0] * before[0] + base[i, 1] * before[1]

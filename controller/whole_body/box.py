@@ -12,9 +12,14 @@ rises by what it changes by plus b dt.
 Outside every such guarantee (a start beyond a limit, a velocity above it) the bounds close to the strongest braking.
 """
 
+import math
+from collections.abc import Callable
+from typing import Any, cast
+
 import numpy as np
 from msgspec import Struct
 
+from controller.compiled import NOTHING, NUMBER, PAIR, VECTOR, compiled, records
 from controller.config import ControllerConfig
 from controller.whole_body.actuation import Actuation
 from rolling_panda.differential_drive import NXI, Array
@@ -23,15 +28,36 @@ from rolling_panda.robot_model import ARM_Q, ARM_XI, RobotModel
 
 #: Rate at which a joint outside its limit comes back (1/s), and its largest velocity in doing so (rad/s).
 _RETURN, _RETURN_SPEED = 2.0, 0.2
+#: What does not change from period to period; SI, of the arm's joints (7), of v and ω (2) or of a wheel.
+_CONSTANTS = np.dtype(
+    [
+        ("highest", "f8", 7),
+        ("lowest", "f8", 7),
+        ("acceleration", "f8", 7),
+        ("arm_step", "f8", 7),
+        ("jerk_step", "f8", 7),
+        ("arm_speed", "f8", 7),
+        ("base_speed", "f8", 2),
+        ("base_step", "f8", 2),
+        ("base_brake", "f8", 2),
+        ("wheel_speed", "f8"),
+        ("wheel_step", "f8"),
+        ("twist", "f8", (2, 2)),
+    ]
+)
 
 
 class Bounds(Struct, frozen=True):
-    """lower ≤ ν ≤ upper (9), and the same for the two wheels' speeds (2)."""
+    """lower ≤ ν ≤ upper (9), and the same for the two wheels' speeds (2).
+
+    `ramp` is [v, ω] (2) after one period of braking along the same arc, which is always inside.
+    """
 
     lower: Array
     upper: Array
     wheel_lower: Array
     wheel_upper: Array
+    ramp: Array
 
 
 class Box:
@@ -40,87 +66,116 @@ class Box:
     def __init__(self, robot: RobotModel, config: ControllerConfig, dt: float) -> None:
         """Precompute for a control period of `dt` (s)."""
         limits, mu, R = robot.limits, robot.drive.half_track, robot.drive.wheel_radius
-        self._twist: list[list[float]] = Actuation(robot.drive).twist.tolist()
-        # Both ends of a joint as upper ends: of q, and of −q.
-        self._ends = np.concatenate([limits.upper[ARM_Q], -limits.lower[ARM_Q]]) - config.joint_margin
-        acceleration = np.tile(limits.acceleration[ARM_XI] * config.arm_acceleration_share, 2)
-        self._arm_step = acceleration * dt
-        self._brake_step = 0.5 * self._arm_step
-        self._brake_square, self._brake_twice = self._brake_step**2, acceleration
-        self._jerk_step = np.tile(limits.jerk[ARM_XI] * config.arm_jerk_share, 2) * dt * dt
-        self._jerk_most = limits.jerk[ARM_XI] * dt * dt
-        self._q, self._sent, self._change = np.empty(14), np.empty(14), np.empty(14)
         #: Largest ν (9).
         self.speed: Array = np.empty(NXI)
         self.speed[:2] = config.base_speed, config.base_yaw_rate
         self.speed[ARM_XI] = limits.velocity[ARM_XI] * config.arm_share
-        self._arm_speed = np.tile(self.speed[ARM_XI], 2)
-        self._wheel_speed = float(limits.velocity[0])
+        acceleration = limits.acceleration[ARM_XI] * config.arm_acceleration_share
         braking = min(max(config.base_braking, config.base_acceleration), float(limits.acceleration[0]) * R)
+        base_step = min(config.base_acceleration, braking) * dt, config.base_yaw_acceleration * dt
+        base_brake = braking * dt, max(braking / mu, config.base_yaw_acceleration) * dt
+        self._arm_step = acceleration * dt
         self._wheel_step = braking / R * dt
-        self._base_step = min(config.base_acceleration, braking) * dt, config.base_yaw_acceleration * dt
-        self._base_brake = braking * dt, max(braking / mu, config.base_yaw_acceleration) * dt
+        self._jerk_most = limits.jerk[ARM_XI] * dt * dt
+        self._constants: Any = np.zeros(1, _CONSTANTS)
+        k = self._constants[0]
+        k["highest"] = limits.upper[ARM_Q] - config.joint_margin
+        k["lowest"] = limits.lower[ARM_Q] + config.joint_margin
+        k["acceleration"], k["arm_step"], k["arm_speed"] = acceleration, self._arm_step, self.speed[ARM_XI]
+        k["jerk_step"] = limits.jerk[ARM_XI] * config.arm_jerk_share * dt * dt
+        k["base_speed"], k["base_step"], k["base_brake"] = self.speed[:2], base_step, base_brake
+        k["wheel_speed"], k["wheel_step"] = float(limits.velocity[0]), self._wheel_step
+        k["twist"] = Actuation(robot.drive).twist
 
     def at(self, q: Array, sent: Array, before: Array) -> Bounds:
         """The bounds at q (12) after ξ̇ `sent` (9), and `before` (9) in the period before that."""
-        here, arm, change = self._q, self._sent, self._change
-        here[:7] = q[ARM_Q]
-        here[7:] = -here[:7]
-        arm[:7] = sent[ARM_XI]
-        arm[7:] = -arm[:7]
-        np.subtract(arm[:7], before[ARM_XI], out=change[:7])
-        change[7:] = -change[:7]
-        np.minimum(np.maximum(change, -self._arm_step, out=change), self._arm_step, out=change)
-        room = self._ends - here
-        most = np.sqrt(self._brake_square + self._brake_twice * np.maximum(room, 0.0)) - self._brake_step
-        if min(room.tolist()) < 0.0:
-            most = np.minimum(most, np.where(room < 0.0, np.maximum(_RETURN * room, -_RETURN_SPEED), np.inf))
-        jerk, brake = self._jerk_step, self._brake_step
-        rise = np.minimum(largest_rise(most - arm + brake, jerk) - brake, largest_rise(self._arm_speed - arm, jerk))
-        # Every end is moved into what can be reached, which keeps their order.
-        rise = np.minimum(rise, np.minimum(self._arm_step, change + jerk))
-        most = arm + np.maximum(rise, np.maximum(-self._arm_step, change - jerk))
         lower, upper = np.empty(NXI), np.empty(NXI)
-        upper[ARM_XI] = most[:7]
-        # Only a state far outside every bound can make the ends contradict each other.
-        lower[ARM_XI] = np.minimum(-most[7:], most[:7])
-        left, right = float(sent[0]), float(sent[1])
-        slower_left, slower_right = self.ramp(left, right)
-        low, high = zip(self._wheel(left, slower_left), self._wheel(right, slower_right), strict=True)
-        (half, _), (_, turn) = self._twist
-        v, omega = half * (left + right), turn * (right - left)
-        lower[0], upper[0] = self._base(0, v, half * (slower_left + slower_right))
-        lower[1], upper[1] = self._base(1, omega, turn * (slower_right - slower_left))
-        return Bounds(lower, upper, np.array(low), np.array(high))
-
-    def ramp(self, left: float, right: float) -> tuple[float, float]:
-        """Wheel speeds after one period of braking along the same arc: what is always possible."""
-        largest = max(abs(left), abs(right)) / self._wheel_step
-        if largest <= 1.0:
-            return 0.0, 0.0
-        return left * (1.0 - 1.0 / largest), right * (1.0 - 1.0 / largest)
+        wheel_lower, wheel_upper, ramp = np.empty(2), np.empty(2), np.empty(2)
+        _bounds(self._constants, q, sent, before, lower, upper, wheel_lower, wheel_upper, ramp)
+        return Bounds(lower, upper, wheel_lower, wheel_upper, ramp)
 
     def brake(self, sent: Array, before: Array) -> Array:
         """ξ̇ (9) after one period of the strongest braking of every actuator, at the arm's rated jerk."""
         out = np.empty(NXI)
-        out[:2] = self.ramp(float(sent[0]), float(sent[1]))
-        arm, most, step = sent[ARM_XI], self._jerk_most, self._arm_step[:7]
+        out[:2] = _ramp(float(sent[0]), float(sent[1]), self._wheel_step)
+        arm, most, step = sent[ARM_XI], self._jerk_most, self._arm_step
         last = np.minimum(np.maximum(arm - before[ARM_XI], -step), step)
         change = np.sign(arm) * np.maximum(np.abs(arm) - step, 0.0) - arm
         out[ARM_XI] = arm + np.minimum(np.maximum(change, last - most), last + most)
         return out
 
-    def _wheel(self, sent: float, ramp: float) -> tuple[float, float]:
-        low = max(-self._wheel_speed, sent - self._wheel_step)
-        high = min(self._wheel_speed, sent + self._wheel_step)
-        return min(low, ramp), max(high, ramp)
 
-    def _base(self, i: int, sent: float, ramp: float) -> tuple[float, float]:
-        """Bounds of v (i = 0) or ω (1): braking may be stronger than speeding up, but not beyond standstill."""
-        step, brake, most = self._base_step[i], self._base_brake[i], float(self.speed[i])
-        low, high = sent - step, sent + step
-        if sent > 0.0:
-            low = min(low, max(0.0, sent - brake))
-        else:
-            high = max(high, min(0.0, sent + brake))
-        return min(max(-most, low), ramp), max(min(most, high), ramp)
+@compiled(PAIR(NUMBER, NUMBER, NUMBER))
+def _ramp(left: float, right: float, step: float) -> tuple[float, float]:
+    """Wheel speeds after one period of braking along the same arc, each by no more than `step`."""
+    largest = max(abs(left), abs(right)) / step
+    if largest <= 1.0:
+        return 0.0, 0.0
+    return left * (1.0 - 1.0 / largest), right * (1.0 - 1.0 / largest)
+
+
+#: The same function for numbers.
+_largest_rise: Callable[[float, float], float] = compiled(NUMBER(NUMBER, NUMBER))(cast(Any, largest_rise))
+
+
+@compiled(NUMBER(NUMBER, NUMBER, NUMBER, NUMBER, NUMBER, NUMBER, NUMBER))
+def _most(
+    room: float, sent: float, before: float, step: float, jerk: float, acceleration: float, speed: float
+) -> float:
+    """The largest velocity of a joint with `room` to its upper limit; see the head of this file."""
+    brake = 0.5 * step
+    change = max(-step, min(step, sent - before))
+    if room < 0.0:
+        most = max(_RETURN * room, -_RETURN_SPEED)
+    else:
+        most = math.sqrt(brake * brake + acceleration * room) - brake
+    rise = min(_largest_rise(most - sent + brake, jerk) - brake, _largest_rise(speed - sent, jerk))
+    # Every end is moved into what can be reached, which keeps their order.
+    rise = min(rise, min(step, change + jerk))
+    return sent + max(rise, max(-step, change - jerk))
+
+
+@compiled(PAIR(NUMBER, NUMBER, NUMBER, NUMBER))
+def _wheel(sent: float, step: float, most: float, ramp: float) -> tuple[float, float]:
+    """Bounds of a wheel's speed."""
+    return min(max(-most, sent - step), ramp), max(min(most, sent + step), ramp)
+
+
+@compiled(PAIR(NUMBER, NUMBER, NUMBER, NUMBER, NUMBER))
+def _base(sent: float, step: float, brake: float, most: float, ramp: float) -> tuple[float, float]:
+    """Bounds of v or ω: braking may be stronger than speeding up, but not beyond standstill."""
+    low, high = sent - step, sent + step
+    if sent > 0.0:
+        low = min(low, max(0.0, sent - brake))
+    else:
+        high = max(high, min(0.0, sent + brake))
+    return min(max(-most, low), ramp), max(min(most, high), ramp)
+
+
+@compiled(NOTHING(records(_CONSTANTS), VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR))
+def _bounds(
+    constants: Any,
+    q: Array,
+    sent: Array,
+    before: Array,
+    lower: Array,
+    upper: Array,
+    wheel_lower: Array,
+    wheel_upper: Array,
+    ramp: Array,
+) -> None:
+    """Write the bounds; see `Bounds`."""
+    k = constants[0]
+    for i in range(7):
+        at, now, last = q[5 + i], sent[2 + i], before[2 + i]
+        step, jerk, a, speed = k.arm_step[i], k.jerk_step[i], k.acceleration[i], k.arm_speed[i]
+        upper[2 + i] = _most(k.highest[i] - at, now, last, step, jerk, a, speed)
+        # The lower end is the upper end of the joint's mirror image. Only a state far outside every bound can make the
+        # two contradict each other.
+        lower[2 + i] = min(-_most(at - k.lowest[i], -now, -last, step, jerk, a, speed), upper[2 + i])
+    slower = _ramp(sent[0], sent[1], k.wheel_step)
+    for i in range(2):
+        wheel_lower[i], wheel_upper[i] = _wheel(sent[i], k.wheel_step, k.wheel_speed, slower[i])
+        moves = k.twist[i, 0] * sent[0] + k.twist[i, 1] * sent[1]
+        ramp[i] = k.twist[i, 0] * slower[0] + k.twist[i, 1] * slower[1]
+        lower[i], upper[i] = _base(moves, k.base_step[i], k.base_brake[i], k.base_speed[i], ramp[i])

@@ -17,8 +17,9 @@ from typing import Any
 import daqp
 import numpy as np
 from msgspec import Struct
-from scipy.linalg.lapack import dgeqrf, dorgqr, dposv, dsyev, dtrtri
+from scipy.linalg.lapack import dsyev
 
+from controller.whole_body.unlimited import RIDGE, factor, unlimited
 from rolling_panda.differential_drive import Array
 
 #: κ: a path is left by about this share of the velocity that is missing along it.
@@ -30,6 +31,9 @@ _IDLE = 3e-5
 _NOTHING = 1e-5
 #: Slack from which on a row counts as given up.
 _GIVEN_UP = 1e-6
+#: What a row is moved beyond the least (in its unit): at the least itself a single velocity is possible, which a solver
+#: that reckons with rounding may not find.
+_ROOM = 1e-8
 _SETTINGS = {"primal_tol": 1e-10}
 _FREE = 1e30
 
@@ -95,18 +99,19 @@ class Cascade:
         """Bind the settings."""
         self._damping, self._damping_from = damping, damping_from
         self._senses: dict[int, Array] = {}
-        self._triangles: dict[int, Array] = {}
         self._ridges: dict[int, Array] = {}
-        self._fulls: dict[int, Array] = {}
 
     def solve(self, p: Problem) -> Answer | None:
         """The velocities, or None where the solver found none."""
         m, n = p.J.shape
         k = p.A.shape[0]
-        Q, R = self._factor(p.J * p.speed)
-        nu = self._unlimited(p, Q, R)
-        if nu is not None:
+        Q, R, nu = np.empty((n, n)), np.empty((n, m)), np.empty(n)
+        factor(p.J, p.speed, Q, R)
+        if not (p.keep_path and p.scale < 1.0) and unlimited(
+            Q, R, p.b, p.c, p.speed, p.T, p.t, p.lower, p.upper, p.A, p.A_lower, p.A_upper, self._damping_from, nu
+        ):
             return Answer(nu, 1.0, None, -1)
+        R = R[:m]
         # Rows over [y, z]: first the bounds of x, then the others.
         rows = np.empty((n + k, 1 + n))
         rows[:, 0] = 0.0
@@ -136,41 +141,6 @@ class Cascade:
             strength = np.abs(multipliers[1:])
             holds = int(strength.argmax())
         return Answer(nu, scale, slack, holds)
-
-    def _factor(self, J: Array) -> tuple[Array, Array]:
-        """Q (n×n, orthogonal) and R (m×m, upper) with Jᵀ = Q[:, :m] R."""
-        m, n = J.shape
-        qr, tau, _, _ = dgeqrf(J.T)
-        R = qr[:m] * self._triangle(m)
-        full = self._full(n)
-        full[:, :m] = qr
-        Q, _, _ = dorgqr(full, tau)
-        return Q, R
-
-    def _unlimited(self, p: Problem, Q: Array, R: Array) -> Array | None:
-        """ν that answers everything, or None where an inequality or damping has a say."""
-        m, n = p.J.shape
-        inverse, info = dtrtri(R)
-        # 1/‖R⁻¹‖ is no larger than the smallest singular value.
-        if info != 0 or float(np.vdot(inverse, inverse)) * self._damping_from**2 > 1.0:
-            return None
-        if p.keep_path and p.scale < 1.0:
-            return None
-        scaled = Q * p.speed[:, None]
-        nu: Array = scaled[:, :m] @ ((p.b + p.c) @ inverse)
-        if n > m:
-            A = p.T @ scaled[:, m:]
-            _, z, info = dposv(A.T @ A + self._ridge(n - m), (p.t - p.T @ nu) @ A)
-            if info != 0:
-                return None
-            nu += scaled[:, m:] @ z
-        if not math.isfinite(float(nu @ nu)) or min(np.minimum(nu - p.lower, p.upper - nu).tolist()) < 0.0:
-            return None
-        if len(p.A_lower):
-            moved = p.A @ nu
-            if min(np.minimum(moved - p.A_lower, p.A_upper - moved).tolist()) < 0.0:
-                return None
-        return nu
 
     def _tool(
         self, p: Problem, Q: Array, R: Array, rows: Array, low: Array, high: Array
@@ -240,7 +210,7 @@ class Cascade:
         if flag < 1 or not math.isfinite(float(v.sum())):
             return None
         slack: Array = np.maximum(v[n:], 0.0)
-        slack[slack > 0.0] += 1e-9
+        slack[slack > 0.0] += _ROOM
         return slack
 
     def _damped(self, tool: Array) -> float:
@@ -261,19 +231,7 @@ class Cascade:
         """What makes the null space's program definite where no task has a say."""
         found = self._ridges.get(size)
         if found is None:
-            found = self._ridges[size] = 1e-8 * np.eye(size)
-        return found
-
-    def _full(self, n: int) -> Array:
-        found = self._fulls.get(n)
-        if found is None:
-            found = self._fulls[n] = np.zeros((n, n), order="F")
-        return found
-
-    def _triangle(self, m: int) -> Array:
-        found = self._triangles.get(m)
-        if found is None:
-            found = self._triangles[m] = np.triu(np.ones((m, m)))
+            found = self._ridges[size] = RIDGE * np.eye(size)
         return found
 
 

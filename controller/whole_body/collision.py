@@ -14,7 +14,9 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from msgspec import Struct
 
+from controller.compiled import FLAG, MATRIX, NOTHING, NUMBER, VECTOR, compiled
 from controller.whole_body.collision_geometry import BLADES, add_ground, bounding_radius, part_of, robot_geometry
 from controller.whole_body.collision_pairs import self_pairs
 from controller.whole_body.obstacle import Axes, Obstacle
@@ -56,8 +58,7 @@ class Clearance:
     pair: Pair
 
 
-@dataclass(frozen=True)
-class Dampers:
+class Dampers(Struct, frozen=True):
     """How the distances of near pairs change: ḋ = normal_jacobian ξ̇.
 
     Attributes:
@@ -90,6 +91,8 @@ class CollisionModel:
     def __init__(self, robot: RobotModel) -> None:
         """Build the robot's shapes and decide by sampling which of its pairs to watch (about 0.2 s)."""
         self._robot = robot
+        # A view of Pinocchio's own memory.
+        self._tool = robot.data.oMf[robot.tool_id]
         self._shapes = robot_geometry(robot)
         objects = self._shapes.geometryObjects
         self._parts = [part_of(item.name) for item in objects]
@@ -184,28 +187,25 @@ class CollisionModel:
         robot = self._robot
         if kinematics is None:
             kinematics = robot.kinematics(q)
-        elif (kinematics.T_odom_tool.translation != robot.data.oMf[robot.tool_id].translation).any():
+        elif not _same(kinematics.T_odom_tool.translation, self._tool.translation):
             raise ControlError("the robot model was moved after these kinematics; compute them again before dampers")
         pin.updateGeometryPlacements(robot.model, robot.data, self._geometry, self._data)
-        if influence != self._known_for or float(self._reach @ np.abs(q - self._known_at)) > _SLACK:
+        if influence != self._known_for or _way(self._reach, q, self._known_at) > _SLACK:
             known = self._nearer(self._everything(influence + _SLACK), influence + _SLACK)
             self._activate(known)
             self._known, self._known_for, self._known_at = known, influence, q.copy()
         else:
             pin.computeDistances(self._geometry, self._data)
         near, results = self._nearer(self._known, influence), self._results
+        jacobian, distance = np.empty((len(near), NXI)), np.empty(len(near))
         if not near:
-            return Dampers(np.zeros((0, NXI)), np.zeros(0), ())
-        # ḋ = n·(v_b − v_a): the wrench of a unit force along n at the nearest points, which is the same for both sides.
-        # Plain numbers: for a few pairs that is faster than arrays.
-        wrenches = []
-        for p in near:
-            nx, ny, nz = self._normals[p].tolist()
-            x, y, z = results[p].getNearestPoint1().tolist()
-            wrenches.append((nx, ny, nz, y * nz - z * ny, z * nx - x * nz, x * ny - y * nx))
-        over_q = (np.array(wrenches) @ robot.data.J) * self._moves[near]
-        distance = np.array([results[p].min_distance for p in near])
-        return Dampers(over_q @ kinematics.S, distance, tuple(self._pair(p) for p in near))
+            return Dampers(jacobian, distance, ())
+        J, S = robot.data.J, kinematics.S
+        for row, p in enumerate(near):
+            result = results[p]
+            distance[row] = result.min_distance
+            _damper(self._normals[p], result.getNearestPoint1(), J, self._moves[p], S, jacobian[row])
+        return Dampers(jacobian, distance, tuple([self._pair(p) for p in near]))
 
     def _place(self, q: Array) -> None:
         robot = self._robot
@@ -300,6 +300,46 @@ class CollisionModel:
             return self._names[p]
         slot, part = divmod(p - len(self._self_pairs), len(self._parts))
         return self._parts[part], self._obstacles[self._occupants[slot]].name
+
+
+@compiled(FLAG(VECTOR, VECTOR))
+def _same(a: Array, b: Array) -> bool:
+    """Whether all entries are equal."""
+    for i in range(len(a)):
+        if a[i] != b[i]:
+            return False
+    return True
+
+
+@compiled(NUMBER(VECTOR, VECTOR, VECTOR))
+def _way(weights: Array, q: Array, q_before: Array) -> float:
+    """Weights · |q − q_before|; see `_motion_bound`."""
+    way = 0.0
+    for i in range(len(q)):
+        way += weights[i] * abs(q[i] - q_before[i])
+    return way
+
+
+@compiled(NOTHING(VECTOR, VECTOR, MATRIX, VECTOR, MATRIX, VECTOR))
+def _damper(n: Array, at: Array, J: Array, moves: Array, S: Array, jacobian: Array) -> None:
+    """Write the row (9) of ḋ = n·(v_b − v_a) over ξ̇: the wrench of a unit force along n at the nearest points.
+
+    Args:
+        n: From the first side to the second (3, odom).
+        at: Nearest point of the first side (3, m, odom); with any other on the line along n the wrench is the same.
+        J: Of every joint's axis, at odom's origin (6×12).
+        moves: 1 for each coordinate of q that moves the second side, −1 the first, 0 both alike or neither (12).
+        S: S(q) (12×9).
+        jacobian: Written.
+    """
+    moment = (at[1] * n[2] - at[2] * n[1], at[2] * n[0] - at[0] * n[2], at[0] * n[1] - at[1] * n[0])
+    jacobian[:] = 0.0
+    for i in range(12):
+        if moves[i] != 0.0:
+            along = n[0] * J[0, i] + n[1] * J[1, i] + n[2] * J[2, i]
+            along += moment[0] * J[3, i] + moment[1] * J[4, i] + moment[2] * J[5, i]
+            for j in range(9):
+                jacobian[j] += moves[i] * along * S[i, j]
 
 
 def _support(model: Any, joint: int) -> Array:

@@ -16,8 +16,9 @@ from controller.whole_body.actuation import Actuation
 from controller.whole_body.box import Bounds, Box
 from controller.whole_body.cascade import Answer, Cascade, Problem, given_up
 from controller.whole_body.guards.axle import AxleAhead
+from controller.whole_body.hierarchy_rows import guard_rows, sendable, tool_rows, wheel_rows
 from controller.whole_body.manipulability import ArmManipulability, Manipulability
-from controller.whole_body.task import ActuatorTask, Demand, Guard, Inequalities, Solution
+from controller.whole_body.task import ActuatorTask, Demand, Guard, Solution
 from controller.whole_body.tasks.arm_posture import ArmPosture
 from controller.whole_body.tasks.base_reference import BaseReference
 from controller.whole_body.tasks.joint_centre import JointCentre
@@ -70,11 +71,8 @@ class Hierarchy:
         )
         self.guards: tuple[Guard, ...] = (AxleAhead(settings.axle_ahead, settings.axle_rate), *guards)
         self._nothing = np.zeros(NXI)
-        self._wheel_rows = np.zeros((2, NXI))
-        self._wheel_rows[:, :2] = self._actuation.wheels
         self._rise = settings.clock_rise * dt
         self._weight = np.repeat([1.0 / _SPEED, 1.0 / _TURN], 3)
-        self._weight_column = self._weight[:, None]
         self._stack(self.secondary_tasks(robot, config))
 
     def secondary_tasks(self, robot: RobotModel, config: ControllerConfig) -> Sequence[SecondaryTask]:
@@ -94,13 +92,12 @@ class Hierarchy:
             return self._brake(demand, "the demand holds a number that is not finite", _NOWHERE)
         bounds = self._box.at(demand.q, demand.sent, demand.sent_before)
         self._climb.now = manipulability = self._manipulability.at(demand.kinematics.J)
-        base = self._actuation.twist @ self._box.ramp(float(demand.sent[0]), float(demand.sent[1]))
+        base = bounds.ramp
         for task, jacobian, target in self._tasks:
             task.write(demand, jacobian, target)
         rows = self._inequalities(demand, bounds)
-        J, wanted = self._tool(demand)
-        share = _share(demand)
-        answer = self._cascade.solve(self._problem(demand, bounds, rows, J, wanted * share, share, base))
+        J, wanted, share = self._tool(demand)
+        answer = self._cascade.solve(self._problem(demand, bounds, rows, J, wanted, share, base))
         if answer is None:
             return self._brake(demand, "no velocity satisfies the limits; the robot brakes", manipulability)
         return self._solution(demand, answer, base, bounds, share, rows.names, manipulability)
@@ -120,42 +117,34 @@ class Hierarchy:
             at += task.rows
         self._tasks = tuple(places)
 
-    def _tool(self, demand: Demand) -> tuple[Array, Array]:
-        """J over ν and what is wanted of J ν, weighted by the limits of the tool or of the actuators themselves."""
+    def _tool(self, demand: Demand) -> tuple[Array, Array, float]:
+        """J over ν, what is wanted of J ν as far as the speed cap allows, and the share of it that this is, 0…1.
+
+        Weighted by the limits of the tool or of the actuators themselves.
+        """
         if isinstance(demand.tool, ActuatorTask):
             # Of a frozen base nothing can be wanted; its rows would only outnumber the arm's joints.
             wanted = _ARM if demand.base == "frozen" else _ALL
-            return np.diag(1.0 / self._box.speed)[wanted], (self._actuation.nu(demand.tool.xi) / self._box.speed)[
-                wanted
-            ]
-        J = self._actuation.rows(demand.kinematics.J_xi)
-        twist = demand.tool.twist
-        if demand.tool.free_axis:
-            R = demand.kinematics.T_odom_tool.rotation[:, ::2].T
-            J = np.concatenate([J[:3], R @ J[3:]])
-            return J * self._weight_column[:5], np.concatenate([twist[:3], R @ twist[3:]]) * self._weight[:5]
-        J *= self._weight_column
-        return J, twist * self._weight
+            shares = np.diag(1.0 / self._box.speed)[wanted]
+            return shares, shares @ self._actuation.nu(demand.tool.xi), 1.0
+        m = 5 if demand.tool.free_axis else 6
+        J, b = np.empty((m, NXI)), np.empty(m)
+        R = demand.kinematics.T_odom_tool.rotation
+        share = tool_rows(
+            demand.kinematics.J_xi, R, demand.tool.twist, demand.speed_cap, self._actuation.wheels, self._weight, J, b
+        )
+        return J, b, share
 
     def _inequalities(self, demand: Demand, bounds: Bounds) -> _Rows:
         """Rows of the guards, then those of the wheels, over ν."""
-        names: tuple[str, ...] = ()
-        found: list[Inequalities] = []
-        for guard in self.guards:
-            rows = guard.rows(demand)
-            if rows.names:
-                found.append(rows)
-                names += rows.names
+        found = [rows for guard in self.guards if (rows := guard.rows(demand)).names]
+        names = sum((rows.names for rows in found), ())
         k = len(names)
         A, lower, upper = np.empty((k + 2, NXI)), np.empty(k + 2), np.empty(k + 2)
         at = 0
         for rows in found:
-            end = at + len(rows.names)
-            A[at:end], lower[at:end] = rows.A, rows.lower
-            at = end
-        A[:k, :2] = A[:k, :2] @ self._actuation.wheels
-        A[k:], upper[:k] = self._wheel_rows, math.inf
-        lower[k:], upper[k:] = bounds.wheel_lower, bounds.wheel_upper
+            at = guard_rows(rows.A, rows.lower, self._actuation.wheels, at, A, lower, upper)
+        wheel_rows(self._actuation.wheels, bounds.wheel_lower, bounds.wheel_upper, at, A, lower, upper)
         return _Rows(A, lower, upper, names)
 
     def _problem(
@@ -170,7 +159,7 @@ class Hierarchy:
             return Problem(J, b, c, speed, sent, bounds.lower, bounds.upper, A, low, high, k, T, t, rise, keep_path)
         # What the base still has to do until it rests is made good by the arm; the wheels' rows have no say then.
         A, low, high = A[:k], low[:k], high[:k]
-        if base.any():
+        if base[0] != 0.0 or base[1] != 0.0:
             c = -(J[:, :2] @ base)
             t = t - T[:, :2] @ base
             low = low - A[:, :2] @ base
@@ -192,11 +181,8 @@ class Hierarchy:
         manipulability: Manipulability,
     ) -> Solution:
         free = ARM_XI if demand.base == "frozen" else _ALL
-        nu = np.empty(NXI)
-        nu[:2] = base
-        nu[free] = answer.nu
-        xi = self._actuation.xi(nu)
-        xi[:2] = np.minimum(np.maximum(xi[:2], bounds.wheel_lower), bounds.wheel_upper)
+        xi = np.empty(NXI)
+        sendable(answer.nu, base, self._actuation.wheels, bounds.wheel_lower, bounds.wheel_upper, xi)
         scale = answer.scale * share
         worst = given_up(answer.slack)
         if worst >= 0:
@@ -212,15 +198,6 @@ class Hierarchy:
         if not math.isfinite(float(sent.sum() + before.sum())):
             return Solution(np.zeros(NXI), 0.0, manipulability.value, False, reason)
         return Solution(self._box.brake(sent, before), 0.0, manipulability.value, False, reason)
-
-
-def _share(demand: Demand) -> float:
-    """How much of the wanted twist the speed cap allows, 0…1."""
-    if isinstance(demand.tool, ActuatorTask):
-        return 1.0
-    linear = demand.tool.twist[:3]
-    speed = math.sqrt(float(linear @ linear))
-    return max(demand.speed_cap, 0.0) / speed if speed > demand.speed_cap else 1.0
 
 
 def _too_near(names: tuple[str, ...], worst: int) -> str:

@@ -3,26 +3,21 @@
 Of the ARM, as the paper's text says: the whole robot's Jacobian, which its formula prints, hides arm singularities.
 """
 
-import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from scipy.linalg.lapack import dposv
+from msgspec import Struct
 
+from controller.compiled import MATRIX, NUMBER, VECTOR, compiled
+from controller.whole_body.small_matrices import cholesky, solve_cholesky
 from rolling_panda.differential_drive import NXI, Array
 from rolling_panda.robot_model import ARM_Q, ARM_XI, RobotModel
 
 _REGULAR = 1e-9
-_THREE = np.ones(3)
-_ONES, _NONE = np.ones((7, 7)), np.zeros((7, 7))
-#: [j, i] is 1 where j ≥ i, j > i and (in the right half) j < i: summing columns j for each i.
-_SUMS = np.block([[np.tril(_ONES), _NONE], [np.tril(_ONES, -1), _NONE], [_NONE, np.triu(_ONES, 1)]])
 
 
-@dataclass(frozen=True)
-class Manipulability:
+class Manipulability(Struct, frozen=True):
     """ω of the arm, and its gradient over ξ (9), whose wheel entries are exactly zero."""
 
     value: float
@@ -32,36 +27,51 @@ class Manipulability:
 class ArmManipulability:
     """Computes ω and its gradient from the joints' axes, which the Jacobian's columns hold."""
 
-    def __init__(self) -> None:
-        """Make the work space."""
-        self._a, self._b = np.empty((5, 21)), np.empty((5, 21))
-
     def at(self, J: Array) -> Manipulability:
-        """ω and gradient from the tool's Jacobian J (6×12) of the current configuration.
-
-        ∂ω/∂q_i = ω tr(J⁺ ∂J/∂q_i). The derivative of a revolute geometric Jacobian is written out here: with v_j, ω_j
-        the columns, ∂v_j/∂q_i = ω_i × v_j for i ≤ j and ω_j × v_i for i > j; ∂ω_j/∂q_i = ω_i × ω_j for i < j, else 0.
-        """
-        arm = J[:, ARM_Q]
+        """ω and gradient from the tool's Jacobian J (6×12) of the current configuration."""
         gradient = np.zeros(NXI)
-        # One Cholesky factorisation gives ω as the product of its diagonal, and (J⁺)ᵀ = (J Jᵀ)⁻¹ J.
-        factor, pinv_T, info = dposv(arm @ arm.T, arm)
-        value = math.prod(factor.diagonal().tolist()) if info == 0 else 0.0
-        if value <= _REGULAR:
-            return Manipulability(0.0, gradient)
-        # tr(J⁺ ∂_iJ) = Σ_j g_j · ∂_i v_j + h_j · ∂_i ω_j with (g, h) the columns of (J⁺)ᵀ.
-        v, w = arm[:3], arm[3:]
-        a, b = self._a, self._b
-        a[:3, :7], a[:3, 7:14], a[:3, 14:] = v, w, pinv_T[:3]
-        b[:3, :7], b[:3, 7:14], b[:3, 14:] = pinv_T[:3], pinv_T[3:], w
-        # With the first two rows repeated below the third, a cross product is two products of shifted rows.
-        a[3:], b[3:] = a[:2], b[:2]
-        crossed = a[1:4] * b[2:5] - a[2:5] * b[1:4]
-        # Σ_{j ≥ i} (ω_i × v_j)·g_j = ω_i · Σ_{j ≥ i} v_j × g_j, and so on: sums over j are products with a triangle.
-        # Σ_{j < i} (ω_j × v_i)·g_j = v_i · Σ_{j < i} g_j × ω_j.
-        summed = crossed @ _SUMS
-        gradient[ARM_XI] = _THREE @ (w * summed[:, :7] + v * summed[:, 7:]) * value
-        return Manipulability(value, gradient)
+        return Manipulability(_climb(J[:, ARM_Q], gradient[ARM_XI]), gradient)
+
+
+@compiled(NUMBER(MATRIX, VECTOR))
+def _climb(J: Array, gradient: Array) -> float:
+    """ω, and its gradient written into `gradient` (7), from the arm's Jacobian J (6×7).
+
+    ∂ω/∂q_i = ω tr(J⁺ ∂J/∂q_i). The derivative of a revolute geometric Jacobian is written out here: with v_j, ω_j
+    the columns, ∂v_j/∂q_i = ω_i × v_j for i ≤ j and ω_j × v_i for i > j; ∂ω_j/∂q_i = ω_i × ω_j for i < j, else 0.
+
+    With (g, h) the columns of (J⁺)ᵀ the trace is Σ_j g_j · ∂_i v_j + h_j · ∂_i ω_j, and as (a × b)·c = a·(b × c),
+    ω_i · (Σ_{j ≥ i} v_j × g_j + Σ_{j > i} ω_j × h_j) + v_i · Σ_{j < i} g_j × ω_j.
+    """
+    square = np.zeros((6, 6))
+    for i in range(6):
+        for j in range(i + 1):
+            for k in range(7):
+                square[i, j] += J[i, k] * J[j, k]
+    # One Cholesky factorisation gives ω as the product of its diagonal, and (J⁺)ᵀ = (J Jᵀ)⁻¹ J.
+    if not cholesky(square):
+        return 0.0
+    value = 1.0
+    for i in range(6):
+        value *= square[i, i]
+    if value <= _REGULAR:
+        return 0.0
+    pinv_T = np.empty((7, 6))
+    for k in range(7):
+        for i in range(6):
+            pinv_T[k, i] = J[i, k]
+        solve_cholesky(square, pinv_T[k])
+    above, below = np.zeros(3), np.zeros(3)
+    for i in range(7):
+        for r, s, t in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+            gradient[i] += value * J[r, i] * below[r]
+            below[r] += pinv_T[i, s] * J[3 + t, i] - pinv_T[i, t] * J[3 + s, i]
+    for i in range(6, -1, -1):
+        for r, s, t in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+            above[r] += J[s, i] * pinv_T[i, t] - J[t, i] * pinv_T[i, s]
+            gradient[i] += value * J[3 + r, i] * above[r]
+            above[r] += J[3 + s, i] * pinv_T[i, 3 + t] - J[3 + t, i] * pinv_T[i, 3 + s]
+    return value
 
 
 def arm_omega(J: Array) -> float:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from controller.compiled import FLAG, NOTHING, VECTOR, compiled
 from controller.config import ControllerConfig
 from controller.whole_body.actuation import Actuation
 from rolling_panda.differential_drive import NXI, Array
@@ -80,11 +81,7 @@ class Saturation:
 
     def admits(self, xi: Array, sent: Array) -> bool:
         """Whether a velocity (9) may follow the one sent last: finite, and inside velocity and acceleration."""
-        # Comparisons with NaN are false, so that NaN is not admitted.
-        return bool(
-            (np.abs(xi) <= self.velocity + 2 * _SLACK).all()
-            and (np.abs(xi - sent) <= self._stop_step * (1 + 1e-9) + _SLACK).all()
-        )
+        return _admits(xi, sent, self.velocity, self._stop_step)
 
     def smooth(self, xi: Array, sent: Array, before: Array) -> Array:
         """The velocity (9) nearest to `xi` that the arm's rated jerk lets follow.
@@ -94,8 +91,8 @@ class Saturation:
             sent: ξ̇ (9) sent last.
             before: ξ̇ (9) sent in the period before that.
         """
-        last, step = sent - before, self._jerk_step
-        smoothed: Array = sent + np.minimum(np.maximum(xi - sent, last - step), last + step)
+        smoothed = np.empty(NXI)
+        _smooth(xi, sent, before, self._jerk_step, smoothed)
         return smoothed
 
     def brake(self, sent: Array) -> Array:
@@ -125,3 +122,23 @@ def _along(xi: Array, wanted: Array) -> float:
     """Share of `wanted` that `xi` holds in its direction, 0…1."""
     square = float(wanted @ wanted)
     return max(0.0, min(1.0, float(xi @ wanted) / square)) if square > 1e-12 else 1.0
+
+
+@compiled(FLAG(VECTOR, VECTOR, VECTOR, VECTOR))
+def _admits(xi: Array, sent: Array, velocity: Array, step: Array) -> bool:
+    """Whether |ξ̇| ≤ velocity and |ξ̇ − ξ̇_sent| ≤ step, but for rounding (9 each)."""
+    for i in range(len(xi)):
+        # Comparisons with NaN are false, so that NaN is not admitted.
+        if not abs(xi[i]) <= velocity[i] + 2 * _SLACK:
+            return False
+        if not abs(xi[i] - sent[i]) <= step[i] * (1 + 1e-9) + _SLACK:
+            return False
+    return True
+
+
+@compiled(NOTHING(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR))
+def _smooth(xi: Array, sent: Array, before: Array, step: Array, smoothed: Array) -> None:
+    """Write ξ̇ with its change inside the last one ± step (9 each)."""
+    for i in range(len(xi)):
+        last = sent[i] - before[i]
+        smoothed[i] = sent[i] + min(max(xi[i] - sent[i], last - step[i]), last + step[i])

@@ -5,7 +5,9 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Literal, Protocol
 
 import numpy as np
+from msgspec import Struct
 
+from controller.compiled import MATRIX, NUMBER, VECTOR, compiled
 from rolling_panda.differential_drive import NQ, NXI, Array
 from rolling_panda.robot_model import Kinematics
 
@@ -97,13 +99,25 @@ class Demand:
         """Whether every number that a method uses is finite."""
         posture, J, tool = self.posture, self.kinematics.J, self.tool
         wanted = tool.twist if isinstance(tool, ToolTask) else tool.xi
-        all_of_it = np.concatenate((self.q, self.sent, self.sent_before, wanted, posture.q, posture.rate, J.ravel("K")))
+        squares = _squares(self.q, self.sent, self.sent_before, wanted, posture.q, posture.rate, J)
         # A square that overflows belongs to a number that is of no use either.
-        return math.isfinite(float(np.vdot(all_of_it, all_of_it))) and not math.isnan(self.speed_cap + self.scale)
+        return math.isfinite(squares) and not math.isnan(self.speed_cap + self.scale)
 
 
-@dataclass(frozen=True)
-class Solution:
+@compiled(NUMBER(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, MATRIX))
+def _squares(q: Array, sent: Array, before: Array, wanted: Array, posture: Array, rate: Array, J: Array) -> float:
+    """Sum of the squares of every entry."""
+    total = 0.0
+    for vector in (q, sent, before, wanted, posture, rate):
+        for entry in vector:
+            total += entry * entry
+    for i in range(J.shape[0]):
+        for j in range(J.shape[1]):
+            total += J[i, j] * J[i, j]
+    return total
+
+
+class Solution(Struct, frozen=True):
     """What a method answers.
 
     Attributes:
@@ -121,8 +135,7 @@ class Solution:
     reason: str = ""
 
 
-@dataclass(frozen=True)
-class Inequalities:
+class Inequalities(Struct, frozen=True):
     """Rows A ξ̇ ≥ lower that are kept before the tool's task: A (k×9), lower (k), and what each row is about."""
 
     A: Array

@@ -11,13 +11,14 @@ P and an inward normal n is linear in ḣ, and so in ξ̈:
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
+from msgspec import Struct
 
+from controller.compiled import MATRIX, NOTHING, NUMBER, VECTOR, compiled
 from controller.whole_body.dynamics import acceleration_of_q
-from rolling_panda.differential_drive import Array
+from rolling_panda.differential_drive import NQ, NXI, Array
 from rolling_panda.robot_model import RobotModel
 
 #: Distance of the caster's contact from its pivot (m, vendor's mesh).
@@ -27,8 +28,7 @@ MARGIN = 0.03
 _STEP = 1e-4
 
 
-@dataclass(frozen=True)
-class TippingRows:
+class TippingRows(Struct, frozen=True):
     """What acceleration may be: matrix ξ̈ ≥ bound, in metres of the zero-moment point at the robot's own weight.
 
     Attributes:
@@ -46,7 +46,9 @@ class TippingRows:
             xi: ξ̇ (9) sent last.
             dt: Control period (s).
         """
-        return self.matrix, self.bound * dt + self.matrix @ xi
+        lower = np.empty(3)
+        _over_velocity(self.matrix, self.bound, xi, dt, lower)
+        return self.matrix, lower
 
 
 class Tipping:
@@ -60,8 +62,8 @@ class Tipping:
             margin: Distance that the zero-moment point keeps from every edge (m).
         """
         self._robot = robot
-        self._mass = float(pin.computeTotalMass(robot.model))
-        self._weight = self._mass * float(np.linalg.norm(robot.model.gravity.linear))
+        mass = float(pin.computeTotalMass(robot.model))
+        self._weight = mass * float(np.linalg.norm(robot.model.gravity.linear))
         wheels = [robot.model.jointPlacements[robot.model.getJointId(f"wheel_{s}")] for s in ("left", "right")]
         left, right = (placement.translation[:2] for placement in wheels)
         pivot = robot.model.frames[robot.frame_id("caster_pivot_link")].placement.translation[:2]
@@ -72,9 +74,9 @@ class Tipping:
         )
 
         kept = np.sum(self.normals * self.points, axis=1) + margin
-        self._edges: list[tuple[float, float, float]] = [
-            (float(n[0]), float(n[1]), float(k)) for n, k in zip(self.normals, kept, strict=True)
-        ]
+        self._edges = np.column_stack([self.normals, kept])
+        # Views of Pinocchio's own memory: the centroidal map A_g (6×12) and the centre of mass (3).
+        self._map, self._center = robot.data.Ag, robot.data.com[0]
 
     def rows(self, q: Array, xi: Array, dt: float = 0.0, S: Array | None = None) -> TippingRows:
         """The bound on ξ̈ at q (12) and ξ̇ (9).
@@ -86,28 +88,20 @@ class Tipping:
                 bend the robot is pressed outwards by its speed and not by its acceleration.
             S: S(q) where it is known already (12×9).
         """
-        data = self._robot.data
         if S is None:
             S = self._robot.drive.basis(float(q[2]))
+        pin.computeCentroidalMap(self._robot.model, self._robot.data, q)
         pressed = self._pressed(q, xi, S)
-        at_x, at_y, phi = q[:3].tolist()
-        c, s = math.cos(phi), math.sin(phi)
-        x, y, z = data.com[0].tolist()
-        x, y = c * (x - at_x) + s * (y - at_y), c * (y - at_y) - s * (x - at_x)
-        # L ḣ + weight · reach is the condition above; plain numbers, since arrays of three cost more than they save.
-        entries = []
-        for nx, ny, kept in self._edges:
-            n_x, n_y, reach = c * nx - s * ny, s * nx + c * ny, nx * x + ny * y - kept
-            entries.append((-z * n_x, -z * n_y, reach, n_y, -n_x, 0.0))
-        L = np.array(entries)
-        reach = L[:, 2]
-        matrix, value = (L @ data.Ag) @ S, L @ pressed + self._weight * reach
+        L, matrix, bound = np.empty((3, 6)), np.empty((3, NXI)), np.empty(3)
+        _condition(self._edges, q, self._center, L)
+        _rows(L, self._map, S, pressed, self._weight, matrix, bound)
         if dt > 0.0:
             for wheel in range(2):
                 nudged = xi.copy()
                 nudged[wheel] += _STEP
-                matrix[:, wheel] += L @ (self._pressed(q, nudged, S) - pressed) * (dt / _STEP)
-        return TippingRows(matrix / self._weight, np.minimum(value / -self._weight, 0.0))
+                change = self._pressed(q, nudged, S) - pressed
+                matrix[:, wheel] += L @ change * (dt / _STEP / self._weight)
+        return TippingRows(matrix, bound)
 
     def zero_moment_point(self, q: Array, xi: Array, acceleration: Array) -> Array:
         """Where on the ground (2, m, base_link) the contact forces have no moment that tips.
@@ -135,14 +129,68 @@ class Tipping:
 
     def _pressed(self, q: Array, xi: Array, S: Array) -> Array:
         """ḣ (6) at ξ̈ = 0: what the speeds alone press with."""
-        v = S @ xi
-        data = self._robot.data
-        pin.computeCentroidalMapTimeVariation(self._robot.model, data, q, v)
-        change: Array = data.dAg @ v
-        # A_g Ṡ ξ̇: the whole robot takes part in the base's centripetal acceleration.
-        change[0] -= self._mass * v[2] * v[1]
-        change[1] += self._mass * v[2] * v[0]
-        return change
+        v, a = np.empty(NQ), np.zeros(NQ)
+        _motion(S, xi, v, a)
+        change = pin.computeCentroidalMomentumTimeVariation(self._robot.model, self._robot.data, q, v, a)
+        pressed: Array = change.vector.copy()
+        return pressed
+
+
+@compiled(NOTHING(MATRIX, VECTOR, VECTOR, NUMBER, VECTOR))
+def _over_velocity(matrix: Array, bound: Array, xi: Array, dt: float, lower: Array) -> None:
+    """Lower = bound · dt + matrix ξ̇."""
+    for i in range(3):
+        lower[i] = bound[i] * dt
+        for j in range(9):
+            lower[i] += matrix[i, j] * xi[j]
+
+
+@compiled(NOTHING(MATRIX, VECTOR, VECTOR, VECTOR))
+def _motion(S: Array, xi: Array, v: Array, a: Array) -> None:
+    """q̇ = S ξ̇ (12) into v, and q̈ = Ṡ ξ̇ (12) into the zeros of a: the base's centripetal acceleration."""
+    for i in range(12):
+        v[i] = 0.0
+        for j in range(9):
+            v[i] += S[i, j] * xi[j]
+    a[0], a[1] = -v[2] * v[1], v[2] * v[0]
+
+
+@compiled(NOTHING(MATRIX, VECTOR, VECTOR, MATRIX))
+def _condition(edges: Array, q: Array, center: Array, L: Array) -> None:
+    """For each edge, L (3×6) with L ḣ + weight · L[:, 2] ≥ 0 as the condition at the head of this file.
+
+    Args:
+        edges: n (2) and n·P + margin of each edge in base_link (3×3).
+        q: Configuration (12).
+        center: Of mass (3, odom).
+        L: Written.
+    """
+    c, s = math.cos(q[2]), math.sin(q[2])
+    x, y = c * (center[0] - q[0]) + s * (center[1] - q[1]), c * (center[1] - q[1]) - s * (center[0] - q[0])
+    z = center[2]
+    for i in range(3):
+        n_x, n_y = c * edges[i, 0] - s * edges[i, 1], s * edges[i, 0] + c * edges[i, 1]
+        L[i, 0], L[i, 1], L[i, 2] = -z * n_x, -z * n_y, edges[i, 0] * x + edges[i, 1] * y - edges[i, 2]
+        L[i, 3], L[i, 4], L[i, 5] = n_y, -n_x, 0.0
+
+
+@compiled(NOTHING(MATRIX, MATRIX, MATRIX, VECTOR, NUMBER, MATRIX, VECTOR))
+def _rows(L: Array, A_g: Array, S: Array, pressed: Array, weight: float, matrix: Array, bound: Array) -> None:
+    """L A_g S (3×9) into matrix, and what the speeds and the weight leave of it (3) into bound, per weight."""
+    over_q = np.zeros(12)
+    for i in range(3):
+        left = weight * L[i, 2]
+        for k in range(6):
+            left += L[i, k] * pressed[k]
+        bound[i] = min(-left / weight, 0.0)
+        for j in range(12):
+            over_q[j] = 0.0
+            for k in range(6):
+                over_q[j] += L[i, k] * A_g[k, j]
+        for j in range(9):
+            matrix[i, j] = 0.0
+            for k in range(12):
+                matrix[i, j] += over_q[k] * S[k, j] / weight
 
 
 def _inner_normal(wheel: Array, pivot: Array, radius: float) -> Array:

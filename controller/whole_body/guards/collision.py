@@ -9,11 +9,15 @@ still stop, after one more period, with the deceleration a. Nearer than d_s, the
 cutter's body have a d_s of their own.
 """
 
+import math
+
 import numpy as np
 
+from controller.compiled import NOTHING, NUMBER, VECTOR, compiled
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.hierarchy_config import HierarchyConfig
 from controller.whole_body.task import NO_ROWS, Demand, Inequalities
+from rolling_panda.differential_drive import Array
 from rolling_panda.errors import ControlError
 
 
@@ -27,7 +31,6 @@ class CollisionGuard:
         self.model = model
         self._influence, self._kept = config.collision_influence, config.kept
         self._speed = config.collision_speed
-        self._part = config.collision_speed
         self._brake = config.collision_braking
         self._step = config.collision_braking * dt
 
@@ -40,9 +43,31 @@ class CollisionGuard:
             near = self.model.dampers(demand.q, self._influence)
         if not near.pairs:
             return NO_ROWS
-        kept = np.array([self._kept(pair) for pair in near.pairs])
-        room = near.distance - kept
-        stopping = np.sqrt(self._step**2 + 2.0 * self._brake * np.maximum(room, 0.0)) - self._step
-        approach = np.minimum(self._speed * room / (self._influence - kept), stopping)
-        names = tuple(f"the distance of {a} to {b}" for a, b in near.pairs)
-        return Inequalities(near.normal_jacobian, np.minimum(-approach, self._part), names)
+        k = len(near.pairs)
+        kept, lower = np.empty(k), np.empty(k)
+        for row, pair in enumerate(near.pairs):
+            kept[row] = self._kept(pair)
+        _damp(near.distance, kept, self._influence, self._speed, self._brake, self._step, lower)
+        return Inequalities(near.normal_jacobian, lower, tuple([f"the distance of {a} to {b}" for a, b in near.pairs]))
+
+
+@compiled(NOTHING(VECTOR, VECTOR, NUMBER, NUMBER, NUMBER, NUMBER, VECTOR))
+def _damp(
+    distance: Array, kept: Array, influence: float, speed: float, brake: float, step: float, lower: Array
+) -> None:
+    """Write the least ḋ (k) of pairs at `distance` d (k) of which `kept` d_s (k) is kept; see the head of this file.
+
+    Args:
+        distance: d (k, m).
+        kept: d_s (k, m).
+        influence: d_i (m).
+        speed: ξ, and the fastest that a pair has to part (m/s).
+        brake: a (m/s²).
+        step: a dt (m/s).
+        lower: Written (k, m/s).
+    """
+    for i in range(len(distance)):
+        room = distance[i] - kept[i]
+        stopping = math.sqrt(step * step + 2.0 * brake * max(room, 0.0)) - step
+        approach = min(speed * room / (influence - kept[i]), stopping)
+        lower[i] = min(-approach, speed)

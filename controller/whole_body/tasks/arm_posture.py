@@ -2,9 +2,10 @@
 
 import numpy as np
 
+from controller.compiled import NOTHING, NUMBER, VECTOR, compiled
 from controller.whole_body.task import Demand
 from rolling_panda.differential_drive import Array
-from rolling_panda.robot_model import ARM_Q, ARM_XI
+from rolling_panda.robot_model import ARM_XI
 
 
 class ArmPosture:
@@ -30,4 +31,11 @@ class ArmPosture:
     def write(self, demand: Demand, jacobian: Array, target: Array) -> None:
         """Write the targets."""
         posture = demand.posture
-        target[:] = self._share * (posture.rate[ARM_Q] + self._gain * (posture.q[ARM_Q] - demand.q[ARM_Q]))
+        _follow(posture.q, posture.rate, demand.q, self._gain, self._share, target)
+
+
+@compiled(NOTHING(VECTOR, VECTOR, VECTOR, NUMBER, VECTOR, VECTOR))
+def _follow(q_ref: Array, rate_ref: Array, q: Array, gain: float, share: Array, target: Array) -> None:
+    """Write the targets (7) of the configurations (12)."""
+    for i in range(7):
+        target[i] = share[i] * (rate_ref[5 + i] + gain * (q_ref[5 + i] - q[5 + i]))

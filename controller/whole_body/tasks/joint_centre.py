@@ -1,7 +1,6 @@
 """Joints near a limit go back towards their middle."""
 
-import numpy as np
-
+from controller.compiled import MATRIX, NOTHING, NUMBER, VECTOR, compiled
 from controller.whole_body.task import Demand
 from rolling_panda.differential_drive import Array
 from rolling_panda.robot_model import ARM_Q, ARM_XI, Limits
@@ -26,16 +25,19 @@ class JointCentre:
         self._gain = gain
         self._low, self._high = limits.lower[ARM_Q] + zone, limits.upper[ARM_Q] - zone
         self._scale = weight**0.5 / speed[ARM_XI] / zone
-        self._diagonal = np.zeros(7)
 
     def begin(self, jacobian: Array) -> None:
-        """Keep a view of the diagonal, where each joint's entry is."""
-        self._diagonal = np.einsum("ii->i", jacobian[:, ARM_XI])
+        """Nothing is the same in every posture."""
 
     def write(self, demand: Demand, jacobian: Array, target: Array) -> None:
         """Write the rows."""
-        arm = demand.q[ARM_Q]
-        depth = np.maximum(self._low - arm, 0.0) - np.maximum(arm - self._high, 0.0)
-        share = np.abs(depth) * self._scale
-        self._diagonal[:] = share
-        target[:] = share * (self._gain * depth)
+        _go_back(demand.q, self._low, self._high, self._scale, self._gain, jacobian, target)
+
+
+@compiled(NOTHING(VECTOR, VECTOR, VECTOR, VECTOR, NUMBER, MATRIX, VECTOR))
+def _go_back(q: Array, low: Array, high: Array, scale: Array, gain: float, jacobian: Array, target: Array) -> None:
+    """Write the rows (7×9) and targets (7) of a configuration (12) between the zones' edges (7)."""
+    for i in range(7):
+        depth = max(low[i] - q[5 + i], 0.0) - max(q[5 + i] - high[i], 0.0)
+        share = abs(depth) * scale[i]
+        jacobian[i, 2 + i], target[i] = share, share * gain * depth

@@ -2,10 +2,16 @@
 
 import math
 
+import numpy as np
+
+from controller.compiled import MATRIX, NOTHING, NUMBER, VECTOR, compiled
 from controller.whole_body.manipulability import Manipulability
 from controller.whole_body.task import Demand
-from rolling_panda.differential_drive import Array
-from rolling_panda.robot_model import ARM_XI
+from rolling_panda.differential_drive import NXI, Array
+
+#: A gradient of this length has no direction.
+_FLAT = 1e-6
+_LEVEL = np.zeros(NXI)
 
 
 class ClimbManipulability:
@@ -32,16 +38,21 @@ class ClimbManipulability:
     def write(self, demand: Demand, jacobian: Array, target: Array) -> None:
         """Write the row."""
         now = self.now
-        jacobian[0, ARM_XI] = 0.0
-        target[0] = 0.0
-        if now is None or now.value >= self._good:
-            return
-        gradient = now.gradient[ARM_XI]
-        steepness = math.sqrt(float(gradient @ gradient))
-        if steepness < 1e-6:
-            return
-        lack = 1.0 - now.value / self._good
+        lack = 0.0 if now is None else max(1.0 - now.value / self._good, 0.0)
+        gradient = _LEVEL if now is None else now.gradient
         # The row fades in with the lack, so that nothing jumps where ω crosses ω_good.
-        share = self._share * lack
-        jacobian[0, ARM_XI] = gradient * (share / steepness)
-        target[0] = share * self._gain * lack
+        _climb(gradient, self._share * lack, self._gain * lack, jacobian, target)
+
+
+@compiled(NOTHING(VECTOR, NUMBER, NUMBER, MATRIX, VECTOR))
+def _climb(gradient: Array, share: float, speed: float, jacobian: Array, target: Array) -> None:
+    """Write the row (1×9) along the gradient (9) and its target; nothing is wanted where it is level."""
+    steepness = 0.0
+    for slope in gradient:
+        steepness += slope * slope
+    steepness = math.sqrt(steepness)
+    if steepness < _FLAT:
+        share, steepness = 0.0, 1.0
+    for i in range(9):
+        jacobian[0, i] = share * gradient[i] / steepness
+    target[0] = share * speed

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from controller.compiled import NOTHING, PACKED, VECTOR, compiled
 from controller.whole_body.actuation import Actuation
 from controller.whole_body.task import Demand
 from rolling_panda.differential_drive import NXI, Array
@@ -23,4 +24,13 @@ class Smoothness:
 
     def write(self, demand: Demand, jacobian: Array, target: Array) -> None:
         """Write the targets."""
-        target[:] = self._share * self._actuation.nu(demand.sent)
+        _keep(self._actuation.twist, demand.sent, self._share, target)
+
+
+@compiled(NOTHING(PACKED, VECTOR, VECTOR, VECTOR))
+def _keep(twist: Array, sent: Array, share: Array, target: Array) -> None:
+    """Write the targets (9) after ξ̇ `sent` (9); `twist` gives [v, ω] of the wheels' speeds (2×2)."""
+    for i in range(2):
+        target[i] = share[i] * (twist[i, 0] * sent[0] + twist[i, 1] * sent[1])
+    for i in range(2, 9):
+        target[i] = share[i] * sent[i]
