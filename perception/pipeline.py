@@ -31,6 +31,8 @@ from rolling_panda.row_messages import Capsule
 #: Every so many samples of a cane's axis go on the wire.
 _THIN_OUT = 4
 _CORDON = m.WOOD_CLASSES.index("cordon")
+#: A shorter vector has no direction.
+_SHORTEST = 1e-6
 #: Frames that may be clicked.
 _EYES = 8
 #: Fewer pixels of cordon say nothing about how far the row is.
@@ -126,7 +128,10 @@ class Perception:
             direction = eye.points([row], [col], [1.0])[0] - eye.t
         else:
             return m.Answer(ok=False, reason=f"perception cannot do {type(request).__name__}")
-        direction = direction / np.linalg.norm(direction)
+        length = float(np.linalg.norm(direction))
+        if length < _SHORTEST:
+            return m.Answer(ok=False, reason="a line of sight needs a direction")
+        direction = direction / length
         rule = self._config.rule
         found = point_by_hand(self.known, origin, direction, rule, self.obstacles, request.user)
         if isinstance(found, str):

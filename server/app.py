@@ -18,6 +18,7 @@ from server.desk import Desk, Result
 from server.guard import Guard, is_protected
 from server.operator_api import answer, operator_router
 from server.pages import pages_router
+from server.plant_api import plant_router
 from server.sessions import Session
 from server.site import site_router
 from server.viser_proxy import viser_router
@@ -67,6 +68,7 @@ def create_app(desk: Desk, origins: frozenset[str]) -> ASGIApp:
 
     app.include_router(site_router(desk, web))
     app.include_router(operator_router(desk))
+    app.include_router(plant_router(desk))
     app.include_router(pages_router(desk))
     app.include_router(viser_router(desk.scene, dropped))
     app.router.routes.append(_PageFiles("/", StaticFiles(directory=web), name="web"))

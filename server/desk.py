@@ -10,6 +10,7 @@ from rolling_panda import intents
 from rolling_panda import messages as m
 from rolling_panda.errors import InputError, ServiceError
 from rolling_panda.page_messages import PagePoints, PageState
+from rolling_panda.plant_requests import PlantRequest
 from server.config import ServerConfig
 from server.event_log import EventLog
 from server.page_view import PageView
@@ -94,6 +95,19 @@ class Desk:
         except ServiceError as error:
             self.note("error", f"{name} by {session.user}: no answer from the controller")
             return Result(503, False, f"The controller does not answer: {error}")
+        return Result(200 if answer.ok else 409, answer.ok, answer.reason)
+
+    async def ask_perception(self, session: Session, request: PlantRequest) -> Result:
+        """Ask perception for another rule or a point, and log what came of it."""
+        name = type(request).__name__
+        if not session.may_operate:
+            return Result(403, False, f"a {session.role} may look and stop, not operate")
+        try:
+            answer = await self.link.ask_perception(request)
+        except ServiceError as error:
+            self.note("error", f"{name} by {session.user}: no answer from perception")
+            return Result(503, False, f"Perception does not answer: {error}")
+        self.note("info", f"{name} by {session.user}: {answer.reason if answer.ok else 'refused, ' + answer.reason}")
         return Result(200 if answer.ok else 409, answer.ok, answer.reason)
 
     async def stop(self, session: Session, reason: str) -> Result:

@@ -1,7 +1,7 @@
 """Bodies of the REST requests: strict, bounded, no unknown field, no NaN."""
 
 import json
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from fastapi import Path
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
@@ -151,3 +151,28 @@ class Me(BaseModel):
 
     user: str
     role: Role
+
+
+class Rule(_Body):
+    """The numbers of the pruning rule; what is left out takes its usual value. Lengths in metres."""
+
+    system: Literal["spur", "guyot"] = "spur"
+    nodes_kept: Annotated[int, Field(ge=1, le=5)] = 2
+    fruiting_nodes: Annotated[int, Field(ge=3, le=20)] = 8
+    keeper_diameter: Annotated[float, Field(ge=0.003, le=0.015)] = 0.006
+    offset: Annotated[float, Field(ge=0.005, le=0.05)] = 0.020
+
+
+class Ray(_JsonTuples):
+    """A line of sight in odom (m): the point goes on the known cane that it passes nearest."""
+
+    origin: tuple[_Metre, _Metre, _Metre]
+    direction: tuple[_Unit, _Unit, _Unit]
+
+
+class Pixel(_Body):
+    """A place in a camera image, as shares of its width and height; `sequence` is that of the frame."""
+
+    sequence: Annotated[int, Field(ge=0, le=2**62)]
+    u: Annotated[float, Field(ge=0.0, le=1.0)]
+    v: Annotated[float, Field(ge=0.0, le=1.0)]

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from rolling_panda import intents, topics
 from rolling_panda import messages as m
 from rolling_panda.page_messages import ProcessPresence
+from rolling_panda.plant_requests import PlantRequest
 from rolling_panda.teleop_messages import TeleopTarget
 from rolling_panda.transport import Transport
 
@@ -64,6 +65,15 @@ class RobotLink:
         """
         loop = asyncio.get_running_loop()
         return await loop.run_in_executor(self._callers, self._transport.call, topics.INTENT, intent)
+
+    async def ask_perception(self, request: PlantRequest) -> m.Answer:
+        """Ask perception.
+
+        Raises:
+            ServiceError: It did not answer in time.
+        """
+        loop = asyncio.get_running_loop()
+        return await loop.run_in_executor(self._callers, self._transport.call, topics.PLANT, request)
 
     def stop(self, user: str, reason: str) -> str:
         """Send the software stop now and again a few times over 100 ms; its id. It needs no controller.
