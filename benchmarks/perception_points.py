@@ -190,7 +190,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Score a range of seeds from two places each; print and write the figures."""
     parser = argparse.ArgumentParser(prog="rolling-panda bench perception", description=__doc__)
     parser.add_argument("--seeds", default="0:10", help="FIRST:LAST, the last one excluded (default: %(default)s)")
-    parser.add_argument("--json", type=Path, help="write the figures here")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures here")
     arguments = parser.parse_args(argv)
     first, last = (int(part) for part in arguments.seeds.split(":"))
     model, total = RobotModel(), Score()

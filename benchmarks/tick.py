@@ -71,7 +71,7 @@ def recorded(steps: int) -> list[Demand]:
 def main(argv: Sequence[str] | None = None) -> int:
     """Measure, print, and write the figures. Returns the exit code."""
     parser = argparse.ArgumentParser(prog="rolling-panda bench tick", description=__doc__)
-    parser.add_argument("--json", type=Path, help="write the figures here")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures here")
     parser.add_argument("--steps", type=int, default=5000, help="control steps measured (default: %(default)s)")
     parser.add_argument("--peers", action="store_true", help="also Pink, mink, PlaCo and TSID on the same problems")
     parser.add_argument(

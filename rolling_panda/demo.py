@@ -3,6 +3,7 @@
 import argparse
 import os
 import secrets
+import shutil
 import socket
 import tempfile
 import threading
@@ -17,6 +18,7 @@ from rolling_panda.errors import InputError
 from rolling_panda.launch import python_command
 from rolling_panda.process import ROBOT_ID, stop_on_signals
 from rolling_panda.resources import resource
+from rolling_panda.router import DEFAULT_ENDPOINT
 
 #: A program that is not complete after this long has failed to start (s).
 STARTUP_S = 120.0
@@ -53,7 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
     folder = Path(tempfile.mkdtemp(prefix="rolling-panda-"))
     supervisor = Supervisor(folder)
     _say(f"Rolling Panda {__version__}: simulation, seed {arguments.seed}")
-    _say(f"Logs of the processes are in {folder}")
+    _say(f"Logs of the processes are in {folder}, for as long as it runs and after a failure")
     token_file = folder / "sign-in-token"
     try:
         death = _start_and_watch(arguments, supervisor, token_file, stopping)
@@ -61,10 +63,12 @@ def run(arguments: argparse.Namespace) -> int:
         supervisor.end()
         token_file.unlink(missing_ok=True)
     if death is None:
+        shutil.rmtree(folder, ignore_errors=True)
         _say("\nStopped; every process has ended.")
         return 0
     _say(f"\n{death.name} ended {death.how}; everything else was stopped. It said last:")
     _say("\n".join(f"  | {line}" for line in (death.tail or "(nothing)").splitlines()))
+    _say(f"The logs of all processes are kept in {folder}")
     return 1
 
 
@@ -109,7 +113,7 @@ def _start_and_watch(
     """What ended the run: a process, or a person (None)."""
     began = time.monotonic()
     page = f"http://{_HOST}:{arguments.port}"
-    router_port = _free_port()
+    router_port = choose_router_port(DEFAULT_ENDPOINT)
     endpoint = f"tcp/{_HOST}:{router_port}"
     supervisor.start("router", python_command("rolling_panda", ["router", "--listen", endpoint, "--exit-with-parent"]))
     while not _accepts(router_port):
@@ -120,6 +124,7 @@ def _start_and_watch(
                 f"the router did not listen within {STARTUP_S:.0f} s; its log is {supervisor.log('router')}"
             )
     _progress("router", began)
+    _say(f"  The robot's wire is at {endpoint}: rolling-panda status --connect {endpoint}")
 
     token = secrets.token_urlsafe(32)
     write_secret(token_file, token)
@@ -175,9 +180,18 @@ def _say(text: str) -> None:
     print(text, flush=True)
 
 
-def _free_port() -> int:
+def choose_router_port(usual: str) -> int:
+    """The port of the usual endpoint, where other commands look first; any free one when it is taken."""
     with socket.socket() as probe:
-        probe.bind((_HOST, 0))
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((_HOST, int(usual.rsplit(":", 1)[1])))
+            # Only listening shows a port that another program has bound with the same option.
+            probe.listen()
+        except OSError:
+            with socket.socket() as other:
+                other.bind((_HOST, 0))
+                return int(other.getsockname()[1])
         return int(probe.getsockname()[1])
 
 

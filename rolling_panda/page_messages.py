@@ -100,6 +100,12 @@ class Selected(PageMessage, frozen=True, kw_only=True):
     point_id: str
 
 
+class HoldEnded(PageMessage, frozen=True, kw_only=True):
+    """The server has ended or refused what this page holds, and takes no more of it before the page lets go."""
+
+    reason: m.Text
+
+
 class Pong(PageMessage, frozen=True, kw_only=True):
     """Answer to a `Ping`, at once, for the round trip."""
 
@@ -135,5 +141,5 @@ class Select(PageMessage, frozen=True, kw_only=True):
     point_id: Annotated[str, Meta(max_length=64)]
 
 
-FromServer = PageState | PagePoints | PageEvents | Selected | Pong
+FromServer = PageState | PagePoints | PageEvents | Selected | HoldEnded | Pong
 FromPage = Ping | Hold | ShowGizmo | Select

@@ -5,7 +5,7 @@ import time
 
 from rolling_panda import messages as m
 from rolling_panda.demo_readiness import Readiness
-from rolling_panda.errors import InputError
+from rolling_panda.errors import InputError, TransportError
 from rolling_panda.process import ROBOT_ID
 from rolling_panda.router import DEFAULT_ENDPOINT
 
@@ -36,7 +36,11 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError(f"there is no process {', '.join(unknown)}; known are {', '.join(m.PROCESSES)}")
     asked = tuple(arguments.processes) or m.PROCESSES
     deadline = time.monotonic() + arguments.wait
-    with Readiness(arguments.connect, arguments.robot_id, None) as readiness:
+    try:
+        readiness = Readiness(arguments.connect, arguments.robot_id, None)
+    except TransportError as error:
+        raise TransportError(f"{error} Give its endpoint with --connect; the demo prints it when it starts.") from error
+    with readiness:
         while not readiness.up().issuperset(asked) and time.monotonic() < deadline:
             time.sleep(_POLL_S)
         up = readiness.up()

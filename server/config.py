@@ -14,7 +14,9 @@ class ServerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         page_rate_hz: `PageState` messages a second to each page.
         scene_rate_hz: Most updates a second of the 3-D view; nothing is sent while nothing moves.
         teleop_rate_hz: `TeleopTarget` messages a second while the operator holds.
-        hold_timeout_s: A hold that is not renewed for this long has ended.
+        hold_timeout_s: A hold that is not renewed for this long moves nothing any more.
+        hold_resume_s: A page that paused for no longer than this, with the button still pressed, holds on; after that
+            only a new press starts a hold.
         view_timeout_s: A page that has not drawn a state younger than this may not move the robot.
         stop_confirm_s: How long a stop waits for the bridge to say that it has latched.
         session_idle_s: A session unused for this long has ended.
@@ -28,6 +30,7 @@ class ServerConfig(Struct, frozen=True, forbid_unknown_fields=True):
     scene_rate_hz: Positive = 30.0
     teleop_rate_hz: Positive = 30.0
     hold_timeout_s: Positive = 0.15
+    hold_resume_s: Positive = 1.0
     view_timeout_s: Positive = 0.5
     stop_confirm_s: Positive = 0.5
     session_idle_s: Positive = 12 * 3600.0

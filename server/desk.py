@@ -42,6 +42,9 @@ class Listener(Protocol):
     def selected(self, point_id: str) -> None:
         """A point was clicked in the 3-D view of this page's session."""
 
+    def hold_ended(self, reason: str) -> None:
+        """The hold of this page's session is over, and why."""
+
 
 @dataclass(eq=False)
 class Desk:
@@ -117,7 +120,7 @@ class Desk:
         holder = self.teleop.holder
         if holder is not None:
             self.teleop.release(holder)
-            self.held_out(holder)
+            self._held_out(holder, "The robot was stopped.")
         self.note("warning", f"software stop by {session.user}: {reason}")
         while time.monotonic() - sent_at < self.config.stop_confirm_s:
             bridge = self.link.bridge.peek()
@@ -148,7 +151,7 @@ class Desk:
         """End this session's hold at once; its gizmo goes back to the tool."""
         self._refused_holds.pop(session.session_id, None)
         if self.teleop.release(session.session_id):
-            self.held_out(session.session_id)
+            self._held_out(session.session_id, "The hold was ended from elsewhere. Press again to go on.")
             self.note("info", f"{session.user} let go of the tool")
 
     def end_lapsed_hold(self, now: float) -> None:
@@ -156,10 +159,13 @@ class Desk:
         ended = self.teleop.expire(now)
         if ended is not None:
             self.note("info", "the hold ended: it was not renewed, or the page no longer sees the robot")
-            self.held_out(ended)
+            self._held_out(ended)
 
-    def held_out(self, owner: str) -> None:
-        """A hold has ended: the gizmo goes back to the tool, and aims there."""
+    def _held_out(self, owner: str, reason: str = "") -> None:
+        """A hold has ended: the gizmo goes back to the tool, and aims there; pages that hold are told a reason."""
+        for page in self.pages:
+            if reason and page.session.session_id == owner:
+                page.hold_ended(reason)
         tool = self.view.tool(time.monotonic())
         if tool is not None and self.scene.gizmos.shown(owner):
             self.scene.gizmos.reset(owner, tool)

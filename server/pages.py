@@ -10,6 +10,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from rolling_panda.page_messages import (
     FromPage,
     Hold,
+    HoldEnded,
     PageEvents,
     PageMessage,
     PagePoints,
@@ -41,11 +42,15 @@ class OpenPage:
         self._wake = asyncio.Event()
         self._pong: Pong | None = None
         self._selected: str | None = None
+        self._hold_ended: HoldEnded | None = None
         self._state: PageState | None = None
         self._points: PagePoints | None = None
         self._event_number = 0
         self._hold_sequence = -1
         self._holding = False
+        self._held_at = 0.0
+        #: The button is still pressed, but its hold is over: only a new press starts another.
+        self._spent = False
 
     async def run(self) -> None:
         """Serve the page until it goes, breaks the rules, or the session ends."""
@@ -72,6 +77,11 @@ class OpenPage:
         self._selected = point_id
         self.wake()
 
+    def hold_ended(self, reason: str) -> None:
+        """This session's hold is over; the page that held must let go and press again."""
+        if self._holding:
+            self._spend(reason)
+
     def wake(self) -> None:
         """There may be something new to send."""
         self._wake.set()
@@ -92,6 +102,9 @@ class OpenPage:
         if self._pong is not None:
             pong, self._pong = self._pong, None
             return pong
+        if self._hold_ended is not None:
+            ended, self._hold_ended = self._hold_ended, None
+            return ended
         if desk.state is not None and desk.state is not self._state:
             self._state = desk.state
             return addressed(desk.state, self.session)
@@ -133,14 +146,34 @@ class OpenPage:
                     return
                 self._hold_sequence = sequence
                 if hold:
-                    self._holding = self._desk.hold(self.session, time.monotonic()).ok
+                    self._hold(time.monotonic())
                 else:
-                    self._holding = False
+                    self._holding = self._spent = False
                     self._desk.let_go(self.session)
             case ShowGizmo(visible=visible):
                 self._desk.show_gizmo(self.session, visible)
             case Select(point_id=point_id):
                 self._desk.scene.select(self.session.session_id, point_id)
+
+    def _hold(self, now: float) -> None:
+        if self._spent:
+            return
+        # A moment's pause of a slow browser goes on by itself; after a longer one it takes a new press.
+        long_ago = now - self._held_at > self._desk.config.hold_resume_s
+        if self._holding and long_ago:
+            self._desk.end_lapsed_hold(now)
+            self._spend("The hold ended: the page or its link was too slow. Press again to go on.")
+            return
+        held = self._desk.hold(self.session, now)
+        if held.ok:
+            self._holding, self._held_at = True, now
+        elif not self._holding:
+            self._spend(held.reason)
+
+    def _spend(self, reason: str) -> None:
+        self._holding, self._spent = False, True
+        self._hold_ended = HoldEnded(reason=reason)
+        self.wake()
 
     async def _close(self, reason: str) -> None:
         try:

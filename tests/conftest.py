@@ -7,7 +7,10 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
+from played_page import browser, page, server
 from playwright.sync_api import sync_playwright
+
+__all__ = ["browser", "page", "server"]
 
 # A time limit for each example would judge how busy the machine is, not the code.
 settings.register_profile("rolling-panda", deadline=None)

@@ -15,7 +15,8 @@ import httpx
 import psutil
 import pytest
 
-from rolling_panda.demo import write_secret
+from rolling_panda import cli
+from rolling_panda.demo import choose_router_port, write_secret
 from rolling_panda.launch import child_environment, python_command
 
 STARTUP_S = 60.0
@@ -106,9 +107,12 @@ def test_it_comes_up_with_a_link_that_works_once_and_ctrl_c_ends_it(tmp_path: Pa
         assert not list(tmp_path.rglob("sign-in-token")), "the server deletes the token once read"
         statuses = [sign_in(page, token) for _ in range(2)]
         assert statuses[0] < 300 and statuses[1] == 401
+        (endpoint,) = re.findall(r"status --connect (\S+)$", demo.text(), re.MULTILINE)
+        assert cli.main(["status", "--connect", endpoint]) == 0
         os.kill(demo.pid, signal.SIGINT)
         assert demo.ends() == 0
         assert "every process has ended" in demo.text()
+        assert not list(tmp_path.glob("rolling-panda-*")), "what went well leaves nothing behind"
         assert demo.trace.stat().st_size > 0
 
 
@@ -125,6 +129,9 @@ def test_when_a_process_is_killed_it_says_which_and_ends_the_rest(tmp_path: Path
         assert demo.ends() == 1
         assert "bridge ended by signal 9 (SIGKILL)" in demo.text()
         assert "Traceback" not in demo.text()
+        (folder,) = tmp_path.glob("rolling-panda-*")
+        assert f"The logs of all processes are kept in {folder}" in demo.text()
+        assert (folder / "bridge.log").exists()
 
 
 def test_when_the_demo_itself_is_killed_nothing_outlives_it(tmp_path: Path) -> None:
@@ -147,6 +154,16 @@ def test_a_process_that_cannot_start_is_told_with_its_reason(tmp_path: Path) -> 
     assert "bridge ended with exit code 1" in done.stdout
     assert "[bridge] has no key 'watchdogs'" in done.stdout
     assert "Traceback" not in done.stdout + done.stderr
+
+
+def test_the_router_is_where_other_commands_look_unless_that_port_is_taken() -> None:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        usual = int(probe.getsockname()[1])
+    endpoint = f"tcp/127.0.0.1:{usual}"
+    assert choose_router_port(endpoint) == usual
+    with socket.create_server(("127.0.0.1", usual)):
+        assert choose_router_port(endpoint) not in (usual, 0)
 
 
 def test_a_secret_is_for_this_user_alone_and_never_written_over(tmp_path: Path) -> None:

@@ -1,64 +1,15 @@
 """The operator's page in a real browser, with a server that the test plays."""
 
 import json
-import time
-from collections.abc import Callable, Iterator
 
 import pytest
-from operator_page import FLAGS
-from played_server import ORIGIN, PlayedServer, bridge, controller, point
-from playwright.sync_api import Browser, Page, expect, sync_playwright
+from played_page import until
+from played_server import ORIGIN, PlayedServer, bridge, controller
+from playwright.sync_api import Browser, Page, expect
 
 from rolling_panda import page_messages as p
-from rolling_panda.resources import resource
 
 pytestmark = pytest.mark.browser
-
-
-@pytest.fixture(scope="module")
-def browser(chromium_path: str) -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=chromium_path, args=list(FLAGS))
-        yield chromium
-        chromium.close()
-
-
-@pytest.fixture
-def server() -> PlayedServer:
-    return PlayedServer(
-        points=(
-            point(1, "PROPOSED"),
-            point(2, "ACCEPTED", user="Ada", reason="accepted by Ada"),
-            point(3, "DONE", spur=2, cut_id="c1"),
-        ),
-        abstained=("vine 1, spur 3: no node seen above the cordon",),
-    )
-
-
-@pytest.fixture
-def page(browser: Browser, server: PlayedServer) -> Iterator[Page]:
-    context = browser.new_context(viewport={"width": 1280, "height": 800}, locale="en-US")
-    page = context.new_page()
-    problems: list[str] = []
-    page.on("pageerror", lambda error: problems.append(str(error)))
-    page.on(
-        "console",
-        lambda message: problems.append(message.text) if "Content Security Policy" in message.text else None,
-    )
-    server.attach(page)
-    page.goto(f"{ORIGIN}/")
-    expect(page.locator("#mode")).to_have_attribute("data-mode", "READY")
-    expect(page.locator("rp-scene iframe")).to_have_class("loaded")
-    yield page
-    context.close()
-    assert problems == []
-
-
-def until(page: Page, condition: Callable[[], bool], seconds: float = 5.0) -> None:
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline, "it did not happen in time"
-        page.wait_for_timeout(20)
 
 
 def test_shows_the_queue_by_vine_and_spur_and_selects(page: Page, server: PlayedServer) -> None:
@@ -92,10 +43,68 @@ def test_only_what_the_controller_allows_is_enabled_and_the_rest_says_why(page: 
     expect(page.locator("#start")).to_be_enabled()
     pause = page.locator("#pause")
     expect(pause).to_be_disabled()
-    expect(pause).to_have_attribute("aria-description", "There is nothing to pause; the robot is in Ready")
+    expect(pause).to_have_attribute("aria-description", "There is nothing to pause; the mode is Ready")
     server.role = "viewer"
     expect(page.locator("#start")).to_have_attribute("title", "You are signed in as a viewer")
     expect(page.locator("#stop")).to_be_enabled()
+
+
+def test_a_greyed_button_does_nothing_and_says_why_to_a_finger(page: Page, server: PlayedServer) -> None:
+    pause = page.locator("#pause")
+    pause.click(force=True)
+    expect(page.locator(".toast")).to_contain_text("There is nothing to pause; the mode is Ready")
+    page.locator('[data-point-id="p3"] button.accept').click(force=True)
+    expect(page.locator(".toast").last).to_contain_text("It is done")
+    server.controller = controller("ESTOP_LATCHED")
+    expect(page.locator("#reset")).to_have_attribute("aria-disabled", "true")
+    page.locator("#reset-reason").press("Enter")
+    expect(page.locator(".toast").last).to_contain_text("Write a reason first")
+    assert server.posted == []
+
+
+def test_it_says_that_it_is_a_simulation_and_what_tells_wood_from_wire(page: Page, server: PlayedServer) -> None:
+    expect(page.locator("rp-camera .panel-head")).to_contain_text("simulation")
+    expect(page.locator("rp-queue .panel-head")).to_contain_text("simulated labels")
+    server.bridge = bridge(kind="panda")
+    expect(page.locator("rp-camera .panel-head")).not_to_contain_text("simulation")
+
+
+def test_the_log_has_the_words_of_the_page(page: Page, server: PlayedServer) -> None:
+    server.tell(p.PageEvents(events=(server.event(2, "info", "READY → AUTO: start by Ada; p1 is FAILED_NOT_CUT"),)))
+    expect(page.locator("#log li .text").last).to_have_text("Ready → Automatic: start by Ada; p1 is Not cut")
+
+
+def test_what_only_engineers_read_is_behind_a_disclosure_that_tells_its_warnings(
+    page: Page, server: PlayedServer
+) -> None:
+    gauge = page.locator('[data-gauge="manipulability"]')
+    expect(gauge).to_be_hidden()
+    expect(page.locator('[data-gauge="joint-margin"]')).to_be_visible()
+    server.controller = controller(manipulability=0.01)
+    summary = page.locator("rp-telemetry summary")
+    expect(summary).to_have_text("For engineers · 1 warning")
+    summary.click()
+    expect(gauge).to_be_visible()
+
+
+def test_a_supervisor_makes_a_link_for_somebody_else(page: Page, server: PlayedServer) -> None:
+    server.answers["/api/invite"] = (200, {"ok": True, "reason": "", "link": "http://127.0.0.1:8000/sign-in?token=abc"})
+    expect(page.locator("#invite-user")).to_be_hidden()
+    page.locator("#invite").click()
+    page.locator("#invite-user").fill("a script")
+    page.locator("#invite-role").select_option("operator")
+    page.locator("#invite-make").click()
+    expect(page.locator("#invite-link")).to_have_value(f"{ORIGIN}/sign-in?token=abc")
+    assert server.posted == [("/api/invite", {"user": "a script", "role": "operator"})]
+    expect(page.locator("#stop")).to_be_visible()
+    page.locator("#invite-user").press("Escape")
+    page.locator("#invite").click()
+    expect(page.locator("#invite-link")).to_have_value("")
+    server.answers["/api/invite"] = (503, {"ok": False, "reason": "no more today"})
+    page.locator("#invite-make").click()
+    expect(page.locator("#invitation")).to_contain_text("No link was made: no more today")
+    server.role = "operator"
+    expect(page.locator("#invite")).to_be_hidden()
 
 
 def test_a_refusal_is_a_notice_and_a_line_of_the_log(page: Page, server: PlayedServer) -> None:
@@ -193,6 +202,25 @@ def test_a_hold_ends_when_the_operator_can_no_longer_mean_it(page: Page, server:
         return
     until(page, lambda: not server.holds()[-1])
     expect(page.locator("#hold")).not_to_have_class("held")
+
+
+def test_a_hold_that_the_server_ended_goes_on_only_when_pressed_again(page: Page, server: PlayedServer) -> None:
+    page.locator("#teleop").click()
+    page.locator("h1").click()
+    page.keyboard.down("h")
+    until(page, lambda: server.holds()[-1:] == [True])
+    server.tell(p.HoldEnded(reason="The hold ended: too slow. Press again to go on."))
+    expect(page.locator(".toast")).to_contain_text("Press again")
+    until(page, lambda: not server.holds()[-1])
+    count = len(server.holds())
+    page.keyboard.down("h")
+    page.wait_for_timeout(300)
+    assert len(server.holds()) == count, "the key that is still down moves nothing"
+    expect(page.locator("#hold")).not_to_have_class("held")
+    page.keyboard.up("h")
+    page.keyboard.down("h")
+    until(page, lambda: server.holds()[-1])
+    page.keyboard.up("h")
 
 
 def test_dragging_in_the_view_counts_as_holding(page: Page, server: PlayedServer) -> None:
@@ -298,46 +326,6 @@ def test_the_sign_in_link_is_used_once_and_leaves_the_address(browser: Browser) 
     page.get_by_role("button", name="Sign in").click()
     expect(page.locator("#mode")).to_have_attribute("data-mode", "READY")
     context.close()
-
-
-@pytest.mark.parametrize("size", [(1280, 800), (1024, 768), (820, 1180)])
-def test_fits_the_screen_with_the_stop_on_top(page: Page, server: PlayedServer, size: tuple[int, int]) -> None:
-    page.set_viewport_size({"width": size[0], "height": size[1]})
-    server.bridge = bridge(stop_id="s1", stopped_by="Ada: stop button")
-    server.controller = controller("ESTOP_LATCHED")
-    expect(page.locator("rp-stop-banner")).to_be_visible()
-    overflow = page.evaluate("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]")
-    assert overflow[0] <= size[0]
-    assert overflow[1] <= size[1]
-    view = page.locator("rp-scene").bounding_box()
-    assert view is not None
-    assert min(view["width"], view["height"]) >= 300, "there is room to see the robot"
-    for selector in ("#stop", "#arm", "#start", "#pause", "#resume", "#home", "#acknowledge", "#teleop", "#hold"):
-        box = page.locator(selector).bounding_box()
-        assert box is not None
-        assert box["height"] >= 44
-        assert box["x"] >= 0
-        assert box["x"] + box["width"] <= size[0]
-        middle = [box["x"] + box["width"] / 2, box["y"] + box["height"] / 2]
-        top = page.evaluate("([x, y]) => document.elementFromPoint(x, y)?.closest('button')?.id", middle)
-        assert f"#{top}" == selector, "nothing lies over it"
-
-
-def test_the_page_is_small_and_keeps_to_its_own_files() -> None:
-    folder = resource("web/index.html").parent
-    scripts = [*folder.glob("*.js"), *folder.glob("components/*.js")]
-    assert sum(script.stat().st_size for script in scripts) < 150_000
-    for file in [*scripts, *folder.glob("*.css"), *folder.glob("*.html")]:
-        text = file.read_text(encoding="utf-8")
-        assert len(text.splitlines()) <= 400, file.name
-        assert "innerHTML" not in text
-        assert "https://" not in text
-    for html in folder.glob("*.html"):
-        text = html.read_text(encoding="utf-8")
-        assert " style=" not in text
-        assert "<style" not in text
-        assert text.count("<script") == text.count(' src="')
-    assert json.loads((folder / "jsconfig.json").read_text(encoding="utf-8"))["compilerOptions"]["strict"] is True
 
 
 def test_a_busy_page_does_not_take_its_own_pause_for_a_lost_link(page: Page, server: PlayedServer) -> None:

@@ -173,9 +173,10 @@ def test_the_tool_follows_while_the_page_holds_and_stops_when_it_falls_silent(se
     assert {message.user for message in sent if message.hold} == {"ann"}
 
 
-def test_a_hold_that_was_renewed_too_late_begins_anew_from_the_tool():
+@pytest.fixture
+def late_page():
+    """A page whose late renewal itself is what ends its hold, so seldom does the server look by itself."""
     wire = FakeWire()
-    # So seldom that the late renewal itself is what ends the hold.
     with running_server(wire, ServerConfig(teleop_rate_hz=0.2)) as server, server.client(user="ann") as client:
         wire.deliver(topics.JOINTS, joints())
         wire.deliver(topics.ODOMETRY, odometry())
@@ -184,13 +185,34 @@ def test_a_hold_that_was_renewed_too_late_begins_anew_from_the_tool():
             page.say("ShowGizmo", visible=True)
             page.hold(True)
             page.hear_event("ann holds the tool")
-            time.sleep(0.3)
-            page.look()
-            page.hold(True)
-            page.hear_event("ann holds the tool")
-        told = [event["text"] for event in client.get("/api/events").json()["events"]]
-    assert not any("refused" in text for text in told), told
-    assert sum("not renewed" in text for text in told) == 1
+            page.told = lambda: [event["text"] for event in client.get("/api/events").json()["events"]]
+            yield page
+
+
+def test_a_hold_that_paused_for_a_moment_begins_anew_from_the_tool(late_page):
+    time.sleep(0.3)
+    late_page.look()
+    late_page.hold(True)
+    late_page.hear_event("ann holds the tool")
+    assert not any("refused" in text for text in late_page.told()), late_page.told()
+    assert sum("not renewed" in text for text in late_page.told()) == 1
+
+
+def test_a_hold_that_paused_for_long_is_over_until_it_is_pressed_anew(late_page):
+    time.sleep(1.2)
+    late_page.look()
+    late_page.hold(True)
+    assert "Press again" in late_page.hear("HoldEnded")["reason"]
+    for _ in range(3):
+        late_page.look()
+        late_page.hold(True)
+    late_page.look()
+    assert sum("holds the tool" in text for text in late_page.told()) == 1
+    late_page.hold(False)
+    late_page.look()
+    late_page.hold(True)
+    late_page.hear_event("ann holds the tool")
+    assert sum("not renewed" in text for text in late_page.told()) == 1
 
 
 def test_letting_go_is_said_at_once(server, page):
@@ -220,8 +242,24 @@ def test_a_page_that_has_not_drawn_the_robot_may_not_hold(server, page):
     page.hear("PageState")
     page.say("ShowGizmo", visible=True)
     page.say("Hold", sequence=1, hold=True)
+    assert "not current" in page.hear("HoldEnded")["reason"]
     page.hear_event("the view of the robot is not current")
+    page.sequence = 1
+    page.look()
+    page.hold(True)
+    page.look()
     assert not any(message.hold for message in sent)
+
+
+def test_a_stop_ends_the_hold_of_the_page_that_held(server, page):
+    sent = server.wire.sent[topics.TELEOP.name]
+    sent.clear()
+    page.look()
+    page.say("ShowGizmo", visible=True)
+    page.hold_until_sent(sent)
+    with server.client(user="bob") as other:
+        other.post("/api/stop")
+    assert page.hear("HoldEnded")["reason"] == "The robot was stopped."
 
 
 def test_an_old_hold_that_arrives_late_is_ignored(server, page):

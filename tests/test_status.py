@@ -60,6 +60,13 @@ def test_being_connected_is_not_being_up(endpoint: str) -> None:
         assert cli.main(["status", "--connect", endpoint, "--wait", "0.3", "server"]) == 1
 
 
+def test_without_a_router_it_says_how_to_name_another(capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.socket() as nobody:
+        nobody.bind(("127.0.0.1", 0))
+        assert cli.main(["status", "--connect", f"tcp/127.0.0.1:{nobody.getsockname()[1]}"]) == 1
+    assert "--connect" in capsys.readouterr().err
+
+
 def test_an_unknown_process_is_refused_with_the_known_ones(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["status", "planner"]) == 1
     assert "planner" in capsys.readouterr().err

@@ -48,6 +48,18 @@ def test_the_tool_follows_a_held_target_and_rests_when_nothing_more_comes(tmp_pa
     assert np.linalg.norm(record.rows["tool"][-1] - goal["position"]) < 0.1, "the tool stopped on its way back"
 
 
+def press(page: Page, robot: LiveRobot) -> None:
+    """Take the gizmo with the mouse; again, as the page asks a person to, where its view was not current enough."""
+    for _ in range(3):
+        page.mouse.down()
+        for _ in range(20):
+            page.wait_for_timeout(50)
+            if robot.mode() == "TELEOP":
+                return
+        page.mouse.up()
+    raise AssertionError(f"the drag does not take the tool\n{robot.logs()}")
+
+
 class View:
     """The 3-D view of a page while it has its first camera (`server/scene.py`)."""
 
@@ -82,7 +94,7 @@ def test_the_tool_follows_the_dragged_gizmo_and_rests_when_it_is_let_go(tmp_path
     with LiveRobot(tmp_path) as robot:
         with operator_page(chromium_path, robot.link("ada")) as page:
             ready(robot)
-            page.wait_for_selector("#teleop:not([disabled])", timeout=60_000)
+            page.wait_for_selector('#teleop[aria-disabled="false"]', timeout=60_000)
             page.click("#teleop")
             page.wait_for_timeout(2_000)
             origin, view = np.array(tool(robot)["position"]), View(page)
@@ -91,8 +103,7 @@ def test_the_tool_follows_the_dragged_gizmo_and_rests_when_it_is_let_go(tmp_path
             grip = origin + 0.8 * view.metres(GIZMO_PX, origin) * along
             page.mouse.move(*view.pixel(grip))
             page.wait_for_timeout(500)
-            page.mouse.down()
-            assert robot.wait(lambda: robot.mode() == "TELEOP", 5, "the drag to take the tool")
+            press(page, robot)
             for way in np.linspace(0.0, 0.15, 16):
                 page.mouse.move(*view.pixel(grip + way * along))
                 page.wait_for_timeout(50)

@@ -42,7 +42,7 @@ export function whyNot(intent) {
   if (controller.allowed.includes(intent)) return "";
   if (!INTENTS.includes(/** @type {any} */ (intent))) return `There is no ${intent}`;
   if (intent === "Start" && controller.mode === "READY" && countOf("ACCEPTED") === 0) return "Accept a point first";
-  return `${NEEDS[intent]}; the robot is in ${MODE_WORDS[controller.mode]}`;
+  return `${NEEDS[intent]}; the mode is ${MODE_WORDS[controller.mode]}`;
 }
 
 /** Why the tool cannot be moved by hand now; empty when it can. */
@@ -53,7 +53,7 @@ export function whyNoTeleoperation() {
   if (controller === null || !isLive("controller")) return staleWords("controller") || "The controller is not there";
   if (!isLive("bridge")) return staleWords("bridge") || "The bridge is not there";
   if (controller.mode === "READY" || controller.mode === "TELEOP") return "";
-  return `Teleoperation needs Ready; the robot is in ${MODE_WORDS[controller.mode]}`;
+  return `Teleoperation needs Ready; the mode is ${MODE_WORDS[controller.mode]}`;
 }
 
 /** @param {import("./messages.js").PointState} state */

@@ -2,7 +2,11 @@
 
 import { link, say, showToast } from "./state.js";
 
-/** @typedef {{ ok: boolean, reason: string, status: number }} Answer `status` 0: the server was not reached. */
+/**
+ * `status` 0: the server was not reached. `link` is what an invitation is answered with.
+ *
+ * @typedef {{ ok: boolean, reason: string, status: number, link?: string }} Answer
+ */
 
 /**
  * @param {string} path
@@ -60,7 +64,7 @@ export async function isSignedIn() {
 
 /**
  * @param {Response} response
- * @returns {Promise<{ ok: boolean, reason: string }>}
+ * @returns {Promise<{ ok: boolean, reason: string, link?: string }>}
  */
 async function answerOf(response) {
   /** @type {any} */
@@ -71,7 +75,7 @@ async function answerOf(response) {
     // An answer without JSON still has its status to tell.
   }
   const reason = typeof body?.reason === "string" ? body.reason : detailOf(body);
-  if (response.ok) return { ok: body?.ok !== false, reason };
+  if (response.ok) return { ok: body?.ok !== false, reason, link: typeof body?.link === "string" ? body.link : "" };
   return { ok: false, reason: reason || STATUS_WORDS[response.status] || `the server answered ${response.status}` };
 }
 

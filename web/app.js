@@ -2,6 +2,7 @@
 
 import "./components/rp-camera.js";
 import "./components/rp-controls.js";
+import "./components/rp-invite.js";
 import "./components/rp-link-banner.js";
 import "./components/rp-log.js";
 import "./components/rp-mode.js";
@@ -13,10 +14,12 @@ import "./components/rp-stop-banner.js";
 import "./components/rp-telemetry.js";
 import "./components/rp-teleoperation.js";
 import "./components/rp-toasts.js";
+import { explainGreyed } from "./greyed.js";
 import { now } from "./state.js";
 import { listenForSpace } from "./stop.js";
 import { guardHold, socket } from "./teleoperation.js";
 
+explainGreyed(document);
 listenForSpace(window);
 guardHold();
 window.setInterval(() => now.set(performance.now()), 250);

@@ -56,14 +56,15 @@ export function setText(node, text) {
 }
 
 /**
- * Enable a button, or disable it and say why.
+ * Enable a button, or grey it and say why. Not the `disabled` attribute: a button that has it swallows the press, and a
+ * finger would never learn the reason (`greyed.js`).
  *
  * @param {HTMLButtonElement} button
  * @param {string} why Empty when it may be pressed.
  * @param {string} [hint] What it does, shown while it may be pressed.
  */
 export function setEnabled(button, why, hint = "") {
-  button.disabled = why !== "";
+  button.setAttribute("aria-disabled", String(why !== ""));
   const words = why || hint;
   if (button.title !== words) button.title = words;
   if (words) button.setAttribute("aria-description", words);

@@ -246,6 +246,14 @@ export const TEXT_MAX_LENGTH = 500;
  */
 
 /**
+ * The server has ended or refused what this page holds, and takes no more of it before the page lets go.
+ *
+ * @typedef {object} HoldEnded
+ * @property {"HoldEnded"} type
+ * @property {string} reason
+ */
+
+/**
  * Answer to a `Ping`, at once, for the round trip.
  *
  * @typedef {object} Pong
@@ -287,6 +295,6 @@ export const TEXT_MAX_LENGTH = 500;
  * @property {string} point_id
  */
 
-/** @typedef {PageState|PagePoints|PageEvents|Selected|Pong} FromServer */
+/** @typedef {PageState|PagePoints|PageEvents|Selected|HoldEnded|Pong} FromServer */
 
 /** @typedef {Ping|Hold|ShowGizmo|Select} FromPage */

@@ -22,6 +22,8 @@ export class Link {
     this.socket = null;
     /** Called when the link has gone; whatever was held must be let go. */
     this.onclose = () => {};
+    /** Called when the server has ended or refused what is held here. @type {(reason: string) => void} */
+    this.onholdended = () => {};
     this.attempts = 0;
     this.silentTurns = 0;
     this.number = 0;
@@ -119,6 +121,9 @@ export class Link {
         break;
       case "Selected":
         selected.set(message.point_id);
+        break;
+      case "HoldEnded":
+        this.onholdended(message.reason);
         break;
       case "Pong":
         this.measure(message.number);

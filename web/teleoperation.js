@@ -39,6 +39,12 @@ export function guardHold() {
     hold.releaseAll();
     teleoperating.set(false);
   };
+  // Whoever still holds must press again: the tool never sets out by itself once it has been stopped.
+  socket.onholdended = (reason) => {
+    if (!hold.holding.get()) return;
+    hold.releaseAll();
+    showToast("warning", reason);
+  };
   // The robot has left the modes in which a hand may move it: start over from the switch, not from a held button.
   pageState.subscribe(() => {
     if (teleoperating.get() && whyNoTeleoperation()) setTeleoperating(false);

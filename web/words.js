@@ -32,6 +32,19 @@ export const PHASE_WORDS = Object.freeze({
   RETREAT: "retreat",
 });
 
+/** @type {Readonly<Record<string, string>>} */
+const RAW_WORDS = Object.freeze({ ...MODE_WORDS, ...POINT_WORDS });
+const RAW = new RegExp(`\\b(${Object.keys(RAW_WORDS).join("|")})\\b`, "g");
+
+/**
+ * A text of the robot's with the page's own words for modes and states.
+ *
+ * @param {string} text
+ */
+export function inWords(text) {
+  return text.replace(RAW, (name) => RAW_WORDS[name] ?? name);
+}
+
 /** @param {number} seconds */
 export function ageWords(seconds) {
   if (seconds < 99.5) return `${seconds.toFixed(1)} s`;

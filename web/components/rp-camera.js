@@ -13,7 +13,8 @@ const OLD_MS = 2500;
 
 class RpCamera extends HTMLElement {
   connectedCallback() {
-    const { head, note } = panelHead("Camera");
+    const source = element("span", { class: "tag", attributes: { title: "The robot and its camera are simulated" } });
+    const { head, note } = panelHead("Camera", source);
     const image = element("img", { attributes: { alt: "What the camera at the tool sees" } });
     const overlay = svg("svg", { role: "group", "aria-label": "Pruning points in the image" });
     const empty = element("p", { class: "empty", text: "Waiting for the first image…", attributes: { role: "status" } });
@@ -53,6 +54,7 @@ class RpCamera extends HTMLElement {
       if (!words && frameAt > 0 && age > OLD_MS) words = `image ${ageWords(age / 1000)} old`;
       setText(note, words);
       this.classList.toggle("stale", words !== "");
+      setText(source, pageState.get()?.bridge?.kind === "sim" ? "simulation" : "");
     });
 
     /** @type {Map<string, SVGGElement>} */

@@ -4,7 +4,7 @@ import { element, setText } from "../element.js";
 import { icon } from "../icons.js";
 import { log } from "../state.js";
 import { drawOn } from "../store.js";
-import { clockWords } from "../words.js";
+import { clockWords, inWords } from "../words.js";
 
 /** @typedef {import("../messages.js").PageEvent} PageEvent */
 
@@ -71,7 +71,7 @@ function lineRow(line) {
     element("time", { text: clockWords(line.wall_time) }),
     element("span", { class: "severity", attributes: { title: line.severity } }, icon(line.severity), line.severity),
     element("span", { class: "process", text: line.process }),
-    element("span", { class: "text", text: line.text }),
+    element("span", { class: "text", text: inWords(line.text) }),
   );
 }
 customElements.define("rp-log", RpLog);

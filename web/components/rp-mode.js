@@ -4,7 +4,7 @@ import { element, setText } from "../element.js";
 import { setIcon } from "../icons.js";
 import { isLive, link, now, pageState } from "../state.js";
 import { drawOn } from "../store.js";
-import { MODE_WORDS, PHASE_WORDS } from "../words.js";
+import { MODE_WORDS, PHASE_WORDS, inWords } from "../words.js";
 
 class RpMode extends HTMLElement {
   connectedCallback() {
@@ -23,8 +23,8 @@ class RpMode extends HTMLElement {
       setIcon(shape, mode || "UNKNOWN");
       const phase = controller ? PHASE_WORDS[controller.phase] : "";
       setText(word, controller ? MODE_WORDS[controller.mode] + (phase ? ` · ${phase}` : "") : "No state yet");
-      setText(reason, controller?.reason ?? "");
-      reason.title = controller?.reason ?? "";
+      setText(reason, inWords(controller?.reason ?? ""));
+      reason.title = reason.textContent ?? "";
     });
   }
 }

@@ -6,7 +6,7 @@ import { element, setEnabled, setText } from "../element.js";
 import { icon, setIcon } from "../icons.js";
 import { pageState, selected } from "../state.js";
 import { select } from "../teleoperation.js";
-import { POINT_WORDS, counted } from "../words.js";
+import { POINT_WORDS, counted, inWords } from "../words.js";
 
 /** @typedef {import("../messages.js").PagePoint} PagePoint */
 /** @typedef {import("../messages.js").PointState} PointState */
@@ -107,7 +107,7 @@ export class RpPoint extends HTMLElement {
     setText(this.facts, `${point.nodes_kept}/${point.nodes_seen} nodes · ${thick} · ${sure}`);
     const kept = `Keeps ${point.nodes_kept} of ${counted(point.nodes_seen, "node")}`;
     this.facts.title = `${kept}; the cane is ${thick} thick; confidence ${sure}`;
-    setText(this.reason, [entry.reason, point.reason].filter(Boolean).join(" · "));
+    setText(this.reason, inWords([entry.reason, point.reason].filter(Boolean).join(" · ")));
     this.reason.title = this.reason.textContent ?? "";
     setEnabled(this.acceptButton, whyNotAccept(row), "Accept this cut (A)");
     setEnabled(this.rejectButton, whyNotReject(row), "Reject this cut (R)");

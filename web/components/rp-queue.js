@@ -15,7 +15,8 @@ const THRESHOLDS = Object.freeze([0, 0.5, 0.7, 0.9]);
 
 class RpQueue extends HTMLElement {
   connectedCallback() {
-    const { head, note } = panelHead("Pruning points");
+    const source = element("span", { class: "tag", attributes: { title: "What tells cane, node and post apart in the image" } });
+    const { head, note } = panelHead("Pruning points", source);
     const summary = element("p", { class: "summary number" });
     const list = element("div", { class: "groups", attributes: { "aria-label": "Pruning points" } });
     const empty = element("div", { class: "empty", attributes: { role: "status" } });
@@ -35,6 +36,7 @@ class RpQueue extends HTMLElement {
       setText(note, words);
       this.classList.toggle("stale", words !== "");
       setText(summary, summaryWords(rows));
+      setText(source, page?.segmenter ?? "");
       setText(empty, emptyWords());
       empty.hidden = rows.length > 0;
       abstained.show(page?.abstained ?? []);

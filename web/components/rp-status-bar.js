@@ -75,7 +75,7 @@ class RpStatusBar extends HTMLElement {
       setText(role, state && state.role !== state.user ? `· ${state.role}` : "");
       name.title = state ? `${state.viewers} page${state.viewers === 1 ? "" : "s"} open now` : "";
     });
-    return element("div", { class: "person" }, name, role, leave);
+    return element("div", { class: "person" }, name, role, document.createElement("rp-invite"), leave);
   }
 }
 customElements.define("rp-status-bar", RpStatusBar);

@@ -32,8 +32,7 @@ class RpStopBanner extends HTMLElement {
       if (await ask("Reset", "/api/reset", { reason: reason.value.trim() })) reason.value = "";
     });
     this.append(
-      element("div", { class: "banner-head" }, icon("ESTOP_LATCHED"), element("h2", { text: "Software stop" })),
-      who,
+      element("div", { class: "banner-head" }, icon("ESTOP_LATCHED"), element("h2", { text: "Software stop" }), who),
       element("ul", { class: "acknowledgements" }, bridge.row, controller.row),
       form,
       element("p", { class: "hint", text: "The reset moves nothing: arm and start again afterwards." }),

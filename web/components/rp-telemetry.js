@@ -1,15 +1,17 @@
 // How well the robot does: tracking, distance to its limits, and whether the computer keeps up.
 
-import { panelHead, setText } from "../element.js";
+import { element, panelHead, setText } from "../element.js";
 import { isLive, link, now, pageState, staleWords } from "../state.js";
 import { drawOn } from "../store.js";
-import { degrees, millimetres } from "../words.js";
+import { counted, degrees, millimetres } from "../words.js";
 import { BaseSpeed } from "../base-speed.js";
 import { RpGauge } from "./rp-gauge.js";
 
 /** @typedef {import("../messages.js").PageState} PageState */
 /** @typedef {import("./rp-gauge.js").GaugeKind & { read: (state: PageState) => number|null }} Reading */
 
+/** What an operator need not read, behind a disclosure. */
+const ENGINEERING = new Set(["manipulability", "tick", "late-ticks"]);
 const DEGREE = 180 / Math.PI;
 const speed = new BaseSpeed();
 
@@ -98,13 +100,16 @@ const READINGS = Object.freeze([
 class RpTelemetry extends HTMLElement {
   connectedCallback() {
     const { head, note } = panelHead("Telemetry");
+    const title = element("summary");
+    const engineers = element("details", { class: "engineers" }, title);
     this.append(head);
     const gauges = READINGS.map((reading) => {
       const gauge = new RpGauge();
       gauge.begin(reading);
-      this.append(gauge);
+      (ENGINEERING.has(reading.id) ? engineers : this).append(gauge);
       return gauge;
     });
+    this.append(engineers);
     /** @type {(number|null)[]} */
     let values = READINGS.map(() => null);
     drawOn([pageState], () => {
@@ -112,6 +117,8 @@ class RpTelemetry extends HTMLElement {
       if (state === null) return;
       values = READINGS.map((reading) => reading.read(state));
       values.forEach((value, index) => gauges[index]?.show(value));
+      const warnings = gauges.filter((gauge) => gauge.parentElement === engineers && gauge.dataset.warning).length;
+      setText(title, `For engineers${warnings > 0 ? ` · ${counted(warnings, "warning")}` : ""}`);
     });
     drawOn([now, link], () => {
       const words = staleWords("bridge", "controller");
@@ -121,6 +128,7 @@ class RpTelemetry extends HTMLElement {
       gauges.forEach((gauge, index) => gauge.remember(live ? (values[index] ?? null) : null));
     });
     gauges.forEach((gauge) => gauge.show(null));
+    setText(title, "For engineers");
   }
 }
 

@@ -4,6 +4,7 @@ import { element } from "../element.js";
 import { icon } from "../icons.js";
 import { dismissToast, toasts } from "../state.js";
 import { drawOn } from "../store.js";
+import { inWords } from "../words.js";
 
 class RpToasts extends HTMLElement {
   connectedCallback() {
@@ -30,7 +31,7 @@ class RpToasts extends HTMLElement {
           "div",
           { class: "toast", data: { severity: toast.severity } },
           icon(toast.severity),
-          element("span", { text: toast.text }),
+          element("span", { text: inWords(toast.text) }),
           close,
         );
         shown.set(toast.id, node);

@@ -1,0 +1,55 @@
+"""The operator's page in a real browser, with a server that the test plays: fixtures of every test of the page."""
+
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+from operator_page import FLAGS
+from played_server import ORIGIN, PlayedServer, point
+from playwright.sync_api import Browser, Page, expect, sync_playwright
+
+
+@pytest.fixture(scope="module")
+def browser(chromium_path: str) -> Iterator[Browser]:
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=chromium_path, args=list(FLAGS))
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture
+def server() -> PlayedServer:
+    return PlayedServer(
+        points=(
+            point(1, "PROPOSED"),
+            point(2, "ACCEPTED", user="Ada", reason="accepted by Ada"),
+            point(3, "DONE", spur=2, cut_id="c1"),
+        ),
+        abstained=("vine 1, spur 3: no node seen above the cordon",),
+    )
+
+
+@pytest.fixture
+def page(browser: Browser, server: PlayedServer) -> Iterator[Page]:
+    context = browser.new_context(viewport={"width": 1280, "height": 800}, locale="en-US")
+    page = context.new_page()
+    problems: list[str] = []
+    page.on("pageerror", lambda error: problems.append(str(error)))
+    page.on(
+        "console",
+        lambda message: problems.append(message.text) if "Content Security Policy" in message.text else None,
+    )
+    server.attach(page)
+    page.goto(f"{ORIGIN}/")
+    expect(page.locator("#mode")).to_have_attribute("data-mode", "READY")
+    expect(page.locator("rp-scene iframe")).to_have_class("loaded")
+    yield page
+    context.close()
+    assert problems == []
+
+
+def until(page: Page, condition: Callable[[], bool], seconds: float = 5.0) -> None:
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, "it did not happen in time"
+        page.wait_for_timeout(20)

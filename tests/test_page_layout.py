@@ -1,0 +1,83 @@
+"""Where things are on the page, on screens of every size."""
+
+import json
+
+import pytest
+from played_page import until
+from played_server import PlayedServer, bridge, controller, point
+from playwright.sync_api import Page, expect
+
+from rolling_panda.resources import resource
+
+pytestmark = pytest.mark.browser
+
+
+@pytest.mark.parametrize("size", [(1280, 800), (1024, 768), (820, 1180)])
+def test_fits_the_screen_with_the_stop_on_top(page: Page, server: PlayedServer, size: tuple[int, int]) -> None:
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    server.bridge = bridge(stop_id="s1", stopped_by="Ada: stop button")
+    server.controller = controller("ESTOP_LATCHED")
+    expect(page.locator("rp-stop-banner")).to_be_visible()
+    leave, stop = page.locator("#sign-out").bounding_box(), page.locator("#stop").bounding_box()
+    assert leave is not None and stop is not None
+    assert leave["x"] + leave["width"] <= stop["x"]
+    overflow = page.evaluate("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]")
+    assert overflow[0] <= size[0]
+    assert overflow[1] <= size[1]
+    view = page.locator("rp-scene").bounding_box()
+    assert view is not None
+    assert min(view["width"], view["height"]) >= 300, "there is room to see the robot"
+    banner = page.locator("rp-stop-banner").bounding_box()
+    assert banner is not None
+    assert banner["y"] >= view["y"] + view["height"] / 2, "the tool stays in view"
+    assert banner["y"] + banner["height"] <= view["y"] + view["height"]
+    for button in page.locator("button:visible").all():
+        assert button.evaluate("each => each.scrollWidth <= each.clientWidth"), f"{button} is cut off"
+    for selector in ("#stop", "#arm", "#start", "#pause", "#resume", "#home", "#acknowledge", "#teleop", "#hold"):
+        box = page.locator(selector).bounding_box()
+        assert box is not None
+        assert box["height"] >= 44
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= size[0]
+        middle = [box["x"] + box["width"] / 2, box["y"] + box["height"] / 2]
+        top = page.evaluate("([x, y]) => document.elementFromPoint(x, y)?.closest('button')?.id", middle)
+        assert f"#{top}" == selector, "nothing lies over it"
+
+
+def test_the_queue_has_room_for_five_points_on_a_small_screen(page: Page, server: PlayedServer) -> None:
+    server.points = tuple(point(number, "PROPOSED", spur=number) for number in range(1, 12))
+    server.tell(server.page_points())
+    fifth, list_ = page.locator("rp-point").nth(4).bounding_box(), page.locator(".groups").bounding_box()
+    assert fifth is not None and list_ is not None
+    assert fifth["y"] + fifth["height"] <= list_["y"] + list_["height"]
+
+
+def test_a_telephone_scrolls_one_column_and_keeps_the_stop(page: Page, server: PlayedServer) -> None:
+    page.set_viewport_size({"width": 390, "height": 844})
+    server.bridge = bridge(stop_id="s1", stopped_by="Ada: stop button")
+    for part in ("#start", "#reset", "#hold", "#accept-all", "rp-gauge >> nth=0", "#log-filter"):
+        page.locator(part).scroll_into_view_if_needed()
+        box = page.locator(part).bounding_box()
+        assert box is not None and box["x"] >= 0 and box["x"] + box["width"] <= 390, part
+        stop = page.locator("#stop").bounding_box()
+        assert stop is not None and stop["y"] >= 0 and stop["y"] + stop["height"] <= 844
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    page.locator("#stop").click()
+    until(page, lambda: len(server.stops()) == 1)
+
+
+def test_the_page_is_small_and_keeps_to_its_own_files() -> None:
+    folder = resource("web/index.html").parent
+    scripts = [*folder.glob("*.js"), *folder.glob("components/*.js")]
+    assert sum(script.stat().st_size for script in scripts) < 150_000
+    for file in [*scripts, *folder.glob("*.css"), *folder.glob("*.html")]:
+        text = file.read_text(encoding="utf-8")
+        assert len(text.splitlines()) <= 400, file.name
+        assert "innerHTML" not in text
+        assert "https://" not in text
+    for html in folder.glob("*.html"):
+        text = html.read_text(encoding="utf-8")
+        assert " style=" not in text
+        assert "<style" not in text
+        assert text.count("<script") == text.count(' src="')
+    assert json.loads((folder / "jsconfig.json").read_text(encoding="utf-8"))["compilerOptions"]["strict"] is True

@@ -1,0 +1,95 @@
+// A supervisor makes a single-use sign-in link for somebody else, or for a script.
+
+import { post } from "../api.js";
+import { element, setText } from "../element.js";
+import { pageState } from "../state.js";
+import { drawOn } from "../store.js";
+
+/** @type {readonly (readonly [role: import("../messages.js").Role, may: string])[]} */
+const ROLES = Object.freeze([
+  ["viewer", "looks, and may stop the robot"],
+  ["operator", "moves the robot"],
+  ["supervisor", "also resets a stop, and invites"],
+]);
+
+class RpInvite extends HTMLElement {
+  connectedCallback() {
+    this.hidden = true;
+    const toggle = element("button", {
+      id: "invite",
+      class: "quiet",
+      text: "Invite",
+      attributes: { type: "button", "aria-expanded": "false", "aria-controls": "invitation" },
+    });
+    const user = element("input", {
+      id: "invite-user",
+      attributes: { type: "text", required: "", maxlength: "40", pattern: "[A-Za-z0-9_.\\- ]+", value: "guest", autocomplete: "off" },
+    });
+    const role = element("select", { id: "invite-role" });
+    for (const [name, may] of ROLES) role.append(element("option", { text: `${name}: ${may}`, attributes: { value: name } }));
+    const words = element("p", { class: "hint", attributes: { role: "status" } });
+    const link = element("input", { id: "invite-link", attributes: { type: "text", readonly: "", "aria-label": "Sign-in link" } });
+    const copy = element("button", { id: "invite-copy", text: "Copy", attributes: { type: "button" } });
+    const made = element("div", { class: "invite-made" }, link, copy);
+    const form = element(
+      "form",
+      { id: "invitation", class: "invitation" },
+      element("label", { text: "Name", attributes: { for: "invite-user" } }),
+      user,
+      element("label", { text: "Role", attributes: { for: "invite-role" } }),
+      role,
+      element("button", { id: "invite-make", class: "primary", text: "Make a link" }),
+      words,
+      made,
+    );
+    this.append(toggle, form);
+
+    const show = (/** @type {boolean} */ open) => {
+      form.hidden = !open;
+      toggle.setAttribute("aria-expanded", String(open));
+      // A link that was shown once is not left on the screen.
+      link.value = "";
+      made.hidden = true;
+      setText(words, "A person or a script signs in with it once, within ten minutes.");
+    };
+    show(false);
+    toggle.addEventListener("click", () => {
+      show(form.hidden);
+      if (!form.hidden) user.focus();
+    });
+    this.addEventListener("keydown", (event) => {
+      if (event.key !== "Escape" || form.hidden) return;
+      show(false);
+      toggle.focus();
+    });
+    form.addEventListener("submit", async (event) => {
+      event.preventDefault();
+      const answer = await post("/api/invite", { user: user.value.trim(), role: role.value });
+      if (!answer.ok || !answer.link) {
+        setText(words, `No link was made: ${answer.reason}`);
+        return;
+      }
+      // The server knows its address on its own machine; this page knows the one that people use.
+      const path = new URL(answer.link);
+      link.value = `${location.origin}${path.pathname}${path.search}`;
+      made.hidden = false;
+      setText(words, `For ${user.value.trim()}, ${role.value}: signs in once, within ten minutes.`);
+      link.select();
+    });
+    copy.addEventListener("click", async () => {
+      link.select();
+      try {
+        await navigator.clipboard.writeText(link.value);
+        setText(words, "Copied.");
+      } catch {
+        setText(words, "The browser does not let a page copy here: press Ctrl+C.");
+      }
+    });
+    drawOn([pageState], () => {
+      const may = pageState.get()?.role === "supervisor";
+      if (this.hidden === may) this.hidden = !may;
+      if (!may && !form.hidden) show(false);
+    });
+  }
+}
+customElements.define("rp-invite", RpInvite);
