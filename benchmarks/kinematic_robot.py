@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+import msgspec
 import numpy as np
 
 from controller.core import Controller
@@ -94,12 +95,15 @@ class KinematicRobot:
             bridge=Sample(self._bridge(), self.now),
             points=self._points,
             obstacles=self._around(),
-            teleop=None if self.teleop is None else Sample(self.teleop, self.now),
+            teleop=None if self.teleop is None else Sample(self._renewed(self.teleop), self.now),
             server_seen=seen,
             perception_seen=seen,
             present=present,
             stops=stops,
         )
+
+    def _renewed(self, teleop: TeleopTarget) -> TeleopTarget:
+        return msgspec.structs.replace(teleop, sequence=round(self.now / self.dt))
 
     def _around(self) -> Sample[Obstacles] | None:
         if not self.obstacles:

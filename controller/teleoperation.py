@@ -20,6 +20,7 @@ class Teleoperation:
         """Bind the parts."""
         self._config, self._follower, self._drive = config, follower, drive
         self._posture: Array = np.concatenate([[0.0, 0.0, config.row_heading, 0.0, 0.0], config.reach])
+        self._newest: Sample[TeleopTarget] | None = None
         self._message: TeleopTarget | None = None
         self._goal: Any = None
         self.pressed = True
@@ -27,11 +28,11 @@ class Teleoperation:
 
     def holding(self, teleop: Sample[TeleopTarget] | None, now: float) -> bool:
         """Whether the operator holds now: the newest demand says so, is fresh, and is one that can be followed."""
-        held = teleop is not None and teleop.message.hold and now - teleop.at <= self._config.hold_max_age_s
-        if teleop is None or not held:
+        newest = self._take(teleop)
+        if newest is None or not newest.message.hold or now - newest.at > self._config.hold_max_age_s:
             self.pressed = True
             return False
-        message = teleop.message
+        message = newest.message
         if message is not self._message:
             self._message, self._goal = message, None
             if message.target is not None:
@@ -41,6 +42,20 @@ class Teleoperation:
                     self._message = None
         self.user = message.user
         return self._message is not None and _means_something(message)
+
+    def _take(self, teleop: Sample[TeleopTarget] | None) -> Sample[TeleopTarget] | None:
+        """The newest demand by its number; one that comes late or twice counts for nothing.
+
+        After a silence that has ended the hold any number is taken: a server that has started again counts from one.
+        """
+        last = self._newest
+        if teleop is not None and (
+            last is None
+            or teleop.message.sequence > last.message.sequence
+            or teleop.at - last.at > self._config.hold_max_age_s
+        ):
+            self._newest = teleop
+        return self._newest
 
     def refuse(self) -> None:
         """What is held now counts no more; it must be released first."""

@@ -27,7 +27,7 @@ class TeleopTarget(Message, frozen=True, kw_only=True):
     alone turns joints with the base still.
 
     Attributes:
-        sequence: Strictly increasing within a hold.
+        sequence: Strictly increasing; one that is not above the last is refused until the hold has ended by silence.
         hold: False ends the hold at once; silence ends it too.
         user: Who holds.
         target: Desired T_odom_tool in odom.

@@ -62,7 +62,7 @@ class Desk:
     pages: set["Listener"] = field(default_factory=set)
     state: PageState | None = None
     points: PagePoints | None = None
-    _made_at: deque[tuple[int, float]] = field(default_factory=lambda: deque(maxlen=100))
+    _seen_at: deque[tuple[int, float]] = field(default_factory=lambda: deque(maxlen=100))
     _refused_holds: dict[str, str] = field(default_factory=dict)
 
     def note(self, severity: m.Severity, text: str) -> None:
@@ -71,22 +71,23 @@ class Desk:
         self.link.event(severity, text, time.monotonic())
 
     def made_state(self, state: PageState, now: float) -> None:
-        """A new state goes out to the pages."""
+        """A new state goes out to the pages; who draws it sees the robot as it was when its posture was measured."""
         self.state = state
-        self._made_at.append((state.number, now))
+        posture = self.link.posture(now)
+        self._seen_at.append((state.number, float("-inf") if posture is None else now - posture.age_s))
 
     def drew(self, session: Session, number: int) -> None:
         """A page of this session has drawn state `number`."""
-        for known, made_at in reversed(self._made_at):
+        for known, seen_at in reversed(self._seen_at):
             if known == number:
-                self.teleop.drew(session.session_id, made_at)
+                self.teleop.drew(session.session_id, seen_at)
                 return
 
     def fetched(self, session: Session, now: float) -> None:
         """A script has fetched the state that was made last."""
         session.looked_at = now
-        if self._made_at:
-            self.teleop.drew(session.session_id, self._made_at[-1][1])
+        if self._seen_at:
+            self.teleop.drew(session.session_id, self._seen_at[-1][1])
 
     async def ask(self, session: Session, intent: intents.Intent) -> Result:
         """Ask the controller, which logs what it does or why it refuses."""

@@ -50,9 +50,9 @@ class TeleopHold:
         """Key of who holds now."""
         return None if self._hold is None else self._hold.holder
 
-    def drew(self, holder: str, state_made_at: float) -> None:
-        """`holder` has drawn the state that was made at this time (s)."""
-        self._drawn_at[holder] = state_made_at
+    def drew(self, holder: str, seen_at: float) -> None:
+        """`holder` has drawn the robot in the posture that was measured at this time (s)."""
+        self._drawn_at[holder] = seen_at
 
     def aim(self, holder: str, target: m.Pose) -> None:
         """Set where this holder's gizmo is; the newest wins."""

@@ -1,9 +1,12 @@
 """A wire in memory for tests of the server: what is published can be read back, and services answer as told."""
 
+import threading
 import time
 from collections import defaultdict
+from contextlib import contextmanager
 
 from rolling_panda import messages as m
+from rolling_panda import topics
 from rolling_panda.transport import Feed, Slot
 
 
@@ -91,3 +94,24 @@ def pruning_point(point_id="p1", revision=3, position=(0.3, 0.85, 1.0)):
 
 def pruning_points(*points, canes=()):
     return m.PruningPoints(header=HEADER, segmenter="test", frames=1, points=points, canes=canes)
+
+
+@contextmanager
+def telling(wire):
+    """The robot says where it is, often, until the event that this yields is set."""
+    silent = threading.Event()
+
+    def tell():
+        while True:
+            wire.deliver(topics.JOINTS, joints())
+            wire.deliver(topics.ODOMETRY, odometry())
+            if silent.wait(0.02):
+                return
+
+    thread = threading.Thread(target=tell)
+    thread.start()
+    try:
+        yield silent
+    finally:
+        silent.set()
+        thread.join()

@@ -1,5 +1,6 @@
 import json
 import threading
+import time
 
 import msgspec
 import pytest
@@ -11,6 +12,7 @@ from fake_wire import (
     odometry,
     pruning_point,
     pruning_points,
+    telling,
 )
 from running_server import eventually, running_server
 
@@ -33,6 +35,13 @@ def server(running):
         sent.clear()
     running.wire.answer = lambda request: m.Answer(ok=True, reason="done")
     return running
+
+
+@pytest.fixture
+def robot(server):
+    """A robot that says where it is until this is set."""
+    with telling(server.wire) as silent:
+        yield silent
 
 
 @pytest.fixture
@@ -239,24 +248,36 @@ def test_state_and_points_are_what_the_robot_said_last(server, client):
     assert [(row["point"]["point_id"], row["entry"]["state"]) for row in rows] == [("p9", "ACCEPTED")]
 
 
-def test_a_script_can_move_the_tool_only_while_it_looks(server, client):
+def test_a_script_can_move_the_tool_only_while_it_looks(server, robot, client):
     target = {"position": [0.3, 0.5, 1.0], "quat_xyzw": [0, 0, 0, 1]}
-    assert client.post("/api/teleop", json={"hold": True, "target": target}).status_code == 409
-    eventually(lambda: client.get("/api/state").status_code == 200)
-    assert client.post("/api/teleop", json={"hold": True, "target": target}).status_code == 200
+
+    def asked():
+        return client.post("/api/teleop", json={"hold": True, "target": target}).status_code
+
+    assert asked() == 409
+    eventually(lambda: client.get("/api/state").json()["base"] and asked() == 200)
     sent = server.wire.sent[topics.TELEOP.name]
     eventually(lambda: any(message.hold for message in sent))
     assert {message.target.position for message in sent if message.hold} == {(0.3, 0.5, 1.0)}
     eventually(lambda: not sent[-1].hold)
 
 
-def test_base_and_joints_can_be_moved_too_but_not_together(server, client):
+def test_a_script_that_fetches_the_state_of_a_silent_robot_may_not_hold(server, robot, client):
+    eventually(lambda: client.get("/api/state").json()["base"])
+    robot.set()
+    time.sleep(0.7)
+    client.get("/api/state")
+    answer = client.post("/api/teleop", json={"hold": True, "base": {"linear": 0.1, "angular": 0.0}})
+    assert answer.status_code == 409 and "not current" in answer.json()["reason"]
+
+
+def test_base_and_joints_can_be_moved_too_but_not_together(server, robot, client):
     sent = server.wire.sent[topics.TELEOP.name]
 
     def moving(**wanted):
         client.get("/api/state")
-        assert client.post("/api/teleop", json={"hold": True, **wanted}).status_code == 200
-        return sent and sent[-1].hold and sent[-1]
+        taken = client.post("/api/teleop", json={"hold": True, **wanted}).status_code == 200
+        return taken and sent and sent[-1].hold and sent[-1]
 
     base = eventually(lambda: moving(base={"linear": 0.1, "angular": -0.2}))
     assert (base.target, base.base, base.joints) == (None, BaseVelocity(0.1, -0.2), None)
@@ -268,7 +289,7 @@ def test_base_and_joints_can_be_moved_too_but_not_together(server, client):
     assert client.post("/api/teleop", json=fast).status_code == 422
 
 
-def test_letting_go_by_rest_ends_the_hold(server, client):
+def test_letting_go_by_rest_ends_the_hold(server, robot, client):
     target = {"position": [0.3, 0.5, 1.0], "quat_xyzw": [0, 0, 0, 1]}
     sent = server.wire.sent[topics.TELEOP.name]
 

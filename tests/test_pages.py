@@ -6,10 +6,9 @@ from fake_wire import (
     HEADER,
     FakeWire,
     controller_state,
-    joints,
-    odometry,
     pruning_point,
     pruning_points,
+    telling,
 )
 from running_server import PATIENCE_S, eventually, running_server
 from websockets.exceptions import ConnectionClosed
@@ -23,9 +22,7 @@ from server.config import ServerConfig
 @pytest.fixture(scope="module")
 def server():
     wire = FakeWire()
-    with running_server(wire) as running:
-        wire.deliver(topics.JOINTS, joints())
-        wire.deliver(topics.ODOMETRY, odometry())
+    with running_server(wire) as running, telling(wire):
         yield running
 
 
@@ -82,9 +79,14 @@ class Page:
         """Hold, as a page does with a pressed button, until the server has told the robot so."""
 
         def told():
-            self.look()
-            self.hold(True)
-            return any(message.hold for message in sent)
+            for _ in range(10):
+                self.look()
+                self.hold(True)
+                if any(message.hold for message in sent):
+                    return True
+            # Refused, since this machine has paused for longer than a view may be old: press anew.
+            self.hold(False)
+            return False
 
         eventually(told)
 
@@ -93,7 +95,8 @@ class Page:
         self.say("Hold", sequence=self.sequence, hold=hold)
 
     def look(self):
-        self.hear("PageState")
+        while self.hear("PageState")["base"] is None:
+            pass
         self.say("Ping", number=1, rendered=self.rendered)
         self.hear("Pong")
 
@@ -177,10 +180,10 @@ def test_the_tool_follows_while_the_page_holds_and_stops_when_it_falls_silent(se
 def late_page():
     """A page whose late renewal itself is what ends its hold, so seldom does the server look by itself."""
     wire = FakeWire()
-    with running_server(wire, ServerConfig(teleop_rate_hz=0.2)) as server, server.client(user="ann") as client:
-        wire.deliver(topics.JOINTS, joints())
-        wire.deliver(topics.ODOMETRY, odometry())
+    config = ServerConfig(teleop_rate_hz=0.2)
+    with running_server(wire, config) as server, telling(wire) as silent, server.client(user="ann") as client:
         with Page(server, client) as page:
+            page.robot_silent = silent
             page.look()
             page.say("ShowGizmo", visible=True)
             page.hold(True)
@@ -213,6 +216,16 @@ def test_a_hold_that_paused_for_long_is_over_until_it_is_pressed_anew(late_page)
     late_page.hold(True)
     late_page.hear_event("ann holds the tool")
     assert sum("not renewed" in text for text in late_page.told()) == 1
+
+
+def test_a_page_that_draws_a_robot_that_has_fallen_silent_may_not_hold(late_page):
+    late_page.robot_silent.set()
+    time.sleep(0.7)
+    late_page.hold(False)
+    for _ in range(3):
+        late_page.look()
+    late_page.hold(True)
+    assert "not current" in late_page.hear("HoldEnded")["reason"]
 
 
 def test_letting_go_is_said_at_once(server, page):

@@ -9,6 +9,7 @@ from benchmarks.kinematic_robot import KinematicRobot
 from controller.config import ControllerConfig
 from controller.core import Controller
 from controller.interface import Sample
+from controller.teleoperation import Teleoperation
 from rolling_panda import intents
 from rolling_panda.config import RobotConfig
 from rolling_panda.robot_model import pose_message
@@ -95,6 +96,23 @@ def test_silence_ends_the_hold(monkeypatch):
     r.run(0.5)
     assert r.state.mode == "READY"
     assert np.abs(r.xi).max() < 1e-3
+
+
+def test_a_demand_that_comes_late_or_twice_counts_for_nothing():
+    teleoperation, age = Teleoperation(CONFIG, None, None), CONFIG.hold_max_age_s
+
+    def holding(sequence, at, hold=True, now=None):
+        message = TeleopTarget(sequence=sequence, hold=hold, user="ada", base=BaseVelocity(0.1, 0.0))
+        return teleoperation.holding(Sample(message, at), at if now is None else now)
+
+    assert holding(5, 1.0)
+    assert not holding(6, 1.0 + 0.2 * age, hold=False)
+    assert not holding(5, 1.0 + 0.3 * age), "older than the release"
+    assert not holding(6, 1.0 + 0.4 * age), "of the same number as the release"
+    assert holding(7, 2.0)
+    assert holding(7, 2.0 + 0.9 * age)
+    assert not holding(7, 2.0 + 0.9 * age, now=2.0 + 1.1 * age), "a repetition keeps nothing alive"
+    assert holding(1, 3.0), "the server has started again"
 
 
 def test_a_hold_from_before_arming_moves_nothing():

@@ -64,11 +64,23 @@ export function setText(node, text) {
  * @param {string} [hint] What it does, shown while it may be pressed.
  */
 export function setEnabled(button, why, hint = "") {
-  button.setAttribute("aria-disabled", String(why !== ""));
   const words = why || hint;
-  if (button.title !== words) button.title = words;
-  if (words) button.setAttribute("aria-description", words);
-  else button.removeAttribute("aria-description");
+  setAttribute(button, "aria-disabled", String(why !== ""));
+  setAttribute(button, "title", words);
+  setAttribute(button, "aria-description", words);
+}
+
+/**
+ * Change an attribute only when it differs: states come twenty times a second, and each change is work for the browser.
+ *
+ * @param {Element} node
+ * @param {string} name
+ * @param {string} value Empty removes it.
+ */
+function setAttribute(node, name, value) {
+  if ((node.getAttribute(name) ?? "") === value) return;
+  if (value) node.setAttribute(name, value);
+  else node.removeAttribute(name);
 }
 
 /**
