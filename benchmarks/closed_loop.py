@@ -19,6 +19,8 @@ from controller.core import Controller
 from controller.estimate import configuration_now
 from controller.interface import Inputs, Outputs, Sample
 from controller.motion import Tracking
+from controller.planning.cuts import CutPlanner
+from controller.work_plan import WorkPlan
 from perception.config import PerceptionConfig
 from perception.pipeline import Perception
 from perception.segmenter import LabelImageSegmenter
@@ -33,6 +35,8 @@ from rolling_panda.row_messages import Obstacles
 _CONTROL_TICKS = 10
 # A frame takes perception about this long, so its points come later by as much.
 _PERCEPTION_S = 0.15
+# A plan of some points takes about this long.
+_PLANNING_S = 1.0
 
 
 class ClosedLoop:
@@ -45,6 +49,7 @@ class ClosedLoop:
         config_path: Path | None = None,
         method: str | None = None,
         watch: Callable[["ClosedLoop", Tracking], None] | None = None,
+        plans: bool = True,
     ) -> None:
         """Grow the row and stand the robot beside it.
 
@@ -53,6 +58,7 @@ class ClosedLoop:
             trace: File for the record of what was actuated.
             config_path: TOML configuration; None takes the simulation's.
             method: Whole-body method; None takes the configured one.
+            plans: False leaves the session's plan away.
             watch: Called after each control period in which the tool follows a trajectory.
         """
         path = config_path or resource("assets/config/sim.toml")
@@ -64,6 +70,8 @@ class ClosedLoop:
         self.controller = Controller(config, robot)
         self._drive = RobotModel(robot).drive
         self._watch = watch
+        self._planner = CutPlanner(config, robot) if plans else None
+        self._planned: tuple[float, WorkPlan] | None = None
         self.perception = Perception(load_section(path, "perception", PerceptionConfig), LabelImageSegmenter())
         self.now = 0.0
         self.inputs = Inputs(present=frozenset(m.PROCESSES))
@@ -165,4 +173,8 @@ class ClosedLoop:
             self.bridge.on_release(outputs.release, self.now)
         if outputs.state is not None:
             self.state = outputs.state
+        if outputs.request is not None and self._planner is not None:
+            self._planned = self.now + _PLANNING_S, self._planner.plan(outputs.request)
+        if self._planned is not None and self.now >= self._planned[0]:
+            self.inputs, self._planned = replace(self.inputs, plan=self._planned[1]), None
         self.events.extend(outputs.events)

@@ -36,7 +36,7 @@ from rolling_panda.resources import resource
 RIGHT_PLACE = 0.010
 _ENDED: tuple[m.PointState, ...] = ("DONE", "FAILED_NOT_CUT", "UNKNOWN")
 _SURVEY_S = 6.0
-_LIMIT_S = 120.0
+_LOOK_S, _LIMIT_S = 3.0, 120.0
 #: Periods between two looks at what touches a cane.
 _LOOK_EVERY = 4
 
@@ -103,7 +103,7 @@ class RowRun:
     canes_touched: dict[str, str]
 
 
-def cut_row(seed: int, points: int, method: str) -> RowRun:
+def cut_row(seed: int, points: int, method: str, plans: bool = True) -> RowRun:
     """Survey from the start posture, accept up to `points` of what was detected, work through them.
 
     A refused acceptance is not among the cuts, as an operator sees the refusal.
@@ -124,7 +124,7 @@ def cut_row(seed: int, points: int, method: str) -> RowRun:
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "trace"
-        with ClosedLoop(seed, path, method=method, watch=watch) as loop:
+        with ClosedLoop(seed, path, method=method, watch=watch, plans=plans) as loop:
             accepted = _accept(loop, points)
             loop.ask(intents.Start(user="bench"))
             begin = loop.now
@@ -186,6 +186,8 @@ def _accept(loop: ClosedLoop, points: int) -> list[m.QueueEntry]:
     accepted = list(loop.queue("ACCEPTED"))
     for entry in accepted[points:]:
         loop.ask(intents.RejectPoint(user="bench", point_id=entry.point_id, reason="not in this run"))
+    # An operator looks at the queue, with or without a plan, before starting.
+    loop.run(_LOOK_S)
     return accepted[:points]
 
 
@@ -221,6 +223,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         help="whole-body method; may be given several times (default: all of them)",
     )
     parser.add_argument("--stages", action="store_true", help="say where the time of a cut goes")
+    parser.add_argument("--no-plan", action="store_true", help="work along the row without the session's plan")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows and the summary here")
     parser.add_argument("--plot", type=Path, metavar="FILE", help="draw the time of a cut by method and stage (PNG)")
     arguments = parser.parse_args(argv)
@@ -230,7 +233,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     for seed in range(arguments.seed, arguments.seed + arguments.count):
         for method in methods:
             begin = time.perf_counter()
-            run = cut_row(seed, arguments.points, method)
+            run = cut_row(seed, arguments.points, method, not arguments.no_plan)
             runs.append(run)
             _tell(run, (run.work_s + _SURVEY_S) / (time.perf_counter() - begin))
     print()

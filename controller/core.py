@@ -19,6 +19,7 @@ from controller.permission import EVENTS, Situation, allowed, refusal
 from controller.queue import PointQueue
 from controller.reach import PostureSearch
 from controller.report import controller_state
+from controller.session import Session
 from controller.stop_latch import StopLatch
 from controller.surroundings import Surroundings
 from controller.teleoperation import Teleoperation
@@ -26,6 +27,7 @@ from controller.whole_body.collision import CollisionModel
 from controller.whole_body.registry import make_method
 from controller.whole_body.saturation import Saturation
 from controller.whole_body.task import Method
+from controller.work_plan import PlanRequest
 from rolling_panda import intents
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
@@ -66,7 +68,9 @@ class Controller:
         self._queue = PointQueue(config)
         self._clearance = CutClearance(RobotModel(robot_config), config)
         search = PostureSearch(RobotModel(robot_config), config, self._clearance.admits)
-        self._sequence = CutSequence(config, search, self._follower, self._saturation, self._queue, run_id)
+        self._session = Session(self._queue)
+        known = self._session.known
+        self._sequence = CutSequence(config, search, self._follower, self._saturation, self._queue, run_id, known)
         self._teleoperation = Teleoperation(config, self._follower, self._robot.drive)
         self._stops = StopLatch()
         self._operator = Operator(self._queue)
@@ -113,12 +117,13 @@ class Controller:
         xi = self._checked(xi)
         motion = self._motion(xi)
         release = self._stops.release_due()
-        state = None
+        state = plan = request = None
         if now >= self._state_due:
             self._state_due = now + _STATE_S
-            state = self._report(now)
+            request = self._review(now)
+            plan, state = self._session.message(now), self._report(now)
         events, self._events = tuple(self._events), []
-        return Outputs(motion, cut, release, state, events)
+        return Outputs(motion, cut, release, state, events, plan, request)
 
     def answer(self, intent: intents.Intent, now: float) -> m.Answer:
         """Do what an operator asks, or say why not.
@@ -323,6 +328,18 @@ class Controller:
             self._state = replace(self._state, reason="the arm is being brought home")
             return ""
         return self._operator.points(intent)
+
+    def _review(self, now: float) -> PlanRequest | None:
+        """Look after the session's plan."""
+        obstacles = self._inputs.obstacles
+        return self._session.review(
+            made=self._inputs.plan,
+            q=None if self._measured is None else self._measured.q,
+            obstacles=() if obstacles is None else obstacles.message.capsules,
+            at_rest=self._homing is None and self._state.mode != "TELEOP" and not np.any(self._sent),
+            working=self._state.mode == "AUTO",
+            now=now,
+        )
 
     # --- report ------------------------------------------------------------------------------------------------------
 

@@ -19,6 +19,8 @@ class CutClearance:
         """Nothing is known to stand around yet."""
         self._settings = config.hierarchy
         self._surroundings = Surroundings(CollisionModel(robot))
+        #: What the last plan that was looked at lacks, in words; empty where it lacks nothing.
+        self.lacking = ""
 
     def take(self, obstacles: Sample[Obstacles] | None) -> None:
         """Take the newest message; one that was taken before costs nothing."""
@@ -26,13 +28,21 @@ class CutClearance:
 
     def admits(self, plan: CutPlan) -> bool:
         """Whether the robot is far enough from itself and all else at the cut, the stand-off and clear of the canes."""
+        self.lacking = self._nearer(plan) if self._settings.collisions else ""
+        return not self.lacking
+
+    def _nearer(self, plan: CutPlan) -> str:
+        """What is nearer than it may be, in words; empty where nothing is."""
         settings = self._settings
-        if not settings.collisions:
-            return True
         within = settings.collision_distance + _ROOM
-        for q in (plan.q_cut, plan.q_stand_off, plan.q_clear):
+        places = (("at the cut", plan.q_cut), ("at the stand-off", plan.q_stand_off), ("clear of it", plan.q_clear))
+        for where, q in places:
             near = self._surroundings.model.distances(q, within)
             for distance, pair in zip(near.distance.tolist(), near.pairs, strict=True):
-                if distance < settings.kept(pair) + _ROOM:
-                    return False
-        return True
+                needed = settings.kept(pair) + _ROOM
+                if distance < needed:
+                    return (
+                        f"{where} {1e3 * distance:.0f} mm would be between {pair[0]} and {pair[1]}, "
+                        f"{1e3 * needed:.0f} mm are needed"
+                    )
+        return ""

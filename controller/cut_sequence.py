@@ -16,7 +16,7 @@ import pinocchio as pin
 from controller.config import ControllerConfig
 from controller.cut_pose import escape_pose
 from controller.motion import Follower, Measured, Tracking
-from controller.next_cut import NextCut
+from controller.next_cut import Known, NextCut
 from controller.queue import PointQueue
 from controller.reach import CutPlan, PostureSearch, Unreachable
 from controller.tool_motion import Leg, ToolMotion
@@ -96,8 +96,12 @@ class CutSequence:
         saturation: Saturation,
         queue: PointQueue,
         run_id: str,
+        known: Known = lambda _: None,
     ) -> None:
-        """Bind the parts. `run_id` makes the cut ids of this start unlike those of any other."""
+        """Bind the parts.
+
+        `run_id` makes the cut ids of this start unlike those of any other; `known` is what a plan says of a point.
+        """
         self._config, self._follower = config, follower
         self._saturation, self._queue, self._run_id = saturation, queue, run_id
         heading = config.row_heading
@@ -108,7 +112,7 @@ class CutSequence:
         self._motion: ToolMotion | None = None
         self._plan: CutPlan | None = None
         self._accepted: m.PruningPoint | None = None
-        self._coming = NextCut(search, queue, config.search_steps)
+        self._coming = NextCut(search, queue, config.search_steps, known)
         self._forget()
 
     @property

@@ -6,7 +6,7 @@ import numpy as np
 
 from controller.config import ControllerConfig
 from controller.cut_pose import escape_pose
-from controller.motion import ArmMotion, Follower, Measured
+from controller.motion import ArmMotion, Follower, Measured, Tracking
 from controller.tool_motion import Leg, ToolMotion
 from rolling_panda.differential_drive import Array
 from rolling_panda.robot_model import ARM_Q
@@ -48,11 +48,16 @@ class Homing:
             if self._out is not None:
                 tracking = self._follower.follow(self._out, robot)
                 if not tracking.done or tracking.position_error > _CLEAR:
+                    self._wait(tracking.done or tracking.scale < _HELD, tracking)
                     return tracking.xi
             self._in = ArmMotion(self._config, robot.q[ARM_Q].copy(), self._goal)
         tracking = self._in.step(robot, self._follower, self._dt)
-        self._held_s = self._held_s + self._dt if tracking.scale < _HELD else 0.0
-        if self._held_s > _PATIENCE_S:
-            self.blocked = tracking.reason or "something holds the arm back"
+        self._wait(tracking.scale < _HELD, tracking)
         self.done = self._in.done and float(np.abs(robot.q[ARM_Q] - self._goal).max()) < _NEAR
         return tracking.xi
+
+    def _wait(self, held: bool, tracking: Tracking) -> None:
+        """Give up when something has held the arm for long enough."""
+        self._held_s = self._held_s + self._dt if held else 0.0
+        if self._held_s > _PATIENCE_S:
+            self.blocked = tracking.reason or "something holds the arm back"

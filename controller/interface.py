@@ -3,7 +3,9 @@
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+from controller.work_plan import PlanRequest, WorkPlan
 from rolling_panda import messages as m
+from rolling_panda.plan_messages import SessionPlan
 from rolling_panda.row_messages import Obstacles
 from rolling_panda.teleop_messages import TeleopTarget
 
@@ -33,6 +35,7 @@ class Inputs:
         perception_seen: The same of perception.
         present: Processes connected now.
         stops: Stop requests that came in since the last step.
+        plan: Newest answer of the planner.
         tick_s: Median time of one control step, measured by the loop (s).
         ticks: Control periods, counted by the loop.
         late_ticks: Those of them that lasted more than half as long again as they should.
@@ -48,6 +51,7 @@ class Inputs:
     perception_seen: float | None = None
     present: frozenset[str] = frozenset()
     stops: tuple[m.StopRequest, ...] = ()
+    plan: WorkPlan | None = None
     tick_s: float = 0.0
     ticks: int = 0
     late_ticks: int = 0
@@ -55,10 +59,12 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Outputs:
-    """What to send after one step; None or empty where nothing is due."""
+    """What to send after one step; None or empty where nothing is due. `request` goes to the planner."""
 
     motion: m.MotionCommand | None = None
     cut: m.CutCommand | None = None
     release: m.ReleaseStop | None = None
     state: m.ControllerState | None = None
     events: tuple[m.LogEvent, ...] = ()
+    plan: SessionPlan | None = None
+    request: PlanRequest | None = None

@@ -11,6 +11,7 @@ from typing import Generic
 
 from controller.core import Controller
 from controller.interface import Inputs, Outputs, Sample
+from controller.plan_worker import PlanWorker
 from rolling_panda import intents
 from rolling_panda import messages as m
 from rolling_panda.errors import ServiceError
@@ -26,6 +27,7 @@ from rolling_panda.topics import (
     MOTION,
     OBSTACLES,
     ODOMETRY,
+    PLAN,
     POINTS,
     RELEASE,
     STOP,
@@ -60,8 +62,18 @@ class _Newest(Generic[Msg]):
 class Loop:
     """Ties one `Controller` to the wire."""
 
-    def __init__(self, controller: Controller, transport: Transport, rate_hz: float) -> None:
-        """Subscribe and announce; nothing runs before `run`."""
+    def __init__(
+        self, controller: Controller, transport: Transport, rate_hz: float, planner: PlanWorker | None = None
+    ) -> None:
+        """Subscribe and announce; nothing runs before `run`.
+
+        Args:
+            controller: What decides.
+            transport: Open session.
+            rate_hz: Of control.
+            planner: Answers plan requests; without one, work goes on without a plan.
+        """
+        self._planner = planner
         self._controller, self._transport, self._period = controller, transport, 1.0 / rate_hz
         self._clock = LoopClock(time.monotonic(), _LONGEST_TURN * self._period)
         self._joints, self._odometry = self._newest(JOINTS), self._newest(ODOMETRY)
@@ -76,6 +88,7 @@ class Loop:
         transport.serve(INTENT, self._ask)
         self._motion, self._cut = transport.publisher(MOTION), transport.publisher(CUT)
         self._state, self._event = transport.publisher(CONTROLLER), transport.publisher(EVENT)
+        self._plan = transport.publisher(PLAN)
         self._ticks: deque[float] = deque(maxlen=round(rate_hz))
         self._tick_s = 0.0
         self._count = self._late = 0
@@ -94,6 +107,7 @@ class Loop:
             perception_seen=beats["perception"][1] if "perception" in beats else None,
             present=self._transport.present(),
             stops=tuple(stop.message for stop in self._stops.drain()),
+            plan=None if self._planner is None else self._planner.newest,
             tick_s=self._tick_s,
             ticks=self._count,
             late_ticks=self._late,
@@ -110,6 +124,10 @@ class Loop:
         if outputs.state is not None:
             self._state.put(outputs.state)
             self._tick_s = statistics.median(self._ticks) if self._ticks else 0.0
+        if outputs.request is not None and self._planner is not None:
+            self._planner.ask(outputs.request)
+        if outputs.plan is not None:
+            self._plan.put(outputs.plan)
         for event in outputs.events:
             self._event.put(event)
 

@@ -1,6 +1,6 @@
 """Looks ahead: which accepted point comes next, and a posture to cut it from, found a few iterations a period."""
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 
 import numpy as np
 
@@ -9,13 +9,24 @@ from controller.reach import CutPlan, PostureSearch, Unreachable
 from rolling_panda.differential_drive import Array
 from rolling_panda.messages import PruningPoint
 
+Known = Callable[[Ticket], CutPlan | Unreachable | None]
+
 
 class NextCut:
     """The search for one point's plan. `look` for the next point, `step` each period, read `found`."""
 
-    def __init__(self, search: PostureSearch, queue: PointQueue, iterations: int) -> None:
-        """Look at nothing yet; `iterations` of the search are done a period."""
-        self._search, self._queue, self._iterations = search, queue, iterations
+    def __init__(
+        self, search: PostureSearch, queue: PointQueue, iterations: int, known: Known = lambda _: None
+    ) -> None:
+        """Look at nothing yet.
+
+        Args:
+            search: Of postures.
+            queue: Says which point is next.
+            iterations: Of the search in one period.
+            known: What a plan says of a ticket's point, which is then not searched for.
+        """
+        self._search, self._queue, self._iterations, self._known = search, queue, iterations, known
         self.forget()
 
     def forget(self) -> None:
@@ -45,7 +56,9 @@ class NextCut:
             self.forget()
             return False
         if not self.stands:
-            self._ticket, self.found = ticket, None
+            self._ticket, self.found, self._finding = ticket, self._known(ticket), None
+            if self.found is not None:
+                return True
             self._finding = self._search.find(np.array(ticket.accepted.position), np.array(ticket.accepted.tangent), q)
         return True
 

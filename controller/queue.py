@@ -47,6 +47,8 @@ class PointQueue:
         self._tickets: dict[str, Ticket] = {}
         self._order: list[str] = []
         self._entries: tuple[QueueEntry, ...] | None = None
+        self._wanted: tuple[str, ...] = ()
+        self._notes: dict[str, str] = {}
 
     def update(self, points: PruningPoints, keep: str = "") -> list[str]:
         """Take in what perception holds true now; returns the acceptances it voided, in words.
@@ -75,7 +77,7 @@ class PointQueue:
                 self._drop(point_id)
             else:
                 self._put(point_id, gone)
-        self._order.sort(key=self._place)
+        self._sort()
         return voided
 
     def get(self, point_id: str) -> Ticket | None:
@@ -122,6 +124,25 @@ class PointQueue:
                 return self._tickets[point_id]
         return None
 
+    def accepted(self) -> tuple[PruningPoint, ...]:
+        """Accepted points, each as it was accepted, by id."""
+        found = (ticket.accepted for ticket in self._tickets.values() if ticket.state == "ACCEPTED")
+        return tuple(sorted((point for point in found if point is not None), key=lambda point: point.point_id))
+
+    def tickets(self) -> tuple[Ticket, ...]:
+        """Every ticket."""
+        return tuple(self._tickets.values())
+
+    def arrange(self, order: tuple[str, ...], notes: dict[str, str] | None = None) -> None:
+        """Work in this order from now on; points that it does not name stay in their places along the row.
+
+        Args:
+            order: Ids of accepted points; none for the order along the row.
+            notes: What is said of accepted points meanwhile, by id.
+        """
+        self._wanted, self._notes, self._entries = order, notes or {}, None
+        self._sort()
+
     def intend(self, point_id: str, cut_id: str) -> None:
         """ACCEPTED → INTENT: the blades are about to move."""
         self._put(point_id, replace(self._tickets[point_id], state="INTENT", cut_id=cut_id, reason="cutting"))
@@ -133,7 +154,7 @@ class PointQueue:
     def entries(self) -> tuple[QueueEntry, ...]:
         """Every point in the order of work, for the wire."""
         if self._entries is None:
-            self._entries = tuple(_entry(self._tickets[point_id]) for point_id in self._order)
+            self._entries = tuple(_entry(self._tickets[i], self._notes.get(i, "")) for i in self._order)
         return self._entries
 
     def _changed(self, ticket: Ticket) -> str:
@@ -151,6 +172,15 @@ class PointQueue:
         text = f"acceptance void: {why}"
         voided.append(f"{ticket.point.point_id}: {text}")
         return replace(ticket, state="PROPOSED", reason=text, accepted=None)
+
+    def _sort(self) -> None:
+        self._order.sort(key=self._place)
+        wanted = [i for i in self._wanted if i in self._tickets and self._tickets[i].state == "ACCEPTED"]
+        among = set(wanted)
+        following = iter(wanted)
+        order = [next(following) if point_id in among else point_id for point_id in self._order]
+        if order != self._order:
+            self._order, self._entries = order, None
 
     def _place(self, point_id: str) -> tuple[float, str]:
         ticket = self._tickets[point_id]
@@ -170,11 +200,11 @@ class PointQueue:
         self._entries = None
 
 
-def _entry(ticket: Ticket) -> QueueEntry:
+def _entry(ticket: Ticket, note: str) -> QueueEntry:
     return QueueEntry(
         point_id=ticket.point.point_id,
         state=ticket.state,
-        reason=ticket.reason,
+        reason=ticket.reason or (note if ticket.state == "ACCEPTED" else ""),
         user=ticket.user,
         cut_id=ticket.cut_id,
         accepted_position=None if ticket.accepted is None else ticket.accepted.position,

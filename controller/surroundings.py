@@ -1,9 +1,11 @@
 """What stands around the robot, as perception tells it, for the method and the plans to keep away from."""
 
+from collections.abc import Sequence
+
 from controller.interface import Sample
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.obstacle import Obstacle
-from rolling_panda.row_messages import Obstacles
+from rolling_panda.row_messages import Capsule, Obstacles
 
 #: A rod thinner than this is watched as if it were this thick (m).
 _THINNEST = 0.001
@@ -24,15 +26,18 @@ class Surroundings:
         changed = self._seen is None or obstacles.message.capsules != self._seen.message.capsules
         self._seen = obstacles
         if changed:
-            self.model.set_obstacles(
-                [
-                    Obstacle(
-                        f"{capsule.kind} {number}",
-                        capsule.kind,
-                        capsule.start,
-                        capsule.end,
-                        max(capsule.start_radius, capsule.end_radius, _THINNEST),
-                    )
-                    for number, capsule in enumerate(obstacles.message.capsules)
-                ]
-            )
+            self.model.set_obstacles(obstacles_of(obstacles.message.capsules))
+
+
+def obstacles_of(capsules: Sequence[Capsule]) -> list[Obstacle]:
+    """What the wire says stands around, as the collision model has it; named by kind and number."""
+    return [
+        Obstacle(
+            f"{capsule.kind} {number}",
+            capsule.kind,
+            capsule.start,
+            capsule.end,
+            max(capsule.start_radius, capsule.end_radius, _THINNEST),
+        )
+        for number, capsule in enumerate(capsules)
+    ]

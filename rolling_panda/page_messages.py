@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from msgspec import Meta, Struct
 
 from rolling_panda import messages as m
+from rolling_panda.plan_messages import Digest, PlanState, PointPlan
 
 Role = Literal["viewer", "operator", "supervisor"]
 Age = Annotated[float, Meta(ge=0.0, le=1e9)]
@@ -60,12 +61,23 @@ class PageState(PageMessage, frozen=True, kw_only=True):
 class PagePoint(Struct, frozen=True, forbid_unknown_fields=True):
     """One row of the queue: the point as perceived and its life in the controller's queue.
 
-    `pixel` is its place in the newest camera image (px, None when outside), for drawing.
+    `pixel` is its place in the newest camera image (px, None when outside), for drawing. `plan` is what the session's
+    plan says of it, None where no plan that holds does.
     """
 
     point: m.PruningPoint
     entry: m.QueueEntry
     pixel: tuple[float, float] | None = None
+    plan: PointPlan | None = None
+
+
+class PagePlan(Struct, frozen=True, forbid_unknown_fields=True):
+    """The session's plan in brief: whether it holds or why not, its hash, and how long it takes (s)."""
+
+    state: PlanState
+    reason: m.Text
+    plan_hash: Digest
+    duration_s: m.NonNegative
 
 
 class PagePoints(PageMessage, frozen=True, kw_only=True):
@@ -76,6 +88,7 @@ class PagePoints(PageMessage, frozen=True, kw_only=True):
     segmenter: m.Text
     frames: m.Count
     image_size: tuple[int, int]
+    plan: PagePlan | None = None
 
 
 class PageEvent(Struct, frozen=True, forbid_unknown_fields=True):

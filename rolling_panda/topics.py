@@ -8,7 +8,7 @@ from typing import Any, Generic, Literal, TypeVar
 
 from msgspec import Struct
 
-from rolling_panda import intents, plant_requests, row_messages, teleop_messages
+from rolling_panda import intents, plan_messages, plant_requests, row_messages, teleop_messages
 from rolling_panda import messages as m
 
 Priority = Literal["REAL_TIME", "INTERACTIVE_HIGH", "DATA_LOW", "BACKGROUND"]
@@ -96,6 +96,10 @@ CONTROLLER = Topic(
     "state/controller", m.ControllerState, "controller", 20, "INTERACTIVE_HIGH", "DROP",
     "mode, queue, tracking",
 )
+PLAN = Topic(
+    "controller/plan", plan_messages.SessionPlan, "controller", 0.2, "DATA_LOW", "DROP",
+    "the session's plan, at once when it changes", latched=True,
+)
 HEARTBEAT = Topic(
     "heartbeat", m.Heartbeat, "any", 20, "INTERACTIVE_HIGH", "DROP",
     "a process's loop is turning",
@@ -122,7 +126,7 @@ SCENERY = Topic(
 )
 
 TOPICS: tuple[Topic[Any], ...] = (
-    MOTION, CUT, STOP, TELEOP, JOINTS, ODOMETRY, BRIDGE, CONTROLLER, HEARTBEAT, EVENT, CAMERA, POINTS,
+    MOTION, CUT, STOP, TELEOP, JOINTS, ODOMETRY, BRIDGE, CONTROLLER, PLAN, HEARTBEAT, EVENT, CAMERA, POINTS,
     OBSTACLES, SCENERY,
 )
 

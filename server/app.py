@@ -13,6 +13,7 @@ from starlette.types import ASGIApp, Scope
 
 from rolling_panda import __version__
 from rolling_panda.page_messages import PageEvents, PagePoints, PageState
+from rolling_panda.plan_messages import SessionPlan
 from rolling_panda.resources import resource
 from server.desk import Desk, Result
 from server.guard import Guard, is_protected
@@ -37,7 +38,7 @@ class _Application(FastAPI):
     def openapi(self) -> dict[str, Any]:
         document = super().openapi()
         _, messages = msgspec.json.schema_components(
-            (PageState, PagePoints, PageEvents), ref_template="#/components/schemas/{name}"
+            (PageState, PagePoints, PageEvents, SessionPlan), ref_template="#/components/schemas/{name}"
         )
         document.setdefault("components", {}).setdefault("schemas", {}).update(messages)
         return document

@@ -144,6 +144,14 @@ def operator_router(desk: Desk) -> APIRouter:
         """Every pruning point in the order of work, with its life in the queue."""
         return _json(desk.points if desk.points is not None else desk.view.points(time.monotonic()))
 
+    @router.get("/plan", tags=["state"], responses=_schema("SessionPlan"))
+    async def plan(session: Caller) -> Response:
+        """The session's plan: order and way of each accepted point that can be cut, and why the others cannot."""
+        received = desk.link.plan.peek()
+        if received is None:
+            return answer(Result(503, False, "The controller has not said its plan yet; ask again."))
+        return _json(received.message)
+
     @router.get("/events", tags=["state"], responses=_schema("PageEvents"))
     async def events(session: Caller, after: Annotated[int, Query(ge=0)] = 0) -> Response:
         """Log lines after line number `after`, oldest first."""

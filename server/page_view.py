@@ -4,7 +4,8 @@ import msgspec
 import numpy as np
 
 from rolling_panda import messages as m
-from rolling_panda.page_messages import PagePoint, PagePoints, PageState, Role
+from rolling_panda.page_messages import PagePlan, PagePoint, PagePoints, PageState, Role
+from rolling_panda.plan_messages import SessionPlan
 from rolling_panda.robot_model import RobotModel, configuration, pose_message
 from server.robot_link import RobotLink
 from server.sessions import Session
@@ -61,11 +62,17 @@ class PageView:
         received, controller = self._link.points.peek(), self._link.controller.peek()
         camera = self._link.camera.peek()
         queue = controller.message.queue if controller else ()
-        made_from = (received, camera, queue)
+        plan = self._link.plan.peek()
+        made_from = (received, camera, queue, plan)
         before = self._made
         if before is not None and made_from == self._made_from:
             return before
-        made = self._make_points(received.message if received else None, queue, camera.message if camera else None)
+        made = self._make_points(
+            received.message if received else None,
+            queue,
+            camera.message if camera else None,
+            plan.message if plan else None,
+        )
         self._made_from = made_from
         if before is not None:
             recounted = msgspec.structs.replace(before, frames=made.frames)
@@ -75,7 +82,11 @@ class PageView:
         return made
 
     def _make_points(
-        self, perceived: m.PruningPoints | None, queue: tuple[m.QueueEntry, ...], camera: m.CameraFrame | None
+        self,
+        perceived: m.PruningPoints | None,
+        queue: tuple[m.QueueEntry, ...],
+        camera: m.CameraFrame | None,
+        plan: SessionPlan | None,
     ) -> PagePoints:
         points = perceived.points if perceived else ()
         queued = {entry.point_id for entry in queue}
@@ -88,12 +99,19 @@ class PageView:
             if point.point_id not in queued
         ]
         pixels = project([point.position for point, _ in rows], camera, self._model)
+        planned = (
+            {} if plan is None or plan.state != "valid" else {each.plan.point_id: each.plan for each in plan.points}
+        )
         return PagePoints(
-            points=tuple(PagePoint(point, entry, pixel) for (point, entry), pixel in zip(rows, pixels, strict=True)),
+            points=tuple(
+                PagePoint(point, entry, pixel, planned.get(point.point_id) if entry.state == "ACCEPTED" else None)
+                for (point, entry), pixel in zip(rows, pixels, strict=True)
+            ),
             abstained=perceived.abstained if perceived else (),
             segmenter=perceived.segmenter if perceived else "",
             frames=perceived.frames if perceived else 0,
             image_size=(camera.intrinsics.width, camera.intrinsics.height) if camera else (0, 0),
+            plan=PagePlan(plan.state, plan.reason, plan.plan_hash, plan.duration_s) if plan else None,
         )
 
 

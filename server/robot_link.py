@@ -43,6 +43,7 @@ class RobotLink:
         self.controller = transport.slot(topics.CONTROLLER)
         self.camera = transport.slot(topics.CAMERA)
         self.points = transport.slot(topics.POINTS)
+        self.plan = transport.slot(topics.PLAN)
         self.scenery = transport.slot(topics.SCENERY)
         self.events = transport.feed(topics.EVENT, 500)
         self._heard: dict[str, float] = {}

@@ -19,6 +19,7 @@ from running_server import eventually, running_server
 from rolling_panda import intents, topics
 from rolling_panda import messages as m
 from rolling_panda.errors import ServiceError
+from rolling_panda.plan_messages import PlannedPoint, PlanRow, PointPlan, SessionPlan
 from rolling_panda.teleop_messages import BaseVelocity
 
 
@@ -324,3 +325,18 @@ def _references(node):
     elif isinstance(node, list):
         for value in node:
             yield from _references(value)
+
+
+def test_the_plan_is_given_whole_and_its_absence_said(server, client):
+    assert client.get("/api/plan").status_code == 503
+    row = PlanRow(0.1, m.PlanarPose(0.2), (0.0,) * 9, m.Pose((0.4, 0.5, 1.0), (0.0, 0.0, 0.0, 1.0)))
+    point = PointPlan(point_id="p1", revision=2, order=1, duration_s=3.0, base=m.PlanarPose(0.2), plan_hash="0f")
+    plan = SessionPlan(
+        header=m.Header(), state="valid", plan_hash="ab", duration_s=7.0, points=(PlannedPoint(point, (row,)),)
+    )
+    server.wire.deliver(topics.PLAN, plan)
+    given = client.get("/api/plan")
+    assert given.status_code == 200
+    assert msgspec.json.decode(given.content, type=SessionPlan) == plan
+    schemas = client.get("/api/openapi.json").json()["components"]["schemas"]
+    assert "plan_hash" in schemas["PointPlan"]["properties"] and "SessionPlan" in schemas

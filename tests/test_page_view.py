@@ -5,6 +5,8 @@ from fake_wire import ARM, HEADER, FakeWire, controller_state, joints, odometry,
 
 from rolling_panda import messages as m
 from rolling_panda import topics
+from rolling_panda.page_messages import PagePlan
+from rolling_panda.plan_messages import PlannedPoint, PointPlan, SessionPlan
 from rolling_panda.robot_model import RobotModel, configuration
 from server.page_view import PageView, project
 from server.robot_link import RobotLink
@@ -104,3 +106,29 @@ def test_a_count_of_frames_alone_is_renewed_only_now_and_then(wire, view):
     assert view.points(101.0) is first
     wire.deliver(topics.POINTS, msgspec.structs.replace(counted, frames=9))
     assert view.points(106.0).frames == 9
+
+
+def plan_of(*points, state="valid"):
+    return SessionPlan(
+        header=HEADER, state=state, reason="", plan_hash="ab", duration_s=9.0,
+        points=tuple(PlannedPoint(each) for each in points),
+    )  # fmt: skip
+
+
+def test_an_accepted_point_comes_with_what_the_plan_that_holds_says_of_it(wire, view):
+    wire.deliver(topics.POINTS, pruning_points(pruning_point("a"), pruning_point("b"), pruning_point("c")))
+    queue = (m.QueueEntry("a", "ACCEPTED"), m.QueueEntry("b", "ACCEPTED"), m.QueueEntry("c", "DONE"))
+    wire.deliver(topics.CONTROLLER, controller_state(queue))
+    assert view.points(0.0).plan is None
+    first = PointPlan(point_id="a", revision=1, order=1, duration_s=2.5)
+    refused = PointPlan(point_id="b", revision=1, order=0, reason="out of reach")
+    done = PointPlan(point_id="c", revision=1, order=2)
+    wire.deliver(topics.PLAN, plan_of(first, refused, done))
+    shown = view.points(0.0)
+    assert [row.plan for row in shown.points] == [first, refused, None]
+    assert shown.plan == PagePlan("valid", "", "ab", 9.0)
+    wire.deliver(topics.PLAN, plan_of(first, refused, done))
+    assert view.points(0.0) is shown, "the same plan, repeated, is not sent again"
+    wire.deliver(topics.PLAN, plan_of(first, refused, done, state="void"))
+    shown = view.points(0.0)
+    assert [row.plan for row in shown.points] == [None, None, None] and shown.plan.state == "void"

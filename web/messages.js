@@ -47,6 +47,8 @@ export const TEXT_MAX_LENGTH = 500;
 
 /** @typedef {"background"|"ground"|"post"|"trunk"|"cordon"|"spur"|"cane"|"node"|"wire"|"hose"|"old cut"} WoodClass */
 
+/** @typedef {"none"|"planning"|"valid"|"void"} PlanState */
+
 /** @typedef {"viewer"|"operator"|"supervisor"} Role */
 
 /** @typedef {[number, number, number, number, number, number, number]} ArmVelocities */
@@ -198,12 +200,42 @@ export const TEXT_MAX_LENGTH = 500;
  */
 
 /**
- * One row of the queue: the point as perceived and its life in the controller's queue. `pixel` is its place in the newest camera image (px, None when outside), for drawing.
+ * What the plan says of one accepted point.
+ *
+ * @typedef {object} PointPlan
+ * @property {string} point_id Of the point.
+ * @property {number} revision That was accepted, and that the plan is for.
+ * @property {number} order 1 for the first that is worked on; 0 when the plan refuses the point.
+ * @property {string} reason Why it is refused, empty when it is not.
+ * @property {number} begins_s When the way to it begins, from the start of the session (s).
+ * @property {number} duration_s Of the way to it, up to where the tool stands clear of the canes (s).
+ * @property {number} clearance Least distance on that way between the robot's parts, and from them to the ground and obstacles (m).
+ * @property {[string, string]} between Between what that is.
+ * @property {number} manipulability Least ω of the arm at the cut and on the way to it.
+ * @property {number} torque_margin What is left of the torque of the joint that uses the largest share of its own (Nm).
+ * @property {string} torque_joint That joint.
+ * @property {PlanarPose|null} base Where the base stands for the cut; None when refused.
+ * @property {string} plan_hash SHA-256 of the way in every control period; empty when refused.
+ */
+
+/**
+ * One row of the queue: the point as perceived and its life in the controller's queue. `pixel` is its place in the newest camera image (px, None when outside), for drawing. `plan` is what the session's plan says of it, None where no plan that holds does.
  *
  * @typedef {object} PagePoint
  * @property {PruningPoint} point
  * @property {QueueEntry} entry
  * @property {[number, number]|null} pixel
+ * @property {PointPlan|null} plan
+ */
+
+/**
+ * The session's plan in brief: whether it holds or why not, its hash, and how long it takes (s).
+ *
+ * @typedef {object} PagePlan
+ * @property {PlanState} state
+ * @property {string} reason
+ * @property {string} plan_hash
+ * @property {number} duration_s
  */
 
 /**
@@ -216,6 +248,7 @@ export const TEXT_MAX_LENGTH = 500;
  * @property {string} segmenter
  * @property {number} frames
  * @property {[number, number]} image_size
+ * @property {PagePlan|null} plan
  */
 
 /**

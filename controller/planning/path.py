@@ -103,6 +103,11 @@ class PathPlanner:
             )
         return Refused(reason)
 
+    def tool(self, q: Array) -> Array:
+        """Place of the tool (3, m, odom) at a configuration (12)."""
+        place: Array = self._robot.pose(q, self._robot.tool_id).translation.copy()
+        return place
+
     def to_stand(self, q: Array, stand: Stand, together: bool = True) -> Planned | Refused:
         """A motion from rest at a configuration (12) to rest at a stand."""
         reason = ""

@@ -5,6 +5,7 @@ the one with the least time between stands, base and arm together, from where th
 them is planned and looked over, so that what the schedule says has been tried.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -33,12 +34,14 @@ class Target:
         T_odom_tool: Tool pose (pin.SE3).
         free_axis: True where the rotation about the tool's y does not matter.
         hold_s: Time spent there (s): the cut and the way in and out.
+        stand: Configuration to be in there; None leaves the choice to the planner.
     """
 
     name: str
     T_odom_tool: Any
     free_axis: bool = True
     hold_s: float = 0.0
+    stand: Stand | None = None
 
 
 @dataclass(frozen=True)
@@ -97,15 +100,18 @@ class Schedule:
 class SessionPlanner:
     """Orders targets and says what is feasible."""
 
-    def __init__(self, planner: PathPlanner, base: BasePlanner, limits: PlanLimits) -> None:
+    def __init__(
+        self, planner: PathPlanner, base: BasePlanner, limits: PlanLimits, tool_speed: float = math.inf
+    ) -> None:
         """Bind the planner.
 
         Args:
             planner: Of motions.
             base: For the time of drives.
             limits: For the time of arm motions.
+            tool_speed: Limit of the tool where motions will be followed by it (m/s).
         """
-        self._planner, self._base, self._limits = planner, base, limits
+        self._planner, self._base, self._limits, self._tool_speed = planner, base, limits, tool_speed
 
     def plan(self, q: Array, targets: Sequence[Target], required: Requirements | None = None) -> Schedule:
         """A schedule from rest at a configuration (12) over all targets that can be worked on.
@@ -124,6 +130,14 @@ class SessionPlanner:
                 refused[target.name] = "two targets have this name; each needs its own"
                 continue
             seen.add(target.name)
+            if target.stand is not None:
+                # Whether there is a way is seen from the stop before.
+                why = self._lacking_stand(target.stand, required)
+                if why:
+                    refused[target.name] = why
+                else:
+                    stands.append((target, target.stand))
+                continue
             planned = self._planner.plan(q, target.T_odom_tool, target.free_axis)
             why = self._lacking(planned, required) if isinstance(planned, Planned) else planned.reason
             if why:
@@ -137,33 +151,44 @@ class SessionPlanner:
     def _schedule(
         self, q: Array, order: Sequence[tuple[Target, Stand]], required: Requirements, refused: dict[str, str]
     ) -> Schedule:
-        """The motions in this order; a target that is not reached from the one before is left out and said."""
+        """The motions in this order; a target that cannot be reached is left out and said."""
         stops: list[Stop] = []
         now, at = 0.0, q
-        for target, stand in order:
-            planned = self._planner.to_stand(at, stand)
-            if not isinstance(planned, Planned):
-                # The stand was found from where the session starts; from here another one may be better.
-                planned = self._planner.plan(at, target.T_odom_tool, target.free_axis)
-            why = self._lacking(planned, required) if isinstance(planned, Planned) else planned.reason
-            if why or not isinstance(planned, Planned):
-                refused[target.name] = why
-                continue
-            arrives = now + planned.plan.duration
-            stops.append(Stop(target.name, planned, now, arrives))
-            now, at = arrives + target.hold_s, planned.plan.q[-1]
+        waiting = list(order)
+        # What is not reached from its neighbour may still be from where the rest ends.
+        for _ in range(2):
+            begun, missed = len(stops), []
+            for target, stand in waiting:
+                planned = self._planner.to_stand(at, stand)
+                if not isinstance(planned, Planned) and target.stand is None:
+                    # The stand was found from where the session starts; from here another one may be better.
+                    planned = self._planner.plan(at, target.T_odom_tool, target.free_axis)
+                why = self._lacking(planned, required) if isinstance(planned, Planned) else planned.reason
+                if why or not isinstance(planned, Planned):
+                    refused[target.name] = why
+                    missed.append((target, stand))
+                    continue
+                refused.pop(target.name, None)
+                arrives = now + planned.plan.duration
+                stops.append(Stop(target.name, planned, now, arrives))
+                now, at = arrives + target.hold_s, planned.plan.q[-1]
+            waiting = missed if len(stops) > begun else []
         return Schedule(tuple(stops), now, refused)
 
     def _costs(self, q: Array, stands: Sequence[Stand]) -> Array:
         """Times (n+1 × n, s) from the start (row 0) and from each stand to each stand."""
         places = [q, *(stand.q for stand in stands)]
         goals = np.array([stand.q[:3] for stand in stands]).reshape(-1, 3)
+        tools = [self._planner.tool(place) for place in places]
         costs = np.zeros((len(places), len(stands)))
         for i, place in enumerate(places):
             if not stands:
                 break
             arm = [quickest(1.0, self._limits.arm_rates(stand.q[ARM_Q] - place[ARM_Q])).duration for stand in stands]
             costs[i] = np.maximum(self._base.duration(place[:3], goals), arm)
+            # The mean speed of a motion is about half its largest.
+            away = [np.linalg.norm(tools[i] - tool) for tool in tools[1:]]
+            costs[i] = np.maximum(costs[i], 2.0 * np.array(away) / self._tool_speed)
         return costs
 
     def _lacking(self, planned: Planned, required: Requirements) -> str:
@@ -174,12 +199,17 @@ class SessionPlanner:
                 f"on the way {least.pair[0]} comes within {1e3 * least.distance:.0f} mm of {least.pair[1]}; "
                 f"{1e3 * required.clearance:.0f} mm are required"
             )
+        if why := self._lacking_stand(stand, required):
+            return why
+        if planned.plan.duration > required.duration:
+            return f"the way takes {planned.plan.duration:.0f} s; at most {required.duration:.0f} s are allowed"
+        return ""
+
+    def _lacking_stand(self, stand: Stand, required: Requirements) -> str:
         if stand.omega < required.omega:
             return f"the arm's manipulability there is {stand.omega:.3f}; at least {required.omega:.3f} is required"
         if stand.margin < required.margin:
             return f"a joint would be {stand.margin:.2f} rad from its limit; {required.margin:.2f} rad are required"
-        if planned.plan.duration > required.duration:
-            return f"the way takes {planned.plan.duration:.0f} s; at most {required.duration:.0f} s are allowed"
         return ""
 
 

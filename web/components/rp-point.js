@@ -40,6 +40,13 @@ export function reject(row) {
   return ask(`Rejecting ${row.point.point_id}`, `/api/points/${id}/reject`, { reason: "" });
 }
 
+/** @param {PagePoint} row */
+function planWords({ plan }) {
+  if (!plan?.order) return "";
+  const clear = `${Math.round(1000 * plan.clearance)} mm between ${plan.between.join(" and ")}`;
+  return `; planned as no. ${plan.order}: the way takes ${plan.duration_s.toFixed(1)} s and leaves ${clear}, manipulability ${plan.manipulability.toFixed(3)}`;
+}
+
 export class RpPoint extends HTMLElement {
   constructor() {
     super();
@@ -104,9 +111,10 @@ export class RpPoint extends HTMLElement {
     setText(this.place, point.point_id);
     const thick = `${(2000 * point.radius).toFixed(1)} mm`;
     const sure = `${Math.round(100 * point.confidence)} %`;
-    setText(this.facts, `${point.nodes_kept}/${point.nodes_seen} nodes · ${thick} · ${sure}`);
+    const planned = row.plan?.order ? ` · no. ${row.plan.order}, way ${row.plan.duration_s.toFixed(1)} s` : "";
+    setText(this.facts, `${point.nodes_kept}/${point.nodes_seen} nodes · ${thick} · ${sure}${planned}`);
     const kept = `Keeps ${point.nodes_kept} of ${counted(point.nodes_seen, "node")}`;
-    this.facts.title = `${kept}; the cane is ${thick} thick; confidence ${sure}`;
+    this.facts.title = `${kept}; the cane is ${thick} thick; confidence ${sure}${planWords(row)}`;
     setText(this.reason, inWords([entry.reason, point.reason].filter(Boolean).join(" · ")));
     this.reason.title = this.reason.textContent ?? "";
     setEnabled(this.acceptButton, whyNotAccept(row), "Accept this cut (A)");

@@ -1,0 +1,85 @@
+"""The session's plan for the wire."""
+
+import math
+
+import pinocchio as pin
+
+from controller.planning.plan import Plan
+from controller.work_plan import PlannedCut, WorkPlan
+from rolling_panda import messages as m
+from rolling_panda.differential_drive import Array
+from rolling_panda.plan_messages import PlannedPoint, PlanRow, PlanState, PointPlan, SessionPlan
+from rolling_panda.robot_model import pose_message
+
+#: Least time between two rows of a preview (s), and the most rows of one way.
+_ROW_S, _MOST_ROWS = 0.1, 200
+
+
+def session_plan(plan: WorkPlan | None, state: PlanState, reason: str, now: float) -> SessionPlan:
+    """The message of a plan, None for when there is none.
+
+    Args:
+        plan: The plan.
+        state: Whether it holds.
+        reason: Why not.
+        now: Monotonic time (s).
+    """
+    header = m.Header(now, "odom")
+    if plan is None:
+        return SessionPlan(header=header, state=state, reason=reason[:500])
+    points = [planned_point(cut, number) for number, cut in enumerate(plan.cuts, 1)]
+    revisions = {point.point_id: point.revision for point in plan.request.points}
+    points += [
+        PlannedPoint(PointPlan(point_id=point_id, revision=revisions[point_id], order=0, reason=why[:500]))
+        for point_id, why in plan.refused.items()
+    ]
+    return SessionPlan(
+        header=header,
+        state=state,
+        reason=reason[:500],
+        plan_hash=plan.digest,
+        duration_s=plan.duration,
+        points=tuple(points),
+    )
+
+
+def planned_point(cut: PlannedCut, order: int) -> PlannedPoint:
+    """One cut of the plan with the way to it."""
+    return PlannedPoint(
+        PointPlan(
+            point_id=cut.point.point_id,
+            revision=cut.point.revision,
+            order=order,
+            begins_s=cut.begins,
+            duration_s=cut.way.duration,
+            clearance=cut.clearance,
+            between=cut.between,
+            manipulability=cut.manipulability,
+            torque_margin=cut.torque_margin,
+            torque_joint=cut.torque_joint,
+            base=_planar(cut.cut.q_cut),
+            plan_hash=cut.way.digest,
+        ),
+        preview(cut.way),
+    )
+
+
+def preview(way: Plan) -> tuple[PlanRow, ...]:
+    """Rows of a way for display: the first, some between, and the last."""
+    last = len(way.t) - 1
+    if not last:
+        return (_row(way, 0),)
+    step = max(math.ceil(_ROW_S / float(way.t[1]) - 1e-9), math.ceil(last / _MOST_ROWS))
+    return tuple(_row(way, row) for row in (*range(0, last, step), last))
+
+
+def _row(way: Plan, row: int) -> PlanRow:
+    a, b, c, d, e, f, g, h, i = way.q[row, 3:].tolist()
+    T = way.T_odom_tool[row]
+    pose = pose_message(pin.SE3(T[:3, :3], T[:3, 3]))
+    return PlanRow(float(way.t[row]), _planar(way.q[row]), (a, b, c, d, e, f, g, h, i), pose)
+
+
+def _planar(q: Array) -> m.PlanarPose:
+    x, y, phi = q[:3].tolist()
+    return m.PlanarPose(x, y, phi)

@@ -1,0 +1,122 @@
+"""Plans in a process of its own, behind everything that keeps time: the control loop asks and never waits."""
+
+import multiprocessing
+import os
+import signal
+import threading
+from multiprocessing.connection import Connection
+
+from controller.config import ControllerConfig
+from controller.work_plan import PlanRequest, WorkPlan
+from rolling_panda.config import RobotConfig
+from rolling_panda.errors import RollingPandaError
+from rolling_panda.priority import take_priority
+
+#: How long the process is waited for when it is told to end (s).
+_END_S = 2.0
+
+
+class PlanWorker:
+    """The newest request is worked on, one at a time; `newest` is the last answer. Close it when done."""
+
+    def __init__(self, config: ControllerConfig, robot_config: RobotConfig) -> None:
+        """Start the process; it is ready some seconds later.
+
+        Args:
+            config: Of the controller.
+            robot_config: Of the robot.
+        """
+        self._configs = config, robot_config
+        self._waiting = threading.Condition()
+        self._request: PlanRequest | None = None
+        self._process: multiprocessing.process.BaseProcess | None = None
+        self._closing = False
+        self.newest: WorkPlan | None = None
+        self._thread = threading.Thread(target=self._run, name="planner", daemon=True)
+        self._thread.start()
+
+    @property
+    def pid(self) -> int | None:
+        """Of the planning process; None while there is none."""
+        process = self._process
+        return None if process is None else process.pid
+
+    def ask(self, request: PlanRequest) -> None:
+        """Plan this next."""
+        with self._waiting:
+            self._request = request
+            self._waiting.notify()
+
+    def close(self) -> None:
+        """End the process, in the middle of a plan too."""
+        with self._waiting:
+            self._closing = True
+            if self._process is not None:
+                self._process.terminate()
+            self._waiting.notify()
+        self._thread.join(_END_S)
+
+    def _run(self) -> None:
+        # Scheduling is a thread's own, and the process that it starts inherits it.
+        take_priority("background")
+        connection = self._start()
+        while (request := self._next()) is not None and connection is not None:
+            try:
+                connection.send(request)
+                self.newest = connection.recv()
+            except (EOFError, OSError):
+                self.newest = WorkPlan(request, failure="the planning process ended; it is being started again")
+                connection.close()
+                connection = self._start()
+        if connection is not None:
+            connection.close()
+        if self._process is not None:
+            self._process.join(_END_S)
+
+    def _next(self) -> PlanRequest | None:
+        """Waits for a request; None when closing."""
+        with self._waiting:
+            while self._request is None and not self._closing:
+                self._waiting.wait()
+            request, self._request = self._request, None
+            return None if self._closing else request
+
+    def _start(self) -> Connection | None:
+        """A new process; None when closing."""
+        context = multiprocessing.get_context("spawn")
+        here, there = context.Pipe()
+        process = context.Process(target=_plan, args=(there, *self._configs), name="planner", daemon=True)
+        with self._waiting:
+            if self._closing:
+                return None
+            process.start()
+            self._process = process
+        there.close()
+        return here
+
+
+def _plan(connection: Connection, config: ControllerConfig, robot_config: RobotConfig) -> None:
+    """The process: answers requests until nobody is there to ask any more."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, name="parent-watch", daemon=True).start()
+    # What only planning needs is loaded here alone.
+    from controller.planning.cuts import CutPlanner
+
+    planner = CutPlanner(config, robot_config)
+    while True:
+        try:
+            request = connection.recv()
+        except EOFError:
+            return
+        try:
+            made = planner.plan(request)
+        except RollingPandaError as error:
+            made = WorkPlan(request, failure=str(error))
+        connection.send(made)
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
