@@ -16,6 +16,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from benchmarks.peers.stopwatch import EDGES_US
 from benchmarks.wilson import interval
 from rolling_panda.errors import InputError
 
@@ -87,6 +88,41 @@ def omega_along(axes: Axes, reach: Results) -> None:
     axes.legend()
 
 
+def tick(axes: Axes, document: dict[str, Any]) -> None:
+    """How long one control step takes, and one whole-body step of others on the same problems.
+
+    Args:
+        axes: To draw in.
+        document: What `bench tick --json` wrote.
+    """
+    parts = document["parts"]
+    series = [
+        ("whole control step", document, "#222222"),
+        ("hierarchy, everything on", parts["step"], COLOURS["hierarchy"]),
+        ("nullspace", parts["nullspace step"], COLOURS["nullspace"]),
+    ]
+    peers = [peer for peer in document.get("peers", []) if "absent" not in peer]
+    for peer, colour in zip(peers, ("#8a63a8", "#3f8fb0", "#a8a13c", "#b0506a"), strict=False):
+        series.append((f"{peer['name']} {peer['version']}", peer, colour))
+    middles = np.sqrt(EDGES_US[1:] * EDGES_US[:-1])
+    for name, times, colour in series:
+        counts = np.array(times["histogram"])
+        label = f"{name}: {times['median_us']:.0f} µs"
+        axes.step(middles, 100 * counts / counts.sum(), where="mid", color=colour, label=label)
+        axes.axvline(times["median_us"], color=colour, lw=0.8, ls=":")
+    axes.set(xlabel="time of one step (µs)", ylabel="share of the steps (%)", xscale="log", xlim=(5, 2000))
+    axes.set_xticks([10, 100, 1000], ["10", "100", "1000"])
+    axes.set_ylim(bottom=0.0)
+    axes.legend(title="median")
+
+
+def _tick(folder: Path, figure: Figure) -> None:
+    document = json.loads((folder / "tick.json").read_text(encoding="utf-8"))
+    if not isinstance(document, dict) or "histogram" not in document:
+        raise InputError(f"{folder / 'tick.json'} is not what `bench tick --json` writes; run it again")
+    tick(figure.add_subplot(), document)
+
+
 def _reach(draw: Callable[[Axes, Results], None]) -> Callable[[Path, Figure], None]:
     def picture(folder: Path, figure: Figure) -> None:
         files = {method: folder / f"reach_{method}.json" for method in COLOURS}
@@ -102,6 +138,7 @@ def _reach(draw: Callable[[Axes, Results], None]) -> Callable[[Path, Figure], No
 PICTURES: dict[str, Callable[[Path, Figure], None]] = {
     "reach_by_distance": _reach(reach_by_distance),
     "omega_along_a_reach": _reach(omega_along),
+    "tick": _tick,
 }
 
 

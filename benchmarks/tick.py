@@ -2,7 +2,6 @@
 
 import argparse
 import gc
-import json
 import platform
 import sys
 import time
@@ -11,6 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from benchmarks.documents import one_row_a_line
 from benchmarks.kinematic_robot import KinematicRobot
 from benchmarks.peers.run import run_peers
 from benchmarks.tick_parts import Recorder, Times, measure_parts, obstacles
@@ -100,7 +100,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         for peer in figures["peers"]:
             print(_line(peer))
     if arguments.json is not None:
-        arguments.json.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
+        arguments.json.write_text(one_row_a_line(figures), encoding="utf-8")
     return 0
 
 

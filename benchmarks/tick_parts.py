@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from benchmarks.peers.stopwatch import histogram
 from controller.config import ControllerConfig
 from controller.whole_body.box import Box
 from controller.whole_body.collision import CollisionModel
@@ -24,17 +25,19 @@ _SPAN, _ROW_Y = (-2.0, 4.0), 0.87
 
 @dataclass(frozen=True)
 class Times:
-    """Of one part over all demands (µs)."""
+    """Of one part over all demands (µs), and how many of them are in each bin of `stopwatch.EDGES_US`."""
 
     median_us: float
     p99_us: float
     max_us: float
+    histogram: list[int]
 
     @staticmethod
     def of(seconds: Sequence[float]) -> "Times":
         """Summary of durations (s)."""
         micros = np.array(seconds) * 1e6
-        return Times(*(round(float(x), 1) for x in (np.median(micros), np.percentile(micros, 99), micros.max())))
+        summary = (round(float(x), 1) for x in (np.median(micros), np.percentile(micros, 99), micros.max()))
+        return Times(*summary, histogram(micros))
 
 
 class Recorder:

@@ -1,10 +1,12 @@
 import json
 
 import pytest
+from matplotlib.figure import Figure
 from PIL import Image
 
 from benchmarks import plots
 from benchmarks.documents import one_row_a_line
+from benchmarks.peers.stopwatch import histogram
 
 
 def reach(reached, target=0):
@@ -66,3 +68,22 @@ def test_a_document_reads_back_with_one_row_a_line():
     assert read["results"] == document["results"]
     assert read["summary"] == {"reached": 3, "share": 0.333333}
     assert sum("ok" in line for line in text.splitlines()) == 4
+
+
+def test_times_of_a_step_are_drawn_with_those_of_the_peers_that_are_there(tmp_path):
+    def times(median):
+        return {"median_us": median, "histogram": histogram([median] * 9)}
+
+    document = times(150.0) | {"parts": {"step": times(50.0), "nullspace step": times(70.0)}}
+    document["peers"] = [{"name": "Pink", "version": "4", **times(150.0)}, {"name": "TSID", "absent": "it crashed"}]
+    write(tmp_path, "tick.json", document)
+    figure = Figure()
+    plots.PICTURES["tick"](tmp_path, figure)
+    (axes,) = figure.axes
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == [
+        "whole control step: 150 µs",
+        "hierarchy, everything on: 50 µs",
+        "nullspace: 70 µs",
+        "Pink 4: 150 µs",
+    ]
+    assert plots.main(["--results", str(tmp_path), "--out", str(tmp_path), "tick"]) == 0

@@ -10,6 +10,15 @@ from typing import Any
 
 import numpy as np
 
+#: Edges of a histogram's bins (µs): thirty to a decade, from 3 µs to 10 ms.
+EDGES_US = 3.0 * 10.0 ** (np.arange(107) / 30.0)
+
+
+def histogram(micros: Any) -> list[int]:
+    """How many durations (µs) are between each two of `EDGES_US`; what is outside counts with the outermost."""
+    counts, _ = np.histogram(np.clip(micros, EDGES_US[0], EDGES_US[-1]), EDGES_US)
+    return [int(count) for count in counts]
+
 
 def urdf() -> Path:
     """The robot's description, from the folder that is the script's only argument."""
@@ -65,6 +74,7 @@ def report(name: str, version: str, note: str, step: Callable[[int], Any], count
                 "median_us": round(float(np.median(micros)), 1),
                 "p99_us": round(float(np.percentile(micros, 99)), 1),
                 "max_us": round(float(micros.max()), 1),
+                "histogram": histogram(micros),
                 "steps": count,
                 "failed": int(failed),
             }
