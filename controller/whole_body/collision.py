@@ -149,6 +149,7 @@ class CollisionModel:
         rows = np.array([part in self._allowed[1] for part in self._parts])
         columns = np.array([o.name in self._allowed[0] for o in self._obstacles], dtype=bool)
         self._ignored = rows[:, None] & columns
+        self._ignores = bool(self._ignored.any())
         self._known_for = -1.0
 
     def distances(self, q: Array, within: float = 0.5) -> Distances:
@@ -218,7 +219,8 @@ class CollisionModel:
         pairs = list(range(len(self._self_pairs)))
         if self._obstacles:
             gaps = self._axes.gaps(np.array(self._centers), self._radii)
-            gaps[self._ignored] = np.inf
+            if self._ignores:
+                gaps[self._ignored] = np.inf
             parts, obstacles = np.nonzero(gaps < within)
             slots = self._occupy(obstacles.tolist())
             pairs += [self._first(slot) + part for slot, part in zip(slots, parts.tolist(), strict=True)]

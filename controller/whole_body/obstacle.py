@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from controller.compiled import MATRIX, NOTHING, PACKED, VECTOR, compiled
 from rolling_panda.differential_drive import Array
 from rolling_panda.errors import InputError
 
@@ -48,20 +49,26 @@ class Axes:
 
     def __init__(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Precompute what does not depend on the spheres."""
-        start = np.array([o.start for o in obstacles], dtype=np.float64).reshape(-1, 3)
-        along = np.array([o.end for o in obstacles], dtype=np.float64).reshape(-1, 3) - start
-        self._square = np.sum(along * along, axis=1)
-        self._inverse = np.where(self._square > _POINT, 1.0 / np.maximum(self._square, _POINT), 0.0)
-        self._start_T, self._along_T = start.T.copy(), along.T.copy()
-        self._offset, self._from_origin = np.sum(start * along, axis=1), np.sum(start * start, axis=1)
+        self._start = np.array([o.start for o in obstacles], dtype=np.float64).reshape(-1, 3)
+        self._along = np.array([o.end for o in obstacles], dtype=np.float64).reshape(-1, 3) - self._start
+        square = np.sum(self._along * self._along, axis=1)
+        self._inverse = np.where(square > _POINT, 1.0 / np.maximum(square, _POINT), 0.0)
         self._radius = np.array([o.radius for o in obstacles], dtype=np.float64)
 
     def gaps(self, centers: Array, radii: Array) -> Array:
         """Gaps (g×n, m) between g spheres and the n obstacles; negative where they overlap."""
-        # |c − s − t a|² with t = (c − s)·a / a², written out so that it takes two products of small matrices.
-        shadow = centers @ self._along_T - self._offset
-        t = np.minimum(np.maximum(shadow * self._inverse, 0.0), 1.0)
-        square = np.sum(centers * centers, axis=1)[:, None] - 2.0 * (centers @ self._start_T) + self._from_origin
-        square += t * (t * self._square - 2.0 * shadow)
-        gaps: Array = np.sqrt(np.maximum(square, 0.0)) - radii[:, None] - self._radius
+        gaps = np.empty((len(centers), len(self._start)))
+        _gaps(centers, radii, self._start, self._along, self._inverse, self._radius, gaps)
         return gaps
+
+
+@compiled(NOTHING(MATRIX, VECTOR, PACKED, PACKED, VECTOR, VECTOR, PACKED))
+def _gaps(centers: Array, radii: Array, start: Array, along: Array, inverse: Array, radius: Array, gaps: Array) -> None:
+    """Write |c − s − t a| less both radii, with t = (c − s)·a / a² inside 0…1; `inverse` is 1/a² (n)."""
+    for g in range(len(radii)):
+        for n in range(len(radius)):
+            x, y, z = centers[g, 0] - start[n, 0], centers[g, 1] - start[n, 1], centers[g, 2] - start[n, 2]
+            t = (x * along[n, 0] + y * along[n, 1] + z * along[n, 2]) * inverse[n]
+            t = min(max(t, 0.0), 1.0)
+            x, y, z = x - t * along[n, 0], y - t * along[n, 1], z - t * along[n, 2]
+            gaps[g, n] = math.sqrt(x * x + y * y + z * z) - radii[g] - radius[n]
