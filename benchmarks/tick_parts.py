@@ -36,8 +36,8 @@ class Times:
     def of(seconds: Sequence[float]) -> "Times":
         """Summary of durations (s)."""
         micros = np.array(seconds) * 1e6
-        summary = (round(float(x), 1) for x in (np.median(micros), np.percentile(micros, 99), micros.max()))
-        return Times(*summary, histogram(micros))
+        median, p99, most = (round(float(x), 1) for x in (np.median(micros), np.percentile(micros, 99), micros.max()))
+        return Times(median, p99, most, histogram(micros))
 
 
 class Recorder:
