@@ -1,11 +1,12 @@
 """The session's plan for the wire."""
 
 import math
+from collections.abc import Sequence
 
 import pinocchio as pin
 
 from controller.planning.plan import Plan
-from controller.work_plan import PlannedCut, WorkPlan
+from controller.work_plan import PlannedCut, PlanRequest, WorkPlan
 from rolling_panda import messages as m
 from rolling_panda.differential_drive import Array
 from rolling_panda.plan_messages import PlannedPoint, PlanRow, PlanState, PointPlan, SessionPlan
@@ -27,20 +28,27 @@ def session_plan(plan: WorkPlan | None, state: PlanState, reason: str, now: floa
     header = m.Header(now, "odom")
     if plan is None:
         return SessionPlan(header=header, state=state, reason=reason[:500])
-    points = [planned_point(cut, number) for number, cut in enumerate(plan.cuts, 1)]
-    revisions = {point.point_id: point.revision for point in plan.request.points}
-    points += [
-        PlannedPoint(PointPlan(point_id=point_id, revision=revisions[point_id], order=0, reason=why[:500]))
-        for point_id, why in plan.refused.items()
-    ]
     return SessionPlan(
         header=header,
         state=state,
         reason=reason[:500],
         plan_hash=plan.digest,
         duration_s=plan.duration,
-        points=tuple(points),
+        points=plan.points,
     )
+
+
+def planned_points(
+    request: PlanRequest, cuts: Sequence[PlannedCut], refused: dict[str, str]
+) -> tuple[PlannedPoint, ...]:
+    """What is said of each point of a request: the cuts in their order, then those refused."""
+    points = [planned_point(cut, number) for number, cut in enumerate(cuts, 1)]
+    revisions = {point.point_id: point.revision for point in request.points}
+    points += [
+        PlannedPoint(PointPlan(point_id=point_id, revision=revisions[point_id], order=0, reason=why[:500]))
+        for point_id, why in refused.items()
+    ]
+    return tuple(points)
 
 
 def planned_point(cut: PlannedCut, order: int) -> PlannedPoint:

@@ -5,6 +5,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from controller.queue import Ticket
+from controller.surroundings import obstacles_of
+from controller.whole_body.obstacle import Axes
 from controller.work_plan import WorkPlan
 from rolling_panda.differential_drive import Array
 from rolling_panda.messages import PointState
@@ -19,8 +21,8 @@ PLACE_TOLERANCE, TURN_TOLERANCE, JOINT_TOLERANCE = 0.05, 0.05, 0.1
 _REACH = 1.3
 #: Rows of a way between two places of the base that are looked at.
 _LOOK = 20
-#: Along an obstacle's axis this far apart (m) places are compared.
-_SPACING = 0.2
+#: Places along an obstacle's axis that are compared, as shares of its length.
+_SHARES = np.linspace(0.0, 1.0, 9)
 #: What became of a point by the work itself leaves the plan for the others as it is.
 _WORKED: frozenset[PointState] = frozenset({"INTENT", "DONE", "FAILED_NOT_CUT", "UNKNOWN"})
 
@@ -61,45 +63,36 @@ def place_changed(plan: WorkPlan, q: Array) -> str:
     return ""
 
 
-def obstacles_changed(plan: WorkPlan, now: Sequence[Capsule]) -> str:
-    """What stands in the plan's way where nothing stood; empty where nothing does. What has gone changes nothing.
+class ObstacleWatch:
+    """Looks out for what a plan has not reckoned with. Made once a plan; a look takes about a millisecond."""
 
-    Args:
-        plan: The plan.
-        now: What stands around now.
-    """
-    before = plan.request.obstacles
-    if now is before or now == before or not plan.cuts:
+    def __init__(self, plan: WorkPlan) -> None:
+        """Remember what stood around, and where the base will be."""
+        self._before = plan.request.obstacles
+        self._axes = Axes(tuple(obstacles_of(self._before)))
+        ways = [cut.way.q[:, :2] for cut in plan.cuts]
+        self._track = np.vstack([*(way[::_LOOK] for way in ways), *(way[-1:] for way in ways), np.empty((0, 2))])
+
+    def changed(self, now: Sequence[Capsule]) -> str:
+        """What stands in the plan's way where nothing stood; empty where nothing does.
+
+        What has gone changes nothing, nor does what is out of the robot's reach all the way.
+
+        Args:
+            now: What stands around now.
+        """
+        if now is self._before or now == self._before or not now or not len(self._track):
+            return ""
+        start, end = np.array([c.start for c in now]), np.array([c.end for c in now])
+        radius = np.array([max(c.start_radius, c.end_radius) for c in now])
+        places = (start[:, None] + _SHARES[:, None] * (end - start)[:, None]).reshape(-1, 3)
+        new = np.full(len(places), True)
+        if self._before:
+            # How far each place sticks out of the one that it sticks out of the least.
+            new = self._axes.gaps(places, -np.repeat(radius, len(_SHARES))).min(axis=1) > OBSTACLE_TOLERANCE
+        for index in np.flatnonzero(new):
+            if np.hypot(*(places[index, :2] - self._track).T).min() < _REACH:
+                x, y, z = places[index]
+                kind = now[int(index) // len(_SHARES)].kind
+                return f"a {kind} is seen at ({x:.1f}, {y:.1f}, {z:.1f}) m that was not when it was made"
         return ""
-    known = _rods(before)
-    track = np.vstack([cut.way.q[::_LOOK, :2] for cut in plan.cuts] + [cut.way.q[-1:, :2] for cut in plan.cuts])
-    for capsule in now:
-        places = _new(capsule, known)
-        if len(places) and np.hypot(*(places[:, None, :2] - track).reshape(-1, 2).T).min() < _REACH:
-            x, y, z = places[0]
-            return f"a {capsule.kind} is seen at ({x:.1f}, {y:.1f}, {z:.1f}) m that was not when it was made"
-    return ""
-
-
-def _rods(capsules: Sequence[Capsule]) -> tuple[Array, Array, Array]:
-    """Starts (n×3), spans (n×3) and radii (n) of capsules."""
-    start = np.array([c.start for c in capsules], dtype=np.float64).reshape(-1, 3)
-    end = np.array([c.end for c in capsules], dtype=np.float64).reshape(-1, 3)
-    return start, end - start, np.array([max(c.start_radius, c.end_radius) for c in capsules], dtype=np.float64)
-
-
-def _new(capsule: Capsule, rods: tuple[Array, Array, Array]) -> Array:
-    """Places along the axis of a capsule (n×3) where it sticks out of all the rods by more than the tolerance."""
-    start, span, radius = rods
-    a, b = np.array(capsule.start), np.array(capsule.end)
-    count = 2 + int(np.linalg.norm(b - a) / _SPACING)
-    places: Array = a + np.linspace(0.0, 1.0, count)[:, None] * (b - a)
-    if not len(start):
-        return places
-    offset = places[:, None] - start
-    square = np.maximum((span * span).sum(axis=1), 1e-12)
-    share = np.clip((offset * span).sum(axis=2) / square, 0.0, 1.0)
-    gap = np.linalg.norm(offset - share[..., None] * span, axis=2) - radius
-    beyond = gap.min(axis=1) + max(capsule.start_radius, capsule.end_radius)
-    sticking: Array = places[beyond > OBSTACLE_TOLERANCE]
-    return sticking

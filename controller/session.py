@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from controller import plan_report
-from controller.plan_validity import obstacles_changed, place_changed, points_changed
+from controller.plan_validity import ObstacleWatch, place_changed, points_changed
 from controller.queue import PointQueue, Ticket
 from controller.reach import CutPlan, Unreachable
 from controller.work_plan import PlannedCut, PlanRequest, WorkPlan
@@ -40,7 +40,8 @@ class Session:
         self._wanted: tuple[m.PruningPoint, ...] = ()
         self._fresh = True
         self._said_at = -np.inf
-        self._compared: tuple[object, object] = (None, None)
+        self._watch = ObstacleWatch(WorkPlan(PlanRequest(0, np.zeros(0), ())))
+        self._compared: object = None
         self._in_the_way = ""
         self._moved = False
 
@@ -108,7 +109,7 @@ class Session:
     def _take(self, made: WorkPlan) -> None:
         self._asked, self._plan = None, made
         self._cuts = {cut.point.point_id: cut for cut in made.cuts}
-        self._compared, self._moved = (None, None), False
+        self._watch, self._compared, self._moved = ObstacleWatch(made), None, False
         self._fresh = True
 
     def _why_void(self, q: Array | None, obstacles: Sequence[Capsule], at_rest: bool, working: bool) -> str:
@@ -119,9 +120,9 @@ class Session:
             return f"planning failed: {plan.failure}"
         why = points_changed(plan, self._queue.tickets())
         if not why:
-            if self._compared[0] is not obstacles or self._compared[1] is not plan:
-                self._compared = (obstacles, plan)
-                self._in_the_way = obstacles_changed(plan, obstacles)
+            if self._compared is not obstacles:
+                self._compared = obstacles
+                self._in_the_way = self._watch.changed(obstacles)
             why = self._in_the_way
         if at_rest and not working and q is not None:
             moved = place_changed(plan, q)

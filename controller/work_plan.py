@@ -6,6 +6,7 @@ from controller.planning.plan import Plan
 from controller.reach import CutPlan
 from rolling_panda.differential_drive import Array
 from rolling_panda.messages import PruningPoint
+from rolling_panda.plan_messages import PlannedPoint
 from rolling_panda.row_messages import Capsule
 
 
@@ -61,6 +62,7 @@ class WorkPlan:
         request: What was asked.
         cuts: In the order of work.
         refused: Reason for each point that is not worked on, by id.
+        points: What is said of each point, for the wire.
         duration: Of the session (s).
         digest: SHA-256 of the request, the configuration and all of the answer; empty when planning failed.
         failure: Why there is no plan at all; empty when there is one.
@@ -69,6 +71,7 @@ class WorkPlan:
     request: PlanRequest
     cuts: tuple[PlannedCut, ...] = ()
     refused: dict[str, str] = field(default_factory=dict)
+    points: tuple[PlannedPoint, ...] = ()
     duration: float = 0.0
     digest: str = ""
     failure: str = ""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from test_cut_planner import PLANNER, point, request
 
-from controller.plan_validity import obstacles_changed, place_changed, points_changed
+from controller.plan_validity import ObstacleWatch, place_changed, points_changed
 from controller.queue import Ticket
 from controller.work_plan import PlanRequest, WorkPlan
 from rolling_panda.row_messages import Capsule
@@ -49,6 +49,10 @@ def test_a_robot_that_was_moved_voids_it() -> None:
         assert words in place_changed(PLAN, away)
     q[3] = 50.0
     assert place_changed(PLAN, q) == "", "where the wheels have turned to means nothing"
+
+
+def obstacles_changed(plan, now):
+    return ObstacleWatch(plan).changed(now)
 
 
 def planned(*obstacles):

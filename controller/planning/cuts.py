@@ -8,6 +8,7 @@ import numpy as np
 from controller.config import ControllerConfig
 from controller.cut_clearance import CutClearance
 from controller.interface import Sample
+from controller.plan_report import planned_points
 from controller.planning.base_path import BasePlanner
 from controller.planning.goal import Stand
 from controller.planning.limits import plan_limits
@@ -86,7 +87,9 @@ class CutPlanner:
                 refused[stop.name] = cut
             else:
                 planned.append(cut)
-        return WorkPlan(request, tuple(planned), refused, schedule.duration, self._digest(request, planned, refused))
+        said = planned_points(request, planned, refused)
+        digest = self._digest(request, planned, refused)
+        return WorkPlan(request, tuple(planned), refused, said, schedule.duration, digest)
 
     def _posture(self, point: PruningPoint, q: Array) -> CutPlan | str:
         """A posture to make the cut from, or why there is none."""
