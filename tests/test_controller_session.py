@@ -58,9 +58,11 @@ class Planned:
         raise AssertionError(f"no valid plan: {self.plans[-1]}")
 
     def until_valid_again(self, before):
-        while (plan := self.until_valid()).plan_hash == before.plan_hash:
-            pass
-        return plan
+        for _ in range(1000):
+            plan = self.until_valid()
+            if plan.plan_hash != before.plan_hash:
+                return plan
+        raise AssertionError("the plan stayed the same")
 
     def start(self):
         assert self.robot.ask(intents.Arm(user="ada")).ok

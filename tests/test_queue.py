@@ -130,3 +130,19 @@ def test_rejected_points_are_not_proposed_and_unknown_ones_are_named():
     assert q.proposed(0.5) == []
     assert "'zz'" in q.accept("zz", 1, "ada")
     assert "'zz'" in q.reject("zz", "ada", "")
+
+
+def test_accepted_points_follow_an_order_asked_for_and_the_others_keep_their_places():
+    places = {"a": 0.1, "b": 0.3, "c": 0.5, "d": 0.7}
+    q = queue(*(point(i, position=(x, 0.75, 1.0)) for i, x in places.items()))
+    for point_id in ("a", "c", "d"):
+        assert q.accept(point_id, q.get(point_id).point.revision, "ada") == ""
+    q.arrange(("d", "a", "c"), {"c": "it is said why"})
+    assert [e.point_id for e in q.entries()] == ["d", "b", "a", "c"]
+    assert [e.reason for e in q.entries()] == ["", "", "", "it is said why"]
+    assert q.next().point.point_id == "d"
+    q.intend("d", "cut-1")
+    q.resolve("d", "DONE", "cut")
+    assert q.next().point.point_id == "a"
+    q.arrange(())
+    assert [e.point_id for e in q.entries()] == ["a", "b", "c", "d"] and q.entries()[2].reason == ""
