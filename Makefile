@@ -58,8 +58,10 @@ $(VENV)/.locked: requirements.lock
 	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
 	@touch $@
 
+# The control code becomes machine code when it is first imported: better here than at the first start.
 $(VENV)/.project: $(VENV)/.locked pyproject.toml
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	$(BIN)/python -c 'import controller.core'
 	@touch $@
 
 # pip-tools lives apart, as it is no part of what the locks describe. No index address is written into them.
