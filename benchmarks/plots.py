@@ -16,7 +16,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from benchmarks.peers.stopwatch import EDGES_US
+from benchmarks.peers.stopwatch import EDGES_US, counts
 from benchmarks.wilson import interval
 from rolling_panda.errors import InputError
 
@@ -106,9 +106,9 @@ def tick(axes: Axes, document: dict[str, Any]) -> None:
         series.append((f"{peer['name']} {peer['version']}", peer, colour))
     middles = np.sqrt(EDGES_US[1:] * EDGES_US[:-1])
     for name, times, colour in series:
-        counts = np.array(times["histogram"])
+        found = counts(times["histogram"])
         label = f"{name}: {times['median_us']:.0f} µs"
-        axes.step(middles, 100 * counts / counts.sum(), where="mid", color=colour, label=label)
+        axes.step(middles, 100 * found / found.sum(), where="mid", color=colour, label=label)
         axes.axvline(times["median_us"], color=colour, lw=0.8, ls=":")
     axes.set(xlabel="time of one step (µs)", ylabel="share of the steps (%)", xscale="log", xlim=(5, 2000))
     axes.set_xticks([10, 100, 1000], ["10", "100", "1000"])

@@ -30,7 +30,7 @@ class Times:
     median_us: float
     p99_us: float
     max_us: float
-    histogram: list[int]
+    histogram: dict[str, int]
 
     @staticmethod
     def of(seconds: Sequence[float]) -> "Times":

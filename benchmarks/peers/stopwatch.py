@@ -14,10 +14,18 @@ import numpy as np
 EDGES_US = 3.0 * 10.0 ** (np.arange(107) / 30.0)
 
 
-def histogram(micros: Any) -> list[int]:
-    """How many durations (µs) are between each two of `EDGES_US`; what is outside counts with the outermost."""
+def histogram(micros: Any) -> dict[str, int]:
+    """How many durations (µs) are in the bins that are not empty, by the number of the bin's lower edge.
+
+    What is outside the outermost edges counts with the outermost bins.
+    """
     counts, _ = np.histogram(np.clip(micros, EDGES_US[0], EDGES_US[-1]), EDGES_US)
-    return [int(count) for count in counts]
+    return {str(i): int(counts[i]) for i in np.flatnonzero(counts)}
+
+
+def counts(histogram: dict[str, int]) -> Any:
+    """How many are in each bin, from what `histogram` gave."""
+    return np.array([histogram.get(str(i), 0) for i in range(len(EDGES_US) - 1)])
 
 
 def urdf() -> Path:
