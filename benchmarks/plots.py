@@ -16,8 +16,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from benchmarks.intervals import share
 from benchmarks.peers.stopwatch import EDGES_US, counts
-from benchmarks.wilson import interval
 from rolling_panda.errors import InputError
 
 #: One colour a method in every picture, told apart without colours by order and legend as well.
@@ -50,7 +50,8 @@ def reach_by_distance(axes: Axes, reach: Results) -> None:
         reached = np.array([row["reached"] for row in rows])
         shown = [i for i in range(len(middles)) if (place == i).any()]
         shares = np.array([reached[place == i].mean() for i in shown])
-        bounds = np.array([interval(int(reached[place == i].sum()), int((place == i).sum())) for i in shown])
+        counted = [share(int(reached[place == i].sum()), int((place == i).sum())) for i in shown]
+        bounds = np.array([(figure.low, figure.high) for figure in counted])
         errors = np.abs(bounds.T - shares)
         axes.errorbar(
             middles[shown] + shift,

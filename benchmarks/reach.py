@@ -19,10 +19,10 @@ import numpy as np
 
 from benchmarks import reach_targets
 from benchmarks.documents import one_row_a_line
+from benchmarks.intervals import share
 from benchmarks.reach_judge import Quality, Trajectory, judge
 from benchmarks.reach_run import BASE, METHODS, MethodName, Runner
 from benchmarks.reach_targets import Target
-from benchmarks.wilson import interval
 from controller.planning.arm_ik import ArmIk
 from controller.whole_body.manipulability import arm_omega
 from rolling_panda.errors import RollingPandaError
@@ -89,7 +89,7 @@ def summarise(rows: Sequence[Row]) -> dict[str, Any]:
     possible = sum(not row.beyond_reach for row in rows)
     moved = [row.quality for row in rows if row.quality.duration > 0.0] or [row.quality for row in rows]
     done = [row.quality for row in rows if row.quality.reached] or moved
-    low, high = interval(reached, len(rows))
+    among = share(reached, len(rows))
 
     def broken(kind: str) -> dict[str, float]:
         counts = [getattr(quality.violations, kind) for quality in moved]
@@ -100,7 +100,7 @@ def summarise(rows: Sequence[Row]) -> dict[str, Any]:
         "targets": len(rows),
         "reached": reached,
         "reached_share": round(reached / len(rows), 4),
-        "reached_share_95": [round(low, 4), round(high, 4)],
+        "reached_share_95": [round(among.low or 0.0, 4), round(among.high or 0.0, 4)],
         "beyond_reach": len(rows) - possible,
         "reached_share_of_the_others": round(reached / max(possible, 1), 4),
         "violations": {kind: broken(kind) for kind in ("position", "velocity", "acceleration")},

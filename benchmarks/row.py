@@ -4,10 +4,10 @@ Several methods work on the same accepted points: a seed's row looks the same to
 """
 
 import argparse
-import json
 import math
 import os
 import platform
+import re
 import sys
 import tempfile
 import time
@@ -20,8 +20,10 @@ import numpy as np
 
 from benchmarks.cane_touches import CaneTouches
 from benchmarks.closed_loop import ClosedLoop
+from benchmarks.documents import one_row_a_line
+from benchmarks.intervals import share
 from benchmarks.row_stages import LIMITS, STAGES, StageClock
-from benchmarks.wilson import interval
+from benchmarks.row_walk import walk
 from bridge.sim import trace
 from bridge.sim.robot import SimulatedRobot
 from controller.config import ControllerConfig
@@ -79,7 +81,8 @@ class RowRun:
         method: Whole-body method.
         seed: Of the row.
         cuts: The accepted points.
-        work_s: From the start to the end of the last one (s, simulated).
+        work_s: Of automatic work, from the start to the end of the last one (s, simulated).
+        other_s: Of looking and of driving on by hand between stretches of work, of a whole row (s, simulated).
         path_rms: Of the true tool against its trajectory, over all followed motion (m).
         contacts: Physics steps in which the robot met posts, trunks, cordons or wires.
         self_contacts: Physics steps in which it met itself.
@@ -94,6 +97,7 @@ class RowRun:
     seed: int
     cuts: tuple[Cut, ...]
     work_s: float
+    other_s: float
     path_rms: float
     contacts: int
     self_contacts: int
@@ -103,10 +107,19 @@ class RowRun:
     canes_touched: dict[str, str]
 
 
-def cut_row(seed: int, points: int, method: str, plans: bool = True) -> RowRun:
+def cut_row(seed: int, points: int, method: str, pictures: float, along: float = 0.0, plans: bool = True) -> RowRun:
     """Survey from the start posture, accept up to `points` of what was detected, work through them.
 
     A refused acceptance is not among the cuts, as an operator sees the refusal.
+
+    Args:
+        seed: Of the row.
+        points: Most points to accept.
+        method: Whole-body method.
+        pictures: The camera takes a second while the robot moves; they are most of what a run costs.
+        along: With a distance (m), not these points but the whole row is worked off until the base has come so far,
+            with everything that is found on the way.
+        plans: False works without the session's plan.
     """
     errors: list[float] = []
     clock = StageClock(load_section(resource("assets/config/sim.toml"), "controller", ControllerConfig))
@@ -124,13 +137,21 @@ def cut_row(seed: int, points: int, method: str, plans: bool = True) -> RowRun:
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "trace"
-        with ClosedLoop(seed, path, method=method, watch=watch, plans=plans) as loop:
-            accepted = _accept(loop, points)
-            loop.ask(intents.Start(user="bench"))
-            begin = loop.now
-            clock.begin(begin)
-            durations = _work(loop, [entry.point_id for entry in accepted])
-            work_s = sum(durations.values()) if durations else loop.now - begin
+        config = _config(Path(folder) / "row.toml", pictures)
+        with ClosedLoop(seed, path, config, method, watch, plans) as loop:
+            accepted = [] if along else _accept(loop, points)
+            begin, other_s = loop.now, 0.0
+            if along:
+                loop.run(_SURVEY_S)
+                loop.ask(intents.Arm(user="bench"))
+                clock.begin(loop.now)
+                work_s, other_s = walk(loop, along)
+                accepted, durations = [entry for entry in loop.queue() if entry.accepted_position is not None], {}
+            else:
+                loop.ask(intents.Start(user="bench"))
+                clock.begin(begin)
+                durations = _work(loop, [entry.point_id for entry in accepted])
+                work_s = sum(durations.values()) if durations else loop.now - begin
             ends = {entry.point_id: entry for entry in loop.queue()}
             stops = sum("PROTECTIVE_STOP" in event.text for event in loop.events)
         record = trace.read(path)
@@ -158,6 +179,7 @@ def cut_row(seed: int, points: int, method: str, plans: bool = True) -> RowRun:
         seed=seed,
         cuts=tuple(cuts),
         work_s=work_s,
+        other_s=other_s,
         path_rms=math.sqrt(float(np.mean(np.square(errors)))) if errors else 0.0,
         contacts=int(np.count_nonzero(record.rows["contacts"])),
         self_contacts=int(np.count_nonzero(record.rows["self_contacts"])),
@@ -166,6 +188,14 @@ def cut_row(seed: int, points: int, method: str, plans: bool = True) -> RowRun:
         limits=clock.limits,
         canes_touched=_spared(touches, record.events),
     )
+
+
+def _config(path: Path, pictures: float) -> Path:
+    """The simulation's configuration with another rate of pictures."""
+    text = resource("assets/config/sim.toml").read_text(encoding="utf-8")
+    usual = re.compile(r"^camera_moving_hz = .*$", re.MULTILINE)
+    path.write_text(usual.sub(f"camera_moving_hz = {pictures}", text, count=1), encoding="utf-8")
+    return path
 
 
 def _spared(touches: CaneTouches, events: Sequence[dict[str, Any]]) -> dict[str, str]:
@@ -222,6 +252,16 @@ def main(argv: Sequence[str] | None = None) -> int:
         choices=tuple(METHODS),
         help="whole-body method; may be given several times (default: all of them)",
     )
+    parser.add_argument(
+        "--along",
+        type=float,
+        default=0.0,
+        metavar="METRES",
+        help="work along the row until the base has come so far, with every point that is found on the way",
+    )
+    parser.add_argument(
+        "--pictures", type=float, default=0.7, help="pictures a second while the robot moves (default: 0.7)"
+    )
     parser.add_argument("--stages", action="store_true", help="say where the time of a cut goes")
     parser.add_argument("--no-plan", action="store_true", help="work along the row without the session's plan")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows and the summary here")
@@ -233,7 +273,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     for seed in range(arguments.seed, arguments.seed + arguments.count):
         for method in methods:
             begin = time.perf_counter()
-            run = cut_row(seed, arguments.points, method, not arguments.no_plan)
+            run = cut_row(seed, arguments.points, method, arguments.pictures, arguments.along, not arguments.no_plan)
             runs.append(run)
             _tell(run, (run.work_s + _SURVEY_S) / (time.perf_counter() - begin))
     print()
@@ -251,11 +291,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         draw({method: mean_stages([run for run in runs if run.method == method]) for method in methods}, arguments.plot)
     if arguments.json is not None:
         document = {
+            "pictures_hz": arguments.pictures,
             "machine": f"{platform.platform()}, {os.cpu_count()} cores",
             "summary": summary,
             "results": [asdict(run) for run in runs],
         }
-        arguments.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+        arguments.json.write_text(one_row_a_line(document), encoding="utf-8")
     return 0
 
 
@@ -295,7 +336,7 @@ def _mean(runs: list[RowRun], field: str, name: str) -> float:
 def summarise(runs: list[RowRun]) -> dict[str, float | int]:
     """Share severed at the right place, seconds a cut, distances and contacts, over all rows of one method."""
     cuts = [cut for run in runs for cut in run.cuts]
-    durations = [cut.duration_s for cut in cuts if cut.right]
+    durations = [cut.duration_s for cut in cuts if cut.right and cut.duration_s > 0.0]
     distances = [cut.distance for cut in cuts if cut.distance is not None]
     tool = [cut.tool_error for cut in cuts if cut.tool_error is not None]
 
@@ -303,15 +344,16 @@ def summarise(runs: list[RowRun]) -> dict[str, float | int]:
         return round(float(np.quantile(values, share)), digits) if values else 0.0
 
     right = sum(cut.right for cut in cuts)
-    low, high = interval(right, len(cuts))
+    at_place = share(right, len(cuts))
     return {
         "accepted": len(cuts),
         "right": right,
         "right_place": round(right / max(len(cuts), 1), 3),
-        "right_place_low": round(low, 3),
-        "right_place_high": round(high, 3),
+        "right_place_low": round(at_place.low or 0.0, 3),
+        "right_place_high": round(1.0 if at_place.high is None else at_place.high, 3),
         "cut_s_mean": round(sum(run.work_s for run in runs) / max(len(cuts), 1), 2),
         "cut_s_median": quantile(durations, 0.5, 2),
+        "other_s_mean": round(sum(run.other_s for run in runs) / max(len(cuts), 1), 2),
         "distance_mm_median": quantile([1e3 * d for d in distances], 0.5, 2),
         "distance_mm_max": quantile([1e3 * d for d in distances], 1.0, 2),
         "tool_mm_p95": quantile([1e3 * d for d in tool], 0.95, 2),

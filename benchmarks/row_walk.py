@@ -62,12 +62,11 @@ def _go_on(loop: ClosedLoop, distance: float) -> None:
         loop.run(0.1)
         loop.run_until(lambda: loop.state is not None and "home" in loop.state.reason, _PATIENCE_S)
         loop.run_until(lambda: loop.state is not None and "being brought" not in loop.state.reason, _PATIENCE_S)
-    begin, goal, sequence = loop.now, _place(loop) + distance, 0
+    begin, goal = loop.now, _place(loop) + distance
     while _place(loop) < goal and loop.now - begin < _PATIENCE_S:
-        sequence += 1
         left = goal - _place(loop)
         drive = BaseVelocity(linear=min(_SPEED, math.sqrt(0.4 * max(left, 0.0)) + 0.01), angular=0.0)
-        held = TeleopTarget(sequence=sequence, hold=True, user=_USER, base=drive)
+        held = TeleopTarget(sequence=round(100 * loop.now), hold=True, user=_USER, base=drive)
         loop.inputs = replace(loop.inputs, teleop=Sample(held, loop.now))
         loop.run(0.05)
     loop.inputs = replace(loop.inputs, teleop=None)

@@ -19,8 +19,19 @@ from rolling_panda.robot_model import ARM_Q, RobotModel
 #: Places of the cut ahead of the axle (m), in order of preference.
 OFFSETS = (0.15, 0.05, 0.25, -0.05, 0.35, -0.15, 0.45)
 #: Approaches in order of preference: turn about the cane and tilt out of the plane square to it (rad). A cut may lean
-#: by 15° (spur-pruning practice); coming from below brings high points into reach.
-APPROACHES = ((0.0, 0.0), (0.0, 0.2), (0.35, 0.0), (-0.35, 0.0), (0.35, 0.2), (-0.35, 0.2), (0.7, 0.0), (-0.7, 0.0))
+#: by 15° (spur-pruning practice); coming from below brings high points into reach, and either way passes a wire.
+APPROACHES = (
+    (0.0, 0.0),
+    (0.0, 0.2),
+    (0.0, 0.26),
+    (0.0, -0.26),
+    (0.35, 0.0),
+    (-0.35, 0.0),
+    (0.35, 0.2),
+    (-0.35, 0.2),
+    (0.7, 0.0),
+    (-0.7, 0.0),
+)
 #: From the arm's shoulder to its wrist at most, over elbow and wrist offsets (m, Panda's dimensions), and from the
 #: wrist to the flange (m).
 _ARM_LENGTH, _WRIST_TO_FLANGE = 0.3266 + 0.3928 + 0.088, 0.107
