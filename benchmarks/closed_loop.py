@@ -16,7 +16,7 @@ from bridge.sim.build import simulated_bridge
 from bridge.sim.robot import SimulatedRobot
 from controller.config import ControllerConfig
 from controller.core import Controller
-from controller.estimate import configuration_now
+from controller.estimate import BaseEstimate
 from controller.interface import Inputs, Outputs, Sample
 from controller.motion import Tracking
 from controller.planning.cuts import CutPlanner
@@ -32,7 +32,6 @@ from rolling_panda.resources import resource
 from rolling_panda.robot_model import RobotModel
 from rolling_panda.row_messages import Obstacles
 
-_CONTROL_TICKS = 10
 # A frame takes perception about this long, so its points come later by as much.
 _PERCEPTION_S = 0.15
 # A plan of some points takes about this long.
@@ -69,6 +68,7 @@ class ClosedLoop:
             config = msgspec.structs.replace(config, method=method)
         self.controller = Controller(config, robot)
         self._drive = RobotModel(robot).drive
+        self._control_ticks = max(1, round(1.0 / (config.rate_hz * TICK_S)))
         self._watch = watch
         self._planner = CutPlanner(config, robot) if plans else None
         self._planned: tuple[float, WorkPlan] | None = None
@@ -85,7 +85,7 @@ class ClosedLoop:
         self._ticks += 1
         self.now = self._ticks * TICK_S
         self._receive(self.bridge.step(self.now))
-        if self._ticks % _CONTROL_TICKS == 0:
+        if self._ticks % self._control_ticks == 0:
             self.inputs = replace(self.inputs, server_seen=self.now, perception_seen=self.now)
             self._send(self.controller.step(self.inputs, self.now))
             tracking = self.controller.tracking
@@ -102,7 +102,7 @@ class ClosedLoop:
         """Advance until `condition()` holds; False when it does not within `limit_s` simulated seconds."""
         end = self.now + limit_s
         while self.now < end:
-            for _ in range(_CONTROL_TICKS):
+            for _ in range(10):
                 self.tick()
             if condition():
                 return True
@@ -134,7 +134,7 @@ class ClosedLoop:
         """Configuration (12) as measured now; needs a joint state and an odometry."""
         joints, odometry = self.inputs.joints, self.inputs.odometry
         assert joints is not None and odometry is not None
-        return configuration_now(joints.message, odometry.message, self._drive)
+        return BaseEstimate(self._drive).configuration(joints.message, odometry.message)
 
     def close(self) -> None:
         """Close the trace."""

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.demo_under_test import Demo
+from benchmarks.load import cores_between, processor_times
 from rolling_panda.resources import resource
 
 #: How far a held target swings to either side of where the tool was (m), and how fast it goes round (s).
@@ -41,6 +42,7 @@ class Watched:
         tool_error: Of the tool against its trajectory in automatic work, at each poll (m).
         modes: Polls by mode.
         factor: Real-time factors.
+        cores: Processors used meanwhile, by process.
     """
 
     ticks: int = 0
@@ -51,6 +53,7 @@ class Watched:
     tool_error: list[float] = field(default_factory=list)
     modes: dict[str, int] = field(default_factory=dict)
     factor: list[float] = field(default_factory=list)
+    cores: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,7 @@ class Figures:
     """The result; times in s, distances in m."""
 
     rate_hz: float
+    base_rate_hz: float
     achieved_hz: float
     on_time_share: float
     late_ticks: int
@@ -68,13 +72,15 @@ class Figures:
     real_time_factor: float
     seconds: float
     modes: dict[str, int]
+    cores: float
+    cores_by_process: dict[str, float]
 
 
-def configured(rate_hz: float) -> str:
-    """The simulation's configuration with controller and joint states at `rate_hz`."""
+def configured(rate_hz: float, base_rate_hz: float) -> str:
+    """The simulation's configuration with the arm and joint states at `rate_hz` and the base at `base_rate_hz`."""
     text = resource("assets/config/sim.toml").read_text(encoding="utf-8")
-    text = re.sub(r"^rate_hz = .*\n", "", text, flags=re.MULTILINE)
-    text = text.replace("[controller]\n", f"[controller]\nrate_hz = {rate_hz}\n")
+    text = re.sub(r"^(base_)?rate_hz = .*\n", "", text, flags=re.MULTILINE)
+    text = text.replace("[controller]\n", f"[controller]\nrate_hz = {rate_hz}\nbase_rate_hz = {base_rate_hz}\n")
     return text.replace("[bridge]\n", f"[bridge]\njoints_hz = {rate_hz}\n")
 
 
@@ -82,6 +88,7 @@ def watch(demo: Demo, seconds: float) -> Watched:
     """Keep the robot moving and note what it tells of itself."""
     seen = Watched()
     begin = demo.state()
+    before = processor_times(demo.tree)
     started = time.monotonic()
     centre: dict[str, Any] | None = None
     while time.monotonic() - started < seconds:
@@ -101,16 +108,18 @@ def watch(demo: Demo, seconds: float) -> Watched:
         time.sleep(_POLL_S)
     end = demo.state()
     seen.seconds = time.monotonic() - started
+    seen.cores = cores_between(before, processor_times(demo.tree), seen.seconds)
     seen.ticks = end["controller"]["ticks"] - begin["controller"]["ticks"]
     seen.late = end["controller"]["late_ticks"] - begin["controller"]["late_ticks"]
     return seen
 
 
-def figures(seen: Watched, rate_hz: float) -> Figures:
+def figures(seen: Watched, rate_hz: float, base_rate_hz: float) -> Figures:
     """Shares and percentiles."""
     errors = sorted(seen.tool_error)
     return Figures(
         rate_hz=rate_hz,
+        base_rate_hz=base_rate_hz,
         achieved_hz=round(seen.ticks / seen.seconds, 1),
         on_time_share=round(1 - seen.late / max(seen.ticks, 1), 5),
         late_ticks=seen.late,
@@ -121,6 +130,8 @@ def figures(seen: Watched, rate_hz: float) -> Figures:
         real_time_factor=round(statistics.median(seen.factor), 3),
         seconds=round(seen.seconds, 1),
         modes=seen.modes,
+        cores=round(sum(seen.cores.values()), 2),
+        cores_by_process=seen.cores,
     )
 
 
@@ -128,22 +139,25 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the benchmark; returns the exit code."""
     parser = argparse.ArgumentParser(prog="rolling-panda bench live", description=__doc__)
     parser.add_argument("--seconds", type=float, default=60.0, help="how long to watch (default: 60)")
-    parser.add_argument("--rate", type=float, default=1000.0, help="control rate in Hz, 50 to 1000 (default: 1000)")
+    parser.add_argument("--rate", type=float, default=1000.0, help="of the arm in Hz, 50 to 1000 (default: 1000)")
+    parser.add_argument("--base-rate", type=float, default=50.0, help="of the base in Hz, 10 to --rate (default: 50)")
     parser.add_argument("--seed", type=int, default=0, help="row to grow (default: 0)")
     parser.add_argument("--port", type=int, default=8766, help="port of the page (default: 8766)")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures here")
     arguments = parser.parse_args(argv)
     if not 50.0 <= arguments.rate <= 1000.0:
         parser.error(f"--rate {arguments.rate:g} is outside 50 to 1000")
+    if not 10.0 <= arguments.base_rate <= arguments.rate:
+        parser.error(f"--base-rate {arguments.base_rate:g} is outside 10 to {arguments.rate:g}")
     with tempfile.TemporaryDirectory() as folder:
         config = Path(folder) / "live.toml"
-        config.write_text(configured(arguments.rate), encoding="utf-8")
+        config.write_text(configured(arguments.rate, arguments.base_rate), encoding="utf-8")
         print("starting the demo", flush=True)
         demo = Demo(arguments.port, arguments.seed, config)
         try:
             demo.begin_work()
             print(f"watching for {arguments.seconds:.0f} s", flush=True)
-            found = figures(watch(demo, arguments.seconds), arguments.rate)
+            found = figures(watch(demo, arguments.seconds), arguments.rate, arguments.base_rate)
         finally:
             demo.close()
     for name, value in asdict(found).items():

@@ -51,15 +51,22 @@ class PageCost:
 
 def cost(root: psutil.Process, seconds: float) -> Cost:
     """Processor and memory of a process and all below it, over `seconds`."""
-    before, began = _times(root), time.monotonic()
+    before, began = processor_times(root), time.monotonic()
     time.sleep(seconds)
-    after, passed = _times(root), time.monotonic() - began
-    used = {pid: (name, spent - before[pid][1]) for pid, (name, spent) in after.items() if pid in before}
-    by_process: dict[str, float] = {}
-    for name, spent in used.values():
-        by_process[name] = round(by_process.get(name, 0.0) + spent / passed, 3)
+    by_process = cores_between(before, processor_times(root), time.monotonic() - began)
     memory = sum(process.memory_full_info().pss for process in [root, *root.children(recursive=True)])
     return Cost(round(sum(by_process.values()), 3), round(memory / 2**20), by_process)
+
+
+def cores_between(
+    before: dict[int, tuple[str, float]], after: dict[int, tuple[str, float]], passed: float
+) -> dict[str, float]:
+    """Cores used by each process between two `processor_times` that are `passed` (s) apart."""
+    by_process: dict[str, float] = {}
+    for pid, (name, spent) in after.items():
+        if pid in before:
+            by_process[name] = round(by_process.get(name, 0.0) + (spent - before[pid][1]) / passed, 3)
+    return by_process
 
 
 def page_cost(demo: Demo, chromium: str, seconds: float, without: Cost) -> PageCost:
@@ -92,10 +99,10 @@ def page_cost(demo: Demo, chromium: str, seconds: float, without: Cost) -> PageC
         browser_tree = [p for p in psutil.Process(os.getpid()).children(recursive=True) if "chrom" in p.name()]
         before, began, already = sum(_spent(p) for p in browser_tree), time.monotonic(), received
         # The page's events are handled only while Playwright is waiting, so the demo is measured around such a wait.
-        demo_before = _times(demo.tree)
+        demo_before = processor_times(demo.tree)
         page.wait_for_timeout(seconds * 1000)
         passed = time.monotonic() - began
-        demo_after = _times(demo.tree)
+        demo_after = processor_times(demo.tree)
         spent = sum(_spent(p) for p in browser_tree) - before
         demo_spent = sum(t - demo_before[pid][1] for pid, (_, t) in demo_after.items() if pid in demo_before)
         bytes_per_s = (received - already) / passed
@@ -103,7 +110,8 @@ def page_cost(demo: Demo, chromium: str, seconds: float, without: Cost) -> PageC
     return PageCost(round(bytes_per_s), round(spent / passed, 3), round(demo_spent / passed - without.cores, 3))
 
 
-def _times(root: psutil.Process) -> dict[int, tuple[str, float]]:
+def processor_times(root: psutil.Process) -> dict[int, tuple[str, float]]:
+    """Name and processor time (s) of a process and of all below it, by their ids."""
     return {process.pid: (_name(process), _spent(process)) for process in [root, *root.children(recursive=True)]}
 
 

@@ -41,7 +41,7 @@ class Times:
 
 
 class Recorder:
-    """A method that keeps what another is asked for."""
+    """A method that keeps what another is asked for, but for what is the arm's alone between the base's periods."""
 
     def __init__(self, method: Method) -> None:
         """Stand before `method`."""
@@ -50,7 +50,8 @@ class Recorder:
 
     def solve(self, demand: Demand) -> Solution:
         """Keep the demand, and answer it."""
-        self.demands.append(demand)
+        if demand.held is None:
+            self.demands.append(demand)
         return self._method.solve(demand)
 
 

@@ -19,7 +19,9 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         home: Survey posture of the arm (rad): the camera looks at the row.
         reach: Posture the search for a cut posture starts from (rad), elbow aside, tool to the left.
         method: Whole-body method by name.
-        rate_hz: Control rate.
+        rate_hz: Control rate, that of the arm.
+        base_rate_hz: Rate of the base; `rate_hz` over it, rounded, is the number of control periods in one of the base.
+            Methods other than `hierarchy` run at one rate.
         row_heading: Direction of the row in odom (rad); the base keeps parallel to it, the row on its left.
         row_distance: Distance of the row from the line y = 0 along `row_heading` where the base drives (m).
         base_speed: Limit of the base in automatic work and teleoperation (m/s).
@@ -49,7 +51,8 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         cut_timeout_s: A cut without outcome for this long is UNKNOWN (s).
         largest_radius: Canes thicker than this are refused (m).
         moved_tolerance: A point that moved further than this after acceptance is not cut (m).
-        arm_lag_s: By which the arm follows late (s): its servos' lag and half a period.
+        base_lag_s: Time constant with which the wheels follow their command (s).
+        arm_lag_s: By which the arm's servos follow late (s); half a period comes on top.
         gain_position: Of the tool's position error (1/s).
         gain_rotation: Of the tool's rotation error (1/s).
         gain_posture: Of the null-space posture (1/s).
@@ -59,7 +62,7 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         limit_zone: γ_start, distance from a limit where repulsion begins (rad).
         damping: λ of the damped pseudo-inverse, in units of the weighted Jacobian.
         joint_margin: Distance from every joint limit that is never entered (rad).
-        search_steps: Iterations of the posture search in one control period.
+        search_steps: Iterations of the posture search in 10 ms, spread over the control periods.
         joints_max_age_s: Older joint states stop the robot (s).
         odometry_max_age_s: Older odometry stops the robot (s).
         bridge_max_age_s: Older bridge states stop the robot (s).
@@ -78,6 +81,7 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
     reach: ArmPosture = (-0.3, -1.2, 1.1, -1.7, 2.25, 2.4, 0.55)
     method: Literal["hierarchy", "nullspace", "decoupled"] = "hierarchy"
     rate_hz: Positive = 100.0
+    base_rate_hz: Positive = 100.0
     row_heading: float = 0.0
     row_distance: Positive = 0.75
     base_speed: Positive = 0.3
@@ -99,7 +103,8 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
     advance_speed: Positive = 0.7
     stand_off: Positive = 0.15
     arm_only: Positive = 0.05
-    arm_lag_s: NotNegative = 0.025
+    base_lag_s: NotNegative = 0.05
+    arm_lag_s: NotNegative = 0.02
     clearance: Positive = 0.22
     position_tolerance: Positive = 0.0015
     rotation_tolerance: Positive = 0.0175
@@ -129,3 +134,13 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
     teleop_turn: Positive = 0.6
     teleop_base: Literal["free", "transit"] = "free"
     hierarchy: HierarchyConfig = HierarchyConfig()
+
+    @property
+    def search_steps_each(self) -> int:
+        """Iterations of the posture search in one control period."""
+        return max(1, round(100.0 * self.search_steps / self.rate_hz))
+
+    @property
+    def base_every(self) -> int:
+        """How many control periods one of the base has."""
+        return max(1, round(self.rate_hz / self.base_rate_hz)) if self.method == "hierarchy" else 1

@@ -9,7 +9,7 @@ from controller import modes, safety
 from controller.config import ControllerConfig
 from controller.cut_clearance import CutClearance
 from controller.cut_sequence import CutSequence
-from controller.estimate import configuration_now
+from controller.estimate import BaseEstimate, wheels_ahead
 from controller.homing import Homing
 from controller.interface import Inputs, Outputs
 from controller.modes import Event
@@ -27,6 +27,7 @@ from controller.whole_body.collision import CollisionModel
 from controller.whole_body.registry import make_method
 from controller.whole_body.saturation import Saturation
 from controller.whole_body.task import Method
+from controller.whole_body.two_rates import TwoRates
 from controller.work_plan import PlanRequest
 from rolling_panda import intents
 from rolling_panda import messages as m
@@ -61,10 +62,14 @@ class Controller:
         """
         self._config, self._dt = config, 1.0 / config.rate_hz
         self._robot = RobotModel(robot_config)
-        self._saturation = Saturation(self._robot, config, self._dt)
+        base_dt = self._dt * config.base_every
+        self._saturation = Saturation(self._robot, config, self._dt, base_dt)
+        self._base = BaseEstimate(self._robot.drive)
         self._surroundings = Surroundings(CollisionModel(self._robot))
-        method = method or make_method(self._robot, config, self._dt, self._surroundings.model)
-        self._follower = Follower(config, method, self._dt)
+        arm = method or make_method(self._robot, config, self._dt, self._surroundings.model)
+        base = method or make_method(self._robot, config, base_dt, self._surroundings.model)
+        self._method = TwoRates(arm, base, config.base_every)
+        self._follower = Follower(config, self._method, self._dt)
         self._queue = PointQueue(config)
         self._clearance = CutClearance(RobotModel(robot_config), config)
         search = PostureSearch(RobotModel(robot_config), config, self._clearance.admits)
@@ -154,9 +159,13 @@ class Controller:
             self._epoch = bridge.epoch + 1
         self._health = safety.health(inputs, self._epoch, now)
         if inputs.joints is not None and inputs.odometry is not None:
-            q = configuration_now(inputs.joints.message, inputs.odometry.message, self._robot.drive)
-            wheels = np.array(inputs.joints.message.velocity[:2])
-            self._measured = Measured(q, self._robot.kinematics(q), self._sent, wheels, self._before)
+            q = self._base.configuration(inputs.joints.message, inputs.odometry.message)
+            # What the arm is told now it does after its own lag; that is when it has to fit the base's velocity.
+            ahead = self._config.arm_lag_s + 0.5 * self._dt
+            measured = np.array(inputs.joints.message.velocity[:2])
+            wheels = wheels_ahead(measured, self._sent[:2], ahead, self._config.base_lag_s)
+            self._measured = Measured(q, self._robot.kinematics(q), self._sent)
+            self._method.begin(self._sent, self._before, wheels)
         self._surroundings.take(inputs.obstacles)
         self._clearance.take(inputs.obstacles)
         if bridge is not None:

@@ -27,6 +27,8 @@ from rolling_panda.robot_model import ARM_Q
 
 #: A cut command is repeated this often until the bridge has seen it (s).
 _REPEAT_S = 0.05
+#: A point that perception has refined by less than this is aimed at as it was (m).
+_REFINED = 0.0003
 #: Between motions without an end to hold: near enough to go on (m).
 _NEAR = 0.02
 
@@ -112,7 +114,7 @@ class CutSequence:
         self._motion: ToolMotion | None = None
         self._plan: CutPlan | None = None
         self._accepted: m.PruningPoint | None = None
-        self._coming = NextCut(search, queue, config.search_steps, known)
+        self._coming = NextCut(search, queue, config.search_steps_each, known)
         self._forget()
 
     @property
@@ -173,6 +175,8 @@ class CutSequence:
         self._events = []
         if self._stage in (Stage.SEARCH, Stage.TRAVEL, Stage.ADVANCE):
             self._check_acceptance(robot)
+        if self._stage in (Stage.TRAVEL, Stage.ADVANCE):
+            self._refine()
         work = _STEPS[self._stage](self, robot, now)
         return work if not self._events else _with(work, tuple(self._events))
 
@@ -297,6 +301,15 @@ class CutSequence:
         else:
             self._forget()
             self._stage = Stage.ESCAPE
+
+    def _refine(self) -> None:
+        """Lead the motion to where perception now sees the point, which is still where it was accepted, but better."""
+        ticket = self._queue.get(self._point_id)
+        if ticket is None or self._motion is None or self._plan is None:
+            return
+        moved = np.array(ticket.point.position) - self._motion.goal.translation
+        if float(np.linalg.norm(moved)) > _REFINED:
+            self._motion.shift(moved)
 
     def _retreat_from(self, robot: Measured) -> None:
         assert self._plan is not None

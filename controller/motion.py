@@ -25,25 +25,11 @@ class Measured:
         q: Configuration (12).
         kinematics: Of the tool at q.
         sent: ξ̇ sent last (9, rad/s).
-        wheels: Measured velocities of the wheels (2, rad/s); None takes them for what was sent.
-        before: ξ̇ sent in the period before the last (9, rad/s); None where nothing accelerates.
     """
 
     q: Array
     kinematics: Kinematics
     sent: Array
-    wheels: Array | None = None
-    before: Array | None = None
-
-    def behind(self) -> Array:
-        """Twist of the tool (6) that the base owes: what its wheels were told beyond what they do."""
-        if self.wheels is None:
-            return _NOTHING
-        owed: Array = self.kinematics.J_xi[:, :2] @ (self.sent[:2] - self.wheels)
-        return owed
-
-
-_NOTHING = np.zeros(6)
 
 
 class Tracking(Struct, frozen=True):
@@ -80,6 +66,7 @@ class Follower:
         self._config, self._method, self._dt = config, method, dt
         self._J_before: Array | None = None
         self._gains = np.repeat([config.gain_position, config.gain_rotation], 3)
+        self._lag = config.arm_lag_s + 0.5 * dt if config.arm_lag_s else 0.0
 
     @property
     def flows(self) -> bool:
@@ -96,12 +83,11 @@ class Follower:
                 robot.q,
                 robot.kinematics,
                 robot.sent,
-                ToolTask(self._twist(wanted, motion.scale, error, robot) + robot.behind(), motion.free_axis),
+                ToolTask(self._twist(wanted, motion.scale, error, robot), motion.free_axis),
                 motion.posture(),
                 motion.base,
                 motion.cap(pose),
                 motion.scale,
-                robot.before,
             )
         )
         motion.advance(out.scale, self._dt)
@@ -118,7 +104,7 @@ class Follower:
             J,
             before,
             robot.sent,
-            self._config.arm_lag_s,
+            self._lag,
             self._dt,
             self._gains,
             error,
@@ -128,8 +114,7 @@ class Follower:
 
     def jog(self, xi: Array, robot: Measured) -> Tracking:
         """One period of the actuators' own velocities ξ̇ (9, rad/s), within the limits and clear of obstacles."""
-        task, posture = ActuatorTask(xi), Posture(robot.q)
-        demand = Demand(robot.q, robot.kinematics, robot.sent, task, posture, "free", before=robot.before)
+        demand = Demand(robot.q, robot.kinematics, robot.sent, ActuatorTask(xi), Posture(robot.q), "free")
         return _tracking(self._method.solve(demand), None, np.zeros(6), False)
 
     def carry(self, goal: Any, linear: float, angular: float, robot: Measured) -> Tracking:
@@ -174,7 +159,6 @@ class Follower:
             posture,
             base,
             self._config.teleop_speed,
-            before=robot.before,
         )
         return _tracking(self._method.solve(demand), goal, error, False)
 

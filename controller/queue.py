@@ -55,7 +55,8 @@ class PointQueue:
 
         Args:
             points: Everything perceived.
-            keep: Point in front of the blades, which hide it from the camera: its disappearance means nothing.
+            keep: Point in front of the blades, which hide it from the camera: its disappearance means nothing. Seen
+                elsewhere than accepted it is void like any other.
         """
         voided: list[str] = []
         seen = {point.point_id for point in points.points}
@@ -65,7 +66,7 @@ class PointQueue:
                 self._put(point.point_id, Ticket(point))
                 continue
             ticket = replace(ticket, point=point, seen=True)
-            why = self._changed(ticket) if point.point_id != keep else ""
+            why = self._changed(ticket)
             self._put(point.point_id, self._void(ticket, why, voided) if why else ticket)
         for point_id, ticket in list(self._tickets.items()):
             if point_id in seen or point_id == keep or not ticket.seen:

@@ -10,6 +10,7 @@ import pinocchio as pin
 
 from controller.compiled import NOTHING, NUMBER, VECTOR, compiled
 from controller.config import ControllerConfig
+from controller.correction import Correction
 from controller.trajectory import PoseTrajectory, Rates, ToolState, quintic, quintic_time
 from controller.whole_body.task import BaseMode, Posture
 from rolling_panda.differential_drive import Array
@@ -104,6 +105,7 @@ class ToolMotion:
         self.legs = len(legs)
         self.duration = max(leg.end for leg in self._legs)
         self.time, self.scale = 0.0, 1.0
+        self._corrections: list[Correction] = []
 
     @property
     def done(self) -> bool:
@@ -120,6 +122,15 @@ class ToolMotion:
         """What the base is for now."""
         return "row" if self._free is not None and self._free[0] <= self.time < self._free[1] else "frozen"
 
+    def shift(self, by: Array) -> None:
+        """Move the goal by (3, m, odom) from now on, without a jump of velocity or acceleration."""
+        config = self._config
+        # At the speed of the last part, so that a late correction does not hurry the blades.
+        made = Correction.within(self.time, by, Rates(config.cut_speed, config.tool_acceleration, config.tool_jerk))
+        self._corrections.append(made)
+        self.goal = pin.SE3(self.goal.rotation, self.goal.translation + by)
+        self.duration = max(self.duration, made.end)
+
     def advance(self, scale: float, dt: float) -> None:
         """Let the clock run at the rate `scale` for one period of `dt` (s)."""
         self.scale = scale
@@ -133,6 +144,11 @@ class ToolMotion:
             if self.time <= leg.begin:
                 break
             leg.trajectory.add(self.time - leg.begin, position, R, twist, acceleration)
+        for made in self._corrections:
+            done = made.progress(self.time)
+            position += done.s * made.by
+            twist[:3] += done.rate * made.by
+            acceleration[:3] += done.acceleration * made.by
         return ToolState(pin.SE3(R, position), twist, acceleration)
 
     def posture(self) -> Posture:

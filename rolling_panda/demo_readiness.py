@@ -36,7 +36,7 @@ class Readiness:
 
     def up(self) -> frozenset[str]:
         """Processes that are up now."""
-        return frozenset(name for name in self._heard if name != "server" or self._page_answers())
+        return frozenset(name for name in tuple(self._heard) if name != "server" or self._page_answers())
 
     def close(self) -> None:
         """Stop watching."""

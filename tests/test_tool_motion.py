@@ -134,3 +134,27 @@ def test_the_last_stretch_to_a_cut_is_slow():
     inside = pose((0.0, 0.15 - 0.9 * CONFIG.slow_zone, 0.0), (0.0, 0.0, 0.0))
     assert path.cap(inside) == pytest.approx(CONFIG.cut_speed)
     assert path.cap(pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))) > 0.2
+
+
+@given(st.floats(0.05, 0.95), st.floats(0.0, 0.5), places)
+def test_a_goal_that_moves_under_way_makes_no_jump_and_is_reached(share, later, by):
+    """Also when it moves again before the first correction has been made."""
+    path, dt = motion([pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), pose((0.3, 0.1, 0.0), (0.0, 0.3, 0.0))]), 1e-4
+    by, goal = np.array(by) / 80.0, path.goal.translation
+    whole = path.duration
+    for time, part in ((share * whole, by), (min(share + later, 1.0) * whole, -0.5 * by)):
+        around = []
+        for step in range(-4, 5):
+            if step == 1:
+                path.time = time
+                path.shift(part)
+            around.append(at(path, time + step * dt))
+        twist = np.array([state.twist[:3] for state in around])
+        assert np.abs(np.diff(twist, axis=0)).max() < 1.2 * CONFIG.tool_acceleration * dt
+        assert np.abs(np.diff(twist, 2, axis=0)).max() < 3.0 * CONFIG.tool_jerk * dt**2
+        position = np.array([state.T_odom_tool.translation for state in around])
+        np.testing.assert_allclose(np.diff(position, axis=0), dt * (twist[1:] + twist[:-1]) / 2, atol=1e-9)
+    end = at(path, path.duration)
+    np.testing.assert_allclose(end.T_odom_tool.translation, goal + 0.5 * by, atol=1e-12)
+    np.testing.assert_allclose(path.goal.translation, goal + 0.5 * by, atol=1e-12)
+    np.testing.assert_allclose(end.twist, 0.0, atol=1e-12)

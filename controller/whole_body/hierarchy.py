@@ -92,7 +92,7 @@ class Hierarchy:
             return self._brake(demand, "the demand holds a number that is not finite", _NOWHERE)
         bounds = self._box.at(demand.q, demand.sent, demand.sent_before)
         self._climb.now = manipulability = self._manipulability.at(demand.kinematics.J)
-        base = bounds.ramp
+        base = bounds.ramp if demand.held is None else self._actuation.twist @ demand.held
         for task, jacobian, target in self._tasks:
             task.write(demand, jacobian, target)
         rows = self._inequalities(demand, bounds)
@@ -123,8 +123,8 @@ class Hierarchy:
         Weighted by the limits of the tool or of the actuators themselves.
         """
         if isinstance(demand.tool, ActuatorTask):
-            # Of a frozen base nothing can be wanted; its rows would only outnumber the arm's joints.
-            wanted = _ARM if demand.base == "frozen" else _ALL
+            # Of a base that is given nothing can be wanted; its rows would only outnumber the arm's joints.
+            wanted = _ARM if demand.arm_only else _ALL
             shares = np.diag(1.0 / self._box.speed)[wanted]
             return shares, shares @ self._actuation.nu(demand.tool.xi), 1.0
         m = 5 if demand.tool.free_axis else 6
@@ -154,10 +154,10 @@ class Hierarchy:
         rise = min(1.0, (max(demand.scale, 0.0) + self._rise) / share) if share > 0.0 else 1.0
         T, t, A, low, high = self._T, self._t, rows.A, rows.lower, rows.upper
         c = self._nothing[: len(b)]
-        if demand.base != "frozen":
+        if not demand.arm_only:
             sent = self._actuation.nu(demand.sent)
             return Problem(J, b, c, speed, sent, bounds.lower, bounds.upper, A, low, high, k, T, t, rise, keep_path)
-        # What the base still has to do until it rests is made good by the arm; the wheels' rows have no say then.
+        # What the base does meanwhile is made good by the arm; the wheels' rows have no say then.
         A, low, high = A[:k], low[:k], high[:k]
         if base[0] != 0.0 or base[1] != 0.0:
             c = -(J[:, :2] @ base)
@@ -180,9 +180,11 @@ class Hierarchy:
         names: tuple[str, ...],
         manipulability: Manipulability,
     ) -> Solution:
-        free = ARM_XI if demand.base == "frozen" else _ALL
+        free = ARM_XI if demand.arm_only else _ALL
         xi = np.empty(NXI)
         sendable(answer.nu, base, self._actuation.wheels, bounds.wheel_lower, bounds.wheel_upper, xi)
+        if demand.held is not None:
+            xi[:2] = demand.sent[:2]
         scale = answer.scale * share
         worst = given_up(answer.slack)
         if worst >= 0:

@@ -31,8 +31,15 @@ class Saturated:
 class Saturation:
     """Makes a wanted velocity sendable by scaling it in time, never by bending it joint by joint."""
 
-    def __init__(self, robot: RobotModel, config: ControllerConfig, dt: float) -> None:
-        """Precompute the limits for a control period of `dt` (s)."""
+    def __init__(self, robot: RobotModel, config: ControllerConfig, dt: float, base_dt: float | None = None) -> None:
+        """Precompute the limits for a control period of `dt` (s).
+
+        Args:
+            robot: Whose limits they are.
+            config: Of the controller.
+            dt: Control period (s).
+            base_dt: Period of the base (s), in which its speed may change by as much at once; None for `dt`.
+        """
         self._dt = dt
         limits = robot.limits
         self._lower = limits.lower[ARM_Q] + config.joint_margin
@@ -51,6 +58,7 @@ class Saturation:
         self._stop_step = self._step.copy()
         braking = min(config.base_braking / robot.drive.wheel_radius, float(limits.acceleration[0]))
         self._stop_step[:2] = np.maximum(braking * dt, self._step[:2])
+        self._greatest_step = self._stop_step * np.where(np.arange(NXI) < 2, (base_dt or dt) / dt, 1.0)
         self._jerk_step = limits.jerk * dt * dt
         self._most, self._least = self.velocity, -self.velocity
         self._brake = 0.5 * self.acceleration[ARM_XI]
@@ -81,7 +89,7 @@ class Saturation:
 
     def admits(self, xi: Array, sent: Array) -> bool:
         """Whether a velocity (9) may follow the one sent last: finite, and inside velocity and acceleration."""
-        return _admits(xi, sent, self.velocity, self._stop_step)
+        return _admits(xi, sent, self.velocity, self._greatest_step)
 
     def smooth(self, xi: Array, sent: Array, before: Array) -> Array:
         """The velocity (9) nearest to `xi` that the arm's rated jerk lets follow.

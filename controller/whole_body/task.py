@@ -77,6 +77,8 @@ class Demand:
         speed_cap: Largest speed of the tool's origin (m/s).
         scale: Rate of the motion's clock in the last period, 0…1.
         before: ξ̇ sent in the period before the last (9); None where nothing accelerates.
+        held: Velocities that the wheels really have (2, rad/s) in a period in which only the arm is solved for and the
+            wheels' command stays; None in the others.
     """
 
     q: Array
@@ -88,6 +90,12 @@ class Demand:
     speed_cap: float = math.inf
     scale: float = 1.0
     before: Array | None = None
+    held: Array | None = None
+
+    @property
+    def arm_only(self) -> bool:
+        """Whether the base's velocity is given."""
+        return self.base == "frozen" or self.held is not None
 
     @property
     def sent_before(self) -> Array:
@@ -100,6 +108,8 @@ class Demand:
         posture, J, tool = self.posture, self.kinematics.J, self.tool
         wanted = tool.twist if isinstance(tool, ToolTask) else tool.xi
         squares = _squares(self.q, self.sent, self.sent_before, wanted, posture.q, posture.rate, J)
+        if self.held is not None and not math.isfinite(float(self.held.sum())):
+            return False
         # A square that overflows belongs to a number that is of no use either.
         return math.isfinite(squares) and not math.isnan(self.speed_cap + self.scale)
 

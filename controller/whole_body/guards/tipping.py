@@ -19,5 +19,9 @@ class TippingGuard:
         """What has to hold in this period."""
         # At the speeds of now: within one period they change by less than the margin is for.
         rows = self._tipping.rows(demand.q, demand.sent, S=demand.kinematics.S)
-        matrix, bound = rows.over_velocity(demand.sent, self._dt)
-        return Inequalities(matrix, bound, _NAMES)
+        matrix, lower = rows.over_velocity(demand.sent, self._dt)
+        if demand.held is not None:
+            # The base goes on accelerating as it was told to; the rows are about the arm alone.
+            at_it = 2.0 * demand.sent[:2] - demand.sent_before[:2]
+            lower = lower + matrix[:, :2] @ (demand.held - at_it)
+        return Inequalities(matrix, lower, _NAMES)

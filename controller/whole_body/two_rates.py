@@ -1,0 +1,72 @@
+"""A whole-body method at two rates: all nine velocities at the base's, the arm's seven at its own, which is higher.
+
+In a period of the base the method is asked twice. Once for all nine velocities over the base's period, of which the
+base's are sent. And, as in every other period, for the arm's over its own: with the wheels' command as it is, and the
+base moving as it really does. So the arm does not notice which periods are the base's, and makes good what the base
+owes.
+
+This is also where a method, which remembers nothing, is told what was sent before and how fast the wheels really turn.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from controller.whole_body.task import Demand, Method, Solution, ToolTask
+from rolling_panda.differential_drive import NXI, Array
+
+
+class TwoRates:
+    """A method for `Demand`s that come every period of the arm; `begin` each period before `solve`."""
+
+    def __init__(self, arm: Method, base: Method, every: int) -> None:
+        """Bind the method for each period, and the same for a period of the base.
+
+        Args:
+            arm: The method for a control period.
+            base: The same for a period of the base.
+            every: How many control periods that has; with 1 `arm` is asked once for everything.
+        """
+        self.name, self.flows = arm.name, arm.flows
+        self._arm, self._base, self._every = arm, base, every
+        self._period = -1
+        # What was sent at the end of the last two periods of the base.
+        self._sent, self._sent_before = np.zeros(NXI), np.zeros(NXI)
+        self._before = np.zeros(NXI)
+        self._wheels: Array | None = None
+
+    def begin(self, sent: Array, before: Array, wheels: Array | None) -> None:
+        """A new period.
+
+        Args:
+            sent: ξ̇ sent last (9).
+            before: ξ̇ sent in the period before that (9).
+            wheels: The wheels' velocities as measured or predicted (2, rad/s); None takes them for what was sent.
+        """
+        self._period = (self._period + 1) % self._every
+        if self._period == 0:
+            self._sent, self._sent_before = sent, self._sent
+        self._before, self._wheels = before, wheels
+
+    def solve(self, demand: Demand) -> Solution:
+        """The actuator velocities that answer the demand; see `Method.solve`."""
+        sent = demand.sent
+        wheels = sent[:2] if self._wheels is None else self._wheels
+        if self._every == 1 or demand.base == "frozen":
+            return self._arm.solve(replace(_made_good(demand, wheels), before=self._before))
+        if self._period == 0:
+            base = self._base.solve(replace(demand, before=self._sent_before))
+            sent = np.concatenate((base.xi[:2], sent[2:]))
+        before = self._before.copy()
+        # Seen from the arm's periods, the base gets to what it was told at a constant acceleration.
+        before[:2] = sent[:2] - (sent[:2] - self._sent[:2]) / self._every
+        return self._arm.solve(replace(demand, sent=sent, before=before, held=wheels))
+
+
+def _made_good(demand: Demand, wheels: Array) -> Demand:
+    """The demand with the twist that the base owes: what its wheels were told beyond what they do."""
+    tool = demand.tool
+    if not isinstance(tool, ToolTask):
+        return demand
+    owed = demand.kinematics.J_xi[:, :2] @ (demand.sent[:2] - wheels)
+    return replace(demand, tool=replace(tool, twist=tool.twist + owed))
