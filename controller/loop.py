@@ -38,6 +38,8 @@ from rolling_panda.transport import Msg, Slot, Transport
 
 #: The most that passes for the loop between two turns, in periods.
 _LONGEST_TURN = 5
+#: How many turns the time of one is the median of, at most.
+_TIMED = 200
 #: A period that lasts this many times as long as it should is late.
 _LATE = 1.5
 #: How long an operator's question waits for the loop (s); less than the service's timeout.
@@ -89,7 +91,7 @@ class Loop:
         self._motion, self._cut = transport.publisher(MOTION), transport.publisher(CUT)
         self._state, self._event = transport.publisher(CONTROLLER), transport.publisher(EVENT)
         self._plan = transport.publisher(PLAN)
-        self._ticks: deque[float] = deque(maxlen=round(rate_hz))
+        self._ticks: deque[float] = deque(maxlen=min(round(rate_hz), _TIMED))
         self._tick_s = 0.0
         self._count = self._late = 0
 

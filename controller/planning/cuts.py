@@ -33,6 +33,9 @@ _CLOSING_S = 0.5
 #: Rows of a way between two looks at the arm's manipulability.
 _LOOK = 10
 
+#: Rows of a plan are no closer than this (s): at an arm's rate of 1 kHz more of them would say nothing more.
+_ROW_S = 0.01
+
 
 class CutPlanner:
     """Answers plan requests. The same request, asked of any instance, has the same answer."""
@@ -50,7 +53,7 @@ class CutPlanner:
             arm_share=config.arm_share,
             arm_acceleration_share=config.arm_acceleration_share,
             joint_margin=config.joint_margin,
-            dt=1.0 / config.rate_hz,
+            dt=max(1.0 / config.rate_hz, _ROW_S),
         )
         paths = PathPlanner(robot, self._collision, self._limits)
         self._sessions = SessionPlanner(paths, BasePlanner(robot.drive, self._limits), self._limits, config.tool_speed)
