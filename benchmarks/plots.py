@@ -65,7 +65,7 @@ def reach_by_distance(axes: Axes, reach: Results) -> None:
         )
     axes.set(xlabel="distance of the goal from the base (m)", ylabel="reached to 1 mm and 0.5° in 30 s (%)")
     axes.set_ylim(-3, 103)
-    axes.legend(loc="center right")
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
 
 
 def omega_along(axes: Axes, reach: Results) -> None:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from controller.blades import Blades
 from controller.config import ControllerConfig
 from controller.cut_pose import escape_pose
 from controller.motion import Follower, Measured, Tracking
@@ -25,8 +26,6 @@ from rolling_panda import messages as m
 from rolling_panda.differential_drive import Array
 from rolling_panda.robot_model import ARM_Q
 
-#: A cut command is repeated this often until the bridge has seen it (s).
-_REPEAT_S = 0.05
 #: A point that perception has refined by less than this is aimed at as it was (m).
 _REFINED = 0.0003
 #: Between motions without an end to hold: near enough to go on (m).
@@ -77,16 +76,6 @@ class Work:
     events: tuple[str, ...] = ()
 
 
-@dataclass
-class _Cut:
-    """A cut under way: the blades may have moved."""
-
-    point_id: str
-    cut_id: str
-    deadline: float
-    asked_at: float = float("-inf")
-
-
 class CutSequence:
     """Works off the queue. `begin` it, `step` it each period while the mode is AUTO, `abort` it otherwise."""
 
@@ -105,11 +94,9 @@ class CutSequence:
         `run_id` makes the cut ids of this start unlike those of any other; `known` is what a plan says of a point.
         """
         self._config, self._follower = config, follower
-        self._saturation, self._queue, self._run_id = saturation, queue, run_id
+        self._saturation, self._queue, self._blades = saturation, queue, Blades(config, queue, run_id)
         heading = config.row_heading
         self._left = np.array([-np.sin(heading), np.cos(heading), 0.0])
-        self._cuts = 0
-        self._cut: _Cut | None = None
         self._events: list[str] = []
         self._motion: ToolMotion | None = None
         self._plan: CutPlan | None = None
@@ -135,7 +122,7 @@ class CutSequence:
     @property
     def cutting(self) -> bool:
         """Whether a cut has been asked for and how it ends is not known yet: the blades may be closing."""
-        return self._cut is not None
+        return self._blades.busy
 
     def begin(self) -> None:
         """Start with getting the tool clear of the canes."""
@@ -150,20 +137,7 @@ class CutSequence:
 
     def watch(self, bridge: m.BridgeState, now: float) -> tuple[str, ...]:
         """Take in how a cut ended, in every mode; returns what happened, in words."""
-        cut = self._cut
-        if cut is None:
-            return ()
-        if bridge.cut_id == cut.cut_id and bridge.outcome:
-            self._cut = None
-            text = _OUTCOMES[bridge.outcome]
-            self._queue.resolve(cut.point_id, bridge.outcome, text)
-            return (f"{cut.point_id}: {text}",)
-        if now > cut.deadline:
-            self._cut = None
-            text = f"no word from the cutter for {self._config.cut_timeout_s} s; look whether it is cut"
-            self._queue.resolve(cut.point_id, "UNKNOWN", text)
-            return (f"{cut.point_id}: UNKNOWN: {text}",)
-        return ()
+        return self._blades.watch(bridge, now)
 
     def step(self, robot: Measured, now: float) -> Work:
         """One period of work.
@@ -232,9 +206,7 @@ class CutSequence:
         there = self._over(tracking, now, config.position_tolerance, config.rotation_tolerance)
         # Where it comes to rest, not where it passes by.
         if there and float(np.linalg.norm(robot.kinematics.J_xi[:3] @ tracking.xi)) < config.settle_speed:
-            self._cuts += 1
-            self._cut = _Cut(self._point_id, f"{self._run_id}-{self._cuts}", now + config.cut_timeout_s)
-            self._queue.intend(self._point_id, self._cut.cut_id)
+            self._blades.begin(self._point_id, now)
             self._stage = Stage.CUT
         elif self._late(now):
             reason = self._missed("the cut", tracking)
@@ -245,16 +217,12 @@ class CutSequence:
 
     def _cutting(self, robot: Measured, now: float) -> Work:
         tracking = self._track(robot)
-        cut = self._cut
-        if cut is None:
+        if not self._blades.busy:
             self._retreat_from(robot)
             return Work(tracking.xi, tracking)
         if self._coming.look(robot.q):
             self._coming.step()
-        if now - cut.asked_at < _REPEAT_S:
-            return Work(tracking.xi, tracking)
-        cut.asked_at = now
-        return Work(tracking.xi, tracking, cut=(cut.cut_id, cut.point_id))
+        return Work(tracking.xi, tracking, cut=self._blades.command(now))
 
     def _retreat(self, robot: Measured, now: float) -> Work:
         tracking = self._track(robot)
@@ -378,11 +346,6 @@ class CutSequence:
         )
 
 
-_OUTCOMES: dict[str, str] = {
-    "DONE": "cut",
-    "FAILED_NOT_CUT": "the cutter reports that nothing was cut",
-    "UNKNOWN": "the cutter does not know whether it cut",
-}
 _STEPS = {
     Stage.REST: CutSequence._rest,
     Stage.ESCAPE: CutSequence._escape,
