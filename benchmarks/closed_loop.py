@@ -23,7 +23,7 @@ from controller.planning.cuts import CutPlanner
 from controller.work_plan import WorkPlan
 from perception.config import PerceptionConfig
 from perception.pipeline import Perception
-from perception.segmenter import LabelImageSegmenter
+from perception.segmenter_choice import choose_segmenter
 from rolling_panda import intents
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig, load_section
@@ -72,7 +72,9 @@ class ClosedLoop:
         self._watch = watch
         self._planner = CutPlanner(config, robot) if plans else None
         self._planned: tuple[float, WorkPlan] | None = None
-        self.perception = Perception(load_section(path, "perception", PerceptionConfig), LabelImageSegmenter())
+        seeing = load_section(path, "perception", PerceptionConfig)
+        weights = Path(seeing.weights) if seeing.weights else None
+        self.perception = Perception(seeing, choose_segmenter(seeing.segmenter, weights))
         self.now = 0.0
         self.inputs = Inputs(present=frozenset(m.PROCESSES))
         self.state: m.ControllerState | None = None

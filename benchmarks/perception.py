@@ -19,6 +19,7 @@ import msgspec
 import numpy as np
 
 from benchmarks.intervals import Figure, quantile, share
+from benchmarks.perception_gallery import save_failure
 from benchmarks.perception_judge import JudgedPoint, RowJudge
 from benchmarks.perception_points import camera_frame, survey_arm
 from bridge.sim.camera import Camera
@@ -26,6 +27,7 @@ from bridge.sim.camera_config import CameraConfig
 from bridge.sim.vineyard import grow
 from bridge.sim.vineyard_config import VineyardConfig
 from perception.config import PerceptionConfig
+from perception.frame import decode_frame
 from perception.pipeline import Perception
 from perception.segmenter_choice import SEGMENTERS, choose_segmenter
 from rolling_panda import messages as m
@@ -56,7 +58,13 @@ class Survey:
 
 
 def survey_row(
-    seed: int, vines: int, perception: Perception, model: RobotModel, camera_config: CameraConfig, into: Survey
+    seed: int,
+    vines: int,
+    perception: Perception,
+    model: RobotModel,
+    camera_config: CameraConfig,
+    into: Survey,
+    gallery: Path | None = None,
 ) -> None:
     """Drive along one row.
 
@@ -67,6 +75,7 @@ def survey_row(
         model: For the camera's place.
         camera_config: Of the camera.
         into: Takes the result.
+        gallery: Folder for pictures of wrong points.
     """
     config = VineyardConfig(vines=vines)
     row = grow(config, seed)
@@ -89,6 +98,13 @@ def survey_row(
         points = result.points
         reasons.update(dict.fromkeys(result.abstained))
     judged = [opinion.point(point) for point in points]
+    for point, verdict in zip(points, judged, strict=True):
+        if gallery is not None and not verdict.right:
+            base = m.PlanarPose(point.position[0] - _CAMERA_AHEAD, 0.0, 0.0)
+            place = model.pose(configuration(base, position), model.camera_id).homogeneous
+            image = camera.render(row, place, 10**6)
+            view = decode_frame(camera_frame(image, camera, base, position, 0), model)
+            save_failure(gallery, verdict, point, row, camera, place, perception.segmenter.segment(view), image.color)
     into.points += judged
     into.abstained += list(reasons)
     for vine, spur in opinion.spurs():
@@ -138,6 +154,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         "--segmenter", choices=SEGMENTERS, default="network", help="what tells classes (default: %(default)s)"
     )
     parser.add_argument("--weights", type=Path, help="ONNX file for the network (default: the one that is shipped)")
+    parser.add_argument("--fuse", action="store_true", help="apply the rule to what all frames have shown of a spur")
+    parser.add_argument("--gallery", type=Path, metavar="DIR", help="put pictures of wrong points here")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write summary and results here")
     words = parser.parse_args(argv)
     if words.seed < 0 or words.vines < 1:
@@ -146,10 +164,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         for number, done in enumerate(range(0, words.vines, ROW_VINES)):
             segmenter = choose_segmenter(words.segmenter, words.weights)
-            perception = Perception(PerceptionConfig(), segmenter, model)
+            perception = Perception(PerceptionConfig(fuse=words.fuse), segmenter, model)
             seed, vines = words.seed + number, min(ROW_VINES, words.vines - done)
             before = len(survey.points)
-            survey_row(seed, vines, perception, model, CameraConfig(), survey)
+            survey_row(seed, vines, perception, model, CameraConfig(), survey, words.gallery)
             new = survey.points[before:]
             print(f"seed {seed}: {vines} vines, {len(new)} points, {sum(p.right for p in new)} right", flush=True)
     except RollingPandaError as error:
@@ -164,6 +182,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             "seed": words.seed,
             "vines": words.vines,
             "segmenter": words.segmenter,
+            "fuse": words.fuse,
             "summary": {name: asdict(figure) for name, figure in summary.items()},
             "by_visibility": {
                 kind: {name: asdict(figure) for name, figure in summarise(survey, kind).items()}

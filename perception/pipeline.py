@@ -51,7 +51,7 @@ class Perception:
             model: For the camera's place; its work space is used, so it is not shared with another thread.
         """
         self._config = config
-        self._segmenter = segmenter
+        self.segmenter = segmenter
         self._model = model or RobotModel()
         self._tracker = Tracker(config.tracker)
         self._numbers = RowNumbers(config.tracker.spur_separation, config.tracker.vine_spacing)
@@ -82,7 +82,7 @@ class Perception:
         self._remember(view)
         self.withdrawn = ()
         try:
-            labels = self._segmenter.segment(view)
+            labels = self.segmenter.segment(view)
         except InputError as error:
             return self._message(view, self._tracker.points(), (str(error),), ())
         self.obstacles = self._map.update(view, labels)
@@ -142,7 +142,7 @@ class Perception:
         """Everything held true now, without a new frame."""
         return m.PruningPoints(
             header=m.Header(self._stamp, "odom"),
-            segmenter=self._segmenter.name,
+            segmenter=self.segmenter.name,
             frames=self._frames,
             points=self._tracker.points(),
             abstained=self._told,
@@ -206,7 +206,7 @@ class Perception:
         self._told = tuple(text[:500] for text in abstained)
         return m.PruningPoints(
             header=m.Header(view.stamp, "odom"),
-            segmenter=self._segmenter.name,
+            segmenter=self.segmenter.name,
             frames=self._frames,
             points=points,
             abstained=self._told,

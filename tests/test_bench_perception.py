@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from benchmarks.perception import Survey, main, summarise
 from benchmarks.perception_judge import RowJudge
@@ -115,3 +116,16 @@ def test_the_command_writes_what_it_measured(tmp_path, capsys):
     assert document["summary"]["along_error_median_m"]["value"] < 0.005
     assert main(["--weights", str(tmp_path / "none.onnx")]) == 1
     assert "cannot load" in capsys.readouterr().err
+
+
+def test_wrong_points_are_pictured(tmp_path, monkeypatch):
+    monkeypatch.setattr("benchmarks.perception_judge.ON_AXIS", -1.0)
+    words = ["--seed", "100", "--vines", "1", "--segmenter", "labels", "--gallery", str(tmp_path)]
+    assert main(words) == 0
+    pictures = [np.asarray(Image.open(path)) for path in sorted(tmp_path.glob("100_p*.png"))]
+    assert len(pictures) >= 6
+    # Colours left, classes right: the right halves have few colours.
+    for picture in pictures:
+        half = picture.shape[1] // 2
+        colors = [len(np.unique(side.reshape(-1, 3), axis=0)) for side in (picture[:, :half], picture[:, half:])]
+        assert colors[1] < 15 < colors[0]

@@ -7,12 +7,17 @@ import onnx_by_hand
 import pytest
 from PIL import Image
 
+from bridge.sim.camera import Camera
+from bridge.sim.camera_config import CameraConfig
+from bridge.sim.vineyard import grow
+from bridge.sim.vineyard_config import VineyardConfig
 from perception.frame import View
 from perception.network_input import network_input
 from perception.network_segmenter import NetworkSegmenter, NoSegmenter
-from perception.segmenter_choice import choose_segmenter
+from perception.segmenter_choice import SHIPPED, choose_segmenter
 from rolling_panda.errors import ConfigError, InputError, MessageError, ModelError
 from rolling_panda.messages import WOOD_CLASSES, Intrinsics
+from rolling_panda.resources import resource
 
 CLASSES = list(WOOD_CLASSES)
 
@@ -110,3 +115,25 @@ def test_without_the_shipped_weights_every_frame_is_declined_with_the_reason(mon
     assert isinstance(segmenter, NoSegmenter)
     with pytest.raises(InputError, match="without the network's weights: assets/network/vine.onnx"):
         segmenter.segment(view(np.zeros((64, 64, 3), np.uint8)))
+
+
+def test_the_shipped_network_is_small_and_carries_its_card():
+    path = resource(SHIPPED)
+    assert path.stat().st_size <= 4 * 2**20
+    card = path.with_suffix(".md").read_text(encoding="utf-8")
+    assert "python -m perception.training" in card and "Limits:" in card
+
+
+def test_the_shipped_network_sees_rows_it_was_not_trained_on():
+    place = np.eye(4)
+    place[:3, :3] = np.column_stack([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
+    place[:3, 3] = [0.5, -0.03, 1.05]
+    segmenter = choose_segmenter("network")
+    found = []
+    for seed in (901, 902):
+        image = Camera(CameraConfig(), seed).render(grow(VineyardConfig(vines=2), seed), place)
+        said = segmenter.classify(image.color, image.depth)
+        for kind, least in (("cordon", 0.85), ("spur", 0.7), ("cane", 0.8), ("node", 0.7)):
+            true = image.labels == CLASSES.index(kind)
+            found.append((kind, np.mean(said[true] == CLASSES.index(kind)) >= least))
+    assert all(good for _, good in found), found

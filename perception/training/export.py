@@ -59,14 +59,15 @@ Tells the class of every pixel of a picture of a vine in winter, for `perception
 
 - Input: `image`, 1×{CHANNELS}×H×W, H and W multiples of 16: red, green, blue from -1 to 1, and 0.2 m / depth, 0 without
   depth.
-- Output: `classes`, 1×H×W, indices in this order: {", ".join(WOOD_CLASSES)}.
+- Output: `classes`, 1×H×W, indices in this order:
+  {", ".join(WOOD_CLASSES)}.
 - Size: {parameters:,} parameters, {path.stat().st_size / 1024:.0f} KiB.
 - Data: {rows * VIEWS} pictures of {rows} rendered rows ({seeds}); no photograph.
 - Training: {trainer.steps} steps of {BATCH} crops of {CROP}×{CROP} pixels, one thread.
 - Command: `python -m perception.training {options} --out {path.name}`.
 
-Scores on {VIEWS * 6} pictures of 6 other rows (seeds from {VALIDATION_SEED}). Overlap is intersection over union, found
-is the share of the class's pixels that were given it.
+Scores on {VIEWS * 6} pictures of 6 other rows (seeds from {VALIDATION_SEED}). Overlap is intersection over
+union, found is the share of the class's pixels that were given it.
 
 | class | overlap | found | overlap without depth |
 |---|---|---|---|

@@ -1,0 +1,59 @@
+"""The training of the segmentation network."""
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch", reason="the extra `training` is not installed: pip install '.[training]'")
+pytest.importorskip("onnx", reason="the extra `training` is not installed: pip install '.[training]'")
+
+from perception.network_segmenter import NetworkSegmenter  # noqa: E402
+from perception.training.export import write_network  # noqa: E402
+from perception.training.fit import Trainer  # noqa: E402
+from perception.training.scenes import Scenes  # noqa: E402
+from perception.training.score import Confusion, confusion  # noqa: E402
+from rolling_panda.messages import WOOD_CLASSES  # noqa: E402
+
+
+@pytest.fixture(scope="module")
+def scenes() -> Scenes:
+    """Two pictures that a network can learn at once: bright is cane, dark is ground."""
+    rng = np.random.default_rng(0)
+    bright = np.kron(rng.integers(0, 2, (2, 16, 16)), np.ones((1, 16, 16))).astype(bool)
+    color = np.where(bright[..., None], 230, 20).astype(np.uint8).repeat(3, axis=-1)
+    labels = np.where(bright, WOOD_CLASSES.index("cane"), WOOD_CLASSES.index("ground")).astype(np.uint8)
+    return Scenes(color, np.full(bright.shape, 0.8, np.float16), labels)
+
+
+def losses(trainer: Trainer, scenes: Scenes, until: int) -> list[float]:
+    return [progress.loss for progress in trainer.run(scenes, until)]
+
+
+def test_the_same_seed_trains_the_same_network_also_in_two_goes(scenes):
+    whole = losses(Trainer(3, 4), scenes, 4)
+    first, second = Trainer(3, 4), Trainer(3, 4)
+    begun = losses(first, scenes, 2)
+    second.restore(first.state())
+    assert begun + losses(second, scenes, 4) == pytest.approx(whole, rel=1e-3)
+    assert losses(Trainer(4, 4), scenes, 1)[0] != pytest.approx(whole[0], rel=1e-3)
+
+
+def test_what_was_learned_survives_the_export(scenes, tmp_path):
+    trainer = Trainer(1, 24)
+    told = losses(trainer, scenes, 24)
+    assert np.mean(told[-4:]) < 0.4 * np.mean(told[:4])
+    score = confusion(trainer.network, scenes)
+    write_network(tmp_path / "net.onnx", trainer, 1, score, score)
+    said = NetworkSegmenter(tmp_path / "net.onnx").classify(scenes.color[0], scenes.depth[0].astype(np.float32))
+    assert np.mean(said == scenes.labels[0]) > 0.9
+    card = (tmp_path / "net.md").read_text(encoding="utf-8")
+    assert f"| cane | {score.overlap()['cane']:.3f} |" in card and "--seed 1 --rows 1 --steps 24" in card
+
+
+def test_overlap_is_intersection_over_union():
+    counts = np.zeros((len(WOOD_CLASSES),) * 2, np.int64)
+    counts[0, 0], counts[0, 1], counts[1, 1] = 6, 2, 4
+    score = Confusion(counts)
+    assert score.overlap() == {"background": 0.75, "ground": 0.667} and score.found() == {
+        "background": 0.75,
+        "ground": 1.0,
+    }
