@@ -1,6 +1,7 @@
 """Writes a trained network as ONNX, with its classes inside and its card beside it."""
 
 import json
+import warnings
 from io import BytesIO
 from pathlib import Path
 
@@ -30,16 +31,19 @@ def write_network(path: Path, trainer: Trainer, rows: int, with_depth: Confusion
     path.parent.mkdir(parents=True, exist_ok=True)
     buffer = BytesIO()
     labeller = Labeller(trainer.network.to(memory_format=torch.contiguous_format)).eval()
-    torch.onnx.export(
-        labeller,
-        (torch.zeros(1, CHANNELS, 64, 64),),
-        buffer,
-        input_names=["image"],
-        output_names=["classes"],
-        dynamic_axes={"image": {2: "height", 3: "width"}, "classes": {1: "height", 2: "width"}},
-        opset_version=_OPSET,
-        dynamo=False,
-    )
+    with warnings.catch_warnings():
+        # The newer exporter needs one more package and gives the same graph.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        torch.onnx.export(
+            labeller,
+            (torch.zeros(1, CHANNELS, 64, 64),),
+            buffer,
+            input_names=["image"],
+            output_names=["classes"],
+            dynamic_axes={"image": {2: "height", 3: "width"}, "classes": {1: "height", 2: "width"}},
+            opset_version=_OPSET,
+            dynamo=False,
+        )
     model = onnx.load_from_string(buffer.getvalue())
     onnx.helper.set_model_props(model, {"classes": json.dumps(list(WOOD_CLASSES))})
     onnx.checker.check_model(model)
