@@ -83,9 +83,8 @@ class Desk:
                 self.teleop.drew(session.session_id, seen_at)
                 return
 
-    def fetched(self, session: Session, now: float) -> None:
+    def fetched(self, session: Session) -> None:
         """A script has fetched the state that was made last."""
-        session.looked_at = now
         if self._seen_at:
             self.teleop.drew(session.session_id, self._seen_at[-1][1])
 

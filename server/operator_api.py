@@ -136,7 +136,7 @@ def operator_router(desk: Desk) -> APIRouter:
         """The newest state of the robot: what the page gets 10 times a second."""
         if desk.state is None:
             return answer(Result(503, False, "The server is starting; ask again."))
-        desk.fetched(session, time.monotonic())
+        desk.fetched(session)
         return _json(addressed(desk.state, session))
 
     @router.get("/points", tags=["state"], responses=_schema("PagePoints"))

@@ -34,7 +34,6 @@ class Session:
         user: Name for logs.
         role: What they may do.
         used_at: When the session was last used (s).
-        looked_at: When the session last fetched the robot's state by REST (s); -inf before.
         ended: Set when the session is over; its sockets close.
     """
 
@@ -42,7 +41,6 @@ class Session:
     user: str
     role: Role
     used_at: float
-    looked_at: float = float("-inf")
     ended: asyncio.Event = field(default_factory=asyncio.Event)
 
     @property

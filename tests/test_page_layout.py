@@ -7,6 +7,7 @@ from played_page import until
 from played_server import PlayedServer, bridge, controller, point
 from playwright.sync_api import Page, expect
 
+from rolling_panda import page_messages as p
 from rolling_panda.resources import resource
 
 pytestmark = pytest.mark.browser
@@ -64,6 +65,39 @@ def test_a_telephone_scrolls_one_column_and_keeps_the_stop(page: Page, server: P
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
     page.locator("#stop").click()
     until(page, lambda: len(server.stops()) == 1)
+
+
+def test_without_a_link_nothing_is_pushed_off_a_tablet(page: Page, server: PlayedServer) -> None:
+    page.set_viewport_size({"width": 820, "height": 1180})
+    server.bridge = bridge(stop_id="s1", stopped_by="Ada: stop button")
+    expect(page.locator("#reset")).to_be_visible()
+    expect(page.locator("#invite")).to_be_visible()
+    server.online = False
+    server.sockets[-1].close()
+    expect(page.locator("rp-link-banner")).to_contain_text("No link to the server")
+    leave, stop = page.locator("#sign-out").bounding_box(), page.locator("#stop").bounding_box()
+    assert leave is not None and stop is not None
+    assert leave["x"] + leave["width"] <= stop["x"]
+    for useless in ("#reset", "#invite"):
+        expect(page.locator(useless)).to_be_hidden()
+
+
+def test_the_log_follows_its_newest_line_when_the_screen_is_turned(page: Page, server: PlayedServer) -> None:
+    def at_end() -> bool:
+        past = "each => each.scrollHeight - each.scrollTop - each.clientHeight"
+        return bool(page.locator("#log ol").evaluate(past) < 2)
+
+    long = "a line that is long enough to need a second one where there is little room for it, " * 2
+    server.tell(p.PageEvents(events=tuple(server.event(number, "info", long) for number in range(2, 42))))
+    expect(page.locator("#log li")).to_have_count(41)
+    for width, height in ((820, 1180), (1280, 800), (390, 844), (1024, 768)):
+        page.set_viewport_size({"width": width, "height": height})
+        until(page, at_end)
+    page.locator("#log ol").evaluate("each => { each.scrollTop = 0; }")
+    page.wait_for_timeout(100)
+    server.tell(p.PageEvents(events=(server.event(42, "info", "while somebody reads older ones"),)))
+    expect(page.locator("#log li")).to_have_count(42)
+    assert page.locator("#log ol").evaluate("each => each.scrollTop") == 0
 
 
 def test_the_page_is_small_and_keeps_to_its_own_files() -> None:

@@ -2,7 +2,7 @@
 
 import { post } from "../api.js";
 import { element, setText } from "../element.js";
-import { pageState } from "../state.js";
+import { link as serverLink, pageState } from "../state.js";
 import { drawOn } from "../store.js";
 
 /** @type {readonly (readonly [role: import("../messages.js").Role, may: string])[]} */
@@ -85,8 +85,8 @@ class RpInvite extends HTMLElement {
         setText(words, "The browser does not let a page copy here: press Ctrl+C.");
       }
     });
-    drawOn([pageState], () => {
-      const may = pageState.get()?.role === "supervisor";
+    drawOn([pageState, serverLink], () => {
+      const may = pageState.get()?.role === "supervisor" && serverLink.get().status === "open";
       if (this.hidden === may) this.hidden = !may;
       if (!may && !form.hidden) show(false);
     });

@@ -29,14 +29,22 @@ class RpLog extends HTMLElement {
     filter.addEventListener("change", () => {
       this.dataset.least = filter.value;
       draw();
-      list.scrollTop = list.scrollHeight;
+      toEnd();
     });
+    // Follow the newest line until somebody scrolls away from it; turning the screen is no such wish.
+    let following = true;
+    const toEnd = () => {
+      list.scrollTop = list.scrollHeight;
+    };
+    list.addEventListener("scroll", () => {
+      following = list.scrollHeight - list.scrollTop - list.clientHeight < 24;
+    });
+    new ResizeObserver(() => following && toEnd()).observe(list);
 
     /** @type {Map<PageEvent, HTMLElement>} */
     const rows = new Map();
     const draw = () => {
       const lines = log.get();
-      const atEnd = list.scrollHeight - list.scrollTop - list.clientHeight < 24;
       const wanted = new Set(lines);
       for (const [line, row] of rows) {
         if (wanted.has(line)) continue;
@@ -57,7 +65,7 @@ class RpLog extends HTMLElement {
       const left = lines.filter((line) => filter.value === "info" || line.severity === "error" || line.severity === filter.value);
       empty.hidden = left.length > 0;
       setText(empty, lines.length === 0 ? "Nothing has happened yet." : "Nothing of this severity.");
-      if (atEnd) list.scrollTop = list.scrollHeight;
+      if (following) toEnd();
     };
     drawOn([log], draw);
   }

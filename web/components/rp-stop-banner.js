@@ -27,6 +27,7 @@ class RpStopBanner extends HTMLElement {
     });
     const reset = element("button", { id: "reset", text: "Reset", attributes: { type: "submit" } });
     const form = element("form", {}, reason, reset);
+    const hint = element("p", { class: "hint", text: "The reset moves nothing: arm and start again afterwards." });
     form.addEventListener("submit", async (event) => {
       event.preventDefault();
       if (await ask("Reset", "/api/reset", { reason: reason.value.trim() })) reason.value = "";
@@ -35,7 +36,7 @@ class RpStopBanner extends HTMLElement {
       element("div", { class: "banner-head" }, icon("ESTOP_LATCHED"), element("h2", { text: "Software stop" }), who),
       element("ul", { class: "acknowledgements" }, bridge.row, controller.row),
       form,
-      element("p", { class: "hint", text: "The reset moves nothing: arm and start again afterwards." }),
+      hint,
     );
     const draw = () => {
       const state = pageState.get();
@@ -48,6 +49,8 @@ class RpStopBanner extends HTMLElement {
         this.setAttribute("role", shown ? "alert" : "none");
       }
       if (!shown) return;
+      // Without a link nobody can reset from here, and the view has little room under both banners.
+      form.hidden = hint.hidden = link.get().status !== "open";
       const told = state?.bridge?.stopped_by || (byController ? state?.controller?.reason : "") || "";
       setText(who, told ? `Pressed by ${told}` : "Pressed on this page; waiting for the robot to say so");
       bridge.show(byBridge);
