@@ -6,7 +6,7 @@ from collections import deque
 import numpy as np
 
 from rolling_panda import messages as m
-from rolling_panda.differential_drive import Array, DifferentialDrive
+from rolling_panda.differential_drive import Array, DifferentialDrive, Pose
 
 #: Odometry is carried forward by no more than this (s); older odometry is a fault, not something to guess from.
 _LONGEST = 0.1
@@ -26,8 +26,7 @@ def wheels_ahead(wheels: Array, sent: Array, ahead: float, lag: float) -> Array:
         lag: Time constant (s); 0 takes them for what they were told.
     """
     left = math.exp(-ahead / lag) if lag > 0.0 else 0.0
-    later: Array = sent + (wheels - sent) * left
-    return later
+    return np.array([told + (now - told) * left for now, told in zip(wheels.tolist(), sent.tolist(), strict=True)])
 
 
 class BaseEstimate:
@@ -41,9 +40,9 @@ class BaseEstimate:
         """Know nothing yet; `drive` is the base's geometry."""
         self._drive = drive
         #: Of the last joint states: stamp, the wheels' angles and the pose by the wheels alone, in a frame of its own.
-        self._past: deque[tuple[float, Array, Array]] = deque()
+        self._past: deque[tuple[float, float, float, Pose]] = deque()
         #: That frame in odom: x, y, turn.
-        self._frame = (0.0, 0.0, 0.0)
+        self._frame: Pose = (0.0, 0.0, 0.0)
         self._odometry: m.Odometry | None = None
 
     def configuration(self, joints: m.JointState, odometry: m.Odometry) -> Array:
@@ -51,14 +50,14 @@ class BaseEstimate:
         q = np.empty(12)
         q[3:] = joints.position
         stamp = joints.header.stamp
-        self._roll(stamp, q[3:5], odometry)
+        self._roll(stamp, joints.position[0], joints.position[1], odometry)
         if odometry is not self._odometry:
             self._odometry = odometry
             self._correct(odometry, stamp)
-        q[:3] = self._in_odom(self._past[-1][2])
+        q[:3] = self._in_odom(self._past[-1][3])
         return q
 
-    def _roll(self, stamp: float, wheels: Array, odometry: m.Odometry) -> None:
+    def _roll(self, stamp: float, left: float, right: float, odometry: m.Odometry) -> None:
         """Go on by what the wheels have turned."""
         past = self._past
         if past and stamp < past[-1][0]:
@@ -66,11 +65,11 @@ class BaseEstimate:
         if past and stamp == past[-1][0]:
             return
         if past:
-            _, before, pose = past[-1]
-            pose = self._drive.integrate(pose, float(wheels[0] - before[0]), float(wheels[1] - before[1]))
+            _, left_before, right_before, pose = past[-1]
+            pose = self._drive.rolled(pose, left - left_before, right - right_before)
         else:
             pose, self._frame = self._carried(odometry, stamp), (0.0, 0.0, 0.0)
-        past.append((stamp, wheels.copy(), pose))
+        past.append((stamp, left, right, pose))
         while past[0][0] < stamp - _LONGEST:
             past.popleft()
 
@@ -80,26 +79,24 @@ class BaseEstimate:
         known = next((entry for entry in reversed(self._past) if entry[0] <= then), None)
         if known is None or stamp - then > _LONGEST:
             return
-        at, _, rolled = known
-        believed = self._in_odom(rolled)
-        wrong = self._carried(odometry, at) - believed
-        wrong[2] = math.remainder(wrong[2], math.tau)
-        share = 1.0 if float(np.abs(wrong).max()) > _ELSEWHERE else _BELIEVED
-        x, y, _ = (believed + share * wrong).tolist()
-        turn = self._frame[2] + share * float(wrong[2])
+        at, _, _, (rolled_x, rolled_y, rolled_phi) = known
+        x, y, phi = self._in_odom((rolled_x, rolled_y, rolled_phi))
+        x_said, y_said, phi_said = self._carried(odometry, at)
+        wrong = x_said - x, y_said - y, math.remainder(phi_said - phi, math.tau)
+        share = 1.0 if max(map(abs, wrong)) > _ELSEWHERE else _BELIEVED
+        x, y, turn = x + share * wrong[0], y + share * wrong[1], self._frame[2] + share * wrong[2]
         c, s = math.cos(turn), math.sin(turn)
-        rolled_x, rolled_y, _ = rolled.tolist()
         self._frame = (x - c * rolled_x + s * rolled_y, y - s * rolled_x - c * rolled_y, turn)
 
-    def _in_odom(self, rolled: Array) -> Array:
+    def _in_odom(self, rolled: Pose) -> Pose:
         x, y, turn = self._frame
         c, s = math.cos(turn), math.sin(turn)
-        rolled_x, rolled_y, phi = rolled.tolist()
-        return np.array([x + c * rolled_x - s * rolled_y, y + s * rolled_x + c * rolled_y, phi + turn])
+        rolled_x, rolled_y, phi = rolled
+        return x + c * rolled_x - s * rolled_y, y + s * rolled_x + c * rolled_y, phi + turn
 
-    def _carried(self, odometry: m.Odometry, stamp: float) -> Array:
+    def _carried(self, odometry: m.Odometry, stamp: float) -> Pose:
         """Odometry's pose carried along its arc to a stamp, earlier or later."""
         ahead = min(max(stamp - odometry.header.stamp, -_LONGEST), _LONGEST)
         left, right = self._drive.wheels(odometry.linear * ahead, odometry.angular * ahead)
         pose = odometry.pose
-        return self._drive.integrate(np.array([pose.x, pose.y, pose.phi]), left, right)
+        return self._drive.rolled((pose.x, pose.y, pose.phi), left, right)

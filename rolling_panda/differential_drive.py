@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 NQ, NXI = 12, 9
 Array = NDArray[np.float64]
+#: x, y (m) and φ (rad).
+Pose = tuple[float, float, float]
 #: The lower part of S: the actuated coordinates are themselves.
 _ACTUATED = np.vstack([np.zeros((NQ - NXI, NXI)), np.eye(NXI)])
 
@@ -66,12 +68,17 @@ class DifferentialDrive:
 
         Exact for constant wheel speeds: the axle centre follows an arc.
         """
-        distance, angle = self.twist(turned_left, turned_right)
         x, y, phi = pose.tolist()
+        return np.array(self.rolled((x, y, phi), turned_left, turned_right))
+
+    def rolled(self, pose: Pose, turned_left: float, turned_right: float) -> Pose:
+        """`integrate` for plain numbers."""
+        distance, angle = self.twist(turned_left, turned_right)
+        x, y, phi = pose
         x, y = x - self.rho * math.cos(phi), y - self.rho * math.sin(phi)
         # Chord of the arc.
         half = angle / 2
         chord = distance * math.sin(half) / half if half != 0.0 else distance
         x, y = x + chord * math.cos(phi + half), y + chord * math.sin(phi + half)
         phi += angle
-        return np.array([x + self.rho * math.cos(phi), y + self.rho * math.sin(phi), phi])
+        return x + self.rho * math.cos(phi), y + self.rho * math.sin(phi), phi

@@ -16,7 +16,7 @@ from controller.whole_body.actuation import Actuation
 from controller.whole_body.box import Bounds, Box
 from controller.whole_body.cascade import Answer, Cascade, Problem, given_up
 from controller.whole_body.guards.axle import AxleAhead
-from controller.whole_body.hierarchy_rows import guard_rows, sendable, tool_rows, wheel_rows
+from controller.whole_body.hierarchy_rows import guard_rows, sendable, tool_rows, wheel_rows, without_base
 from controller.whole_body.manipulability import ArmManipulability, Manipulability
 from controller.whole_body.task import ActuatorTask, Demand, Guard, Solution
 from controller.whole_body.tasks.arm_posture import ArmPosture
@@ -160,9 +160,7 @@ class Hierarchy:
         # What the base does meanwhile is made good by the arm; the wheels' rows have no say then.
         A, low, high = A[:k], low[:k], high[:k]
         if base[0] != 0.0 or base[1] != 0.0:
-            c = -(J[:, :2] @ base)
-            t = t - T[:, :2] @ base
-            low = low - A[:, :2] @ base
+            c, t, low = without_base(J, base, c), without_base(T, base, t), without_base(A, base, low)
         J, T, A = J[:, ARM_XI], T[:, ARM_XI], A[:, ARM_XI]
         lower, upper = bounds.lower[ARM_XI], bounds.upper[ARM_XI]
         sent, speed = demand.sent[ARM_XI], speed[ARM_XI]

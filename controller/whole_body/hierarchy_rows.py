@@ -5,6 +5,8 @@
 
 import math
 
+import numpy as np
+
 from controller.compiled import COUNT, MATRIX, NOTHING, NUMBER, PACKED, VECTOR, compiled
 from rolling_panda.differential_drive import Array
 
@@ -71,6 +73,19 @@ def wheel_rows(wheels: Array, least: Array, most: Array, at: int, A: Array, lowe
         for j in range(9):
             A[at + i, j] = wheels[i, j] if j < 2 else 0.0
         lower[at + i], upper[at + i] = least[i], most[i]
+
+
+def without_base(rows: Array, base: Array, rest: Array) -> Array:
+    """What rows (k×9, over ν or ξ̇) leave of `rest` (k) for the arm, the base's share of them being `base` (2)."""
+    left = np.empty(len(rest))
+    _without_base(rows, base, rest, left)
+    return left
+
+
+@compiled(NOTHING(MATRIX, VECTOR, VECTOR, VECTOR))
+def _without_base(rows: Array, base: Array, rest: Array, left: Array) -> None:
+    for i in range(len(rest)):
+        left[i] = rest[i] - rows[i, 0] * base[0] - rows[i, 1] * base[1]
 
 
 @compiled(NOTHING(VECTOR, VECTOR, PACKED, VECTOR, VECTOR, VECTOR))

@@ -108,8 +108,8 @@ class Demand:
         posture, J, tool = self.posture, self.kinematics.J, self.tool
         wanted = tool.twist if isinstance(tool, ToolTask) else tool.xi
         squares = _squares(self.q, self.sent, self.sent_before, wanted, posture.q, posture.rate, J)
-        if self.held is not None and not math.isfinite(float(self.held.sum())):
-            return False
+        if self.held is not None:
+            squares += self.held[0] ** 2 + self.held[1] ** 2
         # A square that overflows belongs to a number that is of no use either.
         return math.isfinite(squares) and not math.isnan(self.speed_cap + self.scale)
 

@@ -12,7 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from controller.whole_body.task import Demand, Method, Solution, ToolTask
+from controller.compiled import MATRIX, NOTHING, VECTOR, compiled
+from controller.whole_body.task import ActuatorTask, Demand, Method, Solution, ToolTask
 from rolling_panda.differential_drive import NXI, Array
 
 
@@ -53,20 +54,32 @@ class TwoRates:
         sent = demand.sent
         wheels = sent[:2] if self._wheels is None else self._wheels
         if self._every == 1 or demand.base == "frozen":
-            return self._arm.solve(replace(_made_good(demand, wheels), before=self._before))
+            return self._arm.solve(replace(demand, tool=_made_good(demand, wheels), before=self._before))
         if self._period == 0:
             base = self._base.solve(replace(demand, before=self._sent_before))
-            sent = np.concatenate((base.xi[:2], sent[2:]))
+            sent = sent.copy()
+            sent[:2] = base.xi[:2]
         before = self._before.copy()
         # Seen from the arm's periods, the base gets to what it was told at a constant acceleration.
-        before[:2] = sent[:2] - (sent[:2] - self._sent[:2]) / self._every
+        for wheel in (0, 1):
+            before[wheel] = sent[wheel] - (sent[wheel] - self._sent[wheel]) / self._every
         return self._arm.solve(replace(demand, sent=sent, before=before, held=wheels))
 
 
-def _made_good(demand: Demand, wheels: Array) -> Demand:
-    """The demand with the twist that the base owes: what its wheels were told beyond what they do."""
+def _made_good(demand: Demand, wheels: Array) -> ToolTask | ActuatorTask:
+    """The demand's tool with the twist that the base owes: what its wheels were told beyond what they do."""
     tool = demand.tool
     if not isinstance(tool, ToolTask):
-        return demand
-    owed = demand.kinematics.J_xi[:, :2] @ (demand.sent[:2] - wheels)
-    return replace(demand, tool=replace(tool, twist=tool.twist + owed))
+        return tool
+    twist = np.empty(6)
+    _owed(demand.kinematics.J_xi, demand.sent, wheels, tool.twist, twist)
+    return ToolTask(twist, tool.free_axis, tool.keep_path)
+
+
+@compiled(NOTHING(MATRIX, VECTOR, VECTOR, VECTOR, VECTOR))
+def _owed(J_xi: Array, sent: Array, wheels: Array, twist: Array, more: Array) -> None:
+    """More = twist + J_ξ (ξ̇_sent − ξ̇) over the wheels."""
+    for i in range(6):
+        more[i] = twist[i]
+        for j in range(2):
+            more[i] += J_xi[i, j] * (sent[j] - wheels[j])

@@ -1,5 +1,6 @@
 """The wheels and the caster stay on the ground: bounds on what base and arm may accelerate together."""
 
+from controller.whole_body.hierarchy_rows import without_base
 from controller.whole_body.task import Demand, Inequalities
 from controller.whole_body.tipping import Tipping
 
@@ -22,6 +23,5 @@ class TippingGuard:
         matrix, lower = rows.over_velocity(demand.sent, self._dt)
         if demand.held is not None:
             # The base goes on accelerating as it was told to; the rows are about the arm alone.
-            at_it = 2.0 * demand.sent[:2] - demand.sent_before[:2]
-            lower = lower + matrix[:, :2] @ (demand.held - at_it)
+            lower = without_base(matrix, 2.0 * demand.sent[:2] - demand.sent_before[:2] - demand.held, lower)
         return Inequalities(matrix, lower, _NAMES)
