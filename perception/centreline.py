@@ -83,7 +83,7 @@ def _measure(view: View, wood: Wood, members: Index, line: Array, config: Skelet
     stations = _arc(line)
     along = _project(line, stations, wood.points[members])
     length = float(stations[-1])
-    width_arc, width = _widths(view, wood, members, along, line, stations)
+    width_arc, width = _widths(view, wood, members, along, line, stations, config.widening)
     radius = float(np.clip(np.median(width) / 2, 0.001, 0.05)) if len(width) else _FALLBACK_RADIUS
     axis = _smooth(line, stations, along, wood.points[members], config.smoothing)
     steps = np.linalg.norm(np.diff(axis, axis=0), axis=1)
@@ -187,7 +187,9 @@ def base_radius(line: Centreline, reverse: bool) -> float:
     return float(np.clip(width_at_base / 2, 0.001, 0.05))
 
 
-def _widths(view: View, wood: Wood, members: Index, along: Array, line: Array, stations: Array) -> tuple[Array, Array]:
+def _widths(
+    view: View, wood: Wood, members: Index, along: Array, line: Array, stations: Array, widening: float
+) -> tuple[Array, Array]:
     """Arc lengths and widths (m) of stretches without nodes: pixels a unit of length of the image, scaled by depth."""
     u, v, _ = view.pixels(line).T
     pixel_arc = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(u), np.diff(v)))])
@@ -202,7 +204,8 @@ def _widths(view: View, wood: Wood, members: Index, along: Array, line: Array, s
     focal = float(np.sqrt(view.intrinsics.fx * view.intrinsics.fy))
     use = (count > 0) & (node == 0) & (length > 1.0)
     s = (edges[:-1] + _WIDTH_STEP / 2)[use]
-    return s, count[use] / length[use] * depth[use] / focal * _squareness(view, line, stations, s)
+    pixels_wide = np.maximum(count[use] / length[use] - widening, 0.5)
+    return s, pixels_wide * depth[use] / focal * _squareness(view, line, stations, s)
 
 
 def _squareness(view: View, line: Array, stations: Array, arc: Array) -> Array:

@@ -71,6 +71,7 @@ class SkeletonConfig(Struct, frozen=True, forbid_unknown_fields=True):
         border: A spur nearer than this to the image's edge may have canes out of view (px).
         least_cane: Shorter pieces are not called canes (m).
         least_node_pixels: Smaller node blobs are ignored (px).
+        widening: So much wider than they are canes come out of the segmenter (px); it says so itself.
     """
 
     nearest: Positive = 0.15
@@ -87,6 +88,7 @@ class SkeletonConfig(Struct, frozen=True, forbid_unknown_fields=True):
     border: Annotated[float, Meta(ge=0.0, le=1000.0)] = 30.0
     least_cane: Positive = 0.03
     least_node_pixels: Annotated[int, Meta(ge=1, le=100)] = 4
+    widening: Annotated[float, Meta(ge=-3.0, le=3.0)] = 0.0
 
 
 class TrackerConfig(Struct, frozen=True, forbid_unknown_fields=True):

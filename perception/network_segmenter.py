@@ -17,6 +17,8 @@ from rolling_panda.messages import WOOD_CLASSES
 _MULTIPLE = 16
 #: An image darker than this at its brightest, or as even as this, shows nothing (of 255).
 _DARK, _EVEN = 12, 2.0
+#: Nothing draws canes this much too wide (px).
+_WIDEST = 3.0
 #: What onnxruntime raises over a file that it cannot run; they share no root of their own.
 _REFUSALS = (
     ort.Fail,
@@ -31,7 +33,8 @@ _REFUSALS = (
 class NetworkSegmenter:
     """Runs an ONNX file: `image` 1×4×H×W (see `network_input`) to `classes` 1×H×W, uint8.
 
-    The file says which classes it knows, in its metadata under `classes`: a JSON list, equal to `WOOD_CLASSES`.
+    The file says which classes it knows, in its metadata under `classes`: a JSON list, equal to `WOOD_CLASSES`. Under
+    `widening` it may say by how many pixels it draws canes too wide.
     """
 
     def __init__(self, path: Path, threads: int = 2) -> None:
@@ -55,11 +58,17 @@ class NetworkSegmenter:
             raise ConfigError(f"cannot load the network {path}: {error}") from error
         _check(self._session, path)
         self._name = f"network {path.name}"
+        self._widening = _widening(self._session, path)
 
     @property
     def name(self) -> str:
         """The file's name."""
         return self._name
+
+    @property
+    def widening(self) -> float:
+        """As measured when it was trained."""
+        return self._widening
 
     def segment(self, view: View) -> NDArray[np.uint8]:
         """Classes by colour and depth.
@@ -102,6 +111,11 @@ class NoSegmenter:
         """It says that there is none."""
         return "none"
 
+    @property
+    def widening(self) -> float:
+        """Nothing is drawn."""
+        return 0.0
+
     def segment(self, view: View) -> NDArray[np.uint8]:
         """Never returns.
 
@@ -109,6 +123,17 @@ class NoSegmenter:
             InputError: Always.
         """
         raise InputError(self._reason)
+
+
+def _widening(session: onnxruntime.InferenceSession, path: Path) -> float:
+    text = session.get_modelmeta().custom_metadata_map.get("widening", "0")
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not abs(value) <= _WIDEST:
+        raise ConfigError(f"{path}: its widening is {text!r}; give the pixels by which it draws canes too wide")
+    return value
 
 
 def _check(session: onnxruntime.InferenceSession, path: Path) -> None:

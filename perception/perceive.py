@@ -19,6 +19,7 @@ from PIL import Image, ImageDraw
 from perception.config import PerceptionConfig, RuleConfig
 from perception.network_segmenter import NetworkSegmenter
 from perception.photograph import R_LEVEL, Photograph, load_photograph
+from perception.pipeline import with_widening
 from perception.segmenter_choice import SHIPPED
 from perception.still import Still, StillPoint, read_still
 from rolling_panda.errors import InputError, RollingPandaError
@@ -62,7 +63,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         segmenter = NetworkSegmenter(words.weights or resource(SHIPPED))
         photograph = load_photograph(words.image, words.depth, words.intrinsics, words.depth_unit)
         labels = segmenter.classify(photograph.color, photograph.depth)
-        still = read_still(photograph, labels, replace(PerceptionConfig(), rule=rule))
+        config = with_widening(replace(PerceptionConfig(), rule=rule), segmenter.widening)
+        still = read_still(photograph, labels, config)
         words.out.mkdir(parents=True, exist_ok=True)
         _write(words.out, words.image, photograph, labels, still, segmenter.name)
     except (RollingPandaError, OSError) as error:

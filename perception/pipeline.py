@@ -50,7 +50,7 @@ class Perception:
             segmenter: Says which pixel shows what.
             model: For the camera's place; its work space is used, so it is not shared with another thread.
         """
-        self._config = config
+        self._config = with_widening(config, segmenter.widening)
         self.segmenter = segmenter
         self._model = model or RobotModel()
         self._tracker = Tracker(config.tracker)
@@ -212,6 +212,11 @@ class Perception:
             abstained=self._told,
             canes=canes,
         )
+
+
+def with_widening(config: PerceptionConfig, widening: float) -> PerceptionConfig:
+    """The configuration for a segmenter that draws canes so much too wide (px)."""
+    return replace(config, skeleton=replace(config.skeleton, widening=widening))
 
 
 def _beside_wire(place: str, rule: RuleConfig) -> str:

@@ -16,6 +16,10 @@ class Segmenter(Protocol):
     def name(self) -> str:
         """What stands behind the classes, for people."""
 
+    @property
+    def widening(self) -> float:
+        """How much wider than they are it draws canes, on average (px)."""
+
     def segment(self, view: View) -> NDArray[np.uint8]:
         """H×W indices into `WOOD_CLASSES`.
 
@@ -31,6 +35,11 @@ class LabelImageSegmenter:
     def name(self) -> str:
         """It says where the classes come from."""
         return "simulator labels"
+
+    @property
+    def widening(self) -> float:
+        """Nothing: it is what the camera rendered."""
+        return 0.0
 
     def segment(self, view: View) -> NDArray[np.uint8]:
         """The frame's own label image.

@@ -30,6 +30,7 @@ def brightest_channel(
     shape: tuple[int | str, ...] = (1, 4, "h", "w"),
     output: str = "classes",
     kind: str = "uint8",
+    widening: str | None = None,
 ) -> bytes:
     """A model whose class of a pixel is the number of its largest channel.
 
@@ -38,6 +39,7 @@ def brightest_channel(
         shape: Of the input `image`.
         output: Name of the output.
         kind: uint8 or int64.
+        widening: Written into the metadata.
     """
     argmax = (
         _bytes(1, "image")
@@ -63,4 +65,6 @@ def brightest_channel(
     model = _number(1, 8) + _bytes(7, graph) + _bytes(8, _number(2, 17))
     if classes is not None:
         model += _bytes(14, _bytes(1, "classes") + _bytes(2, json.dumps(classes)))
+    if widening is not None:
+        model += _bytes(14, _bytes(1, "widening") + _bytes(2, widening))
     return model

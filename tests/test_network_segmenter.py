@@ -91,6 +91,9 @@ def test_a_frame_without_a_picture_is_refused(tmp_path):
         (onnx_by_hand.brightest_channel(["cane", "sky"]), "its classes are \\['cane', 'sky'\\]"),
         (onnx_by_hand.brightest_channel(None), "its classes are None"),
         (b"no network", "cannot load"),
+        (onnx_by_hand.brightest_channel(CLASSES, widening="much"), "its widening is 'much'"),
+        (onnx_by_hand.brightest_channel(CLASSES, widening="nan"), "its widening is"),
+        (onnx_by_hand.brightest_channel(CLASSES, widening="40"), "its widening is"),
     ],
 )
 def test_a_network_that_does_not_fit_is_refused_in_words(tmp_path, data, says):
@@ -137,3 +140,12 @@ def test_the_shipped_network_sees_rows_it_was_not_trained_on():
             true = image.labels == CLASSES.index(kind)
             found.append((kind, np.mean(said[true] == CLASSES.index(kind)) >= least))
     assert all(good for _, good in found), found
+
+
+def test_a_network_says_how_much_too_wide_it_draws_canes(tmp_path):
+    said = [
+        NetworkSegmenter(written(tmp_path, onnx_by_hand.brightest_channel(CLASSES, widening=text))).widening
+        for text in ("0.4", None)
+    ]
+    assert said == [0.4, 0.0]
+    assert 0.0 <= choose_segmenter("network").widening < 1.0 and choose_segmenter("labels").widening == 0.0

@@ -11,7 +11,7 @@ from bridge.sim.vineyard import grow
 from bridge.sim.vineyard_config import VineyardConfig
 from perception.config import PerceptionConfig
 from perception.frame import decode_frame
-from perception.pipeline import Perception
+from perception.pipeline import Perception, perceive, with_widening
 from perception.segmenter import LabelImageSegmenter
 from rolling_panda import messages as m
 from rolling_panda.codec import StrictDecoder, encode
@@ -148,3 +148,18 @@ def test_clicks_that_mean_no_cane_are_refused(model, frames):
     assert not (sky.ok or old.ok or away.ok)
     assert "no known cane" in sky.reason and "newest" in old.reason
     assert seen.points().points == before
+
+
+def test_canes_drawn_too_wide_are_measured_as_thick_as_they_are(model, frames):
+    view = decode_frame(frames[0], model)
+    cane, node = (m.WOOD_CLASSES.index(kind) for kind in ("cane", "node"))
+    wide = view.labels.copy()
+    wide[:, 1:][(view.labels[:, :-1] == cane) & (view.labels[:, 1:] <= 1)] = cane
+
+    def radius(labels, widening):
+        plant = perceive(view, labels, with_widening(PerceptionConfig(), widening))
+        return np.median([cane.radius for spur in plant.spurs for cane in spur.canes if cane.length > 0.3])
+
+    true = radius(view.labels, 0.0)
+    assert radius(wide, 0.0) - true > 0.0004
+    assert abs(radius(wide, 1.0) - true) < 0.0003

@@ -43,12 +43,13 @@ def test_what_was_learned_survives_the_export(scenes, tmp_path):
     told = losses(trainer, scenes, 16)
     assert np.mean(told[-4:]) < 0.7 * np.mean(told[:4])
     score = confusion(trainer.network, scenes)
-    write_network(tmp_path / "net.onnx", trainer, 1, score, score)
+    write_network(tmp_path / "net.onnx", trainer, 1, score, score, 0.25)
     said = NetworkSegmenter(tmp_path / "net.onnx").classify(scenes.color[0], scenes.depth[0].astype(np.float32))
     image = network_input(scenes.color[0], scenes.depth[0].astype(np.float32))
     with torch.inference_mode():
         meant = trainer.network(torch.from_numpy(image)[None])[0].argmax(dim=0).numpy()
     assert len(np.unique(meant)) > 1 and np.mean(said == meant) > 0.999
+    assert NetworkSegmenter(tmp_path / "net.onnx").widening == 0.25
     card = (tmp_path / "net.md").read_text(encoding="utf-8")
     assert f"| cane | {score.overlap()['cane']:.3f} |" in card and "--seed 1 --rows 1 --steps 16" in card
 

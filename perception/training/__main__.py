@@ -16,7 +16,7 @@ import torch
 from perception.training.export import write_network
 from perception.training.fit import Trainer
 from perception.training.scenes import TRAINING_SEED, VALIDATION_SEED, Scenes, render_scenes
-from perception.training.score import confusion
+from perception.training.score import confusion, widening
 
 _TELL_EVERY = 50
 
@@ -50,7 +50,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 0
     held_out = _scenes(words.work / "validation.npz", VALIDATION_SEED, 6)
     scores = {depth: confusion(trainer.network, held_out, depth) for depth in (True, False)}
-    write_network(words.out, trainer, words.rows, scores[True], scores[False])
+    write_network(words.out, trainer, words.rows, scores[True], scores[False], widening(trainer.network, held_out))
     print(words.out.with_suffix(".md").read_text(encoding="utf-8"))
     return 0
 

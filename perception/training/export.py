@@ -18,7 +18,9 @@ from rolling_panda.messages import WOOD_CLASSES
 _OPSET = 17
 
 
-def write_network(path: Path, trainer: Trainer, rows: int, with_depth: Confusion, without: Confusion) -> None:
+def write_network(
+    path: Path, trainer: Trainer, rows: int, with_depth: Confusion, without: Confusion, wider: float
+) -> None:
     """Write the network and its card.
 
     Args:
@@ -27,6 +29,7 @@ def write_network(path: Path, trainer: Trainer, rows: int, with_depth: Confusion
         rows: That were rendered for it.
         with_depth: How it did on the rows held out.
         without: The same with the depth taken away.
+        wider: By how much it draws canes too wide (px).
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     buffer = BytesIO()
@@ -45,13 +48,13 @@ def write_network(path: Path, trainer: Trainer, rows: int, with_depth: Confusion
             dynamo=False,
         )
     model = onnx.load_from_string(buffer.getvalue())
-    onnx.helper.set_model_props(model, {"classes": json.dumps(list(WOOD_CLASSES))})
+    onnx.helper.set_model_props(model, {"classes": json.dumps(list(WOOD_CLASSES)), "widening": f"{wider:.2f}"})
     onnx.checker.check_model(model)
     onnx.save(model, str(path))
-    path.with_suffix(".md").write_text(_card(path, trainer, rows, with_depth, without), encoding="utf-8")
+    path.with_suffix(".md").write_text(_card(path, trainer, rows, with_depth, without, wider), encoding="utf-8")
 
 
-def _card(path: Path, trainer: Trainer, rows: int, with_depth: Confusion, without: Confusion) -> str:
+def _card(path: Path, trainer: Trainer, rows: int, with_depth: Confusion, without: Confusion, wider: float) -> str:
     parameters = sum(weight.numel() for weight in trainer.network.parameters())
     overlap, found, blind = with_depth.overlap(), with_depth.found(), without.overlap()
     table = "\n".join(f"| {name} | {overlap[name]:.3f} | {found[name]:.3f} | {blind[name]:.3f} |" for name in overlap)
@@ -76,6 +79,8 @@ union, found is the share of the class's pixels that were given it.
 | class | overlap | found | overlap without depth |
 |---|---|---|---|
 {table}
+
+Canes come out {wider:.2f} pixels too wide on average, which is subtracted when they are measured.
 
 Limits: all that it has seen was rendered. Leaves, weeds, snow, wet bark, people and machines were not in it. It has not
 been scored on photographs.

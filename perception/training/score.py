@@ -11,6 +11,10 @@ from perception.training.network import Network
 from perception.training.scenes import Scenes
 from rolling_panda.messages import WOOD_CLASSES
 
+_CANE = (WOOD_CLASSES.index("cane"), WOOD_CLASSES.index("node"))
+#: Every so many lines of a picture are looked at; wider stretches are canes side by side (px).
+_EVERY, _ALONE = 4, 9
+
 
 @dataclass(frozen=True)
 class Confusion:
@@ -31,6 +35,34 @@ class Confusion:
         """Share of each class's pixels that are given it."""
         true = self.counts.sum(axis=1)
         return {name: round(float(self.counts[k, k] / true[k]), 3) for k, name in enumerate(WOOD_CLASSES) if true[k]}
+
+
+def widening(network: Network, scenes: Scenes) -> float:
+    """How much wider than they are the network draws canes that stand alone, on average (px).
+
+    Args:
+        network: With any weights; put into evaluation mode.
+        scenes: Pictures whose sides are multiples of what the network needs.
+    """
+    network.eval()
+    more: list[int] = []
+    with torch.inference_mode():
+        for color, depth, labels in zip(scenes.color, scenes.depth, scenes.labels, strict=True):
+            image = network_input(color, depth.astype(np.float32))
+            said = network(torch.from_numpy(image)[None])[0].argmax(dim=0).numpy()
+            for row in range(0, len(labels), _EVERY):
+                true, seen = _runs(labels[row]), _runs(said[row])
+                for middle, width in true.items():
+                    near = [seen[middle + off] - width for off in (0, -1, 1, -2, 2) if middle + off in seen]
+                    if near and width < _ALONE:
+                        more.append(near[0])
+    return float(np.mean(more)) if more else 0.0
+
+
+def _runs(line: NDArray[np.integer]) -> dict[int, int]:
+    """Widths of the stretches of cane in one line of an image, by their middles."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.isin(line, _CANE).astype(int), [0]])))
+    return {int(a + b) // 2: int(b - a) for a, b in zip(edges[::2], edges[1::2], strict=True)}
 
 
 def confusion(network: Network, scenes: Scenes, with_depth: bool = True) -> Confusion:
