@@ -45,11 +45,13 @@ def controller_state(
     elif measured is not None:
         omega = arm_omega(measured.kinematics.J)
     desired = tracking.desired if tracking is not None else None
+    # In work the sequence itself says why something was given up; a hand has to be told at once.
+    held = tracking.reason if tracking is not None and state.mode == "TELEOP" else ""
     return m.ControllerState(
         header=m.Header(now, "odom"),
         mode=state.mode,
         phase=phase if state.mode == "AUTO" else "",
-        reason=state.reason[:500],
+        reason=(held or state.reason)[:500],
         allowed=allowed,
         active_point_id=active if state.mode == "AUTO" else "",
         method=config.method,

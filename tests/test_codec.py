@@ -2,6 +2,7 @@
 
 import copy
 import math
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -31,7 +32,8 @@ def values(info: Any) -> st.SearchStrategy[Any]:
             low = info.ge if info.ge is not None else info.gt
             return st.floats(low, info.le, exclude_min=info.gt is not None)
         case msgspec.inspect.StrType() if info.pattern is not None:
-            return st.text("aZ09_.:-", min_size=info.min_length or 0, max_size=info.max_length)
+            allowed = [letter for letter in "afZ09_.:-" if re.search(info.pattern, letter)]
+            return st.text(allowed, min_size=info.min_length or 0, max_size=info.max_length)
         case msgspec.inspect.StrType():
             return st.text(min_size=info.min_length or 0, max_size=min(info.max_length or 20, 20))
         case msgspec.inspect.BytesType():

@@ -50,11 +50,18 @@ def test_a_post_in_the_way_of_the_held_tool_is_not_met() -> None:
     robot.teleop = TeleopTarget(sequence=1, hold=True, user="ada", target=target)
     judge = Surroundings(CollisionModel(RobotModel()))
     judge.take(told(*robot.obstacles))
-    least = 1.0
+    least, said = 1.0, set()
     for _ in range(500):
         robot.step()
+        said.add(robot.state.reason)
         least = min(least, judge.model.least(robot.q).distance)
     assert robot.state is not None and robot.state.mode == "TELEOP", robot.events
     moved = robot.model.kinematics(robot.q).T_odom_tool.translation - tool.translation
     assert np.linalg.norm(moved) > 0.1
     assert least > 0.0, "it came near, and touched nothing"
+    assert "post" in robot.state.reason and "holds the tool back" in robot.state.reason, said
+    # Taken back, nothing holds it, and nothing says so.
+    robot.teleop = TeleopTarget(sequence=2, hold=True, user="ada", target=pose_message(tool))
+    for _ in range(100):
+        robot.step()
+    assert robot.state.mode == "TELEOP" and "holds" not in robot.state.reason

@@ -34,6 +34,8 @@ _GIVEN_UP = 1e-6
 #: What a row is moved beyond the least (in its unit): at the least itself a single velocity is possible, which a solver
 #: that reckons with rounding may not find.
 _ROOM = 1e-8
+#: A velocity below this share of its limit counts as none.
+_STANDS = 0.02
 _SETTINGS = {"primal_tol": 1e-10}
 _FREE = 1e30
 
@@ -84,12 +86,14 @@ class Answer(Struct, frozen=True):
         scale: α.
         slack: By how much each soft row was moved, in its unit; None where none was.
         holds: Index of the bound (0…n−1) or row (n…) that holds the tool back the most; −1 for none.
+        missing: Share of b that J ν lacks where α is fixed, 0 otherwise.
     """
 
     nu: Array
     scale: float
     slack: Array | None
     holds: int
+    missing: float = 0.0
 
 
 class Cascade:
@@ -136,11 +140,11 @@ class Cascade:
         z = self._null_space(p, Q, m, v, rows[:, 1:], low[1:], high[1:])
         x = Q[:, :m] @ v[1 : 1 + m] + Q[:, m:] @ z
         nu = np.minimum(np.maximum(x * p.speed, p.lower), p.upper)
-        holds = -1
-        if scale < 1.0:
-            strength = np.abs(multipliers[1:])
-            holds = int(strength.argmax())
-        return Answer(nu, scale, slack, holds)
+        if p.keep_path:
+            return Answer(nu, scale, slack, int(np.abs(multipliers[1:]).argmax()) if scale < 1.0 else -1)
+        rest = R.T @ v[1 : 1 + m] - p.b - p.c
+        missing = math.sqrt(float(rest @ rest) / max(float(p.b @ p.b), _NOTHING**2))
+        return Answer(nu, scale, slack, _standing(multipliers[1:], nu, p.speed), missing)
 
     def _tool(
         self, p: Problem, Q: Array, R: Array, rows: Array, low: Array, high: Array
@@ -233,6 +237,17 @@ class Cascade:
         if found is None:
             found = self._ridges[size] = RIDGE * np.eye(size)
         return found
+
+
+def _standing(multipliers: Array, nu: Array, speed: Array) -> int:
+    """Index of the strongest row, or bound of a velocity that it lets be nothing; −1 for none.
+
+    A velocity that is bounded where it is large is on its way, and holds nothing back for long.
+    """
+    strength = np.abs(multipliers)
+    strength[: len(nu)][np.abs(nu) > _STANDS * speed] = 0.0
+    strongest = int(strength.argmax())
+    return strongest if float(strength[strongest]) > 0.0 else -1
 
 
 def given_up(slack: Array | None) -> int:

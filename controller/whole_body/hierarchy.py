@@ -30,6 +30,8 @@ from rolling_panda.robot_model import ARM_XI, RobotModel
 
 #: A clock slower than this stands still.
 _HELD = 1e-2
+#: A hand whose demand is answered by less than the rest is told what holds the tool back.
+_MISSED = 0.5
 #: Velocities of the tool that weigh the same (m/s, rad/s): what damping is measured in, whatever speed is planned.
 _SPEED, _TURN = 0.3, 0.8
 _NOWHERE = Manipulability(0.0, np.zeros(NXI))
@@ -187,9 +189,11 @@ class Hierarchy:
         worst = given_up(answer.slack)
         if worst >= 0:
             return Solution(xi, scale, manipulability.value, False, _too_near(names, worst))
-        if answer.scale < _HELD and demand.tool.keep_path:
+        held = demand.tool.keep_path and answer.scale < _HELD
+        if held or (answer.missing > _MISSED and answer.holds >= 0):
             what = _holder(answer.holds, free, names)
-            return Solution(xi, scale, manipulability.value, False, f"{what} holds the tool back")
+            # A hand that slides along what holds it has its answer; it is only told.
+            return Solution(xi, scale, manipulability.value, not held, f"{what} holds the tool back")
         return Solution(xi, scale, manipulability.value)
 
     def _brake(self, demand: Demand, reason: str, manipulability: Manipulability) -> Solution:

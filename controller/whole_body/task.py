@@ -135,7 +135,7 @@ class Solution(Struct, frozen=True):
         scale: Rate of the motion's clock, 0…1.
         manipulability: ω of the arm.
         feasible: False when the demand could not be answered: the robot brakes, or a constraint gives way.
-        reason: Why not, in words; empty when it could.
+        reason: What is in the way, in words; a hand that slides along it is told too. Empty where nothing is.
     """
 
     xi: Array
