@@ -3,6 +3,7 @@
 import asyncio
 import time
 from collections import deque
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -90,27 +91,27 @@ class Desk:
 
     async def ask(self, session: Session, intent: intents.Intent) -> Result:
         """Ask the controller, which logs what it does or why it refuses."""
-        name = type(intent).__name__
-        if not session.may_operate:
-            return Result(403, False, f"a {session.role} may look and stop, not operate")
-        try:
-            answer = await self.link.ask(intent)
-        except ServiceError as error:
-            self.note("error", f"{name} by {session.user}: no answer from the controller")
-            return Result(503, False, f"The controller does not answer: {error}")
-        return Result(200 if answer.ok else 409, answer.ok, answer.reason)
+        return await self._asked(session, type(intent).__name__, "the controller", lambda: self.link.ask(intent))
 
     async def ask_perception(self, session: Session, request: PlantRequest) -> Result:
         """Ask perception for another rule or a point, and log what came of it."""
         name = type(request).__name__
+        result = await self._asked(session, name, "perception", lambda: self.link.ask_perception(request))
+        if result.status in (200, 409):
+            self.note(
+                "info", f"{name} by {session.user}: {result.reason if result.ok else 'refused, ' + result.reason}"
+            )
+        return result
+
+    async def _asked(self, session: Session, name: str, whom: str, ask: Callable[[], Awaitable[m.Answer]]) -> Result:
+        """Put a question for somebody who may operate; what comes of it, also when nobody answers."""
         if not session.may_operate:
             return Result(403, False, f"a {session.role} may look and stop, not operate")
         try:
-            answer = await self.link.ask_perception(request)
+            answer = await ask()
         except ServiceError as error:
-            self.note("error", f"{name} by {session.user}: no answer from perception")
-            return Result(503, False, f"Perception does not answer: {error}")
-        self.note("info", f"{name} by {session.user}: {answer.reason if answer.ok else 'refused, ' + answer.reason}")
+            self.note("error", f"{name} by {session.user}: no answer from {whom}")
+            return Result(503, False, f"{whom[0].upper()}{whom[1:]} does not answer: {error}")
         return Result(200 if answer.ok else 409, answer.ok, answer.reason)
 
     async def stop(self, session: Session, reason: str) -> Result:

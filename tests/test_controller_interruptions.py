@@ -1,63 +1,11 @@
 """Operators who change their minds at the worst moment: nothing is cut or moved that was not asked for last."""
 
 import numpy as np
+from controller_at_work import entry, finish, point, robot, run_until, working
 
-from benchmarks.kinematic_robot import KinematicRobot
-from controller.config import ControllerConfig
-from controller.core import Controller
 from rolling_panda import intents
-from rolling_panda import messages as m
-from rolling_panda.config import RobotConfig
 from rolling_panda.robot_model import ARM_Q
 from rolling_panda.teleop_messages import BaseVelocity, TeleopTarget
-
-CONFIG = ControllerConfig()
-
-
-def point(point_id, position, revision=1):
-    return m.PruningPoint(
-        point_id=point_id,
-        revision=revision,
-        position=position,
-        tangent=(0.0, 0.0, 1.0),
-        radius=0.004,
-        confidence=0.9,
-        nodes_seen=5,
-        nodes_kept=2,
-        vine=0,
-        spur=0,
-        reason="test",
-    )
-
-
-def robot():
-    return KinematicRobot(Controller(CONFIG, RobotConfig()), CONFIG.home)
-
-
-def working(shown):
-    """A robot that has been shown points and told to cut them all."""
-    r = robot()
-    r.step()
-    r.show(shown)
-    r.step()
-    for intent in (intents.Arm(user="ada"), intents.AcceptAll(user="ada"), intents.Start(user="ada")):
-        assert r.ask(intent).ok
-    return r
-
-
-def run_until(r, condition, limit_s):
-    while not condition(r.state):
-        r.step()
-        assert r.now < limit_s, f"still {r.state.mode} {r.state.phase}: {r.state.reason}"
-
-
-def finish(r, limit_s):
-    run_until(r, lambda s: s.mode == "AUTO", r.now + 1.0)
-    run_until(r, lambda s: s.mode != "AUTO", limit_s)
-
-
-def entry(r, point_id):
-    return next(e for e in r.state.queue if e.point_id == point_id)
 
 
 def until_retreating_from_the_first(r):

@@ -53,7 +53,7 @@ def main() -> None:
         posture.set_target(reference[i])
         try:
             return mink.solve_ik(configuration, [tool, posture], dt, "daqp", limits=limits, constraints=[constraint])
-        except Exception:
+        except mink.MinkError:
             return None
 
     note = "weighted tasks; position and velocity limits; rolling; no acceleration limits, no collisions"

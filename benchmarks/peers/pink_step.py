@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 from pink import Configuration, solve_ik
+from pink.exceptions import PinkError
 from pink.limits import AccelerationLimit, ConfigurationLimit, VelocityLimit
 from pink.tasks import FrameTask, PostureTask, Task
 from stopwatch import load, report, rolling, urdf
@@ -62,7 +63,7 @@ def main() -> None:
                 constraints=[constraint],
                 safety_break=False,
             )
-        except Exception:
+        except PinkError:
             return None
 
     note = "weighted tasks; position, velocity and acceleration limits; rolling; no collisions"
