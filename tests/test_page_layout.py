@@ -32,6 +32,7 @@ def test_fits_the_screen_with_the_stop_on_top(page: Page, server: PlayedServer, 
     assert banner is not None
     assert banner["y"] >= view["y"] + view["height"] / 2, "the tool stays in view"
     assert banner["y"] + banner["height"] <= view["y"] + view["height"]
+    assert page.locator(".product").evaluate("each => each.scrollWidth <= each.clientWidth"), "its name is cut off"
     for button in page.locator("button:visible").all():
         assert button.evaluate("each => each.scrollWidth <= each.clientWidth"), f"{button} is cut off"
     for selector in ("#stop", "#arm", "#start", "#pause", "#resume", "#home", "#acknowledge", "#teleop", "#hold"):

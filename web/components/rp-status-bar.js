@@ -11,7 +11,12 @@ import { ageWords } from "../words.js";
 class RpStatusBar extends HTMLElement {
   connectedCallback() {
     this.append(
-      element("h1", { class: "product" }, element("img", { attributes: { src: "icon.svg", alt: "" } }), "Rolling Panda"),
+      element(
+        "h1",
+        { class: "product" },
+        element("img", { attributes: { src: "icon.svg", alt: "" } }),
+        element("span", { class: "product-name", text: "Rolling Panda" }),
+      ),
       this.presence(),
       this.linkChip(),
       this.person(),
