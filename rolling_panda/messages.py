@@ -19,7 +19,8 @@ Fraction = Annotated[float, Meta(ge=0.0, le=1.0)]
 Angle = Annotated[float, Meta(ge=-1e6, le=1e6)]
 Speed = Annotated[float, Meta(ge=-100.0, le=100.0)]
 Count = Annotated[int, Meta(ge=0, le=2**62)]
-Name = Annotated[str, Meta(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9_.:\-]+$")]
+#: Without the last part of the pattern a newline at the end would pass: "$" also matches before it.
+Name = Annotated[str, Meta(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9_.:\-]+(?!\n)$")]
 Text = Annotated[str, Meta(max_length=500)]
 
 Vector3 = tuple[Metre, Metre, Metre]

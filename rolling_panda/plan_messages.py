@@ -7,7 +7,7 @@ from msgspec import Meta, Struct
 from rolling_panda.messages import Actuated, Count, Finite, Header, Message, Name, NonNegative, PlanarPose, Pose, Text
 
 PlanState = Literal["none", "planning", "valid", "void"]
-Digest = Annotated[str, Meta(max_length=64, pattern=r"^[0-9a-f]*$")]
+Digest = Annotated[str, Meta(max_length=64, pattern=r"^[0-9a-f]*(?!\n)$")]
 
 
 class PointPlan(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -131,6 +131,13 @@ def test_what_is_out_of_range_is_refused_not_clamped() -> None:
     refused(m.MotionCommand, good | {"sequence": 1.5})
 
 
+@pytest.mark.parametrize("cut_id", ["", "c 1", "c1\n", "\nc1", "c1\nc2", "ç"])
+def test_a_name_that_is_none_is_refused(cut_id: str) -> None:
+    good = {"type": "CutCommand", "epoch": 1, "cut_id": "c1", "point_id": "p1"}
+    assert DECODERS[m.CutCommand].decode(msgspec.msgpack.encode(good)).cut_id == "c1"
+    refused(m.CutCommand, good | {"cut_id": cut_id})
+
+
 def test_a_refusal_names_the_field() -> None:
     tree = plain(m.MotionCommand(epoch=1, sequence=1, echo=1, xi=(0.0,) * 9))
     tree["xi"][3] = math.nan
