@@ -1,6 +1,7 @@
 """Shapes of the 3-D view that stand for points: a cut marker, a selection ring, and the colour of each state."""
 
 import numpy as np
+import pinocchio as pin
 import trimesh
 from numpy.typing import NDArray
 
@@ -37,13 +38,8 @@ def selection_ring() -> trimesh.Trimesh:
 
 def quat_wxyz_of_axis(axis: m.UnitVector3) -> NDArray[np.float64]:
     """The shortest rotation of z onto `axis`, as viser takes it: w, x, y, z."""
-    direction = np.array(axis) / max(float(np.linalg.norm(axis)), 1e-9)
-    w = 1.0 + direction[2]
-    if w < 1e-6:
-        return np.array([0.0, 1.0, 0.0, 0.0])
-    quaternion = np.array([w, -direction[1], direction[0], 0.0])
-    unit: NDArray[np.float64] = quaternion / np.linalg.norm(quaternion)
-    return unit
+    x, y, z, w = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), np.array(axis)).coeffs()
+    return np.array([w, x, y, z])
 
 
 def quat_wxyz(quat_xyzw: m.QuatXyzw) -> tuple[float, float, float, float]:
