@@ -19,8 +19,14 @@ help:
 demo: $(VENV)/.project
 	@exec $(BIN)/rolling-panda demo $(ARGS)
 
+# First the tests that only compute, one on each core; then those that time would disturb, one after the other.
 test: check browser
+ifdef ARGS
 	$(BIN)/pytest $(ARGS)
+else
+	$(BIN)/pytest -n auto -m "not alone and not slow"
+	$(BIN)/pytest -m "alone and not slow"
+endif
 
 check: $(VENV)/.project
 	$(BIN)/ruff check .

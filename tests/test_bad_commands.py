@@ -6,12 +6,15 @@ from typing import Any
 
 import msgspec
 import numpy as np
+import pytest
 import zenoh
 from live_robot import LiveRobot
 
 from bridge.sim import trace
 from rolling_panda.process import ROBOT_ID
 from rolling_panda.topics import MOTION, key
+
+pytestmark = pytest.mark.alone
 
 FAST = [0.5] * 9
 

@@ -20,6 +20,8 @@ from rolling_panda.resources import resource
 from rolling_panda.robot_model import RobotModel
 from rolling_panda.transport import Feed, Publisher, Router, Slot, Transport
 
+pytestmark = pytest.mark.alone
+
 ROOT = Path(__file__).resolve().parents[1]
 REST = (0.0,) * 9
 FORWARD = (*RobotModel().drive.wheels(0.2, 0.0), 0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

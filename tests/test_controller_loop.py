@@ -27,6 +27,8 @@ from rolling_panda.topics import (
 )
 from rolling_panda.transport import Router, Transport
 
+pytestmark = pytest.mark.alone
+
 CONFIG = ControllerConfig()
 
 

@@ -19,6 +19,8 @@ from rolling_panda import cli
 from rolling_panda.demo import choose_router_port, write_secret
 from rolling_panda.launch import child_environment, python_command
 
+pytestmark = pytest.mark.alone
+
 STARTUP_S = 60.0
 CHILDREN = {"router", "bridge", "controller", "perception", "server"}
 

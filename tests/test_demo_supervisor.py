@@ -14,6 +14,8 @@ import pytest
 from rolling_panda.demo_supervisor import Death, Supervisor
 from rolling_panda.launch import child_environment
 
+pytestmark = pytest.mark.alone
+
 PATIENT = [sys.executable, "-c", "import signal; signal.pause()"]
 STUBBORN = "import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN); print('deaf', flush=True); "
 

@@ -4,6 +4,8 @@ from running_server import running_server
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
+pytestmark = pytest.mark.alone
+
 
 @pytest.fixture(scope="module")
 def server():

@@ -7,6 +7,8 @@ from live_robot import LiveRobot
 
 from bridge.sim import trace
 
+pytestmark = pytest.mark.alone
+
 #: From the kill until base and arm are still (s).
 LIMIT_S = 0.4
 

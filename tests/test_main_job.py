@@ -13,7 +13,7 @@ from playwright.sync_api import Page
 
 from bridge.sim import trace
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.alone]
 
 
 def arm_and_accept(page: Page, *places: int) -> list[str]:

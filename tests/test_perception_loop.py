@@ -13,6 +13,8 @@ from rolling_panda.row_messages import Capsule
 from rolling_panda.topics import EVENT, HEARTBEAT, OBSTACLES, PLANT, POINTS
 from rolling_panda.transport import Slot
 
+pytestmark = pytest.mark.alone
+
 
 class Recorder:
     def __init__(self):

@@ -1,11 +1,14 @@
 import time
 
 import numpy as np
+import pytest
 
 from bridge.picture import Picture
 from bridge.sim.camera_config import CameraConfig
 from bridge.sim.photographer import InlinePhotographer, Photographer, ProcessPhotographer
 from bridge.sim.row import Rod, Row
+
+pytestmark = pytest.mark.alone
 
 LENS = CameraConfig(width=64, height=48)
 ROW = Row((Rod("post", np.array([0.0, 1.0, 0.0]), np.array([0.0, 1.0, 2.0]), 0.05, 0.05),))

@@ -6,7 +6,10 @@ from typing import Any
 
 import httpx
 import psutil
+import pytest
 from live_robot import LiveRobot
+
+pytestmark = pytest.mark.alone
 
 
 def proposed(robot: LiveRobot) -> list[dict[str, Any]]:

@@ -15,6 +15,8 @@ from controller.plan_worker import PlanWorker
 from rolling_panda.config import RobotConfig
 from rolling_panda.generate.__main__ import ROOT
 
+pytestmark = pytest.mark.alone
+
 _STARTS_S = 60.0
 
 

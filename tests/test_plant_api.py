@@ -8,6 +8,8 @@ from rolling_panda import messages as m
 from rolling_panda.errors import ServiceError
 from rolling_panda.plant_requests import AddPoint, AddPointInImage, SetRule
 
+pytestmark = pytest.mark.alone
+
 
 @pytest.fixture(scope="module")
 def running():

@@ -15,6 +15,8 @@ from rolling_panda.config import TransportConfig
 from rolling_panda.process import ProcessContext, run_process
 from rolling_panda.transport import Router
 
+pytestmark = pytest.mark.alone
+
 ROOT = Path(__file__).resolve().parents[1]
 WAITING = """
 import sys

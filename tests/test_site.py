@@ -7,6 +7,8 @@ from websockets.sync.client import connect
 from rolling_panda import messages as m
 from rolling_panda import topics
 
+pytestmark = pytest.mark.alone
+
 
 @pytest.fixture(scope="module")
 def server():

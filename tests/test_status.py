@@ -12,6 +12,8 @@ from rolling_panda.config import TransportConfig
 from rolling_panda.topics import HEARTBEAT
 from rolling_panda.transport import Router, Transport
 
+pytestmark = pytest.mark.alone
+
 
 @pytest.fixture(scope="module")
 def endpoint() -> Iterator[str]:

@@ -13,6 +13,8 @@ from playwright.sync_api import Page
 from bridge.sim import trace
 from server.scene_gizmo import GIZMO_PX
 
+pytestmark = pytest.mark.alone
+
 #: Stillness allowed after the hold has ended: 150 ms of silence and the time to come to rest (s).
 LIMIT_S = 0.5
 

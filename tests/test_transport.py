@@ -18,6 +18,8 @@ from rolling_panda.errors import ServiceError, TransportError
 from rolling_panda.topics import CAMERA, HEARTBEAT, INTENT, MOTION, Service, Topic
 from rolling_panda.transport import Feed, Onlooker, Rejections, Router, Slot, Transport
 
+pytestmark = pytest.mark.alone
+
 ROOT = Path(__file__).resolve().parents[1]
 
 

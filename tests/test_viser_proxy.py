@@ -14,6 +14,8 @@ from websockets.sync.client import connect
 
 from rolling_panda import topics
 
+pytestmark = pytest.mark.alone
+
 _PLACING = ("SetPositionMessage", "SetOrientationMessage")
 
 
