@@ -32,6 +32,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=0, help="which vineyard row to grow (default: %(default)s)")
     parser.add_argument("--trace", type=Path, metavar="FILE", help="record there what was really actuated, each step")
     parser.add_argument(
+        "--state", type=Path, metavar="DIR", help="keep there what survives a restart (default: nothing is kept)"
+    )
+    parser.add_argument(
         "--config",
         type=Path,
         default=resource("assets/config/sim.toml"),
@@ -130,6 +133,8 @@ def _start_and_watch(
     write_secret(token_file, token)
     for name, own in _own_arguments(arguments, token_file).items():
         shared = ["--config", str(arguments.config.resolve()), "--robot-id", ROBOT_ID, "--connect", endpoint]
+        # A row is grown anew for each run: what was done in another one says nothing about it.
+        shared += ["--state", str((arguments.state or token_file.parent / "state").resolve())]
         supervisor.start(name, python_command(name, [*shared, "--exit-with-parent", *own]))
 
     with Readiness(endpoint, ROBOT_ID, page) as readiness:

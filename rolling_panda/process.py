@@ -17,6 +17,7 @@ from rolling_panda.config import TransportConfig, load_section
 from rolling_panda.errors import RollingPandaError
 from rolling_panda.priority import Role, take_priority
 from rolling_panda.resources import resource
+from rolling_panda.state_folder import open_state_folder, usual_state_folder
 from rolling_panda.transport import Transport
 
 ROBOT_ID = "rp1"
@@ -43,6 +44,15 @@ class ProcessContext:
     config_path: Path
     transport: Transport
     stopping: threading.Event
+
+    @property
+    def state_folder(self) -> Path:
+        """Where this robot's processes keep what must survive a restart; made when first asked for.
+
+        Raises:
+            InputError: It cannot be made.
+        """
+        return open_state_folder(self.arguments.state or usual_state_folder(self.arguments.robot_id))
 
 
 def run_process(
@@ -88,6 +98,10 @@ def add_common_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--config", type=Path, default=default, help="TOML configuration (default: the simulation's)")
     parser.add_argument("--robot-id", default=ROBOT_ID, help="robot on the wire (default: %(default)s)")
     parser.add_argument("--connect", metavar="ENDPOINT", help="router, tcp/HOST:PORT (default: the configuration's)")
+    state = usual_state_folder("ROBOT_ID")
+    parser.add_argument(
+        "--state", type=Path, metavar="DIR", help=f"folder for what survives a restart (default: {state})"
+    )
     parser.add_argument("--exit-with-parent", action="store_true", help="end when standard input closes")
     parser.add_argument("--version", action="version", version=f"rolling-panda {__version__}")
 

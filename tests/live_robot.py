@@ -67,7 +67,7 @@ class LiveRobot:
             token.touch(0o600)
             token.write_text(TOKEN)
         if name != "router":
-            options += ["--connect", self.endpoint]
+            options += ["--connect", self.endpoint, "--state", str(self.folder / "state")]
             if self.config is not None:
                 options += ["--config", str(self.config)]
         module, words = ("rolling_panda", ["router", *options]) if name == "router" else (name, options)

@@ -1,0 +1,63 @@
+"""Where a process keeps what must survive a restart, and how a small file there is replaced whole or not at all."""
+
+import os
+from pathlib import Path
+
+from rolling_panda.errors import InputError
+
+
+def usual_state_folder(robot_id: str) -> Path:
+    """`rolling-panda/ROBOT` in the user's folder for programs' state (XDG base directories)."""
+    told = os.environ.get("XDG_STATE_HOME", "")
+    # The specification has a relative path ignored.
+    root = Path(told) if Path(told).is_absolute() else Path.home() / ".local" / "state"
+    return root / "rolling-panda" / robot_id
+
+
+def open_state_folder(folder: Path) -> Path:
+    """The folder, made for this user alone where it is missing.
+
+    Raises:
+        InputError: It cannot be made, or is something else.
+    """
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"cannot keep state in {folder}: {error.strerror}; give another folder with --state"
+        ) from error
+    return folder
+
+
+def replace_durably(path: Path, content: bytes) -> None:
+    """Replace a file by `content`; after any interruption there is the old one or the new one, whole.
+
+    Raises:
+        OSError: The content is not on disk.
+    """
+    beside = path.with_name(f".{path.name}.new")
+    descriptor = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+    try:
+        with os.fdopen(descriptor, "wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        beside.replace(path)
+    except OSError:
+        beside.unlink(missing_ok=True)
+        raise
+    # The new name is durable only once the folder is.
+    sync_folder(path.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Make the names in a folder durable.
+
+    Raises:
+        OSError: They are not.
+    """
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
