@@ -1,18 +1,28 @@
 """Messages about what stands in the row: what is in the robot's way, and the simulator's own picture of it."""
 
-from msgspec import Struct
+from typing import Annotated
+
+from msgspec import Meta, Struct
 
 from rolling_panda.messages import Count, Header, Message, NonNegative, Vector3, WoodClass
 
+#: Number of a vine or a spur, -1 for none.
+Number = Annotated[int, Meta(ge=-1, le=10**6)]
+
 
 class Capsule(Struct, frozen=True, forbid_unknown_fields=True):
-    """A rod with round ends: axis from `start` to `end` (m), radii at both (m)."""
+    """A rod with round ends: axis from `start` to `end` (m), radii at both (m).
+
+    `vine` and `spur`, numbers as pruning points have them, are of the spur that it grows from; -1 where there is none.
+    """
 
     kind: WoodClass
     start: Vector3
     end: Vector3
     start_radius: NonNegative
     end_radius: NonNegative
+    vine: Number = -1
+    spur: Number = -1
 
 
 class Scenery(Message, frozen=True, kw_only=True):
