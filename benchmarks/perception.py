@@ -14,6 +14,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import get_args
 
 import msgspec
 import numpy as np
@@ -48,13 +49,13 @@ class Survey:
         points: Every point shown at the end.
         spurs: Spurs in view: seed, vine, spur, how visible, and whether they got a point, and a right one.
         frame_ms: Time of each frame through segmentation, plant model and rule, on a wall clock.
-        abstained: The reasons told at the end.
+        abstained: What every row left open at the end.
     """
 
     points: list[JudgedPoint] = field(default_factory=list)
     spurs: list[dict[str, int | bool | str]] = field(default_factory=list)
     frame_ms: list[float] = field(default_factory=list)
-    abstained: list[str] = field(default_factory=list)
+    abstained: list[m.Abstention] = field(default_factory=list)
 
 
 def survey_row(
@@ -85,7 +86,7 @@ def survey_row(
     first = config.first_vine_x - config.vine_spacing / 2
     last = first + vines * config.vine_spacing
     points: tuple[m.PruningPoint, ...] = ()
-    reasons: dict[str, None] = {}
+    left_open: tuple[m.Abstention, ...] = ()
     for sequence, x in enumerate(np.arange(first, last + STEP, STEP) - _CAMERA_AHEAD):
         base = m.PlanarPose(float(x), 0.0, 0.0)
         place = model.pose(configuration(base, position), model.camera_id).homogeneous
@@ -96,7 +97,7 @@ def survey_row(
         result = perception.process(frame)
         into.frame_ms.append(1000 * (time.perf_counter() - began))
         points = result.points
-        reasons.update(dict.fromkeys(result.abstained))
+        left_open = result.abstained
     judged = [opinion.point(point) for point in points]
     for point, verdict in zip(points, judged, strict=True):
         if gallery is not None and not verdict.right:
@@ -106,7 +107,7 @@ def survey_row(
             view = decode_frame(camera_frame(image, camera, base, position, 0), model)
             save_failure(gallery, verdict, point, row, camera, place, perception.segmenter.segment(view), image.color)
     into.points += judged
-    into.abstained += list(reasons)
+    into.abstained += left_open
     for vine, spur in opinion.spurs():
         own = [p for p in judged if (p.vine, p.spur, p.kind) == (vine, spur, "spur cut")]
         into.spurs.append(
@@ -176,6 +177,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     summary = summarise(survey)
     for name, figure in summary.items():
         print(_line(name, figure))
+    for need in get_args(m.Need):
+        print(f"{f'open for {need}':24} {sum(each.needs == need for each in survey.abstained):8}")
     if words.json is not None:
         document = {
             "machine": f"{platform.platform()}, {os.cpu_count()} cores",
@@ -190,7 +193,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             },
             "results": [asdict(point) for point in survey.points],
             "spurs": survey.spurs,
-            "abstained": survey.abstained,
+            "open": {need: sum(a.needs == need for a in survey.abstained) for need in get_args(m.Need)},
+            "abstained": [msgspec.to_builtins(each) for each in survey.abstained],
         }
         words.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
     return 0

@@ -141,7 +141,7 @@ def evaluate(seed: int, x: float = 0.0, frames: int = 4, model: RobotModel | Non
         began = time.thread_time()
         result = perception.process(frame)
         score.frame_ms.append(1000 * (time.thread_time() - began))
-        points, score.abstained = result.points, list(result.abstained)
+        points, score.abstained = result.points, [each.reason for each in result.abstained]
     truths = {(truth.vine, truth.spur): truth for truth in judge(row)}
     k = camera.intrinsics
     for truth in truths.values():

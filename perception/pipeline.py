@@ -6,6 +6,7 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
+from perception.abstention import OpenPlaces, abstention
 from perception.by_hand import near_wire, point_by_hand
 from perception.centreline import centrelines
 from perception.config import PerceptionConfig, RuleConfig
@@ -14,7 +15,7 @@ from perception.frame import View, decode_frame
 from perception.keep_out import wire_near
 from perception.linking import link
 from perception.mending import mended
-from perception.numbering import RowNumbers
+from perception.numbering import RowNumbers, SpurNumber
 from perception.obstacles import ObstacleMap
 from perception.plant import Cane, Plant
 from perception.plant_map import PlantMap
@@ -56,8 +57,8 @@ class Perception:
         self._tracker = Tracker(config.tracker)
         self._numbers = RowNumbers(config.tracker.spur_separation, config.tracker.vine_spacing)
         self._frames = 0
-        self._abstained: tuple[str, ...] = ()
-        self._told: tuple[str, ...] = ()
+        self._open = OpenPlaces()
+        self._told: tuple[m.Abstention, ...] = ()
         self._stamp = 0.0
         self._eyes: dict[int, View] = {}
         self._canes: tuple[tuple[m.Vector3, ...], ...] = ()
@@ -84,33 +85,32 @@ class Perception:
         try:
             labels = self.segmenter.segment(view)
         except InputError as error:
-            return self._message(view, self._tracker.points(), (str(error),), ())
+            return self._message(view, self._tracker.points(), (abstention(str(error)),), ())
         self.obstacles = self._map.update(view, labels)
         self._frames += 1
         if not self._is_survey(view, labels):
             # Too near or too far to read a whole spur; near enough to see whether the wood still stands.
             tracked = self._tracker.update(view, labels, [])
             self._take(tracked)
-            return self._message(view, tracked.points, (*tracked.withdrawn, *self._abstained), self._canes)
+            return self._message(view, tracked.points, self._left_open(tracked.points), self._canes)
         plant = perceive(view, labels, self._config)
         numbers = self._numbers.number(plant, view.R[:, 0])
         self.known.update(plant, numbers)
         fused = {spur.number: spur.as_spur() for spur in self.known.spurs} if self._config.fuse else {}
-        proposals, abstained = [], []
+        proposals = []
         for spur, number in zip(plant.spurs, numbers, strict=True):
             decision = apply_rule(fused.get(number, spur), self._config.rule, plant.beside(spur))
-            place = f"vine {number.vine}, spur {number.spur}"
+            reasons = list(decision.abstained)
             for cut in decision.cuts:
                 if wire_near(view, labels, cut.position, self._config.rule.wire_distance):
-                    abstained.append(_beside_wire(place, self._config.rule))
+                    reasons.append(_beside_wire(self._config.rule))
                 else:
                     proposals.append(Proposal(cut, number))
-            abstained += [f"{place}: {reason}" for reason in decision.abstained]
+            self._open.note(number, bool(decision.cuts), reasons)
         tracked = self._tracker.update(view, labels, proposals)
         self._take(tracked)
-        self._abstained = tuple(abstained)
         self._canes = tuple(_polyline(cane) for spur in plant.spurs for cane in spur.canes)
-        return self._message(view, tracked.points, (*tracked.withdrawn, *abstained), self._canes)
+        return self._message(view, tracked.points, self._left_open(tracked.points), self._canes)
 
     def answer(self, request: PlantRequest) -> m.Answer:
         """Do what an operator asks for; a refusal changes nothing."""
@@ -160,20 +160,24 @@ class Perception:
         )
         self._config = replace(self._config, rule=rule)
         spurs = {known.number: known.as_spur() for known in self.known.spurs}
-        proposals, abstained = [], []
+        proposals = []
+        self._open.clear()
         for number, spur in spurs.items():
             beside = [cane.axis for other in spurs.values() if other is not spur for cane in other.canes]
             decision = apply_rule(spur, rule, np.concatenate([np.zeros((0, 3)), *beside]))
-            place = f"vine {number.vine}, spur {number.spur}"
-            abstained += [f"{place}: {reason}" for reason in decision.abstained]
+            reasons = list(decision.abstained)
             for cut in decision.cuts:
                 if near_wire(self.obstacles, cut.position, rule.wire_distance):
-                    abstained.append(_beside_wire(place, rule))
+                    reasons.append(_beside_wire(rule))
                 else:
                     proposals.append(Proposal(cut, number))
+            self._open.note(number, bool(decision.cuts), reasons)
         self._tracker.restart(proposals)
-        self._abstained = self._told = tuple(text[:500] for text in abstained)
+        self._told = self._left_open(self._tracker.points())
         return m.Answer(ok=True, reason=f"{len(proposals)} points by the new rule")
+
+    def _left_open(self, points: tuple[m.PruningPoint, ...]) -> tuple[m.Abstention, ...]:
+        return self._open.told({SpurNumber(point.vine, point.spur) for point in points})
 
     def _take(self, tracked: Tracked) -> None:
         self.withdrawn = tracked.withdrawn
@@ -200,10 +204,10 @@ class Perception:
         self,
         view: View,
         points: tuple[m.PruningPoint, ...],
-        abstained: tuple[str, ...],
+        abstained: tuple[m.Abstention, ...],
         canes: tuple[tuple[m.Vector3, ...], ...],
     ) -> m.PruningPoints:
-        self._told = tuple(text[:500] for text in abstained)
+        self._told = abstained
         return m.PruningPoints(
             header=m.Header(view.stamp, "odom"),
             segmenter=self.segmenter.name,
@@ -219,8 +223,8 @@ def with_widening(config: PerceptionConfig, widening: float) -> PerceptionConfig
     return replace(config, skeleton=replace(config.skeleton, widening=widening))
 
 
-def _beside_wire(place: str, rule: RuleConfig) -> str:
-    return f"{place}: a wire passes within {round(rule.wire_distance * 1000)} mm of the cut; cut this one by hand"
+def _beside_wire(rule: RuleConfig) -> str:
+    return f"a wire passes within {round(rule.wire_distance * 1000)} mm of the cut; cut this one by hand"
 
 
 def perceive(view: View, labels: "np.ndarray[tuple[int, ...], np.dtype[np.uint8]]", config: PerceptionConfig) -> Plant:

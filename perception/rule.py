@@ -10,6 +10,7 @@ from typing import Literal
 
 import numpy as np
 
+from perception.abstention import MoreToSee
 from perception.config import RuleConfig
 from perception.plant import Array, Cane, Node, Spur
 
@@ -67,7 +68,7 @@ def decide(spur: Spur, config: RuleConfig, beside: Array | None = None) -> Decis
         beside: Axis points of cane that is not this spur's, N×3 in odom (m).
     """
     if not spur.canes:
-        return Decision(abstained=("no cane could be followed to this spur",))
+        return Decision(abstained=(MoreToSee("no cane could be followed to this spur"),))
     if spur.doubt:
         return Decision(abstained=(spur.doubt,))
     keeper = choose_keeper(spur, config)
@@ -139,10 +140,10 @@ def cut_arc(cane: Cane, config: RuleConfig) -> float | str:
     """Arc length of the cut on a cane (m), or why it cannot be placed."""
     kept = config.nodes_kept
     if cane.base_gap > config.base_doubt:
-        return "the base of the cane to keep is hidden, so its nodes cannot be counted from the first"
+        return MoreToSee("the base of the cane to keep is hidden, so its nodes cannot be counted from the first")
     nodes = count_nodes(cane, config)
     if len(nodes) < kept:
-        return f"only {len(nodes)} of {kept} nodes seen on the cane to keep; never guessed"
+        return MoreToSee(f"only {len(nodes)} of {kept} nodes seen on the cane to keep; never guessed")
     last = nodes[kept - 1]
     following = nodes[kept].arc - last.arc if len(nodes) > kept else None
     if following is None and cane.length < last.arc + config.clear_beyond:
@@ -150,7 +151,7 @@ def cut_arc(cane: Cane, config: RuleConfig) -> float | str:
             return (
                 f"the cane ends {1000 * max(0.0, cane.length - last.arc):.0f} mm past node {kept}: it is pruned already"
             )
-        return f"what lies beyond node {kept} is not in view"
+        return MoreToSee(f"what lies beyond node {kept} is not in view")
     places = [node.arc for node in nodes[: kept + 1]]
     if any(second - first < config.crowded for first, second in zip(places, places[1:], strict=False)):
         return "two nodes seem to sit side by side, so one may belong to another cane"
@@ -159,11 +160,11 @@ def cut_arc(cane: Cane, config: RuleConfig) -> float | str:
     seen = [0.0, *(node.arc for node in cane.nodes)]
     for span in cane.hidden:
         if span.meets(arc - 0.008, arc + 0.008):
-            return "the place of the cut is hidden"
+            return MoreToSee("the place of the cut is hidden")
         first, second = max(span.start, config.basal_reach), min(span.end, last.arc)
         # A hidden stretch matters where a node could sit in it without crowding those that were seen.
         if second > first and _far_from(first, second, seen) > config.node_room:
-            return "a stretch of the cane to keep is hidden where another node may be"
+            return MoreToSee("a stretch of the cane to keep is hidden where another node may be")
     return arc
 
 
@@ -209,7 +210,7 @@ def _renew(spur: Spur, keeper: _Keeper, shorten: Cut, config: RuleConfig) -> Cut
     others = [cane for cane in spur.canes if cane is not keeper.cane]
     rest = f"the {len(others)} other cane{'s' if len(others) > 1 else ''} of this spur left for a person: "
     if spur.axis is None or spur.radius <= 0.0:
-        return rest + "the old stub is not seen clearly"
+        return MoreToSee(rest + "the old stub is not seen clearly")
     root, tip = spur.axis
     length = float(np.linalg.norm(tip - root))
     along = (tip - root) / length

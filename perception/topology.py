@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
+from perception.abstention import MoreToSee
 from perception.centreline import Centreline, base_radius
 from perception.config import SkeletonConfig
 from perception.frame import View
@@ -144,9 +145,9 @@ def _doubt(view: View, cloud: Array, stray: bool, config: SkeletonConfig) -> str
     u, v, _ = view.pixels(cloud).T
     margin = config.border
     if u.min() < margin or u.max() > width - margin or v.min() < margin or v.max() > height - 1:
-        return "the spur is at the edge of the image, so not all of its canes may be in view"
+        return MoreToSee("the spur is at the edge of the image, so not all of its canes may be in view")
     if stray:
-        return "a cane seems to start here, but its base is hidden"
+        return MoreToSee("a cane seems to start here, but its base is hidden")
     return ""
 
 

@@ -40,6 +40,7 @@ Phase = Literal["", "APPROACH", "ADVANCE", "CUT", "RETREAT"]
 PointState = Literal["PROPOSED", "ACCEPTED", "INTENT", "DONE", "FAILED_NOT_CUT", "UNKNOWN", "REJECTED"]
 Severity = Literal["info", "warning", "error"]
 Outcome = Literal["", "DONE", "FAILED_NOT_CUT", "UNKNOWN"]
+Need = Literal["another look", "operator"]
 WoodClass = Literal[
     "background", "ground", "post", "trunk", "cordon", "spur", "cane", "node", "wire", "hose", "old cut"
 ]
@@ -332,6 +333,15 @@ class PruningPoint(Struct, frozen=True, forbid_unknown_fields=True):
     reason: Text
 
 
+class Abstention(Struct, frozen=True, forbid_unknown_fields=True):
+    """A place without a point: why, and what it needs. Without vine and spur (0) it is about no spur in particular."""
+
+    reason: Text
+    needs: Need
+    vine: Annotated[int, Meta(ge=0, le=100000)] = 0
+    spur: Annotated[int, Meta(ge=0, le=100000)] = 0
+
+
 class PruningPoints(Message, frozen=True, kw_only=True):
     """Perception → all: every point it holds true now.
 
@@ -340,7 +350,7 @@ class PruningPoints(Message, frozen=True, kw_only=True):
         segmenter: Name of the segmenter behind it.
         frames: Camera frames used so far.
         points: All points.
-        abstained: Places looked at without a point, each with its reason.
+        abstained: Places looked at without a point, over all frames.
         canes: Axis of each cane as perceived: polylines in odom (m).
     """
 
@@ -348,7 +358,7 @@ class PruningPoints(Message, frozen=True, kw_only=True):
     segmenter: Text
     frames: Count
     points: tuple[PruningPoint, ...]
-    abstained: tuple[Text, ...] = ()
+    abstained: tuple[Abstention, ...] = ()
     canes: tuple[tuple[Vector3, ...], ...] = ()
 
 

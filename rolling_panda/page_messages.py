@@ -84,7 +84,7 @@ class PagePoints(PageMessage, frozen=True, kw_only=True):
     """Sent when it changed: every point in the order of work, and the places where perception abstained."""
 
     points: tuple[PagePoint, ...]
-    abstained: tuple[m.Text, ...]
+    abstained: tuple[m.Abstention, ...]
     segmenter: m.Text
     frames: m.Count
     image_size: tuple[int, int]

@@ -8,6 +8,8 @@ from operator_page import FLAGS
 from played_server import ORIGIN, PlayedServer, point
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
+from rolling_panda import messages as m
+
 
 @pytest.fixture(scope="module")
 def browser(chromium_path: str) -> Iterator[Browser]:
@@ -25,7 +27,10 @@ def server() -> PlayedServer:
             point(2, "ACCEPTED", user="Ada", reason="accepted by Ada"),
             point(3, "DONE", spur=2, cut_id="c1"),
         ),
-        abstained=("vine 1, spur 3: no node seen above the cordon",),
+        abstained=(
+            m.Abstention("no node seen above the cordon", "another look", 1, 3),
+            m.Abstention("a wire passes close to the cut", "operator", 1, 4),
+        ),
     )
 
 

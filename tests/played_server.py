@@ -99,7 +99,7 @@ class PlayedServer:
     controller: m.ControllerState | None = field(default_factory=controller)
     bridge: m.BridgeState | None = field(default_factory=bridge)
     points: tuple[p.PagePoint, ...] = ()
-    abstained: tuple[str, ...] = ()
+    abstained: tuple[m.Abstention, ...] = ()
     gone: dict[str, float] = field(default_factory=dict)
     role: p.Role = "supervisor"
     online: bool = True

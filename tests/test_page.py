@@ -337,3 +337,12 @@ def test_a_busy_page_does_not_take_its_own_pause_for_a_lost_link(page: Page, ser
 def test_a_silent_link_is_given_up_and_tried_again(page: Page, server: PlayedServer) -> None:
     server.silent = True
     until(page, lambda: len(server.sockets) > 1, seconds=10.0)
+
+
+def test_places_without_a_point_are_told_by_what_they_need(page: Page) -> None:
+    look, person = page.locator('[data-needs="another look"]'), page.locator('[data-needs="operator"]')
+    expect(look.locator("summary")).to_have_text("1 place needs another look")
+    expect(person.locator("summary")).to_have_text("1 place for you to decide")
+    person.locator("summary").click()
+    expect(person.locator("li")).to_have_text("Vine 1 · spur 4: a wire passes close to the cut")
+    expect(look.locator("li")).to_have_text("Vine 1 · spur 3: no node seen above the cordon")

@@ -79,7 +79,7 @@ def test_a_corrupt_frame_changes_nothing(model, frames):
 def test_without_labels_it_abstains_with_the_reason(model, frames):
     result = perception(model).process(msgspec.structs.replace(frames[0], labels_zlib=b""))
     assert not result.points
-    assert "label image" in result.abstained[0]
+    assert "label image" in result.abstained[0].reason
 
 
 def test_an_empty_view_gives_no_points(model, frames):

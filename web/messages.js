@@ -45,6 +45,8 @@ export const TEXT_MAX_LENGTH = 500;
 
 /** @typedef {""|"DONE"|"FAILED_NOT_CUT"|"UNKNOWN"} Outcome */
 
+/** @typedef {"another look"|"operator"} Need */
+
 /** @typedef {"background"|"ground"|"post"|"trunk"|"cordon"|"spur"|"cane"|"node"|"wire"|"hose"|"old cut"} WoodClass */
 
 /** @typedef {"none"|"planning"|"valid"|"void"} PlanState */
@@ -229,6 +231,16 @@ export const TEXT_MAX_LENGTH = 500;
  */
 
 /**
+ * A place without a point: why, and what it needs. Without vine and spur (0) it is about no spur in particular.
+ *
+ * @typedef {object} Abstention
+ * @property {string} reason
+ * @property {Need} needs
+ * @property {number} vine
+ * @property {number} spur
+ */
+
+/**
  * The session's plan in brief: whether it holds or why not, its hash, and how long it takes (s).
  *
  * @typedef {object} PagePlan
@@ -244,7 +256,7 @@ export const TEXT_MAX_LENGTH = 500;
  * @typedef {object} PagePoints
  * @property {"PagePoints"} type
  * @property {PagePoint[]} points
- * @property {string[]} abstained
+ * @property {Abstention[]} abstained
  * @property {string} segmenter
  * @property {number} frames
  * @property {[number, number]} image_size

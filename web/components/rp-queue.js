@@ -20,9 +20,12 @@ class RpQueue extends HTMLElement {
     const summary = element("p", { class: "summary number" });
     const list = element("div", { class: "groups", attributes: { "aria-label": "Pruning points" } });
     const empty = element("div", { class: "empty", attributes: { role: "status" } });
-    const abstained = abstainedList();
+    const open = [
+      abstainedList("another look", (count) => `${counted(count, "place")} ${count === 1 ? "needs" : "need"} another look`),
+      abstainedList("operator", (count) => `${counted(count, "place")} for you to decide`),
+    ];
     list.addEventListener("keydown", (event) => this.key(event));
-    this.append(head, element("div", { class: "queue-tools" }, summary, ...acceptAll()), list, empty, abstained.box);
+    this.append(head, element("div", { class: "queue-tools" }, summary, ...acceptAll()), list, empty, ...open.map((each) => each.box));
 
     /** @type {Map<string, RpPoint>} */
     this.rows = new Map();
@@ -39,7 +42,7 @@ class RpQueue extends HTMLElement {
       setText(source, page?.segmenter ?? "");
       setText(empty, emptyWords());
       empty.hidden = rows.length > 0;
-      abstained.show(page?.abstained ?? []);
+      for (const each of open) each.show(page?.abstained ?? []);
       this.place(list, groups, rows, reachable ?? "");
     });
     selected.subscribe((pointId) => this.rows.get(pointId)?.scrollIntoView({ block: "nearest" }));
@@ -123,23 +126,35 @@ function acceptAll() {
   return [button, least];
 }
 
-function abstainedList() {
+/**
+ * The places without a point that need one thing.
+ *
+ * @param {import("../messages.js").Need} needs
+ * @param {(count: number) => string} title
+ */
+function abstainedList(needs, title) {
   const summary = element("summary");
   const list = element("ul");
-  const box = element("details", { class: "abstained" }, summary, list);
+  const box = element("details", { class: "abstained", attributes: { "data-needs": needs } }, summary, list);
   let shown = "";
   return {
     box,
-    /** @param {readonly string[]} reasons */
-    show(reasons) {
-      box.hidden = reasons.length === 0;
-      const key = reasons.join("\n");
+    /** @param {readonly import("../messages.js").Abstention[]} all */
+    show(all) {
+      const lines = all.filter((each) => each.needs === needs).map(placeWords);
+      box.hidden = lines.length === 0;
+      const key = lines.join("\n");
       if (key === shown) return;
       shown = key;
-      setText(summary, `${counted(reasons.length, "place")} looked at without a point`);
-      list.replaceChildren(...reasons.map((reason) => element("li", { text: reason })));
+      setText(summary, title(lines.length));
+      list.replaceChildren(...lines.map((text) => element("li", { text })));
     },
   };
+}
+
+/** @param {import("../messages.js").Abstention} place */
+function placeWords(place) {
+  return place.vine === 0 ? place.reason : `Vine ${place.vine} · spur ${place.spur}: ${place.reason}`;
 }
 
 /** @param {readonly PagePoint[]} rows */

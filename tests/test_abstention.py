@@ -1,0 +1,31 @@
+"""What is left open is remembered per spur, with what it needs, until it is settled."""
+
+from perception.abstention import MoreToSee, OpenPlaces, abstention
+from perception.numbering import SpurNumber
+
+FIRST, SECOND = SpurNumber(1, 1), SpurNumber(2, 1)
+
+
+def test_a_reason_says_whether_another_look_may_help_or_only_a_person():
+    assert abstention(MoreToSee("the place is hidden"), FIRST).needs == "another look"
+    for_a_person = abstention("two canes are alike", FIRST)
+    assert (for_a_person.needs, for_a_person.vine, for_a_person.spur) == ("operator", 1, 1)
+
+
+def test_what_a_spur_lacked_stays_told_while_others_are_looked_at_and_ends_when_it_is_settled():
+    places = OpenPlaces()
+    places.note(SECOND, False, ["two canes are alike"])
+    places.note(FIRST, False, [MoreToSee("hidden")])
+    assert [(each.vine, each.reason) for each in places.told(set())] == [(1, "hidden"), (2, "two canes are alike")]
+    places.note(FIRST, True, [])
+    assert [each.vine for each in places.told(set())] == [2]
+    places.clear()
+    assert places.told(set()) == ()
+
+
+def test_a_look_that_saw_too_little_is_not_told_of_a_spur_that_has_its_point():
+    places = OpenPlaces()
+    places.note(FIRST, False, [MoreToSee("hidden")])
+    assert places.told({FIRST}) == () and len(places.told({SECOND})) == 1
+    places.note(FIRST, True, ["the other cane is left for a person"])
+    assert len(places.told({FIRST})) == 1
