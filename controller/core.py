@@ -182,7 +182,7 @@ class Controller:
         if latched:
             self._event(Event.STOP, now, latched)
         elif self._stops.released(bridge):
-            self._event(Event.RESET, now, self._stops.reset_reason)
+            self._event(Event.RESET, now, self._stops.reset_reason, modes.OPERATOR)
         verdict = safety.check(self._state.mode, self._homing is not None, self._health, self._config)
         if verdict.action == "fault":
             self._event(Event.FAULT, now, verdict.reason)
@@ -190,8 +190,8 @@ class Controller:
             self._event(Event.PROTECT, now, verdict.reason)
         elif verdict.action == "pause":
             self._homing = None
-            if self._state.mode in ("AUTO", "TELEOP"):
-                self._event(Event.PAUSE, now, verdict.reason)
+            if self._state.mode in modes.MOVING:
+                self._event(Event.LOST, now, verdict.reason)
             else:
                 self._say("warning", f"bringing the arm home was stopped: {verdict.reason}")
         self._state = modes.observe(self._state, self._cause(), now)
@@ -208,7 +208,7 @@ class Controller:
                 self._teleoperation.refuse()
                 self._say("warning", f"teleoperation refused: {why}")
             else:
-                self._event(Event.HOLD, now, f"{self._teleoperation.user} moves the robot")
+                self._event(Event.HOLD, now, f"{self._teleoperation.user} moves the robot", modes.OPERATOR)
 
     def _busy(self) -> str:
         """What has to end before a motion may begin; empty when nothing."""
@@ -225,10 +225,10 @@ class Controller:
             return "another controller commands this robot"
         return safety.sensors(self._health, self._config) or ("watchdog" if self._health.watchdog else "")
 
-    def _event(self, event: Event, now: float, reason: str) -> str:
+    def _event(self, event: Event, now: float, reason: str, by: modes.Rights = modes.SYSTEM) -> str:
         """Put an event to the machine; what it changes is logged. Returns the refusal."""
         before = self._state
-        transition = modes.step(before, event, now, reason)
+        transition = modes.step(before, event, now, reason, by)
         self._state = transition.state
         if self._state.mode != before.mode:
             self._leave(before.mode)
@@ -260,7 +260,7 @@ class Controller:
         for text in work.events:
             self._say("warning", text)
         if work.pause:
-            self._event(Event.PAUSE, now, work.pause)
+            self._event(Event.LOST, now, work.pause)
         elif work.finished:
             self._event(Event.FINISHED, now, "no accepted point is left")
         cut = None
@@ -328,7 +328,7 @@ class Controller:
             return ""
         event = EVENTS.get(type(intent))
         if event is not None:
-            refused = self._event(event, now, f"{event.value} by {intent.user}")
+            refused = self._event(event, now, f"{event.value} by {intent.user}", modes.OPERATOR)
             if isinstance(intent, intents.Start) and not refused:
                 self._sequence.begin()
             return refused

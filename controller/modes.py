@@ -1,40 +1,45 @@
-"""The supervision state machine: pure, one table, everything unlisted refused with a reason in words."""
+"""The supervision state machine: pure, steps the one table, refuses everything unlisted with a reason in words."""
 
 from dataclasses import dataclass, replace
-from enum import Enum
 from typing import Final
 
 from rolling_panda.messages import Mode
+from rolling_panda.mode_table import FIRST, MOVING, ROWS, SEVERITY, Event, Row, Who
+
+__all__ = [
+    "ANYBODY",
+    "MOVING",
+    "OPERATOR",
+    "SEVERITY",
+    "SYSTEM",
+    "Event",
+    "Rights",
+    "State",
+    "Transition",
+    "Who",
+    "boot",
+]
 
 #: How long the cause of a protective stop must be gone before it can be acknowledged (s).
 CLEAR_S: Final = 1.0
-SEVERITY: Final[tuple[Mode, ...]] = (
-    "IDLE",
-    "READY",
-    "TELEOP",
-    "AUTO",
-    "PAUSED",
-    "PROTECTIVE_STOP",
-    "FAULT",
-    "ESTOP_LATCHED",
-)
 
+#: What somebody is to the machine: the kinds of causer that they count as.
+Rights = frozenset[Who]
+#: The program itself.
+SYSTEM: Final[Rights] = frozenset({"system", "anyone"})
+#: Somebody with no right but to stop.
+ANYBODY: Final[Rights] = frozenset({"anyone"})
+#: A supervisor who holds control.
+OPERATOR: Final[Rights] = frozenset({"anyone", "operator", "holder", "supervisor"})
 
-class Event(Enum):
-    """What can happen to the machine; the value is how a person would say it."""
-
-    ARM = "arm"
-    HOLD = "hold to move the tool"
-    RELEASE = "release of the hold"
-    START = "start"
-    FINISHED = "end of the work"
-    PAUSE = "pause"
-    RESUME = "resume"
-    PROTECT = "protective stop"
-    ACKNOWLEDGE = "acknowledge"
-    STOP = "stop"
-    RESET = "reset"
-    FAULT = "fault"
+_TABLE: Final[dict[tuple[Mode, Event], Row]] = {(row.before, row.event): row for row in ROWS}
+_WANTED: Final[dict[Who, str]] = {
+    "system": "the program itself",
+    "anyone": "anybody",
+    "operator": "an operator",
+    "holder": "who holds control",
+    "supervisor": "a supervisor",
+}
 
 
 @dataclass(frozen=True)
@@ -60,35 +65,6 @@ class Transition:
     refused: str = ""
 
 
-_TABLE: Final[dict[tuple[Mode, Event], Mode]] = {
-    ("IDLE", Event.ARM): "READY",
-    ("READY", Event.HOLD): "TELEOP",
-    ("TELEOP", Event.RELEASE): "READY",
-    ("READY", Event.START): "AUTO",
-    ("AUTO", Event.FINISHED): "READY",
-    ("AUTO", Event.PAUSE): "PAUSED",
-    ("TELEOP", Event.PAUSE): "PAUSED",
-    ("PAUSED", Event.RESUME): "READY",
-    ("AUTO", Event.PROTECT): "PROTECTIVE_STOP",
-    ("TELEOP", Event.PROTECT): "PROTECTIVE_STOP",
-    # READY moves too, while the arm is brought home.
-    ("READY", Event.PROTECT): "PROTECTIVE_STOP",
-    ("PROTECTIVE_STOP", Event.ACKNOWLEDGE): "PAUSED",
-    ("FAULT", Event.ACKNOWLEDGE): "IDLE",
-    ("ESTOP_LATCHED", Event.RESET): "IDLE",
-}
-_NEXT: Final[dict[Mode, str]] = {
-    "IDLE": "arm the robot first",
-    "READY": "",
-    "TELEOP": "release the hold first",
-    "AUTO": "pause first",
-    "PAUSED": "resume first",
-    "PROTECTIVE_STOP": "acknowledge first",
-    "FAULT": "acknowledge first",
-    "ESTOP_LATCHED": "reset the stop first",
-}
-
-
 def severity(mode: Mode) -> int:
     """Rank of a mode; of two faults at once the higher one wins."""
     return SEVERITY.index(mode)
@@ -99,7 +75,7 @@ def boot(stopped: str = "") -> State:
     return State("ESTOP_LATCHED", stopped) if stopped else State("IDLE", "started; nothing moves until it is armed")
 
 
-def step(state: State, event: Event, now: float, reason: str = "") -> Transition:
+def step(state: State, event: Event, now: float, reason: str = "", by: Rights = SYSTEM) -> Transition:
     """What an event does.
 
     Args:
@@ -107,23 +83,19 @@ def step(state: State, event: Event, now: float, reason: str = "") -> Transition
         event: What happened.
         now: Monotonic time (s).
         reason: Why, in words; becomes the reason of the new state.
+        by: Who caused it.
     """
-    if event is Event.STOP:
-        return _enter(state, "ESTOP_LATCHED", reason or "stopped")
-    if event is Event.FAULT:
-        return _enter(state, "FAULT", reason or "fault")
-    if event is Event.PROTECT and state.mode == "PROTECTIVE_STOP":
-        return Transition(State("PROTECTIVE_STOP", reason or state.reason))
-    target = _TABLE.get((state.mode, event))
-    if target is None:
-        advice = _NEXT[state.mode]
-        return Transition(state, f"{event.value} is not possible in {state.mode}" + (f": {advice}" if advice else ""))
+    row = _TABLE.get((state.mode, event))
+    if row is None:
+        return _unlisted(state, event, reason)
+    if row.who not in by:
+        return Transition(state, f"{event.value} in {state.mode} is for {_WANTED[row.who]}")
     if event is Event.ACKNOWLEDGE:
         if state.clear_since is None:
             return Transition(state, f"the cause is still there: {state.reason}")
         if now - state.clear_since < CLEAR_S:
             return Transition(state, f"the cause must be gone for {CLEAR_S:.0f} s first")
-    return Transition(State(target, reason or event.value))
+    return Transition(State(row.after, reason or event.value))
 
 
 def observe(state: State, cause: str, now: float) -> State:
@@ -135,9 +107,14 @@ def observe(state: State, cause: str, now: float) -> State:
     return replace(state, clear_since=now) if state.clear_since is None else state
 
 
-def _enter(state: State, mode: Mode, reason: str) -> Transition:
-    if severity(state.mode) > severity(mode):
-        return Transition(state, f"{mode} changes nothing: the robot is in {state.mode}")
-    if state.mode == mode:
+def _unlisted(state: State, event: Event, reason: str) -> Transition:
+    """What an event does that leads nowhere else from here."""
+    if event is Event.PROTECT and state.mode == "PROTECTIVE_STOP":
+        # Another cause, or the old one again: the second that it has to be gone for begins anew.
+        return Transition(State("PROTECTIVE_STOP", reason or state.reason))
+    if event is Event.STOP or (event is Event.FAULT and state.mode == "FAULT"):
         return Transition(state)
-    return Transition(State(mode, reason))
+    if event is Event.FAULT:
+        return Transition(state, f"a fault changes nothing: the robot is in {state.mode}")
+    advice = FIRST[state.mode]
+    return Transition(state, f"{event.value} is not possible in {state.mode}" + (f": {advice}" if advice else ""))

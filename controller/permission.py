@@ -63,7 +63,7 @@ def refusal(intent: intents.Intent, now: float, situation: Situation) -> str:
     config, health, mode = situation.config, situation.health, situation.state.mode
     event = EVENTS.get(type(intent))
     if event is not None and not (event is Event.PAUSE and situation.homing):
-        refused = modes.step(situation.state, event, now).refused
+        refused = modes.step(situation.state, event, now, by=modes.OPERATOR).refused
         if refused:
             return refused
     if isinstance(intent, intents.Arm | intents.Start | intents.Home):

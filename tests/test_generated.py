@@ -23,7 +23,7 @@ def test_generated_files_are_current() -> None:
 def test_an_edited_file_is_noticed(tmp_path: Any) -> None:
     for path in generated():
         copy = tmp_path / path.relative_to(ROOT)
-        copy.parent.mkdir(parents=True)
+        copy.parent.mkdir(parents=True, exist_ok=True)
         copy.write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
     assert stale(tmp_path) == []
     (tmp_path / "web" / "messages.js").write_text("// edited\n", encoding="utf-8")

@@ -1,1 +1,1 @@
-"""What is made from the message definitions: the page's typed messages and the tables of the wire's documentation."""
+"""What is made from the message and mode definitions: the page's typed messages, tables and diagrams of the docs."""

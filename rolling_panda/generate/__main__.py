@@ -1,4 +1,4 @@
-"""`python -m rolling_panda.generate --check | --write`: keep what is made from the message definitions current."""
+"""`python -m rolling_panda.generate --check | --write`: keep what is made from messages and modes current."""
 
 import argparse
 import sys
@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rolling_panda.errors import RollingPandaError
+from rolling_panda.generate import modes
 from rolling_panda.generate.javascript import messages_module
 from rolling_panda.generate.markdown import fill
 
@@ -14,10 +15,11 @@ ROOT = Path(__file__).resolve().parents[2]
 
 def generated(root: Path = ROOT) -> dict[Path, str]:
     """What each generated file of a checkout should contain."""
-    wire = root / "docs" / "wire.md"
+    wire, safety = root / "docs" / "wire.md", root / "docs" / "safety.md"
     return {
         root / "web" / "messages.js": messages_module(),
         wire: fill(wire.read_text(encoding="utf-8")),
+        safety: fill(safety.read_text(encoding="utf-8"), modes.BLOCKS, "docs/safety.md"),
     }
 
 

@@ -1,7 +1,7 @@
 """The tables of `docs/wire.md`, filled in between markers; the words around them are written by hand."""
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Annotated, Any, Literal, get_args, get_origin
 
 import msgspec
@@ -22,24 +22,30 @@ _PLAIN: dict[Any, str] = {
 }
 
 
-def fill(document: str) -> str:
+def fill(document: str, blocks: Mapping[str, Callable[[], str]] | None = None, path: str = "docs/wire.md") -> str:
     """The document with every marked block made anew.
+
+    Args:
+        document: Text with blocks between markers.
+        blocks: Each block by name; those of the wire's documentation unless given.
+        path: Of the document, for errors.
 
     Raises:
         MessageError: A block's name is unknown, or one of the blocks is missing.
     """
+    blocks = BLOCKS if blocks is None else blocks
     seen: set[str] = set()
 
     def replace(match: re.Match[str]) -> str:
         name = match[2]
-        if name not in BLOCKS:
-            raise MessageError(f"docs/wire.md asks for the block {name}; there are {', '.join(BLOCKS)}")
+        if name not in blocks:
+            raise MessageError(f"{path} asks for the block {name}; there are {', '.join(blocks)}")
         seen.add(name)
-        return f"{match[1]}\n{BLOCKS[name]()}\n{match[3]}"
+        return f"{match[1]}\n{blocks[name]()}\n{match[3]}"
 
     out = _BLOCK.sub(replace, document)
-    if seen != set(BLOCKS):
-        raise MessageError(f"docs/wire.md lacks the blocks {', '.join(sorted(set(BLOCKS) - seen))}")
+    if seen != set(blocks):
+        raise MessageError(f"{path} lacks the blocks {', '.join(sorted(set(blocks) - seen))}")
     return out
 
 
@@ -61,7 +67,7 @@ def topics_table() -> str:
                 topic.about,
             )
         )
-    return _table(("topic", "message", "sender", "rate", "priority", "congestion", "carried", "what"), rows)
+    return table(("topic", "message", "sender", "rate", "priority", "congestion", "carried", "what"), rows)
 
 
 def services_table() -> str:
@@ -76,13 +82,13 @@ def services_table() -> str:
         )
         for service in SERVICES
     ]
-    return _table(("service", "requests", "answered by", "timeout", "what"), rows)
+    return table(("service", "requests", "answered by", "timeout", "what"), rows)
 
 
 def types_table() -> str:
     """One row a named type that is not a message."""
     rows = [(f"`{name}`", spelled_out(hint)) for name, hint in aliases().items()]
-    return _table(("name", "values"), rows)
+    return table(("name", "values"), rows)
 
 
 def wire_messages() -> str:
@@ -162,7 +168,7 @@ def _sections(roots: Iterable[type[msgspec.Struct]], leave_out: set[type[msgspec
         for field in text.fields:
             default = "required" if field.required else f"`{_default(field.default)}`"
             rows.append((f"`{field.name}`", _named(field.hint), default, field.about))
-        parts.append(_table(("field", "type", "default", "meaning"), rows))
+        parts.append(table(("field", "type", "default", "meaning"), rows))
     return "\n".join(parts)
 
 
@@ -178,7 +184,8 @@ def _link(struct: type[msgspec.Struct]) -> str:
     return f"[{struct.__name__}](#{struct.__name__.lower()})"
 
 
-def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+def table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+    """A Markdown table."""
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     lines.extend("| " + " | ".join(row) + " |" for row in rows)
     return "\n".join(lines) + "\n"
