@@ -19,6 +19,7 @@ FORWARDED = {
     "controller": ("controller", "whole-body control and the supervision state machine"),
     "perception": ("perception", "camera frames to pruning points"),
     "server": ("server", "the operator's page and its REST interface"),
+    "audit": ("controller.audit", "what was decided, refused and done: check the record or write it out"),
     "perceive": ("perception.perceive", "classes and pruning points of one photograph"),
     "vineyard": ("bridge.sim.vineyard_command", "grow a simulated row, write and picture it"),
     "bench": ("benchmarks", "measurements: time of a control step, cuts in simulated rows"),

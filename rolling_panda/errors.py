@@ -34,3 +34,7 @@ class InputError(RollingPandaError):
 
 class ControlError(RollingPandaError):
     """A control step has no answer: its numbers are not finite or its equations cannot be solved."""
+
+
+class LedgerError(RollingPandaError):
+    """The ledger cannot be read or written, or has been changed from outside."""
