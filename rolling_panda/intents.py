@@ -4,13 +4,18 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from rolling_panda.messages import Count, Fraction, Name, Text
+from rolling_panda.messages import Count, Fraction, Name, Role, Text
 
 
 class Intent(Struct, frozen=True, kw_only=True, tag=True, forbid_unknown_fields=True):
-    """Root of what an operator may ask of the controller. `user` is who asks, `role` what they may."""
+    """Root of what an operator may ask of the controller.
+
+    `user` is who asks and `role` what they may; `client` tells apart who has the same name, empty where none has.
+    """
 
     user: Text
+    role: Role = "operator"
+    client: Annotated[str, Meta(max_length=64)] = ""
 
 
 class Arm(Intent, frozen=True, kw_only=True):
@@ -63,4 +68,37 @@ class Reset(Intent, frozen=True, kw_only=True):
     reason: Annotated[str, Meta(min_length=1, max_length=500)]
 
 
-AnyIntent = Arm | AcceptPoint | RejectPoint | AcceptAll | Start | Pause | Resume | Home | Acknowledge | Reset
+class TakeControl(Intent, frozen=True, kw_only=True):
+    """Hold control of the robot's motion. From somebody else only with `confirmed`; the robot stops first."""
+
+    confirmed: bool = False
+
+
+class RequestControl(Intent, frozen=True, kw_only=True):
+    """Ask who holds control to grant it."""
+
+
+class GrantControl(Intent, frozen=True, kw_only=True):
+    """Give control to who has asked for it; the robot stops first."""
+
+
+class ReturnControl(Intent, frozen=True, kw_only=True):
+    """Give control up; what moves is paused."""
+
+
+AnyIntent = (
+    Arm
+    | AcceptPoint
+    | RejectPoint
+    | AcceptAll
+    | Start
+    | Pause
+    | Resume
+    | Home
+    | Acknowledge
+    | Reset
+    | TakeControl
+    | RequestControl
+    | GrantControl
+    | ReturnControl
+)

@@ -32,6 +32,7 @@ Actuated = tuple[Angle, Angle, Angle, Angle, Angle, Angle, Angle, Angle, Angle]
 #: Velocities of ξ (rad/s).
 ActuatedVelocity = tuple[Speed, Speed, Speed, Speed, Speed, Speed, Speed, Speed, Speed]
 
+Role = Literal["viewer", "operator", "supervisor"]
 Process = Literal["bridge", "controller", "perception", "server"]
 PROCESSES: tuple[Process, ...] = ("bridge", "controller", "perception", "server")
 
@@ -93,25 +94,32 @@ class MotionCommand(Message, frozen=True, kw_only=True):
     """Controller → bridge: the velocity of every actuator, newest wins.
 
     Attributes:
-        epoch: One more than the newest epoch the bridge had seen when this controller started; an older one is refused.
+        epoch: Counts starts of the controller and leases given, durably; an older one is refused.
         sequence: Strictly increasing within an epoch.
         echo: `sequence` of the newest `JointState` the command was computed from. The bridge knows when it sent that
             state, so it judges the command's age on its own clock.
         xi: [θ̇_l, θ̇_r, q̇₁…q̇₇] in rad/s.
+        token: Random part of the lease's token; within an epoch another one is refused.
     """
 
     epoch: Count
     sequence: Count
     echo: Count
     xi: ActuatedVelocity
+    token: Annotated[str, Meta(max_length=32)] = ""
 
 
 class CutCommand(Message, frozen=True, kw_only=True):
-    """Controller → bridge: close the blades once. Repeated until seen; the bridge acts on a `cut_id` once."""
+    """Controller → bridge: close the blades once. Repeated until seen; the bridge acts on a `cut_id` once.
+
+    `epoch`, `token` and `echo` are judged as those of a motion command, and the robot has to be at rest.
+    """
 
     epoch: Count
     cut_id: Name
     point_id: Name
+    echo: Count = 0
+    token: Annotated[str, Meta(max_length=32)] = ""
 
 
 class StopRequest(Message, frozen=True, kw_only=True):

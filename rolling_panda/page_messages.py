@@ -1,13 +1,14 @@
 """What the server and the operator's page say to each other over `/ws`, as JSON; `web/messages.js` is made from it."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from msgspec import Meta, Struct
 
 from rolling_panda import messages as m
+from rolling_panda.control_messages import ClientKey, ControlState, StopState
 from rolling_panda.plan_messages import Digest, PlanState, PointPlan
 
-Role = Literal["viewer", "operator", "supervisor"]
+Role = m.Role
 Age = Annotated[float, Meta(ge=0.0, le=1e9)]
 
 
@@ -42,6 +43,9 @@ class PageState(PageMessage, frozen=True, kw_only=True):
         joints: Newest joint state: speeds for the gauges.
         base: Base pose in odom.
         camera_frame: Sequence of the newest camera frame, to fetch `/camera/color.jpg?n=…`.
+        client: The reader's own key, to be compared with the holder's.
+        control: Who holds control of the robot's motion.
+        stops: What bridge and controller hold latched.
     """
 
     number: m.Count
@@ -56,6 +60,9 @@ class PageState(PageMessage, frozen=True, kw_only=True):
     joints: m.JointState | None
     base: m.PlanarPose | None
     camera_frame: m.Count
+    client: ClientKey = ""
+    control: ControlState | None = None
+    stops: tuple[StopState, ...] = ()
 
 
 class PagePoint(Struct, frozen=True, forbid_unknown_fields=True):

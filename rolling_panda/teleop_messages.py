@@ -4,7 +4,7 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from rolling_panda.messages import Count, Message, Pose, Text
+from rolling_panda.messages import Count, Message, NonNegative, Pose, Text
 
 JointVelocity = Annotated[float, Meta(ge=-10.0, le=10.0)]
 ArmVelocities = tuple[
@@ -33,6 +33,8 @@ class TeleopTarget(Message, frozen=True, kw_only=True):
         target: Desired T_odom_tool in odom.
         base: Velocity of the base.
         joints: Velocities of the arm's joints (7, rad/s).
+        client: Tells apart who has the same name, as in an intent.
+        round_trip_s: From the holder's page to the server and back, as the server measured it (s).
     """
 
     sequence: Count
@@ -41,3 +43,5 @@ class TeleopTarget(Message, frozen=True, kw_only=True):
     target: Pose | None = None
     base: BaseVelocity | None = None
     joints: ArmVelocities | None = None
+    client: Annotated[str, Meta(max_length=64)] = ""
+    round_trip_s: NonNegative = 0.0

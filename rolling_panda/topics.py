@@ -8,7 +8,7 @@ from typing import Any, Generic, Literal, TypeVar
 
 from msgspec import Struct
 
-from rolling_panda import intents, plan_messages, plant_requests, row_messages, teleop_messages
+from rolling_panda import control_messages, intents, plan_messages, plant_requests, row_messages, teleop_messages
 from rolling_panda import messages as m
 
 Priority = Literal["REAL_TIME", "INTERACTIVE_HIGH", "DATA_LOW", "BACKGROUND"]
@@ -96,6 +96,22 @@ CONTROLLER = Topic(
     "state/controller", m.ControllerState, "controller", 20, "INTERACTIVE_HIGH", "DROP",
     "mode, queue, tracking",
 )
+PRESENCE = Topic(
+    "operator/presence", control_messages.Presence, "server", 5, "REAL_TIME", "DROP",
+    "who is there; it renews the lease", express=True,
+)
+CONTROL = Topic(
+    "state/control", control_messages.ControlState, "controller", 20, "INTERACTIVE_HIGH", "DROP",
+    "who holds control of the robot's motion",
+)
+STOPS = Topic(
+    "state/stops", control_messages.StopState, "any", 2, "INTERACTIVE_HIGH", "DROP",
+    "stops latched by the bridge and by the controller, at once when they change", latched=True,
+)
+HARDWARE_STOP = Topic(
+    "simulation/hardware-stop", control_messages.HardwareStop, "any", 0, "INTERACTIVE_HIGH", "BLOCK",
+    "the emergency stop button of the simulated robot",
+)
 PLAN = Topic(
     "controller/plan", plan_messages.SessionPlan, "controller", 0.2, "DATA_LOW", "DROP",
     "the session's plan, at once when it changes", latched=True,
@@ -127,7 +143,7 @@ SCENERY = Topic(
 
 TOPICS: tuple[Topic[Any], ...] = (
     MOTION, CUT, STOP, TELEOP, JOINTS, ODOMETRY, BRIDGE, CONTROLLER, PLAN, HEARTBEAT, EVENT, CAMERA, POINTS,
-    OBSTACLES, SCENERY,
+    OBSTACLES, SCENERY, PRESENCE, CONTROL, STOPS, HARDWARE_STOP,
 )
 
 
@@ -135,7 +151,8 @@ INTENT: Service[intents.Intent] = Service(
     "service/intent",
     (
         intents.Arm, intents.AcceptPoint, intents.RejectPoint, intents.AcceptAll, intents.Start, intents.Pause,
-        intents.Resume, intents.Home, intents.Acknowledge, intents.Reset,
+        intents.Resume, intents.Home, intents.Acknowledge, intents.Reset, intents.TakeControl, intents.RequestControl,
+        intents.GrantControl, intents.ReturnControl,
     ),
     "controller", 1.0, "what an operator asks for",
 )

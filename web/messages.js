@@ -17,7 +17,7 @@ export const SEVERITIES = Object.freeze(["info", "warning", "error"]);
 export const ROLES = Object.freeze(["viewer", "operator", "supervisor"]);
 
 /** What `ControllerState.allowed` may contain. */
-export const INTENTS = Object.freeze(["Arm", "AcceptPoint", "RejectPoint", "AcceptAll", "Start", "Pause", "Resume", "Home", "Acknowledge", "Reset"]);
+export const INTENTS = Object.freeze(["Arm", "AcceptPoint", "RejectPoint", "AcceptAll", "Start", "Pause", "Resume", "Home", "Acknowledge", "Reset", "TakeControl", "RequestControl", "GrantControl", "ReturnControl"]);
 
 export const TEXT_MAX_LENGTH = 500;
 
@@ -32,6 +32,8 @@ export const TEXT_MAX_LENGTH = 500;
 /** @typedef {[number, number, number, number, number, number, number, number, number]} Actuated */
 
 /** @typedef {[number, number, number, number, number, number, number, number, number]} ActuatedVelocity */
+
+/** @typedef {"viewer"|"operator"|"supervisor"} Role */
 
 /** @typedef {"bridge"|"controller"|"perception"|"server"} Process */
 
@@ -50,8 +52,6 @@ export const TEXT_MAX_LENGTH = 500;
 /** @typedef {"background"|"ground"|"post"|"trunk"|"cordon"|"spur"|"cane"|"node"|"wire"|"hose"|"old cut"} WoodClass */
 
 /** @typedef {"none"|"planning"|"valid"|"void"} PlanState */
-
-/** @typedef {"viewer"|"operator"|"supervisor"} Role */
 
 /** @typedef {[number, number, number, number, number, number, number]} ArmVelocities */
 
@@ -166,6 +166,45 @@ export const TEXT_MAX_LENGTH = 500;
  */
 
 /**
+ * Controller → all: the lease on the robot's motion.
+ *
+ * @typedef {object} ControlState
+ * @property {"ControlState"} type
+ * @property {string} holder Key of who holds control, empty when nobody.
+ * @property {string} user Their name.
+ * @property {number} epoch Of the token that motion commands and cut orders carry now.
+ * @property {number} expires_s How long the lease still lives without being renewed (s).
+ * @property {string} requested_by Name of who asks for control, empty when nobody.
+ * @property {string} requested_key Their key.
+ * @property {string} coming Name of who gets control as soon as the robot is at rest, empty when nobody.
+ * @property {string} told What became of control last, in words.
+ * @property {number} told_number Grows with each such change, so that a page tells each once.
+ * @property {boolean} supervised Whether somebody who may operate sees the robot now.
+ */
+
+/**
+ * One stop as a process has latched it.
+ *
+ * @typedef {object} StopRecord
+ * @property {string} stop_id Its id.
+ * @property {string} source Process or input that it came from.
+ * @property {string} user Who pressed; empty where nobody did.
+ * @property {string} reason Why.
+ * @property {number} wall_time When this process latched it.
+ */
+
+/**
+ * Bridge and controller → all: the stops that this process holds latched, the newest first.
+ *
+ * @typedef {object} StopState
+ * @property {"StopState"} type
+ * @property {Process} process Whose latch this is.
+ * @property {StopRecord[]} stops What is latched.
+ * @property {string} released_by Who released the last one that was, and why; empty before.
+ * @property {boolean} hardware Whether the hardware stop is pressed; always false from the controller.
+ */
+
+/**
  * 10 Hz: everything that changes all the time. The last known state stays, with its age.
  *
  * @typedef {object} PageState
@@ -182,6 +221,9 @@ export const TEXT_MAX_LENGTH = 500;
  * @property {JointState|null} joints Newest joint state: speeds for the gauges.
  * @property {PlanarPose|null} base Base pose in odom.
  * @property {number} camera_frame Sequence of the newest camera frame, to fetch `/camera/color.jpg?n=…`.
+ * @property {string} client The reader's own key, to be compared with the holder's.
+ * @property {ControlState|null} control Who holds control of the robot's motion.
+ * @property {StopState[]} stops What bridge and controller hold latched.
  */
 
 /**
