@@ -15,7 +15,7 @@ class Operator:
     def points(self, intent: intents.Intent) -> str:
         """Accept or reject; returns why not, empty when done."""
         if isinstance(intent, intents.AcceptPoint):
-            return self._queue.accept(intent.point_id, intent.revision, intent.user)
+            return self._queue.accept(intent.point_id, intent.revision, intent.user, intent.digest)
         if isinstance(intent, intents.RejectPoint):
             return self._queue.reject(intent.point_id, intent.user, intent.reason)
         if isinstance(intent, intents.AcceptAll):
@@ -35,7 +35,7 @@ class Operator:
 
     def _accept_all(self, intent: intents.AcceptAll) -> str:
         points = self._queue.proposed(intent.confidence)
-        refusals = [self._queue.accept(point.point_id, point.revision, intent.user) for point in points]
+        refusals = [self._queue.accept(point.point_id, point.revision, intent.user, point.digest) for point in points]
         self._accepted = refusals.count("")
         if self._accepted:
             return ""

@@ -85,8 +85,15 @@ class PointQueue:
         """The ticket of a point, None when there is none."""
         return self._tickets.get(point_id)
 
-    def accept(self, point_id: str, revision: int, user: str) -> str:
-        """Bind an acceptance to the point as the operator saw it; returns why not, empty when accepted."""
+    def accept(self, point_id: str, revision: int, user: str, digest: str = "") -> str:
+        """Bind an acceptance to the point as the operator saw it; returns why not, empty when accepted.
+
+        Args:
+            point_id: Of the point.
+            revision: That the operator saw.
+            user: Who accepts.
+            digest: Hash of what the operator saw; empty where they do not say it.
+        """
         ticket = self._tickets.get(point_id)
         if ticket is None:
             return f"there is no point {point_id!r}"
@@ -96,6 +103,10 @@ class PointQueue:
             return f"perception does not see {point_id} any more"
         if ticket.point.revision != revision:
             return f"{point_id} has changed since: revision {revision} was seen, it is {ticket.point.revision} now"
+        if digest and digest != ticket.point.digest:
+            return (
+                f"{point_id} is not what was seen: its hash is {ticket.point.digest[:8] or 'unknown'}, not {digest[:8]}"
+            )
         radius = ticket.point.radius
         if radius > self._config.largest_radius:
             limit = 2e3 * self._config.largest_radius
@@ -209,4 +220,5 @@ def _entry(ticket: Ticket, note: str) -> QueueEntry:
         user=ticket.user,
         cut_id=ticket.cut_id,
         accepted_position=None if ticket.accepted is None else ticket.accepted.position,
+        digest="" if ticket.accepted is None else ticket.accepted.digest,
     )

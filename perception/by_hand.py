@@ -2,11 +2,12 @@
 
 import numpy as np
 
+from perception.clearance import clearance
 from perception.config import RuleConfig
 from perception.numbering import SpurNumber
 from perception.plant import Array
 from perception.plant_map import KnownSpur, PlantMap
-from perception.rule import Cut, count_nodes
+from perception.rule import Cut, count_nodes, nearest_node
 from rolling_panda.row_messages import Capsule
 
 #: A click this far beside a cane means it (m).
@@ -60,13 +61,16 @@ def point_by_hand(
         nodes_seen=len(nodes),
         nodes_kept=len(below),
         reason=f"Placed by {user}: {where} on this cane.",
+        offset=arc - below[-1].arc if below else None,
+        node_distance=nearest_node(cane, tuple(below), position),
     )
     return cut, spur.number
 
 
 def near_wire(obstacles: tuple[Capsule, ...], position: Array, distance: float) -> bool:
     """Whether a known wire is within `distance` (m) of a place (3, m, odom)."""
-    return any(_distance(rod, position) < distance for rod in obstacles if rod.kind == "wire")
+    gap = clearance(obstacles, "wire", position)
+    return gap is not None and gap < distance
 
 
 def _nearest(known: PlantMap, origin: Array, direction: Array) -> tuple[KnownSpur, int, float] | None:
@@ -83,9 +87,3 @@ def _nearest(known: PlantMap, origin: Array, direction: Array) -> tuple[KnownSpu
             if gaps[k] < _BESIDE and (best is None or gaps[k] < best[0]):
                 best = float(gaps[k]), spur, number, float(arcs[k])
     return None if best is None else best[1:]
-
-
-def _distance(rod: Capsule, point: Array) -> float:
-    start, axis = np.array(rod.start), np.array(rod.end) - np.array(rod.start)
-    share = float(np.clip((point - start) @ axis / max(float(axis @ axis), 1e-12), 0.0, 1.0))
-    return float(np.linalg.norm(point - start - share * axis))

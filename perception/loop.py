@@ -12,6 +12,7 @@ from perception.pipeline import Perception
 from perception.worker import Worker
 from rolling_panda import messages as m
 from rolling_panda import topics
+from rolling_panda.crop_messages import PointCrop
 from rolling_panda.plant_requests import PlantRequest
 from rolling_panda.row_messages import Obstacles
 from rolling_panda.transport import Transport
@@ -22,6 +23,7 @@ class _Result:
     points: m.PruningPoints
     withdrawn: tuple[str, ...]
     obstacles: Obstacles
+    crops: tuple[PointCrop, ...]
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,7 @@ class Loop:
         self._frames = transport.slot(topics.CAMERA)
         self._points = transport.publisher(topics.POINTS)
         self._obstacles = transport.publisher(topics.OBSTACLES)
+        self._crops = transport.publisher(topics.CROPS)
         self._heartbeat = transport.publisher(topics.HEARTBEAT)
         self._events = transport.publisher(topics.EVENT)
         self._worker: Worker[_Job, _Result] = Worker(lambda job: _work(perception, job))
@@ -57,8 +60,10 @@ class Loop:
         transport.serve(topics.PLANT, self._ask)
         self._newest: m.PruningPoints | None = None
         self._in_the_way: Obstacles | None = None
+        self._pictures: dict[tuple[str, int], PointCrop] = {}
+        """In the order in which they are repeated, the next one first."""
         self._sequence = 0
-        self._sent = self._sent_obstacles = -1e9
+        self._sent = self._sent_obstacles = self._sent_crop = -1e9
         self._last_error = ""
         self._shown: frozenset[str] = frozenset()
         self._hanging = False
@@ -90,6 +95,8 @@ class Loop:
         if self._in_the_way is not None and now - self._sent_obstacles >= 1.0 / topics.OBSTACLES.rate_hz:
             self._obstacles.put(self._in_the_way)
             self._sent_obstacles = now
+        if self._pictures and now - self._sent_crop >= 1.0 / topics.CROPS.rate_hz:
+            self._repeat_crop(now)
         self._beat(now)
 
     def _ask(self, request: PlantRequest) -> m.Answer:
@@ -105,6 +112,7 @@ class Loop:
     def _take(self, result: _Result, now: float) -> None:
         self._newest, self._in_the_way, self._last_error = result.points, result.obstacles, ""
         self._publish(now)
+        self._show_crops(result.crops)
         shown = frozenset(point.point_id for point in result.points.points)
         if shown - self._shown:
             new = len(shown - self._shown)
@@ -113,6 +121,20 @@ class Loop:
             # Mostly since it was cut. Where somebody had accepted it, the controller warns.
             self._tell("info", text, now)
         self._shown = shown
+
+    def _show_crops(self, crops: tuple[PointCrop, ...]) -> None:
+        wanted = {(crop.point_id, crop.revision): crop for crop in crops}
+        new = {key: crop for key, crop in wanted.items() if key not in self._pictures}
+        for crop in new.values():
+            self._crops.put(crop)
+        self._pictures = {key: crop for key, crop in self._pictures.items() if key in wanted} | new
+
+    def _repeat_crop(self, now: float) -> None:
+        key = next(iter(self._pictures))
+        crop = self._pictures.pop(key)
+        self._pictures[key] = crop
+        self._crops.put(crop)
+        self._sent_crop = now
 
     def _refuse(self, reason: str, now: float) -> None:
         # The same fault frame after frame is told once.
@@ -149,4 +171,4 @@ def _work(perception: Perception, job: _Job) -> _Result:
     else:
         points = perception.process(job)
     obstacles = Obstacles(header=points.header, capsules=perception.obstacles)
-    return _Result(points, perception.withdrawn, obstacles)
+    return _Result(points, perception.withdrawn, obstacles, perception.crops)

@@ -7,8 +7,10 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from perception.abstention import OpenPlaces, abstention
+from perception.album import Album, Crop
 from perception.by_hand import near_wire, point_by_hand
 from perception.centreline import centrelines
+from perception.clearance import clearance
 from perception.config import PerceptionConfig, RuleConfig
 from perception.fragments import find_fragments, find_wood
 from perception.frame import View, decode_frame
@@ -24,6 +26,7 @@ from perception.segmenter import Segmenter
 from perception.topology import build_plant
 from perception.tracker import Proposal, Tracked, Tracker
 from rolling_panda import messages as m
+from rolling_panda.crop_messages import PointCrop
 from rolling_panda.errors import InputError
 from rolling_panda.plant_requests import AddPoint, AddPointInImage, PlantRequest, SetRule
 from rolling_panda.robot_model import RobotModel
@@ -63,6 +66,8 @@ class Perception:
         self._eyes: dict[int, View] = {}
         self._canes: tuple[tuple[m.Vector3, ...], ...] = ()
         self._map = ObstacleMap(config.obstacles)
+        self._album = Album()
+        self._crops: dict[str, PointCrop] = {}
         self.known = PlantMap()
         """The vines as known from all frames."""
         self.withdrawn: tuple[str, ...] = ()
@@ -96,6 +101,7 @@ class Perception:
         plant = perceive(view, labels, self._config)
         numbers = self._numbers.number(plant, view.R[:, 0])
         self.known.update(plant, numbers)
+        self._album.add(view, plant, numbers)
         fused = {spur.number: spur.as_spur() for spur in self.known.spurs} if self._config.fuse else {}
         proposals = []
         for spur, number in zip(plant.spurs, numbers, strict=True):
@@ -144,19 +150,57 @@ class Perception:
             header=m.Header(self._stamp, "odom"),
             segmenter=self.segmenter.name,
             frames=self._frames,
-            points=self._tracker.points(),
+            points=self._explained(self._tracker.points()),
             abstained=self._told,
             canes=self._canes,
+            rule=self._rule,
+        )
+
+    @property
+    def crops(self) -> tuple[PointCrop, ...]:
+        """A picture of every point shown whose spur some image shows, in the order of the points."""
+        return tuple(self._crops.values())
+
+    @property
+    def _rule(self) -> m.PruningRule:
+        rule = self._config.rule
+        return m.PruningRule(
+            system=rule.system,
+            nodes_kept=rule.nodes_kept,
+            fruiting_nodes=rule.fruiting_nodes,
+            keeper_diameter=rule.keeper_diameter,
+            offset=rule.offset,
+        )
+
+    def _explained(self, points: tuple[m.PruningPoint, ...]) -> tuple[m.PruningPoint, ...]:
+        """The points with what stands around them; their pictures are renewed where a revision has none."""
+        crops: dict[str, PointCrop] = {}
+        for point in points:
+            crop = self._crops.get(point.point_id)
+            if crop is None or crop.revision != point.revision:
+                cut = self._album.crop(SpurNumber(point.vine, point.spur), np.array(point.position))
+                crop = None if cut is None else _crop_message(point, cut)
+            if crop is not None:
+                crops[point.point_id] = crop
+        self._crops = crops
+        return tuple(
+            replace(
+                point,
+                wire_distance=clearance(self.obstacles, "wire", np.array(point.position)),
+                cordon_distance=clearance(self.obstacles, "cordon", np.array(point.position)),
+            )
+            for point in points
         )
 
     def _set_rule(self, request: SetRule) -> m.Answer:
+        asked = request.rule
         rule = replace(
             self._config.rule,
-            system=request.system,
-            nodes_kept=request.nodes_kept,
-            fruiting_nodes=request.fruiting_nodes,
-            keeper_diameter=request.keeper_diameter,
-            offset=request.offset,
+            system=asked.system,
+            nodes_kept=asked.nodes_kept,
+            fruiting_nodes=asked.fruiting_nodes,
+            keeper_diameter=asked.keeper_diameter,
+            offset=asked.offset,
         )
         self._config = replace(self._config, rule=rule)
         spurs = {known.number: known.as_spur() for known in self.known.spurs}
@@ -212,15 +256,20 @@ class Perception:
             header=m.Header(view.stamp, "odom"),
             segmenter=self.segmenter.name,
             frames=self._frames,
-            points=points,
+            points=self._explained(points),
             abstained=self._told,
             canes=canes,
+            rule=self._rule,
         )
 
 
 def with_widening(config: PerceptionConfig, widening: float) -> PerceptionConfig:
     """The configuration for a segmenter that draws canes so much too wide (px)."""
     return replace(config, skeleton=replace(config.skeleton, widening=widening))
+
+
+def _crop_message(point: m.PruningPoint, crop: Crop) -> PointCrop:
+    return PointCrop(point_id=point.point_id, revision=point.revision, sequence=crop.sequence, jpeg=crop.jpeg)
 
 
 def _beside_wire(rule: RuleConfig) -> str:

@@ -6,15 +6,13 @@ in one cut beyond the keeper. Nothing is extrapolated: what was not seen is not 
 """
 
 from dataclasses import dataclass, field
-from typing import Literal
 
 import numpy as np
 
 from perception.abstention import MoreToSee
 from perception.config import RuleConfig
 from perception.plant import Array, Cane, Node, Spur
-
-CutKind = Literal["spur cut", "renewal cut", "cane cut", "by hand"]
+from rolling_panda.messages import CutKind
 
 
 @dataclass(frozen=True)
@@ -31,6 +29,8 @@ class Cut:
         nodes_seen: Count nodes seen on the keeper.
         nodes_kept: Count nodes that stay.
         reason: One sentence for a grower.
+        offset: Past the last kept node, along the wood (m); None where none is below the cut.
+        node_distance: To the nearest node that stays (m); None where none is known.
     """
 
     kind: CutKind
@@ -41,6 +41,8 @@ class Cut:
     nodes_seen: int
     nodes_kept: int
     reason: str
+    offset: float | None = None
+    node_distance: float | None = None
 
 
 @dataclass(frozen=True)
@@ -195,7 +197,14 @@ def _shorten(spur: Spur, keeper: _Keeper, config: RuleConfig) -> Cut | str:
         nodes_seen=len(nodes),
         nodes_kept=kept,
         reason=f"Spur cut on {keeper.why}: {where} past node {kept}, so that {kept} nodes and the basal bud stay.",
+        offset=past,
+        node_distance=nearest_node(cane, nodes[:kept], cane.at(arc)),
     )
+
+
+def nearest_node(cane: Cane, nodes: tuple[Node, ...], place: Array) -> float | None:
+    """Distance (m) of the nearest of a cane's nodes from a place (3, m, odom); None without any."""
+    return min((float(np.linalg.norm(cane.at(node.arc) - place)) for node in nodes), default=None)
 
 
 def cut_confidence(cane: Cane, arc: float, choice: float, config: RuleConfig) -> float:
@@ -235,4 +244,5 @@ def _renew(spur: Spur, keeper: _Keeper, shorten: Cut, config: RuleConfig) -> Cut
         nodes_seen=shorten.nodes_seen,
         nodes_kept=shorten.nodes_kept,
         reason=f"Renewal cut: takes the old stub off with {len(others)} other cane(s), just past the cane that stays.",
+        node_distance=nearest_node(keeper.cane, keeper.cane.nodes, position),
     )

@@ -5,7 +5,7 @@ from msgspec.structs import replace
 
 from perception.config import RuleConfig
 from perception.plant import Array, Cane, Spur
-from perception.rule import Cut, Decision, count_nodes, cut_arc, cut_confidence
+from perception.rule import Cut, Decision, count_nodes, cut_arc, cut_confidence, nearest_node
 
 #: What the rule never proposes: last year's cane cannot be followed to its head from the front.
 _OLD_CANE = "last year's cane is left for a person"
@@ -53,7 +53,7 @@ def _cut(cane: Cane, kept: int, kind: str, config: RuleConfig) -> Cut | str:
     if 2 * cane.radius > config.largest_diameter:
         return f"the cane is {2000 * cane.radius:.0f} mm thick, more than the shears may cut"
     nodes = count_nodes(cane, config)
-    past = 1000 * (arc - nodes[kept - 1].arc)
+    past = arc - nodes[kept - 1].arc
     lower = kind == "spur cut"
     becomes = "the lower of two canes, the next spur" if lower else "the upper of two canes, which will fruit"
     return Cut(
@@ -64,5 +64,7 @@ def _cut(cane: Cane, kept: int, kind: str, config: RuleConfig) -> Cut | str:
         confidence=cut_confidence(cane, arc, 1.0, rule),
         nodes_seen=len(nodes),
         nodes_kept=kept,
-        reason=f"Guyot, on {becomes}: {past:.0f} mm past node {kept}.",
+        reason=f"Guyot, on {becomes}: {1000 * past:.0f} mm past node {kept}.",
+        offset=past,
+        node_distance=nearest_node(cane, nodes[:kept], cane.at(arc)),
     )

@@ -1,19 +1,23 @@
 """Points over time: identities that last, averages that beat the noise, and withdrawal of what has gone."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
+from perception import uncertainty
 from perception.config import TrackerConfig
+from perception.cutting_force import cutting_force
 from perception.fragments import CANE, NODE
 from perception.frame import View
 from perception.numbering import SpurNumber
 from perception.plant import Array
-from perception.rule import Cut, CutKind
+from perception.rule import Cut
 from rolling_panda import messages as m
-from rolling_panda.messages import WOOD_CLASSES
+from rolling_panda.messages import WOOD_CLASSES, CutKind
+from rolling_panda.point_digest import point_digest
 
 _SPUR = WOOD_CLASSES.index("spur")
 #: How far from where it should be wood may be seen and still be the same (m).
@@ -63,13 +67,19 @@ class _Track:
     misses: int = 0
     gone: int = 0
     shown: m.PruningPoint | None = None
+    scatter: Array = field(default_factory=lambda: np.zeros((3, 3)))
+    turns: Array = field(default_factory=lambda: np.zeros((3, 3)))
+    """Scatter of single looks around the means: of places (m²) and of tangents."""
 
     def add(self, cut: Cut, memory: int) -> None:
         self.hits += 1
         self.misses = self.gone = 0
         share = 1.0 / min(self.hits, memory)
-        self.position = self.position + share * (cut.position - self.position)
-        tangent = self.tangent + share * (cut.tangent - self.tangent)
+        off, turn = cut.position - self.position, cut.tangent - self.tangent
+        self.scatter = (1.0 - share) * (self.scatter + share * np.outer(off, off))
+        self.turns = (1.0 - share) * (self.turns + share * np.outer(turn, turn))
+        self.position = self.position + share * off
+        tangent = self.tangent + share * turn
         self.tangent = tangent / np.linalg.norm(tangent)
         self.radius += share * (cut.radius - self.radius)
         self.cut = cut
@@ -119,25 +129,27 @@ class Tracker:
     def restart(self, proposals: list[Proposal]) -> None:
         """Show these, and what persons placed, instead of all else: the rule has changed, the vines have not.
 
-        What stays where it was keeps its name.
+        The cut of a spur keeps its name; where it changes, it has a new revision.
         """
         old = [track for track in self._tracks if track.cut.kind != "by hand"]
         self._tracks = [track for track in self._tracks if track.cut.kind == "by hand"]
         for proposal in proposals:
-            same = [
-                track
-                for track in old
-                if track.cut.kind == proposal.cut.kind
-                and float(np.linalg.norm(track.position - proposal.cut.position)) < self._config.moved
-            ]
-            if same:
-                track = same[0]
-                old.remove(track)
-                track.cut = proposal.cut
-                track.shown = self._message(track)
-                self._tracks.append(track)
-            else:
+            cut = proposal.cut
+            place = (proposal.number, cut.kind)
+            same = [track for track in old if track.shown is not None and (track.number, track.cut.kind) == place]
+            if not same:
                 self.add(proposal)
+                continue
+            track = min(same, key=lambda each: float(np.linalg.norm(each.position - cut.position)))
+            old.remove(track)
+            if float(np.linalg.norm(track.position - cut.position)) < self._config.moved:
+                # Where it was: what its looks have told stays.
+                track.cut = cut
+            else:
+                shown = track.shown
+                track = _Track(track.point_id, proposal.number, cut, cut.position, cut.tangent, cut.radius, shown=shown)
+            track.shown = self._message(track)
+            self._tracks.append(track)
 
     def points(self) -> tuple[m.PruningPoint, ...]:
         """The points shown, in the order in which they were first seen."""
@@ -214,22 +226,14 @@ class Tracker:
             track.shown = self._message(track)
 
     def _message(self, track: _Track) -> m.PruningPoint:
-        """The wire form; position and tangent change only together with the revision."""
+        """The wire form; what is cut and where changes only together with the revision."""
         old, cut = track.shown, track.cut
-        position, tangent, revision = _vector(track.position), _vector(track.tangent), 1
-        if old is not None:
-            moved = float(np.linalg.norm(track.position - np.array(old.position)))
-            turned = float(np.arccos(np.clip(track.tangent @ np.array(old.tangent), -1.0, 1.0)))
-            revision = old.revision
-            if moved > self._config.moved or turned > self._config.turned:
-                revision += 1
-            else:
-                position, tangent = old.position, old.tangent
-        return m.PruningPoint(
+        looks = min(track.hits, self._config.memory)
+        point = m.PruningPoint(
             point_id=track.point_id,
-            revision=revision,
-            position=position,
-            tangent=tangent,
+            revision=1,
+            position=_vector(track.position),
+            tangent=_vector(track.tangent),
             radius=float(track.radius),
             confidence=cut.confidence,
             nodes_seen=min(cut.nodes_seen, 100),
@@ -237,9 +241,36 @@ class Tracker:
             vine=track.number.vine,
             spur=track.number.spur,
             reason=cut.reason[:500],
+            kind=cut.kind,
+            position_covariance=_symmetric(uncertainty.of_place(track.scatter, looks)),
+            tangent_covariance=_symmetric(uncertainty.of_direction(track.turns, looks, track.tangent)),
+            offset=cut.offset,
+            force=cutting_force(float(track.radius)),
+            node_distance=cut.node_distance,
         )
+        if old is not None:
+            same = self._same_cut(old, point)
+            point = replace(
+                point,
+                revision=old.revision if same else old.revision + 1,
+                position=old.position if same else point.position,
+                tangent=old.tangent if same else point.tangent,
+            )
+        return replace(point, digest=point_digest(point))
+
+    def _same_cut(self, old: m.PruningPoint, new: m.PruningPoint) -> bool:
+        moved = float(np.linalg.norm(np.subtract(new.position, old.position)))
+        turned = float(np.arccos(np.clip(np.dot(new.tangent, old.tangent), -1.0, 1.0)))
+        counts = (new.kind, new.nodes_kept, new.vine, new.spur) == (old.kind, old.nodes_kept, old.vine, old.spur)
+        return counts and moved <= self._config.moved and turned <= self._config.turned
 
 
 def _vector(values: Array) -> tuple[float, float, float]:
     x, y, z = (float(value) for value in values)
     return x, y, z
+
+
+def _symmetric(matrix: Array) -> m.Covariance:
+    """The upper triangle of a symmetric 3×3, to four digits."""
+    a, b, c, d, e, f = (float(f"{value:.4g}") for value in matrix[np.triu_indices(3)])
+    return a, b, c, d, e, f

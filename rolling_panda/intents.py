@@ -4,7 +4,7 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from rolling_panda.messages import Count, Fraction, Name, Role, Text
+from rolling_panda.messages import Count, Digest, Fraction, Name, Role, Text
 
 
 class Intent(Struct, frozen=True, kw_only=True, tag=True, forbid_unknown_fields=True):
@@ -23,10 +23,11 @@ class Arm(Intent, frozen=True, kw_only=True):
 
 
 class AcceptPoint(Intent, frozen=True, kw_only=True):
-    """Put a proposed point on the queue; `revision` is the one the operator saw."""
+    """Put a proposed point on the queue; `revision` is the one the operator saw, `digest` its hash, if they say it."""
 
     point_id: Name
     revision: Count
+    digest: Digest = ""
 
 
 class RejectPoint(Intent, frozen=True, kw_only=True):

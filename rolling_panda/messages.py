@@ -5,7 +5,7 @@ on a number is part of its type, so decoding refuses NaN and infinity as well as
 Field names follow ROS where ROS has the message.
 """
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from msgspec import Meta, Struct
 
@@ -46,19 +46,11 @@ WoodClass = Literal[
     "background", "ground", "post", "trunk", "cordon", "spur", "cane", "node", "wire", "hose", "old cut"
 ]
 #: Index = value in a label image.
-WOOD_CLASSES: tuple[WoodClass, ...] = (
-    "background",
-    "ground",
-    "post",
-    "trunk",
-    "cordon",
-    "spur",
-    "cane",
-    "node",
-    "wire",
-    "hose",
-    "old cut",
-)
+WOOD_CLASSES: tuple[WoodClass, ...] = get_args(WoodClass)
+CutKind = Literal["spur cut", "renewal cut", "cane cut", "by hand"]
+Digest = Annotated[str, Meta(max_length=64, pattern=r"^[0-9a-f]*(?!\n)$")]
+#: Symmetric 3×3 (m² of positions): xx, xy, xz, yy, yz, zz.
+Covariance = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
 
 
 class Message(Struct, frozen=True, kw_only=True, tag=True, forbid_unknown_fields=True):
@@ -85,9 +77,6 @@ class PlanarPose(Struct, frozen=True, forbid_unknown_fields=True):
     x: Metre = 0.0
     y: Metre = 0.0
     phi: Angle = 0.0
-
-
-# --- commands --------------------------------------------------------------------------------------------------------
 
 
 class MotionCommand(Message, frozen=True, kw_only=True):
@@ -129,9 +118,6 @@ class StopRequest(Message, frozen=True, kw_only=True):
     source: Name
     user: Text
     reason: Text
-
-
-# --- state -----------------------------------------------------------------------------------------------------------
 
 
 class JointState(Message, frozen=True, kw_only=True):
@@ -203,7 +189,7 @@ class BridgeState(Message, frozen=True, kw_only=True):
 
 
 class QueueEntry(Struct, frozen=True, forbid_unknown_fields=True):
-    """One pruning point in the controller's queue: its life, and why it is where it is, in words."""
+    """A pruning point in the controller's queue: its life, why it is where it is, the `digest` that was accepted."""
 
     point_id: Name
     state: PointState
@@ -211,6 +197,7 @@ class QueueEntry(Struct, frozen=True, forbid_unknown_fields=True):
     user: Text = ""
     cut_id: Annotated[str, Meta(max_length=64)] = ""
     accepted_position: Vector3 | None = None
+    digest: Digest = ""
 
 
 class ControllerState(Message, frozen=True, kw_only=True):
@@ -271,9 +258,6 @@ class LogEvent(Message, frozen=True, kw_only=True):
     text: Text
 
 
-# --- perception ------------------------------------------------------------------------------------------------------
-
-
 class Intrinsics(Struct, frozen=True, forbid_unknown_fields=True):
     """Pinhole camera: image size (px), focal lengths and principal point (px)."""
 
@@ -316,7 +300,7 @@ class PruningPoint(Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         point_id: Stable while the point is tracked from frame to frame.
-        revision: Grows when position or tangent changes by more than the tracker's noise.
+        revision: Grows when what is cut changes: its kind, the nodes kept, or by more than noise its place or tangent.
         position: On the cane's axis, in odom (m).
         tangent: Unit vector along the cane, pointing away from the cordon, in odom.
         radius: Of the cane (m).
@@ -326,6 +310,14 @@ class PruningPoint(Struct, frozen=True, forbid_unknown_fields=True):
         vine: Number of the vine along the row, as perceived.
         spur: Number of the spur position on that vine, as perceived.
         reason: Why here, in one sentence a grower understands.
+        kind: Shortens the cane that stays, takes the old stub with its other canes off, tips the cane that will fruit
+            (Guyot), or is where a person wants it.
+        offset: Past the last kept node, along the cane (m); None where no kept node is below the cut.
+        force: Predicted cutting force (N).
+        wire_distance: To the surface of the nearest known wire (m); None while none is known.
+        cordon_distance: The same for cordons.
+        node_distance: To the nearest node that stays (m); None where none is known.
+        digest: Hash of what is cut and where, as `rolling_panda.point_digest` makes it; one for each revision.
     """
 
     point_id: Name
@@ -339,6 +331,25 @@ class PruningPoint(Struct, frozen=True, forbid_unknown_fields=True):
     vine: Annotated[int, Meta(ge=0, le=100000)]
     spur: Annotated[int, Meta(ge=0, le=100000)]
     reason: Text
+    kind: CutKind = "spur cut"
+    position_covariance: Covariance | None = None
+    tangent_covariance: Covariance | None = None
+    offset: Metre | None = None
+    force: NonNegative = 0.0
+    wire_distance: Finite | None = None
+    cordon_distance: Finite | None = None
+    node_distance: NonNegative | None = None
+    digest: Digest = ""
+
+
+class PruningRule(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Nodes kept on a spur, and on a Guyot vine's new cane; least diameter of a keeper (m); past the last node (m)."""
+
+    system: Literal["spur", "guyot"] = "spur"
+    nodes_kept: Annotated[int, Meta(ge=1, le=5)] = 2
+    fruiting_nodes: Annotated[int, Meta(ge=3, le=20)] = 8
+    keeper_diameter: Annotated[float, Meta(ge=0.003, le=0.015)] = 0.006
+    offset: Annotated[float, Meta(ge=0.005, le=0.05)] = 0.020
 
 
 class Abstention(Struct, frozen=True, forbid_unknown_fields=True):
@@ -360,6 +371,7 @@ class PruningPoints(Message, frozen=True, kw_only=True):
         points: All points.
         abstained: Places looked at without a point, over all frames.
         canes: Axis of each cane as perceived: polylines in odom (m).
+        rule: In force; None where nobody says.
     """
 
     header: Header
@@ -368,9 +380,7 @@ class PruningPoints(Message, frozen=True, kw_only=True):
     points: tuple[PruningPoint, ...]
     abstained: tuple[Abstention, ...] = ()
     canes: tuple[tuple[Vector3, ...], ...] = ()
-
-
-# --- services --------------------------------------------------------------------------------------------------------
+    rule: PruningRule | None = None
 
 
 class ReleaseStop(Message, frozen=True, kw_only=True):

@@ -6,7 +6,7 @@ from msgspec import Meta, Struct
 
 from rolling_panda import messages as m
 from rolling_panda.control_messages import ClientKey, ControlState, StopState
-from rolling_panda.plan_messages import Digest, PlanState, PointPlan
+from rolling_panda.plan_messages import PlanState, PointPlan
 
 Role = m.Role
 Age = Annotated[float, Meta(ge=0.0, le=1e9)]
@@ -83,7 +83,7 @@ class PagePlan(Struct, frozen=True, forbid_unknown_fields=True):
 
     state: PlanState
     reason: m.Text
-    plan_hash: Digest
+    plan_hash: m.Digest
     duration_s: m.NonNegative
 
 
@@ -96,6 +96,7 @@ class PagePoints(PageMessage, frozen=True, kw_only=True):
     frames: m.Count
     image_size: tuple[int, int]
     plan: PagePlan | None = None
+    rule: m.PruningRule | None = None
 
 
 class PageEvent(Struct, frozen=True, forbid_unknown_fields=True):

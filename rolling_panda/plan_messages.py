@@ -1,13 +1,24 @@
 """The session's plan on the wire: what will be done in which order, and what cannot be done and why."""
 
-from typing import Annotated, Literal
+from typing import Literal
 
-from msgspec import Meta, Struct
+from msgspec import Struct
 
-from rolling_panda.messages import Actuated, Count, Finite, Header, Message, Name, NonNegative, PlanarPose, Pose, Text
+from rolling_panda.messages import (
+    Actuated,
+    Count,
+    Digest,
+    Finite,
+    Header,
+    Message,
+    Name,
+    NonNegative,
+    PlanarPose,
+    Pose,
+    Text,
+)
 
 PlanState = Literal["none", "planning", "valid", "void"]
-Digest = Annotated[str, Meta(max_length=64, pattern=r"^[0-9a-f]*(?!\n)$")]
 
 
 class PointPlan(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

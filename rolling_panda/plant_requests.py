@@ -1,10 +1,10 @@
 """What an operator may ask of perception: another pruning rule, or a point where they put it."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from rolling_panda.messages import Count, Text, UnitVector3, Vector3
+from rolling_panda.messages import Count, PruningRule, Text, UnitVector3, Vector3
 
 
 class PlantRequest(Struct, frozen=True, kw_only=True, tag=True, forbid_unknown_fields=True):
@@ -14,21 +14,9 @@ class PlantRequest(Struct, frozen=True, kw_only=True, tag=True, forbid_unknown_f
 
 
 class SetRule(PlantRequest, frozen=True, kw_only=True):
-    """Prune by these numbers from now on; points of all that was seen change at once.
+    """Prune by these numbers from now on; points of all that was seen change at once."""
 
-    Attributes:
-        system: How the vines are trained.
-        nodes_kept: Count nodes that stay on a spur.
-        fruiting_nodes: Count nodes that stay on a Guyot vine's new cane.
-        keeper_diameter: The lowest cane at least this thick becomes the new spur (m).
-        offset: Cut so far past the last kept node (m).
-    """
-
-    system: Literal["spur", "guyot"] = "spur"
-    nodes_kept: Annotated[int, Meta(ge=1, le=5)] = 2
-    fruiting_nodes: Annotated[int, Meta(ge=3, le=20)] = 8
-    keeper_diameter: Annotated[float, Meta(ge=0.003, le=0.015)] = 0.006
-    offset: Annotated[float, Meta(ge=0.005, le=0.05)] = 0.020
+    rule: PruningRule = PruningRule()
 
 
 class AddPoint(PlantRequest, frozen=True, kw_only=True):

@@ -8,7 +8,15 @@ from typing import Any, Generic, Literal, TypeVar
 
 from msgspec import Struct
 
-from rolling_panda import control_messages, intents, plan_messages, plant_requests, row_messages, teleop_messages
+from rolling_panda import (
+    control_messages,
+    crop_messages,
+    intents,
+    plan_messages,
+    plant_requests,
+    row_messages,
+    teleop_messages,
+)
 from rolling_panda import messages as m
 
 Priority = Literal["REAL_TIME", "INTERACTIVE_HIGH", "DATA_LOW", "BACKGROUND"]
@@ -132,6 +140,10 @@ POINTS = Topic(
     "perception/points", m.PruningPoints, "perception", 2, "DATA_LOW", "DROP",
     "every pruning point held true now", latched=True,
 )
+CROPS = Topic(
+    "perception/crops", crop_messages.PointCrop, "perception", 2, "BACKGROUND", "DROP",
+    "a point's picture, at once when it is new, then one after the other", latched=True,
+)
 OBSTACLES = Topic(
     "perception/obstacles", row_messages.Obstacles, "perception", 1, "DATA_LOW", "DROP",
     "posts, trunks, cordons and wires seen so far", latched=True,
@@ -143,7 +155,7 @@ SCENERY = Topic(
 
 TOPICS: tuple[Topic[Any], ...] = (
     MOTION, CUT, STOP, TELEOP, JOINTS, ODOMETRY, BRIDGE, CONTROLLER, PLAN, HEARTBEAT, EVENT, CAMERA, POINTS,
-    OBSTACLES, SCENERY, PRESENCE, CONTROL, STOPS, HARDWARE_STOP,
+    CROPS, OBSTACLES, SCENERY, PRESENCE, CONTROL, STOPS, HARDWARE_STOP,
 )
 
 

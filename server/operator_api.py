@@ -59,7 +59,8 @@ def operator_router(desk: Desk) -> APIRouter:
     @router.post("/points/{point_id}/accept", tags=["points"])
     async def accept(session: Caller, point_id: PointId, request: body.AcceptPoint) -> Response:
         """Accept a point as it was seen: with the revision that `GET /api/points` showed."""
-        return await ask(session, intents.AcceptPoint(user=session.user, point_id=point_id, revision=request.revision))
+        accepted = request.model_dump()
+        return await ask(session, intents.AcceptPoint(user=session.user, point_id=point_id, **accepted))
 
     @router.post("/points/{point_id}/reject", tags=["points"])
     async def reject(session: Caller, point_id: PointId, request: body.RejectPoint) -> Response:

@@ -112,6 +112,7 @@ class PageView:
             frames=perceived.frames if perceived else 0,
             image_size=(camera.intrinsics.width, camera.intrinsics.height) if camera else (0, 0),
             plan=PagePlan(plan.state, plan.reason, plan.plan_hash, plan.duration_s) if plan else None,
+            rule=perceived.rule if perceived else None,
         )
 
 

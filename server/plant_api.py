@@ -1,11 +1,14 @@
 """REST for what an operator asks of perception: another pruning rule, and points by hand."""
 
-from fastapi import APIRouter, Response
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Response
 
 from rolling_panda import plant_requests as ask
+from rolling_panda.messages import PruningRule
 from server import requests as body
-from server.desk import Desk
-from server.operator_api import Caller, answer
+from server.desk import Desk, Result
+from server.operator_api import Caller, PointId, answer
 
 
 def plant_router(desk: Desk) -> APIRouter:
@@ -15,7 +18,8 @@ def plant_router(desk: Desk) -> APIRouter:
     @router.post("/rule")
     async def rule(session: Caller, request: body.Rule) -> Response:
         """Prune by these numbers from now on. Points of all that was seen change at once; accepted ones may go."""
-        return answer(await desk.ask_perception(session, ask.SetRule(user=session.user, **request.model_dump())))
+        wanted = ask.SetRule(user=session.user, rule=PruningRule(**request.model_dump()))
+        return answer(await desk.ask_perception(session, wanted))
 
     @router.post("/points/by-hand")
     async def by_hand(session: Caller, request: body.Ray) -> Response:
@@ -29,5 +33,13 @@ def plant_router(desk: Desk) -> APIRouter:
         return answer(
             await desk.ask_perception(session, ask.AddPointInImage(user=session.user, **request.model_dump()))
         )
+
+    @router.get("/points/{point_id}/crop", response_class=Response)
+    async def crop(session: Caller, point_id: PointId, revision: Annotated[int, Query(ge=0)] | None = None) -> Response:
+        """What the camera saw around a point, the cut in the middle, as JPEG; of one revision where that is said."""
+        found = desk.link.crops.get(point_id)
+        if found is None or revision not in (None, found.revision):
+            return answer(Result(404, False, "no picture of this point has come yet"))
+        return Response(found.jpeg, media_type="image/jpeg")
 
     return router

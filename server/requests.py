@@ -37,9 +37,10 @@ class SignIn(_Body):
 
 
 class AcceptPoint(_Body):
-    """The revision that the operator saw; an older one is refused."""
+    """The revision that the operator saw; an older one is refused. With the point's hash another content is too."""
 
     revision: Annotated[int, Field(ge=0, le=2**62)]
+    digest: Annotated[str, Field(max_length=64, pattern=r"^[0-9a-f]*$")] = ""
 
 
 class RejectPoint(_Body):

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 from rolling_panda import intents, topics
 from rolling_panda import messages as m
+from rolling_panda.crop_messages import PointCrop
 from rolling_panda.page_messages import ProcessPresence
 from rolling_panda.plant_requests import PlantRequest
 from rolling_panda.teleop_messages import TeleopTarget
@@ -20,6 +21,8 @@ from rolling_panda.transport import Transport
 
 _STOP_REPEATS = 5
 _STOP_SPACING_S = 0.025
+#: Pictures of points that are kept; of 8 kB each at most.
+_MOST_CROPS = 3000
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,9 @@ class RobotLink:
         self.points = transport.slot(topics.POINTS)
         self.plan = transport.slot(topics.PLAN)
         self.scenery = transport.slot(topics.SCENERY)
+        self.crops: dict[str, PointCrop] = {}
+        """The newest picture of each point, by its id."""
+        transport.subscribe(topics.CROPS, self._on_crop)
         self.events = transport.feed(topics.EVENT, 500)
         self._heard: dict[str, float] = {}
         transport.subscribe(topics.HEARTBEAT, self._on_heartbeat)
@@ -131,6 +137,13 @@ class RobotLink:
         """Stop waiting for answers."""
         self._callers.shutdown(wait=False, cancel_futures=True)
         self._writer.shutdown(wait=False, cancel_futures=True)
+
+    def _on_crop(self, message: PointCrop, at: float) -> None:
+        # Renewed at the end, so that points long gone are the first to be forgotten.
+        self.crops.pop(message.point_id, None)
+        self.crops[message.point_id] = message
+        if len(self.crops) > _MOST_CROPS:
+            del self.crops[next(iter(self.crops))]
 
     def _on_heartbeat(self, message: m.Heartbeat, at: float) -> None:
         self._heard[message.process] = at

@@ -7,10 +7,11 @@ from perception.config import PerceptionConfig
 from perception.loop import Loop
 from perception.worker import Worker
 from rolling_panda import messages as m
+from rolling_panda.crop_messages import PointCrop
 from rolling_panda.errors import MessageError
 from rolling_panda.plant_requests import SetRule
 from rolling_panda.row_messages import Capsule
-from rolling_panda.topics import EVENT, HEARTBEAT, OBSTACLES, PLANT, POINTS
+from rolling_panda.topics import CROPS, EVENT, HEARTBEAT, OBSTACLES, PLANT, POINTS
 from rolling_panda.transport import Slot
 
 pytestmark = pytest.mark.alone
@@ -29,7 +30,7 @@ class Wire:
 
     def __init__(self):
         self.frames = Slot()
-        self.out = {topic.name: Recorder() for topic in (POINTS, OBSTACLES, HEARTBEAT, EVENT)}
+        self.out = {topic.name: Recorder() for topic in (POINTS, CROPS, OBSTACLES, HEARTBEAT, EVENT)}
 
     def slot(self, topic):
         return self.frames
@@ -46,13 +47,14 @@ class Eyes:
     """Perception that does what its frames say."""
 
     withdrawn = ()
+    crops = ()
     obstacles = (Capsule("wire", (0.0, 0.75, 1.2), (2.0, 0.75, 1.2), 0.004, 0.004),)
 
     def __init__(self):
         self.release = threading.Event()
 
     def answer(self, request):
-        return m.Answer(ok=True, reason=f"kept {request.nodes_kept}")
+        return m.Answer(ok=True, reason=f"kept {request.rule.nodes_kept}")
 
     def points(self):
         return m.PruningPoints(header=m.Header(), segmenter="s", frames=7, points=())
@@ -177,7 +179,9 @@ def turns(loop, until, start=0.0):
 def test_a_request_is_answered_between_frames_and_its_points_are_sent_at_once(parts):
     wire, _, loop = parts
     said = []
-    asking = threading.Thread(target=lambda: said.append(wire.ask(SetRule(user="Ada", nodes_kept=3))))
+    asking = threading.Thread(
+        target=lambda: said.append(wire.ask(SetRule(user="Ada", rule=m.PruningRule(nodes_kept=3))))
+    )
     asking.start()
     turns(loop, lambda: wire.out[POINTS.name].sent)
     asking.join(5.0)
@@ -193,3 +197,22 @@ def test_a_request_that_waits_too_long_is_not_done_later(parts, monkeypatch):
     assert not wire.ask(SetRule(user="Ada")).ok
     turns(loop, lambda: wire.out[POINTS.name].sent)
     assert done == []
+
+
+def test_a_picture_is_sent_when_it_is_new_and_again_now_and_then(parts):
+    wire, eyes, loop = parts
+    sent = wire.out[CROPS.name].sent
+    eyes.crops = tuple(PointCrop(point_id=name, revision=1, sequence=1, jpeg=b"x") for name in ("p1", "p2"))
+    wire.frames.store("frame", 0.0)
+    turns(loop, lambda: len(sent) >= 2)
+    for tick in range(21):
+        loop.turn(tick / 20.0)
+    assert [crop.point_id for crop in sent[:2]] == ["p1", "p2"]
+    assert {crop.point_id for crop in sent[2:]} == {"p1", "p2"} and len(sent) <= 6
+    eyes.crops = (PointCrop(point_id="p2", revision=2, sequence=5, jpeg=b"y"),)
+    before = len(sent)
+    wire.frames.store("frame", 2.0)
+    turns(loop, lambda: len(sent) > before, start=1.05)
+    for tick in range(21):
+        loop.turn(2.0 + tick / 20.0)
+    assert {(crop.point_id, crop.revision) for crop in sent[before:]} == {("p2", 2)}

@@ -17,6 +17,7 @@ from rolling_panda import messages as m
 from rolling_panda.codec import StrictDecoder, encode
 from rolling_panda.errors import MessageError
 from rolling_panda.plant_requests import AddPoint, AddPointInImage, SetRule
+from rolling_panda.point_digest import point_digest
 from rolling_panda.robot_model import RobotModel, configuration
 
 
@@ -99,7 +100,7 @@ def shown(model, frames):
 
 def test_another_rule_changes_the_points_at_once_and_back_again(model, frames):
     seen, before = shown(model, frames)
-    answer = seen.answer(SetRule(user="Ada", nodes_kept=1))
+    answer = seen.answer(SetRule(user="Ada", rule=m.PruningRule(nodes_kept=1)))
     assert answer.ok and "points by the new rule" in answer.reason
     fewer = seen.points().points
     assert fewer and all(point.nodes_kept == 1 for point in fewer)
@@ -116,7 +117,7 @@ def test_another_rule_changes_the_points_at_once_and_back_again(model, frames):
 
 def test_frames_after_another_rule_follow_it(model, frames):
     seen, _ = shown(model, frames)
-    seen.answer(SetRule(user="Ada", nodes_kept=1))
+    seen.answer(SetRule(user="Ada", rule=m.PruningRule(nodes_kept=1)))
     for frame in frames:
         result = seen.process(frame)
     assert result.points and all(point.nodes_kept == 1 for point in result.points)
@@ -136,7 +137,7 @@ def test_a_click_into_the_picture_adds_a_point_that_stays(model, frames):
     beyond = np.array(before[0].position) + 0.02 * np.array(before[0].tangent)
     assert np.linalg.norm(np.array(added.position) - beyond) < 0.006
     assert added.reason.startswith("Placed by Ada") and added.radius == pytest.approx(before[0].radius, abs=0.001)
-    assert seen.answer(SetRule(user="Ada", nodes_kept=1)).ok
+    assert seen.answer(SetRule(user="Ada", rule=m.PruningRule(nodes_kept=1))).ok
     assert answer.reason in {point.point_id for point in seen.points().points}, "another rule does not take it away"
 
 
@@ -163,3 +164,46 @@ def test_canes_drawn_too_wide_are_measured_as_thick_as_they_are(model, frames):
     true = radius(view.labels, 0.0)
     assert radius(wide, 0.0) - true > 0.0004
     assert abs(radius(wide, 1.0) - true) < 0.0003
+
+
+def test_a_point_says_how_sure_it_is_and_what_is_near(model, frames):
+    seen, points = shown(model, frames)
+    for point in points:
+        rows = np.zeros((3, 3))
+        rows[np.triu_indices(3)] = point.position_covariance
+        covariance = rows + np.triu(rows, 1).T
+        assert 0.001 < np.sqrt(np.linalg.eigvalsh(covariance)).min() <= np.sqrt(np.trace(covariance)) < 0.01
+        assert 100.0 < point.force < 2000.0
+        assert point.node_distance > 0.005
+        assert point.digest == point_digest(point)
+        assert point.cordon_distance is None or point.cordon_distance > -0.02
+        if point.kind == "spur cut":
+            assert 0.01 < point.offset <= 0.021 and f"{1000 * point.offset:.0f} mm" in point.reason
+    assert any(point.cordon_distance is not None for point in points)
+    assert seen.points().rule == m.PruningRule()
+
+
+def test_every_point_has_a_picture_that_is_renewed_with_its_revision(model, frames):
+    seen, points = shown(model, frames)
+    crops = {crop.point_id: crop for crop in seen.crops}
+    assert crops.keys() == {point.point_id for point in points}
+    assert {crop.sequence for crop in crops.values()} <= {frame.sequence for frame in frames}
+    seen.answer(SetRule(user="Ada", rule=m.PruningRule(offset=0.03)))
+    now = {point.point_id: point for point in seen.points().points}
+    again = {crop.point_id: crop for crop in seen.crops}
+    moved = [name for name in crops if name in now and now[name].revision > crops[name].revision]
+    assert moved and all(again[name].revision == now[name].revision for name in moved)
+    assert all(again[name].jpeg != crops[name].jpeg for name in moved)
+
+
+def test_another_rule_keeps_the_names_of_the_spurs_cuts(model, frames):
+    seen, before = shown(model, frames)
+    seen.answer(SetRule(user="Ada", rule=m.PruningRule(offset=0.03)))
+    now = {(point.vine, point.spur, point.kind): point for point in seen.points().points}
+    assert seen.points().rule.offset == 0.03
+    kept = [(old, now[key]) for old in before if (key := (old.vine, old.spur, old.kind)) in now]
+    assert kept
+    for old, new in kept:
+        moved = np.linalg.norm(np.subtract(old.position, new.position))
+        assert new.point_id == old.point_id
+        assert (new.revision > old.revision) is bool(moved > PerceptionConfig().tracker.moved)

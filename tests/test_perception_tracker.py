@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -144,3 +146,26 @@ def test_a_cane_too_near_to_be_measured_keeps_its_point(distance):
     for _ in range(10):
         result = feed(tracker, near)
     assert len(result.points) == 1
+
+
+def test_one_revision_has_one_hash_and_another_count_of_nodes_is_another_revision():
+    tracker, rng, seen = Tracker(CONFIG), np.random.default_rng(0), set()
+    for _ in range(30):
+        x, y = rng.normal(0.0, 0.002, 2)
+        seen |= {(point.revision, point.digest) for point in feed(tracker, view(), proposal(x, y)).points}
+    assert len(seen) == 1
+    other = proposal()
+    other = replace(other, cut=replace(other.cut, nodes_kept=3))
+    (point,) = feed(tracker, view(), other).points
+    assert (point.revision, point.nodes_kept) == (2, 3) and (1, point.digest) not in seen
+
+
+def test_the_place_is_as_uncertain_as_the_looks_differ():
+    def spread(noise):
+        tracker, rng = Tracker(CONFIG), np.random.default_rng(0)
+        for _ in range(20):
+            x, y = rng.normal(0.0, noise, 2)
+            feed(tracker, view(), proposal(x, y))
+        return np.sqrt(tracker.points()[0].position_covariance[0])
+
+    assert 0.0015 <= spread(0.0) < spread(0.005) < 0.004

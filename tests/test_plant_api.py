@@ -5,6 +5,8 @@ from fake_wire import FakeWire
 from running_server import running_server
 
 from rolling_panda import messages as m
+from rolling_panda import topics
+from rolling_panda.crop_messages import PointCrop
 from rolling_panda.errors import ServiceError
 from rolling_panda.plant_requests import AddPoint, AddPointInImage, SetRule
 
@@ -31,7 +33,12 @@ def server(running):
         (
             "rule",
             {"system": "guyot", "nodes_kept": 1, "fruiting_nodes": 10, "keeper_diameter": 0.007, "offset": 0.015},
-            SetRule(user="ann", system="guyot", nodes_kept=1, fruiting_nodes=10, keeper_diameter=0.007, offset=0.015),
+            SetRule(
+                user="ann",
+                rule=m.PruningRule(
+                    system="guyot", nodes_kept=1, fruiting_nodes=10, keeper_diameter=0.007, offset=0.015
+                ),
+            ),
         ),
         (
             "points/by-hand",
@@ -86,3 +93,16 @@ def test_a_viewer_may_not_ask_and_a_refusal_or_silence_is_told(server):
 
         server.wire.answer = dead
         assert client.post("/api/rule", json={}).status_code == 503
+
+
+def test_the_picture_of_a_point_is_given_for_its_revision(server):
+    with server.client(role="viewer", user="bob") as client:
+        assert client.get("/api/points/p1/crop").status_code == 404
+        server.wire.deliver(topics.CROPS, PointCrop(point_id="p1", revision=3, sequence=7, jpeg=b"picture"))
+        answer = client.get("/api/points/p1/crop?revision=3")
+        assert (answer.content, answer.headers["content-type"]) == (b"picture", "image/jpeg")
+        assert client.get("/api/points/p1/crop?revision=4").status_code == 404
+        server.wire.deliver(topics.CROPS, PointCrop(point_id="p1", revision=4, sequence=9, jpeg=b"newer"))
+        assert client.get("/api/points/p1/crop").content == b"newer"
+    with server.visitor() as stranger:
+        assert stranger.get("/api/points/p1/crop").status_code == 401

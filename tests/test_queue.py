@@ -146,3 +146,13 @@ def test_accepted_points_follow_an_order_asked_for_and_the_others_keep_their_pla
     assert q.next().point.point_id == "a"
     q.arrange(())
     assert [e.point_id for e in q.entries()] == ["a", "b", "c", "d"] and q.entries()[2].reason == ""
+
+
+def test_another_content_than_was_seen_is_refused():
+    queue = PointQueue(ControllerConfig())
+    point = msgspec.structs.replace(POINT, digest="ab" * 16)
+    queue.update(m.PruningPoints(header=m.Header(), segmenter="s", frames=1, points=(point,)))
+    assert "not what was seen" in queue.accept(point.point_id, point.revision, "Ada", "cd" * 16)
+    assert queue.entries()[0].digest == ""
+    assert queue.accept(point.point_id, point.revision, "Ada", point.digest) == ""
+    assert queue.entries()[0].digest == point.digest

@@ -1,6 +1,14 @@
 """The table of what is on the wire is complete and consistent."""
 
-from rolling_panda import control_messages, intents, plan_messages, plant_requests, row_messages, teleop_messages
+from rolling_panda import (
+    control_messages,
+    crop_messages,
+    intents,
+    plan_messages,
+    plant_requests,
+    row_messages,
+    teleop_messages,
+)
 from rolling_panda import messages as m
 from rolling_panda import topics as t
 from rolling_panda.plant_requests import PlantRequest
@@ -15,7 +23,16 @@ def test_names_are_unique_and_keys_carry_robot_and_version() -> None:
 def test_every_message_is_on_the_wire_once() -> None:
     carried = [topic.message for topic in t.TOPICS] + [r for s in t.SERVICES for r in s.requests] + [m.Answer]
     assert len(carried) == len(set(carried))
-    modules = (m, control_messages, plan_messages, row_messages, teleop_messages, intents, plant_requests)
+    modules = (
+        m,
+        control_messages,
+        crop_messages,
+        plan_messages,
+        row_messages,
+        teleop_messages,
+        intents,
+        plant_requests,
+    )
     defined = [value for module in modules for value in vars(module).values()]
     known = {
         kind

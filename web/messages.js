@@ -51,6 +51,10 @@ export const TEXT_MAX_LENGTH = 500;
 
 /** @typedef {"background"|"ground"|"post"|"trunk"|"cordon"|"spur"|"cane"|"node"|"wire"|"hose"|"old cut"} WoodClass */
 
+/** @typedef {"spur cut"|"renewal cut"|"cane cut"|"by hand"} CutKind */
+
+/** @typedef {[number, number, number, number, number, number]} Covariance */
+
 /** @typedef {"none"|"planning"|"valid"|"void"} PlanState */
 
 /** @typedef {[number, number, number, number, number, number, number]} ArmVelocities */
@@ -81,7 +85,7 @@ export const TEXT_MAX_LENGTH = 500;
  */
 
 /**
- * One pruning point in the controller's queue: its life, and why it is where it is, in words.
+ * A pruning point in the controller's queue: its life, why it is where it is, the `digest` that was accepted.
  *
  * @typedef {object} QueueEntry
  * @property {string} point_id
@@ -90,6 +94,7 @@ export const TEXT_MAX_LENGTH = 500;
  * @property {string} user
  * @property {string} cut_id
  * @property {Vector3|null} accepted_position
+ * @property {string} digest
  */
 
 /**
@@ -231,7 +236,7 @@ export const TEXT_MAX_LENGTH = 500;
  *
  * @typedef {object} PruningPoint
  * @property {string} point_id Stable while the point is tracked from frame to frame.
- * @property {number} revision Grows when position or tangent changes by more than the tracker's noise.
+ * @property {number} revision Grows when what is cut changes: its kind, the nodes kept, or by more than noise its place or tangent.
  * @property {Vector3} position On the cane's axis, in odom (m).
  * @property {UnitVector3} tangent Unit vector along the cane, pointing away from the cordon, in odom.
  * @property {number} radius Of the cane (m).
@@ -241,6 +246,15 @@ export const TEXT_MAX_LENGTH = 500;
  * @property {number} vine Number of the vine along the row, as perceived.
  * @property {number} spur Number of the spur position on that vine, as perceived.
  * @property {string} reason Why here, in one sentence a grower understands.
+ * @property {CutKind} kind Shortens the cane that stays, takes the old stub with its other canes off, tips the cane that will fruit (Guyot), or is where a person wants it.
+ * @property {Covariance|null} position_covariance
+ * @property {Covariance|null} tangent_covariance
+ * @property {number|null} offset Past the last kept node, along the cane (m); None where no kept node is below the cut.
+ * @property {number} force Predicted cutting force (N).
+ * @property {number|null} wire_distance To the surface of the nearest known wire (m); None while none is known.
+ * @property {number|null} cordon_distance The same for cordons.
+ * @property {number|null} node_distance To the nearest node that stays (m); None where none is known.
+ * @property {string} digest Hash of what is cut and where, as `rolling_panda.point_digest` makes it; one for each revision.
  */
 
 /**
@@ -293,6 +307,17 @@ export const TEXT_MAX_LENGTH = 500;
  */
 
 /**
+ * Nodes kept on a spur, and on a Guyot vine's new cane; least diameter of a keeper (m); past the last node (m).
+ *
+ * @typedef {object} PruningRule
+ * @property {"spur"|"guyot"} system
+ * @property {number} nodes_kept
+ * @property {number} fruiting_nodes
+ * @property {number} keeper_diameter
+ * @property {number} offset
+ */
+
+/**
  * Sent when it changed: every point in the order of work, and the places where perception abstained.
  *
  * @typedef {object} PagePoints
@@ -303,6 +328,7 @@ export const TEXT_MAX_LENGTH = 500;
  * @property {number} frames
  * @property {[number, number]} image_size
  * @property {PagePlan|null} plan
+ * @property {PruningRule|null} rule
  */
 
 /**
