@@ -79,7 +79,7 @@ class BridgeCore:
         """
         self.robot = robot
         self.refusals = Refusals(rejections)
-        self._kind = kind
+        self.kind = kind
         self._odometer = odometer
         self._scenery = scenery
         self._scenery_ticks = round(config.scenery_s / TICK_S)
@@ -240,7 +240,7 @@ class BridgeCore:
         self._round_trip.forget(self._clock)
         return m.BridgeState(
             header=m.Header(now),
-            kind=self._kind,
+            kind=self.kind,
             epoch=self._gate.epoch,
             watchdog=self._was_tripped,
             stop_id=self._latch.stop_id,

@@ -1,13 +1,10 @@
-"""The bridge on the wire: take the newest commands, step in real time, publish what is due.
-
-A simulated robot stands still while nobody steps it. So its own time, which the watchdog and all ages run on, is the
-number of steps done: a machine that is suspended for a moment, or too slow, loses time and no more.
-"""
+"""The bridge on the wire: take the newest commands, step in real time, publish what is due."""
 
 import threading
 import time
 
 from bridge.core import TICK_S, BridgeCore, BridgeOutputs
+from bridge.robot_time import RealTime, RobotTime, SteppedTime
 from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.transport import Transport
@@ -15,9 +12,6 @@ from rolling_panda.transport import Transport
 # Waking twice as often as joint states go out costs a fifth of waking every millisecond, and delays a command by 2.5 ms
 # on average at the usual rate.
 _WAKES = 2
-# A bridge that has fallen behind by more than this lets time run slower instead of hurrying.
-_CATCH_UP_S = 0.1
-_BURST = 20
 
 
 class BridgeLoop:
@@ -28,7 +22,8 @@ class BridgeLoop:
         self._core = core
         self._lock = threading.Lock()
         self._wake_s = max(TICK_S, core.joints_s / _WAKES)
-        self._start, self._ticks = time.monotonic(), 0
+        clock = time.monotonic()
+        self._time: RobotTime = RealTime(clock, TICK_S) if core.kind == "real" else SteppedTime(clock, TICK_S)
         transport.on_reject = core.refusals.log
         self._motion = transport.slot(topics.MOTION)
         self._cuts = transport.feed(topics.CUT, 32)
@@ -43,31 +38,21 @@ class BridgeLoop:
 
     def run(self, stopping: threading.Event) -> None:
         """Step in real time until `stopping` is set."""
-        begin = time.monotonic()
         while not stopping.wait(self._wake_s):
-            clock = time.monotonic()
-            due = int((clock - begin) / TICK_S) - self._ticks
-            if due * TICK_S > _CATCH_UP_S:
-                begin += (due - _BURST) * TICK_S
-            for outputs in self._advance(min(due, _BURST), clock):
+            for outputs in self._advance(time.monotonic()):
                 self._publish(outputs)
 
-    @property
-    def _now(self) -> float:
-        """The robot's own time (s)."""
-        return self._start + self._ticks * TICK_S
-
-    def _advance(self, due: int, clock: float) -> list[BridgeOutputs]:
+    def _advance(self, clock: float) -> list[BridgeOutputs]:
         outputs = []
         with self._lock:
+            due = self._time.due(clock)
             motion = self._motion.take()
             if motion is not None:
-                self._core.on_motion(motion.message, self._now, motion.at)
+                self._core.on_motion(motion.message, self._time.now, motion.at)
             for cut in self._cuts.drain():
-                self._core.on_cut(cut.message, self._now)
+                self._core.on_cut(cut.message, self._time.now)
             for _ in range(due):
-                self._ticks += 1
-                outputs.append(self._core.step(self._now, clock))
+                outputs.append(self._core.step(self._time.tick(), clock))
         return outputs
 
     def _publish(self, outputs: BridgeOutputs) -> None:
@@ -86,8 +71,8 @@ class BridgeLoop:
 
     def _stop(self, request: m.StopRequest, at: float) -> None:
         with self._lock:
-            self._core.on_stop(request, self._now)
+            self._core.on_stop(request, self._time.now)
 
     def _release(self, request: m.ReleaseStop) -> m.Answer:
         with self._lock:
-            return self._core.on_release(request, self._now)
+            return self._core.on_release(request, self._time.now)
