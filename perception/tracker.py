@@ -1,7 +1,6 @@
 """Points over time: identities that last, averages that beat the noise, and withdrawal of what has gone."""
 
 from dataclasses import dataclass, field
-from typing import Literal
 
 import numpy as np
 from msgspec.structs import replace
@@ -10,26 +9,17 @@ from numpy.typing import NDArray
 from perception import uncertainty
 from perception.config import TrackerConfig
 from perception.cutting_force import cutting_force
-from perception.fragments import CANE, NODE
 from perception.frame import View
+from perception.glance import glance
 from perception.numbering import SpurNumber
 from perception.plant import Array
 from perception.rule import Cut
 from rolling_panda import messages as m
-from rolling_panda.messages import WOOD_CLASSES, CutKind
+from rolling_panda.messages import CutKind
 from rolling_panda.point_digest import point_digest
 
-_SPUR = WOOD_CLASSES.index("spur")
-#: How far from where it should be wood may be seen and still be the same (m).
-_SAME_DEPTH = 0.025
-#: A depth camera is blind nearer than this (0.18 m for the D435i), with room for a point off its place (m).
-_NEAREST = 0.25
-#: How far to the side of where it should be it is looked for (m): odometry and a close view are off by millimetres.
-_AROUND = 0.008
 #: Frames without support after which a point never shown is forgotten, and a contradicted one withdrawn.
 _PATIENCE = 5
-
-Look = Literal["standing", "gone", "unseen"]
 
 
 @dataclass(frozen=True)
@@ -186,7 +176,8 @@ class Tracker:
         self, track: _Track, view: View, labels: NDArray[np.uint8], contradicted: set[tuple[SpurNumber, CutKind]]
     ) -> str | None:
         """Why a point that this frame did not propose is withdrawn; None to keep it, empty to drop it in silence."""
-        look = self._look(track, view, labels)
+        # Whether the wood just beyond the cut is still there.
+        look = glance(view, labels, track.position + self._config.probe * track.tangent)
         if look == "unseen":
             return None
         track.gone = track.gone + 1 if look == "gone" else 0
@@ -197,24 +188,6 @@ class Tracker:
             if track.misses >= _PATIENCE:
                 return "withdrawn: closer looks put the cut elsewhere on this spur" if track.shown is not None else ""
         return None
-
-    def _look(self, track: _Track, view: View, labels: NDArray[np.uint8]) -> Look:
-        """Whether the wood just beyond the cut is still there, as far as this frame can tell."""
-        u, v, z = view.pixels(track.position + self._config.probe * track.tangent)[0]
-        height, width = view.depth.shape
-        reach = max(2, round(view.intrinsics.fx * _AROUND / max(z, 0.1)))
-        if z < _NEAREST or not (reach <= u < width - reach - 1 and reach <= v < height - reach - 1):
-            return "unseen"
-        row, col = round(v), round(u)
-        window = slice(row - reach, row + reach + 1), slice(col - reach, col + reach + 1)
-        depth, kind = view.depth[window], labels[window]
-        wood = (kind == CANE) | (kind == NODE) | (kind == _SPUR)
-        if (wood & (np.abs(depth - z) < _SAME_DEPTH)).any():
-            return "standing"
-        # Nearer things hide the place, and wood without depth is too near to place.
-        if (wood & (depth == 0.0)).any() or ((depth > 0.0) & (depth < z - _SAME_DEPTH)).any():
-            return "unseen"
-        return "gone"
 
     def _show(self, supported: list[_Track]) -> None:
         taken = {(track.number, track.cut.kind) for track in self._tracks if track.shown is not None}

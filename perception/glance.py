@@ -1,0 +1,46 @@
+"""Whether wood stands at a known place, as far as one frame can tell."""
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perception.fragments import CANE, NODE
+from perception.frame import View
+from perception.plant import Array
+from rolling_panda.messages import WOOD_CLASSES
+
+_SPUR = WOOD_CLASSES.index("spur")
+#: How far from where it should be wood may be seen and still be the same (m).
+_SAME_DEPTH = 0.025
+#: A depth camera is blind nearer than this (0.18 m for the D435i), with room for a point off its place (m).
+_NEAREST = 0.25
+#: How far to the side of where it should be it is looked for (m): odometry and a close view are off by millimetres.
+_AROUND = 0.008
+
+Glance = Literal["standing", "gone", "unseen"]
+
+
+def glance(view: View, labels: NDArray[np.uint8], place: Array) -> Glance:
+    """Look for spur, cane or node at a place.
+
+    Args:
+        view: The frame.
+        labels: Its classes, H×W.
+        place: On the wood's axis (3, m, odom).
+    """
+    u, v, z = view.pixels(place)[0]
+    height, width = view.depth.shape
+    reach = max(2, round(view.intrinsics.fx * _AROUND / max(z, 0.1)))
+    if z < _NEAREST or not (reach <= u < width - reach - 1 and reach <= v < height - reach - 1):
+        return "unseen"
+    row, col = round(v), round(u)
+    window = slice(row - reach, row + reach + 1), slice(col - reach, col + reach + 1)
+    depth, kind = view.depth[window], labels[window]
+    wood = (kind == CANE) | (kind == NODE) | (kind == _SPUR)
+    if (wood & (np.abs(depth - z) < _SAME_DEPTH)).any():
+        return "standing"
+    # Nearer things hide the place, and wood without depth is too near to place.
+    if (wood & (depth == 0.0)).any() or ((depth > 0.0) & (depth < z - _SAME_DEPTH)).any():
+        return "unseen"
+    return "gone"
