@@ -18,6 +18,7 @@ from controller.config import ControllerConfig
 from controller.core import Controller
 from controller.estimate import BaseEstimate
 from controller.interface import Inputs, Outputs, Sample
+from controller.journal import LedgerState
 from controller.motion import Tracking
 from controller.planning.cuts import CutPlanner
 from controller.work_plan import WorkPlan
@@ -93,7 +94,7 @@ class ClosedLoop:
             tracking = self.controller.tracking
             if self._watch is not None and tracking is not None and tracking.desired is not None:
                 self._watch(self, tracking)
-            self.inputs = replace(self.inputs, stops=())
+            self.inputs = replace(self.inputs, stops=(), ledger=LedgerState(self.controller.recorded))
 
     def run(self, seconds: float) -> None:
         """Advance by simulated seconds."""

@@ -7,6 +7,7 @@ import numpy as np
 
 from controller.core import Controller
 from controller.interface import Inputs, Outputs, Sample
+from controller.journal import LedgerState
 from rolling_panda import intents
 from rolling_panda import messages as m
 from rolling_panda.differential_drive import NXI, Array
@@ -56,6 +57,7 @@ class KinematicRobot:
     state: m.ControllerState | None = None
     now: float = 0.0
     stop_id: str = ""
+    ledger: LedgerState = LedgerState()
 
     def __post_init__(self) -> None:
         """Place the robot at the origin."""
@@ -100,6 +102,7 @@ class KinematicRobot:
             perception_seen=seen,
             present=present,
             stops=stops,
+            ledger=self.ledger,
         )
 
     def _renewed(self, teleop: TeleopTarget) -> TeleopTarget:
@@ -129,6 +132,8 @@ class KinematicRobot:
             self.stop_id = ""
         if out.state is not None:
             self.state = out.state
+        if out.records and not self.ledger.failure:
+            self.ledger = LedgerState(out.records[-1].number)
         self.events += [event.text for event in out.events]
         self.record.append(command)
         self._integrate(command)

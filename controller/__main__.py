@@ -7,6 +7,9 @@ from collections.abc import Sequence
 
 from controller.config import ControllerConfig
 from controller.core import Controller
+from controller.ledger import Ledger
+from controller.ledger_start import restored, start_record
+from controller.ledger_writer import LedgerWriter
 from controller.loop import Loop
 from controller.plan_worker import PlanWorker
 from rolling_panda.config import RobotConfig, load_section
@@ -21,9 +24,14 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run(context: ProcessContext) -> None:
     config = load_section(context.config_path, "controller", ControllerConfig)
     robot_config = load_section(context.config_path, "robot", RobotConfig)
-    controller = Controller(config, robot_config, run_id=uuid.uuid4().hex[:12])
+    run_id = uuid.uuid4().hex[:12]
+    controller = Controller(config, robot_config, run_id)
+    folder = context.state_folder
+    controller.restore(restored(folder))
+    ledger = LedgerWriter(lambda: Ledger(folder))
+    ledger.write([start_record(context.config_path, run_id)])
     planner = PlanWorker(config, robot_config)
-    loop = Loop(controller, context.transport, config.rate_hz, planner)
+    loop = Loop(controller, context.transport, config.rate_hz, ledger, planner)
     # What lives now lives until the end: the collector need not look at it in the middle of a control period.
     gc.collect()
     gc.freeze()
@@ -31,6 +39,7 @@ def _run(context: ProcessContext) -> None:
         loop.run(context.stopping)
     finally:
         planner.close()
+        ledger.close()
 
 
 if __name__ == "__main__":

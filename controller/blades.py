@@ -23,6 +23,7 @@ class _Cut:
     point_id: str
     cut_id: str
     deadline: float
+    record: int
     asked_at: float = -math.inf
 
 
@@ -41,15 +42,15 @@ class Blades:
         return self._cut is not None
 
     def begin(self, point_id: str, now: float) -> None:
-        """Intend a cut at a point; the queue holds the intent before any command is sent."""
+        """Intend a cut at a point; no command is sent before that intent is durable."""
         self._cuts += 1
-        self._cut = _Cut(point_id, f"{self._run_id}-{self._cuts}", now + self._timeout_s)
-        self._queue.intend(point_id, self._cut.cut_id)
+        cut_id = f"{self._run_id}-{self._cuts}"
+        self._cut = _Cut(point_id, cut_id, now + self._timeout_s, self._queue.intend(point_id, cut_id))
 
     def command(self, now: float) -> tuple[str, str] | None:
-        """(cut_id, point_id) to command in this period; None between repetitions."""
+        """(cut_id, point_id) to command in this period; None between repetitions and before the intent is durable."""
         cut = self._cut
-        if cut is None or now - cut.asked_at < _REPEAT_S:
+        if cut is None or now - cut.asked_at < _REPEAT_S or not self._queue.recorded(cut.record):
             return None
         cut.asked_at = now
         return cut.cut_id, cut.point_id
@@ -64,6 +65,11 @@ class Blades:
             text = _OUTCOMES[bridge.outcome]
             self._queue.resolve(cut.point_id, bridge.outcome, text)
             return (f"{cut.point_id}: {text}",)
+        if now > cut.deadline and cut.asked_at == -math.inf:
+            self._cut = None
+            text = f"no order was given within {self._timeout_s} s"
+            self._queue.resolve(cut.point_id, "FAILED_NOT_CUT", text)
+            return (f"{cut.point_id}: not cut: {text}",)
         if now > cut.deadline:
             self._cut = None
             text = f"no word from the cutter for {self._timeout_s} s; look whether it is cut"

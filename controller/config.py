@@ -69,6 +69,7 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         server_max_age_s: Older server heartbeats stop automatic work (s).
         hold_link_max_age_s: Older server heartbeats end teleoperation (s).
         perception_max_age_s: Older perception heartbeats stop automatic work (s).
+        ledger_max_age_s: Work whose record is not durable after this long is a fault (s).
         hold_max_age_s: Teleoperation ends after this silence (s).
         teleop_speed: Limit of the tool in teleoperation (m/s).
         teleop_turn: The same for turning (rad/s).
@@ -129,6 +130,7 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
     server_max_age_s: Positive = 1.0
     hold_link_max_age_s: Positive = 0.3
     perception_max_age_s: Positive = 1.0
+    ledger_max_age_s: Positive = 0.6
     hold_max_age_s: Positive = 0.15
     teleop_speed: Positive = 0.25
     teleop_turn: Positive = 0.6

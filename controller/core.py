@@ -1,6 +1,7 @@
 """The controller without wires: newest inputs and intents in, commands and state out. No clock, no thread."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from controller.cut_sequence import CutSequence
 from controller.estimate import BaseEstimate, wheels_ahead
 from controller.homing import Homing
 from controller.interface import Inputs, Outputs
+from controller.journal import Journal, RequestRow, TicketRow
 from controller.modes import Event
 from controller.motion import Follower, Measured, Tracking
 from controller.operator import Operator
@@ -70,7 +72,8 @@ class Controller:
         base = method or make_method(self._robot, config, base_dt, self._surroundings.model)
         self._method = TwoRates(arm, base, config.base_every)
         self._follower = Follower(config, self._method, self._dt)
-        self._queue = PointQueue(config)
+        self._journal = Journal()
+        self._queue = PointQueue(config, self._journal)
         self._clearance = CutClearance(RobotModel(robot_config), config)
         search = PostureSearch(RobotModel(robot_config), config, self._clearance.admits)
         self._session = Session(self._queue)
@@ -98,6 +101,15 @@ class Controller:
     def mode(self) -> m.Mode:
         """Mode of the supervision machine."""
         return self._state.mode
+
+    @property
+    def recorded(self) -> int:
+        """Number of the newest record: what was done is durable when the ledger has that one."""
+        return self._journal.number
+
+    def restore(self, rows: Iterable[TicketRow]) -> None:
+        """Take up the queue of an earlier start; nothing of it resumes by itself."""
+        self._queue.restore(rows)
 
     @property
     def tracking(self) -> Tracking | None:
@@ -128,7 +140,7 @@ class Controller:
             request = self._review(now)
             plan, state = self._session.message(now), self._report(now)
         events, self._events = tuple(self._events), []
-        return Outputs(motion, cut, release, state, events, plan, request)
+        return Outputs(motion, cut, release, state, events, plan, request, self._journal.take())
 
     def answer(self, intent: intents.Intent, now: float) -> m.Answer:
         """Do what an operator asks, or say why not.
@@ -142,6 +154,9 @@ class Controller:
         if not refused:
             refused = self._do(intent, now)
         what = type(intent).__name__
+        if isinstance(intent, intents.AnyIntent):
+            row = RequestRow(asked=intent, ok=not refused, reason=refused[:500], mode=self._state.mode)
+            self._journal.add("request", intent.user, row)
         if refused:
             self._say("warning", f"{intent.user}: {what} refused: {refused}")
             return m.Answer(ok=False, reason=refused[:500])
@@ -157,7 +172,10 @@ class Controller:
         bridge = inputs.bridge.message if inputs.bridge is not None else None
         if bridge is not None and self._epoch is None:
             self._epoch = bridge.epoch + 1
-        self._health = safety.health(inputs, self._epoch, now)
+        self._journal.observe(inputs.ledger, now)
+        self._journal.stops(inputs.stops)
+        trouble = self._journal.trouble(now, self._config.ledger_max_age_s)
+        self._health = safety.health(inputs, self._epoch, now, trouble)
         if inputs.joints is not None and inputs.odometry is not None:
             q = self._base.configuration(inputs.joints.message, inputs.odometry.message)
             # What the arm is told now it does after its own lag; that is when it has to fit the base's velocity.
@@ -223,7 +241,11 @@ class Controller:
         """Why a PROTECTIVE_STOP or FAULT could not be left now; empty when its cause is gone."""
         if self._health.overruled:
             return "another controller commands this robot"
-        return safety.sensors(self._health, self._config) or ("watchdog" if self._health.watchdog else "")
+        return (
+            self._health.ledger
+            or safety.sensors(self._health, self._config)
+            or ("watchdog" if self._health.watchdog else "")
+        )
 
     def _event(self, event: Event, now: float, reason: str, by: modes.Rights = modes.SYSTEM) -> str:
         """Put an event to the machine; what it changes is logged. Returns the refusal."""
@@ -368,6 +390,6 @@ class Controller:
         )
 
     def _say(self, severity: m.Severity, text: str) -> None:
-        self._events.append(
-            m.LogEvent(header=m.Header(self._now), process="controller", severity=severity, text=text[:500])
-        )
+        event = m.LogEvent(header=m.Header(self._now), process="controller", severity=severity, text=text[:500])
+        self._events.append(event)
+        self._journal.add("event", "controller", event)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+from controller.journal import LedgerState, Record
 from controller.work_plan import PlanRequest, WorkPlan
 from rolling_panda import messages as m
 from rolling_panda.plan_messages import SessionPlan
@@ -36,6 +37,7 @@ class Inputs:
         present: Processes connected now.
         stops: Stop requests that came in since the last step.
         plan: Newest answer of the planner.
+        ledger: How much of what was recorded is durable.
         tick_s: Median time of one control step, measured by the loop (s).
         ticks: Control periods, counted by the loop.
         late_ticks: Those of them that lasted more than half as long again as they should.
@@ -52,6 +54,7 @@ class Inputs:
     present: frozenset[str] = frozenset()
     stops: tuple[m.StopRequest, ...] = ()
     plan: WorkPlan | None = None
+    ledger: LedgerState = LedgerState()
     tick_s: float = 0.0
     ticks: int = 0
     late_ticks: int = 0
@@ -59,7 +62,10 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Outputs:
-    """What to send after one step; None or empty where nothing is due. `request` goes to the planner."""
+    """What to send after one step; None or empty where nothing is due.
+
+    `request` goes to the planner, `records` to the ledger.
+    """
 
     motion: m.MotionCommand | None = None
     cut: m.CutCommand | None = None
@@ -68,3 +74,4 @@ class Outputs:
     events: tuple[m.LogEvent, ...] = ()
     plan: SessionPlan | None = None
     request: PlanRequest | None = None
+    records: tuple[Record, ...] = ()

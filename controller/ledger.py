@@ -75,6 +75,9 @@ class Ledger:
                 self._prepare()
                 sync_folder(folder)
             self._check_end()
+            number, hashed = self._newest()
+            if number == 0:
+                self._point_head_at(number, hashed)
         except LedgerError:
             self._database.close()
             raise
@@ -100,9 +103,7 @@ class Ledger:
                 with contextlib.suppress(sqlite3.Error):
                     self._database.execute("ROLLBACK")
                 raise
-        # Not flushed: after a power cut it may name an older row, which is in the chain all the same.
-        with contextlib.suppress(OSError):
-            self._head.write_text(f"{number} {previous.hex()}\n", encoding="ascii")
+        self._point_head_at(number, previous)
         return number
 
     def newest(self, kind: str) -> Iterator[tuple[str, str]]:
@@ -131,6 +132,16 @@ class Ledger:
     ) -> None:
         """Close."""
         self.close()
+
+    def _point_head_at(self, number: int, hashed: bytes) -> None:
+        # One write of one length, so that a process that is killed leaves the old head or the new one. Not flushed:
+        # after a power cut it may name an older row, which is in the chain all the same.
+        with contextlib.suppress(OSError):
+            descriptor = os.open(self._head, os.O_WRONLY | os.O_CREAT, 0o600)
+            try:
+                os.pwrite(descriptor, f"{number:020} {hashed.hex()}\n".encode("ascii"), 0)
+            finally:
+                os.close(descriptor)
 
     def _prepare(self) -> None:
         self._database.execute("PRAGMA journal_mode = WAL")
@@ -178,13 +189,15 @@ def head_problem(database: sqlite3.Connection, head: Path) -> str:
     """Why the row that the head names is not in the ledger; empty when it is, or nothing was ever written."""
     try:
         number, hashed = head.read_text(encoding="ascii").split()
+        if int(number) == 0:
+            return "" if bytes.fromhex(hashed) == ORIGIN else f"{head.name} is not as it was written"
         found = database.execute("SELECT hash FROM audit WHERE number = ?", (int(number),)).fetchone()
         same = found is not None and bytes(found[0]) == bytes.fromhex(hashed)
     except FileNotFoundError:
         return "" if database.execute("SELECT 1 FROM audit").fetchone() is None else f"{head.name} is missing"
     except (OSError, ValueError, TypeError, OverflowError) as error:
         return f"{head.name} cannot be read: {error}"
-    return "" if same else f"row {number}, which {head.name} names as the newest, is not in it"
+    return "" if same else f"row {int(number)}, which {head.name} names as the newest, is not in it"
 
 
 @contextlib.contextmanager

@@ -5,14 +5,14 @@ import statistics
 import threading
 import time
 from collections import deque
-from concurrent.futures import Future
-from concurrent.futures import TimeoutError as FutureTimeoutError
 from typing import Generic
 
+from controller.acknowledged import Acknowledged
 from controller.core import Controller
+from controller.intent_desk import IntentDesk
 from controller.interface import Inputs, Outputs, Sample
+from controller.ledger_writer import LedgerWriter
 from controller.plan_worker import PlanWorker
-from rolling_panda import intents
 from rolling_panda import messages as m
 from rolling_panda.errors import ServiceError
 from rolling_panda.loop_clock import LoopClock
@@ -42,8 +42,6 @@ _LONGEST_TURN = 5
 _TIMED = 200
 #: A period that lasts this many times as long as it should is late.
 _LATE = 1.5
-#: How long an operator's question waits for the loop (s); less than the service's timeout.
-_ANSWER_S = 0.8
 
 
 class _Newest(Generic[Msg]):
@@ -65,7 +63,12 @@ class Loop:
     """Ties one `Controller` to the wire."""
 
     def __init__(
-        self, controller: Controller, transport: Transport, rate_hz: float, planner: PlanWorker | None = None
+        self,
+        controller: Controller,
+        transport: Transport,
+        rate_hz: float,
+        ledger: LedgerWriter,
+        planner: PlanWorker | None = None,
     ) -> None:
         """Subscribe and announce; nothing runs before `run`.
 
@@ -73,9 +76,12 @@ class Loop:
             controller: What decides.
             transport: Open session.
             rate_hz: Of control.
+            ledger: Records what is decided and done.
             planner: Answers plan requests; without one, work goes on without a plan.
         """
-        self._planner = planner
+        self._planner, self._ledger = planner, ledger
+        self._acknowledged = Acknowledged()
+        self._desk = IntentDesk(controller, self._acknowledged)
         self._controller, self._transport, self._period = controller, transport, 1.0 / rate_hz
         self._clock = LoopClock(time.monotonic(), _LONGEST_TURN * self._period)
         self._joints, self._odometry = self._newest(JOINTS), self._newest(ODOMETRY)
@@ -84,10 +90,10 @@ class Loop:
         self._teleop, self._stops = self._newest(TELEOP), transport.feed(STOP, 32)
         self._beats: dict[m.Process, tuple[int, float]] = {}
         transport.subscribe(HEARTBEAT, self._on_heartbeat)
-        self._intents: queue.SimpleQueue[tuple[intents.Intent, Future[m.Answer]]] = queue.SimpleQueue()
         self._said: queue.SimpleQueue[str] = queue.SimpleQueue()
         transport.on_reject = lambda topic, reason: self._said.put(f"refused on {topic}: {reason}")
-        transport.serve(INTENT, self._ask)
+        transport.serve(INTENT, self._desk.ask)
+        self._lines = transport.feed(EVENT, 1000)
         self._motion, self._cut = transport.publisher(MOTION), transport.publisher(CUT)
         self._state, self._event = transport.publisher(CONTROLLER), transport.publisher(EVENT)
         self._plan = transport.publisher(PLAN)
@@ -110,13 +116,15 @@ class Loop:
             present=self._transport.present(),
             stops=tuple(stop.message for stop in self._stops.drain()),
             plan=None if self._planner is None else self._planner.newest,
+            ledger=self._ledger.state,
             tick_s=self._tick_s,
             ticks=self._count,
             late_ticks=self._late,
         )
 
-    def publish(self, outputs: Outputs) -> None:
-        """Send what is due."""
+    def publish(self, outputs: Outputs, now: float) -> None:
+        """Send what is due; the state when all that it tells is durable."""
+        self._ledger.write(outputs.records)
         if outputs.motion is not None:
             self._motion.put(outputs.motion)
         if outputs.cut is not None:
@@ -124,7 +132,8 @@ class Loop:
         if outputs.release is not None:
             threading.Thread(target=self._release, args=(outputs.release,), daemon=True).start()
         if outputs.state is not None:
-            self._state.put(outputs.state)
+            state = outputs.state
+            self._acknowledged.hold(self._controller.recorded, now, lambda _: self._state.put(state))
             self._tick_s = statistics.median(self._ticks) if self._ticks else 0.0
         if outputs.request is not None and self._planner is not None:
             self._planner.ask(outputs.request)
@@ -142,10 +151,12 @@ class Loop:
             self._late += started - began > _LATE * self._period
             began = started
             now = self._clock.turn(started)
-            self._answer_waiting(now)
+            self._desk.decide(now)
             outputs = self._controller.step(self.update(), now)
             self._ticks.append(time.monotonic() - started)
-            self.publish(outputs)
+            self.publish(outputs, now)
+            self._acknowledged.settle(self._ledger.state, now)
+            self._record_lines()
             self._publish_said()
             due += self._period
             wait = due - time.monotonic()
@@ -163,22 +174,11 @@ class Loop:
         if last is None or last[0] != beat.sequence:
             self._beats[beat.process] = (beat.sequence, self._clock.of(at))
 
-    def _ask(self, intent: intents.Intent) -> m.Answer:
-        """On a thread of the transport: hand the intent to the loop and wait for its answer."""
-        future: Future[m.Answer] = Future()
-        self._intents.put((intent, future))
-        try:
-            return future.result(_ANSWER_S)
-        except FutureTimeoutError:
-            future.cancel()
-            return m.Answer(ok=False, reason="the control loop did not answer in time; nothing was done")
-
-    def _answer_waiting(self, now: float) -> None:
-        while not self._intents.empty():
-            intent, future = self._intents.get()
-            # What nobody waits for any more must not be done.
-            if future.set_running_or_notify_cancel():
-                future.set_result(self._controller.answer(intent, now))
+    def _record_lines(self) -> None:
+        """What the other processes log goes into the ledger; the controller's own lines are in its records."""
+        for line in self._lines.drain():
+            if line.message.process != self._transport.process:
+                self._ledger.note(line.message)
 
     def _release(self, release: m.ReleaseStop) -> None:
         """On a thread of its own: a service call may wait, the control loop may not."""

@@ -1,16 +1,25 @@
 """The pruning points and what became of them, in the order of work along the row."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from typing import Literal
 
+import msgspec
 import numpy as np
 
 from controller.config import ControllerConfig
+from controller.journal import Journal, TicketRow
 from rolling_panda.differential_drive import Array
 from rolling_panda.messages import PointState, PruningPoint, PruningPoints, QueueEntry
+from rolling_panda.point_hash import point_hash
 
 #: A cane that turned further than this after acceptance is not the one the operator saw (rad).
 _TURNED_TOLERANCE = 0.35
+#: A name that comes back further away than this is another cane's (m).
+_ELSEWHERE = 0.03
+_INTERRUPTED = "the controller ended before it knew whether this was cut; look, and say"
+_WAITS = "accepted before a restart; waits until perception sees it again"
+_UNBOUND = "its record does not fit its hash; accept it anew"
 _ACCEPTABLE: frozenset[PointState] = frozenset({"PROPOSED", "REJECTED", "FAILED_NOT_CUT", "UNKNOWN"})
 
 
@@ -24,6 +33,7 @@ class Ticket:
         reason: Why it is there.
         user: Who accepted or rejected it.
         accepted: The point as the operator saw it when accepting; what is cut.
+        hash: Of what was accepted.
         cut_id: Of the last cut made for it.
         seen: True while perception holds the point true.
     """
@@ -33,16 +43,18 @@ class Ticket:
     reason: str = ""
     user: str = ""
     accepted: PruningPoint | None = None
+    hash: str = ""
     cut_id: str = ""
     seen: bool = True
 
 
 class PointQueue:
-    """All points ever proposed, by id. Every change of state goes through a method that says why."""
+    """All points ever proposed, by id. Every change of state goes through a method that says why, and is recorded."""
 
-    def __init__(self, config: ControllerConfig) -> None:
-        """Start empty."""
+    def __init__(self, config: ControllerConfig, journal: Journal | None = None) -> None:
+        """Start empty; changes are recorded in `journal`."""
         self._config = config
+        self._journal = journal or Journal()
         self._along = np.array([np.cos(config.row_heading), np.sin(config.row_heading), 0.0])
         self._tickets: dict[str, Ticket] = {}
         self._order: list[str] = []
@@ -65,6 +77,14 @@ class PointQueue:
             if ticket is None:
                 self._put(point.point_id, Ticket(point))
                 continue
+            if not ticket.seen and ticket.state != "ACCEPTED" and _apart(ticket.point, point) > _ELSEWHERE:
+                # Perception started anew and counts from one again: this name is another cane's now.
+                former = f"{point.point_id}:{point_hash(ticket.point)[:8]}"
+                self._put(former, replace(ticket, point=msgspec.structs.replace(ticket.point, point_id=former)))
+                self._put(point.point_id, Ticket(point))
+                continue
+            if not ticket.seen and ticket.state == "ACCEPTED":
+                ticket = replace(ticket, reason="")
             ticket = replace(ticket, point=point, seen=True)
             why = self._changed(ticket)
             self._put(point.point_id, self._void(ticket, why, voided) if why else ticket)
@@ -111,7 +131,12 @@ class PointQueue:
         if radius > self._config.largest_radius:
             limit = 2e3 * self._config.largest_radius
             return f"{point_id}: the cane is {2e3 * radius:.0f} mm thick, the limit is {limit:.0f} mm"
-        self._put(point_id, replace(ticket, state="ACCEPTED", reason="", user=user, accepted=ticket.point))
+        self._put(
+            point_id,
+            replace(
+                ticket, state="ACCEPTED", reason="", user=user, accepted=ticket.point, hash=point_hash(ticket.point)
+            ),
+        )
         return ""
 
     def reject(self, point_id: str, user: str, reason: str) -> str:
@@ -130,15 +155,16 @@ class PointQueue:
         return [t.point for t in tickets if t.state == "PROPOSED" and t.seen and t.point.confidence >= confidence]
 
     def next(self, skip: Callable[[str], bool] = lambda _: False) -> Ticket | None:
-        """The first accepted point in the order of work."""
+        """The first accepted point in the order of work, of those that perception has seen."""
         for point_id in self._order:
-            if self._tickets[point_id].state == "ACCEPTED" and not skip(point_id):
-                return self._tickets[point_id]
+            ticket = self._tickets[point_id]
+            if ticket.state == "ACCEPTED" and ticket.seen and not skip(point_id):
+                return ticket
         return None
 
     def accepted(self) -> tuple[PruningPoint, ...]:
         """Accepted points, each as it was accepted, by id."""
-        found = (ticket.accepted for ticket in self._tickets.values() if ticket.state == "ACCEPTED")
+        found = (ticket.accepted for ticket in self._tickets.values() if ticket.state == "ACCEPTED" and ticket.seen)
         return tuple(sorted((point for point in found if point is not None), key=lambda point: point.point_id))
 
     def tickets(self) -> tuple[Ticket, ...]:
@@ -155,13 +181,36 @@ class PointQueue:
         self._wanted, self._notes, self._entries = order, notes or {}, None
         self._sort()
 
-    def intend(self, point_id: str, cut_id: str) -> None:
-        """ACCEPTED → INTENT: the blades are about to move."""
+    def intend(self, point_id: str, cut_id: str) -> int:
+        """ACCEPTED → INTENT: the blades are about to move. Returns the number of its record."""
         self._put(point_id, replace(self._tickets[point_id], state="INTENT", cut_id=cut_id, reason="cutting"))
+        return self._journal.number
+
+    def recorded(self, number: int) -> bool:
+        """Is the record of this number durable?"""
+        return self._journal.holds(number)
 
     def resolve(self, point_id: str, state: PointState, reason: str) -> None:
         """End of a point's work: DONE, FAILED_NOT_CUT or UNKNOWN."""
         self._put(point_id, replace(self._tickets[point_id], state=state, reason=reason))
+
+    def restore(self, rows: Iterable[TicketRow]) -> None:
+        """Take up what was recorded before a restart; nothing is worked on before perception has seen it again."""
+        for row in rows:
+            if row.state == "WITHDRAWN" or row.state == "PROPOSED":
+                continue
+            point_id = row.point.point_id
+            self._tickets[point_id] = Ticket(
+                row.point, row.state, row.reason, row.user, row.accepted, row.hash, row.cut_id, seen=False
+            )
+            self._order.append(point_id)
+            if row.state == "INTENT":
+                self.resolve(point_id, "UNKNOWN", _INTERRUPTED)
+            elif row.state == "ACCEPTED" and (row.accepted is None or point_hash(row.accepted) != row.hash):
+                self._put(point_id, replace(self._tickets[point_id], state="REJECTED", reason=_UNBOUND, accepted=None))
+            elif row.state == "ACCEPTED":
+                self._put(point_id, replace(self._tickets[point_id], reason=_WAITS))
+        self._sort()
 
     def entries(self) -> tuple[QueueEntry, ...]:
         """Every point in the order of work, for the wire."""
@@ -172,7 +221,7 @@ class PointQueue:
     def _changed(self, ticket: Ticket) -> str:
         if ticket.state != "ACCEPTED" or ticket.accepted is None:
             return ""
-        moved = float(np.linalg.norm(np.subtract(ticket.point.position, ticket.accepted.position)))
+        moved = _apart(ticket.point, ticket.accepted)
         if moved > self._config.moved_tolerance:
             return f"it moved by {1e3 * moved:.0f} mm after it was accepted"
         turned = float(np.clip(abs(np.dot(ticket.point.tangent, ticket.accepted.tangent)), 0.0, 1.0))
@@ -183,7 +232,7 @@ class PointQueue:
     def _void(self, ticket: Ticket, why: str, voided: list[str]) -> Ticket:
         text = f"acceptance void: {why}"
         voided.append(f"{ticket.point.point_id}: {text}")
-        return replace(ticket, state="PROPOSED", reason=text, accepted=None)
+        return replace(ticket, state="PROPOSED", reason=text, accepted=None, hash="")
 
     def _sort(self) -> None:
         self._order.sort(key=self._place)
@@ -202,14 +251,39 @@ class PointQueue:
     def _put(self, point_id: str, ticket: Ticket) -> None:
         if point_id not in self._tickets:
             self._order.append(point_id)
-        if self._tickets.get(point_id) != ticket:
+        before = self._tickets.get(point_id)
+        if before != ticket:
             self._entries = None
+        if before is None or _recorded(before) != _recorded(ticket):
+            self._record(point_id, ticket, ticket.state)
         self._tickets[point_id] = ticket
 
+    def _record(self, point_id: str, ticket: Ticket, state: PointState | Literal["WITHDRAWN"]) -> None:
+        row = TicketRow(
+            point=ticket.point,
+            state=state,
+            reason=ticket.reason,
+            user=ticket.user,
+            accepted=ticket.accepted,
+            hash=ticket.hash,
+            cut_id=ticket.cut_id,
+        )
+        self._journal.add("ticket", point_id, row)
+
     def _drop(self, point_id: str) -> None:
-        del self._tickets[point_id]
+        self._record(point_id, self._tickets.pop(point_id), "WITHDRAWN")
         self._order.remove(point_id)
         self._entries = None
+
+
+def _apart(one: PruningPoint, other: PruningPoint) -> float:
+    """Distance of two points (m)."""
+    return float(np.linalg.norm(np.subtract(one.position, other.position)))
+
+
+def _recorded(ticket: Ticket) -> tuple[object, ...]:
+    """What of a ticket is worth a record when it changes."""
+    return ticket.state, ticket.user, ticket.accepted, ticket.cut_id, ticket.point.revision
 
 
 def _entry(ticket: Ticket, note: str) -> QueueEntry:

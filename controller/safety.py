@@ -24,6 +24,7 @@ class Health:
         present: Processes connected now.
         watchdog: The bridge says that its watchdog holds the robot.
         overruled: The bridge has accepted a newer controller than this one.
+        ledger: Why what is done cannot be recorded; empty when it can.
     """
 
     joints: float
@@ -34,15 +35,17 @@ class Health:
     present: frozenset[str]
     watchdog: bool
     overruled: bool
+    ledger: str = ""
 
 
-def health(inputs: Inputs, epoch: int | None, now: float) -> Health:
+def health(inputs: Inputs, epoch: int | None, now: float, ledger: str = "") -> Health:
     """How fresh the inputs are.
 
     Args:
         inputs: Newest of everything.
         epoch: Of this controller, None before the first bridge state.
         now: Monotonic time (s).
+        ledger: Why what is done cannot be recorded.
     """
 
     def age(at: float | None) -> float:
@@ -58,6 +61,7 @@ def health(inputs: Inputs, epoch: int | None, now: float) -> Health:
         present=inputs.present,
         watchdog=bridge is not None and bridge.message.watchdog,
         overruled=bridge is not None and epoch is not None and bridge.message.epoch > epoch,
+        ledger=ledger,
     )
 
 
@@ -83,6 +87,8 @@ def check(mode: Mode, moving: bool, health: Health, config: ControllerConfig) ->
     """
     if health.overruled:
         return Verdict("fault", "another controller commands this robot")
+    if health.ledger:
+        return Verdict("fault", health.ledger)
     if not moving and mode not in ("AUTO", "TELEOP"):
         return FINE
     cause = sensors(health, config)

@@ -16,9 +16,14 @@ class Bridge:
 class Queue:
     intended: list = field(default_factory=list)
     resolved: list = field(default_factory=list)
+    durable: int = 1000
 
     def intend(self, point_id, cut_id):
         self.intended.append((point_id, cut_id))
+        return len(self.intended)
+
+    def recorded(self, number):
+        return number <= self.durable
 
     def resolve(self, point_id, outcome, text):
         self.resolved.append((point_id, outcome, text))
@@ -42,6 +47,7 @@ def test_without_a_word_the_cut_is_unknown_and_no_other_is_taken_for_it():
     config, queue = ControllerConfig(), Queue()
     blades = Blades(config, queue, "run")
     blades.begin("p1", 5.0)
+    assert blades.command(5.0)
     assert blades.watch(Bridge(), 5.0 + config.cut_timeout_s) == ()
     (text,) = blades.watch(Bridge(), 5.1 + config.cut_timeout_s)
     assert "UNKNOWN" in text and queue.resolved[0][1] == "UNKNOWN"
@@ -49,3 +55,21 @@ def test_without_a_word_the_cut_is_unknown_and_no_other_is_taken_for_it():
     # The late outcome of the first is not that of the second.
     assert blades.watch(Bridge("run-1", "DONE"), 20.1) == () and blades.busy
     assert blades.command(20.1) == ("run-2", "p2")
+
+
+def test_no_order_is_given_before_the_intent_is_durable():
+    queue = Queue(durable=0)
+    blades = Blades(ControllerConfig(), queue, "run")
+    blades.begin("p1", 0.0)
+    assert all(blades.command(0.01 * tick) is None for tick in range(50))
+    queue.durable = 1
+    assert blades.command(0.5) == ("run-1", "p1")
+
+
+def test_a_cut_that_was_never_ordered_is_no_unknown_one():
+    config, queue = ControllerConfig(), Queue(durable=0)
+    blades = Blades(config, queue, "run")
+    blades.begin("p1", 0.0)
+    assert blades.command(0.1) is None
+    (text,) = blades.watch(Bridge(), config.cut_timeout_s + 0.1)
+    assert "no order was given" in text and queue.resolved[0][1] == "FAILED_NOT_CUT"

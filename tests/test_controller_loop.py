@@ -9,6 +9,9 @@ import pytest
 
 from controller.config import ControllerConfig
 from controller.core import Controller
+from controller.ledger import Ledger, read
+from controller.ledger_check import reading, verify
+from controller.ledger_writer import LedgerWriter
 from controller.loop import Loop
 from rolling_panda import intents
 from rolling_panda import messages as m
@@ -85,6 +88,10 @@ class Rest:
             self.tick()
             threading.Event().wait(0.01)
 
+    def rows(self):
+        with reading(self.folder) as database:
+            return list(read(database))
+
     def mode(self):
         newest = self.state.peek()
         return None if newest is None else newest.message.mode
@@ -95,20 +102,23 @@ class Rest:
 
 
 @pytest.fixture
-def rest():
+def rest(tmp_path):
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
     router = Router(TransportConfig(mode="router", connect=(), listen=(endpoint,)))
     others = Rest(endpoint)
+    others.folder = tmp_path
     stopping = threading.Event()
     with Transport(TransportConfig(connect=(endpoint,)), "controller", "rp1") as transport:
-        loop = Loop(Controller(CONFIG, RobotConfig()), transport, CONFIG.rate_hz)
+        ledger = LedgerWriter(lambda: Ledger(tmp_path))
+        loop = Loop(Controller(CONFIG, RobotConfig()), transport, CONFIG.rate_hz, ledger)
         thread = threading.Thread(target=loop.run, args=(stopping,))
         thread.start()
         yield others
         stopping.set()
         thread.join()
+        ledger.close()
     others.close()
     router.close()
 
@@ -139,6 +149,16 @@ def test_operator_is_answered_a_stop_latches_and_a_reset_releases_it(rest):
     assert [release.stop_id for release in rest.releases] == ["s1"]
     said = " ".join(received.message.text for received in rest.events.drain())
     assert "dog gone" in said and "Start refused" in said
+
+    rest.server.publisher(EVENT).put(
+        m.LogEvent(header=m.Header(), process="server", severity="info", text="ada signed in (supervisor)")
+    )
+    rest.until(lambda: any("ada signed in" in row.entry.body for row in rest.rows()))
+    kinds = {row.entry.kind for row in rest.rows()}
+    assert kinds == {"request", "stop", "event"}
+    refused = [row for row in rest.rows() if row.entry.kind == "request" and '"ok":false' in row.entry.body]
+    assert [row.entry.name for row in refused] == ["ada"] and "arm the robot first" in refused[0].entry.body
+    assert verify(rest.folder).problem == ""
 
 
 def test_a_heartbeat_that_stands_still_is_no_sign_of_life(rest):

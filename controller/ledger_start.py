@@ -1,0 +1,54 @@
+"""What a start reads from the ledger and writes into it first."""
+
+import hashlib
+import platform
+from pathlib import Path
+
+import msgspec
+
+from controller.journal import Record, TicketRow
+from controller.ledger import Ledger
+from rolling_panda import __version__
+from rolling_panda.errors import LedgerError
+
+
+class StartRow(msgspec.Struct, frozen=True, kw_only=True):
+    """A process has started: which program on which Python, and with which configuration."""
+
+    version: str
+    python: str
+    run_id: str
+    config_sha256: str
+    config: str
+
+
+def start_record(config: Path, run_id: str) -> Record:
+    """The record of this start, with the whole configuration."""
+    content = config.read_bytes()
+    row = StartRow(
+        version=__version__,
+        python=platform.python_version(),
+        run_id=run_id,
+        config_sha256=hashlib.sha256(content).hexdigest(),
+        config=content.decode("utf-8", "replace"),
+    )
+    return Record(0, "start", "controller", row)
+
+
+def restored(folder: Path) -> tuple[TicketRow, ...]:
+    """The newest row of each point in the ledger of a folder.
+
+    Raises:
+        LedgerError: The ledger cannot be opened, or a row is not what this version writes.
+    """
+    with Ledger(folder) as ledger:
+        found = []
+        for name, body in ledger.newest("ticket"):
+            try:
+                found.append(msgspec.json.decode(body, type=TicketRow))
+            except msgspec.MsgspecError as error:
+                raise LedgerError(
+                    f"the ledger {ledger.path} tells of point {name} what this version does not understand: {error}; "
+                    f"keep the folder, and give another one with --state"
+                ) from error
+        return tuple(found)
