@@ -18,6 +18,8 @@ class Operator:
             return self._queue.accept(intent.point_id, intent.revision, intent.user, intent.digest)
         if isinstance(intent, intents.RejectPoint):
             return self._queue.reject(intent.point_id, intent.user, intent.reason)
+        if isinstance(intent, intents.ResolvePoint):
+            return self._queue.decide(intent.point_id, intent.outcome, intent.user, intent.reason)
         if isinstance(intent, intents.AcceptAll):
             return self._accept_all(intent)
         return f"{type(intent).__name__} is not something this controller does"
@@ -28,6 +30,9 @@ class Operator:
             return f"accepted {intent.point_id}, revision {intent.revision}"
         if isinstance(intent, intents.RejectPoint):
             return f"rejected {intent.point_id}{f': {intent.reason}' if intent.reason else ''}"
+        if isinstance(intent, intents.ResolvePoint):
+            how = "is cut" if intent.outcome == "DONE" else "is not cut"
+            return f"looked: {intent.point_id} {how}: {intent.reason}"
         if isinstance(intent, intents.AcceptAll):
             points = "1 point" if self._accepted == 1 else f"{self._accepted} points"
             return f"accepted {points} of confidence {intent.confidence:.2f} and more"

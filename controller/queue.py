@@ -11,7 +11,7 @@ from controller.config import ControllerConfig
 from controller.journal import Journal, TicketRow
 from rolling_panda.differential_drive import Array
 from rolling_panda.messages import PointState, PruningPoint, PruningPoints, QueueEntry
-from rolling_panda.point_hash import point_hash
+from rolling_panda.point_digest import point_digest
 
 #: A cane that turned further than this after acceptance is not the one the operator saw (rad).
 _TURNED_TOLERANCE = 0.35
@@ -20,7 +20,7 @@ _ELSEWHERE = 0.03
 _INTERRUPTED = "the controller ended before it knew whether this was cut; look, and say"
 _WAITS = "accepted before a restart; waits until perception sees it again"
 _UNBOUND = "its record does not fit its hash; accept it anew"
-_ACCEPTABLE: frozenset[PointState] = frozenset({"PROPOSED", "REJECTED", "FAILED_NOT_CUT", "UNKNOWN"})
+_ACCEPTABLE: frozenset[PointState] = frozenset({"PROPOSED", "REJECTED", "FAILED_NOT_CUT"})
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class PointQueue:
                 continue
             if not ticket.seen and ticket.state != "ACCEPTED" and _apart(ticket.point, point) > _ELSEWHERE:
                 # Perception started anew and counts from one again: this name is another cane's now.
-                former = f"{point.point_id}:{point_hash(ticket.point)[:8]}"
+                former = f"{point.point_id}:{point_digest(ticket.point)[:8]}"
                 self._put(former, replace(ticket, point=msgspec.structs.replace(ticket.point, point_id=former)))
                 self._put(point.point_id, Ticket(point))
                 continue
@@ -117,6 +117,8 @@ class PointQueue:
         ticket = self._tickets.get(point_id)
         if ticket is None:
             return f"there is no point {point_id!r}"
+        if ticket.state == "UNKNOWN":
+            return f"nobody knows whether {point_id} is cut; look, and say so first"
         if ticket.state not in _ACCEPTABLE:
             return f"{point_id} is {ticket.state}"
         if not ticket.seen:
@@ -134,7 +136,7 @@ class PointQueue:
         self._put(
             point_id,
             replace(
-                ticket, state="ACCEPTED", reason="", user=user, accepted=ticket.point, hash=point_hash(ticket.point)
+                ticket, state="ACCEPTED", reason="", user=user, accepted=ticket.point, hash=point_digest(ticket.point)
             ),
         )
         return ""
@@ -144,7 +146,7 @@ class PointQueue:
         ticket = self._tickets.get(point_id)
         if ticket is None:
             return f"there is no point {point_id!r}"
-        if ticket.state in ("INTENT", "DONE"):
+        if ticket.state in ("INTENT", "DONE", "UNKNOWN"):
             return f"{point_id} is {ticket.state}"
         self._put(point_id, replace(ticket, state="REJECTED", reason=reason or "rejected", user=user, accepted=None))
         return ""
@@ -206,11 +208,21 @@ class PointQueue:
             self._order.append(point_id)
             if row.state == "INTENT":
                 self.resolve(point_id, "UNKNOWN", _INTERRUPTED)
-            elif row.state == "ACCEPTED" and (row.accepted is None or point_hash(row.accepted) != row.hash):
+            elif row.state == "ACCEPTED" and (row.accepted is None or point_digest(row.accepted) != row.hash):
                 self._put(point_id, replace(self._tickets[point_id], state="REJECTED", reason=_UNBOUND, accepted=None))
             elif row.state == "ACCEPTED":
                 self._put(point_id, replace(self._tickets[point_id], reason=_WAITS))
         self._sort()
+
+    def decide(self, point_id: str, outcome: PointState, user: str, reason: str) -> str:
+        """Somebody has looked how an UNKNOWN cut ended; returns why that is not taken, empty when it is."""
+        ticket = self._tickets.get(point_id)
+        if ticket is None:
+            return f"there is no point {point_id!r}"
+        if ticket.state != "UNKNOWN":
+            return f"how {point_id} ended is no question: it is {ticket.state}"
+        self._put(point_id, replace(ticket, state=outcome, reason=f"{user} looked: {reason}"[:500]))
+        return ""
 
     def entries(self) -> tuple[QueueEntry, ...]:
         """Every point in the order of work, for the wire."""

@@ -1,6 +1,6 @@
 """What an operator may ask of the controller: the requests of the intent service, each answered with an `Answer`."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
@@ -35,6 +35,14 @@ class RejectPoint(Intent, frozen=True, kw_only=True):
 
     point_id: Name
     reason: Text = ""
+
+
+class ResolvePoint(Intent, frozen=True, kw_only=True):
+    """Say how a cut ended of which nobody knows (UNKNOWN): somebody has looked."""
+
+    point_id: Name
+    outcome: Literal["DONE", "FAILED_NOT_CUT"]
+    reason: Annotated[str, Meta(min_length=1, max_length=500)]
 
 
 class AcceptAll(Intent, frozen=True, kw_only=True):
@@ -91,6 +99,7 @@ AnyIntent = (
     Arm
     | AcceptPoint
     | RejectPoint
+    | ResolvePoint
     | AcceptAll
     | Start
     | Pause

@@ -162,9 +162,9 @@ TOPICS: tuple[Topic[Any], ...] = (
 INTENT: Service[intents.Intent] = Service(
     "service/intent",
     (
-        intents.Arm, intents.AcceptPoint, intents.RejectPoint, intents.AcceptAll, intents.Start, intents.Pause,
-        intents.Resume, intents.Home, intents.Acknowledge, intents.Reset, intents.TakeControl, intents.RequestControl,
-        intents.GrantControl, intents.ReturnControl,
+        intents.Arm, intents.AcceptPoint, intents.RejectPoint, intents.ResolvePoint, intents.AcceptAll, intents.Start,
+        intents.Pause, intents.Resume, intents.Home, intents.Acknowledge, intents.Reset, intents.TakeControl,
+        intents.RequestControl, intents.GrantControl, intents.ReturnControl,
     ),
     "controller", 1.0, "what an operator asks for",
 )

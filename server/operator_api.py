@@ -67,6 +67,11 @@ def operator_router(desk: Desk) -> APIRouter:
         """Take a point off the queue."""
         return await ask(session, intents.RejectPoint(user=session.user, point_id=point_id, reason=request.reason))
 
+    @router.post("/points/{point_id}/resolve", tags=["points"])
+    async def resolve(session: Caller, point_id: PointId, request: body.ResolvePoint) -> Response:
+        """Say how an UNKNOWN cut ended, after looking; it is never cut again by itself."""
+        return await ask(session, intents.ResolvePoint(user=session.user, point_id=point_id, **request.model_dump()))
+
     @router.post("/arm", tags=["mode"])
     async def arm(session: Caller) -> Response:
         """IDLE to READY."""

@@ -49,6 +49,13 @@ class RejectPoint(_Body):
     reason: _Text = ""
 
 
+class ResolvePoint(_Body):
+    """How an UNKNOWN cut ended, and how that was found out."""
+
+    outcome: Literal["DONE", "FAILED_NOT_CUT"]
+    reason: Annotated[str, Field(min_length=1, max_length=400)]
+
+
 class AcceptAll(_Body):
     """Least confidence, 0…1."""
 

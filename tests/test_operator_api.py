@@ -58,6 +58,11 @@ def client(server):
     [
         ("points/p7/accept", {"revision": 3}, intents.AcceptPoint(user="ann", point_id="p7", revision=3)),
         ("points/p7/reject", {"reason": "too high"}, intents.RejectPoint(user="ann", point_id="p7", reason="too high")),
+        (
+            "points/p7/resolve",
+            {"outcome": "DONE", "reason": "the cane is off"},
+            intents.ResolvePoint(user="ann", point_id="p7", outcome="DONE", reason="the cane is off"),
+        ),
         ("points/p7/reject", {}, intents.RejectPoint(user="ann", point_id="p7")),
         ("points/accept-all", {"confidence": 0.5}, intents.AcceptAll(user="ann", confidence=0.5)),
         ("arm", None, intents.Arm(user="ann")),

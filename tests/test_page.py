@@ -4,7 +4,7 @@ import json
 
 import pytest
 from played_page import until
-from played_server import ORIGIN, PlayedServer, bridge, controller
+from played_server import ORIGIN, PlayedServer, bridge, controller, point
 from playwright.sync_api import Browser, Page, expect
 
 from rolling_panda import page_messages as p
@@ -37,6 +37,15 @@ def test_accepts_and_rejects_with_buttons_and_keys(page: Page, server: PlayedSer
     page.locator("#least-confidence").select_option("0.7")
     page.locator("#accept-all").click()
     until(page, lambda: ("/api/points/accept-all", {"confidence": 0.7}) in server.posted)
+
+
+def test_how_an_unknown_cut_ended_is_said_by_who_has_looked(page: Page, server: PlayedServer) -> None:
+    server.points = (point(6, "UNKNOWN"),)
+    server.tell(server.page_points())
+    row = page.locator('[data-point-id="p6"]')
+    row.get_by_role("button", name="I have looked: it is not cut p6").click()
+    answer = {"outcome": "FAILED_NOT_CUT", "reason": "seen by eye"}
+    until(page, lambda: ("/api/points/p6/resolve", answer) in server.posted)
 
 
 def test_only_what_the_controller_allows_is_enabled_and_the_rest_says_why(page: Page, server: PlayedServer) -> None:

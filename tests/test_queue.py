@@ -119,7 +119,26 @@ def test_an_unknown_or_failed_cut_waits_for_a_person():
         q.intend("a", "cut-1")
         q.resolve("a", outcome, "why")
         assert q.next() is None
+        if outcome == "UNKNOWN":
+            assert "look, and say so first" in q.accept("a", 3, "eve")
+            assert "UNKNOWN" in q.reject("a", "eve", "no")
+            assert q.proposed(0.0) == []
+            assert q.decide("a", "FAILED_NOT_CUT", "eve", "the cane stands") == ""
+            assert q.get("a").reason == "eve looked: the cane stands"
         assert q.accept("a", 3, "eve") == ""
+
+
+def test_what_a_person_saw_ends_an_unknown_cut_and_nothing_else():
+    q = queue(point())
+    assert "no question: it is PROPOSED" in q.decide("a", "DONE", "eve", "cut")
+    assert "there is no point" in q.decide("z", "DONE", "eve", "cut")
+    q.accept("a", 3, "ada")
+    q.intend("a", "cut-1")
+    assert "it is INTENT" in q.decide("a", "DONE", "eve", "cut")
+    q.resolve("a", "UNKNOWN", "why")
+    assert q.decide("a", "DONE", "eve", "the cane is off") == ""
+    assert (state(q), q.get("a").cut_id) == ("DONE", "cut-1")
+    assert "is DONE" in q.accept("a", 3, "eve")
 
 
 def test_rejected_points_are_not_proposed_and_unknown_ones_are_named():

@@ -78,7 +78,7 @@ def test_an_acceptance_that_does_not_fit_its_hash_is_none():
     life = begun(point())
     life.queue.accept("a", 3, "ada")
     (body,) = life.rows().values()
-    life = Life({"a": body.replace(b"0.004", b"0.005")})
+    life = Life({"a": body.replace(b"0.85", b"0.86")})
     assert life.state() == "REJECTED" and "does not fit its hash" in life.queue.get("a").reason
 
 

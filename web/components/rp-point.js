@@ -12,30 +12,52 @@ import { POINT_WORDS, counted, inWords } from "../words.js";
 /** @typedef {import("../messages.js").PointState} PointState */
 
 /** @type {ReadonlySet<PointState>} */
-const CAN_ACCEPT = new Set(/** @type {PointState[]} */ (["PROPOSED", "REJECTED", "FAILED_NOT_CUT", "UNKNOWN"]));
+const CAN_ACCEPT = new Set(/** @type {PointState[]} */ (["PROPOSED", "REJECTED", "FAILED_NOT_CUT"]));
 /** @type {ReadonlySet<PointState>} */
-const CAN_REJECT = new Set(/** @type {PointState[]} */ (["PROPOSED", "ACCEPTED", "FAILED_NOT_CUT", "UNKNOWN"]));
+const CAN_REJECT = new Set(/** @type {PointState[]} */ (["PROPOSED", "ACCEPTED", "FAILED_NOT_CUT"]));
+
+/**
+ * Nobody but the person who looks knows how an unknown cut ended; the two buttons are their two answers then.
+ *
+ * @param {PagePoint} row
+ */
+function isUnknown(row) {
+  return row.entry.state === "UNKNOWN";
+}
+
+/**
+ * @param {PagePoint} row
+ * @param {"DONE"|"FAILED_NOT_CUT"} outcome
+ */
+function resolve(row, outcome) {
+  const id = encodeURIComponent(row.point.point_id);
+  return ask(`Saying how ${row.point.point_id} ended`, `/api/points/${id}/resolve`, { outcome, reason: "seen by eye" });
+}
 
 /** @param {PagePoint} row */
 export function whyNotAccept(row) {
+  if (isUnknown(row)) return whyNot("ResolvePoint");
   if (!CAN_ACCEPT.has(row.entry.state)) return `It is ${POINT_WORDS[row.entry.state].toLowerCase()}`;
   return whyNot("AcceptPoint");
 }
 
 /** @param {PagePoint} row */
 export function whyNotReject(row) {
+  if (isUnknown(row)) return whyNot("ResolvePoint");
   if (!CAN_REJECT.has(row.entry.state)) return `It is ${POINT_WORDS[row.entry.state].toLowerCase()}`;
   return whyNot("RejectPoint");
 }
 
 /** @param {PagePoint} row */
 export function accept(row) {
+  if (isUnknown(row)) return resolve(row, "DONE");
   const id = encodeURIComponent(row.point.point_id);
   return ask(`Accepting ${row.point.point_id}`, `/api/points/${id}/accept`, { revision: row.point.revision });
 }
 
 /** @param {PagePoint} row */
 export function reject(row) {
+  if (isUnknown(row)) return resolve(row, "FAILED_NOT_CUT");
   const id = encodeURIComponent(row.point.point_id);
   return ask(`Rejecting ${row.point.point_id}`, `/api/points/${id}/reject`, { reason: "" });
 }
@@ -117,10 +139,11 @@ export class RpPoint extends HTMLElement {
     this.facts.title = `${kept}; the cane is ${thick} thick; confidence ${sure}${planWords(row)}`;
     setText(this.reason, inWords([entry.reason, point.reason].filter(Boolean).join(" · ")));
     this.reason.title = this.reason.textContent ?? "";
-    setEnabled(this.acceptButton, whyNotAccept(row), "Accept this cut (A)");
-    setEnabled(this.rejectButton, whyNotReject(row), "Reject this cut (R)");
-    this.acceptButton.setAttribute("aria-label", `Accept ${point.point_id}`);
-    this.rejectButton.setAttribute("aria-label", `Reject ${point.point_id}`);
+    const [yes, no] = isUnknown(row) ? ["I have looked: it is cut", "I have looked: it is not cut"] : ["Accept", "Reject"];
+    setEnabled(this.acceptButton, whyNotAccept(row), isUnknown(row) ? `${yes} (A)` : "Accept this cut (A)");
+    setEnabled(this.rejectButton, whyNotReject(row), isUnknown(row) ? `${no} (R)` : "Reject this cut (R)");
+    this.acceptButton.setAttribute("aria-label", `${yes} ${point.point_id}`);
+    this.rejectButton.setAttribute("aria-label", `${no} ${point.point_id}`);
   }
 }
 customElements.define("rp-point", RpPoint);
