@@ -87,6 +87,14 @@ def point(number: int, state: m.PointState, vine: int = 1, spur: int = 1, **chan
         vine=vine,
         spur=spur,
         reason="lowest cane of the spur: keeps two buds, cut above the second",
+        position_covariance=(4e-6, 0.0, 0.0, 9e-6, 0.0, 4e-6),
+        tangent_covariance=(1e-3, 0.0, 0.0, 1e-3, 0.0, 0.0),
+        offset=0.02,
+        force=469.0,
+        wire_distance=0.141,
+        cordon_distance=0.062,
+        node_distance=0.0206,
+        digest=f"{number:08x}" * 4,
     )
     entry = m.QueueEntry(point_id=name, state=state, **changes)
     return p.PagePoint(point=found, entry=entry, pixel=(60.0 + 45.0 * number, 90.0 + 11.0 * number))
@@ -108,6 +116,9 @@ class PlayedServer:
     posted: list[tuple[str, Any]] = field(default_factory=list)
     said: list[p.FromPage] = field(default_factory=list)
     sockets: list[WebSocketRoute] = field(default_factory=list)
+    fetched: list[str] = field(default_factory=list)
+    rule: m.PruningRule | None = field(default_factory=m.PruningRule)
+    crop: bytes = field(default_factory=lambda: camera_image((240, 180)))
     number: int = 0
     started: float = field(default_factory=time.time)
     image: bytes = field(default_factory=lambda: camera_image())
@@ -129,6 +140,12 @@ class PlayedServer:
             route.fulfill(status=status, json=body)
         elif path == "/viser/":
             route.fulfill(body=VIEW, content_type="text/html")
+        elif path.startswith("/api/points/") and path.endswith("/crop"):
+            self.fetched.append(route.request.url.removeprefix(ORIGIN))
+            if self.crop:
+                route.fulfill(body=self.crop, content_type="image/jpeg")
+            else:
+                route.fulfill(status=404, json={"ok": False, "reason": "no picture of this point has come yet"})
         elif path == "/camera/color.jpg":
             route.fulfill(body=self.image, content_type="image/jpeg")
         else:
@@ -188,6 +205,7 @@ class PlayedServer:
             segmenter="simulated labels",
             frames=12,
             image_size=(480, 360),
+            rule=self.rule,
         )
 
     def event(self, number: int, severity: m.Severity, text: str) -> p.PageEvent:
@@ -200,12 +218,12 @@ class PlayedServer:
         return [body for path, body in self.posted if path == "/api/stop"]
 
 
-def camera_image() -> bytes:
+def camera_image(size: tuple[int, int] = (480, 360)) -> bytes:
     image = Image.new("RGB", (480, 360), (46, 58, 44))
     draw = ImageDraw.Draw(image)
     draw.rectangle((0, 250, 480, 275), fill=(92, 70, 50))
     for x in range(60, 460, 55):
         draw.line((x, 250, x + 18, 20), fill=(120, 88, 60), width=7)
     out = BytesIO()
-    image.save(out, "JPEG")
+    image.resize(size).save(out, "JPEG")
     return out.getvalue()

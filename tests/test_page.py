@@ -28,7 +28,7 @@ def test_shows_the_queue_by_vine_and_spur_and_selects(page: Page, server: Played
 
 def test_accepts_and_rejects_with_buttons_and_keys(page: Page, server: PlayedServer) -> None:
     page.locator('[data-point-id="p1"] button.accept').click()
-    until(page, lambda: ("/api/points/p1/accept", {"revision": 4}) in server.posted)
+    until(page, lambda: ("/api/points/p1/accept", {"revision": 4, "digest": "00000001" * 4}) in server.posted)
     expect(page.locator('[data-point-id="p3"] button.accept')).to_be_disabled()
     page.locator('[data-point-id="p1"]').focus()
     page.keyboard.press("ArrowDown")

@@ -7,6 +7,7 @@ import "./components/rp-link-banner.js";
 import "./components/rp-log.js";
 import "./components/rp-mode.js";
 import "./components/rp-queue.js";
+import "./components/rp-rule.js";
 import "./components/rp-scene.js";
 import "./components/rp-status-bar.js";
 import "./components/rp-stop.js";

@@ -78,3 +78,21 @@ const CLOCK = new Intl.DateTimeFormat("en-GB", { hour: "2-digit", minute: "2-dig
 export function clockWords(wallTime) {
   return CLOCK.format(new Date(wallTime * 1000));
 }
+
+/**
+ * A force in N to two digits: it is an estimate.
+ *
+ * @param {number} force
+ */
+export function newtons(force) {
+  return `${Number(force.toPrecision(2))} N`;
+}
+
+/**
+ * Standard deviation of a vector's worst coordinate, from the upper triangle of its covariance.
+ *
+ * @param {import("./messages.js").Covariance} covariance
+ */
+export function uncertainty([xx, , , yy, , zz]) {
+  return Math.sqrt(Math.max(xx, yy, zz, 0));
+}

@@ -52,7 +52,7 @@ export function whyNotReject(row) {
 export function accept(row) {
   if (isUnknown(row)) return resolve(row, "DONE");
   const id = encodeURIComponent(row.point.point_id);
-  return ask(`Accepting ${row.point.point_id}`, `/api/points/${id}/accept`, { revision: row.point.revision });
+  return ask(`Accepting ${row.point.point_id}`, `/api/points/${id}/accept`, { revision: row.point.revision, digest: row.point.digest });
 }
 
 /** @param {PagePoint} row */

@@ -7,6 +7,7 @@ import { link, now, pageState, points, selected, staleWords } from "../state.js"
 import { drawOn } from "../store.js";
 import { select } from "../teleoperation.js";
 import { counted } from "../words.js";
+import { RpPointDetails } from "./rp-point-details.js";
 import { RpPoint, accept, reject, whyNotAccept, whyNotReject } from "./rp-point.js";
 
 /** @typedef {import("../messages.js").PagePoint} PagePoint */
@@ -25,10 +26,8 @@ class RpQueue extends HTMLElement {
       abstainedList("operator", (count) => `${counted(count, "place")} for you to decide`),
     ];
     list.addEventListener("keydown", (event) => this.key(event));
-    this.append(head, element("div", { class: "queue-tools" }, summary, ...acceptAll()), list, empty, ...open.map((each) => each.box));
+    this.append(head, document.createElement("rp-rule"), element("div", { class: "queue-tools" }, summary, ...acceptAll()), list, empty, element("div", { class: "open-places" }, ...open.map((each) => each.box)));
 
-    /** @type {Map<string, RpPoint>} */
-    this.rows = new Map();
     /** @type {Map<string, HTMLElement>} */
     const groups = new Map();
     drawOn([points, pageState, link, now, selected], () => {
@@ -44,12 +43,27 @@ class RpQueue extends HTMLElement {
       empty.hidden = rows.length > 0;
       for (const each of open) each.show(page?.abstained ?? []);
       this.place(list, groups, rows, reachable ?? "");
+      this.explain(rows.find((row) => row.point.point_id === selected.get()));
     });
-    selected.subscribe((pointId) => this.rows.get(pointId)?.scrollIntoView({ block: "nearest" }));
   }
 
   /** @type {Map<string, RpPoint>} */
   rows = new Map();
+
+  details = new RpPointDetails();
+
+  /** @param {PagePoint|undefined} row The chosen one. */
+  explain(row) {
+    const item = row && this.rows.get(row.point.point_id);
+    if (!item) {
+      this.details.remove();
+      return;
+    }
+    this.details.show(row);
+    if (this.details.parentElement === item) return;
+    item.append(this.details);
+    item.scrollIntoView({ block: "nearest" });
+  }
 
   /**
    * Put the rows where they belong, moving only what has to move, so that focus and scroll stay.

@@ -1,0 +1,103 @@
+// What is known of the chosen point: the picture it was found in, and the figures behind the cut.
+
+import { element, setText } from "../element.js";
+import { newtons, uncertainty } from "../words.js";
+
+/** @typedef {import("../messages.js").PagePoint} PagePoint */
+/** @typedef {import("../messages.js").PruningPoint} PruningPoint */
+
+/** A picture that has not come yet is asked for again after so long (ms), so many times. */
+const AGAIN_MS = 1500;
+const TRIES = 20;
+
+/** @type {readonly (readonly [word: string, hint: string, value: (point: PruningPoint) => string])[]} */
+const FACTS = Object.freeze([
+  ["Cut", "What is cut, and how far past the last node that stays", cutWords],
+  ["Keeps", "Nodes that stay, of those seen on the cane", (point) => `${point.nodes_kept} of ${point.nodes_seen} nodes`],
+  ["Cane", "Thickness, and the force that the blades are expected to need", caneWords],
+  ["Place", "How well the place is known, one standard deviation, and the direction of the cane", placeWords],
+  ["Clear of", "From the cut to the nearest known wire, cordon, and node that stays", clearWords],
+  ["Content", "Revision and hash of what is accepted", (point) => `${point.revision} · ${point.digest.slice(0, 8) || "–"}`],
+]);
+
+/** @param {PruningPoint} point */
+function cutWords(point) {
+  const kind = `${point.kind.charAt(0).toUpperCase()}${point.kind.slice(1)}`;
+  return point.offset === null ? kind : `${kind}, ${Math.round(1000 * point.offset)} mm past node ${point.nodes_kept}`;
+}
+
+/** @param {PruningPoint} point */
+function caneWords(point) {
+  const thick = `${(2000 * point.radius).toFixed(1)} mm`;
+  return point.force > 0 ? `${thick}, ≈ ${newtons(point.force)}` : thick;
+}
+
+/** @param {PruningPoint} point */
+function placeWords(point) {
+  if (point.position_covariance === null) return "–";
+  const place = `± ${(1000 * uncertainty(point.position_covariance)).toFixed(1)} mm`;
+  if (point.tangent_covariance === null) return place;
+  return `${place}, ± ${((180 / Math.PI) * uncertainty(point.tangent_covariance)).toFixed(0)}°`;
+}
+
+/** @param {PruningPoint} point */
+function clearWords(point) {
+  const near = /** @type {[string, number|null][]} */ ([
+    ["wire", point.wire_distance],
+    ["cordon", point.cordon_distance],
+    ["node", point.node_distance],
+  ]);
+  const known = near.filter(([, distance]) => distance !== null);
+  if (known.length === 0) return "nothing known near";
+  return `${known.map(([name, distance]) => `${name} ${Math.round(1000 * (distance ?? 0))}`).join(" · ")} mm`;
+}
+
+export class RpPointDetails extends HTMLElement {
+  constructor() {
+    super();
+    this.picture = element("img", { attributes: { alt: "What the camera saw of this spur, the cut in the middle" } });
+    this.frame = element("figure", { class: "crop" }, this.picture);
+    this.facts = element("dl", { class: "number" });
+    /** @type {HTMLElement[]} */
+    this.values = [];
+    this.shown = "";
+    this.tries = 0;
+    this.timer = 0;
+  }
+
+  connectedCallback() {
+    if (this.childElementCount > 0) return;
+    for (const [word, hint] of FACTS) {
+      const value = element("dd");
+      this.values.push(value);
+      this.facts.append(element("div", { attributes: { title: hint } }, element("dt", { text: word }), value));
+    }
+    this.picture.addEventListener("load", () => this.frame.classList.add("loaded"));
+    this.picture.addEventListener("error", () => {
+      if (this.tries++ >= TRIES) return;
+      this.timer = window.setTimeout(() => this.fetch(), AGAIN_MS);
+    });
+    this.append(this.frame, this.facts);
+  }
+
+  /** @param {PagePoint} row */
+  show({ point }) {
+    FACTS.forEach(([, , value], at) => {
+      const node = this.values[at];
+      if (node) setText(node, value(point));
+    });
+    // The hash tells points of the same name apart that perception has found before and after it was started anew.
+    const path = `/api/points/${encodeURIComponent(point.point_id)}/crop?revision=${point.revision}&of=${point.digest}`;
+    if (path === this.shown) return;
+    this.shown = path;
+    this.tries = 0;
+    window.clearTimeout(this.timer);
+    this.frame.classList.remove("loaded");
+    this.fetch();
+  }
+
+  fetch() {
+    this.picture.src = this.tries === 0 ? this.shown : `${this.shown}&try=${this.tries}`;
+  }
+}
+customElements.define("rp-point-details", RpPointDetails);
