@@ -23,9 +23,10 @@ from bridge.shutter import Shutter
 from bridge.watchdog import Watchdog
 from rolling_panda import messages as m
 from rolling_panda.differential_drive import Array
+from rolling_panda.look_messages import PictureRequest
 from rolling_panda.robot_model import Limits
 from rolling_panda.row_messages import Capsule, Scenery
-from rolling_panda.topics import BRIDGE, CUT, MOTION, ODOMETRY
+from rolling_panda.topics import BRIDGE, CUT, MOTION, ODOMETRY, PICTURE
 from rolling_panda.transport import Rejections
 
 TICK_S = 0.001
@@ -136,6 +137,13 @@ class BridgeCore:
             self._begin_cut(command.cut_id, "")
         elif verdict == "refuse" and reason == inhibited:
             self._begin_cut(command.cut_id, "FAILED_NOT_CUT")
+
+    def on_picture(self, request: PictureRequest) -> None:
+        """Take a picture as soon as the camera is free; only for the controller whose commands are taken."""
+        if request.epoch != self._gate.epoch:
+            self.refusals.add(PICTURE.name, "not the controller's that commands the robot")
+            return
+        self._shutter.want(request)
 
     def on_stop(self, request: m.StopRequest, now: float) -> None:
         """Latch the software stop; repetitions and further stops keep the first one."""

@@ -27,6 +27,7 @@ class BridgeLoop:
         transport.on_reject = core.refusals.log
         self._motion = transport.slot(topics.MOTION)
         self._cuts = transport.feed(topics.CUT, 32)
+        self._pictures = transport.feed(topics.PICTURE, 8)
         transport.subscribe(topics.STOP, self._stop)
         transport.serve(topics.RELEASE, self._release)
         self._joints = transport.publisher(topics.JOINTS)
@@ -51,6 +52,8 @@ class BridgeLoop:
                 self._core.on_motion(motion.message, self._time.now, motion.at)
             for cut in self._cuts.drain():
                 self._core.on_cut(cut.message, self._time.now)
+            for picture in self._pictures.drain():
+                self._core.on_picture(picture.message)
             for _ in range(due):
                 outputs.append(self._core.step(self._time.tick(), clock))
         return outputs

@@ -117,6 +117,32 @@ class TrackerConfig(Struct, frozen=True, forbid_unknown_fields=True):
     spur_separation: Positive = 0.045
 
 
+class LookConfig(Struct, frozen=True, forbid_unknown_fields=True):
+    """A closer look at one point.
+
+    Attributes:
+        nearest: The camera may be this near (m).
+        farthest: And this far (m).
+        window: Half the side of what is looked at around the point (m).
+        beyond: The cane stands when it goes on this far past the cut (m).
+        aside: A cane farther beside the point than this is another one (m).
+        short: A cane that ends this near to the cut, before or after it, may still be its cane (m).
+        aligned: Cosine of the largest angle between the cane and the point's tangent.
+        node_shift: The last node that stays may be seen so far from where it was, along the cane (m).
+        node_room: A cut keeps this far from every node (m).
+    """
+
+    nearest: Positive = 0.25
+    farthest: Positive = 0.55
+    window: Positive = 0.09
+    beyond: Positive = 0.02
+    aside: Positive = 0.012
+    short: Positive = 0.02
+    aligned: Positive = 0.85
+    node_shift: Positive = 0.008
+    node_room: Positive = 0.008
+
+
 class ObstacleConfig(Struct, frozen=True, forbid_unknown_fields=True):
     """What becomes an obstacle that the arm keeps away from.
 
@@ -164,6 +190,7 @@ class PerceptionConfig(Struct, frozen=True, forbid_unknown_fields=True):
         skeleton: Pixels to canes.
         tracker: Points over time.
         obstacles: What the arm keeps away from.
+        look: A closer look at one point.
     """
 
     rate_hz: Positive = 20.0
@@ -178,3 +205,4 @@ class PerceptionConfig(Struct, frozen=True, forbid_unknown_fields=True):
     skeleton: SkeletonConfig = SkeletonConfig()
     tracker: TrackerConfig = TrackerConfig()
     obstacles: ObstacleConfig = ObstacleConfig()
+    look: LookConfig = LookConfig()

@@ -3,7 +3,7 @@
 import io
 import math
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -57,6 +57,30 @@ class View:
         z = camera[:, 2]
         safe = np.where(np.abs(z) < 1e-9, 1e-9, z)
         return np.stack([k.fx * camera[:, 0] / safe + k.cx, k.fy * camera[:, 1] / safe + k.cy, z], axis=1)
+
+    def part(self, rows: slice, cols: slice) -> "View":
+        """What a window of the frame shows, as a frame of its own; what reaches beyond the image is cut off.
+
+        Raises:
+            MessageError: The colour image is no JPEG of the right size.
+        """
+        k = self.intrinsics
+        top, bottom = max(0, rows.start), min(k.height, rows.stop)
+        left, right = max(0, cols.start), min(k.width, cols.stop)
+        window = slice(top, bottom), slice(left, right)
+        jpeg = b""
+        if self.color_jpeg:
+            out = io.BytesIO()
+            # Hardly compressed: it is read once, at once.
+            Image.fromarray(self.color()[window]).save(out, "JPEG", quality=98, subsampling=0)
+            jpeg = out.getvalue()
+        return replace(
+            self,
+            intrinsics=m.Intrinsics(right - left, bottom - top, k.fx, k.fy, k.cx - left, k.cy - top),
+            depth=self.depth[window],
+            labels=None if self.labels is None else self.labels[window],
+            color_jpeg=jpeg,
+        )
 
     def color(self) -> NDArray[np.uint8]:
         """The H×W×3 colour image.

@@ -3,6 +3,7 @@
 import queue
 import threading
 import time
+from collections.abc import Callable
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ from perception.worker import Worker
 from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.crop_messages import PointCrop
+from rolling_panda.look_messages import CloseLook
 from rolling_panda.plant_requests import PlantRequest
 from rolling_panda.row_messages import Obstacles
 from rolling_panda.transport import Transport
@@ -55,7 +57,9 @@ class Loop:
         self._crops = transport.publisher(topics.CROPS)
         self._heartbeat = transport.publisher(topics.HEARTBEAT)
         self._events = transport.publisher(topics.EVENT)
-        self._worker: Worker[_Job, _Result] = Worker(lambda job: _work(perception, job))
+        looks = transport.publisher(topics.LOOK)
+        # The controller waits for a look, so it is told before the rest of the frame is worked on.
+        self._worker: Worker[_Job, _Result] = Worker(lambda job: _work(perception, job, looks.put))
         self._asked: queue.SimpleQueue[_Asked] = queue.SimpleQueue()
         transport.serve(topics.PLANT, self._ask)
         self._newest: m.PruningPoints | None = None
@@ -162,13 +166,15 @@ class Loop:
         self._events.put(m.LogEvent(header=m.Header(now), process="perception", severity=severity, text=text[:500]))
 
 
-def _work(perception: Perception, job: _Job) -> _Result:
+def _work(perception: Perception, job: _Job, tell: Callable[[CloseLook], None]) -> _Result:
     if isinstance(job, _Asked):
         # What nobody waits for any more must not be done.
         if job.answer.set_running_or_notify_cancel():
             job.answer.set_result(perception.answer(job.request))
         points = perception.points()
     else:
+        if job.point_id:
+            tell(perception.look_closely(job))
         points = perception.process(job)
     obstacles = Obstacles(header=points.header, capsules=perception.obstacles)
     return _Result(points, perception.withdrawn, obstacles, perception.crops)

@@ -11,6 +11,7 @@ from perception.album import Album, Crop
 from perception.by_hand import near_wire, point_by_hand
 from perception.centreline import centrelines
 from perception.clearance import clearance
+from perception.close_look import look_closely, no_look
 from perception.config import PerceptionConfig, RuleConfig
 from perception.fragments import find_fragments, find_wood
 from perception.frame import View, decode_frame
@@ -28,6 +29,7 @@ from perception.tracker import Proposal, Tracked, Tracker
 from rolling_panda import messages as m
 from rolling_panda.crop_messages import PointCrop
 from rolling_panda.errors import InputError
+from rolling_panda.look_messages import CloseLook
 from rolling_panda.plant_requests import AddPoint, AddPointInImage, PlantRequest, SetRule
 from rolling_panda.robot_model import RobotModel
 from rolling_panda.row_messages import Capsule
@@ -117,6 +119,27 @@ class Perception:
         self._take(tracked)
         self._canes = tuple(_polyline(cane) for spur in plant.spurs for cane in spur.canes)
         return self._message(view, tracked.points, self._left_open(tracked.points), self._canes)
+
+    def look_closely(self, frame: m.CameraFrame) -> CloseLook:
+        """What a picture that the controller asked for shows of its point, which is known better from then on.
+
+        Args:
+            frame: As received, with the point's name.
+
+        Raises:
+            MessageError: The frame is corrupt; nothing changes.
+        """
+        point = self._tracker.ever(frame.point_id)
+        if point is None:
+            return no_look(frame, "perception knows no such point")
+        view = decode_frame(frame, self._model)
+        try:
+            look = look_closely(view, self.segmenter, point, frame.number, self._config)
+        except InputError as error:
+            return no_look(frame, str(error))
+        if look.position is not None and look.tangent is not None:
+            self._tracker.refine(point.point_id, np.array(look.position), np.array(look.tangent))
+        return look
 
     def answer(self, request: PlantRequest) -> m.Answer:
         """Do what an operator asks for; a refusal changes nothing."""

@@ -82,6 +82,8 @@ class Tracker:
         """Start with no points."""
         self._config = config
         self._tracks: list[_Track] = []
+        self._former: dict[str, m.PruningPoint] = {}
+        """Points withdrawn: whether their wood is off may still be asked."""
         self._named = 0
 
     def update(self, view: View, labels: NDArray[np.uint8], proposals: list[Proposal]) -> Tracked:
@@ -100,8 +102,11 @@ class Tracker:
             reason = None if track in supported else self._doubt(track, view, labels, contradicted)
             if reason is None:
                 keep.append(track)
-            elif track.shown is not None and reason:
-                withdrawn.append(f"{track.point_id} (vine {track.number.vine}, spur {track.number.spur}) {reason}")
+                continue
+            if track.shown is not None:
+                self._former[track.point_id] = track.shown
+                if reason:
+                    withdrawn.append(f"{track.point_id} (vine {track.number.vine}, spur {track.number.spur}) {reason}")
         before, self._tracks = self._tracks, keep
         self._show(supported)
         severed = tuple(t.position for t in before if t not in keep and t.gone >= self._config.gone)
@@ -140,6 +145,25 @@ class Tracker:
                 track = _Track(track.point_id, proposal.number, cut, cut.position, cut.tangent, cut.radius, shown=shown)
             track.shown = self._message(track)
             self._tracks.append(track)
+
+    def ever(self, point_id: str) -> m.PruningPoint | None:
+        """A point that is shown or was, as it was shown last; None when there was none of this name."""
+        shown = (track.shown for track in self._tracks if track.point_id == point_id)
+        return next(shown, None) or self._former.get(point_id)
+
+    def refine(self, point_id: str, position: Array, tangent: Array) -> None:
+        """A close look has shown better where a point is; it counts like all looks that are remembered.
+
+        Args:
+            point_id: Of a point shown; of any other nothing is known better.
+            position: On the axis (3, m, odom).
+            tangent: Unit vector along the cane (3, odom).
+        """
+        for track in self._tracks:
+            if track.point_id == point_id and track.shown is not None:
+                track.position, track.tangent = position, tangent
+                track.hits, track.misses, track.gone = max(track.hits, self._config.memory), 0, 0
+                track.shown = self._message(track)
 
     def points(self) -> tuple[m.PruningPoint, ...]:
         """The points shown, in the order in which they were first seen."""

@@ -1,8 +1,7 @@
 """Every message on the wire: frozen, typed, SI units, strict.
 
-Frames are those of REP-105 (`odom`, `base_link`, `tool`, `camera`). Quaternions say their order in the name. A bound
-on a number is part of its type, so decoding refuses NaN and infinity as well as what is out of range, and never clamps.
-Field names follow ROS where ROS has the message.
+Frames: REP-105 (`odom`, `base_link`, `tool`, `camera`). Quaternions say their order in the name. Fields have ROS's
+names. A bound is part of a number's type, so decoding refuses NaN, infinity and what is out of range, never clamping.
 """
 
 from typing import Annotated, Literal, get_args
@@ -282,6 +281,8 @@ class CameraFrame(Message, frozen=True, kw_only=True):
         depth_zlib: H×W uint16 little-endian, row-major, zlib; in units of `depth_unit`; 0 = no return.
         depth_unit: Metres a count.
         labels_zlib: H×W uint8 class indices (`WOOD_CLASSES`), zlib. Empty without a label camera (a real robot).
+        point_id: What the controller asked to look at; empty in a picture that nobody asked for.
+        number: Of that request.
     """
 
     header: Header
@@ -293,6 +294,8 @@ class CameraFrame(Message, frozen=True, kw_only=True):
     depth_zlib: bytes
     depth_unit: Annotated[float, Meta(gt=0.0, le=0.01)]
     labels_zlib: bytes = b""
+    point_id: Annotated[str, Meta(max_length=64)] = ""
+    number: Count = 0
 
 
 class PruningPoint(Struct, frozen=True, forbid_unknown_fields=True):

@@ -12,6 +12,7 @@ from rolling_panda import (
     control_messages,
     crop_messages,
     intents,
+    look_messages,
     plan_messages,
     plant_requests,
     row_messages,
@@ -80,6 +81,10 @@ CUT = Topic(
     "command/cut", m.CutCommand, "controller", 0, "REAL_TIME", "BLOCK",
     "close the blades once, repeated until seen", express=True,
 )
+PICTURE = Topic(
+    "command/picture", look_messages.PictureRequest, "controller", 0, "REAL_TIME", "DROP",
+    "take a picture of a point now, repeated until taken", express=True,
+)
 STOP = Topic(
     "command/stop", m.StopRequest, "any", 0, "REAL_TIME", "BLOCK",
     "software stop, sent several times", express=True,
@@ -144,6 +149,10 @@ CROPS = Topic(
     "perception/crops", crop_messages.PointCrop, "perception", 2, "BACKGROUND", "DROP",
     "a point's picture, at once when it is new, then one after the other", latched=True,
 )
+LOOK = Topic(
+    "perception/look", look_messages.CloseLook, "perception", 0, "INTERACTIVE_HIGH", "DROP",
+    "what a picture that was asked for shows of its point", express=True,
+)
 OBSTACLES = Topic(
     "perception/obstacles", row_messages.Obstacles, "perception", 1, "DATA_LOW", "DROP",
     "posts, trunks, cordons and wires seen so far", latched=True,
@@ -154,8 +163,8 @@ SCENERY = Topic(
 )
 
 TOPICS: tuple[Topic[Any], ...] = (
-    MOTION, CUT, STOP, TELEOP, JOINTS, ODOMETRY, BRIDGE, CONTROLLER, PLAN, HEARTBEAT, EVENT, CAMERA, POINTS,
-    CROPS, OBSTACLES, SCENERY, PRESENCE, CONTROL, STOPS, HARDWARE_STOP,
+    MOTION, CUT, PICTURE, STOP, TELEOP, JOINTS, ODOMETRY, BRIDGE, CONTROLLER, PLAN, HEARTBEAT, EVENT, CAMERA,
+    POINTS, CROPS, LOOK, OBSTACLES, SCENERY, PRESENCE, CONTROL, STOPS, HARDWARE_STOP,
 )
 
 

@@ -11,6 +11,7 @@ from bridge.interface import Measurement, Setpoint
 from bridge.odometer import Odometer
 from bridge.picture import Picture
 from rolling_panda import messages as m
+from rolling_panda.look_messages import PictureRequest
 from rolling_panda.robot_model import RobotModel
 
 MODEL = RobotModel()
@@ -289,3 +290,18 @@ def test_nothing_beyond_the_limits_is_ever_sent(script: list[tuple[str, list[flo
     assert np.all(np.abs(np.diff(sent, axis=0)) <= MODEL.limits.acceleration * 1e-3 + 1e-12)
     arm = bench.robot.now.position[2:]
     assert np.all((arm > MODEL.limits.lower[5:]) & (arm < MODEL.limits.upper[5:]))
+
+
+def test_a_picture_is_taken_at_once_for_the_controller_whose_commands_are_taken_and_no_other(bench: Bench) -> None:
+    bench.run(0.7, REST)
+
+    def look(epoch: int, number: int) -> list[tuple[str, int]]:
+        before = len(bench.outputs)
+        bench.core.on_picture(PictureRequest(epoch=epoch, number=number, point_id="p4"))
+        bench.run(0.05, REST)
+        frames = [out.frame for out in bench.outputs[before:] if out.frame is not None]
+        return [(frame.point_id, frame.number) for frame in frames if frame.point_id]
+
+    assert look(bench.epoch + 1, 1) == []
+    assert any("picture" in refusal.topic for refusal in bench.core.refusals.counts())
+    assert look(bench.epoch, 2) == [("p4", 2)]

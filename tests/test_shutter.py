@@ -1,6 +1,7 @@
 from bridge.picture import Picture
 from bridge.shutter import Shutter
 from rolling_panda import messages as m
+from rolling_panda.look_messages import PictureRequest
 
 PICTURE = Picture(m.Intrinsics(4, 4, 1.0, 1.0, 2.0, 2.0), b"c", b"d", b"l")
 Q = (0.0,) * 9
@@ -32,3 +33,20 @@ def test_never_two_exposures_at_once_and_the_posture_is_that_of_the_exposure() -
     assert frame is not None
     assert (frame.header.stamp, frame.base.x, frame.sequence) == (0.25, 1.0, 1)
     assert shutter.frame(PICTURE) is None
+
+
+def test_a_picture_that_is_asked_for_is_taken_at_once_and_once_and_carries_its_point() -> None:
+    shutter = Shutter(2.0, 0.5, 1e-3)
+    assert exposures(shutter, 0, 10) == [0]
+    shutter.want(PictureRequest(epoch=1, number=4, point_id="p7"))
+    assert shutter.due(20)
+    shutter.exposed(20, m.Header(0.02), m.PlanarPose(), Q)
+    shutter.want(PictureRequest(epoch=1, number=4, point_id="p7"))
+    frame = shutter.frame(PICTURE)
+    assert frame is not None and (frame.point_id, frame.number) == ("p7", 4)
+    assert not shutter.due(30), "a repetition takes no second picture"
+    shutter.want(PictureRequest(epoch=1, number=3, point_id="p6"))
+    assert not shutter.due(30), "an older request comes too late"
+    shutter.exposed(600, m.Header(0.6), m.PlanarPose(), Q)
+    usual = shutter.frame(PICTURE)
+    assert usual is not None and usual.point_id == ""
