@@ -6,6 +6,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from bridge.cut_memory import CutFile
 from bridge.loop import BridgeLoop
 from rolling_panda.process import ProcessContext, run_process
 
@@ -39,14 +40,16 @@ def _run(context: ProcessContext) -> None:
     # Here and not above: a bridge to a real robot must not need the simulator.
     from bridge.sim.build import simulated_bridge
 
+    cuts = CutFile(context.state_folder)
     core = simulated_bridge(
-        context.config_path, arguments.seed, arguments.trace, "process", context.transport.rejections
+        context.config_path, arguments.seed, arguments.trace, "process", context.transport.rejections, cuts=cuts
     )
     gc.freeze()
     try:
         BridgeLoop(core, context.transport).run(context.stopping)
     finally:
         core.robot.close()
+        cuts.close()
 
 
 if __name__ == "__main__":

@@ -10,7 +10,8 @@ from typing import Literal
 import numpy as np
 
 from bridge.config import BridgeConfig
-from bridge.cut_orders import CutOrders
+from bridge.cut_memory import CutMemory
+from bridge.cut_orders import FORGETFUL, CutOrders
 from bridge.gate import Gate
 from bridge.interface import Measurement, Robot, Setpoint
 from bridge.latch import StopLatch
@@ -66,6 +67,7 @@ class BridgeCore:
         kind: Literal["sim", "real"],
         scenery: SceneryOf | None = None,
         rejections: Rejections | None = None,
+        cuts: CutMemory | None = None,
     ) -> None:
         """Start with the watchdog tripped, at rest, without a stop.
 
@@ -77,6 +79,7 @@ class BridgeCore:
             kind: What the robot is, for people.
             scenery: Revision and rods to show; None on a real robot.
             rejections: Table of refusals shared with the transport.
+            cuts: Remembers cuts through restarts; None for as long as this lives.
         """
         self.robot = robot
         self.refusals = Refusals(rejections)
@@ -89,7 +92,7 @@ class BridgeCore:
         self._watchdog = Watchdog(config.fade_s, config.deadline_s)
         self._limiter = Limiter(limits, config.wheel_acceleration, config.joint_margin, TICK_S)
         self._latch = StopLatch()
-        self._orders = CutOrders()
+        self._orders = CutOrders(cuts)
         self._shutter = Shutter(config.camera_moving_hz, config.camera_resting_hz, TICK_S)
         self._pace = Pace()
         self._ticks = 0
@@ -135,7 +138,7 @@ class BridgeCore:
             self.robot.cut(command.cut_id, command.point_id)
             self._measured = replace(self._measured, cutter="closing", cut_id=command.cut_id, outcome="", detail="")
             self._begin_cut(command.cut_id, "")
-        elif verdict == "refuse" and reason == inhibited:
+        elif verdict == "refuse" and reason in (inhibited, FORGETFUL):
             self._begin_cut(command.cut_id, "FAILED_NOT_CUT")
 
     def on_picture(self, request: PictureRequest) -> None:

@@ -2,26 +2,30 @@
 
 from typing import Literal
 
+from bridge.cut_memory import CutMemory, ForLife
 from rolling_panda.messages import CutCommand
 
 OLD_EPOCH = "an older controller's cut"
 BUSY = "the blades are still at the last cut"
+FORGETFUL = "the cut cannot be remembered: the disk is full or broken"
 
-Verdict = Literal["cut", "known", "refuse"]
+Verdict = Literal["cut", "known", "wait", "refuse"]
 
 
 class CutOrders:
-    """Remembers every cut asked for, for as long as the process lives."""
+    """Remembers every cut asked for; with a durable memory, through restarts too."""
 
-    def __init__(self) -> None:
-        """Start with none."""
-        self._known: set[str] = set()
+    def __init__(self, memory: CutMemory | None = None) -> None:
+        """Start with what the memory knows."""
+        self._memory = memory or ForLife()
+        self._known: set[str] = set(self._memory.known)
 
     def judge(self, command: CutCommand, epoch: int, blades_free: bool, inhibited: str) -> tuple[Verdict, str]:
         """Whether to close the blades now, with the reason if not.
 
         An order that comes while the cutter is inhibited is spent: its repetitions must not cut later, when nobody
-        expects it. One from an older controller, or during another cut, changes nothing.
+        expects it. One that is not remembered durably yet waits for its next repetition. One from an older controller,
+        or during another cut, changes nothing.
 
         Args:
             command: The order.
@@ -35,5 +39,11 @@ class CutOrders:
             return "known", ""
         if not blades_free:
             return "refuse", BUSY
+        kept = self._memory.keep(command.cut_id)
+        if inhibited:
+            self._known.add(command.cut_id)
+            return "refuse", inhibited
+        if kept == "waiting":
+            return "wait", ""
         self._known.add(command.cut_id)
-        return ("refuse", inhibited) if inhibited else ("cut", "")
+        return ("cut", "") if kept == "kept" else ("refuse", FORGETFUL)

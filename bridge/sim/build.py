@@ -5,6 +5,7 @@ from typing import Literal
 
 from bridge.config import BridgeConfig
 from bridge.core import TICK_S, BridgeCore
+from bridge.cut_memory import CutMemory
 from bridge.odometer import Odometer
 from bridge.sim.camera_config import CameraConfig
 from bridge.sim.photographer import InlinePhotographer, Photographer, ProcessPhotographer
@@ -23,6 +24,7 @@ def simulated_bridge(
     trace: Path | None = None,
     camera: Literal["inline", "process"] = "inline",
     rejections: Rejections | None = None,
+    cuts: CutMemory | None = None,
 ) -> BridgeCore:
     """A bridge with the simulated robot beside a row grown from `seed`.
 
@@ -33,6 +35,7 @@ def simulated_bridge(
         camera: `inline` renders within a step, so that the same seed and commands give the same messages; `process`
             renders beside it, so that the physics keeps time.
         rejections: Table to count refusals in, shared with the transport.
+        cuts: Remembers cuts through restarts; None for as long as this lives.
 
     Raises:
         ConfigError: A section is wrong, or the trace cannot be written.
@@ -47,4 +50,4 @@ def simulated_bridge(
     )
     odometer = Odometer(model.drive, config.odometry, TICK_S, seed)
     robot = SimulatedRobot(config, row, photographer, writer)
-    return BridgeCore(robot, config, model.limits, odometer, "sim", robot.scenery, rejections)
+    return BridgeCore(robot, config, model.limits, odometer, "sim", robot.scenery, rejections, cuts)
