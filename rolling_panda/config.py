@@ -14,7 +14,7 @@ from msgspec import Meta, Struct
 
 from rolling_panda.errors import ConfigError
 
-SECTIONS = ("transport", "robot", "bridge", "vineyard", "camera", "controller", "perception", "server")
+SECTIONS = ("transport", "robot", "bridge", "vineyard", "camera", "controller", "perception", "server", "real")
 Positive = Annotated[float, Meta(gt=0.0, le=1e6)]
 Section = TypeVar("Section", bound=Struct)
 

@@ -132,12 +132,7 @@ class Onlooker:
         self.rejections = Rejections()
         self.on_reject: Callable[[str, str], None] = lambda topic, reason: None
         self._present: set[str] = set()
-        try:
-            self._session = zenoh.open(_zenoh_config(config))
-        except zenoh.ZError as error:
-            raise TransportError(
-                f"no wire at {', '.join(config.connect + config.listen)}: {_plain(error)}. Is the router running?"
-            ) from error
+        self._session = _open(config)
         self._presence = self._session.liveliness().declare_subscriber(
             key(robot_id, "alive/*"), self._on_presence, history=True
         )
@@ -273,6 +268,59 @@ class Transport(Onlooker):
         )
 
 
+class ForeignWire:
+    """A session for keys and bytes that are not this program's own: a base that speaks ROS 2 through a Zenoh bridge."""
+
+    def __init__(self, config: TransportConfig) -> None:
+        """Open the session.
+
+        Raises:
+            TransportError: The router cannot be reached or an endpoint is wrong.
+        """
+        self._session = _open(config)
+
+    def publisher(self, name: str) -> Callable[[bytes], None]:
+        """What sends bytes under this key, at once and newest first."""
+        publisher = self._session.declare_publisher(
+            name, priority=zenoh.Priority.REAL_TIME, congestion_control=zenoh.CongestionControl.DROP, express=True
+        )
+        return publisher.put
+
+    def subscribe(self, name: str, store: Callable[[bytes, float], None]) -> None:
+        """Call `store(bytes, received_at)` on a thread of the transport; too large samples are left out."""
+
+        def receive(sample: zenoh.Sample) -> None:
+            if len(sample.payload) <= _MAX_MESSAGE_BYTES:
+                store(sample.payload.to_bytes(), time.monotonic())
+
+        self._session.declare_subscriber(name, receive)
+
+    def serve(self, name: str, answer: Callable[[bytes], bytes]) -> None:
+        """Answer requests under this key, on a thread of the transport."""
+
+        def reply(query: zenoh.Query) -> None:
+            with query:
+                query.reply(query.key_expr, answer(query.payload.to_bytes() if query.payload is not None else b""))
+
+        self._session.declare_queryable(name, reply)
+
+    def ask(self, name: str, request: bytes, timeout_s: float) -> bytes:
+        """Ask a service and wait for its reply.
+
+        Raises:
+            ServiceError: Nobody answered in time.
+        """
+        for item in self._session.get(name, payload=zenoh.ZBytes(request), timeout=timeout_s):
+            if item.ok is not None:
+                return item.ok.payload.to_bytes()
+        raise ServiceError(f"{name} did not answer within {timeout_s} s: is its node running, and the bridge to Zenoh?")
+
+    def close(self) -> None:
+        """Close the session; safe to call twice."""
+        if not self._session.is_closed():
+            self._session.close()
+
+
 class Router:
     """The Zenoh router that the processes meet at, run inside this process."""
 
@@ -292,6 +340,15 @@ class Router:
     def close(self) -> None:
         """Stop routing."""
         self._session.close()
+
+
+def _open(config: TransportConfig) -> zenoh.Session:
+    try:
+        return zenoh.open(_zenoh_config(config))
+    except zenoh.ZError as error:
+        raise TransportError(
+            f"no wire at {', '.join(config.connect + config.listen)}: {_plain(error)}. Is the router running?"
+        ) from error
 
 
 def _plain(error: zenoh.ZError) -> str:

@@ -1,0 +1,39 @@
+"""Configuration of the real robot: section `[real]`."""
+
+from typing import Annotated
+
+from msgspec import Meta, Struct
+
+from rolling_panda.config import Positive
+
+Key = Annotated[str, Meta(max_length=200)]
+
+
+class BaseConfig(Struct, frozen=True, forbid_unknown_fields=True):
+    """The MP-500 as its maker's ROS 2 nodes show it behind a `zenoh-bridge-ros2dds`.
+
+    Attributes:
+        connect: Where that bridge is reached; empty = the router of this program.
+        namespace: Of the ROS nodes, put before every key.
+        command_hz: Velocity commands a second.
+        fade_s: Silence of this program after which the last command begins to fade.
+        deadline_s: Silence after which zeros are sent.
+        stale_s: Wheel speeds older than this are a fault.
+        unmonitored_s: An emergency-stop state older than this is a fault.
+        runaway_s: Wheels that still turn this long after zeros were commanded are stopped by the relay board.
+    """
+
+    connect: Key = ""
+    namespace: Key = ""
+    command_hz: Annotated[float, Meta(ge=10.0, le=200.0)] = 50.0
+    fade_s: Positive = 0.07
+    deadline_s: Positive = 0.2
+    stale_s: Positive = 0.25
+    unmonitored_s: Positive = 1.0
+    runaway_s: Positive = 1.0
+
+
+class RealConfig(Struct, frozen=True, forbid_unknown_fields=True):
+    """All devices of the real robot."""
+
+    base: BaseConfig = BaseConfig()

@@ -1,0 +1,236 @@
+"""The Neobotix MP-500 base: ROS 2 messages through Zenoh, with a deadline of our own.
+
+The maker's own watchdog lets the base run on for 1 s, 1.5 m at full speed. So a thread here sends commands at a fixed
+rate whatever the bridge does: a target that is not renewed fades to zero within `deadline_s`.
+
+The relay board tells the right motor's velocity negated, as it is mounted mirrored, and raw encoder counts in place of
+angles; the wheels' angles are the integral of their speeds.
+"""
+
+import threading
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from bridge.real import ros_messages as ros
+from bridge.real.config import BaseConfig
+from bridge.watchdog import Watchdog
+from rolling_panda.differential_drive import Array, DifferentialDrive
+from rolling_panda.errors import MessageError, ServiceError
+from rolling_panda.transport import ForeignWire
+
+COMMAND, WHEELS, ODOMETRY = "cmd_vel", "drives/joint_states", "odom"
+EMERGENCY, BATTERY = "emergency_stop_state", "battery_state"
+SOFT_STOP, SOFT_RELEASE = "set_EMstop", "unset_EMstop"
+FREE = 0
+# Slower than this (rad/s) a wheel is at rest: 7 mm/s.
+_REST = 0.05
+# A stamp that jumps by more than this (s) is no measure of the time between two messages.
+_LONGEST_GAP = 0.25
+_SERVICE_S = 1.0
+
+
+@dataclass(frozen=True)
+class BaseState:
+    """What the base says.
+
+    Attributes:
+        position: Angles of the wheels since the start, left and right (2, rad).
+        velocity: Their speeds (2, rad/s).
+        fault: Why the base may not move now; empty when it may.
+        severe: Whether a person has to release the fault.
+        battery: Charge 0…1; NaN when unknown.
+    """
+
+    position: Array
+    velocity: Array
+    fault: str
+    severe: bool
+    battery: float
+
+
+class Mp500:
+    """Implements the base's part of the robot. `read` and `write` return at once."""
+
+    def __init__(
+        self, wire: ForeignWire, drive: DifferentialDrive, acceleration: float, config: BaseConfig, moving: bool = True
+    ) -> None:
+        """Subscribe, and begin to send zeros.
+
+        Args:
+            wire: Where the base's ROS 2 topics are; closed with the base.
+            drive: Geometry of the base.
+            acceleration: Largest change of a wheel's speed in what is sent (rad/s²).
+            config: Names and deadlines.
+            moving: False sends nothing at all: state only.
+        """
+        self._wire, self._drive, self._config = wire, drive, config
+        self._step = acceleration / config.command_hz
+        self._watchdog = Watchdog(config.fade_s, config.deadline_s)
+        self._lock = threading.Lock()
+        self._target = self._sent = np.zeros(2)
+        self._position = self._velocity = np.zeros(2)
+        self._stamp = self._wheels_at = self._emergency_at = float("-inf")
+        self._emergency, self._cause = FREE, ""
+        self._rest_since: float | None = None
+        self._runaway = ""
+        self._battery = float("nan")
+        self._rejected = 0
+        prefix = f"{config.namespace}/" if config.namespace else ""
+        self._prefix = prefix
+        wire.subscribe(prefix + WHEELS, self._on_wheels)
+        wire.subscribe(prefix + EMERGENCY, self._on_emergency)
+        wire.subscribe(prefix + BATTERY, self._on_battery)
+        self._closing = threading.Event()
+        self._thread: threading.Thread | None = None
+        if moving:
+            self._send = wire.publisher(prefix + COMMAND)
+            self._thread = threading.Thread(target=self._command, name="mp500", daemon=True)
+            self._thread.start()
+
+    def read(self) -> BaseState:
+        """The newest state."""
+        now = time.monotonic()
+        with self._lock:
+            fault, severe = self._fault(now)
+            return BaseState(self._position, self._velocity, fault, severe, self._battery)
+
+    def write(self, wheels: Array) -> None:
+        """Speeds of the wheels from now on (2, rad/s), until the deadline."""
+        with self._lock:
+            self._target = wheels.copy()
+            self._watchdog.feed(time.monotonic())
+
+    def soft_stop(self) -> bool:
+        """Ask the relay board to stop the motors; waits. Returns whether it says so."""
+        return self._ask(SOFT_STOP)
+
+    def release(self) -> bool:
+        """Take the relay board's soft stop back, by an operator's word; waits. Returns whether it says so."""
+        with self._lock:
+            self._runaway = ""
+            self._rest_since = None
+        return self._ask(SOFT_RELEASE)
+
+    def close(self) -> None:
+        """Send a last zero and let go; safe to call twice."""
+        if not self._closing.is_set():
+            self._closing.set()
+            if self._thread is not None:
+                self._thread.join()
+                self._send(_twist(0.0, 0.0))
+            self._wire.close()
+
+    def _command(self) -> None:
+        period = 1.0 / self._config.command_hz
+        due = time.monotonic()
+        while not self._closing.wait(max(0.0, due - time.monotonic())):
+            now = time.monotonic()
+            # What was missed is left out: a burst of old commands helps nobody.
+            due = max(due + period, now)
+            with self._lock:
+                sent = self._next(now)
+                runaway = self._is_runaway(now)
+            self._send(_twist(*self._drive.twist(float(sent[0]), float(sent[1]))))
+            if runaway:
+                # Not from this thread: the answer may take a second, and commands go on.
+                threading.Thread(target=self.soft_stop, name="mp500-soft-stop", daemon=True).start()
+
+    def _next(self, now: float) -> Array:
+        fault, severe = self._fault(now)
+        if severe:
+            # The motors have no power: what follows begins at zero, by a ramp.
+            self._sent = np.zeros(2)
+        else:
+            goal = 0.0 * self._target if fault else self._watchdog.trust(now) * self._target
+            self._sent = self._sent + np.minimum(np.maximum(goal - self._sent, -self._step), self._step)
+        if np.any(self._sent != 0.0):
+            self._rest_since = None
+        elif self._rest_since is None:
+            self._rest_since = now
+        return self._sent
+
+    def _is_runaway(self, now: float) -> bool:
+        """Whether wheels turn that were told to rest; True once."""
+        if self._runaway or self._rest_since is None or now - self._rest_since < self._config.runaway_s:
+            return False
+        # By hand, with the motors off, it may be pushed about.
+        if self._emergency != FREE or float(np.abs(self._velocity).max()) <= _REST:
+            return False
+        self._runaway = "the wheels turn though zero is commanded; the relay board was told to stop the motors"
+        return True
+
+    def _fault(self, now: float) -> tuple[str, bool]:
+        """Why the base may not move, and whether a person has to release it; empty and False when it may."""
+        config = self._config
+        if self._runaway:
+            return self._runaway, True
+        if self._emergency != FREE:
+            return self._cause, True
+        if now - self._wheels_at > config.stale_s:
+            known = self._wheels_at > float("-inf")
+            age = f"for {now - self._wheels_at:.1f} s" if known else "yet"
+            return f"base: no wheel speeds on {self._prefix}{WHEELS} {age}", False
+        if now - self._emergency_at > config.unmonitored_s:
+            return f"base: no emergency-stop state on {self._prefix}{EMERGENCY}", False
+        return "", False
+
+    def _on_wheels(self, data: bytes, at: float) -> None:
+        try:
+            message = ros.decode(ros.JOINT_STATE, data)
+        except MessageError:
+            self._rejected += 1
+            return
+        if len(message.velocity) < 2 or not np.all(np.isfinite(message.velocity[:2])):
+            self._rejected += 1
+            return
+        velocity = np.array([message.velocity[0], -message.velocity[1]])
+        stamp = message.header.stamp.sec + message.header.stamp.nanosec * 1e-9
+        with self._lock:
+            gap = stamp - self._stamp
+            if not 0.0 < gap < _LONGEST_GAP:
+                gap = min(max(0.0, at - self._wheels_at), _LONGEST_GAP)
+            self._position = self._position + 0.5 * (velocity + self._velocity) * gap
+            self._velocity, self._stamp, self._wheels_at = velocity, stamp, at
+
+    def _on_emergency(self, data: bytes, at: float) -> None:
+        try:
+            message = ros.decode(ros.EMERGENCY_STOP, data)
+        except MessageError:
+            self._rejected += 1
+            return
+        causes = {
+            "button": message.emergency_button_stop,
+            "laser scanner": message.scanner_stop,
+            "software": message.software_stop,
+        }
+        names = ", ".join(name for name, active in causes.items() if active)
+        stopped = message.software_stop or message.emergency_state != FREE
+        with self._lock:
+            self._emergency = int(message.emergency_state) or int(message.software_stop)
+            self._emergency_at = at
+            self._cause = f"base: emergency stop ({names or 'being confirmed'})" if stopped else ""
+
+    def _on_battery(self, data: bytes, at: float) -> None:
+        try:
+            message = ros.decode(ros.BATTERY_STATE, data)
+        except MessageError:
+            self._rejected += 1
+            return
+        with self._lock:
+            self._battery = float(message.percentage)
+
+    def _ask(self, service: str) -> bool:
+        request = ros.encode(ros.make(ros.EMPTY, structure_needs_at_least_one_member=0))
+        try:
+            reply = self._wire.ask(self._prefix + service, request, _SERVICE_S)
+            return bool(ros.decode(ros.SUCCESS, reply).success)
+        except (ServiceError, MessageError):
+            return False
+
+
+def _twist(v: float, omega: float) -> bytes:
+    vector = "geometry_msgs/msg/Vector3"
+    linear, angular = ros.make(vector, x=v, y=0.0, z=0.0), ros.make(vector, x=0.0, y=0.0, z=omega)
+    return ros.encode(ros.make(ros.TWIST, linear=linear, angular=angular))
