@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from perception.clearance import clearance
 from perception.config import RuleConfig
+from perception.keep_out import near_wire
 from perception.numbering import SpurNumber
 from perception.plant import Array
 from perception.plant_map import KnownSpur, PlantMap
@@ -65,12 +65,6 @@ def point_by_hand(
         node_distance=nearest_node(cane, tuple(below), position),
     )
     return cut, spur.number
-
-
-def near_wire(obstacles: tuple[Capsule, ...], position: Array, distance: float) -> bool:
-    """Whether a known wire is within `distance` (m) of a place (3, m, odom)."""
-    gap = clearance(obstacles, "wire", position)
-    return gap is not None and gap < distance
 
 
 def _nearest(known: PlantMap, origin: Array, direction: Array) -> tuple[KnownSpur, int, float] | None:

@@ -23,6 +23,8 @@ _TAPER = 0.42
 _FALLBACK_RADIUS = 0.004
 #: Consecutive samples of an axis nearer than this make no direction (m).
 _STANDSTILL = 1e-5
+#: Where another cane goes on beyond an end, no farther than this from it in depth, the two run into each other (m).
+_JOINED = 0.02
 #: A piece of cane without pixels is hidden where it is at least this long (m); half a node.
 _HIDDEN = 0.006
 
@@ -68,16 +70,20 @@ def centrelines(view: View, wood: Wood, chains: list[Array], config: SkeletonCon
     found = np.isfinite(distance)
     pixel_owner = np.full(len(wood.rows), -1, dtype=np.intp)
     pixel_owner[found] = owner[nearest[found]]
+    cane = np.zeros(view.depth.shape, dtype=bool)
+    cane[wood.rows, wood.cols] = True
     out = []
     for k, line in enumerate(lines):
         members = np.nonzero(pixel_owner == k)[0]
-        measured = _measure(view, wood, members, line, config)
+        measured = _measure(view, wood, cane, members, line, config)
         if measured is not None:
             out.append(measured)
     return out
 
 
-def _measure(view: View, wood: Wood, members: Index, line: Array, config: SkeletonConfig) -> Centreline | None:
+def _measure(
+    view: View, wood: Wood, cane: NDArray[np.bool_], members: Index, line: Array, config: SkeletonConfig
+) -> Centreline | None:
     if len(members) < 20:
         return None
     stations = _arc(line)
@@ -98,7 +104,7 @@ def _measure(view: View, wood: Wood, members: Index, line: Array, config: Skelet
         width=width,
         nodes=_nodes(wood, members, along, config),
         hidden=_hidden(along, length),
-        ends=(_why(view, axis[0], axis[0] - axis[1]), _why(view, axis[-1], axis[-1] - axis[-2])),
+        ends=(_why(view, cane, axis[0], axis[0] - axis[1]), _why(view, cane, axis[-1], axis[-1] - axis[-2])),
     )
 
 
@@ -240,8 +246,8 @@ def _hidden(along: Array, length: float) -> tuple[Span, ...]:
     return tuple(Span(float(seen[g]), float(seen[g + 1])) for g in gaps)
 
 
-def _why(view: View, tip: Array, outward: Array) -> CaneEnd:
-    """Why a cane is seen no further than `tip`."""
+def _why(view: View, cane: NDArray[np.bool_], tip: Array, outward: Array) -> CaneEnd:
+    """Why a cane is seen no further than `tip`; where cane pixels go on, it runs into another one."""
     beyond = tip + outward / max(float(np.linalg.norm(outward)), 1e-9) * 0.008
     u, v, z = view.pixels(beyond)[0]
     height, width = view.depth.shape
@@ -250,4 +256,5 @@ def _why(view: View, tip: Array, outward: Array) -> CaneEnd:
         return "image border"
     patch: NDArray[np.float32] = view.depth[row - 1 : row + 2, col - 1 : col + 2]
     nearer = (patch > 0.0) & (patch < z - 0.01)
-    return "hidden" if nearer.any() else "free"
+    joined = cane[row, col] and abs(float(view.depth[row, col]) - z) < _JOINED
+    return "hidden" if nearer.any() or joined else "free"

@@ -18,11 +18,15 @@ class RuleConfig(Struct, frozen=True, forbid_unknown_fields=True):
         fruiting_nodes: The same on a Guyot vine's new cane.
         keeper_diameter: The lowest cane at least this thick becomes the new spur, else the thickest (m).
         offset: Cut this far past the last kept node (m).
+        shift: By so much at most a cut is moved along the cane to keep another cane out of the blades (m).
         short_internode: Where the next node is nearer than this, cut midway instead (m).
         basal_reach: A node nearer to the cane's base than this is the basal bud (m).
         clear_beyond: This much cane past the last kept node must be in plain view (m).
+        pruned: A cane that ends sooner than this past it has been pruned already (m).
         node_room: A hidden stretch at least this far from every seen node might hide another node (m).
-        diameter_doubt: Diameters closer to `keeper_diameter` than this leave the choice in doubt (m).
+        diameter_doubt: A diameter seen once and closer to `keeper_diameter` than this leaves the choice in doubt; over
+            more looks the less, by the root of their number (m).
+        steadiest: So many looks count for that at most: what they have in common does not average out.
         crowded: Nodes nearer to each other than this past the basal bud may belong to two canes (m).
         height_doubt: Canes whose bases differ in height by less than this cannot be told apart by it (m).
         stub_room: Least free stub between the keeper and the next cane for one cut that removes the rest (m).
@@ -30,7 +34,9 @@ class RuleConfig(Struct, frozen=True, forbid_unknown_fields=True):
         crossing: Another cane this near to the cut would be between the open blades too: half their opening (m).
         base_doubt: A cane whose base is hidden over more than this cannot have its nodes counted (m).
         largest_diameter: Thicker wood is refused (m).
-        wire_distance: No cut is proposed nearer to a wire than this (m).
+        wire_distance: No cut is proposed nearer to a wire or a hose than this: 15 mm, and 3 mm for what is seen (m).
+        cordon_distance: The same for cordon and trunk (m).
+        node_distance: The same for nodes that stay (m).
     """
 
     system: Literal["spur", "guyot"] = "spur"
@@ -38,11 +44,14 @@ class RuleConfig(Struct, frozen=True, forbid_unknown_fields=True):
     fruiting_nodes: Annotated[int, Meta(ge=3, le=20)] = 8
     keeper_diameter: Positive = 0.006
     offset: Positive = 0.020
+    shift: Positive = 0.008
     short_internode: Positive = 0.040
     basal_reach: Positive = 0.055
-    clear_beyond: Positive = 0.045
+    clear_beyond: Positive = 0.030
+    pruned: Positive = 0.045
     node_room: Positive = 0.035
     diameter_doubt: Positive = 0.00035
+    steadiest: Annotated[int, Meta(ge=1, le=100)] = 4
     crowded: Positive = 0.03
     height_doubt: Positive = 0.004
     stub_room: Positive = 0.016
@@ -51,6 +60,8 @@ class RuleConfig(Struct, frozen=True, forbid_unknown_fields=True):
     crossing: Positive = 0.015
     largest_diameter: Positive = 0.015
     wire_distance: Positive = 0.018
+    cordon_distance: Positive = 0.020
+    node_distance: Positive = 0.010
 
 
 class SkeletonConfig(Struct, frozen=True, forbid_unknown_fields=True):

@@ -8,14 +8,14 @@ from numpy.typing import NDArray
 
 from perception.abstention import OpenPlaces, abstention
 from perception.album import Album, Crop
-from perception.by_hand import near_wire, point_by_hand
+from perception.by_hand import point_by_hand
 from perception.centreline import centrelines
 from perception.clearance import clearance
 from perception.close_look import look_closely, no_look
-from perception.config import PerceptionConfig, RuleConfig
+from perception.config import PerceptionConfig
 from perception.fragments import find_fragments, find_wood
 from perception.frame import View, decode_frame
-from perception.keep_out import wire_near
+from perception.keep_out import as_known, in_view
 from perception.linking import link
 from perception.mending import mended
 from perception.numbering import RowNumbers, SpurNumber
@@ -102,19 +102,15 @@ class Perception:
             return self._message(view, tracked.points, self._left_open(tracked.points), self._canes)
         plant = perceive(view, labels, self._config)
         numbers = self._numbers.number(plant, view.R[:, 0])
-        self.known.update(plant, numbers)
+        spurs = self.known.update(plant, numbers)
         self._album.add(view, plant, numbers)
         fused = {spur.number: spur.as_spur() for spur in self.known.spurs} if self._config.fuse else {}
+        keep_out = in_view(view, labels, self.obstacles, self._config.rule)
         proposals = []
-        for spur, number in zip(plant.spurs, numbers, strict=True):
-            decision = apply_rule(fused.get(number, spur), self._config.rule, plant.beside(spur))
-            reasons = list(decision.abstained)
-            for cut in decision.cuts:
-                if wire_near(view, labels, cut.position, self._config.rule.wire_distance):
-                    reasons.append(_beside_wire(self._config.rule))
-                else:
-                    proposals.append(Proposal(cut, number))
-            self._open.note(number, bool(decision.cuts), reasons)
+        for seen, spur, number in zip(plant.spurs, spurs, numbers, strict=True):
+            decision = apply_rule(fused.get(number, spur), self._config.rule, plant.beside(seen), keep_out)
+            proposals += [Proposal(cut, number) for cut in decision.cuts]
+            self._open.note(number, bool(decision.cuts), list(decision.abstained))
         tracked = self._tracker.update(view, labels, proposals)
         self._take(tracked)
         self._canes = tuple(_polyline(cane) for spur in plant.spurs for cane in spur.canes)
@@ -228,17 +224,13 @@ class Perception:
         self._config = replace(self._config, rule=rule)
         spurs = {known.number: known.as_spur() for known in self.known.spurs}
         proposals = []
+        keep_out = as_known(self.obstacles, rule)
         self._open.clear()
         for number, spur in spurs.items():
             beside = [cane.axis for other in spurs.values() if other is not spur for cane in other.canes]
-            decision = apply_rule(spur, rule, np.concatenate([np.zeros((0, 3)), *beside]))
-            reasons = list(decision.abstained)
-            for cut in decision.cuts:
-                if near_wire(self.obstacles, cut.position, rule.wire_distance):
-                    reasons.append(_beside_wire(rule))
-                else:
-                    proposals.append(Proposal(cut, number))
-            self._open.note(number, bool(decision.cuts), reasons)
+            decision = apply_rule(spur, rule, np.concatenate([np.zeros((0, 3)), *beside]), keep_out)
+            proposals += [Proposal(cut, number) for cut in decision.cuts]
+            self._open.note(number, bool(decision.cuts), list(decision.abstained))
         self._tracker.restart(proposals)
         self._told = self._left_open(self._tracker.points())
         return m.Answer(ok=True, reason=f"{len(proposals)} points by the new rule")
@@ -293,10 +285,6 @@ def with_widening(config: PerceptionConfig, widening: float) -> PerceptionConfig
 
 def _crop_message(point: m.PruningPoint, crop: Crop) -> PointCrop:
     return PointCrop(point_id=point.point_id, revision=point.revision, sequence=crop.sequence, jpeg=crop.jpeg)
-
-
-def _beside_wire(rule: RuleConfig) -> str:
-    return f"a wire passes within {round(rule.wire_distance * 1000)} mm of the cut; cut this one by hand"
 
 
 def perceive(view: View, labels: "np.ndarray[tuple[int, ...], np.dtype[np.uint8]]", config: PerceptionConfig) -> Plant:

@@ -48,6 +48,7 @@ class Cane:
         hidden: Stretches that were not seen, by arc length.
         end: Why the axis stops.
         base_gap: Distance from the first axis point to the wood it grows from (m).
+        looks: Over how many looks the radius was measured.
     """
 
     axis: Array
@@ -57,6 +58,7 @@ class Cane:
     hidden: tuple[Span, ...]
     end: CaneEnd
     base_gap: float
+    looks: int = 1
 
     @property
     def base(self) -> Array:

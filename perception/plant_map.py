@@ -4,6 +4,7 @@ A cane seen again is known by its spur and by where its axis runs. Its nodes are
 the looks that could have shown them; places and radii are means over the looks, with their scatter.
 """
 
+from collections import deque
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -67,6 +68,7 @@ class KnownCane:
         radius: Over the looks (1, m).
         base: Over the looks (3, m, odom).
         nodes: Seen at least once, by arc length.
+        radii: Of the newest looks (m).
         cut_at: Arc length where it was cut (m); infinite while it stands.
     """
 
@@ -74,11 +76,16 @@ class KnownCane:
     radius: Estimate
     base: Estimate
     nodes: list[KnownNode] = field(default_factory=list)
+    radii: deque[float] = field(default_factory=lambda: deque(maxlen=_MEMORY))
     cut_at: float = np.inf
 
     def trusted(self) -> tuple[KnownNode, ...]:
         """Nodes seen in a good share of the looks, on what still stands."""
         return tuple(n for n in self.nodes if n.arc.looks >= _SHARE * self.base.looks and n.arc.mean[0] < self.cut_at)
+
+    def steadied(self, cane: Cane) -> Cane:
+        """A look at it, as thick as all looks say: in a single one something beside it may have made it wide."""
+        return replace(cane, radius=float(np.median(self.radii)), looks=len(self.radii))
 
     def as_cane(self) -> Cane:
         """The best look with the nodes and the radius of all."""
@@ -114,13 +121,14 @@ class PlantMap:
         self._spurs: dict[SpurNumber, KnownSpur] = {}
         self._trunks: dict[int, Estimate] = {}
 
-    def update(self, plant: Plant, numbers: tuple[SpurNumber, ...]) -> None:
-        """Take the plant of one frame in.
+    def update(self, plant: Plant, numbers: tuple[SpurNumber, ...]) -> tuple[Spur, ...]:
+        """Take the plant of one frame in; returns its spurs with canes as thick as all looks so far say.
 
         Args:
             plant: As perceived.
             numbers: Of its spurs, in their order.
         """
+        steadied = []
         for spur, number in zip(plant.spurs, numbers, strict=True):
             known = self._spurs.get(number)
             if known is None:
@@ -129,8 +137,8 @@ class PlantMap:
                 known.position.add(spur.position)
                 if not spur.doubt and (known.best.doubt or len(spur.canes) > len(known.best.canes)):
                     known.best = spur
-            for cane in spur.canes:
-                _add_cane(known, cane)
+            canes = tuple(_add_cane(known, cane).steadied(cane) for cane in spur.canes)
+            steadied.append(replace(spur, canes=canes))
         for place in plant.trunks:
             near = [n.vine for n in self._spurs if np.linalg.norm(self._spurs[n].position.mean[:2] - place[:2]) < 0.4]
             if near:
@@ -139,6 +147,7 @@ class PlantMap:
                     self._trunks[vine].add(place)
                 else:
                     self._trunks[vine] = Estimate.of(place)
+        return tuple(steadied)
 
     def sever(self, position: Array) -> bool:
         """What lies beyond a cut at `position` (3, m, odom) is gone; whether any known cane passes there."""
@@ -171,14 +180,17 @@ class PlantMap:
         return dict(self._trunks)
 
 
-def _add_cane(spur: KnownSpur, cane: Cane) -> None:
+def _add_cane(spur: KnownSpur, cane: Cane) -> KnownCane:
     for known in spur.canes:
         if _gap(known.best, cane) < _SAME_CANE:
             break
     else:
-        spur.canes.append(KnownCane(cane, Estimate.of(np.array([cane.radius])), Estimate.of(cane.base), _nodes(cane)))
-        return
+        known = KnownCane(cane, Estimate.of(np.array([cane.radius])), Estimate.of(cane.base), _nodes(cane))
+        known.radii.append(cane.radius)
+        spur.canes.append(known)
+        return known
     known.radius.add(np.array([cane.radius]))
+    known.radii.append(cane.radius)
     known.base.add(cane.base)
     if cane.base_gap + _unseen(cane) < known.best.base_gap + _unseen(known.best) and cane.length > 0.2:
         known.best = cane
@@ -191,6 +203,7 @@ def _add_cane(spur: KnownSpur, cane: Cane) -> None:
         else:
             known.nodes.append(KnownNode(Estimate.of(np.array([node.arc])), node.pixels))
     known.nodes.sort(key=lambda node: float(node.arc.mean[0]))
+    return known
 
 
 def _nodes(cane: Cane) -> list[KnownNode]:

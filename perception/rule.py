@@ -11,6 +11,7 @@ import numpy as np
 
 from perception.abstention import MoreToSee
 from perception.config import RuleConfig
+from perception.keep_out import KeepOut, anywhere
 from perception.plant import Array, Cane, Node, Spur
 from rolling_panda.messages import CutKind
 
@@ -61,13 +62,14 @@ class _Keeper:
     doubts: tuple[str, ...] = field(default=())
 
 
-def decide(spur: Spur, config: RuleConfig, beside: Array | None = None) -> Decision:
+def decide(spur: Spur, config: RuleConfig, beside: Array | None = None, keep_out: KeepOut = anywhere) -> Decision:
     """Apply the rule to one spur.
 
     Args:
         spur: With the canes that were followed to it.
         config: The rule's numbers.
         beside: Axis points of cane that is not this spur's, N×3 in odom (m).
+        keep_out: Where the blades must not go.
     """
     if not spur.canes:
         return Decision(abstained=(MoreToSee("no cane could be followed to this spur"),))
@@ -76,17 +78,15 @@ def decide(spur: Spur, config: RuleConfig, beside: Array | None = None) -> Decis
     keeper = choose_keeper(spur, config)
     if isinstance(keeper, str):
         return Decision(abstained=(keeper,))
-    shorten = _shorten(spur, keeper, config)
-    if isinstance(shorten, str):
-        return Decision(abstained=(shorten,))
     other_wood = [cane.axis for cane in spur.canes if cane is not keeper.cane]
     if beside is not None:
         other_wood.append(beside)
-    if _nearest(other_wood, shorten.position) < config.crossing:
-        return Decision(abstained=("another cane passes so close to the cut that the shears would take it too",))
+    shorten = _shorten(keeper, other_wood, config, keep_out)
+    if isinstance(shorten, str):
+        return Decision(abstained=(shorten,))
     if len(spur.canes) == 1:
         return Decision(cuts=(shorten,))
-    renew = _renew(spur, keeper, shorten, config)
+    renew = _renew(spur, keeper, shorten, config, keep_out)
     if isinstance(renew, str):
         return Decision(cuts=(shorten,), abstained=(renew,))
     return Decision(cuts=(shorten, renew))
@@ -108,7 +108,7 @@ def choose_keeper(spur: Spur, config: RuleConfig) -> _Keeper | str:
     if len(canes) == 1:
         return _Keeper(canes[0], "the only cane on this spur")
     # A choice that turns on less than the error of a diameter is none.
-    margin = config.diameter_doubt
+    margin = config.diameter_doubt / np.sqrt(min(config.steadiest, *(cane.looks for cane in canes)))
     keeper = _pick(canes, config.keeper_diameter)
     for limit in (config.keeper_diameter - margin, config.keeper_diameter + margin):
         if _pick(canes, limit) is not keeper:
@@ -148,11 +148,10 @@ def cut_arc(cane: Cane, config: RuleConfig) -> float | str:
         return MoreToSee(f"only {len(nodes)} of {kept} nodes seen on the cane to keep; never guessed")
     last = nodes[kept - 1]
     following = nodes[kept].arc - last.arc if len(nodes) > kept else None
-    if following is None and cane.length < last.arc + config.clear_beyond:
-        if cane.end == "free":
-            return (
-                f"the cane ends {1000 * max(0.0, cane.length - last.arc):.0f} mm past node {kept}: it is pruned already"
-            )
+    beyond = max(0.0, cane.length - last.arc)
+    if following is None and cane.end == "free" and beyond < config.pruned:
+        return f"the cane ends {1000 * beyond:.0f} mm past node {kept}: it is pruned already"
+    if following is None and beyond < config.clear_beyond:
         return MoreToSee(f"what lies beyond node {kept} is not in view")
     places = [node.arc for node in nodes[: kept + 1]]
     if any(second - first < config.crowded for first, second in zip(places, places[1:], strict=False)):
@@ -176,9 +175,37 @@ def _far_from(start: float, end: float, taken: list[float]) -> float:
     return float(np.min(np.abs(places[:, None] - np.array(taken)[None]), axis=1).max())
 
 
-def _shorten(spur: Spur, keeper: _Keeper, config: RuleConfig) -> Cut | str:
+def clear_arc(cane: Cane, arc: float, others: list[Array], config: RuleConfig, keep_out: KeepOut) -> float | str:
+    """Arc length nearest to a cut's (m) where nothing else is between the open blades, or why there is none.
+
+    Args:
+        cane: That is cut.
+        arc: Of the cut at its best (m).
+        others: Axes of other canes, each N×3 in odom (m).
+        config: How near is too near, and how far the cut may move.
+        keep_out: Where the blades must not go.
+    """
+    why = ""
+    for share in (0.0, 0.5, -0.5, 1.0, -1.0):
+        place = arc + share * config.shift
+        if any(abs(node.arc - place) < config.node_distance for node in cane.nodes):
+            continue
+        if _nearest(others, cane.at(place)) < config.crossing:
+            reason = "another cane passes so close to the cut that the shears would take it too"
+        else:
+            reason = keep_out(cane.at(place))
+        if not reason:
+            return place
+        why = why or reason
+    return why or "no place for the blades between two nodes"
+
+
+def _shorten(keeper: _Keeper, others: list[Array], config: RuleConfig, keep_out: KeepOut) -> Cut | str:
     cane = keeper.cane
-    arc = cut_arc(cane, config)
+    best = cut_arc(cane, config)
+    if isinstance(best, str):
+        return best
+    arc = clear_arc(cane, best, others, config, keep_out)
     if isinstance(arc, str):
         return arc
     if 2 * cane.radius > config.largest_diameter:
@@ -186,7 +213,7 @@ def _shorten(spur: Spur, keeper: _Keeper, config: RuleConfig) -> Cut | str:
     nodes = count_nodes(cane, config)
     kept = config.nodes_kept
     past = arc - nodes[kept - 1].arc
-    midway = past < config.offset - 1e-9
+    midway = best - nodes[kept - 1].arc < config.offset - 1e-9
     where = f"midway to the next node, {1000 * past:.0f} mm" if midway else f"{1000 * past:.0f} mm"
     return Cut(
         kind="spur cut",
@@ -215,7 +242,7 @@ def cut_confidence(cane: Cane, arc: float, choice: float, config: RuleConfig) ->
     return float(np.clip(seen * min(1.0, 0.6 + pixels / 50.0) * choice, 0.0, 1.0))
 
 
-def _renew(spur: Spur, keeper: _Keeper, shorten: Cut, config: RuleConfig) -> Cut | str:
+def _renew(spur: Spur, keeper: _Keeper, shorten: Cut, config: RuleConfig, keep_out: KeepOut) -> Cut | str:
     others = [cane for cane in spur.canes if cane is not keeper.cane]
     rest = f"the {len(others)} other cane{'s' if len(others) > 1 else ''} of this spur left for a person: "
     if spur.axis is None or spur.radius <= 0.0:
@@ -233,6 +260,8 @@ def _renew(spur: Spur, keeper: _Keeper, shorten: Cut, config: RuleConfig) -> Cut
     position = root + (stands + room / 2) * along
     if float(np.linalg.norm(keeper.cane.axis - position, axis=1).min()) < config.shears_room:
         return rest + "the shears would touch the cane that stays"
+    if kept_out := keep_out(position):
+        return rest + kept_out
     if 2 * spur.radius > config.largest_diameter:
         return rest + f"the stub is {2000 * spur.radius:.0f} mm thick, more than the shears may cut"
     return Cut(

@@ -1,23 +1,24 @@
 """The Guyot rule: of a spur's two canes the lower one becomes the next spur, the upper one the cane that will fruit."""
 
-import numpy as np
 from msgspec.structs import replace
 
 from perception.config import RuleConfig
+from perception.keep_out import KeepOut, anywhere
 from perception.plant import Array, Cane, Spur
-from perception.rule import Cut, Decision, count_nodes, cut_arc, cut_confidence, nearest_node
+from perception.rule import Cut, Decision, clear_arc, count_nodes, cut_arc, cut_confidence, nearest_node
 
 #: What the rule never proposes: last year's cane cannot be followed to its head from the front.
 _OLD_CANE = "last year's cane is left for a person"
 
 
-def decide_guyot(spur: Spur, config: RuleConfig, beside: Array | None = None) -> Decision:
+def decide_guyot(spur: Spur, config: RuleConfig, beside: Array | None = None, keep_out: KeepOut = anywhere) -> Decision:
     """Apply the rule to one spur.
 
     Args:
         spur: With the canes that were followed to it.
         config: The rule's numbers.
         beside: Axis points of cane that is not this spur's, N×3 in odom (m).
+        keep_out: Where the blades must not go.
     """
     if spur.doubt:
         return Decision(abstained=(spur.doubt,))
@@ -33,11 +34,7 @@ def decide_guyot(spur: Spur, config: RuleConfig, beside: Array | None = None) ->
         (lower, upper, config.nodes_kept, "spur cut"),
         (upper, lower, config.fruiting_nodes, "cane cut"),
     ):
-        result = _cut(cane, kept, kind, config)
-        if isinstance(result, Cut):
-            near = other.axis if beside is None else np.concatenate([other.axis, beside])
-            if float(np.linalg.norm(near - result.position, axis=1).min()) < config.crossing:
-                result = "another cane passes so close to the cut that the shears would take it too"
+        result = _cut(cane, kept, kind, [other.axis, beside if beside is not None else other.axis], config, keep_out)
         if isinstance(result, Cut):
             cuts.append(result)
         else:
@@ -45,9 +42,10 @@ def decide_guyot(spur: Spur, config: RuleConfig, beside: Array | None = None) ->
     return Decision(tuple(cuts), tuple(abstained))
 
 
-def _cut(cane: Cane, kept: int, kind: str, config: RuleConfig) -> Cut | str:
+def _cut(cane: Cane, kept: int, kind: str, others: list[Array], config: RuleConfig, keep_out: KeepOut) -> Cut | str:
     rule = replace(config, nodes_kept=kept)
-    arc = cut_arc(cane, rule)
+    best = cut_arc(cane, rule)
+    arc = best if isinstance(best, str) else clear_arc(cane, best, others, rule, keep_out)
     if isinstance(arc, str):
         return arc
     if 2 * cane.radius > config.largest_diameter:

@@ -9,7 +9,7 @@ from skimage.morphology import skeletonize
 
 from perception.config import PerceptionConfig
 from perception.fragments import CANE, NODE
-from perception.keep_out import wire_near
+from perception.keep_out import in_view
 from perception.photograph import Photograph
 from perception.pipeline import perceive
 from perception.rule import Cut
@@ -80,13 +80,11 @@ def read_still(photograph: Photograph, labels: NDArray[np.uint8], config: Percep
     view = photograph.view(depth)
     plant = perceive(view, labels, config)
     points, abstained = [], []
+    keep_out = in_view(view, labels, (), config.rule)
     for number, spur in enumerate(plant.spurs, 1):
-        decision = apply_rule(spur, config.rule, plant.beside(spur))
+        decision = apply_rule(spur, config.rule, plant.beside(spur), keep_out)
         abstained += [f"spur {number}: {reason}" for reason in decision.abstained]
         for cut in decision.cuts:
-            if wire_near(view, labels, cut.position, config.rule.wire_distance):
-                abstained.append(f"spur {number}: a wire passes close to the cut; cut this one by hand")
-                continue
             u, v, _ = view.pixels(cut.position)[0]
             x, y, _ = view.pixels(cut.position + 0.02 * cut.tangent)[0]
             points.append(StillPoint(cut, (float(u), float(v)), (float(x), float(y)), number))

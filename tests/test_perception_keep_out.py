@@ -7,11 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from perception.config import RuleConfig
 from perception.frame import View
-from perception.keep_out import wire_near
+from perception.keep_out import as_known, in_view, wire_near
 from rolling_panda import messages as m
+from rolling_panda.row_messages import Capsule
 
-WIRE, CANE = m.WOOD_CLASSES.index("wire"), m.WOOD_CLASSES.index("cane")
+WIRE, HOSE, CANE = (m.WOOD_CLASSES.index(kind) for kind in ("wire", "hose", "cane"))
+RULE = RuleConfig()
 LENS = m.Intrinsics(width=320, height=240, fx=400.0, fy=400.0, cx=159.5, cy=119.5)
 CUT = np.array([0.0, 0.0, 0.8])
 
@@ -47,3 +50,22 @@ def test_cuts_out_of_the_image_are_answered_too(x: float, y: float) -> None:
     outside = replace(seen, labels=np.zeros_like(seen.labels))
     assert outside.labels is not None
     assert wire_near(outside, outside.labels, np.array([x, y, 0.8]), 0.018) is False
+
+
+@pytest.mark.parametrize("kind", [WIRE, HOSE])
+def test_the_drip_hose_is_kept_away_from_like_a_wire(kind: int) -> None:
+    assert RULE.wire_distance >= 0.015
+    for above, near in ((0.014, True), (0.030, False)):
+        seen = view(round(119.5 - above * 400 / 0.8), 0.8)
+        assert seen.labels is not None
+        seen.labels[seen.labels == WIRE] = kind
+        assert bool(in_view(seen, seen.labels, (), RULE)(CUT)) is near
+
+
+@pytest.mark.parametrize("kind", ["wire", "hose", "cordon", "trunk"])
+def test_what_was_seen_before_keeps_the_blades_out_too(kind: m.WoodClass) -> None:
+    least = 0.020 if kind in ("cordon", "trunk") else 0.015
+    for gap, near in ((least - 0.001, True), (0.03, False)):
+        rod = Capsule(kind, (-1.0, 0.01 + gap, 0.8), (1.0, 0.01 + gap, 0.8), 0.01, 0.01)
+        assert bool(as_known((rod,), RULE)(CUT)) is near, f"{kind} at {gap} m"
+    assert as_known((), RULE)(CUT) == ""

@@ -90,6 +90,48 @@ def test_a_cut_where_another_cane_crosses_is_left_alone():
     assert decide(spur(cane()), RULE, np.zeros((0, 3))).cuts
 
 
+def test_a_cut_gives_way_to_a_cane_or_a_wire_that_crosses_a_little_off_and_stays_on_its_internode():
+    for side in (-1, 1):
+        crossing = np.array([[0.1 * k - 0.5, 0.008, 1.2 + side * 0.010] for k in range(11)])
+        (cut,) = decide(spur(cane()), RULE, crossing).cuts
+        assert 0.0 < (1.2 - cut.position[2]) * side <= RULE.shift + 1e-9
+        assert np.linalg.norm(crossing - cut.position, axis=1).min() >= RULE.crossing
+    (cut,) = decide(spur(cane()), RULE, None, lambda place: "wire" if abs(place[2] - 1.205) < 0.009 else "").cuts
+    assert cut.position[2] == pytest.approx(1.196) and "16 mm past node 2" in cut.reason
+    assert decide(spur(cane()), RULE, None, lambda place: "a wire is there").abstained == ("a wire is there",)
+
+
+def test_blades_keep_10_mm_from_the_nodes():
+    # Midway between nodes 30 mm apart; a cane crosses there, and to either side a node is too near.
+    tight = cane(nodes=(0.02, 0.10, 0.18, 0.212))
+    crossing = np.array([[0.0, 0.0145, 1.196]])
+    assert decide(spur(tight), RULE).cuts
+    assert all(cut.node_distance >= RULE.node_distance for cut in decide(spur(tight), RULE, crossing).cuts)
+    nearer = replace(tight, nodes=(*tight.nodes[:3], Node(0.198, 30)))
+    assert not decide(spur(nearer), RULE).cuts
+
+
+def test_a_diameter_seen_often_leaves_less_in_doubt():
+    near = [cane(radius=0.00311, base=(0.02, 0.0, 0.93)), cane(base=(0.0, 0.0, 0.99))]
+    assert "too near" in choose_keeper(spur(*near), RULE)
+    often = [replace(each, looks=9) for each in near]
+    assert choose_keeper(spur(*often), RULE).cane is often[0]
+    assert "too near" in choose_keeper(spur(often[0], near[1]), RULE), "one of them was seen once only"
+
+
+def test_a_cane_that_runs_into_another_is_cut_where_enough_of_it_is_seen_and_a_pruned_one_never_again():
+    going_on = cane(nodes=(0.02, 0.10, 0.18), length=0.212, end="hidden")
+    assert cut_arc(going_on, RULE) == pytest.approx(0.20)
+    assert "pruned already" in cut_arc(replace(going_on, end="free"), RULE)
+    assert "not in view" in cut_arc(cane(nodes=(0.02, 0.10, 0.18), length=0.205, end="hidden"), RULE)
+
+
+def test_a_stub_is_not_cut_where_the_blades_must_not_go():
+    low, high = cane(base=(0.025, 0.0, 0.93)), cane(base=(0.0, 0.0, 0.99))
+    decision = decide(spur(low, high), RULE, None, lambda place: "the cordon is near" if place[2] < 1.0 else "")
+    assert [cut.kind for cut in decision.cuts] == ["spur cut"] and "cordon" in decision.abstained[0]
+
+
 def test_a_cane_below_the_keeper_is_left_for_a_person():
     thin = cane(radius=0.0025, base=(0.02, 0.0, 0.93))
     decision = decide(spur(thin, cane(base=(0.0, 0.0, 0.99))), RULE)

@@ -42,6 +42,14 @@ def test_a_cane_seen_again_is_one_cane_and_its_measures_are_means():
     assert only.radius.mean[0] == pytest.approx(0.004) and only.radius.covariance[0, 0] > 0.0
 
 
+def test_a_look_is_as_thick_as_most_looks_say():
+    map_, looks = PlantMap(), [0.004, 0.0041, 0.0065, 0.0039]
+    told = [map_.update(plant(cane(radius=radius)), (NUMBER,))[0].canes[0] for radius in looks]
+    assert [only.looks for only in told] == [1, 2, 3, 4]
+    assert told[0].radius == 0.004 and told[2].radius == pytest.approx(0.0041)
+    assert told[3].radius == pytest.approx(0.00405) and told[3].nodes == cane().nodes
+
+
 def test_canes_side_by_side_stay_two():
     (spur,) = known(*[plant(cane(), cane(x=0.03))] * 3).spurs
     assert len(spur.canes) == 2 and len(spur.as_spur().canes) == 2
