@@ -168,7 +168,8 @@ class ObstacleConfig(Struct, frozen=True, forbid_unknown_fields=True):
         apart: Posts and trunks farther apart than this along the row are two (m).
         wire_apart: Wires farther apart than this in height are two (m).
         piece: A cordon is cut into pieces of this length (m).
-        most: Rods kept at most.
+        most: Rods kept at most; of canes the nearest.
+        canes: Whether what stays of the canes is among them.
     """
 
     nearest: Positive = 0.2
@@ -182,6 +183,7 @@ class ObstacleConfig(Struct, frozen=True, forbid_unknown_fields=True):
     wire_apart: Positive = 0.06
     piece: Positive = 0.15
     most: Annotated[int, Meta(ge=1, le=500)] = 200
+    canes: bool = True
 
 
 class PerceptionConfig(Struct, frozen=True, forbid_unknown_fields=True):

@@ -24,6 +24,7 @@ from perception.plant import Cane, Plant
 from perception.plant_map import PlantMap
 from perception.rules import apply_rule
 from perception.segmenter import Segmenter
+from perception.staying import StayingCanes
 from perception.topology import build_plant
 from perception.tracker import Proposal, Tracked, Tracker
 from rolling_panda import messages as m
@@ -68,6 +69,7 @@ class Perception:
         self._eyes: dict[int, View] = {}
         self._canes: tuple[tuple[m.Vector3, ...], ...] = ()
         self._map = ObstacleMap(config.obstacles)
+        self._staying = StayingCanes(config.obstacles)
         self._album = Album()
         self._crops: dict[str, PointCrop] = {}
         self.known = PlantMap()
@@ -93,12 +95,13 @@ class Perception:
             labels = self.segmenter.segment(view)
         except InputError as error:
             return self._message(view, self._tracker.points(), (abstention(str(error)),), ())
-        self.obstacles = self._map.update(view, labels)
+        rods = self._map.update(view, labels)
         self._frames += 1
         if not self._is_survey(view, labels):
             # Too near or too far to read a whole spur; near enough to see whether the wood still stands.
             tracked = self._tracker.update(view, labels, [])
             self._take(tracked)
+            self._tell_obstacles(view, labels, rods, ())
             return self._message(view, tracked.points, self._left_open(tracked.points), self._canes)
         plant = perceive(view, labels, self._config)
         numbers = self._numbers.number(plant, view.R[:, 0])
@@ -113,6 +116,7 @@ class Perception:
             self._open.note(number, bool(decision.cuts), list(decision.abstained))
         tracked = self._tracker.update(view, labels, proposals)
         self._take(tracked)
+        self._tell_obstacles(view, labels, rods, numbers)
         self._canes = tuple(_polyline(cane) for spur in plant.spurs for cane in spur.canes)
         return self._message(view, tracked.points, self._left_open(tracked.points), self._canes)
 
@@ -232,6 +236,7 @@ class Perception:
             proposals += [Proposal(cut, number) for cut in decision.cuts]
             self._open.note(number, bool(decision.cuts), list(decision.abstained))
         self._tracker.restart(proposals)
+        self._staying.choose(self.known.spurs, self._tracker.shown(), rule)
         self._told = self._left_open(self._tracker.points())
         return m.Answer(ok=True, reason=f"{len(proposals)} points by the new rule")
 
@@ -242,6 +247,20 @@ class Perception:
         self.withdrawn = tracked.withdrawn
         for place in tracked.severed:
             self.known.sever(place)
+
+    def _tell_obstacles(
+        self, view: View, labels: NDArray[np.uint8], rods: tuple[Capsule, ...], numbers: tuple[SpurNumber, ...]
+    ) -> None:
+        """Rods, and of the canes that stay the nearest; `numbers` are the spurs that this frame has shown."""
+        config = self._config.obstacles
+        if not config.canes:
+            self.obstacles = rods
+            return
+        seen = [spur for spur in self.known.spurs if spur.number in numbers]
+        canes = self._staying.update(view, labels, seen, self._tracker.shown(), self._config.rule)
+        told = (*rods, *canes)[: config.most]
+        # The same object as before where nothing is new.
+        self.obstacles = self.obstacles if told == self.obstacles else told
 
     def _remember(self, view: View) -> None:
         """Keep the cameras' places of the newest frames, for clicks into them; not their images."""

@@ -1,5 +1,6 @@
 """Points over time: identities that last, averages that beat the noise, and withdrawal of what has gone."""
 
+import dataclasses
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -168,6 +169,14 @@ class Tracker:
     def points(self) -> tuple[m.PruningPoint, ...]:
         """The points shown, in the order in which they were first seen."""
         return tuple(track.shown for track in self._tracks if track.shown is not None)
+
+    def shown(self) -> tuple[Proposal, ...]:
+        """The cuts behind these points, each where the point is."""
+        return tuple(
+            Proposal(dataclasses.replace(t.cut, position=np.array(t.shown.position)), t.number)
+            for t in self._tracks
+            if t.shown is not None
+        )
 
     def _associate(self, proposals: list[Proposal]) -> list[_Track]:
         """Each proposal joins the nearest track of its kind, or starts one; returns the tracks supported."""
