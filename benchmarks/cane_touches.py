@@ -1,8 +1,9 @@
 """Whether the robot brushes against canes, worked out from the row as it stands: in the simulation canes give way."""
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
-from bridge.sim.row import Rod
+from bridge.sim.row import Rod, Row
+from bridge.sim.vineyard_truth import judge
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.collision_geometry import BLADES
 from controller.whole_body.obstacle import Obstacle
@@ -20,13 +21,20 @@ class CaneTouches:
 
     Attributes:
         touched: For each cane the parts that touched it.
+        touched_staying: The same for wood of it that stays when the row is pruned.
     """
 
-    def __init__(self) -> None:
-        """Nothing touched."""
+    def __init__(self, staying: Collection[int] = ()) -> None:
+        """Nothing touched.
+
+        Args:
+            staying: Rods that stay, by their numbers.
+        """
         self._model = CollisionModel(RobotModel())
         self._revision = -1
+        self._staying = frozenset(f"{number}" for number in staying)
         self.touched: dict[Cane, set[str]] = {}
+        self.touched_staying: dict[Cane, set[str]] = {}
 
     def look(self, q: Array, rods: Iterable[tuple[int, Rod]], revision: int) -> None:
         """Take in one moment.
@@ -49,6 +57,19 @@ class CaneTouches:
         for a, b in self._model.distances(q, 0.0).pairs:
             if b in self._canes and a != BLADES:
                 self.touched.setdefault(self._canes[b], set()).add(a)
+                if b in self._staying:
+                    self.touched_staying.setdefault(self._canes[b], set()).add(a)
+
+
+def staying_rods(row: Row) -> frozenset[int]:
+    """Rods of the canes that the judge keeps, below the one that is cut through; `row` has not been cut yet."""
+    truth = {(spur.vine, spur.spur): spur for spur in judge(row)}
+    out = set()
+    for number, rod in row.standing():
+        spur = truth.get((rod.vine, rod.spur))
+        if spur is not None and spur.cut is not None and rod.cane == spur.keeper and number < spur.cut.rod:
+            out.add(number)
+    return frozenset(out)
 
 
 def _point(at: Array) -> tuple[float, float, float]:

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.cane_touches import CaneTouches
+from benchmarks.cane_touches import Cane, CaneTouches, staying_rods
 from benchmarks.closed_loop import ClosedLoop
 from benchmarks.documents import one_row_a_line
 from benchmarks.intervals import share
@@ -26,6 +26,7 @@ from benchmarks.row_stages import LIMITS, STAGES, StageClock
 from benchmarks.row_walk import walk
 from bridge.sim import trace
 from bridge.sim.robot import SimulatedRobot
+from bridge.sim.row import Row
 from controller.config import ControllerConfig
 from controller.motion import Tracking
 from controller.whole_body.registry import METHODS
@@ -91,6 +92,7 @@ class RowRun:
         limits: Seconds under way between cuts by what held the motion back.
         canes_touched: Canes, not the ones cut, that a part of the robot other than the blades overlapped with, and
             which parts these were.
+        staying_touched: The same of wood that stays when the row is pruned, on canes that were cut too.
     """
 
     method: str
@@ -105,6 +107,7 @@ class RowRun:
     stages: dict[str, float]
     limits: dict[str, float]
     canes_touched: dict[str, str]
+    staying_touched: dict[str, str]
 
 
 def cut_row(seed: int, points: int, method: str, pictures: float, along: float = 0.0, plans: bool = True) -> RowRun:
@@ -124,21 +127,19 @@ def cut_row(seed: int, points: int, method: str, pictures: float, along: float =
     errors: list[float] = []
     clock = StageClock(load_section(resource("assets/config/sim.toml"), "controller", ControllerConfig))
 
-    touches = CaneTouches()
-
     def watch(loop: ClosedLoop, tracking: Tracking) -> None:
         if loop.controller.mode == "AUTO":
             clock.note(loop, tracking)
             if len(errors) % _LOOK_EVERY == 0:
-                robot = loop.bridge.robot
-                assert isinstance(robot, SimulatedRobot)
-                touches.look(loop.configuration(), robot.row.standing(), robot.row.revision)
+                row = _row(loop)
+                touches.look(loop.configuration(), row.standing(), row.revision)
             errors.append(float(np.linalg.norm(loop.true_tool() - tracking.desired.translation)))
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "trace"
         config = _config(Path(folder) / "row.toml", pictures)
         with ClosedLoop(seed, path, config, method, watch, plans) as loop:
+            touches = CaneTouches(staying_rods(_row(loop)))
             accepted = [] if along else _accept(loop, points)
             begin, other_s = loop.now, 0.0
             if along:
@@ -187,7 +188,14 @@ def cut_row(seed: int, points: int, method: str, pictures: float, along: float =
         stages=clock.stages,
         limits=clock.limits,
         canes_touched=_spared(touches, record.events),
+        staying_touched=_named(touches.touched_staying),
     )
+
+
+def _row(loop: ClosedLoop) -> Row:
+    robot = loop.bridge.robot
+    assert isinstance(robot, SimulatedRobot)
+    return robot.row
 
 
 def _config(path: Path, pictures: float) -> Path:
@@ -201,10 +209,13 @@ def _config(path: Path, pictures: float) -> Path:
 def _spared(touches: CaneTouches, events: Sequence[dict[str, Any]]) -> dict[str, str]:
     """What was touched, but for the canes that were cut."""
     cut = {(piece["vine"], piece["spur"], piece["cane"]) for event in events for piece in event.get("severed", ())}
+    return _named({cane: parts for cane, parts in touches.touched.items() if cane not in cut})
+
+
+def _named(touched: dict[Cane, set[str]]) -> dict[str, str]:
     return {
         f"vine {vine}, spur {spur}, cane {cane}": ", ".join(sorted(parts))
-        for (vine, spur, cane), parts in sorted(touches.touched.items())
-        if (vine, spur, cane) not in cut
+        for (vine, spur, cane), parts in sorted(touched.items())
     }
 
 
@@ -361,6 +372,7 @@ def summarise(runs: list[RowRun]) -> dict[str, float | int]:
         "contact_steps": sum(run.contacts for run in runs),
         "self_contact_steps": sum(run.self_contacts for run in runs),
         "canes_touched": sum(len(run.canes_touched) for run in runs),
+        "staying_touched": sum(len(run.staying_touched) for run in runs),
         "stops": sum(run.stops for run in runs),
     }
 

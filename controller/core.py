@@ -185,6 +185,7 @@ class Controller:
             self._measured = Measured(q, self._robot.kinematics(q), self._sent)
             self._method.begin(self._sent, self._before, wheels)
         self._surroundings.take(inputs.obstacles)
+        self._surroundings.work_at(self._sequence.places)
         self._clearance.take(inputs.obstacles)
         if bridge is not None:
             for text in self._sequence.watch(bridge, now):
@@ -365,7 +366,7 @@ class Controller:
         obstacles = self._inputs.obstacles
         return self._session.review(
             made=self._inputs.plan,
-            q=None if self._measured is None else self._measured.q,
+            q=None if self._measured is None else self._sequence.clear_of_canes(self._measured.q),
             obstacles=() if obstacles is None else obstacles.message.capsules,
             at_rest=self._homing is None and self._state.mode != "TELEOP" and not np.any(self._sent),
             working=self._state.mode == "AUTO",

@@ -2,6 +2,7 @@
 
 from controller.config import ControllerConfig
 from controller.interface import Sample
+from controller.planning.limits import PlanLimits
 from controller.reach import CutPlan
 from controller.surroundings import Surroundings
 from controller.whole_body.collision import CollisionModel
@@ -27,19 +28,26 @@ class CutClearance:
         self._surroundings.take(obstacles)
 
     def admits(self, plan: CutPlan) -> bool:
-        """Whether the robot is far enough from itself and all else at the cut, the stand-off and clear of the canes."""
+        """Whether the robot is far enough from itself and all else at the cut, the stand-off and clear of the canes.
+
+        The blades may touch the spur that is cut.
+        """
+        self._surroundings.work_at((plan.poses.cut.translation,))
         self.lacking = self._nearer(plan) if self._settings.collisions else ""
         return not self.lacking
 
     def _nearer(self, plan: CutPlan) -> str:
         """What is nearer than it may be, in words; empty where nothing is."""
         settings = self._settings
-        within = settings.collision_distance + _ROOM
+        within = max(settings.collision_distance + _ROOM, PlanLimits.clearance)
         places = (("at the cut", plan.q_cut), ("at the stand-off", plan.q_stand_off), ("clear of it", plan.q_clear))
         for where, q in places:
             near = self._surroundings.model.distances(q, within)
             for distance, pair in zip(near.distance.tolist(), near.pairs, strict=True):
                 needed = settings.kept(pair) + _ROOM
+                if q is plan.q_clear:
+                    # From here a plan leads on.
+                    needed = max(needed, PlanLimits.clearance)
                 if distance < needed:
                     return (
                         f"{where} {1e3 * distance:.0f} mm would be between {pair[0]} and {pair[1]}, "

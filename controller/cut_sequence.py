@@ -101,6 +101,7 @@ class CutSequence:
         self._motion: ToolMotion | None = None
         self._plan: CutPlan | None = None
         self._accepted: m.PruningPoint | None = None
+        self._places: tuple[Array, ...] = ()
         self._coming = NextCut(search, queue, config.search_steps_each, known)
         self._forget()
 
@@ -118,6 +119,15 @@ class CutSequence:
     def in_canes(self) -> str:
         """Point that the tool hides from the camera now, empty when none."""
         return self._point_id if self._stage in (Stage.ADVANCE, Stage.CUT, Stage.RETREAT) else ""
+
+    @property
+    def places(self) -> tuple[Array, ...]:
+        """Cuts that the motion under way begins or ends at (3, m, odom): the blades may touch the spurs there."""
+        return self._places
+
+    def clear_of_canes(self, q: Array) -> Array:
+        """Configuration (12) that the work under way will be in before it goes on, from q (12): q outside the canes."""
+        return _at_base(self._plan.q_clear, q) if self.in_canes and self._plan is not None else q
 
     @property
     def cutting(self) -> bool:
@@ -152,6 +162,11 @@ class CutSequence:
         if self._stage in (Stage.TRAVEL, Stage.ADVANCE):
             self._refine()
         work = _STEPS[self._stage](self, robot, now)
+        onwards = self._coming.found if self._stage is Stage.RETREAT else None
+        plans = [plan for plan in (self._plan, onwards) if isinstance(plan, CutPlan)]
+        if plans:
+            # While the tool is got clear of the canes there is no plan, and it is still where the last one led.
+            self._places = tuple(plan.poses.cut.translation for plan in plans)
         return work if not self._events else _with(work, tuple(self._events))
 
     # --- stages ------------------------------------------------------------------------------------------------------

@@ -6,7 +6,7 @@ import numpy as np
 
 from controller.queue import Ticket
 from controller.surroundings import obstacles_of
-from controller.whole_body.obstacle import Axes
+from controller.whole_body.obstacle import Axes, Obstacle
 from controller.work_plan import WorkPlan
 from rolling_panda.differential_drive import Array
 from rolling_panda.messages import PointState
@@ -19,6 +19,8 @@ OBSTACLE_TOLERANCE = 0.05
 PLACE_TOLERANCE, TURN_TOLERANCE, JOINT_TOLERANCE = 0.05, 0.05, 0.1
 #: No point of the robot is farther than this from the middle of its axle (m): what stands beyond is not in its way.
 _REACH = 1.3
+#: A cane matters where the tool goes in among the canes: its half width, with the camera beside it, and some room (m).
+_BESIDE_TOOL = 0.12
 #: Rows of a way between two places of the base that are looked at.
 _LOOK = 20
 #: Places along an obstacle's axis that are compared, as shares of its length.
@@ -72,11 +74,14 @@ class ObstacleWatch:
         self._axes = Axes(tuple(obstacles_of(self._before)))
         ways = [cut.way.q[:, :2] for cut in plan.cuts]
         self._track = np.vstack([*(way[::_LOOK] for way in ways), *(way[-1:] for way in ways), np.empty((0, 2))])
+        lines = [(cut.cut.poses.clear.translation, cut.cut.poses.cut.translation) for cut in plan.cuts]
+        self._lines = Axes(tuple(Obstacle("", "line", _point(a), _point(b), _BESIDE_TOOL) for a, b in lines))
 
     def changed(self, now: Sequence[Capsule]) -> str:
         """What stands in the plan's way where nothing stood; empty where nothing does.
 
-        What has gone changes nothing, nor does what is out of the robot's reach all the way.
+        What has gone changes nothing, nor does what is out of the robot's reach all the way, nor a cane that is not
+        beside the tool's line into a cut.
 
         Args:
             now: What stands around now.
@@ -91,8 +96,19 @@ class ObstacleWatch:
             # How far each place sticks out of the one that it sticks out of the least.
             new = self._axes.gaps(places, -np.repeat(radius, len(_SHARES))).min(axis=1) > OBSTACLE_TOLERANCE
         for index in np.flatnonzero(new):
-            if np.hypot(*(places[index, :2] - self._track).T).min() < _REACH:
+            kind = now[int(index) // len(_SHARES)].kind
+            if self._in_the_way(places[index], kind == "cane"):
                 x, y, z = places[index]
-                kind = now[int(index) // len(_SHARES)].kind
                 return f"a {kind} is seen at ({x:.1f}, {y:.1f}, {z:.1f}) m that was not when it was made"
         return ""
+
+    def _in_the_way(self, place: Array, cane: bool) -> bool:
+        if cane:
+            # More canes come into view all along the row; only the tool goes in among them.
+            return float(self._lines.gaps(place[None], np.zeros(1)).min()) < 0.0
+        return float(np.hypot(*(place[:2] - self._track).T).min()) < _REACH
+
+
+def _point(at: Array) -> tuple[float, float, float]:
+    x, y, z = at.tolist()
+    return x, y, z

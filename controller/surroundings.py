@@ -2,22 +2,31 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from controller.interface import Sample
 from controller.whole_body.collision import CollisionModel
-from controller.whole_body.obstacle import Obstacle
+from controller.whole_body.obstacle import Axes, Obstacle
+from rolling_panda.differential_drive import Array
 from rolling_panda.row_messages import Capsule, Obstacles
 
 #: A rod thinner than this is watched as if it were this thick (m).
 _THINNEST = 0.001
+#: The spur that is cut has a cane this near to the cut (m): what stays of a cane ends just below it, and shears cut a
+#: stub beside the cane that stays on it.
+_ON_SPUR = 0.045
 
 
 class Surroundings:
-    """Keeps a collision model up to date with the newest obstacles."""
+    """Keeps a collision model up to date with the newest obstacles, and with which of them the blades may touch."""
 
     def __init__(self, model: CollisionModel) -> None:
         """Begin with nothing around."""
         self.model = model
         self._seen: Sample[Obstacles] | None = None
+        self._places: tuple[Array, ...] = ()
+        self._canes: tuple[Capsule, ...] = ()
+        self._names: tuple[str, ...] = ()
 
     def take(self, obstacles: Sample[Obstacles] | None) -> None:
         """Take the newest message; one that was taken before costs nothing."""
@@ -25,15 +34,41 @@ class Surroundings:
             return
         changed = self._seen is None or obstacles.message.capsules != self._seen.message.capsules
         self._seen = obstacles
-        if changed:
-            self.model.set_obstacles(obstacles_of(obstacles.message.capsules))
+        if not changed:
+            return
+        around = obstacles_of(obstacles.message.capsules)
+        self.model.set_obstacles(around)
+        both = list(zip(obstacles.message.capsules, around, strict=True))
+        self._canes = tuple(capsule for capsule, _ in both if capsule.kind == "cane")
+        canes = tuple(obstacle for capsule, obstacle in both if capsule.kind == "cane")
+        self._names, self._axes = tuple(cane.name for cane in canes), Axes(canes)
+        self._allow()
+
+    def work_at(self, places: tuple[Array, ...]) -> None:
+        """Let the blades, and nothing else of the robot, touch the spurs that are cut at these places (3, m, odom)."""
+        if len(places) == len(self._places) and all(map(np.array_equal, places, self._places)):
+            return
+        self._places = places
+        self._allow()
+
+    def _allow(self) -> None:
+        allowed: set[str] = set()
+        if self._canes and self._places:
+            gaps = self._axes.gaps(np.array(self._places), np.zeros(len(self._places)))
+            for row in gaps:
+                nearest = int(np.argmin(row))
+                if row[nearest] < _ON_SPUR:
+                    spur = self._canes[nearest].vine, self._canes[nearest].spur
+                    same = ((c.vine, c.spur) == spur for c in self._canes)
+                    allowed |= {name for name, is_same in zip(self._names, same, strict=True) if is_same}
+        self.model.allow(allowed)
 
 
 def obstacles_of(capsules: Sequence[Capsule]) -> list[Obstacle]:
-    """What the wire says stands around, as the collision model has it; named by kind and number."""
+    """What the wire says stands around, as the collision model has it; named by kind, number and spur."""
     return [
         Obstacle(
-            f"{capsule.kind} {number}",
+            f"{capsule.kind} {number}" + (f" of vine {capsule.vine}, spur {capsule.spur}" if capsule.spur >= 0 else ""),
             capsule.kind,
             capsule.start,
             capsule.end,

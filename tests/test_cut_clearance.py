@@ -4,6 +4,7 @@ import pytest
 from controller.config import ControllerConfig
 from controller.cut_clearance import CutClearance
 from controller.interface import Sample
+from controller.planning.limits import PlanLimits
 from controller.reach import CutPlan, PostureSearch, Unreachable
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.obstacle import Obstacle
@@ -74,7 +75,35 @@ def test_what_is_far_away_changes_nothing():
         (("camera", "wire 1"), SETTINGS.collision_distance),
         (("link5", "cutter"), SETTINGS.cutter_distance),
         (("link5", "base"), SETTINGS.collision_distance),
+        (("camera", "cane 3 of vine 1, spur 2"), SETTINGS.cane_distance),
+        (("cutter", "cane 3"), SETTINGS.cutter_distance),
+        (("blades", "cane 3"), SETTINGS.blade_distance),
     ],
 )
 def test_each_pair_keeps_its_own_distance(pair, kept):
     assert SETTINGS.kept(pair) == kept
+
+
+def cane(x, y=0.785, top=1.159, spur=1):
+    return Capsule("cane", (x, y, 0.95), (x, y, top), 0.004, 0.004, 1, spur)
+
+
+def test_the_spur_that_is_cut_is_in_nothings_way_and_another_one_as_near_is():
+    free, own = find(), find(cane(POINT[0]))
+    assert isinstance(own, CutPlan)
+    np.testing.assert_array_equal(free.q_cut, own.q_cut)
+    # Where a cane crosses the cut that is not of the nearest spur, the straight approach is not taken.
+    crossed = find(cane(POINT[0]), cane(POINT[0] + 0.02, top=1.3, spur=2))
+    assert not isinstance(crossed, CutPlan) or not np.allclose(crossed.q_cut, free.q_cut)
+
+
+def test_clear_of_the_canes_there_is_room_for_a_plan_to_lead_on():
+    """Blades may come nearer to something at the cut than where ways begin and end."""
+    free = find()
+    x, y, z = free.poses.clear.translation.tolist()
+    beside = Capsule("wire", (x + 0.047, y, z - 0.03), (x + 0.047, y, z + 0.03), 0.002, 0.002)
+    plan = find(beside)
+    model = CollisionModel(RobotModel())
+    model.set_obstacles([Obstacle("wire 0", "wire", beside.start, beside.end, 0.002)])
+    assert SETTINGS.blade_distance + 0.003 < model.least(free.q_clear).distance < PlanLimits.clearance
+    assert isinstance(plan, Unreachable) or model.least(plan.q_clear).distance >= PlanLimits.clearance

@@ -141,6 +141,19 @@ def test_a_start_in_contact_gets_away_and_reaches():
     assert least(plan) > COLLISION.least(q).distance - 0.01
 
 
+def test_what_a_start_is_too_near_to_does_not_count_as_the_clearance_of_the_way(obstacles):
+    goal = pose(2.0, 1.0, 0.9)
+    free = PLANNER.plan(start(), goal)
+    blades = ROBOT.pose(start(), ROBOT.tool_id).act(np.array([0.0, 0.0, 0.02]))
+    x, y, z = blades.tolist()
+    obstacles([Obstacle("cane 1", "cane", (x, y, z - 0.2), (x, y, z + 0.1), 0.004)])
+    assert COLLISION.least(start()).distance < 0.014
+    planned = PLANNER.plan(start(), goal)
+    plan = check(planned, start(), goal)
+    assert least(plan) < 0.014, "it begins there"
+    assert LIMITS.clearance - 0.006 < planned.clearance.distance <= free.clearance.distance + 0.005
+
+
 def test_round_a_post_in_between(obstacles):
     goal = pose(3.0, 0.0, 0.9)
     free = PLANNER.plan(start(), goal)

@@ -75,6 +75,21 @@ def test_only_what_stands_in_its_way_where_nothing_stood_voids_it() -> None:
     assert "a wire is seen" in obstacles_changed(planned(), (WIRE,))
 
 
+def cane(x, y=0.75, top=1.15):
+    return Capsule("cane", (x, y, 0.95), (x, y, top), 0.004, 0.004, 1, 2)
+
+
+def test_of_new_canes_only_those_beside_the_tools_line_into_a_cut_void_it() -> None:
+    plan = planned(WIRE)
+    (cut,) = plan.cuts
+    x, y, _ = cut.cut.poses.cut.translation.tolist()
+    assert "a cane is seen" in obstacles_changed(plan, (WIRE, cane(x + 0.08, y)))
+    assert "a cane is seen" in obstacles_changed(plan, (WIRE, cane(x, y - 0.15)))
+    assert obstacles_changed(plan, (WIRE, *(cane(x + away) for away in (-0.6, -0.2, 0.2, 0.6)))) == ""
+    known = planned(WIRE, cane(x + 0.08, y))
+    assert obstacles_changed(known, (WIRE, cane(x + 0.09, y + 0.02))) == "", "noise moves it by less than that"
+
+
 def test_a_thicker_one_voids_it_and_a_thinner_one_does_not() -> None:
     thick = Capsule("wire", WIRE.start, WIRE.end, 0.08, 0.08)
     assert obstacles_changed(planned(WIRE), (thick,)) != ""

@@ -36,6 +36,47 @@ def test_what_perception_tells_is_what_distances_are_kept_to() -> None:
     assert around.model.least(HOME).distance == free
 
 
+def cane(x: float, vine: int = 1, spur: int = 2, low: float = 0.9, high: float = 1.2) -> Capsule:
+    return Capsule("cane", (x, 0.0, low), (x, 0.0, high), 0.004, 0.004, vine, spur)
+
+
+def parts_near(around: Surroundings, q: np.ndarray, name: str) -> set[str]:
+    return {a for a, b in around.model.distances(q, 2.0).pairs if b == name}
+
+
+def test_the_blades_may_touch_the_spur_that_is_cut_and_nothing_else_may() -> None:
+    around = Surroundings(CollisionModel(RobotModel()))
+    first, second = "cane 0 of vine 1, spur 2", "cane 2 of vine 1, spur 3"
+    around.take(told(cane(1.0), post(1.0, 0.5), cane(1.04, spur=3), cane(1.0, low=1.2, high=1.3)))
+    everything = parts_near(around, HOME, first)
+    assert {"blades", "cutter", "camera", "link5", "base"} <= everything
+    around.work_at((np.array([1.0, 0.0, 1.22]),))
+    assert parts_near(around, HOME, first) == everything - {"blades"}
+    assert parts_near(around, HOME, "cane 3 of vine 1, spur 2") == everything - {"blades"}, "all of the spur"
+    assert "blades" in parts_near(around, HOME, second) and "blades" in parts_near(around, HOME, "post 1")
+    around.work_at((np.array([1.0, 0.0, 1.22]), np.array([1.04, 0.0, 1.22])))
+    assert "blades" not in parts_near(around, HOME, first) | parts_near(around, HOME, second)
+    around.work_at(())
+    assert "blades" in parts_near(around, HOME, first)
+
+
+def test_what_is_cut_stays_known_when_canes_are_told_anew_under_other_numbers() -> None:
+    around = Surroundings(CollisionModel(RobotModel()))
+    around.work_at((np.array([1.0, 0.0, 1.22]),))
+    around.take(told(cane(1.0)))
+    assert "blades" not in parts_near(around, HOME, "cane 0 of vine 1, spur 2")
+    around.take(told(cane(2.0, spur=5), cane(1.0)))
+    assert "blades" in parts_near(around, HOME, "cane 0 of vine 1, spur 5")
+    assert "blades" not in parts_near(around, HOME, "cane 1 of vine 1, spur 2")
+
+
+def test_a_cut_far_from_every_cane_exempts_none() -> None:
+    around = Surroundings(CollisionModel(RobotModel()))
+    around.take(told(cane(1.0)))
+    around.work_at((np.array([1.06, 0.0, 1.0]),))
+    assert "blades" in parts_near(around, HOME, "cane 0 of vine 1, spur 2")
+
+
 def test_a_post_in_the_way_of_the_held_tool_is_not_met() -> None:
     """The tool is led straight through a post; it stops before it, and the reason names it."""
     robot = KinematicRobot(Controller(CONFIG, RobotConfig()), CONFIG.home)

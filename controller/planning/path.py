@@ -39,7 +39,8 @@ class Planned:
     Attributes:
         plan: The motion.
         stand: Where it ends.
-        clearance: Least distance along it (m), and between what.
+        clearance: Least distance along it (m), and between what; a start that is too near to something does not count
+            until the motion has led out of that.
     """
 
     plan: Plan
@@ -207,12 +208,17 @@ class PathPlanner:
             row = min(last, looks.after(row, least.distance - needed))
 
     def _least(self, plan: Plan) -> Clearance:
-        """The least distance of a plan, to a few millimetres."""
+        """The least distance of a plan that was looked over, to a few millimetres."""
         looks, row, last = plan.looks(), 0, len(plan.t) - 1
-        least = self._collision.least(plan.q[0])
+        needed = self._limits.clearance - _BETWEEN
+        least: Clearance | None = None
         while row < last:
-            # Rows from which the least so far cannot be undercut by more than _BETWEEN are skipped.
             here = self._collision.least(plan.q[row])
-            least = min(least, here, key=lambda clearance: clearance.distance)
+            if least is None and here.distance < needed:
+                row = looks.after(row, needed - here.distance)
+                continue
+            # Rows from which the least so far cannot be undercut by more than _BETWEEN are skipped.
+            least = here if least is None else min(least, here, key=lambda clearance: clearance.distance)
             row = looks.after(row, here.distance - least.distance + _BETWEEN)
-        return min(least, self._collision.least(plan.q[last]), key=lambda clearance: clearance.distance)
+        end = self._collision.least(plan.q[last])
+        return end if least is None else min(least, end, key=lambda clearance: clearance.distance)

@@ -29,6 +29,7 @@ class HierarchyConfig(Struct, frozen=True, forbid_unknown_fields=True):
         collision_distance: d_s, kept between any two parts that are watched (m).
         blade_distance: The same for the blades (m), which work near wires that nothing else may come near to.
         cutter_distance: The same for the cutter's body (m), whose capsule is 9 mm larger than it.
+        cane_distance: The same of the robot's other parts to canes that stay (m).
         collision_influence: d_i, nearer than which they approach more slowly (m).
         collision_speed: ξ, fastest approach at d_i (m/s), and fastest parting below d_s.
         collision_braking: Deceleration that an approach reckons with (m/s²).
@@ -51,6 +52,7 @@ class HierarchyConfig(Struct, frozen=True, forbid_unknown_fields=True):
     collision_distance: Positive = 0.015
     blade_distance: Positive = 0.004
     cutter_distance: Positive = 0.008
+    cane_distance: Positive = 0.010
     collision_influence: Positive = 0.08
     collision_speed: Positive = 0.25
     collision_braking: Positive = 0.5
@@ -59,4 +61,5 @@ class HierarchyConfig(Struct, frozen=True, forbid_unknown_fields=True):
     def kept(self, pair: tuple[str, str]) -> float:
         """d_s of a pair of parts, by their names (m): of the tool's parts the smaller one of the two."""
         own = {"blades": self.blade_distance, "cutter": self.cutter_distance}
-        return min(own.get(part, self.collision_distance) for part in pair)
+        usual = self.cane_distance if pair[1].startswith("cane ") else self.collision_distance
+        return min(own.get(part, usual) for part in pair)
