@@ -41,7 +41,8 @@ class Obstacles(Message, frozen=True, kw_only=True):
 
     Attributes:
         header: `frame_id` is odom.
-        capsules: Posts, trunks, cordons and wires. Canes are not among them: they give way, and some are to be cut.
+        capsules: Posts, trunks, cordons, wires, and of the canes what stays once the row is pruned, each with its vine
+            and spur. What is to be cut off is not among them: it gives way.
     """
 
     header: Header

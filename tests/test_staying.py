@@ -225,7 +225,7 @@ def test_a_new_rule_leaves_other_wood(surveyed):
     _, seen = surveyed
     model, row, camera = RobotModel(), surveyed[0], Camera(CameraConfig(), 3)
     before = max(c.end[2] for c in canes(seen))
-    assert seen.answer(SetRule(user="ada", nodes_kept=3)).ok
+    assert seen.answer(SetRule(user="ada", rule=m.PruningRule(nodes_kept=3))).ok
     base, position = m.PlanarPose(), (0.0, 0.0, *survey_arm())
     place = model.pose(configuration(base, position), model.camera_id).homogeneous
     seen.process(camera_frame(camera.render(row, place, 9), camera, base, position, 9))
