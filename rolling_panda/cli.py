@@ -20,6 +20,7 @@ FORWARDED = {
     "perception": ("perception", "camera frames to pruning points"),
     "server": ("server", "the operator's page and its REST interface"),
     "audit": ("controller.audit", "what was decided, refused and done: check the record or write it out"),
+    "user": ("server.user_command", "who may sign in with a password"),
     "perceive": ("perception.perceive", "classes and pruning points of one photograph"),
     "vineyard": ("bridge.sim.vineyard_command", "grow a simulated row, write and picture it"),
     "bench": ("benchmarks", "measurements: time of a control step, cuts in simulated rows"),

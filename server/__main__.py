@@ -23,6 +23,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="file with the token of the first sign-in link; deleted once read (default: make one, print the link)",
     )
+    parser.add_argument(
+        "--users", type=Path, metavar="FILE", help="sign in with name and password; see `rolling-panda user --help`"
+    )
+    parser.add_argument("--tls-cert", type=Path, metavar="FILE", help="certificate with its chain, PEM: serve HTTPS")
+    parser.add_argument("--tls-key", type=Path, metavar="FILE", help="its private key, PEM")
 
 
 if __name__ == "__main__":

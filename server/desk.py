@@ -14,7 +14,9 @@ from rolling_panda.page_messages import PagePoints, PageState
 from rolling_panda.plant_requests import PlantRequest
 from server.config import ServerConfig
 from server.event_log import EventLog
+from server.motion_rate import MotionRate
 from server.page_view import PageView
+from server.passwords import Passwords
 from server.robot_link import RobotLink
 from server.scene import Scene
 from server.sessions import Session, Sessions
@@ -60,10 +62,13 @@ class Desk:
     teleop: TeleopHold
     address: str
     cookie: str
+    passwords: Passwords | None = None
+    motion: MotionRate = field(default_factory=MotionRate)
     pages: set["Listener"] = field(default_factory=set)
     state: PageState | None = None
     points: PagePoints | None = None
     _seen_at: deque[tuple[int, float]] = field(default_factory=lambda: deque(maxlen=100))
+    _users_trouble: str = ""
     _refused_holds: dict[str, str] = field(default_factory=dict)
 
     def note(self, severity: m.Severity, text: str) -> None:
@@ -185,10 +190,28 @@ class Desk:
         self.scene.show_gizmo(session.session_id, tool)
         self.teleop.aim(session.session_id, tool)
 
+    def end_void_sessions(self) -> None:
+        """Sign out whoever's account has been removed or changed."""
+        if self.passwords is None:
+            return
+        try:
+            accounts = {user.name: user.fingerprint for user in self.passwords.users.everyone()}
+        except InputError as error:
+            # Whoever is at work stays at work; nobody new comes in.
+            if str(error) != self._users_trouble:
+                self._users_trouble = str(error)
+                self.note("error", self._users_trouble)
+            return
+        self._users_trouble = ""
+        for session in self.sessions.void(accounts):
+            self.note("warning", f"the account of {session.user} was removed or changed")
+            self.sign_out(session)
+
     def sign_out(self, session: Session) -> None:
         """End a session everywhere."""
         self.let_go(session)
         self.teleop.forget(session.session_id)
+        self.motion.forget(session.session_id)
         self.scene.forget(session.session_id)
         self.sessions.end(session)
         self.note("info", f"{session.user} signed out")

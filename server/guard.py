@@ -66,7 +66,7 @@ class Guard:
 
         async def with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
-                _add_headers(MutableHeaders(scope=message), path)
+                _add_headers(MutableHeaders(scope=message), path, scope.get("scheme") == "https")
             await send(message)
 
         if scope["method"] not in _SAFE_METHODS and not self._origin_allowed(scope):
@@ -155,9 +155,11 @@ async def _refuse(send: Send, status: int, reason: str) -> None:
     await send({"type": "http.response.body", "body": body})
 
 
-def _add_headers(headers: MutableHeaders, path: str) -> None:
+def _add_headers(headers: MutableHeaders, path: str, secure: bool) -> None:
     view = path == "/viser" or path.startswith("/viser/")
     headers["Content-Security-Policy"] = VIEW_POLICY if view else PAGE_POLICY
+    if secure:
+        headers["Strict-Transport-Security"] = "max-age=31536000"
     headers["X-Content-Type-Options"] = "nosniff"
     # "no-referrer" would make browsers send `Origin: null` with some of the page's own requests.
     headers["Referrer-Policy"] = "same-origin"

@@ -17,6 +17,8 @@ from server.desk import Desk
 _STALE_S = 1.0
 _POINTS_RATE_HZ = 5.0
 _LOG_RATE_HZ = 10.0
+#: Whose account has been removed is out after this long (s).
+_ACCOUNTS_S = 0.5
 
 
 class Loop:
@@ -40,11 +42,15 @@ class Loop:
             _every(1 / config.teleop_rate_hz, self._teleop),
             _every(1 / _POINTS_RATE_HZ, self._points),
             _every(1 / _LOG_RATE_HZ, self._log),
+            _every(_ACCOUNTS_S, self._accounts),
         ]
 
     async def _beat(self, now: float) -> None:
         self._turns += 1
         self._desk.link.beat(self._turns)
+
+    async def _accounts(self, now: float) -> None:
+        self._desk.end_void_sessions()
 
     async def _state(self, now: float) -> None:
         self._number += 1

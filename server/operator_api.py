@@ -14,6 +14,7 @@ from pydantic import BaseModel
 
 from rolling_panda import intents
 from rolling_panda import messages as m
+from rolling_panda.errors import InputError
 from rolling_panda.page_messages import PageEvents
 from rolling_panda.teleop_messages import BaseVelocity
 from server import requests as body
@@ -128,6 +129,10 @@ def operator_router(desk: Desk) -> APIRouter:
         if not request.hold:
             desk.let_go(session)
             return answer(Result(200, True, "released"))
+        try:
+            desk.motion.count(session.session_id, time.monotonic())
+        except InputError as error:
+            return answer(Result(429, False, str(error)))
         aim = Aim(
             None if request.target is None else m.Pose(request.target.position, request.target.quat_xyzw),
             None if request.base is None else BaseVelocity(request.base.linear, request.base.angular),
@@ -173,6 +178,8 @@ def operator_router(desk: Desk) -> APIRouter:
         """A single-use sign-in link for somebody else or for a script. Supervisors only."""
         if session.role != "supervisor":
             return answer(Result(403, False, "only a supervisor may invite"))
+        if desk.passwords is not None:
+            return answer(Result(403, False, "here people sign in with a password: rolling-panda user add NAME"))
         expires_at = time.monotonic() + desk.config.invite_s
         token = desk.sessions.invite(request.user, request.role, expires_at)
         desk.note("info", f"{session.user} made a sign-in link for {request.user} ({request.role})")

@@ -7,6 +7,7 @@ import msgspec
 from fastapi import APIRouter
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from rolling_panda.errors import InputError
 from rolling_panda.page_messages import (
     FromPage,
     Hold,
@@ -146,7 +147,7 @@ class OpenPage:
                     return
                 self._hold_sequence = sequence
                 if hold:
-                    self._hold(time.monotonic())
+                    self._renew(time.monotonic())
                 else:
                     self._holding = self._spent = False
                     self._desk.let_go(self.session)
@@ -154,6 +155,14 @@ class OpenPage:
                 self._desk.show_gizmo(self.session, visible)
             case Select(point_id=point_id):
                 self._desk.scene.select(self.session.session_id, point_id)
+
+    def _renew(self, now: float) -> None:
+        try:
+            self._desk.motion.count(self.session.session_id, now)
+        except InputError:
+            # A renewal too many renews nothing; one in time follows, or the hold ends.
+            return
+        self._hold(now)
 
     def _hold(self, now: float) -> None:
         if self._spent:

@@ -31,9 +31,23 @@ class _JsonTuples(_Body):
 
 
 class SignIn(_Body):
-    """The token of a sign-in link."""
+    """Name and password, or the token of a sign-in link."""
 
-    token: Annotated[str, Field(min_length=1, max_length=200)]
+    token: Annotated[str, Field(min_length=1, max_length=200)] | None = None
+    user: Annotated[str, Field(min_length=1, max_length=40)] | None = None
+    password: Annotated[str, Field(min_length=1, max_length=200)] | None = None
+
+    @model_validator(mode="after")
+    def _is_one_of_both(self) -> "SignIn":
+        if (self.token is None) == (self.user is None) or (self.user is None) != (self.password is None):
+            raise ValueError("give a token, or user and password")
+        return self
+
+
+class SignInWay(BaseModel):
+    """How people sign in to this server: with a password, or with a link that works once."""
+
+    password: bool
 
 
 class AcceptPoint(_Body):

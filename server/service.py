@@ -16,12 +16,14 @@ from rolling_panda.errors import InputError
 from rolling_panda.process import ProcessContext
 from rolling_panda.robot_model import RobotModel
 from rolling_panda.transport import Transport
+from server.access import Access, Tls, access
 from server.app import create_app
 from server.config import ServerConfig
 from server.desk import Desk
 from server.event_log import EventLog
 from server.loop import Loop
 from server.page_view import PageView
+from server.passwords import Passwords
 from server.robot_link import RobotLink
 from server.robot_meshes import robot_parts
 from server.scene import Scene
@@ -35,19 +37,23 @@ def run(context: ProcessContext) -> None:
     """Serve until `context.stopping` is set.
 
     Raises:
-        InputError: The port is taken, or the token file cannot be used.
+        InputError: The port is taken, or a file cannot be used.
     """
     config = load_section(context.config_path, "server", ServerConfig)
     arguments = context.arguments
+    allowed = access(arguments)
     with listen(arguments.host, arguments.port) as door:
         port = int(door.getsockname()[1])
         sessions = Sessions(config.session_idle_s)
-        address = f"http://127.0.0.1:{port}"
-        token = _first_token(arguments.sign_in_token_file)
-        sessions.admit(token, "supervisor", "supervisor")
-        if arguments.sign_in_token_file is None:
-            print(f"Sign in once with this link: {address}/sign-in?token={token}", flush=True)
-        asyncio.run(serve(config, context.transport, sessions, door, address, context.stopping))
+        address = f"{allowed.scheme}://127.0.0.1:{port}"
+        if allowed.users is None:
+            token = _first_token(arguments.sign_in_token_file)
+            sessions.admit(token, "supervisor", "supervisor")
+            if arguments.sign_in_token_file is None:
+                print(f"Sign in once with this link: {address}/sign-in?token={token}", flush=True)
+        else:
+            print(f"Sign in with name and password: {address}", flush=True)
+        asyncio.run(serve(config, context.transport, sessions, door, address, context.stopping, allowed))
 
 
 def listen(host: str, port: int) -> socket.socket:
@@ -76,8 +82,10 @@ async def serve(
     door: socket.socket,
     address: str,
     stopping: threading.Event,
+    allowed: Access | None = None,
 ) -> None:
     """Serve the page on `door` until `stopping` is set; `address` is how the page is reached on this machine."""
+    allowed = allowed or Access()
     soon = asyncio.get_running_loop().call_soon_threadsafe
     model = RobotModel()
     scene = Scene(
@@ -101,10 +109,12 @@ async def serve(
         address,
         # Cookies do not know ports: two servers on one machine must not sign each other's people out.
         f"rolling_panda_{port}",
+        None if allowed.users is None else Passwords(allowed.users),
     )
-    origins = frozenset({f"http://127.0.0.1:{port}", f"http://localhost:{port}", *config.origins})
+    own = {f"{allowed.scheme}://{name}:{port}" for name in ("127.0.0.1", "localhost")}
+    origins = frozenset({*own, *config.origins})
     jobs = [asyncio.create_task(job) for job in Loop(desk).jobs()]
-    site = asyncio.create_task(_site(create_app(desk, origins), config, door, stopping))
+    site = asyncio.create_task(_site(create_app(desk, origins), config, door, stopping, allowed.tls))
     try:
         # A job that fails ends the server: a page that shows half the truth is worse than none.
         await asyncio.wait([*jobs, site], return_when=asyncio.FIRST_COMPLETED)
@@ -130,7 +140,9 @@ class _Site(uvicorn.Server):
         yield
 
 
-async def _site(app: ASGIApp, config: ServerConfig, door: socket.socket, stopping: threading.Event) -> None:
+async def _site(
+    app: ASGIApp, config: ServerConfig, door: socket.socket, stopping: threading.Event, tls: Tls | None
+) -> None:
     site = _Site(
         uvicorn.Config(
             app,
@@ -141,6 +153,8 @@ async def _site(app: ASGIApp, config: ServerConfig, door: socket.socket, stoppin
             ws_max_size=config.max_body_bytes,
             ws_per_message_deflate=False,
             timeout_graceful_shutdown=1,
+            ssl_certfile=None if tls is None else str(tls.certificate),
+            ssl_keyfile=None if tls is None else str(tls.key),
         )
     )
     serving = asyncio.create_task(site.serve(sockets=[door]))

@@ -6,14 +6,14 @@ No clock here: `now` is seconds of a monotonic clock, given by the caller.
 import asyncio
 import hashlib
 import secrets
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from rolling_panda.errors import InputError
 from rolling_panda.page_messages import Role
+from server.attempts import Attempts
 
 _TOKEN_BYTES = 32
-_FREE_ATTEMPTS = 5
-_MAX_DELAY_S = 60.0
 
 
 class SignInError(InputError):
@@ -34,6 +34,7 @@ class Session:
         user: Name for logs.
         role: What they may do.
         used_at: When the session was last used (s).
+        account: Fingerprint of the account that was signed in to with a password; empty for a link's session.
         ended: Set when the session is over; its sockets close.
     """
 
@@ -41,6 +42,7 @@ class Session:
     user: str
     role: Role
     used_at: float
+    account: str = ""
     ended: asyncio.Event = field(default_factory=asyncio.Event)
 
     @property
@@ -64,8 +66,7 @@ class Sessions:
         self._idle_s = idle_s
         self._invitations: dict[str, _Invitation] = {}
         self._sessions: dict[str, Session] = {}
-        self._failures = 0
-        self._refuse_until = float("-inf")
+        self._attempts = Attempts()
 
     def invite(self, user: str, role: Role, expires_at: float = float("inf")) -> str:
         """A new sign-in token of 256 bits, good for one sign-in until `expires_at` (s)."""
@@ -83,23 +84,25 @@ class Sessions:
             raise InputError(f"the sign-in token has {len(token)} characters; it must have at least 22 (128 bits)")
         self._invitations[_digest(token)] = _Invitation(user, role, expires_at)
 
-    def sign_in(self, token: str, now: float) -> Session:
-        """Use a token up and open a session.
+    def sign_in(self, token: str, now: float, address: str = "") -> Session:
+        """Use a token up and open a session; `address` is where the attempt comes from.
 
         Raises:
             SignInError: Unknown, used or expired token, or too many bad attempts before this one.
         """
-        if now < self._refuse_until:
-            wait = self._refuse_until - now
+        wait = self._attempts.wait((address,), now)
+        if wait > 0.0:
             raise SignInError(f"too many bad sign-ins; try again in {wait:.0f} s", wait)
         invitation = self._invitations.pop(_digest(token), None)
         if invitation is None or now > invitation.expires_at:
-            self._failures += 1
-            if self._failures >= _FREE_ATTEMPTS:
-                self._refuse_until = now + min(2.0 ** (self._failures - _FREE_ATTEMPTS), _MAX_DELAY_S)
+            self._attempts.failed((address,), now)
             raise SignInError("this sign-in link has been used, has expired or is not from this server")
-        self._failures = 0
-        session = Session(secrets.token_urlsafe(_TOKEN_BYTES), invitation.user, invitation.role, now)
+        self._attempts.succeeded((address,))
+        return self.open(invitation.user, invitation.role, now)
+
+    def open(self, user: str, role: Role, now: float, account: str = "") -> Session:
+        """A new session for somebody who has shown who they are."""
+        session = Session(secrets.token_urlsafe(_TOKEN_BYTES), user, role, now, account)
         self._sessions[_digest(session.session_id)] = session
         return session
 
@@ -117,6 +120,11 @@ class Sessions:
     def everyone(self) -> tuple[Session, ...]:
         """Every live session."""
         return tuple(self._sessions.values())
+
+    def void(self, accounts: Mapping[str, str]) -> tuple[Session, ...]:
+        """Sessions whose account is gone or has changed, given the fingerprint of each user's account by name."""
+        sessions = self._sessions.values()
+        return tuple(each for each in sessions if each.account and accounts.get(each.user) != each.account)
 
     def end(self, session: Session) -> None:
         """Sign out; safe to call twice."""

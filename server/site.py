@@ -4,7 +4,7 @@ import time
 from pathlib import Path
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Request, Response
+from fastapi import APIRouter, Depends, Header, Request, Response
 from fastapi.responses import FileResponse, JSONResponse
 
 from rolling_panda import __version__
@@ -19,12 +19,26 @@ def _maybe_session(request: Request) -> Session | None:
     return session
 
 
+def _address(request: Request) -> str:
+    return "" if request.client is None else request.client.host
+
+
 Visitor = Annotated[Session | None, Depends(_maybe_session)]
+Origin = Annotated[str, Header(include_in_schema=False)]
+Address = Annotated[str, Depends(_address)]
 
 
 def site_router(desk: Desk, web: Path) -> APIRouter:
     """Routes outside the session; `web` is the folder of the page."""
     router = APIRouter()
+
+    async def _signed_in(request: body.SignIn, address: str) -> Session:
+        if request.token is not None:
+            return desk.sessions.sign_in(request.token, time.monotonic(), address)
+        if desk.passwords is None:
+            raise SignInError("this server has no users file: sign in with the link that it printed")
+        user = await desk.passwords.enter(request.user or "", request.password or "", address)
+        return desk.sessions.open(user.name, user.role, time.monotonic(), user.fingerprint)
 
     @router.get("/", include_in_schema=False)
     def page(visitor: Visitor) -> Response:
@@ -36,12 +50,13 @@ def site_router(desk: Desk, web: Path) -> APIRouter:
         return FileResponse(web / "sign-in.html")
 
     @router.post("/api/sign-in", tags=["sessions"], responses={401: {"model": body.Outcome}})
-    async def sign_in(visitor: Visitor, request: body.SignIn) -> Response:
-        """Use up the token of a sign-in link; the answer sets the session cookie."""
+    async def sign_in(visitor: Visitor, request: body.SignIn, address: Address, origin: Origin) -> Response:
+        """Sign in with name and password, or use up the token of a link; the answer sets the session cookie."""
         try:
-            session = desk.sessions.sign_in(request.token, time.monotonic())
+            session = await _signed_in(request, address)
         except SignInError as error:
-            desk.note("warning", f"sign-in refused: {error}")
+            whose = f" as {request.user!r}" if request.user is not None else ""
+            desk.note("warning", f"sign-in{whose} from {address} refused: {error}")
             if error.wait_s > 0:
                 refused = answer(Result(429, False, str(error)))
                 refused.headers["Retry-After"] = str(max(1, round(error.wait_s)))
@@ -56,10 +71,16 @@ def site_router(desk: Desk, web: Path) -> APIRouter:
             session.session_id,
             httponly=True,
             samesite="strict",
-            secure=desk.address.startswith("https:"),
+            # Behind a proxy that speaks TLS too; the guard has checked that this is one of the server's own origins.
+            secure=origin.startswith("https:"),
             path="/",
         )
         return signed_in
+
+    @router.get("/api/sign-in", tags=["sessions"])
+    async def sign_in_way() -> body.SignInWay:
+        """How to sign in."""
+        return body.SignInWay(password=desk.passwords is not None)
 
     @router.post("/api/sign-out", tags=["sessions"], responses={401: {"model": body.Outcome}})
     async def sign_out(visitor: Visitor) -> Response:

@@ -10,6 +10,7 @@ from unittest.mock import patch
 import httpx
 
 from rolling_panda.robot_model import RobotModel
+from server.access import Access
 from server.config import ServerConfig
 from server.robot_meshes import robot_parts
 from server.service import listen, serve
@@ -42,24 +43,26 @@ class RunningServer:
 
     def visitor(self):
         """An HTTP client that has not signed in and says no origin."""
-        return httpx.Client(base_url=self.address, timeout=PATIENCE_S, trust_env=False)
+        # The certificate of a test's own server is nobody's.
+        return httpx.Client(base_url=self.address, timeout=PATIENCE_S, trust_env=False, verify=False)
 
     def cookie(self, client):
         return "; ".join(f"{name}={value}" for name, value in client.cookies.items())
 
     @property
     def socket_address(self):
-        return self.address.replace("http:", "ws:")
+        return self.address.replace("http", "ws", 1)
 
 
 @contextlib.contextmanager
-def running_server(wire, config=None):
+def running_server(wire, config=None, access=None):
     parts()
     sessions = Sessions(3600.0)
     stopping = threading.Event()
     with listen("127.0.0.1", 0) as door, patch("server.service.robot_parts", lambda model: parts()):
-        address = f"http://127.0.0.1:{door.getsockname()[1]}"
-        work = serve(config or ServerConfig(), wire, sessions, door, address, stopping)
+        access = access or Access()
+        address = f"{access.scheme}://127.0.0.1:{door.getsockname()[1]}"
+        work = serve(config or ServerConfig(), wire, sessions, door, address, stopping, access)
         failure = []
 
         def run():

@@ -35,8 +35,8 @@ def served(monkeypatch):
     """Instead of serving, hand over what would have been served."""
     seen = {}
 
-    async def serve(config, transport, sessions, door, address, stopping):
-        seen.update(sessions=sessions, address=address)
+    async def serve(config, transport, sessions, door, address, stopping, allowed):
+        seen.update(sessions=sessions, address=address, allowed=allowed)
 
     monkeypatch.setattr(service, "serve", serve)
     return seen

@@ -1,36 +1,69 @@
-// Signing in: hands the token of the printed link to the server, once, and takes it out of the address at once.
+// Signing in: with name and password, or with the token of the printed link, which leaves the address at once.
 
 import { post } from "./api.js";
 
 const progress = /** @type {HTMLElement} */ (document.getElementById("progress"));
-const form = /** @type {HTMLFormElement} */ (document.getElementById("token-form"));
-const field = /** @type {HTMLInputElement} */ (document.getElementById("token"));
+const hint = /** @type {HTMLElement} */ (document.getElementById("token-hint"));
+const tokenForm = /** @type {HTMLFormElement} */ (document.getElementById("token-form"));
+const tokenField = /** @type {HTMLInputElement} */ (document.getElementById("token"));
+const passwordForm = /** @type {HTMLFormElement} */ (document.getElementById("password-form"));
+const userField = /** @type {HTMLInputElement} */ (document.getElementById("user"));
+const passwordField = /** @type {HTMLInputElement} */ (document.getElementById("password"));
 
-/** @param {string} token */
-async function signIn(token) {
+/** @returns {Promise<boolean>} Do people sign in with a password here? */
+async function withPassword() {
+  try {
+    const response = await fetch("/api/sign-in", { signal: AbortSignal.timeout(4000) });
+    return response.ok && (await response.json()).password === true;
+  } catch {
+    return false;
+  }
+}
+
+/** @param {object} body */
+async function signIn(body) {
   progress.textContent = "Signing in…";
   progress.className = "";
-  const answer = await post("/api/sign-in", { token });
+  const answer = await post("/api/sign-in", body);
   if (answer.ok) {
     location.replace("/");
     return;
   }
-  progress.textContent = `Not signed in: ${answer.status === 401 && !answer.reason ? "the token is not valid" : answer.reason}`;
+  const unsaid = answer.status === 401 && !answer.reason;
+  progress.textContent = `Not signed in: ${unsaid ? "the token is not valid" : answer.reason}`;
   progress.className = "problem";
-  form.hidden = false;
-  field.focus();
+  ask(passwordFirst);
 }
 
-form.addEventListener("submit", (event) => {
+/** @param {boolean} password */
+function ask(password) {
+  passwordForm.hidden = !password;
+  tokenForm.hidden = hint.hidden = password;
+  if (!password) {
+    tokenField.focus();
+  } else if (userField.value) {
+    passwordField.select();
+    passwordField.focus();
+  } else {
+    userField.focus();
+  }
+}
+
+tokenForm.addEventListener("submit", (event) => {
   event.preventDefault();
-  void signIn(field.value.trim());
+  void signIn({ token: tokenField.value.trim() });
+});
+passwordForm.addEventListener("submit", (event) => {
+  event.preventDefault();
+  void signIn({ user: userField.value.trim(), password: passwordField.value });
 });
 
 const token = new URLSearchParams(location.search).get("token") ?? "";
 history.replaceState(null, "", location.pathname);
+const passwordFirst = await withPassword();
 if (token) {
-  void signIn(token);
+  await signIn({ token });
 } else {
-  progress.textContent = "Open the link that the program printed, or enter its token.";
-  form.hidden = false;
+  progress.textContent = passwordFirst ? "" : "Open the link that the program printed, or enter its token.";
+  ask(passwordFirst);
 }

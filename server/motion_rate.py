@@ -1,0 +1,31 @@
+"""How often one session may ask for motion: what comes faster is refused, and moves nothing."""
+
+from rolling_panda.errors import InputError
+
+MOST_HZ = 60.0
+#: What a busy browser had to keep back may come at once, up to so many requests.
+_AT_ONCE = 20.0
+
+
+class MotionRate:
+    """A bucket of tokens a session. No clock here: `now` is given (s)."""
+
+    def __init__(self) -> None:
+        """Nobody has asked yet."""
+        self._buckets: dict[str, tuple[float, float]] = {}
+
+    def count(self, session_id: str, now: float) -> None:
+        """A session asks for motion.
+
+        Raises:
+            InputError: It does so too often.
+        """
+        tokens, at = self._buckets.get(session_id, (_AT_ONCE, now))
+        tokens = min(_AT_ONCE, tokens + (now - at) * MOST_HZ)
+        self._buckets[session_id] = max(0.0, tokens - 1.0), now
+        if tokens < 1.0:
+            raise InputError(f"at most {MOST_HZ:.0f} requests for motion a second; ask less often")
+
+    def forget(self, session_id: str) -> None:
+        """That session has ended."""
+        self._buckets.pop(session_id, None)
