@@ -34,6 +34,11 @@ class Limiter:
         self._last = np.zeros_like(self._jerk)
         self.sent = np.zeros_like(self._velocity)
 
+    def go_on_from(self, velocity: Array, change: Array) -> None:
+        """The arm took this as its last velocity (7, rad/s) and change in a period, whatever was sent."""
+        self.sent[ARM_XI] = velocity
+        self._last = change
+
     def step(self, desired: Array, arm: Array) -> Array:
         """What to send on now.
 

@@ -1,12 +1,13 @@
 """Configuration of the real robot: section `[real]`."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
 from rolling_panda.config import Positive
 
 Key = Annotated[str, Meta(max_length=200)]
+Vector = tuple[float, float, float]
 
 
 class BaseConfig(Struct, frozen=True, forbid_unknown_fields=True):
@@ -33,7 +34,36 @@ class BaseConfig(Struct, frozen=True, forbid_unknown_fields=True):
     runaway_s: Positive = 1.0
 
 
+class ArmConfig(Struct, frozen=True, forbid_unknown_fields=True):
+    """The Panda, through libfranka.
+
+    Attributes:
+        address: Of its control box; empty = no arm.
+        realtime: `enforce` refuses to start without a real-time kernel.
+        fade_s: Silence of this program after which the last target begins to fade.
+        deadline_s: Silence after which the arm holds.
+        joint_margin: Distance to a joint's limit at which motion towards it has ended (rad).
+        load_mass: Of what hangs on the flange (kg).
+        load_center: Its centre of mass in the flange's frame (m).
+        load_inertia: Its inertia about that centre: diagonal (kg·m²).
+        contact_torque: External torque of a joint that stops the arm (Nm).
+        contact_force: External force at the flange that stops the arm (N).
+    """
+
+    address: Key = ""
+    realtime: Literal["enforce", "ignore"] = "enforce"
+    fade_s: Positive = 0.07
+    deadline_s: Positive = 0.2
+    joint_margin: Positive = 0.01
+    load_mass: Annotated[float, Meta(ge=0.0, le=3.0)] = 1.2
+    load_center: Vector = (0.0, 0.0, 0.08)
+    load_inertia: Vector = (0.004, 0.004, 0.002)
+    contact_torque: Positive = 20.0
+    contact_force: Positive = 30.0
+
+
 class RealConfig(Struct, frozen=True, forbid_unknown_fields=True):
     """All devices of the real robot."""
 
     base: BaseConfig = BaseConfig()
+    arm: ArmConfig = ArmConfig()

@@ -1,0 +1,60 @@
+"""What the arm is told each millisecond: the newest target, interpolated, within velocity, acceleration and jerk."""
+
+import numpy as np
+
+from bridge.limiter import Limiter
+from bridge.watchdog import Watchdog
+from rolling_panda.differential_drive import Array
+from rolling_panda.robot_model import ARM_XI, Limits
+
+TICK_S = 0.001
+# Targets that come in farther apart than this (s) are followed as if they had come so: the delay must stay small.
+_LONGEST_SPAN = 0.02
+
+
+class ArmFollower:
+    """Follows joint velocities that come in slower than 1 kHz; holds on a deadline of its own.
+
+    Between two targets it goes in a straight line for as long as they lay apart, so a stairway of targets becomes
+    the slope that was meant. Times are on one monotonic clock (s).
+    """
+
+    def __init__(self, limits: Limits, joint_margin: float, fade_s: float, deadline_s: float) -> None:
+        """At rest, without a target.
+
+        Args:
+            limits: Of the robot, over ξ; the arm's part counts.
+            joint_margin: Distance to a joint's limit at which motion towards it has ended (rad).
+            fade_s: Silence after which the last target begins to fade.
+            deadline_s: Silence after which the target is zero.
+        """
+        self._limiter = Limiter(limits, float(limits.acceleration[0]), joint_margin, TICK_S)
+        self._watchdog = Watchdog(fade_s, deadline_s)
+        self._start = self._target = np.zeros(7)
+        self._began, self._span = float("-inf"), TICK_S
+        self._desired = np.zeros(9)
+
+    def aim(self, target: Array, at: float) -> None:
+        """A target (7, rad/s) was written at `at`."""
+        self._start = self._goal(at)
+        self._span = min(max(at - self._began, TICK_S), _LONGEST_SPAN)
+        self._target, self._began = target, at
+        self._watchdog.feed(at)
+
+    def step(self, now: float, q: Array, dq: Array, ddq: Array, hold: bool = False) -> Array:
+        """Joint velocities for the next millisecond (7, rad/s).
+
+        Args:
+            now: Present time (s).
+            q: Measured joint angles (7, rad).
+            dq: Velocities that the arm took as commanded last (7, rad/s): after lost packets these are its own guess.
+            ddq: Accelerations likewise (7, rad/s²).
+            hold: Come to rest whatever the target is.
+        """
+        self._limiter.go_on_from(dq, ddq * TICK_S)
+        self._desired[ARM_XI] = 0.0 if hold else self._watchdog.trust(now) * self._goal(now)
+        return self._limiter.step(self._desired, q)[ARM_XI]
+
+    def _goal(self, now: float) -> Array:
+        share = min(1.0, (now - self._began) / self._span)
+        return self._start + share * (self._target - self._start)

@@ -1,0 +1,81 @@
+"""What bridge and arm process tell each other through shared memory."""
+
+from dataclasses import dataclass
+from multiprocessing.context import SpawnContext
+
+import numpy as np
+
+from bridge.real.arm_memory import Memory
+from rolling_panda.differential_drive import Array
+
+
+@dataclass(frozen=True)
+class ArmTarget:
+    """Bridge → arm.
+
+    Attributes:
+        number: Grows with each write.
+        at: When it was written (s, monotonic).
+        velocity: Of the joints (7, rad/s).
+        releases: How often a person has released the arm; when it grows, the arm may recover from what stopped it.
+        closing: The bridge ends.
+    """
+
+    number: int
+    at: float
+    velocity: Array
+    releases: int
+    closing: bool
+
+
+@dataclass(frozen=True)
+class ArmState:
+    """Arm → bridge.
+
+    Attributes:
+        at: When it was written (s, monotonic).
+        position: Joint angles (7, rad).
+        velocity: Their velocities (7, rad/s).
+        fault: Why the arm does not follow; empty when it does.
+        severe: Whether a person has to release it.
+        success_rate: Share of the last 100 commands that came in time.
+        commands: Commands given since the start.
+    """
+
+    at: float
+    position: Array
+    velocity: Array
+    fault: str
+    severe: bool
+    success_rate: float
+    commands: int
+
+
+class ArmLink:
+    """Both directions; handed to the arm's process when it starts."""
+
+    def __init__(self, context: SpawnContext) -> None:
+        """Empty."""
+        self._down = Memory(context, 10)
+        self._up = Memory(context, 18)
+
+    def command(self, at: float, velocity: Array, releases: int, closing: bool) -> None:
+        """The bridge's side: replace the target."""
+        self._down.write(np.concatenate([[at], velocity, [releases, closing]]))
+
+    def target(self) -> ArmTarget:
+        """The arm's side: the newest target."""
+        note = self._down.read()
+        v = note.values
+        return ArmTarget(note.number, float(v[0]), v[1:8], int(v[8]), bool(v[9]))
+
+    def tell(self, state: ArmState) -> None:
+        """The arm's side: replace the state."""
+        numbers = [state.severe, state.success_rate, state.commands]
+        self._up.write(np.concatenate([[state.at], state.position, state.velocity, numbers]), state.fault)
+
+    def state(self) -> ArmState:
+        """The bridge's side: the newest state; `at` is 0 before the first."""
+        note = self._up.read()
+        v = note.values
+        return ArmState(float(v[0]), v[1:8], v[8:15], note.text, bool(v[15]), float(v[16]), int(v[17]))

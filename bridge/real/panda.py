@@ -1,0 +1,84 @@
+"""The Panda as the bridge sees it: a process that is told targets and tells states."""
+
+import importlib.util
+import multiprocessing
+import os
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from bridge.real.arm_link import ArmLink, ArmState
+from bridge.real.config import ArmConfig
+from rolling_panda.differential_drive import Array
+from rolling_panda.errors import InputError
+from rolling_panda.robot_model import Limits
+
+# A state older than this (s) is a fault: the control box tells a thousand a second.
+_STALE_S = 0.25
+_CLOSE_S = 2.0
+
+
+class Panda:
+    """Implements the arm's part of the robot. `read` and `write` return at once."""
+
+    def __init__(self, config: ArmConfig, limits: Limits, moving: bool = True) -> None:
+        """Start the arm's process; it connects by itself, and says in its state how far it is.
+
+        Raises:
+            InputError: The driver is not installed.
+        """
+        if importlib.util.find_spec("panda_py") is None:
+            raise InputError("the arm's driver is not installed; run: pip install 'rolling-panda[real]'")
+        self._config, self._limits, self._moving = config, limits, moving
+        self._releases = 0
+        self._start()
+
+    def read(self) -> ArmState:
+        """The newest state."""
+        state = self._link.state()
+        if not self._process.is_alive():
+            return replace(state, fault="arm: its process has ended", severe=True)
+        silent = time.monotonic() - state.at
+        if silent > _STALE_S and not state.fault:
+            return replace(state, fault=f"arm: no state for {silent:.1f} s", severe=False)
+        return state
+
+    def write(self, velocity: Array) -> None:
+        """Velocities of the joints from now on (7, rad/s), until the deadline."""
+        self._link.command(time.monotonic(), velocity, self._releases, closing=False)
+
+    def release(self) -> None:
+        """A person says that the arm may recover from what stopped it; it does so by itself then, at rest."""
+        self._releases += 1
+        if not self._process.is_alive():
+            self._start()
+        self._link.command(time.monotonic(), np.zeros(7), self._releases, closing=False)
+
+    def close(self) -> None:
+        """Let the arm come to rest, and end its process; safe to call twice."""
+        if self._process.is_alive():
+            self._link.command(time.monotonic(), np.zeros(7), self._releases, closing=True)
+            self._process.join(_CLOSE_S)
+            if self._process.is_alive():
+                self._process.kill()
+        self._process.join()
+
+    def _start(self) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._link = ArmLink(context)
+        self._link.command(time.monotonic(), np.zeros(7), self._releases, closing=False)
+        self._process = context.Process(
+            target=_serve,
+            args=(self._config, self._limits, self._link, self._moving, os.getpid()),
+            name="rolling-panda-arm",
+            daemon=True,
+        )
+        self._process.start()
+
+
+def _serve(config: ArmConfig, limits: Limits, link: ArmLink, moving: bool, parent: int) -> None:
+    # Here and not above: only the arm's process loads libfranka.
+    from bridge.real.panda_process import run
+
+    run(config, limits, link, moving, parent)

@@ -1,0 +1,174 @@
+"""The arm's own process: libfranka's 1 kHz loop, with nothing beside it that could keep it waiting.
+
+A Python thread that is busy for some milliseconds loses packets, so bridge and arm share memory and no interpreter.
+When the bridge ends, however it ends, targets stop coming: the arm holds and the process ends.
+"""
+
+import gc
+import os
+import time
+from typing import Any
+
+import numpy as np
+from panda_py import libfranka
+
+from bridge.real.arm_follower import ArmFollower
+from bridge.real.arm_link import ArmLink, ArmState
+from bridge.real.config import ArmConfig
+from rolling_panda.priority import take_priority
+from rolling_panda.robot_model import Limits
+
+_RETRY_S = 1.0
+# How long the bridge may be silent before this process asks whether it still exists (s).
+_ORPHAN_S = 1.0
+# libfranka's filter is off above this (Hz): the follower's targets are smooth already.
+_NO_FILTER = 1000.0
+_AT_REST = 1e-6
+_MODE = libfranka.RobotMode
+
+
+def run(config: ArmConfig, limits: Limits, link: ArmLink, moving: bool, parent: int) -> None:
+    """Serve the arm until the bridge ends; the body of the process.
+
+    Args:
+        config: Address, payload, deadlines.
+        limits: Of the robot, over ξ.
+        link: To the bridge.
+        moving: False only reads.
+        parent: Process id of the bridge.
+    """
+    take_priority("control")
+    gc.freeze()
+    gc.disable()
+    session = _Session(config, limits, link, moving, parent)
+    while not session.ended():
+        try:
+            session.serve()
+        except RuntimeError as error:
+            # Every error of libfranka comes as this one.
+            session.say(f"arm: {_words(error)}")
+            time.sleep(_RETRY_S)
+
+
+class _Session:
+    def __init__(self, config: ArmConfig, limits: Limits, link: ArmLink, moving: bool, parent: int) -> None:
+        self._config, self._link, self._moving, self._parent = config, link, moving, parent
+        self._follower = ArmFollower(limits, config.joint_margin, config.fade_s, config.deadline_s)
+        self._position, self._velocity = np.zeros(7), np.zeros(7)
+        self._success_rate, self._commands = 0.0, 0
+        self._seen = 0
+        self._releases = link.target().releases
+        self._fault, self._severe = "arm: not connected yet", False
+
+    def ended(self) -> bool:
+        """Whether the bridge is closing or gone."""
+        target = self._link.target()
+        silent = time.monotonic() - target.at > _ORPHAN_S
+        return target.closing or (silent and os.getppid() != self._parent)
+
+    def say(self, fault: str, severe: bool = False) -> None:
+        """Tell the bridge why the arm does not follow."""
+        self._fault, self._severe = fault, severe
+        self._tell()
+
+    def serve(self) -> None:
+        """One connection: prepare the arm, then follow, or wait for what keeps it from following to go away."""
+        config = self._config
+        enforce = (
+            libfranka.RealtimeConfig.kEnforce if config.realtime == "enforce" else libfranka.RealtimeConfig.kIgnore
+        )
+        robot = libfranka.Robot(config.address, enforce)
+        if self._moving:
+            torque, force = [config.contact_torque] * 7, [config.contact_force] * 6
+            robot.set_collision_behavior(torque, torque, torque, torque, force, force, force, force)
+            inertia = np.diag(config.load_inertia).ravel().tolist()
+            robot.set_load(config.load_mass, list(config.load_center), inertia)
+        while not self.ended():
+            state = robot.read_once()
+            self._note(state)
+            self._judge(state)
+            if self._severe and self._link.target().releases != self._releases:
+                self._releases = self._link.target().releases
+                self._recover(robot)
+            elif self._fault or not self._moving:
+                robot.read(self._watch)
+            else:
+                self._follow(robot)
+
+    def _judge(self, state: Any) -> None:
+        """Whether the arm can be commanded as it is; what a person has to release stays until then."""
+        if state.robot_mode == _MODE.kReflex:
+            reasons = str(state.last_motion_errors) + str(state.current_errors)
+            self._fault, self._severe = self._fault if self._severe else f"arm: reflex {reasons}", True
+        elif state.robot_mode == _MODE.kUserStopped:
+            self._fault, self._severe = "arm: its user stop is pressed", True
+        elif not self._severe:
+            idle = state.robot_mode in (_MODE.kIdle, _MODE.kMove)
+            self._fault = "" if idle else f"arm: it is in {state.robot_mode}, not ready to move"
+
+    def _recover(self, robot: Any) -> None:
+        """A person has said that the arm may go on."""
+        if robot.read_once().robot_mode == _MODE.kUserStopped:
+            return
+        try:
+            robot.automatic_error_recovery()
+        except RuntimeError as error:
+            self.say(f"arm: cannot recover: {_words(error)}", severe=True)
+        else:
+            self.say("")
+
+    def _follow(self, robot: Any) -> None:
+        try:
+            robot.control_joint_velocity(
+                self._command, libfranka.ControllerMode.kJointImpedance, limit_rate=True, cutoff_frequency=_NO_FILTER
+            )
+        except RuntimeError as error:
+            self.say(f"arm: {_words(error)}", severe=True)
+
+    def _command(self, state: Any, duration: Any) -> Any:
+        """Libfranka's callback, each millisecond."""
+        now = time.monotonic()
+        target = self._link.target()
+        if target.number != self._seen:
+            self._seen = target.number
+            self._follower.aim(target.velocity, target.at)
+        self._commands += 1
+        self._note(state)
+        self._releases = target.releases
+        ending = target.closing or (now - target.at > _ORPHAN_S and os.getppid() != self._parent)
+        dq = self._follower.step(now, self._position, np.array(state.dq_d), np.array(state.ddq_d), hold=ending)
+        out = libfranka.JointVelocities(dq.tolist())
+        out.motion_finished = ending and float(np.abs(dq).max()) < _AT_REST
+        return out
+
+    def _watch(self, state: Any) -> bool:
+        """Libfranka's callback while nothing is commanded; True to go on watching."""
+        self._note(state)
+        severe, fault = self._severe, self._fault
+        self._judge(state)
+        if (severe, fault) != (self._severe, self._fault):
+            self._tell()
+        released = self._link.target().releases != self._releases
+        return not (self.ended() or (released and self._severe) or (self._moving and not self._fault))
+
+    def _note(self, state: Any) -> None:
+        self._position, self._velocity = np.array(state.q), np.array(state.dq)
+        self._success_rate = float(state.control_command_success_rate)
+        self._tell()
+
+    def _tell(self) -> None:
+        self._link.tell(
+            ArmState(
+                time.monotonic(),
+                self._position,
+                self._velocity,
+                self._fault,
+                self._severe,
+                self._success_rate,
+                self._commands,
+            )
+        )
+
+
+def _words(error: RuntimeError) -> str:
+    return str(error).removeprefix("libfranka: ").splitlines()[0]
