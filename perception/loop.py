@@ -17,7 +17,7 @@ from rolling_panda.crop_messages import PointCrop
 from rolling_panda.look_messages import CloseLook
 from rolling_panda.plant_requests import PlantRequest
 from rolling_panda.row_messages import Obstacles
-from rolling_panda.transport import Transport
+from rolling_panda.transport import Received, Transport
 
 
 @dataclass(frozen=True)
@@ -66,6 +66,8 @@ class Loop:
         self._in_the_way: Obstacles | None = None
         self._pictures: dict[tuple[str, int], PointCrop] = {}
         """In the order in which they are repeated, the next one first."""
+        self._sightings = perception.sightings
+        self._noted: Received[m.CameraFrame] | None = None
         self._sequence = 0
         self._sent = self._sent_obstacles = self._sent_crop = -1e9
         self._last_error = ""
@@ -89,6 +91,11 @@ class Loop:
             self._take(done.result, now)
         elif done is not None:
             self._refuse(str(done.error), now)
+        frame = self._frames.peek()
+        if frame is not None and frame is not self._noted:
+            # Also those that are never worked on: the page shows them, and may click into them.
+            self._noted = frame
+            self._sightings.note(frame.message)
         if self._worker.busy_for(now) == 0.0:
             if not self._asked.empty():
                 self._worker.submit(self._asked.get(), now)

@@ -1,7 +1,5 @@
 """Camera frames in, pruning points out."""
 
-import dataclasses
-
 import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
@@ -24,6 +22,7 @@ from perception.plant import Cane, Plant
 from perception.plant_map import PlantMap
 from perception.rules import apply_rule
 from perception.segmenter import Segmenter
+from perception.sightings import Sightings
 from perception.staying import StayingCanes
 from perception.topology import build_plant
 from perception.tracker import Proposal, Tracked, Tracker
@@ -38,10 +37,10 @@ from rolling_panda.row_messages import Capsule
 #: Every so many samples of a cane's axis go on the wire.
 _THIN_OUT = 4
 _CORDON = m.WOOD_CLASSES.index("cordon")
+#: A point by hand this near to another would be the same cut (m).
+_TAKEN = 0.01
 #: A shorter vector has no direction.
 _SHORTEST = 1e-6
-#: Frames that may be clicked.
-_EYES = 8
 #: Fewer pixels of cordon say nothing about how far the row is.
 _LEAST_CORDON = 200
 
@@ -66,12 +65,13 @@ class Perception:
         self._open = OpenPlaces()
         self._told: tuple[m.Abstention, ...] = ()
         self._stamp = 0.0
-        self._eyes: dict[int, View] = {}
         self._canes: tuple[tuple[m.Vector3, ...], ...] = ()
         self._map = ObstacleMap(config.obstacles)
         self._staying = StayingCanes(config.obstacles)
         self._album = Album()
         self._crops: dict[str, PointCrop] = {}
+        self.sightings = Sightings()
+        """Where the camera was."""
         self.known = PlantMap()
         """The vines as known from all frames."""
         self.withdrawn: tuple[str, ...] = ()
@@ -89,7 +89,8 @@ class Perception:
             MessageError: The frame is corrupt; nothing changes.
         """
         view = decode_frame(frame, self._model)
-        self._remember(view)
+        self._stamp = view.stamp
+        self.sightings.note(frame)
         self.withdrawn = ()
         try:
             labels = self.segmenter.segment(view)
@@ -148,13 +149,10 @@ class Perception:
         if isinstance(request, AddPoint):
             origin, direction = np.array(request.origin), np.array(request.direction)
         elif isinstance(request, AddPointInImage):
-            eye = self._eyes.get(request.sequence)
-            if eye is None:
+            line = self.sightings.line(request.sequence, request.u, request.v, self._model)
+            if line is None:
                 return m.Answer(ok=False, reason="that picture is not among the newest ones any more; click again")
-            k = eye.intrinsics
-            row, col = request.v * k.height - 0.5, request.u * k.width - 0.5
-            origin = eye.t
-            direction = eye.points([row], [col], [1.0])[0] - eye.t
+            origin, direction = line.origin, line.direction
         else:
             return m.Answer(ok=False, reason=f"perception cannot do {type(request).__name__}")
         length = float(np.linalg.norm(direction))
@@ -165,6 +163,9 @@ class Perception:
         found = point_by_hand(self.known, origin, direction, rule, self.obstacles, request.user)
         if isinstance(found, str):
             return m.Answer(ok=False, reason=found)
+        for point in self._tracker.points():
+            if float(np.linalg.norm(np.array(point.position) - found[0].position)) < _TAKEN:
+                return m.Answer(ok=False, reason=f"{point.point_id} is there already, within {1000 * _TAKEN:.0f} mm")
         return m.Answer(ok=True, reason=self._tracker.add(Proposal(*found)).point_id)
 
     def points(self) -> m.PruningPoints:
@@ -261,14 +262,6 @@ class Perception:
         told = (*rods, *canes)[: config.most]
         # The same object as before where nothing is new.
         self.obstacles = self.obstacles if told == self.obstacles else told
-
-    def _remember(self, view: View) -> None:
-        """Keep the cameras' places of the newest frames, for clicks into them; not their images."""
-        self._stamp = view.stamp
-        nothing = np.zeros((0, 0), np.float32)
-        self._eyes[view.sequence] = dataclasses.replace(view, depth=nothing, labels=None, color_jpeg=b"")
-        while len(self._eyes) > _EYES:
-            del self._eyes[next(iter(self._eyes))]
 
     def _is_survey(self, view: View, labels: NDArray[np.uint8]) -> bool:
         """Whether the frame looks at the cordon from where spurs can be read as a whole."""

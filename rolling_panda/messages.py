@@ -48,7 +48,6 @@ WoodClass = Literal[
 WOOD_CLASSES: tuple[WoodClass, ...] = get_args(WoodClass)
 CutKind = Literal["spur cut", "renewal cut", "cane cut", "by hand"]
 Digest = Annotated[str, Meta(max_length=64, pattern=r"^[0-9a-f]*(?!\n)$")]
-#: Symmetric 3×3 (m² of positions): xx, xy, xz, yy, yz, zz.
 Covariance = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
 
 

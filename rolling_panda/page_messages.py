@@ -121,6 +121,13 @@ class Selected(PageMessage, frozen=True, kw_only=True):
     point_id: str
 
 
+class Sightline(PageMessage, frozen=True, kw_only=True):
+    """A click into the 3-D view of a session that places points: from `origin` along `direction` (odom, m)."""
+
+    origin: m.Vector3
+    direction: m.UnitVector3
+
+
 class HoldEnded(PageMessage, frozen=True, kw_only=True):
     """The server has ended or refused what this page holds, and takes no more of it before the page lets go."""
 
@@ -156,11 +163,17 @@ class ShowGizmo(PageMessage, frozen=True, kw_only=True):
     visible: bool
 
 
+class PlaceByHand(PageMessage, frozen=True, kw_only=True):
+    """From now on clicks into the 3-D view are meant for new points, each answered with a `Sightline`; or no more."""
+
+    active: bool
+
+
 class Select(PageMessage, frozen=True, kw_only=True):
     """Highlight a point in the 3-D view; empty = none."""
 
     point_id: Annotated[str, Meta(max_length=64)]
 
 
-FromServer = PageState | PagePoints | PageEvents | Selected | HoldEnded | Pong
-FromPage = Ping | Hold | ShowGizmo | Select
+FromServer = PageState | PagePoints | PageEvents | Selected | Sightline | HoldEnded | Pong
+FromPage = Ping | Hold | ShowGizmo | PlaceByHand | Select

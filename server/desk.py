@@ -10,7 +10,7 @@ from typing import Protocol
 from rolling_panda import intents
 from rolling_panda import messages as m
 from rolling_panda.errors import InputError, ServiceError
-from rolling_panda.page_messages import PagePoints, PageState
+from rolling_panda.page_messages import PagePoints, PageState, Sightline
 from rolling_panda.plant_requests import PlantRequest
 from server.config import ServerConfig
 from server.event_log import EventLog
@@ -41,6 +41,11 @@ class Listener(Protocol):
 
     def wake(self) -> None:
         """There may be something new to send."""
+
+    placing: bool
+
+    def sighted(self, line: Sightline) -> None:
+        """This page's session has clicked into the 3-D view, to place a point there."""
 
     def selected(self, point_id: str) -> None:
         """A point was clicked in the 3-D view of this page's session."""
@@ -228,11 +233,29 @@ class Desk:
             if page.session.session_id == owner:
                 page.selected(point_id)
 
+    def place_by_hand(self, page: Listener, placing: bool) -> None:
+        """A page takes its session's next clicks into the 3-D view for points to place, or no more."""
+        page.placing = placing and page.session.may_operate
+        self._take_clicks(page.session)
+
+    def _take_clicks(self, session: Session) -> None:
+        taken = any(page.placing for page in self.pages if page.session is session)
+        self.scene.take_clicks(session.session_id, taken)
+
+    def sighted(self, owner: str, origin: m.Vector3, direction: m.Vector3) -> None:
+        """`owner` clicked into their 3-D view; of their pages the one that places asks for the point."""
+        for page in self.pages:
+            if page.placing and page.session.session_id == owner:
+                page.sighted(Sightline(origin=origin, direction=direction))
+                return
+
     def page_closed(self, page: Listener, holding: bool) -> None:
         """A page has gone; with the last one of its session goes the gizmo, and with a holding one the hold."""
         self.pages.discard(page)
         if holding:
             self.let_go(page.session)
+        if page.placing:
+            self._take_clicks(page.session)
         if not any(other.session is page.session for other in self.pages):
             self.show_gizmo(page.session, False)
 

@@ -17,10 +17,12 @@ from rolling_panda.page_messages import (
     PagePoints,
     PageState,
     Ping,
+    PlaceByHand,
     Pong,
     Select,
     Selected,
     ShowGizmo,
+    Sightline,
 )
 from server.desk import Desk
 from server.page_view import addressed
@@ -44,6 +46,8 @@ class OpenPage:
         self._pong: Pong | None = None
         self._selected: str | None = None
         self._hold_ended: HoldEnded | None = None
+        self._sightline: Sightline | None = None
+        self.placing = False
         self._state: PageState | None = None
         self._points: PagePoints | None = None
         self._event_number = 0
@@ -78,6 +82,11 @@ class OpenPage:
         self._selected = point_id
         self.wake()
 
+    def sighted(self, line: Sightline) -> None:
+        """This session has clicked into the 3-D view, to place a point there."""
+        self._sightline = line
+        self.wake()
+
     def hold_ended(self, reason: str) -> None:
         """This session's hold is over; the page that held must let go and press again."""
         if self._holding:
@@ -109,6 +118,9 @@ class OpenPage:
         if desk.state is not None and desk.state is not self._state:
             self._state = desk.state
             return addressed(desk.state, self.session)
+        if self._sightline is not None:
+            line, self._sightline = self._sightline, None
+            return line
         if self._selected is not None:
             point_id, self._selected = self._selected, None
             return Selected(point_id=point_id)
@@ -153,6 +165,8 @@ class OpenPage:
                     self._desk.let_go(self.session)
             case ShowGizmo(visible=visible):
                 self._desk.show_gizmo(self.session, visible)
+            case PlaceByHand(active=active):
+                self._desk.place_by_hand(self, active)
             case Select(point_id=point_id):
                 self._desk.scene.select(self.session.session_id, point_id)
 

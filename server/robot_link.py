@@ -21,6 +21,8 @@ from rolling_panda.transport import Transport
 
 _STOP_REPEATS = 5
 _STOP_SPACING_S = 0.025
+#: Images of the camera that are kept: a page asks for the one that it was told of, and newer ones may have come since.
+_MOST_IMAGES = 5
 #: Pictures of points that are kept; of 8 kB each at most.
 _MOST_CROPS = 3000
 
@@ -45,6 +47,9 @@ class RobotLink:
         self.bridge = transport.slot(topics.BRIDGE)
         self.controller = transport.slot(topics.CONTROLLER)
         self.camera = transport.slot(topics.CAMERA)
+        self.images: dict[int, bytes] = {}
+        """Of the newest few frames, by their sequence."""
+        transport.subscribe(topics.CAMERA, self._on_frame)
         self.points = transport.slot(topics.POINTS)
         self.plan = transport.slot(topics.PLAN)
         self.scenery = transport.slot(topics.SCENERY)
@@ -137,6 +142,11 @@ class RobotLink:
         """Stop waiting for answers."""
         self._callers.shutdown(wait=False, cancel_futures=True)
         self._writer.shutdown(wait=False, cancel_futures=True)
+
+    def _on_frame(self, message: m.CameraFrame, at: float) -> None:
+        self.images[message.sequence] = message.color_jpeg
+        if len(self.images) > _MOST_IMAGES:
+            del self.images[next(iter(self.images))]
 
     def _on_crop(self, message: PointCrop, at: float) -> None:
         # Renewed at the end, so that points long gone are the first to be forgotten.

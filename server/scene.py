@@ -14,6 +14,7 @@ from rolling_panda.differential_drive import Array
 from rolling_panda.page_messages import PagePoint
 from rolling_panda.row_messages import Capsule, Scenery
 from server.robot_meshes import Part
+from server.scene_clicks import SceneClicks
 from server.scene_door import SceneDoor
 from server.scene_gizmo import SceneGizmos
 from server.scene_markers import STATE_COLORS, cut_marker, quat_wxyz_of_axis, selection_ring
@@ -40,6 +41,7 @@ class Scene:
         parts: list[Part],
         on_select: Callable[[str, str], object],
         on_aim: Callable[[str, m.Pose], object],
+        on_sightline: Callable[[str, m.Vector3, m.Vector3], object],
         on_stranger: Callable[[], object],
     ) -> None:
         """Start viser and draw the robot.
@@ -49,6 +51,7 @@ class Scene:
             parts: Its looks.
             on_select: Called with (owner, point_id) when `owner` clicked a point.
             on_aim: Called with (owner, target) when `owner` dragged their gizmo.
+            on_sightline: Called with (owner, origin, direction) when `owner`, who places points, clicked into the view.
             on_stranger: Called when a connection that did not come through the proxy was refused.
         """
         with contextlib.redirect_stdout(io.StringIO()):
@@ -56,6 +59,7 @@ class Scene:
         self.port = int(self._server.get_port())
         self.door = SceneDoor(self._server, on_stranger)
         self.gizmos = SceneGizmos(on_aim)
+        self._clicks = SceneClicks(on_sightline)
         self._on_select = on_select
         self._marker = cut_marker()
         self._points: dict[str, tuple[PagePoint, viser.MeshHandle]] = {}
@@ -123,10 +127,18 @@ class Scene:
         """Show the gizmo of `owner` at the tool (pose in odom)."""
         self.gizmos.show(owner, tool, self._clients(owner))
 
+    def take_clicks(self, owner: str, taken: bool) -> None:
+        """Take the clicks of `owner` anywhere into the view for lines of sight, or no more."""
+        if taken:
+            self._clicks.listen(owner, self._clients(owner))
+        else:
+            self._clicks.end(owner)
+
     def forget(self, owner: str) -> None:
         """`owner` has signed out."""
         self._selected.pop(owner, None)
         self.gizmos.hide(owner)
+        self._clicks.end(owner)
 
     def move(self, q: Array) -> bool:
         """Show the robot at q (12); True when something was sent."""
@@ -193,10 +205,12 @@ class Scene:
         owner = self.door.owner(client.client_id)
         if owner is not None:
             self.gizmos.attach(owner, client)
+            self._clicks.attach(owner, client)
             self._draw_selection(owner)
 
     async def _on_client_gone(self, client: viser.ClientHandle) -> None:
         self.gizmos.detach(client.client_id)
+        self._clicks.detach(client.client_id)
 
     def _draw_surroundings(self) -> None:
         server, scene = self._server, self._server.scene

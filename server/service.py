@@ -94,6 +94,7 @@ async def serve(
         # Called on viser's thread, and not before a page is served.
         on_select=lambda owner, point_id: soon(desk.clicked, owner, point_id),
         on_aim=lambda owner, target: soon(desk.teleop.aim, owner, target),
+        on_sightline=lambda owner, origin, direction: soon(desk.sighted, owner, origin, direction),
         on_stranger=lambda: soon(desk.note, "warning", "refused a connection to the 3-D view from outside the page"),
     )
     link = RobotLink(transport)

@@ -4,7 +4,7 @@ import time
 from pathlib import Path
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Header, Request, Response
+from fastapi import APIRouter, Depends, Header, Query, Request, Response
 from fastapi.responses import FileResponse, JSONResponse
 
 from rolling_panda import __version__
@@ -102,11 +102,14 @@ def site_router(desk: Desk, web: Path) -> APIRouter:
         return {"name": "rolling-panda", "version": __version__}
 
     @router.get("/camera/color.jpg", tags=["state"], response_class=Response)
-    async def camera() -> Response:
-        """The newest image of the eye-in-hand camera, JPEG."""
+    async def camera(n: Annotated[int, Query(ge=0)] | None = None) -> Response:
+        """The newest image of the eye-in-hand camera, JPEG; with `n` that of frame `n`, one of the newest few."""
         frame = desk.link.camera.peek()
         if frame is None:
             return answer(Result(404, False, "no camera image has come yet"))
-        return Response(frame.message.color_jpeg, media_type="image/jpeg")
+        image = frame.message.color_jpeg if n is None else desk.link.images.get(n)
+        if image is None:
+            return answer(Result(404, False, f"frame {n} is not among the newest ones; {frame.message.sequence} is"))
+        return Response(image, media_type="image/jpeg")
 
     return router

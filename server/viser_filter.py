@@ -49,6 +49,16 @@ class SceneNodeClick(_ClientMessage, frozen=True, tag="SceneNodeClickMessage"):
     owner: _Owner = ""
 
 
+class ScenePointer(_ClientMessage, frozen=True, tag="ScenePointerMessage"):
+    """A click anywhere into the scene, while somebody places points by hand."""
+
+    event_type: Literal["click"]
+    ray_origin: Vector3
+    ray_direction: Vector3
+    screen_pos: tuple[_Screen]
+    modifier: _Modifier | None
+
+
 class GizmoUpdate(_ClientMessage, frozen=True, tag="TransformControlsUpdateMessage"):
     """The gizmo was dragged to here."""
 
@@ -72,7 +82,7 @@ class GizmoDragEnd(_ClientMessage, frozen=True, tag="TransformControlsDragEndMes
     owner: _Owner = ""
 
 
-_Admitted = ViewerCamera | SceneNodeClick | GizmoUpdate | GizmoDragStart | GizmoDragEnd
+_Admitted = ViewerCamera | SceneNodeClick | ScenePointer | GizmoUpdate | GizmoDragStart | GizmoDragEnd
 _DECODER: msgspec.msgpack.Decoder[_Admitted] = msgspec.msgpack.Decoder(_Admitted, strict=True)
 _ENCODER = msgspec.msgpack.Encoder()
 

@@ -116,7 +116,8 @@ class PlayedServer:
     posted: list[tuple[str, Any]] = field(default_factory=list)
     said: list[p.FromPage] = field(default_factory=list)
     sockets: list[WebSocketRoute] = field(default_factory=list)
-    fetched: list[str] = field(default_factory=list)
+    crops_fetched: list[str] = field(default_factory=list)
+    frames_fetched: list[int] = field(default_factory=list)
     rule: m.PruningRule | None = field(default_factory=m.PruningRule)
     crop: bytes = field(default_factory=lambda: camera_image((240, 180)))
     number: int = 0
@@ -141,12 +142,13 @@ class PlayedServer:
         elif path == "/viser/":
             route.fulfill(body=VIEW, content_type="text/html")
         elif path.startswith("/api/points/") and path.endswith("/crop"):
-            self.fetched.append(route.request.url.removeprefix(ORIGIN))
+            self.crops_fetched.append(route.request.url.removeprefix(ORIGIN))
             if self.crop:
                 route.fulfill(body=self.crop, content_type="image/jpeg")
             else:
                 route.fulfill(status=404, json={"ok": False, "reason": "no picture of this point has come yet"})
         elif path == "/camera/color.jpg":
+            self.frames_fetched.append(int(route.request.url.split("n=")[1]))
             route.fulfill(body=self.image, content_type="image/jpeg")
         else:
             name = {"/": "index.html", "/sign-in": "sign-in.html"}.get(path, path.lstrip("/"))

@@ -17,7 +17,7 @@ def test_the_chosen_point_shows_its_picture_and_what_is_behind_the_cut(page: Pag
     page.locator('[data-point-id="p1"]').click()
     details = page.locator('[data-point-id="p1"] rp-point-details')
     expect(details.locator(".crop")).to_have_class("crop loaded")
-    assert server.fetched[-1].startswith("/api/points/p1/crop?revision=4")
+    assert server.crops_fetched[-1].startswith("/api/points/p1/crop?revision=4")
     for words in (
         "Spur cut, 20 mm past node 2",
         "8.0 mm, ≈ 470 N",
@@ -25,28 +25,28 @@ def test_the_chosen_point_shows_its_picture_and_what_is_behind_the_cut(page: Pag
         "wire 141 · cordon 62 · node 21 mm",
     ):
         expect(details).to_contain_text(words)
-    count = len(server.fetched)
+    count = len(server.crops_fetched)
     page.locator('[data-point-id="p3"]').click()
     expect(page.locator("rp-point-details")).to_have_count(1)
-    until(page, lambda: len(server.fetched) == count + 1)
+    until(page, lambda: len(server.crops_fetched) == count + 1)
 
 
 def test_a_picture_is_fetched_once_a_revision_and_again_until_it_has_come(page: Page, server: PlayedServer) -> None:
     server.crop = b""
     page.locator('[data-point-id="p1"]').click()
     crop = page.locator("rp-point-details .crop")
-    until(page, lambda: len(server.fetched) == 1)
+    until(page, lambda: len(server.crops_fetched) == 1)
     expect(crop).to_have_class("crop")
     server.crop = PlayedServer().crop
     expect(crop).to_have_class("crop loaded")
     for _ in range(3):
         server.tell(server.page_points())
     page.wait_for_timeout(300)
-    assert len(server.fetched) == 2
+    assert len(server.crops_fetched) == 2
     first = msgspec.structs.replace(server.points[0].point, revision=5, digest="ab" * 16)
     server.points = (msgspec.structs.replace(server.points[0], point=first), *server.points[1:])
     server.tell(server.page_points())
-    until(page, lambda: server.fetched[-1].startswith("/api/points/p1/crop?revision=5"))
+    until(page, lambda: server.crops_fetched[-1].startswith("/api/points/p1/crop?revision=5"))
 
 
 def moved(row: p.PagePoint, digest: str) -> p.PagePoint:

@@ -1,5 +1,6 @@
 import threading
 import time
+from types import SimpleNamespace
 
 import pytest
 
@@ -11,7 +12,7 @@ from rolling_panda.crop_messages import PointCrop
 from rolling_panda.errors import MessageError
 from rolling_panda.plant_requests import SetRule
 from rolling_panda.row_messages import Capsule
-from rolling_panda.topics import CROPS, EVENT, HEARTBEAT, OBSTACLES, PLANT, POINTS
+from rolling_panda.topics import CROPS, EVENT, HEARTBEAT, LOOK, OBSTACLES, PLANT, POINTS
 from rolling_panda.transport import Slot
 
 pytestmark = pytest.mark.alone
@@ -30,7 +31,7 @@ class Wire:
 
     def __init__(self):
         self.frames = Slot()
-        self.out = {topic.name: Recorder() for topic in (POINTS, CROPS, OBSTACLES, HEARTBEAT, EVENT)}
+        self.out = {topic.name: Recorder() for topic in (POINTS, LOOK, CROPS, OBSTACLES, HEARTBEAT, EVENT)}
 
     def slot(self, topic):
         return self.frames
@@ -43,11 +44,18 @@ class Wire:
         return self.out[topic.name]
 
 
+class Frame(str):
+    """A frame that says what is to become of it."""
+
+    point_id = ""
+
+
 class Eyes:
     """Perception that does what its frames say."""
 
     withdrawn = ()
     crops = ()
+    sightings = SimpleNamespace(note=lambda frame: None)
     obstacles = (Capsule("wire", (0.0, 0.75, 1.2), (2.0, 0.75, 1.2), 0.004, 0.004),)
 
     def __init__(self):
@@ -85,7 +93,7 @@ def turn_until(loop, done, now=0.0):
 def test_points_are_sent_when_they_are_new_and_again_at_two_hertz(parts):
     wire, _, loop = parts
     points = wire.out[POINTS.name].sent
-    wire.frames.store("frame", 0.0)
+    wire.frames.store(Frame("frame"), 0.0)
     turn_until(loop, lambda: points)
     for tick in range(1, 41):
         loop.turn(tick / 20.0)
@@ -98,7 +106,7 @@ def test_obstacles_are_sent_once_a_second_from_the_first_frame_on(parts):
     obstacles = wire.out[OBSTACLES.name].sent
     loop.turn(0.0)
     assert not obstacles
-    wire.frames.store("frame", 0.0)
+    wire.frames.store(Frame("frame"), 0.0)
     turn_until(loop, lambda: obstacles)
     for tick in range(1, 62):
         loop.turn(tick / 20.0)
@@ -109,7 +117,7 @@ def test_obstacles_are_sent_once_a_second_from_the_first_frame_on(parts):
 def test_the_heartbeat_counts_turns_and_stops_counting_when_a_frame_hangs(parts):
     wire, eyes, loop = parts
     beats = wire.out[HEARTBEAT.name].sent
-    wire.frames.store("hang", 0.0)
+    wire.frames.store(Frame("hang"), 0.0)
     for tick in range(60):
         loop.turn(tick / 20.0)
     counted = [beat.sequence for beat in beats]
@@ -123,9 +131,9 @@ def test_the_heartbeat_counts_turns_and_stops_counting_when_a_frame_hangs(parts)
 def test_a_corrupt_frame_is_told_once_and_sends_no_points(parts):
     wire, _, loop = parts
     events = wire.out[EVENT.name].sent
-    wire.frames.store("corrupt", 0.0)
+    wire.frames.store(Frame("corrupt"), 0.0)
     turn_until(loop, lambda: events)
-    wire.frames.store("corrupt", 0.1)
+    wire.frames.store(Frame("corrupt"), 0.1)
     for _ in range(20):
         loop.turn(0.2)
         time.sleep(0.001)
@@ -139,7 +147,7 @@ def test_new_points_and_points_that_were_cut_are_no_warnings(parts):
     point = m.PruningPoint("p1", 1, (0.3, 0.8, 1.0), (0.0, 0.0, 1.0), 0.004, 0.9, 5, 2, 0, 0, "two nodes stay")
     eyes.process = lambda frame: m.PruningPoints(header=m.Header(), segmenter="s", frames=1, points=(point,))
     eyes.withdrawn = ("p2 withdrawn: it has been cut",)
-    wire.frames.store("frame", 0.0)
+    wire.frames.store(Frame("frame"), 0.0)
     turn_until(loop, lambda: len(events) == 2)
     assert [event.text for event in events] == ["1 new pruning point, 1 in all", "p2 withdrawn: it has been cut"]
     assert {event.severity for event in events} == {"info"}
@@ -203,7 +211,7 @@ def test_a_picture_is_sent_when_it_is_new_and_again_now_and_then(parts):
     wire, eyes, loop = parts
     sent = wire.out[CROPS.name].sent
     eyes.crops = tuple(PointCrop(point_id=name, revision=1, sequence=1, jpeg=b"x") for name in ("p1", "p2"))
-    wire.frames.store("frame", 0.0)
+    wire.frames.store(Frame("frame"), 0.0)
     turns(loop, lambda: len(sent) >= 2)
     for tick in range(21):
         loop.turn(tick / 20.0)
@@ -211,8 +219,22 @@ def test_a_picture_is_sent_when_it_is_new_and_again_now_and_then(parts):
     assert {crop.point_id for crop in sent[2:]} == {"p1", "p2"} and len(sent) <= 6
     eyes.crops = (PointCrop(point_id="p2", revision=2, sequence=5, jpeg=b"y"),)
     before = len(sent)
-    wire.frames.store("frame", 2.0)
+    wire.frames.store(Frame("frame"), 2.0)
     turns(loop, lambda: len(sent) > before, start=1.05)
     for tick in range(21):
         loop.turn(2.0 + tick / 20.0)
     assert {(crop.point_id, crop.revision) for crop in sent[before:]} == {("p2", 2)}
+
+
+def test_a_frame_that_is_never_worked_on_can_be_clicked_all_the_same(parts):
+    wire, eyes, loop = parts
+    noted = []
+    loop._sightings = SimpleNamespace(note=noted.append)
+    wire.frames.store(Frame("hang"), 0.0)
+    turns(loop, lambda: noted)
+    wire.frames.store(Frame("shown"), 0.1)
+    loop.turn(0.2)
+    wire.frames.store(Frame("newer"), 0.3)
+    loop.turn(0.4)
+    assert noted == ["hang", "shown", "newer"]
+    eyes.release.set()

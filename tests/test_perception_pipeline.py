@@ -136,6 +136,8 @@ def test_a_click_into_the_picture_adds_a_point_that_stays(model, frames):
     added = {point.point_id: point for point in seen.process(frames[0]).points}[answer.reason]
     beyond = np.array(before[0].position) + 0.02 * np.array(before[0].tangent)
     assert np.linalg.norm(np.array(added.position) - beyond) < 0.006
+    again = seen.answer(click)
+    assert not again.ok and f"{answer.reason} is there already" in again.reason
     assert added.reason.startswith("Placed by Ada") and added.radius == pytest.approx(before[0].radius, abs=0.001)
     assert seen.answer(SetRule(user="Ada", rule=m.PruningRule(nodes_kept=1))).ok
     assert answer.reason in {point.point_id for point in seen.points().points}, "another rule does not take it away"

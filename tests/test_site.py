@@ -93,6 +93,9 @@ def test_the_camera_image_is_the_newest_one(server, visitor):
     answer = visitor.get("/camera/color.jpg")
     assert (answer.content, answer.headers["content-type"]) == (b"jpeg2", "image/jpeg")
     assert answer.headers["cache-control"] == "no-store"
+    # The page shows the frame that it was told of, whatever has come since.
+    assert visitor.get("/camera/color.jpg?n=1").content == b"jpeg1"
+    assert visitor.get("/camera/color.jpg?n=7").status_code == 404
 
 
 def test_a_visitor_gets_the_sign_in_page_and_a_signed_in_person_the_operators_page(server, visitor):

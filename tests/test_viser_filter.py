@@ -21,6 +21,10 @@ DRAG = {
 }  # fmt: skip
 GRAB = {"type": "TransformControlsDragStartMessage", "name": "/gizmo", "owner": "client"}
 LET_GO = {"type": "TransformControlsDragEndMessage", "name": "/gizmo", "owner": "client"}
+POINTER = {
+    "type": "ScenePointerMessage", "event_type": "click", "ray_origin": [0, 0, 1.5], "ray_direction": [0, 1, 0],
+    "screen_pos": [[0.4, 0.6]], "modifier": None,
+}  # fmt: skip
 FORGED = {"type": "GuiUpdateMessage", "uuid": "x", "updates": {"value": 1e6}}
 
 
@@ -28,14 +32,14 @@ def frame(message):
     return msgspec.msgpack.encode(message)
 
 
-@pytest.mark.parametrize("message", [CAMERA, CLICK, DRAG, GRAB, LET_GO])
+@pytest.mark.parametrize("message", [CAMERA, CLICK, POINTER, DRAG, GRAB, LET_GO])
 def test_what_an_operator_may_say_reaches_viser_unchanged(message):
     admitted = admit(frame(message), may_operate=True)
     assert msgspec.msgpack.decode(admitted) == message
     assert type(_messages.Message.deserialize(admitted)).__name__ == message["type"]
 
 
-@pytest.mark.parametrize("message", [CLICK, DRAG, GRAB, LET_GO])
+@pytest.mark.parametrize("message", [CLICK, POINTER, DRAG, GRAB, LET_GO])
 def test_a_viewer_may_only_look(message):
     assert admit(frame(message), may_operate=False) is None
     assert admit(frame(CAMERA), may_operate=False) is not None
@@ -43,7 +47,7 @@ def test_a_viewer_may_only_look(message):
 
 @pytest.mark.parametrize("name", sorted(each.__name__ for each in _messages.Message.get_subclasses()))
 def test_every_other_message_that_viser_knows_is_dropped(name):
-    allowed = {message["type"] for message in (CAMERA, CLICK, DRAG, GRAB, LET_GO)}
+    allowed = {message["type"] for message in (CAMERA, CLICK, POINTER, DRAG, GRAB, LET_GO)}
     if name not in allowed:
         kind_fields = wire_field_names(_messages.Message._subclass_from_type_string()[name])
         for message in ({"type": name}, {"type": name} | dict.fromkeys(kind_fields, 0), CAMERA | {"type": name}):
@@ -54,6 +58,9 @@ def test_every_other_message_that_viser_knows_is_dropped(name):
     "message",
     [
         FORGED,
+        POINTER | {"event_type": "rect-select"},
+        POINTER | {"screen_pos": [[0.4, 0.6], [0.5, 0.7]]},
+        POINTER | {"ray_direction": [float("nan"), 0, 1]},
         DRAG | {"position": [float("nan"), 0, 0]},
         DRAG | {"position": [1e308, 0, 0]},
         DRAG | {"position": [0, 0]},

@@ -7,7 +7,7 @@ import pytest
 import zstandard
 from fake_wire import FakeWire, joints, odometry, pruning_point, pruning_points, telling
 from running_server import PATIENCE_S, eventually, running_server
-from test_viser_filter import CAMERA, CLICK, DRAG, FORGED, GRAB
+from test_viser_filter import CAMERA, CLICK, DRAG, FORGED, GRAB, POINTER
 from viser import _messages
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
@@ -122,6 +122,50 @@ def test_a_click_on_a_point_selects_it_on_the_pages_of_that_session_alone(server
         hear(view, lambda message: message.get("name") == "/selection")
         kinds = [json.loads(other_page.recv(timeout=PATIENCE_S))["type"] for _ in range(5)]
         assert "Selected" not in kinds
+
+
+def hear_kind(page, kind):
+    while True:
+        message = json.loads(page.recv(timeout=PATIENCE_S))
+        if message["type"] == kind:
+            return message
+
+
+def enables_clicks(message):
+    return message["type"] == "ScenePointerEnableMessage" and message["event_type"] == "click"
+
+
+def test_clicks_into_the_view_are_lines_of_sight_while_a_page_places_points(server):
+    with (
+        server.client() as client,
+        open_socket(server, client, "/ws") as page,
+        open_view(server, client) as view,
+    ):
+        hear(view, replayed)
+        say(view, CAMERA)
+        page.send(json.dumps({"type": "PlaceByHand", "active": True}))
+        assert hear(view, enables_clicks)[-1]["modifiers"]
+        say(view, POINTER)
+        line = hear_kind(page, "Sightline")
+        assert (line["origin"], line["direction"]) == ([0.0, 0.0, 1.5], [0.0, 1.0, 0.0])
+        page.send(json.dumps({"type": "PlaceByHand", "active": False}))
+        assert not hear(view, enables_clicks)[-1]["modifiers"]
+        page.send(json.dumps({"type": "PlaceByHand", "active": True}))
+        hear(view, enables_clicks)
+        page.close()
+        assert not hear(view, enables_clicks)[-1]["modifiers"], "nobody is left who places"
+
+
+def test_a_viewer_takes_no_clicks(server):
+    with (
+        server.client(role="viewer") as client,
+        open_socket(server, client, "/ws") as page,
+        open_view(server, client) as view,
+    ):
+        hear(view, replayed)
+        page.send(json.dumps({"type": "PlaceByHand", "active": True}))
+        with pytest.raises(TimeoutError):
+            hear(view, enables_clicks, patience_s=0.4)
 
 
 def test_the_gizmo_is_on_the_holders_view_alone_and_its_drags_become_targets(server):

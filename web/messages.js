@@ -359,6 +359,15 @@ export const TEXT_MAX_LENGTH = 500;
  */
 
 /**
+ * A click into the 3-D view of a session that places points: from `origin` along `direction` (odom, m).
+ *
+ * @typedef {object} Sightline
+ * @property {"Sightline"} type
+ * @property {Vector3} origin
+ * @property {UnitVector3} direction
+ */
+
+/**
  * The server has ended or refused what this page holds, and takes no more of it before the page lets go.
  *
  * @typedef {object} HoldEnded
@@ -401,6 +410,14 @@ export const TEXT_MAX_LENGTH = 500;
  */
 
 /**
+ * From now on clicks into the 3-D view are meant for new points, each answered with a `Sightline`; or no more.
+ *
+ * @typedef {object} PlaceByHand
+ * @property {"PlaceByHand"} type
+ * @property {boolean} active
+ */
+
+/**
  * Highlight a point in the 3-D view; empty = none.
  *
  * @typedef {object} Select
@@ -408,6 +425,6 @@ export const TEXT_MAX_LENGTH = 500;
  * @property {string} point_id
  */
 
-/** @typedef {PageState|PagePoints|PageEvents|Selected|HoldEnded|Pong} FromServer */
+/** @typedef {PageState|PagePoints|PageEvents|Selected|Sightline|HoldEnded|Pong} FromServer */
 
-/** @typedef {Ping|Hold|ShowGizmo|Select} FromPage */
+/** @typedef {Ping|Hold|ShowGizmo|PlaceByHand|Select} FromPage */

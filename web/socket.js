@@ -5,6 +5,7 @@ import { link, points, roundTrip, say, selected, takeEvents, takeState } from ".
 
 /** @typedef {import("./messages.js").FromServer} FromServer */
 /** @typedef {import("./messages.js").FromPage} FromPage */
+/** @typedef {import("./messages.js").Sightline} Sightline */
 
 const PING_MS = 100;
 /**
@@ -24,6 +25,8 @@ export class Link {
     this.onclose = () => {};
     /** Called when the server has ended or refused what is held here. @type {(reason: string) => void} */
     this.onholdended = () => {};
+    /** Called when this session has clicked into the 3-D view to place a point. @type {(line: Sightline) => void} */
+    this.onsightline = () => {};
     this.attempts = 0;
     this.silentTurns = 0;
     this.number = 0;
@@ -121,6 +124,9 @@ export class Link {
         break;
       case "Selected":
         selected.set(message.point_id);
+        break;
+      case "Sightline":
+        this.onsightline(message);
         break;
       case "HoldEnded":
         this.onholdended(message.reason);

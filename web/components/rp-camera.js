@@ -1,124 +1,121 @@
-// What the eye-in-hand camera sees, with the pruning points drawn on it.
+// What the eye-in-hand camera sees, with the pruning points drawn on it; it can be held still, and clicked to add a point.
 
+import { place, placing } from "../by-hand.js";
+import { CameraMarks } from "../camera-marks.js";
 import { element, panelHead, setText, svg } from "../element.js";
 import { link, now, pageState, points, selected, staleWords } from "../state.js";
-import { drawOn } from "../store.js";
-import { select } from "../teleoperation.js";
-import { POINT_WORDS, ageWords } from "../words.js";
+import { drawOn, signal } from "../store.js";
+import { ageWords } from "../words.js";
 
-/** @typedef {import("../messages.js").PagePoint} PagePoint */
+/** @typedef {import("../camera-marks.js").Pixel} Pixel */
 
 /** Frames come at 2 Hz; one that is this old (ms) is called old. */
 const OLD_MS = 2500;
 
 class RpCamera extends HTMLElement {
+  constructor() {
+    super();
+    this.image = element("img", { attributes: { alt: "What the camera at the tool sees" } });
+    this.overlay = svg("svg", { role: "group", "aria-label": "Pruning points in the image" });
+    this.empty = element("p", { class: "empty", text: "Waiting for the first image…", attributes: { role: "status" } });
+    this.picture = element("div", { class: "picture" }, this.image, this.empty);
+    this.shownFrame = 0;
+    this.frameAt = 0;
+    this.loading = false;
+    /** Where points are in the image that is held still; null while it is not. */
+    this.held = signal(/** @type {Map<string, Pixel>|null} */ (null));
+  }
+
   connectedCallback() {
     const source = element("span", { class: "tag", attributes: { title: "The robot and its camera are simulated" } });
-    const { head, note } = panelHead("Camera", source);
-    const image = element("img", { attributes: { alt: "What the camera at the tool sees" } });
-    const overlay = svg("svg", { role: "group", "aria-label": "Pruning points in the image" });
-    const empty = element("p", { class: "empty", text: "Waiting for the first image…", attributes: { role: "status" } });
-    const picture = element("div", { class: "picture" }, image, empty);
-    picture.append(overlay);
-    this.append(head, picture);
-    image.hidden = true;
+    const freeze = element("button", { id: "freeze", class: "quiet", text: "Freeze", attributes: { type: "button" } });
+    const { head, note } = panelHead("Camera", source, freeze);
+    this.picture.append(this.overlay);
+    this.append(head, this.picture);
+    this.image.hidden = true;
 
-    let shownFrame = 0;
-    let loading = false;
-    let frameAt = 0;
-    const fetchNewest = () => {
-      const frame = pageState.get()?.camera_frame ?? 0;
-      if (loading || frame === shownFrame || frame === 0) return;
-      loading = true;
-      // Decoded aside first: the picture never flashes empty between two frames.
-      const next = new Image();
-      next.addEventListener("load", () => {
-        loading = false;
-        shownFrame = frame;
-        frameAt = performance.now();
-        image.src = next.src;
-        image.hidden = false;
-        empty.hidden = true;
-      });
-      next.addEventListener("error", () => {
-        loading = false;
-        shownFrame = frame;
-        if (image.hidden) setText(empty, "The image did not load; trying the next one.");
-      });
-      next.src = `/camera/color.jpg?n=${frame}`;
-    };
-    pageState.subscribe(fetchNewest);
-    drawOn([pageState, link, now], () => {
+    pageState.subscribe(() => this.fetchNewest());
+    drawOn([pageState, link, now, this.held], () => {
+      const held = this.held.get() !== null;
+      const age = performance.now() - this.frameAt;
       let words = staleWords("bridge");
-      const age = performance.now() - frameAt;
-      if (!words && frameAt > 0 && age > OLD_MS) words = `image ${ageWords(age / 1000)} old`;
+      if (!words && held) words = `frozen, ${ageWords(age / 1000)} old`;
+      else if (!words && this.frameAt > 0 && age > OLD_MS) words = `image ${ageWords(age / 1000)} old`;
       setText(note, words);
-      this.classList.toggle("stale", words !== "");
+      this.classList.toggle("stale", words !== "" && !held);
+      this.classList.toggle("frozen", held);
       setText(source, pageState.get()?.bridge?.kind === "sim" ? "simulation" : "");
     });
 
-    /** @type {Map<string, SVGGElement>} */
-    const marks = new Map();
-    drawOn([points, selected], () => {
+    freeze.addEventListener("click", () => {
+      this.held.set(this.held.get() === null ? this.pixels() : null);
+      this.fetchNewest();
+    });
+    drawOn([this.held], () => {
+      const held = this.held.get() !== null;
+      freeze.setAttribute("aria-pressed", String(held));
+      freeze.title = held ? "Show what the camera sees now" : "Hold this image still; the robot goes on";
+    });
+    this.overlay.addEventListener("click", (event) => void this.clicked(event));
+
+    const marks = new CameraMarks(this.overlay);
+    drawOn([points, selected, this.held], () => {
       const page = points.get();
       const [width, height] = page?.image_size ?? [0, 0];
       if (width > 0) {
-        overlay.setAttribute("viewBox", `0 0 ${width} ${height}`);
-        picture.style.setProperty("aspect-ratio", `${width} / ${height}`);
+        this.overlay.setAttribute("viewBox", `0 0 ${width} ${height}`);
+        this.picture.style.setProperty("aspect-ratio", `${width} / ${height}`);
       }
-      const unit = Math.max(width, 1) / 320;
-      const visible = (page?.points ?? []).filter((row) => row.pixel !== null);
-      const wanted = new Set(visible.map((row) => row.point.point_id));
-      for (const [id, mark] of marks) {
-        if (wanted.has(id)) continue;
-        mark.remove();
-        marks.delete(id);
-      }
-      for (const row of visible) drawMark(overlay, marks, row, unit);
+      const held = this.held.get();
+      marks.show(
+        page?.points ?? [],
+        (row) => (held === null ? row.pixel : (held.get(row.point.point_id) ?? null)),
+        Math.max(width, 1) / 320,
+      );
     });
   }
-}
 
-/**
- * @param {SVGSVGElement} overlay
- * @param {Map<string, SVGGElement>} marks
- * @param {PagePoint} row
- * @param {number} unit Image pixels for one pixel of a 320-pixel-wide picture.
- */
-function drawMark(overlay, marks, row, unit) {
-  const { point, entry, pixel } = row;
-  if (pixel === null) return;
-  let mark = marks.get(point.point_id);
-  if (!mark) {
-    mark = svg("g", { class: "mark" });
-    mark.append(
-      svg("circle", { class: "target", r: 14 * unit }),
-      svg("circle", { class: "halo", r: 7 * unit }),
-      svg("circle", { class: "ring", r: 7 * unit }),
-      svg("path", { class: "sign" }),
-      svg("title"),
-    );
-    mark.addEventListener("click", () => select(point.point_id));
-    marks.set(point.point_id, mark);
-    overlay.append(mark);
+  /** @returns {Map<string, Pixel>} */
+  pixels() {
+    const out = new Map();
+    for (const row of points.get()?.points ?? []) if (row.pixel !== null) out.set(row.point.point_id, row.pixel);
+    return out;
   }
-  mark.dataset.state = entry.state;
-  mark.classList.toggle("selected", selected.get() === point.point_id);
-  mark.setAttribute("transform", `translate(${pixel[0].toFixed(1)} ${pixel[1].toFixed(1)})`);
-  const [, , , sign, title] = mark.children;
-  sign?.setAttribute("d", SIGNS[entry.state]);
-  sign?.setAttribute("transform", `scale(${unit})`);
-  if (title) setText(title, `${point.point_id}: ${POINT_WORDS[entry.state]}`);
-}
 
-/** Small signs inside the ring, in pixels around its centre. @type {Readonly<Record<import("../messages.js").PointState, string>>} */
-const SIGNS = Object.freeze({
-  PROPOSED: "M0 -.5v1",
-  ACCEPTED: "M-3 .2l2.2 2.2L3 -2.4",
-  INTENT: "M-3 -3l6 6M3 -3l-6 6M0 -4v8",
-  DONE: "M-3 .2l2.2 2.2L3 -2.4M-4.5 5.5h9",
-  FAILED_NOT_CUT: "M0 -3.6v4M0 2.8v.6",
-  UNKNOWN: "M-1.8 -2a1.9 1.9 0 1 1 2.4 2.4l-.6 1M0 3.4v.3",
-  REJECTED: "M-3 -3l6 6M3 -3l-6 6",
-});
+  /** Decoded aside first: the picture never flashes empty between two frames. */
+  fetchNewest() {
+    const frame = pageState.get()?.camera_frame ?? 0;
+    if (this.loading || frame === this.shownFrame || frame === 0 || this.held.get() !== null) return;
+    this.loading = true;
+    const next = new Image();
+    next.addEventListener("load", () => {
+      this.loading = false;
+      if (this.held.get() !== null) return;
+      this.shownFrame = frame;
+      this.frameAt = performance.now();
+      this.image.src = next.src;
+      this.image.hidden = false;
+      this.empty.hidden = true;
+    });
+    next.addEventListener("error", () => {
+      this.loading = false;
+      if (this.image.hidden) setText(this.empty, "The image did not load; trying the next one.");
+    });
+    next.src = `/camera/color.jpg?n=${frame}`;
+  }
+
+  /** @param {MouseEvent} event */
+  async clicked(event) {
+    const [width, height] = points.get()?.image_size ?? [0, 0];
+    const toScreen = this.overlay.getScreenCTM();
+    if (!placing.get() || this.image.hidden || width === 0 || toScreen === null) return;
+    const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(toScreen.inverse());
+    const [u, v] = [at.x / width, at.y / height];
+    if (u < 0 || u > 1 || v < 0 || v > 1) return;
+    const name = await place("/api/points/by-hand-in-image", { sequence: this.shownFrame, u, v });
+    const held = this.held.get();
+    // In an image that is held still the new point is where it was clicked.
+    if (name && held !== null) this.held.set(new Map(held).set(name, [at.x, at.y]));
+  }
+}
 customElements.define("rp-camera", RpCamera);

@@ -2,7 +2,9 @@
 
 import { countOf, whyNot } from "../allowed.js";
 import { ask } from "../api.js";
+import { placing, setPlacing, whyNoPlacing } from "../by-hand.js";
 import { element, panelHead, setEnabled, setText } from "../element.js";
+import { icon } from "../icons.js";
 import { link, now, pageState, points, selected, staleWords } from "../state.js";
 import { drawOn } from "../store.js";
 import { select } from "../teleoperation.js";
@@ -26,7 +28,7 @@ class RpQueue extends HTMLElement {
       abstainedList("operator", (count) => `${counted(count, "place")} for you to decide`),
     ];
     list.addEventListener("keydown", (event) => this.key(event));
-    this.append(head, document.createElement("rp-rule"), element("div", { class: "queue-tools" }, summary, ...acceptAll()), list, empty, element("div", { class: "open-places" }, ...open.map((each) => each.box)));
+    this.append(head, document.createElement("rp-rule"), element("div", { class: "queue-tools" }, summary, ...acceptAll(), addByHand()), list, empty, element("div", { class: "open-places" }, ...open.map((each) => each.box)));
 
     /** @type {Map<string, HTMLElement>} */
     const groups = new Map();
@@ -138,6 +140,16 @@ function acceptAll() {
     setEnabled(button, why, "Accept every proposed point with this confidence");
   });
   return [button, least];
+}
+
+function addByHand() {
+  const button = element("button", { id: "add-by-hand", attributes: { type: "button", "aria-label": "Add a point by hand" } }, icon("add"));
+  button.addEventListener("click", () => setPlacing(!placing.get()));
+  drawOn([placing, pageState, link, now], () => {
+    setEnabled(button, whyNoPlacing(), "Add a point by hand: click a cane in the 3-D view or in the camera image");
+    button.setAttribute("aria-pressed", String(placing.get()));
+  });
+  return button;
 }
 
 /**
