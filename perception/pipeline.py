@@ -258,8 +258,8 @@ class Perception:
             self.obstacles = rods
             return
         seen = [spur for spur in self.known.spurs if spur.number in numbers]
-        canes = self._staying.update(view, labels, seen, self._tracker.shown(), self._config.rule)
-        told = (*rods, *canes)[: config.most]
+        room = max(0, config.most - len(rods))
+        told = (*rods, *self._staying.update(view, labels, seen, self._tracker.shown(), self._config.rule, room))
         # The same object as before where nothing is new.
         self.obstacles = self.obstacles if told == self.obstacles else told
 

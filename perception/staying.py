@@ -43,7 +43,7 @@ _INTERNODE = 0.10
 _SHORTEST = 0.02
 
 
-@dataclass
+@dataclass(eq=False)
 class _Cane:
     """One cane: where it will be cut, what was told of it, and how often it was found gone.
 
@@ -67,6 +67,10 @@ class _Cane:
     looks: int = 0
     doubted: int = 0
 
+    def away(self, place: Array) -> float:
+        """Distance of its base from a place (3, m); infinite while nothing is told."""
+        return np.inf if self.axis is None else float(np.linalg.norm(self.axis[0] - place))
+
     def withdraw(self) -> None:
         self.axis, self.capsules, self.gone = None, (), 0
 
@@ -86,8 +90,9 @@ class StayingCanes:
         spurs: Iterable[KnownSpur],
         cuts: Sequence[Proposal],
         rule: RuleConfig,
+        most: int,
     ) -> tuple[Capsule, ...]:
-        """Take one frame in; what is known to stay now, nearest to the camera first.
+        """Take one frame in; what is known to stay now.
 
         Args:
             view: The frame.
@@ -95,13 +100,20 @@ class StayingCanes:
             spurs: Those whose canes may have been seen anew.
             cuts: All that are proposed.
             rule: What it leaves.
+            most: Capsules at most, of the canes nearest to the camera.
         """
         self.choose(spurs, cuts, rule)
         for cane in self._canes.values():
-            if cane.axis is not None and float(np.linalg.norm(cane.axis[0] - view.t)) < _FAR:
+            if cane.away(view.t) < _FAR:
                 self._glance(cane, view, labels)
-        capsules = [capsule for cane in self._canes.values() for capsule in cane.capsules]
-        return tuple(sorted(capsules, key=lambda capsule: float(np.linalg.norm(np.array(capsule.start) - view.t))))
+        # In the same order every time, so that a message where nothing is new equals the one before.
+        standing = sorted(self._canes.values(), key=lambda cane: cane.away(view.t))
+        nearest: list[_Cane] = []
+        for cane in standing:
+            if sum(len(other.capsules) for other in nearest) + len(cane.capsules) > most:
+                break
+            nearest.append(cane)
+        return tuple(c for cane in self._canes.values() if cane in nearest for c in cane.capsules)
 
     def choose(self, spurs: Iterable[KnownSpur], cuts: Sequence[Proposal], rule: RuleConfig) -> None:
         """Judge the canes of some spurs anew; see `update`."""

@@ -64,9 +64,9 @@ def view(*columns):
     return View(0, 0.0, lens, depth, labels, b"", np.eye(3), np.zeros(3))
 
 
-def told(plants, *cuts, rule=RULE, staying=None, seen=None):
+def told(plants, *cuts, rule=RULE, staying=None, seen=None, most=200):
     seen = seen or view(*(c.best.axis[0, 0] for spur in plants.spurs for c in spur.canes))
-    return (staying or StayingCanes(CONFIG)).update(seen, seen.labels, plants.spurs, list(cuts), rule)
+    return (staying or StayingCanes(CONFIG)).update(seen, seen.labels, plants.spurs, list(cuts), rule, most)
 
 
 def top(capsules):
@@ -244,8 +244,11 @@ def test_without_canes_rods_alone_are_told(surveyed):
     assert seen.obstacles and not canes(seen)
 
 
-def test_of_too_many_the_nearest_canes_are_told():
-    staying, plants = StayingCanes(CONFIG), known(cane(), cane(0.05), cane(0.3))
-    capsules = told(plants, staying=staying)
-    first = [abs(c.start[0]) for c in capsules]
-    assert first == sorted(first) and first[-1] > 0.25
+def test_of_too_many_the_nearest_canes_are_told_in_an_order_that_stays():
+    staying, plants = StayingCanes(CONFIG), known(cane(0.3), cane(-0.05), cane(0.02))
+    everything = told(plants, staying=staying)
+    assert [round(c.end[0], 2) for c in everything] == [0.3, -0.05, 0.02]
+    assert told(plants, staying=staying, most=2) == everything[1:]
+    elsewhere = replace(view(), t=np.array([0.3, 0.0, 0.9]))
+    assert told(plants, staying=staying, seen=elsewhere) == everything
+    assert told(plants, staying=staying, seen=elsewhere, most=1) == everything[:1]

@@ -30,6 +30,8 @@ class HierarchyConfig(Struct, frozen=True, forbid_unknown_fields=True):
         blade_distance: The same for the blades (m), which work near wires that nothing else may come near to.
         cutter_distance: The same for the cutter's body (m), whose capsule is 9 mm larger than it.
         cane_distance: The same of the robot's other parts to canes that stay (m).
+        cane_speed: ξ for canes (m/s): wider than for what does not give, and in step with the way into a cut.
+        cane_braking: Deceleration that an approach to a cane reckons with (m/s²), that of the way into a cut.
         collision_influence: d_i, nearer than which they approach more slowly (m).
         collision_speed: ξ, fastest approach at d_i (m/s), and fastest parting below d_s.
         collision_braking: Deceleration that an approach reckons with (m/s²).
@@ -53,6 +55,8 @@ class HierarchyConfig(Struct, frozen=True, forbid_unknown_fields=True):
     blade_distance: Positive = 0.004
     cutter_distance: Positive = 0.008
     cane_distance: Positive = 0.010
+    cane_speed: Positive = 0.7
+    cane_braking: Positive = 1.2
     collision_influence: Positive = 0.08
     collision_speed: Positive = 0.25
     collision_braking: Positive = 0.5
@@ -61,5 +65,10 @@ class HierarchyConfig(Struct, frozen=True, forbid_unknown_fields=True):
     def kept(self, pair: tuple[str, str]) -> float:
         """d_s of a pair of parts, by their names (m): of the tool's parts the smaller one of the two."""
         own = {"blades": self.blade_distance, "cutter": self.cutter_distance}
-        usual = self.cane_distance if pair[1].startswith("cane ") else self.collision_distance
+        usual = self.cane_distance if is_cane(pair) else self.collision_distance
         return min(own.get(part, usual) for part in pair)
+
+
+def is_cane(pair: tuple[str, str]) -> bool:
+    """Whether the second of a pair, by its name, is a cane."""
+    return pair[1].startswith("cane ")

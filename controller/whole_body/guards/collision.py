@@ -6,7 +6,7 @@ For each pair of parts nearer than d_i, with n the direction between their neare
 
 The first term is Faverjon and Tournassoud's velocity damper. The second lets a pair approach only as fast as it can
 still stop, after one more period, with the deceleration a. Nearer than d_s, the pair has to part. The blades and the
-cutter's body have a d_s of their own.
+cutter's body have a d_s of their own, and canes a ξ and an a: the tool slides in between them, and they bend.
 """
 
 import math
@@ -15,7 +15,7 @@ import numpy as np
 
 from controller.compiled import NOTHING, NUMBER, VECTOR, compiled
 from controller.whole_body.collision import CollisionModel
-from controller.whole_body.hierarchy_config import HierarchyConfig
+from controller.whole_body.hierarchy_config import HierarchyConfig, is_cane
 from controller.whole_body.task import NO_ROWS, Demand, Inequalities
 from rolling_panda.differential_drive import Array
 from rolling_panda.errors import ControlError
@@ -30,9 +30,9 @@ class CollisionGuard:
         """Guard what `model` watches, for a control period of `dt` (s)."""
         self.model = model
         self._influence, self._kept = config.collision_influence, config.kept
-        self._speed = config.collision_speed
-        self._brake = config.collision_braking
-        self._step = config.collision_braking * dt
+        self._usual = config.collision_speed, config.collision_braking
+        self._cane = config.cane_speed, config.cane_braking
+        self._dt = dt
 
     def rows(self, demand: Demand) -> Inequalities:
         """What has to hold in this period."""
@@ -44,30 +44,30 @@ class CollisionGuard:
         if not near.pairs:
             return NO_ROWS
         k = len(near.pairs)
-        kept, lower = np.empty(k), np.empty(k)
+        kept, speed, brake, lower = np.empty((4, k))
         for row, pair in enumerate(near.pairs):
             kept[row] = self._kept(pair)
-        _damp(near.distance, kept, self._influence, self._speed, self._brake, self._step, lower)
+            speed[row], brake[row] = self._cane if is_cane(pair) else self._usual
+        _damp(near.distance, kept, self._influence, speed, brake, self._dt, lower)
         return Inequalities(near.normal_jacobian, lower, tuple([f"the distance of {a} to {b}" for a, b in near.pairs]))
 
 
-@compiled(NOTHING(VECTOR, VECTOR, NUMBER, NUMBER, NUMBER, NUMBER, VECTOR))
-def _damp(
-    distance: Array, kept: Array, influence: float, speed: float, brake: float, step: float, lower: Array
-) -> None:
+@compiled(NOTHING(VECTOR, VECTOR, NUMBER, VECTOR, VECTOR, NUMBER, VECTOR))
+def _damp(distance: Array, kept: Array, influence: float, speed: Array, brake: Array, dt: float, lower: Array) -> None:
     """Write the least ḋ (k) of pairs at `distance` d (k) of which `kept` d_s (k) is kept; see the head of this file.
 
     Args:
         distance: d (k, m).
         kept: d_s (k, m).
         influence: d_i (m).
-        speed: ξ, and the fastest that a pair has to part (m/s).
-        brake: a (m/s²).
-        step: a dt (m/s).
+        speed: ξ, and the fastest that a pair has to part (k, m/s).
+        brake: a (k, m/s²).
+        dt: Of the control period (s).
         lower: Written (k, m/s).
     """
     for i in range(len(distance)):
         room = distance[i] - kept[i]
-        stopping = math.sqrt(step * step + 2.0 * brake * max(room, 0.0)) - step
-        approach = min(speed * room / (influence - kept[i]), stopping)
-        lower[i] = min(-approach, speed)
+        step = brake[i] * dt
+        stopping = math.sqrt(step * step + 2.0 * brake[i] * max(room, 0.0)) - step
+        approach = min(speed[i] * room / (influence - kept[i]), stopping)
+        lower[i] = min(-approach, speed[i])
