@@ -153,7 +153,7 @@ def test_out_of_the_canes_the_tool_gets_on_its_line_also_when_work_was_broken_of
 
 def test_the_way_in_beside_a_cane_is_not_left():
     """At full speed into a gap: what slows the tool down is the same as on the way itself, so that nothing jumps."""
-    r = working((point("a", CUT),), obstacles=(OWN, cane(CUT[0] + 0.037, spur=2, top=1.2)))
+    r = working((point("a", CUT),), obstacles=(OWN, cane(CUT[0] + 0.045, spur=2, top=1.2)))
     run_until(r, lambda s: s is not None and s.phase == "ADVANCE", 25.0)
     away, began = 0.0, r.now
     while r.state.phase == "ADVANCE":
