@@ -62,8 +62,44 @@ class ArmConfig(Struct, frozen=True, forbid_unknown_fields=True):
     contact_force: Positive = 30.0
 
 
+class CutterConfig(Struct, frozen=True, forbid_unknown_fields=True):
+    """The secateurs behind a ROS 2 service.
+
+    Attributes:
+        service: Key of the service; empty = no cutter.
+        connect: Where the bridge to that service is reached; empty = the router of this program.
+        timeout_s: How long the blades may take.
+        retry_s: Pause between attempts to open blades that jam.
+    """
+
+    service: Key = ""
+    connect: Key = ""
+    timeout_s: Positive = 2.0
+    retry_s: Positive = 1.0
+
+
+class CameraConfig(Struct, frozen=True, forbid_unknown_fields=True):
+    """The RealSense on the hand.
+
+    Attributes:
+        enabled: Whether there is one.
+        serial: Its serial number; empty = the only one.
+        width: Image width (px); 848 is best for depth.
+        height: Image height (px).
+        rate_hz: Frames a second.
+    """
+
+    enabled: bool = True
+    serial: Key = ""
+    width: Annotated[int, Meta(ge=160, le=1920)] = 848
+    height: Annotated[int, Meta(ge=120, le=1080)] = 480
+    rate_hz: Annotated[int, Meta(ge=6, le=90)] = 30
+
+
 class RealConfig(Struct, frozen=True, forbid_unknown_fields=True):
     """All devices of the real robot."""
 
     base: BaseConfig = BaseConfig()
     arm: ArmConfig = ArmConfig()
+    camera: CameraConfig = CameraConfig()
+    cutter: CutterConfig = CutterConfig()

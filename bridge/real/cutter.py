@@ -1,0 +1,109 @@
+"""Electric secateurs behind a ROS 2 service: `true` closes the blades, `false` opens them.
+
+The service (std_srvs/SetBool) answers when the blades are there: success, or not and why. So a jam is told by the
+device and silence by a timeout; what became of the cane then is unknown, and a person decides.
+"""
+
+import queue
+import threading
+import time
+from dataclasses import dataclass
+
+from bridge.interface import CutterState
+from bridge.real import ros_messages as ros
+from bridge.real.config import CutterConfig
+from rolling_panda.errors import MessageError, ServiceError
+from rolling_panda.messages import Outcome
+from rolling_panda.transport import ForeignWire
+
+
+@dataclass(frozen=True)
+class CutterStatus:
+    """What the blades do, and how the last cut ended."""
+
+    state: CutterState
+    cut_id: str = ""
+    outcome: Outcome = ""
+    detail: str = ""
+
+
+class Cutter:
+    """Implements the cutter's part of the robot. Calls return at once; a thread asks the device."""
+
+    def __init__(self, wire: ForeignWire, config: CutterConfig, moving: bool = True) -> None:
+        """Open the blades, whatever they were at, unless `moving` is off."""
+        self._wire, self._config = wire, config
+        self._status = CutterStatus("opening" if moving else "open")
+        self._enabled = False
+        self._interrupted = threading.Event()
+        self._orders: queue.SimpleQueue[str | None] = queue.SimpleQueue()
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._run, args=(moving,), name="cutter", daemon=True)
+        self._thread.start()
+
+    def read(self) -> CutterStatus:
+        """The newest state."""
+        return self._status
+
+    def enable(self, blades: bool) -> None:
+        """Whether the blades may close now; one that closes without it opens again."""
+        if self._enabled and not blades and self._status.state == "closing":
+            self._interrupted.set()
+            # Beside the request that is under way: the device must hear it at once.
+            threading.Thread(target=self._ask, args=(False,), name="cutter-open", daemon=True).start()
+        self._enabled = blades
+
+    def cut(self, cut_id: str) -> None:
+        """Begin to close the blades."""
+        self._interrupted.clear()
+        self._status = CutterStatus("closing", cut_id)
+        self._orders.put(cut_id)
+
+    def close(self) -> None:
+        """Let go; safe to call twice."""
+        if not self._closing.is_set():
+            self._closing.set()
+            self._orders.put(None)
+            self._thread.join()
+            self._wire.close()
+
+    def _run(self, moving: bool) -> None:
+        if moving:
+            self._open("")
+        while (cut_id := self._orders.get()) is not None:
+            if not self._enabled or self._interrupted.is_set():
+                self._end(cut_id, "FAILED_NOT_CUT", "the cutter was inhibited before the blades began to close")
+                continue
+            said = self._ask(True)
+            if self._interrupted.is_set():
+                self._end(cut_id, "UNKNOWN", "the cutter was inhibited while the blades closed")
+            elif said is None:
+                self._end(cut_id, "UNKNOWN", f"the cutter did not answer within {self._config.timeout_s} s")
+            elif said == "":
+                self._end(cut_id, "DONE", "the blades met")
+            else:
+                self._end(cut_id, "FAILED_NOT_CUT", f"jam: {said}", "jammed")
+
+    def _end(self, cut_id: str, outcome: Outcome, detail: str, state: CutterState = "opening") -> None:
+        self._status = CutterStatus(state, cut_id, outcome, detail)
+        self._open(cut_id)
+
+    def _open(self, cut_id: str) -> None:
+        """Open the blades, however often it takes."""
+        while not self._closing.is_set():
+            last = self._status
+            if self._ask(False) == "":
+                self._status = CutterStatus("open", last.cut_id, last.outcome, last.detail)
+                return
+            self._status = CutterStatus("jammed", last.cut_id, last.outcome, last.detail)
+            time.sleep(self._config.retry_s)
+
+    def _ask(self, shut: bool) -> str | None:
+        """Close or open: empty when the blades are there, else why not; None when nobody answers in time."""
+        config = self._config
+        try:
+            data = self._wire.ask(config.service, ros.encode(ros.make(ros.SET_BOOL, data=shut)), config.timeout_s)
+            reply = ros.decode(ros.SET_BOOL_REPLY, data)
+        except (ServiceError, MessageError):
+            return None
+        return "" if reply.success else (str(reply.message) or "the blades did not get there")

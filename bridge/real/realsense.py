@@ -1,0 +1,130 @@
+"""The RealSense camera on the hand: pictures on demand, from a thread that keeps the stream flowing."""
+
+import threading
+import time
+from typing import Any, Protocol
+
+import numpy as np
+
+from bridge.picture import Picture, encode_picture
+from bridge.real.config import CameraConfig
+from rolling_panda.errors import InputError
+from rolling_panda.messages import Intrinsics
+
+_WAIT_MS = 1000
+# No frame for so long (s) is a fault worth telling: at 30 frames a second, sixty of them.
+_STALE_S = 2.0
+
+
+class Frames(Protocol):
+    """Where sets of one colour and one depth frame come from: librealsense's pipeline, or its syncer in a test."""
+
+    def wait_for_frames(self, timeout_ms: int) -> Any:
+        """The next set; raises RuntimeError when none comes in time."""
+
+    def close(self) -> None:
+        """Stop the stream."""
+
+
+class RealSense:
+    """Implements the camera's part of the robot. `capture` returns at once."""
+
+    def __init__(self, frames: Frames, align: Any) -> None:
+        """Begin to take frames.
+
+        Args:
+            frames: Open stream; closed with the camera.
+            align: librealsense's filter that puts depth into the colour image.
+        """
+        self._frames, self._align = frames, align
+        self._fault = ""
+        self._asked, self._closing = threading.Event(), threading.Event()
+        self._ready: Picture | None = None
+        self._newest = time.monotonic()
+        self.taken = 0
+        self._thread = threading.Thread(target=self._run, name="realsense", daemon=True)
+        self._thread.start()
+
+    def capture(self, expose: bool) -> Picture | None:
+        """Take the next frame if `expose` is set; returns a picture that has become ready, each once."""
+        if expose:
+            self._asked.set()
+        picture, self._ready = self._ready, None
+        return picture
+
+    @property
+    def fault(self) -> str:
+        """Why there are no pictures; empty while there are."""
+        silent = time.monotonic() - self._newest
+        return self._fault or (f"camera: no frame for {silent:.0f} s" if silent > _STALE_S else "")
+
+    def close(self) -> None:
+        """Stop; safe to call twice."""
+        if not self._closing.is_set():
+            self._closing.set()
+            self._thread.join()
+            self._frames.close()
+
+    def _run(self) -> None:
+        while not self._closing.is_set():
+            try:
+                frames = self._frames.wait_for_frames(_WAIT_MS)
+                depth, color = frames.get_depth_frame(), frames.get_color_frame()
+                if not (depth and color):
+                    continue
+                self._newest, self.taken = time.monotonic(), self.taken + 1
+                if self._asked.is_set():
+                    self._asked.clear()
+                    self._ready = self._picture(frames)
+            except RuntimeError as error:
+                # librealsense tells everything so: no frame in time, a cable that was pulled.
+                self._fault = "" if "arrive" in str(error) else f"camera: {error}"
+
+    def _picture(self, frames: Any) -> Picture:
+        aligned = self._align.process(frames)
+        depth, color = aligned.get_depth_frame(), aligned.get_color_frame()
+        lens = color.get_profile().as_video_stream_profile().get_intrinsics()
+        return encode_picture(
+            Intrinsics(lens.width, lens.height, lens.fx, lens.fy, lens.ppx, lens.ppy),
+            np.asanyarray(color.get_data()),
+            np.asanyarray(depth.get_data()).astype(np.float32) * np.float32(depth.get_units()),
+            None,
+        )
+
+
+class _Pipeline:
+    def __init__(self, pipeline: Any) -> None:
+        self._pipeline = pipeline
+
+    def wait_for_frames(self, timeout_ms: int) -> Any:
+        return self._pipeline.wait_for_frames(timeout_ms)
+
+    def close(self) -> None:
+        self._pipeline.stop()
+
+
+def open_realsense(config: CameraConfig) -> RealSense:
+    """The camera with the configured serial number, or the only one there is.
+
+    Raises:
+        InputError: The driver is not installed, or there is no such camera.
+    """
+    try:
+        import pyrealsense2 as rs
+    except ImportError as error:
+        raise InputError("the camera's driver is not installed; run: pip install 'rolling-panda[real]'") from error
+    # The pipeline would wait 15 s for a camera to be plugged in.
+    present = [device.get_info(rs.camera_info.serial_number) for device in rs.context().query_devices()]
+    if not present or (config.serial and config.serial not in present):
+        there = f"; there are {', '.join(present)}" if present else ""
+        raise InputError(f"no RealSense camera {config.serial or 'at all'}{there}; check its USB 3 cable and its power")
+    pipeline, settings = rs.pipeline(), rs.config()
+    if config.serial:
+        settings.enable_device(config.serial)
+    settings.enable_stream(rs.stream.depth, config.width, config.height, rs.format.z16, config.rate_hz)
+    settings.enable_stream(rs.stream.color, config.width, config.height, rs.format.rgb8, config.rate_hz)
+    try:
+        pipeline.start(settings)
+    except RuntimeError as error:
+        raise InputError(f"the RealSense camera does not stream: {error}; check its USB 3 cable") from error
+    return RealSense(_Pipeline(pipeline), rs.align(rs.stream.color))
