@@ -38,6 +38,8 @@ COPY --from=install /app /app
 # again on a processor of another kind.
 ENV NUMBA_CACHE_DIR=/var/cache/rolling-panda
 RUN install --directory --owner 10001 --group 10001 $NUMBA_CACHE_DIR
+# What survives a restart: a volume that is mounted here belongs to this user too.
+RUN install --directory --owner 10001 --group 10001 --mode 700 /var/lib/rolling-panda
 # MuJoCo computes here and draws nothing, so it needs no OpenGL. One thread of linear algebra a process: see launch.py.
 ENV PATH=/app/bin:$PATH \
     PYTHONUNBUFFERED=1 \

@@ -21,6 +21,7 @@ FORWARDED = {
     "server": ("server", "the operator's page and its REST interface"),
     "audit": ("controller.audit", "what was decided, refused and done: check the record or write it out"),
     "user": ("server.user_command", "who may sign in with a password"),
+    "certificates": ("rolling_panda.certificates", "certificates of one's own for mutual TLS on the robot's wire"),
     "perceive": ("perception.perceive", "classes and pruning points of one photograph"),
     "vineyard": ("bridge.sim.vineyard_command", "grow a simulated row, write and picture it"),
     "bench": ("benchmarks", "measurements: time of a control step, cuts in simulated rows"),

@@ -24,15 +24,17 @@ class TransportConfig(Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         mode: `client` of a router, the `router` itself, or `peer` with explicit endpoints.
-        connect: Endpoints to connect to, as `tcp/HOST:PORT`.
+        connect: Endpoints to connect to, as `tcp/HOST:PORT`, or `tls/HOST:PORT` with certificates.
         listen: Endpoints to listen on.
         connect_timeout_s: How long to try before giving up at the start; later losses are retried for ever.
+        certificates: Folder with ca.pem and this process's NAME.pem and NAME.key, for mutual TLS; empty for none.
     """
 
     mode: Literal["client", "peer", "router"] = "client"
     connect: tuple[str, ...] = ("tcp/127.0.0.1:7447",)
     listen: tuple[str, ...] = ()
     connect_timeout_s: Positive = 10.0
+    certificates: str = ""
 
 
 class RobotConfig(Struct, frozen=True, forbid_unknown_fields=True):

@@ -2,6 +2,7 @@
 
 import urllib.error
 import urllib.request
+from pathlib import Path
 from types import TracebackType
 from typing import Self
 
@@ -19,7 +20,7 @@ class Readiness:
     A process counts as up once its loop has spoken, which is later than being connected.
     """
 
-    def __init__(self, endpoint: str, robot_id: str, page: str | None) -> None:
+    def __init__(self, endpoint: str, robot_id: str, page: str | None, certificates: Path | None = None) -> None:
         """Connect to the router at `endpoint`.
 
         `page` is the address that the server will answer at; without it, the server's word on the wire is enough.
@@ -29,7 +30,9 @@ class Readiness:
         """
         self._page = page
         self._heard: set[str] = set()
-        self._onlooker = Onlooker(TransportConfig(connect=(endpoint,), connect_timeout_s=3.0), robot_id)
+        folder = "" if certificates is None else str(certificates)
+        config = TransportConfig(connect=(endpoint,), connect_timeout_s=3.0, certificates=folder)
+        self._onlooker = Onlooker(config, robot_id)
         self._onlooker.subscribe(BRIDGE, lambda message, at: self._heard.add("bridge"))
         self._onlooker.subscribe(CONTROLLER, lambda message, at: self._heard.add("controller"))
         self._onlooker.subscribe(HEARTBEAT, self._on_heartbeat)

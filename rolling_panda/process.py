@@ -83,6 +83,8 @@ def run_process(
         transport_config = load_section(arguments.config, "transport", TransportConfig)
         if arguments.connect is not None:
             transport_config = msgspec.structs.replace(transport_config, connect=(arguments.connect,))
+        if arguments.certificates is not None:
+            transport_config = msgspec.structs.replace(transport_config, certificates=str(arguments.certificates))
         take_priority(_PRIORITY[process])
         with Transport(transport_config, process, arguments.robot_id) as transport:
             run(ProcessContext(arguments, arguments.config, transport, stopping))
@@ -98,6 +100,12 @@ def add_common_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--config", type=Path, default=default, help="TOML configuration (default: the simulation's)")
     parser.add_argument("--robot-id", default=ROBOT_ID, help="robot on the wire (default: %(default)s)")
     parser.add_argument("--connect", metavar="ENDPOINT", help="router, tcp/HOST:PORT (default: the configuration's)")
+    parser.add_argument(
+        "--certificates",
+        type=Path,
+        metavar="DIR",
+        help="mutual TLS to a router at tls/HOST:PORT, with files from there",
+    )
     state = usual_state_folder("ROBOT_ID")
     parser.add_argument(
         "--state", type=Path, metavar="DIR", help=f"folder for what survives a restart (default: {state})"

@@ -1,6 +1,7 @@
 """`rolling-panda router`: the place on the network where the processes meet."""
 
 import argparse
+from pathlib import Path
 
 from rolling_panda.config import TransportConfig
 from rolling_panda.priority import take_priority
@@ -18,6 +19,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         help=f"where to listen, tcp/HOST:PORT; may be given several times (default: {DEFAULT_ENDPOINT})",
     )
+    parser.add_argument(
+        "--certificates",
+        type=Path,
+        metavar="DIR",
+        help="mutual TLS and access control, listening at tls/HOST:PORT; see `rolling-panda certificates --help`",
+    )
     parser.add_argument("--exit-with-parent", action="store_true", help="end when standard input closes")
 
 
@@ -32,7 +39,8 @@ def run(arguments: argparse.Namespace) -> int:
         end_with_parent(stopping)
     endpoints = tuple(arguments.listen or (DEFAULT_ENDPOINT,))
     take_priority("control")
-    router = Router(TransportConfig(mode="router", connect=(), listen=endpoints))
+    folder = "" if arguments.certificates is None else str(arguments.certificates)
+    router = Router(TransportConfig(mode="router", connect=(), listen=endpoints, certificates=folder))
     try:
         print(f"router listening on {', '.join(endpoints)}", flush=True)
         stopping.wait()

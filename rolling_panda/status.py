@@ -2,6 +2,7 @@
 
 import argparse
 import time
+from pathlib import Path
 
 from rolling_panda import messages as m
 from rolling_panda.demo_readiness import Readiness
@@ -18,6 +19,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "processes", nargs="*", metavar="PROCESS", help=f"of {', '.join(m.PROCESSES)} (default: all of them)"
     )
     parser.add_argument("--connect", metavar="ENDPOINT", default=DEFAULT_ENDPOINT, help="router (default: %(default)s)")
+    parser.add_argument(
+        "--certificates", type=Path, metavar="DIR", help="with onlooker.pem, for a router at tls/HOST:PORT"
+    )
     parser.add_argument("--robot-id", default=ROBOT_ID, help="robot on the wire (default: %(default)s)")
     parser.add_argument(
         "--wait", type=float, default=2.0, metavar="S", help="how long to listen for them (default: %(default)s s)"
@@ -37,7 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
     asked = tuple(arguments.processes) or m.PROCESSES
     deadline = time.monotonic() + arguments.wait
     try:
-        readiness = Readiness(arguments.connect, arguments.robot_id, None)
+        readiness = Readiness(arguments.connect, arguments.robot_id, None, arguments.certificates)
     except TransportError as error:
         raise TransportError(f"{error} Give its endpoint with --connect; the demo prints it when it starts.") from error
     with readiness:

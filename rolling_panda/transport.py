@@ -10,6 +10,7 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Generic, Self, TypeVar
 
@@ -21,6 +22,7 @@ from rolling_panda.codec import StrictDecoder, encode
 from rolling_panda.config import TransportConfig
 from rolling_panda.errors import MessageError, ServiceError, TransportError
 from rolling_panda.topics import Service, Topic, key
+from rolling_panda.wire_access import ONLOOKER, access_control
 
 Msg = TypeVar("Msg", bound=m.Message)
 Req = TypeVar("Req", bound=Struct)
@@ -122,8 +124,8 @@ class Rejections:
 class Onlooker:
     """A read-only session on the wire of one robot that announces nobody. Use as a context manager, or call `close`."""
 
-    def __init__(self, config: TransportConfig, robot_id: str) -> None:
-        """Open the session.
+    def __init__(self, config: TransportConfig, robot_id: str, name: str = ONLOOKER) -> None:
+        """Open the session; `name` is whose certificate shows who this is, where there is one.
 
         Raises:
             TransportError: The router cannot be reached or an endpoint is wrong.
@@ -132,7 +134,7 @@ class Onlooker:
         self.rejections = Rejections()
         self.on_reject: Callable[[str, str], None] = lambda topic, reason: None
         self._present: set[str] = set()
-        self._session = _open(config)
+        self._session = _open(config, name)
         self._presence = self._session.liveliness().declare_subscriber(
             key(robot_id, "alive/*"), self._on_presence, history=True
         )
@@ -207,7 +209,7 @@ class Transport(Onlooker):
         Raises:
             TransportError: The router cannot be reached or an endpoint is wrong.
         """
-        super().__init__(config, robot_id)
+        super().__init__(config, robot_id, process)
         self.process = process
         self._token = self._session.liveliness().declare_token(key(robot_id, f"alive/{process}"))
 
@@ -277,7 +279,7 @@ class ForeignWire:
         Raises:
             TransportError: The router cannot be reached or an endpoint is wrong.
         """
-        self._session = _open(config)
+        self._session = _open(config, ONLOOKER)
 
     def publisher(self, name: str) -> Callable[[bytes], None]:
         """What sends bytes under this key, at once and newest first."""
@@ -325,13 +327,13 @@ class Router:
     """The Zenoh router that the processes meet at, run inside this process."""
 
     def __init__(self, config: TransportConfig) -> None:
-        """Listen on `config.listen`.
+        """Listen on `config.listen`; with certificates, whoever is not known is refused, and so is what is not theirs.
 
         Raises:
             TransportError: An endpoint is taken or wrong.
         """
         try:
-            self._session = zenoh.open(_zenoh_config(config))
+            self._session = zenoh.open(_zenoh_config(config, "router"))
         except zenoh.ZError as error:
             raise TransportError(
                 f"cannot listen on {', '.join(config.listen)}: {_plain(error)}. Choose another port."
@@ -342,9 +344,9 @@ class Router:
         self._session.close()
 
 
-def _open(config: TransportConfig) -> zenoh.Session:
+def _open(config: TransportConfig, name: str) -> zenoh.Session:
     try:
-        return zenoh.open(_zenoh_config(config))
+        return zenoh.open(_zenoh_config(config, name))
     except zenoh.ZError as error:
         raise TransportError(
             f"no wire at {', '.join(config.connect + config.listen)}: {_plain(error)}. Is the router running?"
@@ -362,7 +364,7 @@ def _bounded(data: bytes) -> bytes:
     return data
 
 
-def _zenoh_config(config: TransportConfig) -> zenoh.Config:
+def _zenoh_config(config: TransportConfig, name: str) -> zenoh.Config:
     out = zenoh.Config()
 
     def insert(path: str, value: Any) -> None:
@@ -375,4 +377,28 @@ def _zenoh_config(config: TransportConfig) -> zenoh.Config:
     insert("connect/exit_on_failure", True)
     insert("scouting/multicast/enabled", False)
     insert("scouting/gossip/enabled", False)
+    if config.certificates:
+        _secure(insert, config, name)
     return out
+
+
+def _secure(insert: Callable[[str, Any], None], config: TransportConfig, name: str) -> None:
+    """Mutual TLS with the files of `name`; a router refuses what the table of topics does not let a sender say."""
+    folder = Path(config.certificates).resolve()
+    authority, certificate, private = (folder / file for file in ("ca.pem", f"{name}.pem", f"{name}.key"))
+    for file in (authority, certificate, private):
+        if not file.is_file():
+            raise TransportError(
+                f"there is no certificate file {file}; make a folder with `rolling-panda certificates --out DIR`"
+            )
+    plain = [endpoint for endpoint in (*config.connect, *config.listen) if not endpoint.startswith("tls/")]
+    if plain:
+        raise TransportError(f"with certificates every endpoint is tls/HOST:PORT; got {', '.join(plain)}")
+    side = "listen" if config.mode == "router" else "connect"
+    insert("transport/link/tls/root_ca_certificate", str(authority))
+    insert("transport/link/tls/enable_mtls", True)
+    insert("transport/link/tls/verify_name_on_connect", True)
+    insert(f"transport/link/tls/{side}_certificate", str(certificate))
+    insert(f"transport/link/tls/{side}_private_key", str(private))
+    if config.mode == "router":
+        insert("access_control", access_control())

@@ -1,0 +1,208 @@
+"""On a wire with certificates each process may say what is its own to say, and an intruder nothing at all."""
+
+import socket
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bridge.sim.trace import read
+from rolling_panda import intents
+from rolling_panda import messages as m
+from rolling_panda.certificates import NAMES, main, make
+from rolling_panda.codec import encode
+from rolling_panda.config import TransportConfig
+from rolling_panda.errors import InputError, ServiceError, TransportError
+from rolling_panda.launch import child_environment, python_command
+from rolling_panda.topics import BRIDGE, INTENT, JOINTS, MOTION, RELEASE, SERVICES, STOP, TOPICS, key
+from rolling_panda.transport import Onlooker, Router, Transport
+from rolling_panda.wire_access import CALLERS, ONLOOKER, access_control
+
+pytestmark = pytest.mark.alone
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@pytest.fixture(scope="module")
+def certificates(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("wire") / "certificates"
+    make(folder, ("127.0.0.1",), 2)
+    return folder
+
+
+def config(endpoint: str, folder: Path | str) -> TransportConfig:
+    return TransportConfig(connect=(endpoint,), connect_timeout_s=2.0, certificates=str(folder))
+
+
+@pytest.fixture(scope="module")
+def endpoint(certificates: Path):
+    endpoint = f"tls/127.0.0.1:{free_port()}"
+    router = Router(TransportConfig(mode="router", connect=(), listen=(endpoint,), certificates=str(certificates)))
+    yield endpoint
+    router.close()
+
+
+def heard(onlooker: Onlooker, senders: list[Onlooker]) -> set[tuple[str, str]]:
+    """(sender, topic) of everything that got through when every sender sent on every topic."""
+    got: set[tuple[str, str]] = set()
+    session = onlooker._session
+    declared = session.declare_subscriber(
+        key("rp1", "**"), lambda sample: got.add((sample.payload.to_string(), str(sample.key_expr)))
+    )
+    time.sleep(0.3)
+    for name, sender in zip((*m.PROCESSES, ONLOOKER), senders, strict=True):
+        for topic in TOPICS:
+            sender._session.put(key("rp1", topic.name), name)
+    time.sleep(1.0)
+    declared.undeclare()
+    return {(sender, where.removeprefix(key("rp1", ""))) for sender, where in got}
+
+
+def test_each_topic_carries_what_its_sender_says_and_nobody_elses_word(certificates: Path, endpoint: str) -> None:
+    settings = config(endpoint, certificates)
+    with Onlooker(settings, "rp1") as listener:
+        senders: list[Onlooker] = [Transport(settings, process, "rp1") for process in m.PROCESSES]
+        senders.append(Onlooker(settings, "rp1"))
+        try:
+            got = heard(listener, senders)
+        finally:
+            for sender in senders:
+                sender.close()
+    allowed = {(process, topic.name) for topic in TOPICS for process in m.PROCESSES if topic.sender in (process, "any")}
+    assert got == allowed
+
+
+def test_a_service_is_asked_by_its_callers_and_answered_by_its_process(certificates: Path, endpoint: str) -> None:
+    settings = config(endpoint, certificates)
+    release = m.ReleaseStop(stop_id="s", user="ada", reason="test")
+    with (
+        Transport(settings, "bridge", "rp1") as bridge,
+        Transport(settings, "controller", "rp1") as controller,
+        Transport(settings, "server", "rp1") as server,
+    ):
+        bridge.serve(RELEASE, lambda request: m.Answer(ok=True, reason="the bridge"))
+        controller.serve(INTENT, lambda request: m.Answer(ok=True, reason="the controller"))
+        time.sleep(0.3)
+        assert controller.call(RELEASE, release).reason == "the bridge"
+        with pytest.raises(ServiceError):
+            server.call(RELEASE, release)
+        assert server.present() == {"bridge", "controller", "server"}
+        with Transport(settings, "perception", "rp1") as perception:
+            # What it declares to answer does not count, and what it asks is not answered.
+            perception.serve(RELEASE, lambda request: m.Answer(ok=True, reason="not the bridge"))
+            time.sleep(0.3)
+            assert {controller.call(RELEASE, release).reason for _ in range(10)} == {"the bridge"}
+            with pytest.raises(ServiceError):
+                perception.call(INTENT, intents.Arm(user="eve"))
+        assert server.call(INTENT, intents.Arm(user="ada")).reason == "the controller"
+
+
+def test_the_table_names_the_callers_of_every_service() -> None:
+    assert set(CALLERS) == {service.name for service in SERVICES}
+    assert INTENT.name in CALLERS
+    told = access_control()
+    assert told["default_permission"] == "deny"
+    assert {subject["cert_common_names"][0] for subject in told["subjects"]} == {*m.PROCESSES, ONLOOKER}
+
+
+def test_without_a_certificate_of_this_authority_nobody_comes_in(
+    certificates: Path, endpoint: str, tmp_path: Path
+) -> None:
+    with pytest.raises(TransportError):
+        Transport(
+            TransportConfig(connect=(endpoint.replace("tls", "tcp"),), connect_timeout_s=1.0), "controller", "rp1"
+        )
+    make(tmp_path / "own", ("127.0.0.1",), 2)
+    with pytest.raises(TransportError):
+        Transport(config(endpoint, tmp_path / "own"), "controller", "rp1")
+    mixed = tmp_path / "mixed"
+    mixed.mkdir()
+    (mixed / "ca.pem").write_bytes((certificates / "ca.pem").read_bytes())
+    for name in ("controller.pem", "controller.key"):
+        (mixed / name).write_bytes((tmp_path / "own" / name).read_bytes())
+    with Onlooker(config(endpoint, certificates), "rp1") as listener:
+        got = listener.slot(STOP)
+        time.sleep(0.3)
+        with pytest.raises(TransportError):
+            intruder = Transport(config(endpoint, mixed), "controller", "rp1")
+            stop = m.StopRequest(stop_id="a", source="x", user="eve", reason="r")
+            intruder._session.put(key("rp1", STOP.name), stop)
+        time.sleep(0.3)
+        assert got.peek() is None
+
+
+def test_what_does_not_fit_is_one_clear_line(certificates: Path, tmp_path: Path, capsys) -> None:
+    with pytest.raises(TransportError, match="no certificate file .*bridge.pem.*rolling-panda certificates"):
+        folder = tmp_path / "some"
+        folder.mkdir()
+        (folder / "ca.pem").write_text("")
+        Transport(config("tls/127.0.0.1:1", folder), "bridge", "rp1")
+    with pytest.raises(TransportError, match="every endpoint is tls/HOST:PORT; got tcp/127.0.0.1:1"):
+        Transport(config("tcp/127.0.0.1:1", certificates), "bridge", "rp1")
+    with pytest.raises(InputError, match="give --out a new folder"):
+        make(certificates, ("127.0.0.1",), 2)
+    assert main(["--out", str(tmp_path / "new"), "--days", "0"]) == 1
+    assert "1 to 3650" in capsys.readouterr().err
+    assert main(["--out", str(tmp_path / "new")]) == 0
+    assert all((tmp_path / "new" / f"{name}.key").stat().st_mode & 0o077 == 0 for name in NAMES)
+
+
+def commands(wire: Onlooker, epoch: int, seconds: float) -> None:
+    """Drive forward by motion commands that answer the newest joint state, as a controller does."""
+    joints = wire.slot(JOINTS)
+    end, sequence = time.monotonic() + seconds, 0
+    while time.monotonic() < end:
+        newest = joints.peek()
+        if newest is not None:
+            sequence += 1
+            xi = (0.0 if sequence < 20 else 1.0,) * 2 + (0.0,) * 7
+            command = m.MotionCommand(epoch=epoch, sequence=sequence, echo=newest.message.sequence, xi=xi)
+            wire._session.put(key("rp1", MOTION.name), encode(command))
+        time.sleep(0.01)
+
+
+def test_only_the_controller_moves_the_robot(certificates: Path, tmp_path: Path) -> None:
+    port, trace = free_port(), tmp_path / "trace"
+    endpoint = f"tls/127.0.0.1:{port}"
+    shared = ["--certificates", str(certificates)]
+    lines = {
+        "router": ("rolling_panda", ["router", "--listen", endpoint, *shared]),
+        "bridge": (
+            "bridge",
+            ["sim", "--trace", str(trace), "--connect", endpoint, "--state", str(tmp_path / "state"), *shared],
+        ),
+    }
+    running: list[subprocess.Popen[bytes]] = []
+    settings = TransportConfig(connect=(endpoint,), connect_timeout_s=20.0, certificates=str(certificates))
+
+    def driven() -> float:
+        return float(np.abs(read(trace).rows["base_velocity"][:, 0]).max())
+
+    try:
+        for module, words in lines.values():
+            running.append(subprocess.Popen(python_command(module, words), env=child_environment()))
+        with Onlooker(settings, "rp1") as onlooker:
+            state = onlooker.slot(BRIDGE)
+            end = time.monotonic() + 60.0
+            while state.peek() is None:
+                assert time.monotonic() < end and all(child.poll() is None for child in running)
+                time.sleep(0.05)
+        for intruder in ("server", "perception"):
+            with Transport(settings, intruder, "rp1") as wire:
+                commands(wire, 7, 1.0)
+        assert driven() < 1e-3
+        with Transport(settings, "controller", "rp1") as wire:
+            commands(wire, 8, 1.5)
+        time.sleep(0.3)
+        assert driven() > 0.02
+    finally:
+        for child in reversed(running):
+            child.terminate()
+        for child in running:
+            child.wait(10)
