@@ -126,6 +126,8 @@ def operator_router(desk: Desk) -> APIRouter:
 
         Only while the caller also fetches `GET /api/state` at least twice a second: who does not look may not move.
         """
+        if not session.may_operate:
+            return answer(Result(403, False, f"a {session.role} may look and stop, not operate"))
         if not request.hold:
             desk.let_go(session)
             return answer(Result(200, True, "released"))
