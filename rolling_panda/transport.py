@@ -10,9 +10,8 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from types import TracebackType
-from typing import Any, Generic, Self, TypeVar
+from typing import Generic, Self, TypeVar
 
 import zenoh
 from msgspec import Struct
@@ -22,7 +21,8 @@ from rolling_panda.codec import StrictDecoder, encode
 from rolling_panda.config import TransportConfig
 from rolling_panda.errors import MessageError, ServiceError, TransportError
 from rolling_panda.topics import Service, Topic, key
-from rolling_panda.wire_access import ONLOOKER, access_control
+from rolling_panda.wire_access import ONLOOKER
+from rolling_panda.wire_settings import wire_settings
 
 Msg = TypeVar("Msg", bound=m.Message)
 Req = TypeVar("Req", bound=Struct)
@@ -366,39 +366,6 @@ def _bounded(data: bytes) -> bytes:
 
 def _zenoh_config(config: TransportConfig, name: str) -> zenoh.Config:
     out = zenoh.Config()
-
-    def insert(path: str, value: Any) -> None:
+    for path, value in wire_settings(config, name).items():
         out.insert_json5(path, json.dumps(value))
-
-    insert("mode", config.mode)
-    insert("connect/endpoints", list(config.connect))
-    insert("listen/endpoints", list(config.listen))
-    insert("connect/timeout_ms", round(config.connect_timeout_s * 1000))
-    insert("connect/exit_on_failure", True)
-    insert("scouting/multicast/enabled", False)
-    insert("scouting/gossip/enabled", False)
-    if config.certificates:
-        _secure(insert, config, name)
     return out
-
-
-def _secure(insert: Callable[[str, Any], None], config: TransportConfig, name: str) -> None:
-    """Mutual TLS with the files of `name`; a router refuses what the table of topics does not let a sender say."""
-    folder = Path(config.certificates).resolve()
-    authority, certificate, private = (folder / file for file in ("ca.pem", f"{name}.pem", f"{name}.key"))
-    for file in (authority, certificate, private):
-        if not file.is_file():
-            raise TransportError(
-                f"there is no certificate file {file}; make a folder with `rolling-panda certificates --out DIR`"
-            )
-    plain = [endpoint for endpoint in (*config.connect, *config.listen) if not endpoint.startswith("tls/")]
-    if plain:
-        raise TransportError(f"with certificates every endpoint is tls/HOST:PORT; got {', '.join(plain)}")
-    side = "listen" if config.mode == "router" else "connect"
-    insert("transport/link/tls/root_ca_certificate", str(authority))
-    insert("transport/link/tls/enable_mtls", True)
-    insert("transport/link/tls/verify_name_on_connect", True)
-    insert(f"transport/link/tls/{side}_certificate", str(certificate))
-    insert(f"transport/link/tls/{side}_private_key", str(private))
-    if config.mode == "router":
-        insert("access_control", access_control())
