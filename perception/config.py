@@ -34,7 +34,7 @@ class RuleConfig(Struct, frozen=True, forbid_unknown_fields=True):
         crossing: Another cane this near to the cut would be between the open blades too: half their opening (m).
         base_doubt: A cane whose base is hidden over more than this cannot have its nodes counted (m).
         largest_diameter: Thicker wood is refused (m).
-        wire_distance: No cut is proposed nearer to a wire or a hose than this: 15 mm, and 3 mm for what is seen (m).
+        wire_distance: No cut is proposed nearer to a wire or a hose than this: 15 mm, and what a pixel is wide (m).
         cordon_distance: The same for cordon and trunk (m).
         node_distance: The same for nodes that stay (m).
     """
@@ -44,22 +44,22 @@ class RuleConfig(Struct, frozen=True, forbid_unknown_fields=True):
     fruiting_nodes: Annotated[int, Meta(ge=3, le=20)] = 8
     keeper_diameter: Positive = 0.006
     offset: Positive = 0.020
-    shift: Positive = 0.008
+    shift: Positive = 0.0095
     short_internode: Positive = 0.040
     basal_reach: Positive = 0.055
     clear_beyond: Positive = 0.030
     pruned: Positive = 0.045
     node_room: Positive = 0.035
     diameter_doubt: Positive = 0.00035
-    steadiest: Annotated[int, Meta(ge=1, le=100)] = 4
+    steadiest: Annotated[int, Meta(ge=1, le=100)] = 9
     crowded: Positive = 0.03
     height_doubt: Positive = 0.004
     stub_room: Positive = 0.016
     shears_room: Positive = 0.022
-    base_doubt: Positive = 0.015
+    base_doubt: Positive = 0.018
     crossing: Positive = 0.015
     largest_diameter: Positive = 0.015
-    wire_distance: Positive = 0.018
+    wire_distance: Positive = 0.0165
     cordon_distance: Positive = 0.020
     node_distance: Positive = 0.010
 
@@ -108,6 +108,8 @@ class TrackerConfig(Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         association: A cut this near to a known point is the same one (m).
         hits: Frames that must agree before a point is shown.
+        sparse_hits: After `sparse_looks` at a spur so many suffice, where no other frame said anything else.
+        sparse_looks: See there.
         memory: Frames that a running average looks back.
         moved: A point that has moved by more than this gets a new revision (m).
         turned: The same for its tangent (rad).
@@ -119,6 +121,8 @@ class TrackerConfig(Struct, frozen=True, forbid_unknown_fields=True):
 
     association: Positive = 0.03
     hits: Hits = 3
+    sparse_hits: Hits = 2
+    sparse_looks: Hits = 6
     memory: Hits = 20
     moved: Positive = 0.004
     turned: Positive = 0.15

@@ -46,7 +46,7 @@ def mended(view: View, labels: NDArray[np.uint8], config: SkeletonConfig) -> Vie
     bad_rows, bad_cols = rows[~good], cols[~good]
     offsets = np.arange(2 * _REACH + 1)
     window = trusted[bad_rows[:, None, None] + offsets[:, None], bad_cols[:, None, None] + offsets[None, :]]
-    found = np.sort(window.reshape(len(bad_rows), -1), axis=1)
+    found = np.sort(window.reshape(len(bad_rows), len(offsets) ** 2), axis=1)
     count = np.count_nonzero(found, axis=1)
     # Zeros come first in order: the middle of what is behind them.
     middle = found.shape[1] - count + (count - 1) // 2

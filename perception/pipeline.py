@@ -115,7 +115,8 @@ class Perception:
             decision = apply_rule(fused.get(number, spur), self._config.rule, plant.beside(seen), keep_out)
             proposals += [Proposal(cut, number) for cut in decision.cuts]
             self._open.note(number, bool(decision.cuts), list(decision.abstained))
-        tracked = self._tracker.update(view, labels, proposals)
+        looks = {spur.number: spur.position.looks for spur in self.known.spurs}
+        tracked = self._tracker.update(view, labels, proposals, looks)
         self._take(tracked)
         self._tell_obstacles(view, labels, rods, numbers)
         self._canes = tuple(_polyline(cane) for spur in plant.spurs for cane in spur.canes)

@@ -12,7 +12,7 @@ from perception.frame import View
 from perception.plant import Array, Cane, Node, Plant, Span, Spur
 from rolling_panda.messages import WOOD_CLASSES
 
-_SPUR, _CORDON, _TRUNK = (WOOD_CLASSES.index(name) for name in ("spur", "cordon", "trunk"))
+_SPUR, _CORDON, _TRUNK, _OLD_CUT = (WOOD_CLASSES.index(name) for name in ("spur", "cordon", "trunk", "old cut"))
 _EIGHT = np.ones((3, 3), dtype=bool)
 #: Spur pixels fewer than these are a speck.
 _LEAST_SPUR, _LEAST_TRUNK = 12, 300
@@ -29,8 +29,9 @@ def build_plant(view: View, labels: NDArray[np.uint8], lines: list[Centreline], 
         lines: Canes without roots.
         config: How near is touching.
     """
-    clouds = _merge(_clouds(view, labels, _SPUR, _LEAST_SPUR, config))
-    trunks = _clouds(view, labels, _TRUNK, _LEAST_TRUNK, config)
+    # An old cut is the end of the stub on which it is; those on trunk and arms touch no spur.
+    clouds = _merge(_clouds(view, labels, (_SPUR, _OLD_CUT), _LEAST_SPUR, config))
+    trunks = _clouds(view, labels, (_TRUNK,), _LEAST_TRUNK, config)
     cordon = _cordon(view, labels, config)
     rooted: list[list[Cane]] = [[] for _ in clouds]
     loose: list[Array] = []
@@ -82,17 +83,26 @@ def _cane(line: Centreline, reverse: bool, gap: float) -> Cane:
     )
 
 
-def _clouds(view: View, labels: NDArray[np.uint8], kind: int, least: int, config: SkeletonConfig) -> list[Array]:
-    """Surface points of each blob of a class, each N×3 in odom (m)."""
-    mask = (labels == kind) & (view.depth > config.nearest) & (view.depth < config.farthest)
+def _clouds(
+    view: View, labels: NDArray[np.uint8], kinds: tuple[int, ...], least: int, config: SkeletonConfig
+) -> list[Array]:
+    """Surface points of each blob of some classes that has enough pixels of the first, each N×3 in odom (m)."""
+    rows, cols = np.nonzero(np.isin(labels, kinds))
+    depth = view.depth[rows, cols]
+    near = (depth > config.nearest) & (depth < config.farthest)
+    rows, cols, depth = rows[near], cols[near], depth[near].astype(float)
+    if not len(rows):
+        return []
+    first, last = (rows.min(), cols.min()), (rows.max() + 1, cols.max() + 1)
+    mask = np.zeros((last[0] - first[0], last[1] - first[1]), dtype=bool)
+    mask[rows - first[0], cols - first[1]] = True
     labelled, count = ndimage.label(mask, structure=_EIGHT)
-    rows, cols = np.nonzero(mask)
-    owner = labelled[rows, cols] - 1
-    points = view.points(rows, cols, view.depth[rows, cols].astype(float))
+    owner = labelled[rows - first[0], cols - first[1]] - 1
+    enough = np.bincount(owner, labels[rows, cols] == kinds[0], minlength=count) >= least
+    points = view.points(rows, cols, depth)
     order = np.argsort(owner, kind="stable")
     bounds = np.searchsorted(owner[order], np.arange(count + 1))
-    out = [points[order[bounds[k] : bounds[k + 1]]] for k in range(count)]
-    return [cloud for cloud in out if len(cloud) >= least]
+    return [points[order[bounds[k] : bounds[k + 1]]] for k in range(count) if enough[k]]
 
 
 def _merge(clouds: list[Array]) -> list[Array]:

@@ -1,7 +1,10 @@
 """Points over time: identities that last, averages that beat the noise, and withdrawal of what has gone."""
 
 import dataclasses
+from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 
 import numpy as np
 from msgspec.structs import replace
@@ -19,8 +22,8 @@ from rolling_panda import messages as m
 from rolling_panda.messages import CutKind
 from rolling_panda.point_digest import point_digest
 
-#: Frames without support after which a point never shown is forgotten, and a contradicted one withdrawn.
-_PATIENCE = 5
+#: Frames without support after which a contradicted point is withdrawn, and one that was never shown is forgotten.
+_PATIENCE, _MEMORY_OF_UNSHOWN = 5, 20
 
 
 @dataclass(frozen=True)
@@ -87,13 +90,20 @@ class Tracker:
         """Points withdrawn: whether their wood is off may still be asked."""
         self._named = 0
 
-    def update(self, view: View, labels: NDArray[np.uint8], proposals: list[Proposal]) -> Tracked:
+    def update(
+        self,
+        view: View,
+        labels: NDArray[np.uint8],
+        proposals: list[Proposal],
+        looks: Mapping[SpurNumber, int] = MappingProxyType({}),
+    ) -> Tracked:
         """Take one frame in.
 
         Args:
             view: The frame.
             labels: Its classes.
             proposals: Cuts that it proposes.
+            looks: At each spur so far.
         """
         supported = self._associate(proposals)
         contradicted = {(track.number, track.cut.kind) for track in supported}
@@ -109,7 +119,7 @@ class Tracker:
                 if reason:
                     withdrawn.append(f"{track.point_id} (vine {track.number.vine}, spur {track.number.spur}) {reason}")
         before, self._tracks = self._tracks, keep
-        self._show(supported)
+        self._show(supported, looks)
         severed = tuple(t.position for t in before if t not in keep and t.gone >= self._config.gone)
         return Tracked(self.points(), tuple(withdrawn), severed)
 
@@ -218,15 +228,20 @@ class Tracker:
             return f"withdrawn: the wood beyond it was gone in {track.gone} frames, so it has been cut"
         if track.shown is None or (track.number, track.cut.kind) in contradicted:
             track.misses += 1
-            if track.misses >= _PATIENCE:
+            if track.misses >= (_PATIENCE if track.shown is not None else _MEMORY_OF_UNSHOWN):
                 return "withdrawn: closer looks put the cut elsewhere on this spur" if track.shown is not None else ""
         return None
 
-    def _show(self, supported: list[_Track]) -> None:
+    def _show(self, supported: list[_Track], looks: Mapping[SpurNumber, int]) -> None:
+        places = Counter((track.number, track.cut.kind) for track in self._tracks)
         taken = {(track.number, track.cut.kind) for track in self._tracks if track.shown is not None}
-        for track in supported:
+        for track in self._tracks:
             place = (track.number, track.cut.kind)
-            if track.shown is None and (track.hits < self._config.hits or place in taken):
+            if track.shown is None:
+                often = looks.get(track.number, 0) >= self._config.sparse_looks and places[place] == 1
+                if place in taken or track.hits < (self._config.sparse_hits if often else self._config.hits):
+                    continue
+            elif track not in supported:
                 continue
             taken.add(place)
             track.shown = self._message(track)

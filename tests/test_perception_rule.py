@@ -97,7 +97,7 @@ def test_a_cut_gives_way_to_a_cane_or_a_wire_that_crosses_a_little_off_and_stays
         assert 0.0 < (1.2 - cut.position[2]) * side <= RULE.shift + 1e-9
         assert np.linalg.norm(crossing - cut.position, axis=1).min() >= RULE.crossing
     (cut,) = decide(spur(cane()), RULE, None, lambda place: "wire" if abs(place[2] - 1.205) < 0.009 else "").cuts
-    assert cut.position[2] == pytest.approx(1.196) and "16 mm past node 2" in cut.reason
+    assert cut.position[2] == pytest.approx(1.2 - RULE.shift / 2) and "15 mm past node 2" in cut.reason
     assert decide(spur(cane()), RULE, None, lambda place: "a wire is there").abstained == ("a wire is there",)
 
 

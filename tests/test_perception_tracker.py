@@ -42,6 +42,31 @@ def test_a_point_shows_after_enough_frames_agree():
     assert shown == [0] * (CONFIG.hits - 1) + [1]
 
 
+def test_after_many_looks_two_that_agree_are_enough_where_none_disagrees():
+    def survey(*others):
+        tracker, number = Tracker(CONFIG), SpurNumber(1, 1)
+        for look, said in enumerate((proposal(), None, *others, None, None, proposal(), None), 1):
+            cuts = [] if said is None else [said]
+            points = tracker.update(view(), view().labels, cuts, {number: look}).points
+        return look, points
+
+    looks, points = survey(None, None)
+    assert looks >= CONFIG.sparse_looks and len(points) == CONFIG.sparse_hits - 1 == 1
+    assert survey()[1] and survey()[0] >= CONFIG.sparse_looks
+    assert not survey(proposal(y=0.06), None)[1], "another look put the cut elsewhere"
+    tracker = Tracker(CONFIG)
+    for _ in range(2):
+        early = feed(tracker, view(), proposal()).points
+    assert not early, "two looks are not many"
+
+
+def test_looks_that_say_nothing_do_not_make_it_forget_what_few_have_said():
+    tracker = Tracker(CONFIG)
+    for said in (True, *[False] * 6, True, *[False] * 6, True):
+        points = feed(tracker, view(), *([proposal()] if said else [])).points
+    assert len(points) == 1
+
+
 def test_noise_is_averaged_and_changes_neither_name_nor_revision():
     tracker, rng = Tracker(CONFIG), np.random.default_rng(0)
     names = set()
