@@ -19,6 +19,7 @@ from bridge.limiter import Limiter
 from bridge.odometer import Odometer
 from bridge.pace import Pace
 from bridge.refusals import Refusals
+from bridge.robot_faults import RobotFaults
 from bridge.round_trip import RoundTrip
 from bridge.shutter import Shutter
 from bridge.watchdog import Watchdog
@@ -91,6 +92,7 @@ class BridgeCore:
         self._gate = Gate(limits.velocity, config.max_age_s)
         self._watchdog = Watchdog(config.fade_s, config.deadline_s)
         self._limiter = Limiter(limits, config.wheel_acceleration, config.joint_margin, TICK_S)
+        self._faults = RobotFaults()
         self._latch = StopLatch()
         self._orders = CutOrders(cuts)
         self._shutter = Shutter(config.camera_moving_hz, config.camera_resting_hz, TICK_S)
@@ -128,6 +130,8 @@ class BridgeCore:
         inhibited = ""
         if self._latch.stop_id:
             inhibited = "the software stop is latched"
+        elif self._faults.current:
+            inhibited = self._faults.current
         elif self._watchdog.tripped(now) or self._gate.must_rest:
             inhibited = "no valid setpoint keeps the cutter enabled"
         free = self._measured.cutter == "open"
@@ -160,6 +164,7 @@ class BridgeCore:
         if reason:
             return m.Answer(ok=False, reason=reason)
         self._halt()
+        self._faults.released(now)
         self._say("info", f"software stop released by {request.user}: {request.reason}")
         return m.Answer(ok=True)
 
@@ -168,26 +173,38 @@ class BridgeCore:
         self._clock = now if clock is None else clock
         tripped = self._watch(now)
         stopped = bool(self._latch.stop_id)
-        share = 0.0 if stopped else self._watchdog.trust(now)
+        share = 0.0 if stopped or self._faults.current else self._watchdog.trust(now)
         xi = self._limiter.step(share * self._desired, self._measured.position[2:])
         blades = not (stopped or tripped)
-        self.robot.write(Setpoint(xi, blades, self._gate.epoch, self._gate.sequence, self._clock))
+        releases = self._faults.releases
+        self.robot.write(Setpoint(xi, blades, self._gate.epoch, self._gate.sequence, self._clock, releases))
         self._measured = self.robot.read()
         self._ticks += 1
         self._follow_cut()
         return self._outputs(now)
 
     def _watch(self, now: float) -> bool:
-        tripped = self._watchdog.tripped(now)
+        self._watch_robot(now)
+        tripped = self._watchdog.tripped(now) or bool(self._faults.current)
         if tripped and not self._was_tripped:
             self._halt()
-            self._say("warning", "no valid setpoint: base 0, arm holds, cutter inhibited")
+            if not self._faults.current:
+                self._say("warning", "no valid setpoint: base 0, arm holds, cutter inhibited")
         elif self._was_tripped and not tripped:
             self._say("info", "setpoints come in: the robot follows")
         if tripped != self._was_tripped:
             self._state_due = True
         self._was_tripped = tripped
         return tripped
+
+    def _watch_robot(self, now: float) -> None:
+        measured = self._measured
+        change = self._faults.follow(measured.fault, measured.severe, bool(self._latch.stop_id), now)
+        if change is not None:
+            self._halt()
+            self._say("warning" if self._faults.current else "info", change.text)
+            if change.stop is not None:
+                self.on_stop(change.stop, now)
 
     def _halt(self) -> None:
         self._desired = np.zeros_like(self._desired)

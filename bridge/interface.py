@@ -12,7 +12,10 @@ CutterState = Literal["open", "closing", "opening", "jammed"]
 
 @dataclass(frozen=True)
 class Measurement:
-    """What the robot's sensors say: ξ and its rates over [θ_l, θ_r, q₁…q₇] (rad, rad/s), and the cutter."""
+    """What the robot's sensors say: ξ and its rates over [θ_l, θ_r, q₁…q₇] (rad, rad/s), and the cutter.
+
+    `fault` is why the robot itself does not move, empty when it does; a `severe` one has to be released by a person.
+    """
 
     position: Array
     velocity: Array
@@ -20,17 +23,23 @@ class Measurement:
     cut_id: str
     outcome: Outcome
     detail: str
+    fault: str = ""
+    severe: bool = False
 
 
 @dataclass(frozen=True)
 class Setpoint:
-    """What is really sent on: ξ̇ (rad/s), whether the blades may close, and the token that it follows from."""
+    """What is really sent on: ξ̇ (rad/s), whether the blades may close, and the token that it follows from.
+
+    When `releases` grows, a person has released a stop, and the robot may recover from what stopped it.
+    """
 
     xi: Array
     blades: bool
     epoch: int
     sequence: int
     at: float
+    releases: int = 0
 
 
 class Robot(Protocol):

@@ -2,6 +2,7 @@
 
 import math
 import random
+import time
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -10,7 +11,7 @@ from bridge_rig import FORWARD, MODEL, REST, NoCamera, Parts, Rig, SimulatedPlan
 from bridge.config import BridgeConfig
 from bridge.core import TICK_S, BridgeCore
 from bridge.odometer import Odometer
-from bridge.robot_time import SteppedTime
+from bridge.robot_time import RealTime, SteppedTime
 from bridge.sim.robot import SimulatedRobot
 from bridge.sim.row import Row
 from rolling_panda import messages as m
@@ -28,7 +29,16 @@ def simulated() -> Parts:
     return Parts(start, plant, lambda: SteppedTime(0.0, TICK_S), real=False, close=plant.robot.close)
 
 
-@pytest.fixture(params=[simulated])
+def real() -> Parts:
+    for driver in ("panda_py", "rosbags"):
+        pytest.importorskip(driver, reason="the extra `real` is not installed: pip install '.[real]'")
+    from real_rig import RealPlant
+
+    plant = RealPlant()
+    return Parts(plant.start, plant, lambda: RealTime(time.monotonic(), TICK_S), real=True, close=plant.close)
+
+
+@pytest.fixture(params=[simulated, pytest.param(real, marks=pytest.mark.alone)])
 def rig(request: pytest.FixtureRequest) -> Iterator[Rig]:
     factory: Callable[[], Parts] = request.param
     rig = Rig(factory())

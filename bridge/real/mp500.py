@@ -7,6 +7,7 @@ The relay board tells the right motor's velocity negated, as it is mounted mirro
 angles; the wheels' angles are the integral of their speeds.
 """
 
+import contextlib
 import threading
 import time
 from dataclasses import dataclass
@@ -29,6 +30,8 @@ _REST = 0.05
 # A stamp that jumps by more than this (s) is no measure of the time between two messages.
 _LONGEST_GAP = 0.25
 _SERVICE_S = 1.0
+# A service without arguments: CDR header, and one byte since a structure has at least one.
+_EMPTY_REQUEST = b"\x00\x01\x00\x00\x00"
 
 
 @dataclass(frozen=True)
@@ -102,16 +105,12 @@ class Mp500:
             self._target = wheels.copy()
             self._watchdog.feed(time.monotonic())
 
-    def soft_stop(self) -> bool:
-        """Ask the relay board to stop the motors; waits. Returns whether it says so."""
-        return self._ask(SOFT_STOP)
-
-    def release(self) -> bool:
-        """Take the relay board's soft stop back, by an operator's word; waits. Returns whether it says so."""
+    def release(self) -> None:
+        """A person says that the relay board's soft stop may end; returns at once."""
         with self._lock:
             self._runaway = ""
             self._rest_since = None
-        return self._ask(SOFT_RELEASE)
+        self._ask(SOFT_RELEASE)
 
     def close(self) -> None:
         """Send a last zero and let go; safe to call twice."""
@@ -134,8 +133,7 @@ class Mp500:
                 runaway = self._is_runaway(now)
             self._send(_twist(*self._drive.twist(float(sent[0]), float(sent[1]))))
             if runaway:
-                # Not from this thread: the answer may take a second, and commands go on.
-                threading.Thread(target=self.soft_stop, name="mp500-soft-stop", daemon=True).start()
+                self._ask(SOFT_STOP)
 
     def _next(self, now: float) -> Array:
         fault, severe = self._fault(now)
@@ -169,9 +167,7 @@ class Mp500:
         if self._emergency != FREE:
             return self._cause, True
         if now - self._wheels_at > config.stale_s:
-            known = self._wheels_at > float("-inf")
-            age = f"for {now - self._wheels_at:.1f} s" if known else "yet"
-            return f"base: no wheel speeds on {self._prefix}{WHEELS} {age}", False
+            return f"base: no wheel speeds on {self._prefix}{WHEELS}", False
         if now - self._emergency_at > config.unmonitored_s:
             return f"base: no emergency-stop state on {self._prefix}{EMERGENCY}", False
         return "", False
@@ -221,13 +217,14 @@ class Mp500:
         with self._lock:
             self._battery = float(message.percentage)
 
-    def _ask(self, service: str) -> bool:
-        request = ros.encode(ros.make(ros.EMPTY, structure_needs_at_least_one_member=0))
-        try:
-            reply = self._wire.ask(self._prefix + service, request, _SERVICE_S)
-            return bool(ros.decode(ros.SUCCESS, reply).success)
-        except (ServiceError, MessageError):
-            return False
+    def _ask(self, service: str) -> None:
+        """Ask the relay board from a thread: the answer may take a second; what came of it is in the stop state."""
+
+        def ask() -> None:
+            with contextlib.suppress(ServiceError):
+                self._wire.ask(self._prefix + service, _EMPTY_REQUEST, _SERVICE_S)
+
+        threading.Thread(target=ask, name=f"mp500-{service}", daemon=True).start()
 
 
 def _twist(v: float, omega: float) -> bytes:

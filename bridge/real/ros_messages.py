@@ -14,20 +14,18 @@ ODOMETRY = "nav_msgs/msg/Odometry"
 JOINT_STATE = "sensor_msgs/msg/JointState"
 BATTERY_STATE = "sensor_msgs/msg/BatteryState"
 EMERGENCY_STOP = "neo_msgs2/msg/EmergencyStopState"
-#: Request of a service without arguments, and the reply of one that says how it went.
-EMPTY = "rolling_panda/msg/Empty"
+#: Reply of the relay board's services.
 SUCCESS = "rolling_panda/msg/Success"
 #: std_srvs/srv/SetBool: request and reply.
 SET_BOOL = "std_msgs/msg/Bool"
 SET_BOOL_REPLY = "rolling_panda/msg/SetBoolReply"
 
-# Field for field as in the packages' .msg and .srv files. An empty structure travels as one byte.
+# Field for field as in the packages' .msg and .srv files.
 _DEFINITIONS = {
     EMERGENCY_STOP: (
         "std_msgs/Header header\nint16 EMFREE=0\nint16 EMSTOP=1\nint16 EMCONFIRMED=2\n"
         "bool emergency_button_stop\nbool scanner_stop\nbool software_stop\nint16 emergency_state"
     ),
-    EMPTY: "uint8 structure_needs_at_least_one_member",
     SUCCESS: "bool success",
     SET_BOOL_REPLY: "bool success\nstring message",
 }

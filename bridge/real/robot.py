@@ -1,0 +1,126 @@
+"""The real robot behind the bridge's interface: base, arm, cutter and camera put together."""
+
+from typing import Protocol
+
+import numpy as np
+
+from bridge.interface import Measurement, Setpoint
+from bridge.picture import Picture
+from bridge.real.arm_link import ArmState
+from bridge.real.cutter import CutterStatus
+from bridge.real.mp500 import BaseState
+from rolling_panda.differential_drive import Array
+
+
+class Base(Protocol):
+    """`bridge.real.mp500.Mp500`, or what stands for it."""
+
+    def read(self) -> BaseState:
+        """The newest state."""
+
+    def write(self, wheels: Array) -> None:
+        """Speeds of the wheels (2, rad/s), until its deadline."""
+
+    def release(self) -> object:
+        """A person lets it go on."""
+
+    def close(self) -> None:
+        """Let go."""
+
+
+class Arm(Protocol):
+    """`bridge.real.panda.Panda`, or what stands for it."""
+
+    def read(self) -> ArmState:
+        """The newest state."""
+
+    def write(self, velocity: Array) -> None:
+        """Velocities of the joints (7, rad/s), until its deadline."""
+
+    def release(self) -> None:
+        """A person lets it go on."""
+
+    def close(self) -> None:
+        """Let go."""
+
+
+class Blades(Protocol):
+    """`bridge.real.cutter.Cutter`, or what stands for it."""
+
+    def read(self) -> CutterStatus:
+        """What the blades do."""
+
+    def enable(self, blades: bool) -> None:
+        """Whether they may close."""
+
+    def cut(self, cut_id: str) -> None:
+        """Begin to close."""
+
+    def close(self) -> None:
+        """Let go."""
+
+
+class Camera(Protocol):
+    """`bridge.real.realsense.RealSense`, or what stands for it."""
+
+    def capture(self, expose: bool) -> Picture | None:
+        """Ask for a picture, or fetch one."""
+
+    def close(self) -> None:
+        """Let go."""
+
+
+class RealRobot:
+    """Implements `bridge.interface.Robot`; nothing here waits for a device."""
+
+    def __init__(self, base: Base, arm: Arm, blades: Blades, camera: Camera | None) -> None:
+        """Put together what is connected already.
+
+        Args:
+            base: Drives.
+            arm: Reaches.
+            blades: Cut.
+            camera: Sees; None on a robot without one.
+        """
+        self._base, self._arm, self._blades, self._camera = base, arm, blades, camera
+        self._releases = 0
+
+    def read(self) -> Measurement:
+        """The newest of every device; a fault of one is a fault of the robot."""
+        base, arm, blades = self._base.read(), self._arm.read(), self._blades.read()
+        return Measurement(
+            np.concatenate([base.position, arm.position]),
+            np.concatenate([base.velocity, arm.velocity]),
+            blades.state,
+            blades.cut_id,
+            blades.outcome,
+            blades.detail,
+            fault="; ".join(filter(None, [base.fault, arm.fault])),
+            severe=base.severe or arm.severe,
+        )
+
+    def write(self, setpoint: Setpoint) -> None:
+        """Hand the setpoint to every device; they follow it at their own rates until their own deadlines."""
+        if setpoint.releases > self._releases:
+            self._releases = setpoint.releases
+            self._base.release()
+            self._arm.release()
+        self._base.write(setpoint.xi[:2])
+        self._arm.write(setpoint.xi[2:])
+        self._blades.enable(setpoint.blades)
+
+    def cut(self, cut_id: str, point_id: str) -> None:
+        """Begin to close the blades."""
+        self._blades.cut(cut_id)
+
+    def capture(self, expose: bool) -> Picture | None:
+        """Ask the camera for a picture, or fetch the one that is ready."""
+        return None if self._camera is None else self._camera.capture(expose)
+
+    def close(self) -> None:
+        """Let go of every device."""
+        self._blades.close()
+        self._base.close()
+        self._arm.close()
+        if self._camera is not None:
+            self._camera.close()
