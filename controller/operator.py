@@ -13,11 +13,13 @@ class Operator:
         self._accepted = 0
 
     def points(self, intent: intents.Intent) -> str:
-        """Accept or reject; returns why not, empty when done."""
+        """Decide; returns why not, empty when done."""
         if isinstance(intent, intents.AcceptPoint):
             return self._queue.accept(intent.point_id, intent.revision, intent.user, intent.digest)
         if isinstance(intent, intents.RejectPoint):
             return self._queue.reject(intent.point_id, intent.user, intent.reason)
+        if isinstance(intent, intents.ReconsiderPoint):
+            return self._queue.reconsider(intent.point_id, intent.user)
         if isinstance(intent, intents.ResolvePoint):
             return self._queue.decide(intent.point_id, intent.outcome, intent.user, intent.reason)
         if isinstance(intent, intents.AcceptAll):
@@ -30,6 +32,8 @@ class Operator:
             return f"accepted {intent.point_id}, revision {intent.revision}"
         if isinstance(intent, intents.RejectPoint):
             return f"rejected {intent.point_id}{f': {intent.reason}' if intent.reason else ''}"
+        if isinstance(intent, intents.ReconsiderPoint):
+            return f"took back the decision about {intent.point_id}"
         if isinstance(intent, intents.ResolvePoint):
             how = "is cut" if intent.outcome == "DONE" else "is not cut"
             return f"looked: {intent.point_id} {how}: {intent.reason}"

@@ -21,6 +21,7 @@ _PROBES: dict[type[intents.Intent], intents.Intent | None] = {
     intents.Arm: intents.Arm(user=""),
     intents.AcceptPoint: None,
     intents.RejectPoint: None,
+    intents.ReconsiderPoint: None,
     intents.ResolvePoint: None,
     intents.AcceptAll: None,
     intents.Start: intents.Start(user=""),

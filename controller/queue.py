@@ -151,6 +151,18 @@ class PointQueue:
         self._put(point_id, replace(ticket, state="REJECTED", reason=reason or "rejected", user=user, accepted=None))
         return ""
 
+    def reconsider(self, point_id: str, user: str) -> str:
+        """ACCEPTED or REJECTED → PROPOSED; returns why not, empty when done."""
+        ticket = self._tickets.get(point_id)
+        if ticket is None:
+            return f"there is no point {point_id!r}"
+        if ticket.state not in ("ACCEPTED", "REJECTED"):
+            return f"{point_id} is {ticket.state}: there is nothing to take back"
+        if not ticket.seen:
+            return f"perception does not see {point_id} any more"
+        self._put(point_id, replace(ticket, state="PROPOSED", reason="", user=user, accepted=None, hash=""))
+        return ""
+
     def proposed(self, confidence: float) -> list[PruningPoint]:
         """Points that wait for a decision and are at least this sure."""
         tickets = (self._tickets[i] for i in self._order)

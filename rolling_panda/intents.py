@@ -37,6 +37,12 @@ class RejectPoint(Intent, frozen=True, kw_only=True):
     reason: Text = ""
 
 
+class ReconsiderPoint(Intent, frozen=True, kw_only=True):
+    """Take back what was decided about a point: accepted or rejected, it is proposed again."""
+
+    point_id: Name
+
+
 class ResolvePoint(Intent, frozen=True, kw_only=True):
     """Say how a cut ended of which nobody knows (UNKNOWN): somebody has looked."""
 
@@ -99,6 +105,7 @@ AnyIntent = (
     Arm
     | AcceptPoint
     | RejectPoint
+    | ReconsiderPoint
     | ResolvePoint
     | AcceptAll
     | Start

@@ -171,7 +171,8 @@ TOPICS: tuple[Topic[Any], ...] = (
 INTENT: Service[intents.Intent] = Service(
     "service/intent",
     (
-        intents.Arm, intents.AcceptPoint, intents.RejectPoint, intents.ResolvePoint, intents.AcceptAll, intents.Start,
+        intents.Arm, intents.AcceptPoint, intents.RejectPoint, intents.ReconsiderPoint, intents.ResolvePoint,
+        intents.AcceptAll, intents.Start,
         intents.Pause, intents.Resume, intents.Home, intents.Acknowledge, intents.Reset, intents.TakeControl,
         intents.RequestControl, intents.GrantControl, intents.ReturnControl,
     ),

@@ -68,6 +68,11 @@ def operator_router(desk: Desk) -> APIRouter:
         """Take a point off the queue."""
         return await ask(session, intents.RejectPoint(user=session.user, point_id=point_id, reason=request.reason))
 
+    @router.post("/points/{point_id}/reconsider", tags=["points"])
+    async def reconsider(session: Caller, point_id: PointId) -> Response:
+        """Take back what was decided: an accepted or rejected point is proposed again."""
+        return await ask(session, intents.ReconsiderPoint(user=session.user, point_id=point_id))
+
     @router.post("/points/{point_id}/resolve", tags=["points"])
     async def resolve(session: Caller, point_id: PointId, request: body.ResolvePoint) -> Response:
         """Say how an UNKNOWN cut ended, after looking; it is never cut again by itself."""

@@ -34,7 +34,7 @@ ALLOWED = {
 
 
 def controller(mode: m.Mode = "READY", **changes: Any) -> m.ControllerState:
-    points = ("AcceptPoint", "RejectPoint", "ResolvePoint", "AcceptAll")
+    points = ("AcceptPoint", "RejectPoint", "ReconsiderPoint", "ResolvePoint", "AcceptAll")
     state = m.ControllerState(
         header=m.Header(),
         mode=mode,

@@ -63,6 +63,7 @@ def client(server):
             {"outcome": "DONE", "reason": "the cane is off"},
             intents.ResolvePoint(user="ann", point_id="p7", outcome="DONE", reason="the cane is off"),
         ),
+        ("points/p7/reconsider", None, intents.ReconsiderPoint(user="ann", point_id="p7")),
         ("points/p7/reject", {}, intents.RejectPoint(user="ann", point_id="p7")),
         ("points/accept-all", {"confidence": 0.5}, intents.AcceptAll(user="ann", confidence=0.5)),
         ("arm", None, intents.Arm(user="ann")),

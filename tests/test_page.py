@@ -33,6 +33,7 @@ def test_accepts_and_rejects_with_buttons_and_keys(page: Page, server: PlayedSer
     page.locator('[data-point-id="p1"]').focus()
     page.keyboard.press("ArrowDown")
     page.keyboard.press("r")
+    page.keyboard.press("Enter")
     until(page, lambda: ("/api/points/p2/reject", {"reason": ""}) in server.posted)
     page.locator("#least-confidence").select_option("0.7")
     page.locator("#accept-all").click()

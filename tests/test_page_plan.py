@@ -42,8 +42,8 @@ def page(chromium_path: str) -> Iterator[Page]:
 
 def test_a_row_says_its_number_and_way_or_why_the_plan_refuses_it(page: Page) -> None:
     facts = page.locator('[data-point-id="p1"] .facts')
-    expect(facts).to_contain_text("no. 2, way 3.1 s")
+    expect(page.locator('[data-point-id="p1"] .reason')).to_contain_text("no. 2, way 3.1 s")
     assert "leaves 122 mm between link5 and camera, manipulability 0.070" in (facts.get_attribute("title") or "")
     expect(page.locator('[data-point-id="p2"] .reason')).to_contain_text("no posture of the arm reaches it")
     for other in ("p2", "p3"):
-        expect(page.locator(f'[data-point-id="{other}"] .facts')).not_to_contain_text("way")
+        expect(page.locator(f'[data-point-id="{other}"] .reason')).not_to_contain_text("way 3")

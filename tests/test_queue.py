@@ -175,3 +175,16 @@ def test_another_content_than_was_seen_is_refused():
     assert queue.entries()[0].digest == ""
     assert queue.accept(point.point_id, point.revision, "Ada", point.digest) == ""
     assert queue.entries()[0].digest == point.digest
+
+
+def test_a_decision_is_taken_back_until_the_cut_begins():
+    queue = PointQueue(ControllerConfig())
+    queue.update(m.PruningPoints(header=m.Header(), segmenter="s", frames=1, points=(POINT,)))
+    assert "nothing to take back" in queue.reconsider("a", "Ada")
+    assert queue.accept("a", POINT.revision, "Ada") == "" and queue.reconsider("a", "Ada") == ""
+    assert queue.entries()[0].state == "PROPOSED" and queue.next() is None
+    assert queue.reject("a", "Ada", "wrong cane") == "" and queue.reconsider("a", "Ada") == ""
+    assert queue.entries()[0].state == "PROPOSED" and queue.entries()[0].reason == ""
+    assert queue.accept("a", POINT.revision, "Ada") == ""
+    queue.intend("a", "c1")
+    assert "nothing to take back" in queue.reconsider("a", "Ada")

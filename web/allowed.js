@@ -16,6 +16,7 @@ const NEEDS = Object.freeze({
   AcceptPoint: "Points cannot be accepted",
   AcceptAll: "Points cannot be accepted",
   RejectPoint: "Points cannot be rejected",
+  ReconsiderPoint: "Decisions cannot be taken back",
   ResolvePoint: "How a cut ended cannot be said",
 });
 

@@ -1,67 +1,13 @@
 // One row of the queue: a pruning point, why it is where it is, and what may be done with it.
 
-import { whyNot } from "../allowed.js";
-import { ask } from "../api.js";
+import { accept, isUnknown, reject, whyNotAccept, whyNotReject } from "../decisions.js";
 import { element, setEnabled, setText } from "../element.js";
 import { icon, setIcon } from "../icons.js";
-import { pageState, selected } from "../state.js";
+import { pageState } from "../state.js";
 import { select } from "../teleoperation.js";
 import { POINT_WORDS, counted, inWords } from "../words.js";
 
 /** @typedef {import("../messages.js").PagePoint} PagePoint */
-/** @typedef {import("../messages.js").PointState} PointState */
-
-/** @type {ReadonlySet<PointState>} */
-const CAN_ACCEPT = new Set(/** @type {PointState[]} */ (["PROPOSED", "REJECTED", "FAILED_NOT_CUT"]));
-/** @type {ReadonlySet<PointState>} */
-const CAN_REJECT = new Set(/** @type {PointState[]} */ (["PROPOSED", "ACCEPTED", "FAILED_NOT_CUT"]));
-
-/**
- * Nobody but the person who looks knows how an unknown cut ended; the two buttons are their two answers then.
- *
- * @param {PagePoint} row
- */
-function isUnknown(row) {
-  return row.entry.state === "UNKNOWN";
-}
-
-/**
- * @param {PagePoint} row
- * @param {"DONE"|"FAILED_NOT_CUT"} outcome
- */
-function resolve(row, outcome) {
-  const id = encodeURIComponent(row.point.point_id);
-  return ask(`Saying how ${row.point.point_id} ended`, `/api/points/${id}/resolve`, { outcome, reason: "seen by eye" });
-}
-
-/** @param {PagePoint} row */
-export function whyNotAccept(row) {
-  if (isUnknown(row)) return whyNot("ResolvePoint");
-  if (!CAN_ACCEPT.has(row.entry.state)) return `It is ${POINT_WORDS[row.entry.state].toLowerCase()}`;
-  return whyNot("AcceptPoint");
-}
-
-/** @param {PagePoint} row */
-export function whyNotReject(row) {
-  if (isUnknown(row)) return whyNot("ResolvePoint");
-  if (!CAN_REJECT.has(row.entry.state)) return `It is ${POINT_WORDS[row.entry.state].toLowerCase()}`;
-  return whyNot("RejectPoint");
-}
-
-/** @param {PagePoint} row */
-export function accept(row) {
-  if (isUnknown(row)) return resolve(row, "DONE");
-  const id = encodeURIComponent(row.point.point_id);
-  return ask(`Accepting ${row.point.point_id}`, `/api/points/${id}/accept`, { revision: row.point.revision, digest: row.point.digest });
-}
-
-/** @param {PagePoint} row */
-export function reject(row) {
-  if (isUnknown(row)) return resolve(row, "FAILED_NOT_CUT");
-  const id = encodeURIComponent(row.point.point_id);
-  return ask(`Rejecting ${row.point.point_id}`, `/api/points/${id}/reject`, { reason: "" });
-}
-
 /** @param {PagePoint} row */
 function planWords({ plan }) {
   if (!plan?.order) return "";
@@ -87,7 +33,7 @@ export class RpPoint extends HTMLElement {
     );
     this.rejectButton = element(
       "button",
-      { class: "reject", attributes: { type: "button" }, onclick: () => this.row && void reject(this.row) },
+      { class: "reject", attributes: { type: "button" }, onclick: () => this.reject() },
       icon("REJECTED"),
     );
   }
@@ -95,6 +41,7 @@ export class RpPoint extends HTMLElement {
   connectedCallback() {
     if (this.childElementCount > 0) return;
     this.setAttribute("role", "listitem");
+    this.tabIndex = -1;
     this.append(
       element(
         "div",
@@ -111,33 +58,34 @@ export class RpPoint extends HTMLElement {
     this.addEventListener("focus", () => this.choose());
   }
 
+  /** An unknown cut is answered at once; a rejection may have a reason, which the queue asks for. */
+  reject() {
+    if (!this.row) return;
+    if (isUnknown(this.row)) void reject(this.row, "");
+    else this.dispatchEvent(new CustomEvent("reject", { bubbles: true }));
+  }
+
   choose() {
     if (this.row) select(this.row.point.point_id);
   }
 
-  /**
-   * @param {PagePoint} row
-   * @param {boolean} reachable Is this the row that the Tab key comes to?
-   */
-  show(row, reachable) {
+  /** @param {PagePoint} row */
+  show(row) {
     this.row = row;
     const { point, entry } = row;
     this.dataset.pointId = point.point_id;
     this.dataset.state = entry.state;
-    this.tabIndex = reachable ? 0 : -1;
-    const chosen = selected.get() === point.point_id;
-    this.setAttribute("aria-current", String(chosen));
     this.classList.toggle("active", pageState.get()?.controller?.active_point_id === point.point_id);
     setIcon(this.shape, entry.state);
     setText(this.word, POINT_WORDS[entry.state]);
     setText(this.place, point.point_id);
     const thick = `${(2000 * point.radius).toFixed(1)} mm`;
     const sure = `${Math.round(100 * point.confidence)} %`;
-    const planned = row.plan?.order ? ` · no. ${row.plan.order}, way ${row.plan.duration_s.toFixed(1)} s` : "";
-    setText(this.facts, `${point.nodes_kept}/${point.nodes_seen} nodes · ${thick} · ${sure}${planned}`);
+    const planned = row.plan?.order ? `no. ${row.plan.order}, way ${row.plan.duration_s.toFixed(1)} s` : "";
+    setText(this.facts, `${point.nodes_kept}/${point.nodes_seen} nodes · ${thick} · ${sure}`);
     const kept = `Keeps ${point.nodes_kept} of ${counted(point.nodes_seen, "node")}`;
     this.facts.title = `${kept}; the cane is ${thick} thick; confidence ${sure}${planWords(row)}`;
-    setText(this.reason, inWords([entry.reason, point.reason].filter(Boolean).join(" · ")));
+    setText(this.reason, inWords([planned, entry.reason, point.reason].filter(Boolean).join(" · ")));
     this.reason.title = this.reason.textContent ?? "";
     const [yes, no] = isUnknown(row) ? ["I have looked: it is cut", "I have looked: it is not cut"] : ["Accept", "Reject"];
     setEnabled(this.acceptButton, whyNotAccept(row), isUnknown(row) ? `${yes} (A)` : "Accept this cut (A)");

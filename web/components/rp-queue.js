@@ -1,8 +1,8 @@
-// The queue of pruning points, by vine and spur; up, down, A and R work from the keyboard.
+// The queue of pruning points, by vine and spur; arrows, A, R, Z and N work from the keyboard.
 
 import { countOf, whyNot } from "../allowed.js";
-import { ask } from "../api.js";
 import { placing, setPlacing, whyNoPlacing } from "../by-hand.js";
+import { accept, acceptAll, decisions, undo, whyNoUndo, whyNotAccept, whyNotReject } from "../decisions.js";
 import { element, panelHead, setEnabled, setText } from "../element.js";
 import { icon } from "../icons.js";
 import { link, now, pageState, points, selected, staleWords } from "../state.js";
@@ -10,16 +10,30 @@ import { drawOn } from "../store.js";
 import { select } from "../teleoperation.js";
 import { counted } from "../words.js";
 import { RpPointDetails } from "./rp-point-details.js";
-import { RpPoint, accept, reject, whyNotAccept, whyNotReject } from "./rp-point.js";
+import { RpPoint } from "./rp-point.js";
+import { RpReason } from "./rp-reason.js";
 
 /** @typedef {import("../messages.js").PagePoint} PagePoint */
 
+/** What a row's buttons depend on. */
+const MAY = Object.freeze(["AcceptPoint", "RejectPoint", "ResolvePoint"]);
+/** How many rows a page of the list is. */
+const PAGE = 6;
+/** Keys that go to another row: from one, of so many. @type {Readonly<Record<string, (at: number, last: number) => number>>} */
+const STEPS = Object.freeze({
+  ArrowDown: (at, last) => Math.min(at + 1, last),
+  ArrowUp: (at) => Math.max(at - 1, 0),
+  PageDown: (at, last) => Math.min(at + PAGE, last),
+  PageUp: (at) => Math.max(at - PAGE, 0),
+  Home: () => 0,
+  End: (_, last) => last,
+});
 const THRESHOLDS = Object.freeze([0, 0.5, 0.7, 0.9]);
 
 class RpQueue extends HTMLElement {
   connectedCallback() {
     const source = element("span", { class: "tag", attributes: { title: "What tells cane, node and post apart in the image" } });
-    const { head, note } = panelHead("Pruning points", source);
+    const { head, note } = panelHead("Pruning points", source, undoButton());
     const summary = element("p", { class: "summary number" });
     const list = element("div", { class: "groups", attributes: { "aria-label": "Pruning points" } });
     const empty = element("div", { class: "empty", attributes: { role: "status" } });
@@ -28,29 +42,64 @@ class RpQueue extends HTMLElement {
       abstainedList("operator", (count) => `${counted(count, "place")} for you to decide`),
     ];
     list.addEventListener("keydown", (event) => this.key(event));
-    this.append(head, document.createElement("rp-rule"), element("div", { class: "queue-tools" }, summary, ...acceptAll(), addByHand()), list, empty, element("div", { class: "open-places" }, ...open.map((each) => each.box)));
+    list.addEventListener("reject", (event) => this.askWhy(/** @type {RpPoint} */ (event.target)));
+    this.append(head, document.createElement("rp-rule"), element("div", { class: "queue-tools" }, summary, ...acceptEvery(), addByHand()), list, empty, element("div", { class: "open-places" }, ...open.map((each) => each.box)));
 
     /** @type {Map<string, HTMLElement>} */
     const groups = new Map();
-    drawOn([points, pageState, link, now, selected], () => {
+    let drawn = "";
+    /** @type {import("../messages.js").PagePoints|null} */
+    let drawnPage = null;
+    drawOn([points, pageState, link, now], () => {
       const page = points.get();
-      const rows = inOrder(page?.points ?? []);
-      const reachable = this.rows.has(selected.get()) ? selected.get() : rows[0]?.point.point_id;
       const words = staleWords("controller", "perception");
       setText(note, words);
       this.classList.toggle("stale", words !== "");
-      setText(summary, summaryWords(rows));
       setText(source, page?.segmenter ?? "");
       setText(empty, emptyWords());
-      empty.hidden = rows.length > 0;
+      // States come ten times a second; the rows change with the points, and with what may be done with them.
+      const may = MAY.map(whyNot).concat(pageState.get()?.controller?.active_point_id ?? "").join("\n");
+      if (page === drawnPage && may === drawn) return;
+      drawnPage = page;
+      drawn = may;
+      this.order = inOrder(page?.points ?? []);
+      setText(summary, summaryWords(this.order));
+      empty.hidden = this.order.length > 0;
       for (const each of open) each.show(page?.abstained ?? []);
-      this.place(list, groups, rows, reachable ?? "");
-      this.explain(rows.find((row) => row.point.point_id === selected.get()));
+      this.place(list, groups);
+      this.choose();
     });
+    drawOn([selected], () => this.choose());
   }
 
   /** @type {Map<string, RpPoint>} */
   rows = new Map();
+  /** The points as they are listed. @type {readonly PagePoint[]} */
+  order = [];
+  /** The row that is marked as chosen. */
+  chosen = "";
+  reason = new RpReason();
+
+  /** Mark the chosen row alone, and let the Tab key come to it, or else to the first. */
+  choose() {
+    const pointId = selected.get();
+    const reachable = this.rows.has(pointId) ? pointId : (this.order[0]?.point.point_id ?? "");
+    for (const name of [this.chosen, this.reachable, pointId, reachable]) {
+      const item = this.rows.get(name);
+      item?.setAttribute("aria-current", String(name === pointId));
+      if (item) item.tabIndex = name === reachable ? 0 : -1;
+    }
+    this.chosen = pointId;
+    this.reachable = reachable;
+    this.explain(this.order.find((row) => row.point.point_id === pointId));
+  }
+
+  reachable = "";
+
+  /** @param {RpPoint} item */
+  askWhy(item) {
+    if (item.row) this.reason.open(item.row, item);
+  }
 
   details = new RpPointDetails();
 
@@ -72,10 +121,9 @@ class RpQueue extends HTMLElement {
    *
    * @param {HTMLElement} list
    * @param {Map<string, HTMLElement>} groups
-   * @param {readonly PagePoint[]} rows
-   * @param {string} reachable
    */
-  place(list, groups, rows, reachable) {
+  place(list, groups) {
+    const rows = this.order;
     const wantedRows = new Set(rows.map((row) => row.point.point_id));
     const wantedGroups = new Set(rows.map(groupOf));
     removeOthers(this.rows, wantedRows);
@@ -101,31 +149,46 @@ class RpQueue extends HTMLElement {
       }
       putAfter(group, item, lastRow);
       lastRow = item;
-      item.show(row, row.point.point_id === reachable);
+      item.show(row);
     }
   }
 
   /** @param {KeyboardEvent} event */
   key(event) {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
-    const order = inOrder(points.get()?.points ?? []);
-    const at = order.findIndex((row) => row.point.point_id === selected.get());
-    const row = order[at];
-    if (event.key === "ArrowDown" || event.key === "ArrowUp") {
+    const at = this.order.findIndex((row) => row.point.point_id === selected.get());
+    const row = this.order[at];
+    const to = STEPS[event.key]?.(Math.max(at, -1), this.order.length - 1);
+    const key = event.key.toLowerCase();
+    if (to !== undefined) {
       event.preventDefault();
-      const next = order[at < 0 ? 0 : Math.min(order.length - 1, Math.max(0, at + (event.key === "ArrowDown" ? 1 : -1)))];
+      const next = this.order[to];
       if (!next) return;
       select(next.point.point_id);
       this.rows.get(next.point.point_id)?.focus();
-    } else if (event.key.toLowerCase() === "a" && row && !whyNotAccept(row)) {
+    } else if (key === "a" && row && !whyNotAccept(row)) {
       void accept(row);
-    } else if (event.key.toLowerCase() === "r" && row && !whyNotReject(row)) {
-      void reject(row);
+    } else if (key === "r" && row && !whyNotReject(row)) {
+      event.preventDefault();
+      this.rows.get(row.point.point_id)?.reject();
+    } else if (key === "z" && !whyNoUndo()) {
+      void undo();
+    } else if (key === "n" && !whyNoPlacing()) {
+      setPlacing(!placing.get());
     }
   }
 }
 
-function acceptAll() {
+function undoButton() {
+  const button = element("button", { id: "undo", class: "quiet", text: "Undo", attributes: { type: "button" } });
+  button.addEventListener("click", () => void undo());
+  drawOn([decisions, pageState, link, now], () => {
+    setEnabled(button, whyNoUndo(), `Take back: ${decisions.get().at(-1)?.words ?? ""} (Z)`);
+  });
+  return button;
+}
+
+function acceptEvery() {
   const least = element("select", { id: "least-confidence", attributes: { "aria-label": "Least confidence to accept" } });
   for (const value of THRESHOLDS) {
     const words = value === 0 ? "any" : `≥ ${value * 100} %`;
@@ -133,7 +196,7 @@ function acceptAll() {
   }
   const button = element("button", { id: "accept-all", text: "Accept all", attributes: { type: "button" } });
   button.addEventListener("click", () => {
-    void ask("Accepting all", "/api/points/accept-all", { confidence: Number(least.value) });
+    void acceptAll(Number(least.value));
   });
   drawOn([points, pageState, link, now], () => {
     const why = whyNot("AcceptAll") || (countOf("PROPOSED") === 0 ? "There is no proposed point" : "");
