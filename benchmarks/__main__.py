@@ -12,6 +12,7 @@ BENCHMARKS = {
     "reach": ("benchmarks.reach", "tool poses anywhere around the robot: reached, limits, manipulability"),
     "arm": ("benchmarks.arm", "the arm alone between random poses, beside published figures"),
     "load": ("benchmarks.load", "processor, memory and traffic of the demo"),
+    "ledger": ("benchmarks.ledger", "what recording costs the control step, on a slow disk too"),
     "live": ("benchmarks.live", "the running demo: control periods on time, round trip, tool error"),
     "perception": ("benchmarks.perception", "surveys of unseen rows, every pruning point judged"),
     "plots": ("benchmarks.plots", "pictures of what the others wrote with --json"),

@@ -36,7 +36,7 @@ def measure(steps: int) -> tuple[list[float], list[Demand]]:
     """
     durations: list[float] = []
     while len(durations) < steps:
-        robot = _working()
+        robot = working()
         gc.collect()
         gc.freeze()
         while len(durations) < steps:
@@ -61,7 +61,7 @@ def recorded(steps: int) -> list[Demand]:
     demands: list[Demand] = []
     while len(demands) < steps:
         recorder.demands.clear()
-        robot = _working(recorder)
+        robot = working(recorder)
         while len(demands) + len(recorder.demands) < steps and (robot.now < 1.0 or robot.controller.mode == "AUTO"):
             robot.step()
         demands += recorder.demands
@@ -112,7 +112,7 @@ def _line(peer: dict[str, Any]) -> str:
     return f"{title:<30}{peer['median_us']:>9}{peer['p99_us']:>9}{peer['max_us']:>9}  {peer['note']}{failed}"
 
 
-def _working(method: Method | None = None) -> KinematicRobot:
+def working(method: Method | None = None) -> KinematicRobot:
     config = ControllerConfig()
     robot = KinematicRobot(Controller(config, RobotConfig(), method=method), config.home)
     robot.step()

@@ -1,0 +1,141 @@
+"""What recording costs the control step: without a disk, with one, and with one whose every flush takes 200 ms."""
+
+import argparse
+import gc
+import itertools
+import platform
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import closing
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+from benchmarks.documents import one_row_a_line
+from benchmarks.kinematic_robot import KinematicRobot
+from benchmarks.tick import working
+from benchmarks.tick_parts import Times
+from controller.journal import LedgerState, Record
+from controller.ledger import Entry, Ledger
+from controller.ledger_check import verify
+from controller.ledger_writer import LedgerWriter
+from rolling_panda import intents
+from rolling_panda import messages as m
+
+_PERIOD_S = 0.01
+_SLOW_S = 0.2
+#: An operator's decision every so many periods, and a line of another process's log: more than any work gives.
+_DECISION, _LINE = 20, 5
+
+
+class SlowDisk(Ledger):
+    """A ledger on a disk whose every flush takes its time; like a flush it waits outside of Python's lock."""
+
+    def append(self, entries: Iterable[Entry]) -> int:
+        """Add rows, slowly."""
+        time.sleep(_SLOW_S)
+        return super().append(entries)
+
+
+class NoDisk:
+    """Takes records and forgets them: what the step costs without a ledger."""
+
+    def __init__(self) -> None:
+        """Start with nothing taken."""
+        self.state = LedgerState()
+
+    def write(self, records: tuple[Record, ...]) -> None:
+        """Durable at once."""
+        if records:
+            self.state = LedgerState(records[-1].number)
+
+    def note(self, line: m.LogEvent) -> None:
+        """Nothing is kept."""
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+def measure(seconds: float, make: Callable[[], LedgerWriter | NoDisk]) -> list[float]:
+    """Durations (s) of control steps in automatic work, each with handing its records over, at 100 Hz in real time."""
+    durations: list[float] = []
+    while len(durations) < seconds / _PERIOD_S:
+        # Records are numbered anew with each controller.
+        with closing(make()) as ledger:
+            _work(working(), ledger, round(seconds / _PERIOD_S), durations)
+    return durations
+
+
+def _work(robot: KinematicRobot, ledger: LedgerWriter | NoDisk, steps: int, durations: list[float]) -> None:
+    """Until the work has ended or there are enough steps."""
+    line = m.LogEvent(header=m.Header(), process="server", severity="info", text="bench")
+    gc.collect()
+    gc.freeze()
+    due = time.perf_counter()
+    while len(durations) < steps:
+        if len(durations) % _DECISION == 0:
+            robot.ask(intents.RejectPoint(user="bench", point_id="p999"))
+        inputs = replace(robot.inputs(), ledger=ledger.state)
+        started = time.perf_counter()
+        out = robot.controller.step(inputs, robot.now)
+        ledger.write(out.records)
+        ended = time.perf_counter()
+        if robot.controller.mode != "AUTO":
+            break
+        durations.append(ended - started)
+        if len(durations) % _LINE == 0:
+            ledger.note(line)
+        robot.take(out)
+        due += _PERIOD_S
+        time.sleep(max(0.0, due - time.perf_counter()))
+    gc.unfreeze()
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Measure, print, and write the figures. Returns the exit code."""
+    parser = argparse.ArgumentParser(prog="rolling-panda bench ledger", description=__doc__)
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures here")
+    parser.add_argument("--seconds", type=float, default=10.0, help="of each kind in each round (default: %(default)s)")
+    parser.add_argument("--rounds", type=int, default=3, help="of all three kinds in turn (default: %(default)s)")
+    arguments = parser.parse_args(argv)
+    if arguments.seconds <= 0.0 or arguments.rounds < 1:
+        parser.error("--seconds and --rounds must be positive")
+    durations: dict[str, list[float]] = {"no disk": [], "disk": [], "slow disk": []}
+    with tempfile.TemporaryDirectory() as folder:
+        for number, name in itertools.product(range(arguments.rounds), durations):
+            place = Path(folder) / f"{name} {number}"
+            place.mkdir()
+            durations[name] += measure(arguments.seconds, _ledgers(name, place))
+            if name != "no disk":
+                _check(place)
+    figures: dict[str, Any] = {"machine": platform.platform(), "slow_flush_s": _SLOW_S}
+    for name, each in durations.items():
+        times = Times.of(each)
+        figures[name] = {**asdict(times), "steps": len(each)}
+        print(
+            f"{name:<10} median {times.median_us} us, p99 {times.p99_us} us, max {times.max_us} us, {len(each)} steps"
+        )
+    if arguments.json is not None:
+        arguments.json.write_text(one_row_a_line(figures), encoding="utf-8")
+    return 0
+
+
+def _ledgers(name: str, place: Path) -> Callable[[], LedgerWriter | NoDisk]:
+    kinds: dict[str, Callable[[], LedgerWriter | NoDisk]] = {
+        "no disk": NoDisk,
+        "disk": lambda: LedgerWriter(lambda: Ledger(place)),
+        "slow disk": lambda: LedgerWriter(lambda: SlowDisk(place)),
+    }
+    return kinds[name]
+
+
+def _check(place: Path) -> None:
+    verdict = verify(place)
+    if verdict.problem or not verdict.rows:
+        raise SystemExit(f"bench ledger: the ledger is not whole: {verdict.problem or 'it is empty'}")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
