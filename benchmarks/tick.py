@@ -113,6 +113,7 @@ def _line(peer: dict[str, Any]) -> str:
 
 
 def working(method: Method | None = None) -> KinematicRobot:
+    """A robot without mass that has begun to work on accepted points."""
     config = ControllerConfig()
     robot = KinematicRobot(Controller(config, RobotConfig(), method=method), config.home)
     robot.step()

@@ -80,6 +80,10 @@ with Transport(TransportConfig(connect=(sys.argv[2],)), "controller", "rp1") as 
 """
 
 
+#: Kills of one ledger, and places to cut: more than can be accepted between so many kills.
+ROUND, PLACES = 25, 500
+
+
 def points(count):
     made = tuple(
         m.PruningPoint(
@@ -98,15 +102,18 @@ class Operator:
         self.wire = Transport(TransportConfig(connect=(endpoint,)), "server", "rp1")
         self.show = self.wire.publisher(POINTS)
         self.state = self.wire.slot(CONTROLLER)
-        self.accepted, self.done, self.next, self.all = set(), set(), 0, points(900)
+        self.accepted, self.done, self.next, self.all, self.shown_at = set(), set(), 0, points(PLACES), 0.0
 
     def work(self, until):
         while time.monotonic() < until:
-            self.show.put(self.all)
+            if time.monotonic() - self.shown_at > 0.1:
+                self.shown_at = time.monotonic()
+                self.show.put(self.all)
             name = f"p{self.next}"
             try:
                 answer = self.wire.call(INTENT, intents.AcceptPoint(user="ada", point_id=name, revision=1))
             except ServiceError:
+                time.sleep(0.05)
                 continue
             if answer.ok:
                 self.accepted.add(name)
@@ -133,25 +140,35 @@ def test_no_acknowledged_decision_is_lost(tmp_path, kills):
         probe.bind(("127.0.0.1", 0))
         endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
     router = Router(TransportConfig(mode="router", connect=(), listen=(endpoint,)))
-    operator, chance = Operator(endpoint), random.Random(3)
+    chance = random.Random(3)
     try:
-        for kill in range(kills):
-            child = subprocess.Popen(
-                [sys.executable, "-c", CHILD, str(tmp_path), endpoint, f"run{kill}"], env=child_environment()
-            )
+        for begin in range(0, kills, ROUND):
+            folder = tmp_path / str(begin)
+            folder.mkdir()
+            operator = Operator(endpoint)
             try:
-                before = len(operator.accepted)
-                while len(operator.accepted) == before:
-                    operator.work(time.monotonic() + 0.02)
-                    assert child.poll() is None
-                operator.work(time.monotonic() + chance.uniform(0.0, 0.1))
+                for kill in range(begin, min(kills, begin + ROUND)):
+                    killed(folder, endpoint, operator, chance)
+                    assert verify(folder).problem == ""
+                    assert lost(folder, operator) == set(), f"after kill {kill + 1}"
+                assert operator.done
             finally:
-                child.kill()
-                child.wait()
-            operator.look()
-            assert verify(tmp_path).problem == ""
-            assert lost(tmp_path, operator) == set(), f"after kill {kill + 1}"
-        assert len(operator.accepted) >= kills and operator.done
+                operator.wire.close()
     finally:
-        operator.wire.close()
         router.close()
+
+
+def killed(folder, endpoint, operator, chance):
+    """One life of the controller: it comes up, does some work, and is killed in the middle of more."""
+    child = subprocess.Popen([sys.executable, "-c", CHILD, str(folder), endpoint, f"run{chance.random()}"],
+                             env=child_environment())  # fmt: skip
+    try:
+        before = len(operator.accepted)
+        while len(operator.accepted) == before:
+            operator.work(time.monotonic() + 0.02)
+            assert child.poll() is None and operator.next < PLACES
+        operator.work(time.monotonic() + chance.uniform(0.0, 0.1))
+    finally:
+        child.kill()
+        child.wait()
+    operator.look()
