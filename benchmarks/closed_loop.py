@@ -29,12 +29,15 @@ from rolling_panda import intents
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig, load_section
 from rolling_panda.differential_drive import Array
+from rolling_panda.look_messages import CloseLook
 from rolling_panda.resources import resource
 from rolling_panda.robot_model import RobotModel
 from rolling_panda.row_messages import Obstacles
 
 # A frame takes perception about this long, so its points come later by as much.
 _PERCEPTION_S = 0.15
+# A closer look is at a part of a frame, and comes before the rest of it.
+_LOOK_S = 0.08
 # A plan of some points takes about this long.
 _PLANNING_S = 1.0
 
@@ -50,6 +53,7 @@ class ClosedLoop:
         method: str | None = None,
         watch: Callable[["ClosedLoop", Tracking], None] | None = None,
         plans: bool = True,
+        looks: bool = True,
     ) -> None:
         """Grow the row and stand the robot beside it.
 
@@ -59,6 +63,7 @@ class ClosedLoop:
             config_path: TOML configuration; None takes the simulation's.
             method: Whole-body method; None takes the configured one.
             plans: False leaves the session's plan away.
+            looks: False cuts without a closer look before, and takes the cutter's word afterwards.
             watch: Called after each control period in which the tool follows a trajectory.
         """
         path = config_path or resource("assets/config/sim.toml")
@@ -67,6 +72,8 @@ class ClosedLoop:
         config = load_section(path, "controller", ControllerConfig)
         if method is not None:
             config = msgspec.structs.replace(config, method=method)
+        if not looks:
+            config = msgspec.structs.replace(config, confirm=False, verify=False)
         self.controller = Controller(config, robot)
         self._drive = RobotModel(robot).drive
         self._control_ticks = max(1, round(1.0 / (config.rate_hz * TICK_S)))
@@ -81,6 +88,7 @@ class ClosedLoop:
         self.state: m.ControllerState | None = None
         self.events: list[m.LogEvent] = []
         self._ticks = 0
+        self._looked: tuple[float, CloseLook] | None = None
         self._seen: tuple[float, m.PruningPoints] | None = None
 
     def tick(self) -> None:
@@ -158,6 +166,10 @@ class ClosedLoop:
             self.inputs = replace(self.inputs, odometry=Sample(outputs.odometry, self.now))
         if outputs.state is not None:
             self.inputs = replace(self.inputs, bridge=Sample(outputs.state, self.now))
+        if outputs.frame is not None and outputs.frame.point_id:
+            self._looked = self.now + _LOOK_S, self.perception.look_closely(outputs.frame)
+        if self._looked is not None and self.now >= self._looked[0]:
+            self.inputs, self._looked = replace(self.inputs, look=Sample(self._looked[1], self.now)), None
         if outputs.frame is not None:
             self._seen = self.now + _PERCEPTION_S, self.perception.process(outputs.frame)
         if self._seen is not None and self.now >= self._seen[0]:
@@ -172,6 +184,8 @@ class ClosedLoop:
             self.bridge.on_motion(outputs.motion, self.now)
         if outputs.cut is not None:
             self.bridge.on_cut(outputs.cut, self.now)
+        if outputs.picture is not None:
+            self.bridge.on_picture(outputs.picture)
         if outputs.release is not None:
             self.bridge.on_release(outputs.release, self.now)
         if outputs.state is not None:

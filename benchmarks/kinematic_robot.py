@@ -11,6 +11,7 @@ from controller.journal import LedgerState
 from rolling_panda import intents
 from rolling_panda import messages as m
 from rolling_panda.differential_drive import NXI, Array
+from rolling_panda.look_messages import CloseLook, PictureRequest
 from rolling_panda.robot_model import ARM_Q, RobotModel
 from rolling_panda.row_messages import Capsule, Obstacles
 from rolling_panda.teleop_messages import TeleopTarget
@@ -70,6 +71,7 @@ class KinematicRobot:
         self._points: Sample[m.PruningPoints] | None = None
         self._told: Sample[Obstacles] | None = None
         self._stops: tuple[m.StopRequest, ...] = ()
+        self._look: Sample[CloseLook] | None = None
         self._joints: Sample[m.JointState] | None = None
         self._odometry: Sample[m.Odometry] | None = None
 
@@ -103,6 +105,7 @@ class KinematicRobot:
             present=present,
             stops=stops,
             ledger=self.ledger,
+            look=self._look,
         )
 
     def _renewed(self, teleop: TeleopTarget) -> TeleopTarget:
@@ -125,6 +128,8 @@ class KinematicRobot:
         if out.motion is not None:
             command = np.array(out.motion.xi)
             self._epoch = out.motion.epoch
+        if out.picture is not None:
+            self._look = self._looked(out.picture)
         if out.cut is not None and out.cut.cut_id != self._cut_id:
             self._cut_id, self._cut_at = out.cut.cut_id, self.now
             self.cuts.append((out.cut.point_id, self.model.kinematics(self.q).T_odom_tool.homogeneous.copy()))
@@ -148,6 +153,21 @@ class KinematicRobot:
         """Let time pass."""
         for _ in range(round(seconds / self.dt)):
             self.step()
+
+    def _looked(self, request: PictureRequest) -> Sample[CloseLook]:
+        """A camera that always sees the point: where it was shown, and off once its cut is done."""
+        shown = () if self._points is None else self._points.message.points
+        point = next((each for each in shown if each.point_id == request.point_id), None)
+        off = self.outcome == "DONE" and any(cut[0] == request.point_id for cut in self.cuts)
+        look = CloseLook(
+            header=m.Header(self.now, "odom"),
+            point_id=request.point_id,
+            number=request.number,
+            finding="severed" if off else "unseen" if point is None else "seen",
+            position=None if off or point is None else point.position,
+            tangent=None if off or point is None else point.tangent,
+        )
+        return Sample(look, self.now)
 
     def _measure(self) -> None:
         header = m.Header(self.now, "odom")

@@ -1,6 +1,7 @@
 """One cut from the first command to its outcome, whatever the mode is meanwhile."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from controller.config import ControllerConfig
@@ -14,6 +15,9 @@ _OUTCOMES: dict[str, str] = {
     "FAILED_NOT_CUT": "the cutter reports that nothing was cut",
     "UNKNOWN": "the cutter does not know whether it cut",
 }
+
+
+Ended = Callable[[str, m.Outcome, str, float], None]
 
 
 @dataclass
@@ -30,8 +34,16 @@ class _Cut:
 class Blades:
     """Asks for cuts, one at a time, and hands what became of each to the queue."""
 
-    def __init__(self, config: ControllerConfig, queue: PointQueue, run_id: str) -> None:
-        """Bind the parts. `run_id` makes the cut ids of this start unlike those of any other."""
+    def __init__(self, config: ControllerConfig, queue: PointQueue, run_id: str, ended: Ended | None = None) -> None:
+        """Bind the parts.
+
+        Args:
+            config: Of the controller.
+            queue: Holds the intents, and takes what became of them.
+            run_id: Makes the cut ids of this start unlike those of any other.
+            ended: Is told the cutter's word in place of the queue: point, outcome, words, now.
+        """
+        self._ended = ended
         self._timeout_s, self._queue, self._run_id = config.cut_timeout_s, queue, run_id
         self._cuts = 0
         self._cut: _Cut | None = None
@@ -63,7 +75,10 @@ class Blades:
         if bridge.cut_id == cut.cut_id and bridge.outcome:
             self._cut = None
             text = _OUTCOMES[bridge.outcome]
-            self._queue.resolve(cut.point_id, bridge.outcome, text)
+            if self._ended is not None:
+                self._ended(cut.point_id, bridge.outcome, text, now)
+            else:
+                self._queue.resolve(cut.point_id, bridge.outcome, text)
             return (f"{cut.point_id}: {text}",)
         if now > cut.deadline and cut.asked_at == -math.inf:
             self._cut = None

@@ -50,6 +50,12 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         reach_timeout_s: A motion that has not ended this long after its planned end has failed (s).
         cut_timeout_s: A cut without outcome for this long is UNKNOWN (s).
         largest_radius: Canes thicker than this are refused (m).
+        confirm: Whether each point is looked at from near before it is cut.
+        verify: Whether each cut is looked at afterwards; else the cutter's word is taken for it.
+        look_within: The look before a cut is taken this near to the place clear of the canes (m).
+        look_speed: The tool is slower than this meanwhile (m/s).
+        look_from: The look afterwards is taken when the tool is this far from the cut (m).
+        look_timeout_s: A look without a picture ends after this time (s).
         moved_tolerance: A point that moved further than this after acceptance is not cut (m).
         base_lag_s: Time constant with which the wheels follow their command (s).
         arm_lag_s: By which the arm's servos follow late (s); half a period comes on top.
@@ -113,6 +119,12 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
     reach_timeout_s: Positive = 6.0
     cut_timeout_s: Positive = 3.0
     largest_radius: Positive = 0.0075
+    confirm: bool = True
+    verify: bool = True
+    look_within: Positive = 0.08
+    look_speed: Positive = 0.25
+    look_from: Positive = 0.15
+    look_timeout_s: Positive = 8.0
     moved_tolerance: Positive = 0.005
     gain_position: Gain = 5.0
     gain_rotation: Gain = 5.0

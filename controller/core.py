@@ -36,6 +36,7 @@ from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
 from rolling_panda.differential_drive import NXI, Array
 from rolling_panda.errors import ControlError
+from rolling_panda.look_messages import PictureRequest
 from rolling_panda.robot_model import RobotModel
 
 _STATE_S = 0.05
@@ -140,7 +141,7 @@ class Controller:
             request = self._review(now)
             plan, state = self._session.message(now), self._report(now)
         events, self._events = tuple(self._events), []
-        return Outputs(motion, cut, release, state, events, plan, request, self._journal.take())
+        return Outputs(motion, cut, release, state, events, plan, request, self._journal.take(), self._picture(now))
 
     def answer(self, intent: intents.Intent, now: float) -> m.Answer:
         """Do what an operator asks, or say why not.
@@ -160,8 +161,7 @@ class Controller:
         if refused:
             self._say("warning", f"{intent.user}: {what} refused: {refused}")
             return m.Answer(ok=False, reason=refused[:500])
-        told = self._operator.told(intent)
-        if told:
+        if told := self._operator.told(intent):
             self._say("info", f"{intent.user}: {told}")
         return m.Answer(ok=True)
 
@@ -188,7 +188,7 @@ class Controller:
         self._surroundings.work_at(self._sequence.places)
         self._clearance.take(inputs.obstacles)
         if bridge is not None:
-            for text in self._sequence.watch(bridge, now):
+            for text in self._sequence.watch(bridge, None if inputs.look is None else inputs.look.message, now):
                 self._say("info", text)
         if inputs.points is not None and inputs.points is not self._points_seen:
             self._points_seen = inputs.points
@@ -303,6 +303,10 @@ class Controller:
             self._state = replace(self._state, reason="the arm is home")
             self._say("info", "the arm is home")
         return xi
+
+    def _picture(self, now: float) -> PictureRequest | None:
+        due = self._sequence.picture(now) if self._epoch is not None else None
+        return None if due is None else PictureRequest(epoch=self._epoch or 0, number=due[0], point_id=due[1])
 
     def _checked(self, xi: Array) -> Array:
         """The last gate: what is not finite or outside the limits is not sent; the robot brakes instead."""

@@ -6,74 +6,36 @@ cut flows into the way to the next.
 """
 
 import math
-from dataclasses import dataclass
-from enum import Enum
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from controller.blades import Blades
 from controller.config import ControllerConfig
+from controller.confirmation import not_as_accepted
 from controller.cut_pose import escape_pose
+from controller.eye import Eye
 from controller.motion import Follower, Measured, Tracking
 from controller.next_cut import Known, NextCut
 from controller.queue import PointQueue
 from controller.reach import CutPlan, PostureSearch, Unreachable
+from controller.stages import PHASES, Stage, Work
 from controller.tool_motion import Leg, ToolMotion
+from controller.verification import Verification
+from controller.ways import Ways, at_base
 from controller.whole_body.saturation import Saturation
 from rolling_panda import messages as m
 from rolling_panda.differential_drive import Array
-from rolling_panda.robot_model import ARM_Q
+from rolling_panda.look_messages import CloseLook
 
 #: A point that perception has refined by less than this is aimed at as it was (m).
 _REFINED = 0.0003
+#: A look that does not show its point is taken once more.
+_PICTURES = 2
+#: From farther away the base has to come first, before the canes are entered (m).
+_BASE_NEAR = 0.1
 #: Between motions without an end to hold: near enough to go on (m).
 _NEAR = 0.02
-
-
-class Stage(Enum):
-    """Step of the sequence."""
-
-    REST = "rest"
-    ESCAPE = "getting clear of the canes"
-    SEARCH = "looking for a posture"
-    TRAVEL = "on the way to the stand-off"
-    ADVANCE = "straight in"
-    CUT = "cutting"
-    RETREAT = "straight back"
-
-
-_PHASES: dict[Stage, m.Phase] = {
-    Stage.REST: "",
-    Stage.ESCAPE: "RETREAT",
-    Stage.SEARCH: "APPROACH",
-    Stage.TRAVEL: "APPROACH",
-    Stage.ADVANCE: "ADVANCE",
-    Stage.CUT: "CUT",
-    Stage.RETREAT: "RETREAT",
-}
-
-
-@dataclass(frozen=True)
-class Work:
-    """What one period of work gave.
-
-    Attributes:
-        xi: ξ̇ to send (9).
-        tracking: Of the motion, None while standing.
-        cut: The cut to command now: (cut_id, point_id) as a message without its epoch, else None.
-        finished: True when no accepted point is left.
-        pause: Why work must pause, empty when it goes on.
-        events: What happened, in words.
-    """
-
-    xi: Array
-    tracking: Tracking | None = None
-    cut: tuple[str, str] | None = None
-    finished: bool = False
-    pause: str = ""
-    events: tuple[str, ...] = ()
 
 
 class CutSequence:
@@ -94,7 +56,8 @@ class CutSequence:
         `run_id` makes the cut ids of this start unlike those of any other; `known` is what a plan says of a point.
         """
         self._config, self._follower = config, follower
-        self._saturation, self._queue, self._blades = saturation, queue, Blades(config, queue, run_id)
+        self._saturation, self._queue = saturation, queue
+        self._blades = Blades(config, queue, run_id, self._ended)
         heading = config.row_heading
         self._left = np.array([-np.sin(heading), np.cos(heading), 0.0])
         self._events: list[str] = []
@@ -102,13 +65,22 @@ class CutSequence:
         self._plan: CutPlan | None = None
         self._accepted: m.PruningPoint | None = None
         self._places: tuple[Array, ...] = ()
+        self._ways = Ways(config, follower.flows)
+        self._eye = Eye(config.look_timeout_s, _PICTURES)
+        self._verification = Verification(queue, self._eye, config.verify)
         self._coming = NextCut(search, queue, config.search_steps_each, known)
+        self._started: float | None = None
+        #: Where the blades closed last (m, odom), and on which point.
+        self._cut_at: Array = np.zeros(3)
+        self._cut_point = ""
+        #: Where perception had the point when it was looked at closely, which shows it better.
+        self._looked_at: m.Vector3 | None = None
         self._forget()
 
     @property
     def phase(self) -> m.Phase:
         """Phase on the wire."""
-        return _PHASES[self._stage]
+        return PHASES[self._stage]
 
     @property
     def active(self) -> str:
@@ -127,7 +99,7 @@ class CutSequence:
 
     def clear_of_canes(self, q: Array) -> Array:
         """Configuration (12) that the work under way will be in before it goes on, from q (12): q outside the canes."""
-        return _at_base(self._plan.q_clear, q) if self.in_canes and self._plan is not None else q
+        return at_base(self._plan.q_clear, q) if self.in_canes and self._plan is not None else q
 
     @property
     def cutting(self) -> bool:
@@ -145,9 +117,15 @@ class CutSequence:
         """Leave the work; a cut under way is still watched, an accepted point stays accepted."""
         self._forget()
 
-    def watch(self, bridge: m.BridgeState, now: float) -> tuple[str, ...]:
-        """Take in how a cut ended, in every mode; returns what happened, in words."""
-        return self._blades.watch(bridge, now)
+    def watch(self, bridge: m.BridgeState, look: CloseLook | None, now: float) -> tuple[str, ...]:
+        """Take in how a cut ended and what the newest look showed, in every mode; returns what happened, in words."""
+        if look is not None:
+            self._eye.take(look, now)
+        return *self._blades.watch(bridge, now), *self._verification.step(now)
+
+    def picture(self, now: float) -> tuple[int, str] | None:
+        """Number and point of the picture to ask for in this period; None when none is due."""
+        return self._eye.due(now)
 
     def step(self, robot: Measured, now: float) -> Work:
         """One period of work.
@@ -157,17 +135,22 @@ class CutSequence:
             now: Monotonic time (s).
         """
         self._events = []
-        if self._stage in (Stage.SEARCH, Stage.TRAVEL, Stage.ADVANCE):
+        if self._stage in (Stage.SEARCH, Stage.TRAVEL, Stage.LOOK, Stage.ADVANCE):
             self._check_acceptance(robot)
-        if self._stage in (Stage.TRAVEL, Stage.ADVANCE):
+        if self._stage is Stage.ADVANCE or (self._stage is Stage.TRAVEL and not self._config.confirm):
             self._refine()
+        if self._stage in (Stage.RETREAT, Stage.TRAVEL):
+            away = robot.kinematics.T_odom_tool.translation - self._cut_at
+            if float(np.linalg.norm(away)) > self._config.look_from:
+                # On the way out, without a stop: a picture of the moment is enough to see that wood is gone.
+                self._verification.look(self._cut_point, now)
         work = _STEPS[self._stage](self, robot, now)
         onwards = self._coming.found if self._stage is Stage.RETREAT else None
         plans = [plan for plan in (self._plan, onwards) if isinstance(plan, CutPlan)]
         if plans:
             # While the tool is got clear of the canes there is no plan, and it is still where the last one led.
             self._places = tuple(plan.poses.cut.translation for plan in plans)
-        return work if not self._events else _with(work, tuple(self._events))
+        return work if not self._events else work.saying(tuple(self._events))
 
     # --- stages ------------------------------------------------------------------------------------------------------
 
@@ -190,7 +173,8 @@ class CutSequence:
         """Choose the next point and look for a posture; stand still while looking."""
         self._forget()
         if not self._coming.look(robot.q):
-            return Work(self._saturation.ramp(robot.sent), finished=True)
+            # The last cut may still have to be made once more.
+            return Work(self._saturation.ramp(robot.sent), finished=not self._verification.pending)
         self._point_id, self._accepted, self._stage = self._coming.point_id, self._coming.accepted, Stage.SEARCH
         return Work(self._saturation.ramp(robot.sent))
 
@@ -203,16 +187,42 @@ class CutSequence:
             return Work(xi)
         self._plan = coming.found
         self._stage = Stage.TRAVEL
-        self._go(robot, *self._way_to(self._plan, robot.kinematics.T_odom_tool, robot.q), slow_end=True)
+        self._go(robot, *self._way_to(self._plan, robot.kinematics.T_odom_tool, robot.q), to_cut=True)
         return Work(xi)
 
     def _travel(self, robot: Measured, now: float) -> Work:
         tracking = self._track(robot)
         assert self._motion is not None
-        if self._motion.leg == self._motion.legs - 1:
+        last = self._motion.leg == self._motion.legs - 1
+        if last and not self._config.confirm:
             self._stage = Stage.ADVANCE
-        elif self._late(now):
+        elif last and self._slow_near(robot):
+            self._eye.ask(self._point_id, now)
+            self._started, self._stage = None, Stage.LOOK
+        elif self._config.confirm and not self._over(tracking, now, 0.0) and self._late(now):
             return self._fail(robot, self._missed("the stand-off", tracking))
+        return Work(tracking.xi, tracking)
+
+    def _look(self, robot: Measured, now: float) -> Work:
+        """A closer look on the way, before the canes are entered; what it shows is cut, or not."""
+        tracking, look = self._track(robot), self._eye.answer(self._point_id, now)
+        if look is None:
+            return Work(tracking.xi, tracking)
+        self._eye.forget(self._point_id)
+        ticket = self._queue.get(self._point_id)
+        assert self._motion is not None and self._plan is not None
+        why = not_as_accepted(look, ticket, self._config.moved_tolerance)
+        if why:
+            self._queue.void(self._point_id, why)
+            # The next period leaves it.
+            return Work(tracking.xi, tracking)
+        assert ticket is not None
+        self._looked_at = ticket.point.position
+        self._motion.extend(self._ways.into(self._plan))
+        moved = np.array(look.position) - self._motion.goal.translation
+        if float(np.linalg.norm(moved)) > _REFINED:
+            self._motion.shift(moved)
+        self._started, self._stage = None, Stage.ADVANCE
         return Work(tracking.xi, tracking)
 
     def _advance(self, robot: Measured, now: float) -> Work:
@@ -258,7 +268,7 @@ class CutSequence:
         return self._next(robot)
 
     def _rest(self, robot: Measured, now: float) -> Work:
-        return Work(self._saturation.ramp(robot.sent), finished=True)
+        return self._next(robot)
 
     # --- parts -------------------------------------------------------------------------------------------------------
 
@@ -266,8 +276,9 @@ class CutSequence:
         self._stage = Stage.REST
         self._point_id = ""
         self._accepted = None
+        self._looked_at = None
         self._motion = self._plan = None
-        self._started: float | None = None
+        self._started = None
 
     def _check_acceptance(self, robot: Measured) -> None:
         ticket = self._queue.get(self._point_id)
@@ -288,7 +299,7 @@ class CutSequence:
     def _refine(self) -> None:
         """Lead the motion to where perception now sees the point, which is still where it was accepted, but better."""
         ticket = self._queue.get(self._point_id)
-        if ticket is None or self._motion is None or self._plan is None:
+        if ticket is None or self._motion is None or ticket.point.position == self._looked_at:
             return
         moved = np.array(ticket.point.position) - self._motion.goal.translation
         if float(np.linalg.norm(moved)) > _REFINED:
@@ -297,31 +308,32 @@ class CutSequence:
     def _retreat_from(self, robot: Measured) -> None:
         assert self._plan is not None
         self._stage = Stage.RETREAT
-        arm_only = self._config.arm_only if self._follower.flows else math.inf
-        clear, q_clear = self._plan.poses.clear, _at_base(self._plan.q_clear, robot.q)
-        back = Leg(clear, q_clear, self._config.tool_speed, frozen_until=arm_only)
+        self._cut_at, self._cut_point = robot.kinematics.T_odom_tool.translation.copy(), self._point_id
+        back = self._ways.out(self._plan, robot.q)
         ticket, plan = self._queue.get(self._point_id), self._coming.found
         unsure = ticket is not None and ticket.state == "UNKNOWN"
         stands = isinstance(plan, CutPlan) and self._coming.stands and not unsure
-        onwards = self._way_to(plan, clear, q_clear) if stands and isinstance(plan, CutPlan) else ()
+        onwards = self._way_to(plan, back.goal, back.q_goal) if stands and isinstance(plan, CutPlan) else ()
         if not onwards:
             self._coming.forget()
-        self._go(robot, back, *onwards, slow_end=bool(onwards))
+        self._go(robot, back, *onwards, to_cut=bool(onwards))
 
     def _way_to(self, plan: CutPlan, T_odom_tool: Any, q: Array) -> tuple[Leg, ...]:
-        """From a pose of the tool (pin.SE3) at q (12): clear of the canes to before the next cut, then straight in."""
-        config, poses = self._config, plan.poses
-        if self._follower.flows:
-            clear = Leg(poses.clear, plan.q_clear, config.tool_speed)
-            return clear, Leg(poses.cut, plan.q_cut, config.advance_speed, config.arm_only)
-        # The base takes the arm along as it is; then the arm alone does the rest.
-        q_there = _at_base(q, plan.q_clear)
-        carried = _base_pose(q_there) * _base_pose(q).inverse() * T_odom_tool
-        return (
-            Leg(carried, q_there, config.tool_speed),
-            Leg(poses.clear, plan.q_clear, config.tool_speed, math.inf),
-            Leg(poses.cut, plan.q_cut, config.advance_speed, math.inf),
-        )
+        """From a pose of the tool (pin.SE3) at q (12) to a cut; where a look comes first, to where it is taken."""
+        there = self._ways.there(plan, T_odom_tool, q)
+        return there if self._config.confirm else (*there, self._ways.into(plan))
+
+    def _slow_near(self, robot: Measured) -> bool:
+        """Whether the camera has the point in view from near, and hardly moves."""
+        assert self._motion is not None
+        away = robot.kinematics.T_odom_tool.translation - self._motion.goal.translation
+        speed = float(np.linalg.norm(robot.kinematics.J_xi[:3] @ robot.sent))
+        base = float(np.linalg.norm(robot.q[:2] - self._motion.q_goal[:2]))
+        near = float(np.linalg.norm(away)) < self._config.look_within and base < _BASE_NEAR
+        return near and speed < self._config.look_speed
+
+    def _ended(self, point_id: str, outcome: m.Outcome, word: str, now: float) -> None:
+        self._verification.begin(point_id, outcome, word, now)
 
     def _fail(self, robot: Measured, reason: str) -> Work:
         self._queue.resolve(self._point_id, "FAILED_NOT_CUT", reason)
@@ -330,11 +342,17 @@ class CutSequence:
         self._stage = Stage.ESCAPE
         return Work(self._saturation.ramp(robot.sent))
 
-    def _go(self, robot: Measured, *legs: Leg, slow_end: bool = False) -> None:
+    def _go(self, robot: Measured, *legs: Leg, to_cut: bool = False) -> None:
         # From where the tool is, not from where it should be: a motion begins at rest.
-        flows = self._follower.flows
+        looks = self._config.confirm
         self._motion = ToolMotion(
-            self._config, robot.kinematics.T_odom_tool, robot.q, legs, slow_end=slow_end, flows=flows
+            self._config,
+            robot.kinematics.T_odom_tool,
+            robot.q,
+            legs,
+            slow_end=to_cut and not looks,
+            flows=self._follower.flows,
+            waits=to_cut and looks,
         )
         self._started = None
 
@@ -366,22 +384,8 @@ _STEPS = {
     Stage.ESCAPE: CutSequence._escape,
     Stage.SEARCH: CutSequence._find,
     Stage.TRAVEL: CutSequence._travel,
+    Stage.LOOK: CutSequence._look,
     Stage.ADVANCE: CutSequence._advance,
     Stage.CUT: CutSequence._cutting,
     Stage.RETREAT: CutSequence._retreat,
 }
-
-
-def _at_base(q_arm: Array, q_base: Array) -> Array:
-    """The arm posture of one configuration (12) with the base of another."""
-    out = q_base.copy()
-    out[ARM_Q] = q_arm[ARM_Q]
-    return out
-
-
-def _base_pose(q: Array) -> Any:
-    return pin.SE3(pin.exp3(np.array([0.0, 0.0, q[2]])), np.array([q[0], q[1], 0.0]))
-
-
-def _with(work: Work, events: tuple[str, ...]) -> Work:
-    return Work(work.xi, work.tracking, work.cut, work.finished, work.pause, work.events + events)

@@ -6,6 +6,7 @@ from typing import Generic, TypeVar
 from controller.journal import LedgerState, Record
 from controller.work_plan import PlanRequest, WorkPlan
 from rolling_panda import messages as m
+from rolling_panda.look_messages import CloseLook, PictureRequest
 from rolling_panda.plan_messages import SessionPlan
 from rolling_panda.row_messages import Obstacles
 from rolling_panda.teleop_messages import TeleopTarget
@@ -38,6 +39,7 @@ class Inputs:
         stops: Stop requests that came in since the last step.
         plan: Newest answer of the planner.
         ledger: How much of what was recorded is durable.
+        look: What the newest picture that was asked for shows.
         tick_s: Median time of one control step, measured by the loop (s).
         ticks: Control periods, counted by the loop.
         late_ticks: Those of them that lasted more than half as long again as they should.
@@ -55,6 +57,7 @@ class Inputs:
     stops: tuple[m.StopRequest, ...] = ()
     plan: WorkPlan | None = None
     ledger: LedgerState = LedgerState()
+    look: Sample[CloseLook] | None = None
     tick_s: float = 0.0
     ticks: int = 0
     late_ticks: int = 0
@@ -75,3 +78,4 @@ class Outputs:
     plan: SessionPlan | None = None
     request: PlanRequest | None = None
     records: tuple[Record, ...] = ()
+    picture: PictureRequest | None = None

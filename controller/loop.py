@@ -24,9 +24,11 @@ from rolling_panda.topics import (
     HEARTBEAT,
     INTENT,
     JOINTS,
+    LOOK,
     MOTION,
     OBSTACLES,
     ODOMETRY,
+    PICTURE,
     PLAN,
     POINTS,
     RELEASE,
@@ -94,6 +96,7 @@ class Loop:
         transport.on_reject = lambda topic, reason: self._said.put(f"refused on {topic}: {reason}")
         transport.serve(INTENT, self._desk.ask)
         self._lines = transport.feed(EVENT, 1000)
+        self._look, self._picture = self._newest(LOOK), transport.publisher(PICTURE)
         self._motion, self._cut = transport.publisher(MOTION), transport.publisher(CUT)
         self._state, self._event = transport.publisher(CONTROLLER), transport.publisher(EVENT)
         self._plan = transport.publisher(PLAN)
@@ -117,6 +120,7 @@ class Loop:
             stops=tuple(stop.message for stop in self._stops.drain()),
             plan=None if self._planner is None else self._planner.newest,
             ledger=self._ledger.state,
+            look=self._look.sample(),
             tick_s=self._tick_s,
             ticks=self._count,
             late_ticks=self._late,
@@ -129,6 +133,8 @@ class Loop:
             self._motion.put(outputs.motion)
         if outputs.cut is not None:
             self._cut.put(outputs.cut)
+        if outputs.picture is not None:
+            self._picture.put(outputs.picture)
         if outputs.release is not None:
             threading.Thread(target=self._release, args=(outputs.release,), daemon=True).start()
         if outputs.state is not None:

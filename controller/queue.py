@@ -208,6 +208,14 @@ class PointQueue:
         """End of a point's work: DONE, FAILED_NOT_CUT or UNKNOWN."""
         self._put(point_id, replace(self._tickets[point_id], state=state, reason=reason))
 
+    def again(self, point_id: str, reason: str) -> None:
+        """INTENT → ACCEPTED: it stands after a cut, and is cut once more as it was accepted."""
+        self._put(point_id, replace(self._tickets[point_id], state="ACCEPTED", reason=reason))
+
+    def void(self, point_id: str, why: str) -> None:
+        """ACCEPTED → PROPOSED: it is not what was accepted."""
+        self._put(point_id, self._void(self._tickets[point_id], why, []))
+
     def restore(self, rows: Iterable[TicketRow]) -> None:
         """Take up what was recorded before a restart; nothing is worked on before perception has seen it again."""
         for row in rows:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -84,6 +84,7 @@ class ToolMotion:
         slow_end: bool = False,
         free_axis: bool = False,
         flows: bool = True,
+        waits: bool = False,
     ) -> None:
         """Plan.
 
@@ -95,8 +96,10 @@ class ToolMotion:
             slow_end: True for the way to the cut: the last `slow_zone` is at `cut_speed`.
             free_axis: True where the rotation about the tool's y does not matter.
             flows: False makes every leg end at rest before the next one begins.
+            waits: True where it may have to wait at its end until it is extended: the base may still move there.
         """
         self._config, self._slow_end, self.free_axis = config, slow_end, free_axis
+        self._flows, self._waits_until = flows, math.inf if waits and flows else 0.0
         self._start, self._q_start, self._legs = start, q_start, _timed(config, start, q_start, legs, flows)
         self.goal, self.q_goal, self.speed = legs[-1].goal, legs[-1].q_goal, max(leg.speed for leg in legs)
         self._goal_place = self.goal.translation.tolist()
@@ -120,7 +123,28 @@ class ToolMotion:
     @property
     def base(self) -> BaseMode:
         """What the base is for now."""
-        return "row" if self._free is not None and self._free[0] <= self.time < self._free[1] else "frozen"
+        if self._free is None:
+            return "frozen"
+        return "row" if self._free[0] <= self.time < max(self._free[1], self._waits_until) else "frozen"
+
+    def extend(self, leg: Leg) -> None:
+        """Go on with one more leg, to a cut, with the base where it ends now; it flows into what is left of the last.
+
+        Args:
+            leg: Its end is the goal from now on, and the last `slow_zone` is slow.
+        """
+        config, last = self._config, self._legs[-1]
+        made = _placed(config, last.leg.goal, last.leg.q_goal, [leg], self._flows, None, 0.0)[0]
+        begin = last.end
+        if self._flows:
+            begin -= config.blend * min(last.trajectory.duration, made.trajectory.duration)
+        made = replace(made, begin=max(begin, self.time))
+        self._legs = (*self._legs, made)
+        free = made.free(math.inf)
+        self._waits_until = 0.0 if free is None else free[1]
+        self.goal, self.q_goal, self.speed = leg.goal, leg.q_goal, max(self.speed, leg.speed)
+        self._goal_place, self._slow_end = leg.goal.translation.tolist(), True
+        self.legs, self.duration = len(self._legs), max(self.duration, made.end)
 
     def shift(self, by: Array) -> None:
         """Move the goal by (3, m, odom) from now on, without a jump of velocity or acceleration."""

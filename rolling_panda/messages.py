@@ -36,7 +36,7 @@ Process = Literal["bridge", "controller", "perception", "server"]
 PROCESSES: tuple[Process, ...] = ("bridge", "controller", "perception", "server")
 
 Mode = Literal["IDLE", "READY", "TELEOP", "AUTO", "PAUSED", "PROTECTIVE_STOP", "FAULT", "ESTOP_LATCHED"]
-Phase = Literal["", "APPROACH", "ADVANCE", "CUT", "RETREAT"]
+Phase = Literal["", "APPROACH", "LOOK", "ADVANCE", "CUT", "RETREAT"]
 PointState = Literal["PROPOSED", "ACCEPTED", "INTENT", "DONE", "FAILED_NOT_CUT", "UNKNOWN", "REJECTED"]
 Severity = Literal["info", "warning", "error"]
 Outcome = Literal["", "DONE", "FAILED_NOT_CUT", "UNKNOWN"]
@@ -312,8 +312,7 @@ class PruningPoint(Struct, frozen=True, forbid_unknown_fields=True):
         vine: Number of the vine along the row, as perceived.
         spur: Number of the spur position on that vine, as perceived.
         reason: Why here, in one sentence a grower understands.
-        kind: Shortens the cane that stays, takes the old stub with its other canes off, tips the cane that will fruit
-            (Guyot), or is where a person wants it.
+        kind: Shortens the cane that stays, takes the old stub off, tips the cane that will fruit, or is a person's.
         offset: Past the last kept node, along the cane (m); None where no kept node is below the cut.
         force: Predicted cutting force (N).
         wire_distance: To the surface of the nearest known wire (m); None while none is known.

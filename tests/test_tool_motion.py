@@ -158,3 +158,32 @@ def test_a_goal_that_moves_under_way_makes_no_jump_and_is_reached(share, later, 
     np.testing.assert_allclose(end.T_odom_tool.translation, goal + 0.5 * by, atol=1e-12)
     np.testing.assert_allclose(path.goal.translation, goal + 0.5 * by, atol=1e-12)
     np.testing.assert_allclose(end.twist, 0.0, atol=1e-12)
+
+
+@given(st.lists(st.tuples(places, turns), min_size=3, max_size=3), st.floats(0.3, 1.3))
+def test_a_motion_that_is_extended_on_its_way_or_at_its_end_goes_on_without_a_jump(corners, share):
+    corners = [pose(*corner) for corner in corners]
+    path = motion(corners[:2], waits=True)
+    time = share * path.duration
+    before = at(path, time)
+    q = np.zeros(12)
+    q[5] = 2.0
+    path.extend(Leg(corners[2], q, CONFIG.tool_speed, 0.05))
+    after = at(path, time)
+    np.testing.assert_allclose(after.T_odom_tool.homogeneous, before.T_odom_tool.homogeneous, atol=1e-12)
+    np.testing.assert_allclose(after.twist, before.twist, atol=1e-12)
+    end = at(path, path.duration)
+    np.testing.assert_allclose(end.T_odom_tool.homogeneous, corners[2].homogeneous, atol=1e-9)
+    np.testing.assert_allclose(end.twist, 0.0, atol=1e-12)
+    assert path.done and path.posture().q[5] == pytest.approx(2.0)
+
+
+def test_the_base_may_move_while_a_motion_waits_and_not_once_it_is_in_the_canes():
+    there, cut = pose((0.3, 0.2, 0.1), (0, 0, 0)), pose((0.3, 0.4, 0.1), (0, 0, 0))
+    path = motion([pose((0, 0, 0), (0, 0, 0)), there], waits=True)
+    path.time = path.duration + 3.0
+    assert path.base == "row"
+    path.extend(Leg(cut, np.zeros(12), CONFIG.tool_speed, CONFIG.arm_only))
+    assert path.base == "row"
+    path.time = path.duration - 0.01
+    assert path.base == "frozen"

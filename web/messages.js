@@ -39,7 +39,7 @@ export const TEXT_MAX_LENGTH = 500;
 
 /** @typedef {"IDLE"|"READY"|"TELEOP"|"AUTO"|"PAUSED"|"PROTECTIVE_STOP"|"FAULT"|"ESTOP_LATCHED"} Mode */
 
-/** @typedef {""|"APPROACH"|"ADVANCE"|"CUT"|"RETREAT"} Phase */
+/** @typedef {""|"APPROACH"|"LOOK"|"ADVANCE"|"CUT"|"RETREAT"} Phase */
 
 /** @typedef {"PROPOSED"|"ACCEPTED"|"INTENT"|"DONE"|"FAILED_NOT_CUT"|"UNKNOWN"|"REJECTED"} PointState */
 
@@ -246,7 +246,7 @@ export const TEXT_MAX_LENGTH = 500;
  * @property {number} vine Number of the vine along the row, as perceived.
  * @property {number} spur Number of the spur position on that vine, as perceived.
  * @property {string} reason Why here, in one sentence a grower understands.
- * @property {CutKind} kind Shortens the cane that stays, takes the old stub with its other canes off, tips the cane that will fruit (Guyot), or is where a person wants it.
+ * @property {CutKind} kind Shortens the cane that stays, takes the old stub off, tips the cane that will fruit, or is a person's.
  * @property {Covariance|null} position_covariance
  * @property {Covariance|null} tangent_covariance
  * @property {number|null} offset Past the last kept node, along the cane (m); None where no kept node is below the cut.

@@ -27,6 +27,7 @@ export const MODE_WORDS = Object.freeze({
 export const PHASE_WORDS = Object.freeze({
   "": "",
   APPROACH: "approach",
+  LOOK: "closer look",
   ADVANCE: "advance",
   CUT: "cut",
   RETREAT: "retreat",

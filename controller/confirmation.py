@@ -1,0 +1,28 @@
+"""Whether a point is still what was accepted, by a closer look before its cut."""
+
+import numpy as np
+
+from controller.queue import Ticket
+from rolling_panda.look_messages import CloseLook
+
+
+def not_as_accepted(look: CloseLook, ticket: Ticket | None, tolerance: float) -> str:
+    """Why a point is not cut after a closer look, in words; empty when it is.
+
+    Args:
+        look: What was seen.
+        ticket: Of the point.
+        tolerance: It may have moved so far since it was accepted (m).
+    """
+    if ticket is None or ticket.accepted is None:
+        return "it is not accepted any more"
+    if look.finding == "severed":
+        return "on a closer look its cane is off already"
+    if look.finding == "changed":
+        return f"on a closer look {look.reason}: accept it again if it is right"
+    if look.finding == "unseen" or look.position is None:
+        return f"a closer look did not show it: {look.reason}"
+    moved = float(np.linalg.norm(np.subtract(look.position, ticket.accepted.position)))
+    if moved > tolerance:
+        return f"moved {1e3 * moved:.0f} mm on a closer look: accept it again"
+    return ""

@@ -1,0 +1,58 @@
+"""The steps of the work on a point, and what one control period of it gives."""
+
+from dataclasses import dataclass, replace
+from enum import Enum
+
+from controller.motion import Tracking
+from rolling_panda import messages as m
+from rolling_panda.differential_drive import Array
+
+
+class Stage(Enum):
+    """Step of the sequence."""
+
+    REST = "rest"
+    ESCAPE = "getting clear of the canes"
+    SEARCH = "looking for a posture"
+    TRAVEL = "on the way to the stand-off"
+    LOOK = "looking closely"
+    ADVANCE = "straight in"
+    CUT = "cutting"
+    RETREAT = "straight back"
+
+
+PHASES: dict[Stage, m.Phase] = {
+    Stage.REST: "",
+    Stage.ESCAPE: "RETREAT",
+    Stage.SEARCH: "APPROACH",
+    Stage.TRAVEL: "APPROACH",
+    Stage.LOOK: "LOOK",
+    Stage.ADVANCE: "ADVANCE",
+    Stage.CUT: "CUT",
+    Stage.RETREAT: "RETREAT",
+}
+
+
+@dataclass(frozen=True)
+class Work:
+    """What one period of work gave.
+
+    Attributes:
+        xi: ξ̇ to send (9).
+        tracking: Of the motion, None while standing.
+        cut: The cut to command now: (cut_id, point_id) as a message without its epoch, else None.
+        finished: True when no accepted point is left.
+        pause: Why work must pause, empty when it goes on.
+        events: What happened, in words.
+    """
+
+    xi: Array
+    tracking: Tracking | None = None
+    cut: tuple[str, str] | None = None
+    finished: bool = False
+    pause: str = ""
+    events: tuple[str, ...] = ()
+
+    def saying(self, events: tuple[str, ...]) -> "Work":
+        """The same, with more that happened."""
+        return replace(self, events=self.events + events)
