@@ -9,7 +9,8 @@ pytest.importorskip("onnx", reason="the extra `training` is not installed: pip i
 from perception.network_input import network_input  # noqa: E402
 from perception.network_segmenter import NetworkSegmenter  # noqa: E402
 from perception.training.export import write_network  # noqa: E402
-from perception.training.fit import Trainer  # noqa: E402
+from perception.training.fit import WEIGHTS, Trainer  # noqa: E402
+from perception.training.network import Labeller  # noqa: E402
 from perception.training.scenes import Scenes  # noqa: E402
 from perception.training.score import Confusion, confusion  # noqa: E402
 from rolling_panda.messages import WOOD_CLASSES  # noqa: E402
@@ -42,12 +43,12 @@ def test_what_was_learned_survives_the_export(scenes, tmp_path):
     trainer = Trainer(1, 16)
     told = losses(trainer, scenes, 16)
     assert np.mean(told[-4:]) < 0.7 * np.mean(told[:4])
-    score = confusion(trainer.network, scenes)
+    score = confusion(Labeller(trainer.network, WEIGHTS), scenes)
     write_network(tmp_path / "net.onnx", trainer, 1, score, score, 0.25)
     said = NetworkSegmenter(tmp_path / "net.onnx").classify(scenes.color[0], scenes.depth[0].astype(np.float32))
     image = network_input(scenes.color[0], scenes.depth[0].astype(np.float32))
     with torch.inference_mode():
-        meant = trainer.network(torch.from_numpy(image)[None])[0].argmax(dim=0).numpy()
+        meant = Labeller(trainer.network, WEIGHTS)(torch.from_numpy(image)[None])[0].numpy()
     assert len(np.unique(meant)) > 1 and np.mean(said == meant) > 0.999
     assert NetworkSegmenter(tmp_path / "net.onnx").widening == 0.25
     card = (tmp_path / "net.md").read_text(encoding="utf-8")
@@ -62,3 +63,13 @@ def test_overlap_is_intersection_over_union():
         "background": 0.75,
         "ground": 1.0,
     }
+
+
+def test_what_counted_double_in_training_is_not_drawn_too_wide_for_it():
+    """Where two classes are equally likely, training makes the logit of the heavier one larger by log 2."""
+    logits = torch.zeros(1, 3, 1, 2)
+    logits[0, 1] = float(np.log(2.0))
+    logits[0, 2, 0, 0] = 0.1
+    logits[0, 1, 0, 1] += 0.1
+    told = Labeller(torch.nn.Identity(), (1.0, 2.0, 1.0))(logits)
+    assert told.tolist() == [[[2, 1]]]

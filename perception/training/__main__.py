@@ -14,7 +14,8 @@ import numpy as np
 import torch
 
 from perception.training.export import write_network
-from perception.training.fit import Trainer
+from perception.training.fit import WEIGHTS, Trainer
+from perception.training.network import Labeller
 from perception.training.scenes import TRAINING_SEED, VALIDATION_SEED, Scenes, render_scenes
 from perception.training.score import confusion, widening
 
@@ -49,8 +50,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     if trainer.step < trainer.steps:
         return 0
     held_out = _scenes(words.work / "validation.npz", VALIDATION_SEED, 6)
-    scores = {depth: confusion(trainer.network, held_out, depth) for depth in (True, False)}
-    write_network(words.out, trainer, words.rows, scores[True], scores[False], widening(trainer.network, held_out))
+    labeller = Labeller(trainer.network, WEIGHTS)
+    scores = {depth: confusion(labeller, held_out, depth) for depth in (True, False)}
+    write_network(words.out, trainer, words.rows, scores[True], scores[False], widening(labeller, held_out))
     print(words.out.with_suffix(".md").read_text(encoding="utf-8"))
     return 0
 

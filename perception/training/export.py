@@ -9,7 +9,7 @@ import onnx
 import torch
 
 from perception.network_input import CHANNELS
-from perception.training.fit import BATCH, CROP, Trainer
+from perception.training.fit import BATCH, CROP, WEIGHTS, Trainer
 from perception.training.network import Labeller
 from perception.training.scenes import TRAINING_SEED, VALIDATION_SEED, VIEWS
 from perception.training.score import Confusion
@@ -33,7 +33,7 @@ def write_network(
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     buffer = BytesIO()
-    labeller = Labeller(trainer.network.to(memory_format=torch.contiguous_format)).eval()
+    labeller = Labeller(trainer.network.to(memory_format=torch.contiguous_format), WEIGHTS).eval()
     with warnings.catch_warnings():
         # The newer exporter needs one more package and gives the same graph.
         warnings.simplefilter("ignore", DeprecationWarning)

@@ -17,7 +17,7 @@ from rolling_panda.messages import WOOD_CLASSES, WoodClass
 CROP, BATCH = 256, 8
 _PEAK_RATE = 3e-3
 #: Small things count for more than their pixels.
-_WEIGHTS: dict[WoodClass, float] = {
+_HEAVIER: dict[WoodClass, float] = {
     "background": 0.4,
     "ground": 0.3,
     "spur": 2.0,
@@ -26,6 +26,8 @@ _WEIGHTS: dict[WoodClass, float] = {
     "wire": 1.5,
     "old cut": 2.0,
 }
+#: Of all classes in their order.
+WEIGHTS = tuple(_HEAVIER.get(kind, 1.0) for kind in WOOD_CLASSES)
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ class Trainer:
         self.network = Network(CHANNELS, len(WOOD_CLASSES)).to(memory_format=torch.channels_last)
         self._optimiser = torch.optim.AdamW(self.network.parameters(), _PEAK_RATE, weight_decay=1e-4)
         self._schedule = torch.optim.lr_scheduler.OneCycleLR(self._optimiser, _PEAK_RATE, total_steps=steps)
-        self._loss = nn.CrossEntropyLoss(torch.tensor([_WEIGHTS.get(kind, 1.0) for kind in WOOD_CLASSES]))
+        self._loss = nn.CrossEntropyLoss(torch.tensor(WEIGHTS))
         self.seed = seed
         self.steps, self.step = steps, 0
 

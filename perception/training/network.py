@@ -4,6 +4,7 @@ Folding blocks into channels at the input, and unfolding them at the output, kee
 quarter of the cost of working at full resolution.
 """
 
+from collections.abc import Sequence
 from typing import cast
 
 import torch
@@ -59,11 +60,20 @@ class Network(nn.Module):
 class Labeller(nn.Module):
     """The network with what is exported: the index of the likeliest class."""
 
-    def __init__(self, network: Network) -> None:
-        """Wrap a trained network."""
+    prior: Tensor
+
+    def __init__(self, network: Network, weights: Sequence[float]) -> None:
+        """Wrap a trained network.
+
+        Args:
+            network: Trained.
+            weights: Of the classes in training. They make it learn what is small, and also draw it too wide; for the
+                answer their logarithm is taken back.
+        """
         super().__init__()
         self.network = network
+        self.register_buffer("prior", torch.log(torch.tensor(list(weights))).reshape(1, -1, 1, 1))
 
     def forward(self, image: Tensor) -> Tensor:
         """Classes (N×H×W, uint8)."""
-        return torch.argmax(self.network(image), dim=1).to(torch.uint8)
+        return torch.argmax(self.network(image) - self.prior, dim=1).to(torch.uint8)

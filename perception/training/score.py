@@ -7,7 +7,7 @@ import torch
 from numpy.typing import NDArray
 
 from perception.network_input import network_input
-from perception.training.network import Network
+from perception.training.network import Labeller
 from perception.training.scenes import Scenes
 from rolling_panda.messages import WOOD_CLASSES
 
@@ -37,19 +37,19 @@ class Confusion:
         return {name: round(float(self.counts[k, k] / true[k]), 3) for k, name in enumerate(WOOD_CLASSES) if true[k]}
 
 
-def widening(network: Network, scenes: Scenes) -> float:
-    """How much wider than they are the network draws canes that stand alone, on average (px).
+def widening(labeller: Labeller, scenes: Scenes) -> float:
+    """How much wider than they are it draws canes that stand alone, on average (px).
 
     Args:
-        network: With any weights; put into evaluation mode.
+        labeller: With any weights; put into evaluation mode.
         scenes: Pictures whose sides are multiples of what the network needs.
     """
-    network.eval()
+    labeller.eval()
     more: list[int] = []
     with torch.inference_mode():
         for color, depth, labels in zip(scenes.color, scenes.depth, scenes.labels, strict=True):
             image = network_input(color, depth.astype(np.float32))
-            said = network(torch.from_numpy(image)[None])[0].argmax(dim=0).numpy()
+            said = labeller(torch.from_numpy(image)[None])[0].numpy()
             for row in range(0, len(labels), _EVERY):
                 true, seen = _runs(labels[row]), _runs(said[row])
                 for middle, width in true.items():
@@ -65,20 +65,20 @@ def _runs(line: NDArray[np.integer]) -> dict[int, int]:
     return {int(a + b) // 2: int(b - a) for a, b in zip(edges[::2], edges[1::2], strict=True)}
 
 
-def confusion(network: Network, scenes: Scenes, with_depth: bool = True) -> Confusion:
+def confusion(labeller: Labeller, scenes: Scenes, with_depth: bool = True) -> Confusion:
     """Run a network over whole pictures.
 
     Args:
-        network: With any weights; put into evaluation mode.
+        labeller: With any weights; put into evaluation mode.
         scenes: Pictures whose sides are multiples of what the network needs.
         with_depth: False to take the depth away.
     """
-    network.eval()
+    labeller.eval()
     size = len(WOOD_CLASSES)
     counts = np.zeros(size * size, np.int64)
     with torch.inference_mode():
         for color, depth, labels in zip(scenes.color, scenes.depth, scenes.labels, strict=True):
             image = network_input(color, depth.astype(np.float32) if with_depth else None)
-            said = network(torch.from_numpy(image)[None])[0].argmax(dim=0).numpy()
+            said = labeller(torch.from_numpy(image)[None])[0].numpy()
             counts += np.bincount(labels.astype(np.int64).ravel() * size + said.ravel(), minlength=size * size)
     return Confusion(counts.reshape(size, size))
