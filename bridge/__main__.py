@@ -6,27 +6,32 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from bridge.core import BridgeCore
 from bridge.cut_memory import CutFile
 from bridge.loop import BridgeLoop
 from rolling_panda.process import ProcessContext, run_process
+from rolling_panda.resources import resource
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the bridge; returns the exit code."""
-    return run_process("bridge", "The robot, with its own watchdog, limits and latched stop.", _run, _arguments, argv)
+    about = "The robot, with its own watchdog, limits and latched stop."
+    return run_process("bridge", about, _run, _arguments, with_usual_config(sys.argv[1:] if argv is None else argv))
+
+
+def with_usual_config(argv: Sequence[str]) -> list[str]:
+    """The command line; for the real robot with its own configuration where none is given."""
+    given = any(word == "--config" or word.startswith("--config=") for word in argv)
+    usual = ["--config", str(resource("assets/config/real.toml"))] if "real" in argv and not given else []
+    return [*argv, *usual]
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
-    def kind(text: str) -> str:
-        if text == "real":
-            parser.exit(1, f"{parser.prog}: the real robot is not part of this version; run: {parser.prog} sim\n")
-        if text != "sim":
-            raise argparse.ArgumentTypeError(f"{text!r} is no robot; choose sim")
-        return text
-
-    parser.add_argument("kind", nargs="?", type=kind, default="sim", metavar="sim|real", help="robot (default: sim)")
+    parser.add_argument("kind", nargs="?", choices=("sim", "real"), default="sim", help="robot (default: sim)")
     parser.add_argument("--seed", type=_seed, default=0, help="of the simulated vineyard (default: 0)")
     parser.add_argument("--trace", type=Path, metavar="FILE", help="record what the simulation really actuates")
+    parser.add_argument("--check", action="store_true", help="real: look at every device, move none, print a table")
+    parser.add_argument("--readonly", action="store_true", help="real: tell the robot's state, command nothing")
 
 
 def _seed(text: str) -> int:
@@ -37,19 +42,33 @@ def _seed(text: str) -> int:
 
 def _run(context: ProcessContext) -> None:
     arguments = context.arguments
-    # Here and not above: a bridge to a real robot must not need the simulator.
+    if arguments.kind == "real" and arguments.check:
+        from bridge.real.check_command import check
+
+        check(context.config_path)
+        return
+    cuts = CutFile(context.state_folder)
+    try:
+        core = _core(context, cuts)
+        gc.freeze()
+        try:
+            BridgeLoop(core, context.transport).run(context.stopping)
+        finally:
+            core.robot.close()
+    finally:
+        cuts.close()
+
+
+def _core(context: ProcessContext, cuts: CutFile) -> BridgeCore:
+    arguments, rejections = context.arguments, context.transport.rejections
+    # Here and not above: a bridge to a real robot must not need the simulator, nor the other way round.
+    if arguments.kind == "real":
+        from bridge.real.build import real_bridge
+
+        return real_bridge(context.config_path, not arguments.readonly, rejections, cuts)
     from bridge.sim.build import simulated_bridge
 
-    cuts = CutFile(context.state_folder)
-    core = simulated_bridge(
-        context.config_path, arguments.seed, arguments.trace, "process", context.transport.rejections, cuts=cuts
-    )
-    gc.freeze()
-    try:
-        BridgeLoop(core, context.transport).run(context.stopping)
-    finally:
-        core.robot.close()
-        cuts.close()
+    return simulated_bridge(context.config_path, arguments.seed, arguments.trace, "process", rejections, cuts=cuts)
 
 
 if __name__ == "__main__":

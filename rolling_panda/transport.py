@@ -279,7 +279,7 @@ class ForeignWire:
         Raises:
             TransportError: The router cannot be reached or an endpoint is wrong.
         """
-        self._session = _open(config, ONLOOKER)
+        self._session = _open(config, "bridge")
 
     def publisher(self, name: str) -> Callable[[bytes], None]:
         """What sends bytes under this key, at once and newest first."""

@@ -10,6 +10,7 @@ angles; the wheels' angles are the integral of their speeds.
 import contextlib
 import threading
 import time
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,18 +80,26 @@ class Mp500:
         self._rest_since: float | None = None
         self._runaway = ""
         self._battery = float("nan")
-        self._rejected = 0
+        #: Messages by topic, and those among them that were none.
+        self.heard: Counter[str] = Counter()
+        self.rejected = 0
         prefix = f"{config.namespace}/" if config.namespace else ""
         self._prefix = prefix
         wire.subscribe(prefix + WHEELS, self._on_wheels)
         wire.subscribe(prefix + EMERGENCY, self._on_emergency)
         wire.subscribe(prefix + BATTERY, self._on_battery)
+        wire.subscribe(prefix + ODOMETRY, self._on_odometry)
         self._closing = threading.Event()
         self._thread: threading.Thread | None = None
         if moving:
             self._send = wire.publisher(prefix + COMMAND)
             self._thread = threading.Thread(target=self._command, name="mp500", daemon=True)
             self._thread.start()
+
+    @property
+    def told(self) -> bool:
+        """Whether the wheels have told their speeds yet."""
+        return self._wheels_at > float("-inf")
 
     def read(self) -> BaseState:
         """The newest state."""
@@ -173,13 +182,14 @@ class Mp500:
         return "", False
 
     def _on_wheels(self, data: bytes, at: float) -> None:
+        self.heard[WHEELS] += 1
         try:
             message = ros.decode(ros.JOINT_STATE, data)
         except MessageError:
-            self._rejected += 1
+            self.rejected += 1
             return
         if len(message.velocity) < 2 or not np.all(np.isfinite(message.velocity[:2])):
-            self._rejected += 1
+            self.rejected += 1
             return
         velocity = np.array([message.velocity[0], -message.velocity[1]])
         stamp = message.header.stamp.sec + message.header.stamp.nanosec * 1e-9
@@ -191,10 +201,11 @@ class Mp500:
             self._velocity, self._stamp, self._wheels_at = velocity, stamp, at
 
     def _on_emergency(self, data: bytes, at: float) -> None:
+        self.heard[EMERGENCY] += 1
         try:
             message = ros.decode(ros.EMERGENCY_STOP, data)
         except MessageError:
-            self._rejected += 1
+            self.rejected += 1
             return
         causes = {
             "button": message.emergency_button_stop,
@@ -209,13 +220,18 @@ class Mp500:
             self._cause = f"base: emergency stop ({names or 'being confirmed'})" if stopped else ""
 
     def _on_battery(self, data: bytes, at: float) -> None:
+        self.heard[BATTERY] += 1
         try:
             message = ros.decode(ros.BATTERY_STATE, data)
         except MessageError:
-            self._rejected += 1
+            self.rejected += 1
             return
         with self._lock:
             self._battery = float(message.percentage)
+
+    def _on_odometry(self, data: bytes, at: float) -> None:
+        # The base's own odometry is not used: the bridge has its own from the wheels. It tells that the node is alive.
+        self.heard[ODOMETRY] += 1
 
     def _ask(self, service: str) -> None:
         """Ask the relay board from a thread: the answer may take a second; what came of it is in the stop state."""

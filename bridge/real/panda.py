@@ -34,6 +34,11 @@ class Panda:
         self._releases = 0
         self._start()
 
+    @property
+    def told(self) -> bool:
+        """Whether the arm has told where its joints are."""
+        return bool(np.any(self._link.state().position))
+
     def read(self) -> ArmState:
         """The newest state."""
         state = self._link.state()

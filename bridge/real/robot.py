@@ -11,6 +11,8 @@ from bridge.real.cutter import CutterStatus
 from bridge.real.mp500 import BaseState
 from rolling_panda.differential_drive import Array
 
+READ_ONLY = "the bridge was started with --readonly"
+
 
 class Base(Protocol):
     """`bridge.real.mp500.Mp500`, or what stands for it."""
@@ -73,7 +75,7 @@ class Camera(Protocol):
 class RealRobot:
     """Implements `bridge.interface.Robot`; nothing here waits for a device."""
 
-    def __init__(self, base: Base, arm: Arm, blades: Blades, camera: Camera | None) -> None:
+    def __init__(self, base: Base, arm: Arm, blades: Blades, camera: Camera | None, moving: bool = True) -> None:
         """Put together what is connected already.
 
         Args:
@@ -81,9 +83,10 @@ class RealRobot:
             arm: Reaches.
             blades: Cut.
             camera: Sees; None on a robot without one.
+            moving: False only reads: nothing is handed to any device, and the robot says so as its fault.
         """
         self._base, self._arm, self._blades, self._camera = base, arm, blades, camera
-        self._releases = 0
+        self._moving, self._releases = moving, 0
 
     def read(self) -> Measurement:
         """The newest of every device; a fault of one is a fault of the robot."""
@@ -95,12 +98,14 @@ class RealRobot:
             blades.cut_id,
             blades.outcome,
             blades.detail,
-            fault="; ".join(filter(None, [base.fault, arm.fault])),
+            fault="; ".join(filter(None, ["" if self._moving else READ_ONLY, base.fault, arm.fault])),
             severe=base.severe or arm.severe,
         )
 
     def write(self, setpoint: Setpoint) -> None:
         """Hand the setpoint to every device; they follow it at their own rates until their own deadlines."""
+        if not self._moving:
+            return
         if setpoint.releases > self._releases:
             self._releases = setpoint.releases
             self._base.release()

@@ -1,0 +1,147 @@
+"""The real bridge from a configuration file: every device opened, and a state from each before anything begins."""
+
+import time
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+from msgspec.structs import replace
+
+from bridge.config import BridgeConfig
+from bridge.core import TICK_S, BridgeCore
+from bridge.cut_memory import CutMemory
+from bridge.odometer import Odometer
+from bridge.real.config import CutterConfig, RealConfig
+from bridge.real.cutter import Cutter, CutterStatus
+from bridge.real.mp500 import Mp500
+from bridge.real.panda import Panda
+from bridge.real.realsense import RealSense, open_realsense
+from bridge.real.robot import RealRobot
+from rolling_panda.config import RobotConfig, TransportConfig, load_section
+from rolling_panda.errors import InputError
+from rolling_panda.robot_model import RobotModel
+from rolling_panda.transport import ForeignWire, Rejections
+
+_FIRST_STATE_S = 15.0
+
+
+class NoCutter:
+    """Stands on the hand of a robot without a cutter: every cut fails, and says so."""
+
+    def __init__(self) -> None:
+        """No cut yet."""
+        self._status = CutterStatus("open")
+
+    def read(self) -> CutterStatus:
+        """How the last cut ended."""
+        return self._status
+
+    def enable(self, blades: bool) -> None:
+        """Nothing may close."""
+
+    def cut(self, cut_id: str) -> None:
+        """Fail."""
+        self._status = CutterStatus("open", cut_id, "FAILED_NOT_CUT", "no cutter is configured: [real.cutter] service")
+
+    def close(self) -> None:
+        """Nothing to let go of."""
+
+
+@dataclass(frozen=True)
+class Devices:
+    """Every device of the robot, opened."""
+
+    base: Mp500
+    arm: Panda
+    blades: Cutter | NoCutter
+    camera: RealSense | None
+
+    def close(self) -> None:
+        """Let go of every device."""
+        with ExitStack() as stack:
+            for device in (self.camera, self.arm, self.base, self.blades):
+                if device is not None:
+                    stack.callback(device.close)
+
+
+def open_devices(config_path: Path, model: RobotModel, moving: bool) -> Devices:
+    """Open every configured device.
+
+    Args:
+        config_path: TOML file with the sections transport, bridge and real.
+        model: Of the robot.
+        moving: False sends no command to any device.
+
+    Raises:
+        ConfigError: A section is wrong.
+        InputError: A driver or a device is missing.
+        TransportError: The base's or the cutter's wire cannot be reached.
+    """
+    real = load_section(config_path, "real", RealConfig)
+    wire = load_section(config_path, "transport", TransportConfig)
+    acceleration = load_section(config_path, "bridge", BridgeConfig).wheel_acceleration
+    if not real.arm.address:
+        raise InputError(f'{config_path} does not say where the arm\'s control box is: [real.arm] address = "…"')
+    with ExitStack() as opened:
+        camera = open_realsense(real.camera) if real.camera.enabled else None
+        if camera is not None:
+            opened.callback(camera.close)
+        base = Mp500(ForeignWire(_reached(wire, real.base.connect)), model.drive, acceleration, real.base, moving)
+        opened.callback(base.close)
+        blades = _blades(wire, real.cutter, moving)
+        opened.callback(blades.close)
+        arm = Panda(real.arm, model.limits, moving)
+        opened.pop_all()
+    return Devices(base, arm, blades, camera)
+
+
+def real_bridge(
+    config_path: Path, moving: bool = True, rejections: Rejections | None = None, cuts: CutMemory | None = None
+) -> BridgeCore:
+    """A bridge with the real robot.
+
+    Args:
+        config_path: TOML file with the sections transport, robot, bridge and real.
+        moving: False only reads.
+        rejections: Table to count refusals in, shared with the transport.
+        cuts: Remembers cuts through restarts; None for as long as this lives.
+
+    Raises:
+        ConfigError: A section is wrong.
+        InputError: A driver or a device is missing, or tells no state.
+        TransportError: The base's or the cutter's wire cannot be reached.
+    """
+    config = load_section(config_path, "bridge", BridgeConfig)
+    model = RobotModel(load_section(config_path, "robot", RobotConfig))
+    devices = open_devices(config_path, model, moving)
+    try:
+        wait_for_states(devices)
+    except InputError:
+        devices.close()
+        raise
+    robot = RealRobot(devices.base, devices.arm, devices.blades, devices.camera, moving)
+    odometer = Odometer(model.drive, config.odometry, TICK_S)
+    return BridgeCore(robot, config, model.limits, odometer, "real", None, rejections, cuts)
+
+
+def wait_for_states(devices: Devices, limit_s: float = _FIRST_STATE_S) -> None:
+    """Return when base and arm have told where they stand: before that nobody may take them to stand at zero.
+
+    Raises:
+        InputError: One of them has not, within the limit.
+    """
+    end = time.monotonic() + limit_s
+    while not (devices.base.told and devices.arm.told):
+        if time.monotonic() > end:
+            silent = devices.arm.read().fault if devices.base.told else devices.base.read().fault
+            raise InputError(f"no state within {limit_s:.0f} s: {silent}. See: rolling-panda bridge real --check")
+        time.sleep(0.02)
+
+
+def _reached(wire: TransportConfig, connect: str) -> TransportConfig:
+    """The program's own router, or another one that asks for no certificates."""
+    return replace(wire, connect=(connect,), certificates="") if connect else wire
+
+
+def _blades(wire: TransportConfig, config: CutterConfig, moving: bool) -> Cutter | NoCutter:
+    return Cutter(ForeignWire(_reached(wire, config.connect)), config, moving) if config.service else NoCutter()
