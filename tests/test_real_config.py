@@ -5,11 +5,14 @@ import pytest
 
 from bridge.__main__ import with_usual_config
 from bridge.config import BridgeConfig
+from bridge.real.build import open_devices
 from bridge.real.config import RealConfig
 from controller.config import ControllerConfig
 from perception.config import PerceptionConfig
 from rolling_panda.config import RobotConfig, TransportConfig, load_section
+from rolling_panda.errors import InputError
 from rolling_panda.resources import resource
+from rolling_panda.robot_model import RobotModel
 from server.config import ServerConfig
 
 REAL, SIM = resource("assets/config/real.toml"), resource("assets/config/sim.toml")
@@ -44,3 +47,15 @@ def test_the_real_robot_has_its_own_configuration_unless_another_is_given() -> N
     assert with_usual_config(["real", "--config", "mine.toml"]) == ["real", "--config", "mine.toml"]
     assert with_usual_config(["real", "--config=mine.toml"]) == ["real", "--config=mine.toml"]
     assert with_usual_config(["sim"]) == ["sim"]
+
+
+def test_without_the_drivers_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("bridge.real.build.importlib.util.find_spec", lambda name: None)
+    with pytest.raises(InputError, match=r"panda_py, pyrealsense2, rosbags.*pip install 'rolling-panda\[real\]'"):
+        open_devices(REAL, RobotModel(), moving=False)
+
+
+def test_without_an_address_of_the_arm_it_says_which_key_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("bridge.real.build.importlib.util.find_spec", lambda name: True)
+    with pytest.raises(InputError, match=r"\[real.arm\] address"):
+        open_devices(REAL, RobotModel(), moving=False)

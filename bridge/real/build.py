@@ -1,5 +1,6 @@
 """The real bridge from a configuration file: every device opened, and a state from each before anything begins."""
 
+import importlib.util
 import time
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -23,6 +24,7 @@ from rolling_panda.robot_model import RobotModel
 from rolling_panda.transport import ForeignWire, Rejections
 
 _FIRST_STATE_S = 15.0
+_DRIVERS = ("panda_py", "pyrealsense2", "rosbags")
 
 
 class NoCutter:
@@ -77,6 +79,12 @@ def open_devices(config_path: Path, model: RobotModel, moving: bool) -> Devices:
         InputError: A driver or a device is missing.
         TransportError: The base's or the cutter's wire cannot be reached.
     """
+    missing = [name for name in _DRIVERS if importlib.util.find_spec(name) is None]
+    if missing:
+        names = ", ".join(missing)
+        raise InputError(
+            f"the real robot's drivers are not installed ({names}); run: pip install 'rolling-panda[real]'"
+        )
     real = load_section(config_path, "real", RealConfig)
     wire = load_section(config_path, "transport", TransportConfig)
     acceleration = load_section(config_path, "bridge", BridgeConfig).wheel_acceleration
