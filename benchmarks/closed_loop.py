@@ -28,6 +28,7 @@ from perception.segmenter_choice import choose_segmenter
 from rolling_panda import intents
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig, load_section
+from rolling_panda.control_messages import Person, Presence
 from rolling_panda.differential_drive import Array
 from rolling_panda.look_messages import CloseLook
 from rolling_panda.resources import resource
@@ -77,6 +78,8 @@ class ClosedLoop:
         self.controller = Controller(config, robot)
         self._drive = RobotModel(robot).drive
         self._control_ticks = max(1, round(1.0 / (config.rate_hz * TICK_S)))
+        self._control_hz = config.rate_hz
+        self._people: tuple[str, ...] = ()
         self._watch = watch
         self._planner = CutPlanner(config, robot) if plans else None
         self._planned: tuple[float, WorkPlan] | None = None
@@ -97,7 +100,9 @@ class ClosedLoop:
         self.now = self._ticks * TICK_S
         self._receive(self.bridge.step(self.now))
         if self._ticks % self._control_ticks == 0:
-            self.inputs = replace(self.inputs, server_seen=self.now, perception_seen=self.now)
+            self.inputs = replace(
+                self.inputs, server_seen=self.now, perception_seen=self.now, presence=Sample(self._present(), self.now)
+            )
             self._send(self.controller.step(self.inputs, self.now))
             tracking = self.controller.tracking
             if self._watch is not None and tracking is not None and tracking.desired is not None:
@@ -121,6 +126,10 @@ class ClosedLoop:
 
     def ask(self, intent: intents.Intent) -> m.Answer:
         """What an operator asks for, answered at once."""
+        if intent.user not in self._people:
+            # Who asks is there, which the controller hears in its next period.
+            self._people = (*self._people, intent.user)
+            self.run(1.0 / self._control_hz)
         return self.controller.answer(intent, self.now)
 
     def stop(self, reason: str) -> None:
@@ -158,6 +167,10 @@ class ClosedLoop:
     def __exit__(self, *_: object) -> None:
         """Close the trace."""
         self.close()
+
+    def _present(self) -> Presence:
+        people = tuple(Person(name, name, "supervisor", 0.0) for name in self._people)
+        return Presence(sequence=self._ticks, people=people)
 
     def _receive(self, outputs: BridgeOutputs) -> None:
         if outputs.joints is not None:

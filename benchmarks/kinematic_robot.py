@@ -10,6 +10,7 @@ from controller.interface import Inputs, Outputs, Sample
 from controller.journal import LedgerState
 from rolling_panda import intents
 from rolling_panda import messages as m
+from rolling_panda.control_messages import Person, Presence
 from rolling_panda.differential_drive import NXI, Array
 from rolling_panda.look_messages import CloseLook, PictureRequest
 from rolling_panda.robot_model import ARM_Q, RobotModel
@@ -40,6 +41,8 @@ class KinematicRobot:
         perception: False takes perception away.
         obstacles: What stands around.
         record: Velocities commanded (9 each).
+        people: Names of who is there; whoever asks for something is.
+        watching: Whether they see the robot.
     """
 
     controller: Controller
@@ -59,6 +62,8 @@ class KinematicRobot:
     now: float = 0.0
     stop_id: str = ""
     ledger: LedgerState = LedgerState()
+    people: set[str] = field(default_factory=set)
+    watching: bool = True
 
     def __post_init__(self) -> None:
         """Place the robot at the origin."""
@@ -68,6 +73,7 @@ class KinematicRobot:
         self.xi: Array = np.zeros(NXI)
         self._sequence, self._epoch = 0, 0
         self._cut_id, self._cut_at = "", 0.0
+        self._told_presence = False
         self._points: Sample[m.PruningPoints] | None = None
         self._told: Sample[Obstacles] | None = None
         self._stops: tuple[m.StopRequest, ...] = ()
@@ -100,6 +106,7 @@ class KinematicRobot:
             points=self._points,
             obstacles=self._around(),
             teleop=None if self.teleop is None else Sample(self._renewed(self.teleop), self.now),
+            presence=Sample(self._present(), self.now) if self.server else None,
             server_seen=seen,
             perception_seen=seen,
             present=present,
@@ -147,7 +154,18 @@ class KinematicRobot:
 
     def ask(self, intent: intents.Intent) -> m.Answer:
         """An operator's intent."""
+        self.people.add(intent.user)
+        if not self._told_presence:
+            self.step()
         return self.controller.answer(intent, self.now)
+
+    def _present(self) -> Presence:
+        if self.teleop is not None:
+            self.people.add(self.teleop.user)
+        self._told_presence = bool(self.people)
+        age = 0.0 if self.watching else 1e6
+        people = tuple(Person(name, name, "supervisor", age) for name in sorted(self.people))
+        return Presence(sequence=self._sequence, people=people)
 
     def run(self, seconds: float) -> None:
         """Let time pass."""

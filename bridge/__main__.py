@@ -9,6 +9,7 @@ from pathlib import Path
 from bridge.core import BridgeCore
 from bridge.cut_memory import CutFile
 from bridge.loop import BridgeLoop
+from bridge.memory import Memory, open_memory
 from rolling_panda.process import ProcessContext, run_process
 from rolling_panda.resources import resource
 
@@ -47,9 +48,9 @@ def _run(context: ProcessContext) -> None:
 
         check(context.config_path)
         return
-    cuts = CutFile(context.state_folder)
+    cuts, memory = CutFile(context.state_folder), open_memory(context.state_folder)
     try:
-        core = _core(context, cuts)
+        core = _core(context, cuts, memory)
         gc.freeze()
         try:
             BridgeLoop(core, context.transport).run(context.stopping)
@@ -57,18 +58,22 @@ def _run(context: ProcessContext) -> None:
             core.robot.close()
     finally:
         cuts.close()
+        memory.close()
 
 
-def _core(context: ProcessContext, cuts: CutFile) -> BridgeCore:
+def _core(context: ProcessContext, cuts: CutFile, memory: Memory) -> BridgeCore:
     arguments, rejections = context.arguments, context.transport.rejections
     # Here and not above: a bridge to a real robot must not need the simulator, nor the other way round.
     if arguments.kind == "real":
         from bridge.real.build import real_bridge
 
-        return real_bridge(context.config_path, not arguments.readonly, rejections, cuts)
-    from bridge.sim.build import simulated_bridge
+        return real_bridge(context.config_path, not arguments.readonly, rejections, cuts, memory)
+    from bridge.sim.build import simulated_bridge, subscribe_button
 
-    return simulated_bridge(context.config_path, arguments.seed, arguments.trace, "process", rejections, cuts=cuts)
+    seed, trace = arguments.seed, arguments.trace
+    core = simulated_bridge(context.config_path, seed, trace, "process", rejections, cuts=cuts, memory=memory)
+    subscribe_button(core, context.transport)
+    return core
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 The latch, the watchdog and the limits are here and are the bridge's own: no other process can overrule them.
 """
 
+import secrets
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -16,6 +17,7 @@ from bridge.gate import Gate
 from bridge.interface import Measurement, Robot, Setpoint
 from bridge.latch import StopLatch
 from bridge.limiter import Limiter
+from bridge.memory import Memory, Remembered
 from bridge.odometer import Odometer
 from bridge.pace import Pace
 from bridge.refusals import Refusals
@@ -24,16 +26,22 @@ from bridge.round_trip import RoundTrip
 from bridge.shutter import Shutter
 from bridge.watchdog import Watchdog
 from rolling_panda import messages as m
+from rolling_panda.control_messages import StopState
 from rolling_panda.differential_drive import Array
 from rolling_panda.look_messages import PictureRequest
 from rolling_panda.robot_model import Limits
 from rolling_panda.row_messages import Capsule, Scenery
-from rolling_panda.topics import BRIDGE, CUT, MOTION, ODOMETRY, PICTURE
+from rolling_panda.topics import BRIDGE, CUT, MOTION, ODOMETRY, PICTURE, STOPS
 from rolling_panda.transport import Rejections
 
 TICK_S = 0.001
 _ODOMETRY_TICKS = round(1 / ODOMETRY.rate_hz / TICK_S)
 _STATE_TICKS = round(1 / BRIDGE.rate_hz / TICK_S)
+_STOPS_TICKS = round(1 / STOPS.rate_hz / TICK_S)
+# At most so fast (rad/s) are wheels and joints when the blades may begin to close: 5 mm/s at the axle, and what holding
+# the tool in place takes.
+_CUT_WHEELS, _CUT_JOINTS = 0.04, 0.1
+MOVING_CUT = "the robot is not at rest"
 # Faster than this (rad/s) is motion that the camera should follow.
 _MOVING = 0.01
 
@@ -50,6 +58,7 @@ class BridgeOutputs:
     frame: m.CameraFrame | None = None
     scenery: Scenery | None = None
     events: tuple[m.LogEvent, ...] = ()
+    stops: StopState | None = None
 
 
 class BridgeCore:
@@ -69,6 +78,7 @@ class BridgeCore:
         scenery: SceneryOf | None = None,
         rejections: Rejections | None = None,
         cuts: CutMemory | None = None,
+        memory: Memory | None = None,
     ) -> None:
         """Start with the watchdog tripped, at rest, without a stop.
 
@@ -81,6 +91,7 @@ class BridgeCore:
             scenery: Revision and rods to show; None on a real robot.
             rejections: Table of refusals shared with the transport.
             cuts: Remembers cuts through restarts; None for as long as this lives.
+            memory: What survives a restart; None forgets.
         """
         self.robot = robot
         self.refusals = Refusals(rejections)
@@ -89,18 +100,21 @@ class BridgeCore:
         self._scenery = scenery
         self._scenery_ticks = round(config.scenery_s / TICK_S)
         self._scenery_revision = -1
-        self._gate = Gate(limits.velocity, config.max_age_s)
+        self._memory = memory or Memory()
+        before = self._memory.remembered
+        self._gate = Gate(limits.velocity, config.max_age_s, before.epoch, before.token)
+        self._latch = StopLatch(before.stops, before.released, before.released_by)
         self._watchdog = Watchdog(config.fade_s, config.deadline_s)
         self._limiter = Limiter(limits, config.wheel_acceleration, config.joint_margin, TICK_S)
         self._faults = RobotFaults()
-        self._latch = StopLatch()
         self._orders = CutOrders(cuts)
         self._shutter = Shutter(config.camera_moving_hz, config.camera_resting_hz, TICK_S)
         self._pace = Pace()
         self._ticks = 0
         self._joint_ticks = round(1 / config.joints_hz / TICK_S)
         self._round_trip = RoundTrip()
-        self._clock = 0.0
+        self._clock = self._wall = 0.0
+        self._stops_due = True
         self._desired: Array = np.zeros_like(limits.velocity)
         self._was_tripped = True
         self._measured = robot.read()
@@ -117,10 +131,13 @@ class BridgeCore:
 
     def on_motion(self, command: m.MotionCommand, now: float, clock: float | None = None) -> None:
         """Take a motion command received at `now`; a refused one is counted and changes nothing."""
-        reason = self._gate.refuse(command, now)
+        epoch = self._gate.epoch
+        reason = self._gate.refuse(command, now, not np.any(self._limiter.sent))
         if reason is not None:
             self.refusals.add(MOTION.name, reason)
             return
+        if command.epoch != epoch:
+            self._remember()
         self._watchdog.feed(now)
         self._round_trip.back(command.echo, self._clock if clock is None else clock)
         self._desired = np.array(command.xi)
@@ -134,8 +151,8 @@ class BridgeCore:
             inhibited = self._faults.current
         elif self._watchdog.tripped(now) or self._gate.must_rest:
             inhibited = "no valid setpoint keeps the cutter enabled"
-        free = self._measured.cutter == "open"
-        verdict, reason = self._orders.judge(command, self._gate.epoch, free, inhibited)
+        wrong = self._gate.refuse_cut(command, now) or self._unsteady()
+        verdict, reason = self._orders.judge(command, wrong, self._measured.cutter == "open", inhibited)
         if verdict == "refuse":
             self.refusals.add(CUT.name, reason)
         if verdict == "cut":
@@ -152,11 +169,30 @@ class BridgeCore:
             return
         self._shutter.want(request)
 
-    def on_stop(self, request: m.StopRequest, now: float) -> None:
-        """Latch the software stop; repetitions and further stops keep the first one."""
-        if self._latch.stop(request):
-            self._say("warning", f"software stop by {request.user or request.source}: {request.reason}")
-            self._state_due = True
+    def _unsteady(self) -> str | None:
+        speed = np.abs(self._measured.velocity)
+        still = speed[:2].max() <= _CUT_WHEELS and speed[2:].max() <= _CUT_JOINTS
+        return None if still else MOVING_CUT
+
+    def on_stop(self, request: m.StopRequest, now: float, wall_time: float = 0.0) -> None:
+        """Latch a stop; repetitions change nothing. `wall_time` (s since 1970) is for people."""
+        if self._latch.stop(request, wall_time):
+            what = "emergency stop" if request.source == "hardware" else "software stop"
+            self._say("warning", f"{what} by {request.user or request.source}: {request.reason}")
+            self._stops_changed()
+
+    def _stops_changed(self) -> None:
+        self._state_due = self._stops_due = True
+        self._remember()
+
+    def _watch_button(self, now: float) -> None:
+        pressed = self._measured.emergency
+        if pressed and not self._latch.hardware:
+            stop_id = f"hardware-{secrets.token_hex(8)}"
+            reason = "the emergency stop button of the robot is pressed"
+            self.on_stop(m.StopRequest(stop_id=stop_id, source="hardware", user="", reason=reason), now, self._wall)
+        if pressed != self._latch.hardware:
+            self._latch.hardware, self._stops_due = pressed, True
 
     def on_release(self, request: m.ReleaseStop, now: float) -> m.Answer:
         """Release the latched stop that the request names. Nothing moves before a setpoint at rest has come."""
@@ -165,12 +201,14 @@ class BridgeCore:
             return m.Answer(ok=False, reason=reason)
         self._halt()
         self._faults.released(now)
+        self._stops_changed()
         self._say("info", f"software stop released by {request.user}: {request.reason}")
         return m.Answer(ok=True)
 
-    def step(self, now: float, clock: float | None = None) -> BridgeOutputs:
-        """Advance one tick of 1 ms; `clock` is `now` unless given."""
-        self._clock = now if clock is None else clock
+    def step(self, now: float, clock: float | None = None, wall_time: float = 0.0) -> BridgeOutputs:
+        """Advance one tick of 1 ms; `clock` is `now` unless given, `wall_time` (s since 1970) is for people."""
+        self._clock, self._wall = now if clock is None else clock, wall_time
+        self._watch_button(now)
         tripped = self._watch(now)
         stopped = bool(self._latch.stop_id)
         share = 0.0 if stopped or self._faults.current else self._watchdog.trust(now)
@@ -204,11 +242,15 @@ class BridgeCore:
             self._halt()
             self._say("warning" if self._faults.current else "info", change.text)
             if change.stop is not None:
-                self.on_stop(change.stop, now)
+                self.on_stop(change.stop, now, self._wall)
 
     def _halt(self) -> None:
         self._desired = np.zeros_like(self._desired)
         self._gate.require_rest()
+
+    def _remember(self) -> None:
+        latch = self._latch
+        self._memory.keep(Remembered(self._gate.epoch, self._gate.token, latch.stops, latch.over, latch.released_by))
 
     def _begin_cut(self, cut_id: str, outcome: m.Outcome) -> None:
         self._cut_id, self._outcome = cut_id, outcome
@@ -241,6 +283,15 @@ class BridgeCore:
         if self._state_due or ticks % _STATE_TICKS == 0:
             state = self._state(now)
             self._events += [("warning", line) for line in self.refusals.lines(now)]
+        stops = None
+        if self._stops_due or ticks % _STOPS_TICKS == 0:
+            self._stops_due = False
+            stops = StopState(
+                process="bridge",
+                stops=self._latch.stops,
+                released_by=self._latch.released_by,
+                hardware=self._latch.hardware,
+            )
         scenery = self._scenery_message(now) if self._scenery_is_due() else None
         events, self._events = self._events, []
         return BridgeOutputs(
@@ -253,6 +304,7 @@ class BridgeCore:
                 m.LogEvent(header=m.Header(now), process="bridge", severity=severity, text=text[:500])
                 for severity, text in events
             ),
+            stops,
         )
 
     def _joint_state(self, now: float) -> m.JointState:

@@ -5,7 +5,6 @@ from typing import Literal
 from bridge.cut_memory import CutMemory, ForLife
 from rolling_panda.messages import CutCommand
 
-OLD_EPOCH = "an older controller's cut"
 BUSY = "the blades are still at the last cut"
 FORGETFUL = "the cut cannot be remembered: the disk is full or broken"
 
@@ -20,23 +19,23 @@ class CutOrders:
         self._memory = memory or ForLife()
         self._known: set[str] = set(self._memory.known)
 
-    def judge(self, command: CutCommand, epoch: int, blades_free: bool, inhibited: str) -> tuple[Verdict, str]:
+    def judge(self, command: CutCommand, wrong: str | None, blades_free: bool, inhibited: str) -> tuple[Verdict, str]:
         """Whether to close the blades now, with the reason if not.
 
         An order that comes while the cutter is inhibited is spent: its repetitions must not cut later, when nobody
-        expects it. One that is not remembered durably yet waits for its next repetition. One from an older controller,
-        or during another cut, changes nothing.
+        expects it. One that is not remembered durably yet waits for its next repetition. One with a wrong token or too
+        old, during another cut or in motion, changes nothing.
 
         Args:
             command: The order.
-            epoch: Newest controller epoch.
+            wrong: Why the order itself is none that counts now; None when it is.
             blades_free: The blades are open and idle.
             inhibited: Why the cutter is inhibited; empty when it is not.
         """
-        if command.epoch != epoch:
-            return "refuse", OLD_EPOCH
         if command.cut_id in self._known:
             return "known", ""
+        if wrong is not None:
+            return "refuse", wrong
         if not blades_free:
             return "refuse", BUSY
         kept = self._memory.keep(command.cut_id)

@@ -4,9 +4,11 @@ from collections import OrderedDict
 from math import isfinite
 
 from rolling_panda.differential_drive import Array
-from rolling_panda.messages import MotionCommand
+from rolling_panda.messages import CutCommand, MotionCommand
 
 OLD_EPOCH = "an older controller's command"
+OTHER_TOKEN = "another token of the same epoch"
+MOVING = "a new token while the robot still moves under the old one"
 OLD_SEQUENCE = "sequence not newer than the last"
 UNSENT_ECHO = "echoes a joint state that was never sent"
 TOO_OLD = "computed from a joint state that is too old"
@@ -29,17 +31,19 @@ class Gate:
     that nothing that was under way before wakes moving.
     """
 
-    def __init__(self, velocity_limit: Array, max_age_s: float) -> None:
+    def __init__(self, velocity_limit: Array, max_age_s: float, epoch: int = 0, token: str | None = None) -> None:
         """Wait at rest.
 
         Args:
             velocity_limit: Largest speed of each actuator (9, rad/s).
             max_age_s: Largest age of the joint state that a command was computed from (s, the bridge's clock).
+            epoch: Newest one accepted before this start.
+            token: Random part of the token that came with it; None when no command has come yet.
         """
         self._limit = tuple(float(v) * _ROUNDING for v in velocity_limit)
         self._max_age = max_age_s
         self._sent: OrderedDict[int, float] = OrderedDict()
-        self.epoch = 0
+        self.epoch, self.token = epoch, token
         self.sequence = -1
         self.must_rest = True
 
@@ -53,34 +57,53 @@ class Gate:
         """Take nothing but a setpoint at rest from here on, until one has come."""
         self.must_rest = True
 
-    def refuse(self, command: MotionCommand, now: float) -> str | None:
+    def refuse(self, command: MotionCommand, now: float, at_rest: bool = True) -> str | None:
         """Take the command and return None, or the reason why it is refused.
 
         Args:
             command: As decoded; its numbers are checked again here.
             now: When it was received (s, the bridge's clock).
+            at_rest: Whether nothing moves by what was sent on last; only then control may change hands.
         """
-        reason = self._fault(command, now)
+        reason = self._fault(command, now, at_rest)
         if reason is None:
-            self.epoch, self.sequence = command.epoch, command.sequence
+            self.epoch, self.token, self.sequence = command.epoch, command.token, command.sequence
             self.must_rest = False
         return reason
 
-    def _fault(self, command: MotionCommand, now: float) -> str | None:
+    def refuse_cut(self, command: CutCommand, now: float) -> str | None:
+        """Why a cut order is not to be acted on by its token and age; None when it may. Changes nothing."""
+        if command.epoch != self.epoch:
+            return OLD_EPOCH if command.epoch < self.epoch else "a token that no motion command has brought yet"
+        if command.token != self.token:
+            return OTHER_TOKEN
+        return self._stale(command.echo, now)
+
+    def _fault(self, command: MotionCommand, now: float, at_rest: bool) -> str | None:
         if command.epoch < self.epoch:
             return OLD_EPOCH
-        if command.epoch == self.epoch and command.sequence <= self.sequence:
-            return OLD_SEQUENCE
+        if command.epoch == self.epoch and self.token is not None:
+            if command.token != self.token:
+                return OTHER_TOKEN
+            if command.sequence <= self.sequence:
+                return OLD_SEQUENCE
         if not all(isfinite(v) for v in command.xi):
             return NOT_FINITE
         if any(abs(v) > limit for v, limit in zip(command.xi, self._limit, strict=True)):
             return TOO_FAST
-        at = self._sent.get(command.echo)
-        if at is None:
-            newest = next(reversed(self._sent), -1)
-            return UNSENT_ECHO if command.echo > newest else TOO_OLD
-        if now - at > self._max_age:
-            return TOO_OLD
-        if self.must_rest and any(abs(v) > _REST for v in command.xi):
+        stale = self._stale(command.echo, now)
+        if stale is not None:
+            return stale
+        new = command.epoch > self.epoch
+        if new and not at_rest:
+            return MOVING
+        if (self.must_rest or new) and any(abs(v) > _REST for v in command.xi):
             return NOT_AT_REST
         return None
+
+    def _stale(self, echo: int, now: float) -> str | None:
+        at = self._sent.get(echo)
+        if at is None:
+            newest = next(reversed(self._sent), -1)
+            return UNSENT_ECHO if echo > newest else TOO_OLD
+        return TOO_OLD if now - at > self._max_age else None

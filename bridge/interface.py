@@ -15,6 +15,7 @@ class Measurement:
     """What the robot's sensors say: ξ and its rates over [θ_l, θ_r, q₁…q₇] (rad, rad/s), and the cutter.
 
     `fault` is why the robot itself does not move, empty when it does; a `severe` one has to be released by a person.
+    `emergency` is whether its emergency stop button is pressed.
     """
 
     position: Array
@@ -25,6 +26,7 @@ class Measurement:
     detail: str
     fault: str = ""
     severe: bool = False
+    emergency: bool = False
 
 
 @dataclass(frozen=True)

@@ -36,6 +36,7 @@ class BridgeLoop:
         self._camera = transport.publisher(topics.CAMERA)
         self._scenery = transport.publisher(topics.SCENERY)
         self._event = transport.publisher(topics.EVENT)
+        self._stops = transport.publisher(topics.STOPS)
 
     def run(self, stopping: threading.Event) -> None:
         """Step in real time until `stopping` is set."""
@@ -44,7 +45,7 @@ class BridgeLoop:
                 self._publish(outputs)
 
     def _advance(self, clock: float) -> list[BridgeOutputs]:
-        outputs = []
+        outputs, wall_time = [], time.time()
         with self._lock:
             due = self._time.due(clock)
             motion = self._motion.take()
@@ -55,7 +56,7 @@ class BridgeLoop:
             for picture in self._pictures.drain():
                 self._core.on_picture(picture.message)
             for _ in range(due):
-                outputs.append(self._core.step(self._time.tick(), clock))
+                outputs.append(self._core.step(self._time.tick(), clock, wall_time))
         return outputs
 
     def _publish(self, outputs: BridgeOutputs) -> None:
@@ -67,6 +68,8 @@ class BridgeLoop:
             self._state.put(outputs.state)
         if outputs.frame is not None:
             self._camera.put(outputs.frame)
+        if outputs.stops is not None:
+            self._stops.put(outputs.stops)
         if outputs.scenery is not None:
             self._scenery.put(outputs.scenery)
         for event in outputs.events:
@@ -74,7 +77,7 @@ class BridgeLoop:
 
     def _stop(self, request: m.StopRequest, at: float) -> None:
         with self._lock:
-            self._core.on_stop(request, self._time.now)
+            self._core.on_stop(request, self._time.now, time.time())
 
     def _release(self, request: m.ReleaseStop) -> m.Answer:
         with self._lock:

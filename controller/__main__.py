@@ -12,6 +12,8 @@ from controller.ledger_start import restored, start_record
 from controller.ledger_writer import LedgerWriter
 from controller.loop import Loop
 from controller.plan_worker import PlanWorker
+from controller.starts import count_start
+from controller.stop_file import open_stop_file
 from rolling_panda.config import RobotConfig, load_section
 from rolling_panda.process import ProcessContext, run_process
 
@@ -25,13 +27,14 @@ def _run(context: ProcessContext) -> None:
     config = load_section(context.config_path, "controller", ControllerConfig)
     robot_config = load_section(context.config_path, "robot", RobotConfig)
     run_id = uuid.uuid4().hex[:12]
-    controller = Controller(config, robot_config, run_id)
     folder = context.state_folder
-    controller.restore(restored(folder))
+    controller = Controller(config, robot_config, run_id, starts=count_start(folder))
+    stop_file = open_stop_file(folder)
+    controller.restore(restored(folder), stop_file.stops)
     ledger = LedgerWriter(lambda: Ledger(folder))
     ledger.write([start_record(context.config_path, run_id)])
     planner = PlanWorker(config, robot_config)
-    loop = Loop(controller, context.transport, config.rate_hz, ledger, planner)
+    loop = Loop(controller, context.transport, config.rate_hz, ledger, planner, stop_file)
     # What lives now lives until the end: the collector need not look at it in the middle of a control period.
     gc.collect()
     gc.freeze()
@@ -40,6 +43,7 @@ def _run(context: ProcessContext) -> None:
     finally:
         planner.close()
         ledger.close()
+        stop_file.close()
 
 
 if __name__ == "__main__":

@@ -73,6 +73,7 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         odometry_max_age_s: Older odometry stops the robot (s).
         bridge_max_age_s: Older bridge states stop the robot (s).
         server_max_age_s: Older server heartbeats stop automatic work (s).
+        supervision_s: Automatic work ends after so long without anybody who may operate and sees the robot (s).
         hold_link_max_age_s: Older server heartbeats end teleoperation (s).
         perception_max_age_s: Older perception heartbeats stop automatic work (s).
         ledger_max_age_s: Work whose record is not durable after this long is a fault (s).
@@ -139,7 +140,8 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
     joints_max_age_s: Positive = 0.2
     odometry_max_age_s: Positive = 0.25
     bridge_max_age_s: Positive = 0.5
-    server_max_age_s: Positive = 1.0
+    server_max_age_s: Positive = 2.0
+    supervision_s: Positive = 2.0
     hold_link_max_age_s: Positive = 0.3
     perception_max_age_s: Positive = 1.0
     ledger_max_age_s: Positive = 0.6

@@ -7,39 +7,38 @@ from dataclasses import replace
 import numpy as np
 
 from controller import modes, safety
+from controller.authority import ABOUT_CONTROL, MOTION, Authority, client_of
+from controller.body import Body
 from controller.config import ControllerConfig
 from controller.cut_clearance import CutClearance
 from controller.cut_sequence import CutSequence
-from controller.estimate import BaseEstimate, wheels_ahead
 from controller.homing import Homing
 from controller.interface import Inputs, Outputs
 from controller.journal import Journal, RequestRow, TicketRow
+from controller.lease import Client, draw_nonce
 from controller.modes import Event
-from controller.motion import Follower, Measured, Tracking
+from controller.motion import Measured, Tracking
 from controller.operator import Operator
 from controller.permission import EVENTS, Situation, allowed, refusal
 from controller.queue import PointQueue
 from controller.reach import PostureSearch
 from controller.report import controller_state
 from controller.session import Session
+from controller.setpoints import BRAKED
 from controller.stop_latch import StopLatch
-from controller.surroundings import Surroundings
 from controller.teleoperation import Teleoperation
-from controller.whole_body.collision import CollisionModel
-from controller.whole_body.registry import make_method
-from controller.whole_body.saturation import Saturation
 from controller.whole_body.task import Method
-from controller.whole_body.two_rates import TwoRates
 from controller.work_plan import PlanRequest
 from rolling_panda import intents
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
-from rolling_panda.differential_drive import NXI, Array
+from rolling_panda.control_messages import StopRecord
+from rolling_panda.differential_drive import Array
 from rolling_panda.errors import ControlError
 from rolling_panda.look_messages import PictureRequest
 from rolling_panda.robot_model import RobotModel
 
-_STATE_S = 0.05
+_STATE_S, _STOPS_S = 0.05, 0.5
 
 
 class Controller:
@@ -49,7 +48,12 @@ class Controller:
     """
 
     def __init__(
-        self, config: ControllerConfig, robot_config: RobotConfig, run_id: str = "cut", method: Method | None = None
+        self,
+        config: ControllerConfig,
+        robot_config: RobotConfig,
+        run_id: str = "cut",
+        method: Method | None = None,
+        starts: int = 0,
     ) -> None:
         """Build the robot's model and start in IDLE.
 
@@ -58,21 +62,15 @@ class Controller:
             robot_config: Section `[robot]`.
             run_id: Makes this start's cut ids unlike any other's; letters, digits, `_.:-`.
             method: Whole-body method in place of the configured one.
+            starts: How often a controller of this robot has started, counted durably.
 
         Raises:
             ConfigError: There is no such method.
             ModelError: A robot description is missing.
         """
-        self._config, self._dt = config, 1.0 / config.rate_hz
-        self._robot = RobotModel(robot_config)
-        base_dt = self._dt * config.base_every
-        self._saturation = Saturation(self._robot, config, self._dt, base_dt)
-        self._base = BaseEstimate(self._robot.drive)
-        self._surroundings = Surroundings(CollisionModel(self._robot))
-        arm = method or make_method(self._robot, config, self._dt, self._surroundings.model)
-        base = method or make_method(self._robot, config, base_dt, self._surroundings.model)
-        self._method = TwoRates(arm, base, config.base_every)
-        self._follower = Follower(config, self._method, self._dt)
+        self._config, self._body = config, Body(config, robot_config, method)
+        self._robot, self._dt, self._follower = self._body.robot, self._body.dt, self._body.follower
+        self._saturation, self._setpoints = self._body.saturation, self._body.setpoints
         self._journal = Journal()
         self._queue = PointQueue(config, self._journal)
         self._clearance = CutClearance(RobotModel(robot_config), config)
@@ -82,20 +80,16 @@ class Controller:
         self._sequence = CutSequence(config, search, self._follower, self._saturation, self._queue, run_id, known)
         self._teleoperation = Teleoperation(config, self._follower, self._robot.drive)
         self._stops = StopLatch()
+        self._authority = Authority(draw_nonce, config.supervision_s, starts)
         self._operator = Operator(self._queue)
         self._homing: Homing | None = None
         self._state = modes.boot()
         self._inputs = Inputs()
         self._health = safety.health(self._inputs, None, 0.0)
-        self._measured: Measured | None = None
         self._tracking: Tracking | None = None
-        self._sent: Array = np.zeros(NXI)
-        self._before: Array = self._sent
-        self._epoch: int | None = None
-        self._sequence_number = 0
         self._points_seen: object = None
         self._now = 0.0
-        self._state_due = -math.inf
+        self._state_due = self._stops_due = -math.inf
         self._events: list[m.LogEvent] = []
 
     @property
@@ -108,9 +102,11 @@ class Controller:
         """Number of the newest record: what was done is durable when the ledger has that one."""
         return self._journal.number
 
-    def restore(self, rows: Iterable[TicketRow]) -> None:
-        """Take up the queue of an earlier start; nothing of it resumes by itself."""
+    def restore(self, rows: Iterable[TicketRow], stops: tuple[StopRecord, ...] = ()) -> None:
+        """Take up the queue and the latched stops of an earlier start; nothing resumes by itself."""
         self._queue.restore(rows)
+        self._stops = StopLatch(stops)
+        self._state = modes.boot(self._stops.latched)
 
     @property
     def tracking(self) -> Tracking | None:
@@ -131,17 +127,19 @@ class Controller:
             xi, cut = self._move(now)
         except ControlError as error:
             self._event(Event.FAULT, now, str(error))
-            xi, cut = self._saturation.ramp(self._sent), None
-        xi = self._checked(xi)
-        motion = self._motion(xi)
+            xi, cut = self._saturation.ramp(self._setpoints.sent), None
+        motion = self._send(xi)
         release = self._stops.release_due()
-        state = plan = request = None
+        state = control = stops = plan = request = None
         if now >= self._state_due:
             self._state_due = now + _STATE_S
             request = self._review(now)
-            plan, state = self._session.message(now), self._report(now)
+            plan, state, control = self._session.message(now), self._report(now), self._authority.message(now)
+        if self._stops.changed or now >= self._stops_due:
+            self._stops_due, stops = now + _STOPS_S, self._stops.message()
         events, self._events = tuple(self._events), []
-        return Outputs(motion, cut, release, state, events, plan, request, self._journal.take(), self._picture(now))
+        picture, records = self._picture(now), self._journal.take()
+        return Outputs(motion, cut, release, state, events, plan, request, records, picture, control, stops)
 
     def answer(self, intent: intents.Intent, now: float) -> m.Answer:
         """Do what an operator asks, or say why not.
@@ -151,9 +149,10 @@ class Controller:
             now: Monotonic time (s).
         """
         self._now = now
-        refused = refusal(intent, now, self._situation())
-        if not refused:
-            refused = self._do(intent, now)
+        if isinstance(intent, ABOUT_CONTROL):
+            refused = self._authority.ask(intent, now)
+        else:
+            refused = refusal(intent, now, self._situation(intent)) or self._do(intent, now)
         what = type(intent).__name__
         if isinstance(intent, intents.AnyIntent):
             row = RequestRow(asked=intent, ok=not refused, reason=refused[:500], mode=self._state.mode)
@@ -170,22 +169,15 @@ class Controller:
     def _take(self, inputs: Inputs, now: float) -> None:
         self._inputs = inputs
         bridge = inputs.bridge.message if inputs.bridge is not None else None
-        if bridge is not None and self._epoch is None:
-            self._epoch = bridge.epoch + 1
+        if bridge is not None and self._authority.token is None:
+            self._authority.begin(bridge.epoch)
         self._journal.observe(inputs.ledger, now)
         self._journal.stops(inputs.stops)
         trouble = self._journal.trouble(now, self._config.ledger_max_age_s)
-        self._health = safety.health(inputs, self._epoch, now, trouble)
-        if inputs.joints is not None and inputs.odometry is not None:
-            q = self._base.configuration(inputs.joints.message, inputs.odometry.message)
-            # What the arm is told now it does after its own lag; that is when it has to fit the base's velocity.
-            ahead = self._config.arm_lag_s + 0.5 * self._dt
-            measured = np.array(inputs.joints.message.velocity[:2])
-            wheels = wheels_ahead(measured, self._sent[:2], ahead, self._config.base_lag_s)
-            self._measured = Measured(q, self._robot.kinematics(q), self._sent)
-            self._method.begin(self._sent, self._before, wheels)
-        self._surroundings.take(inputs.obstacles)
-        self._surroundings.work_at(self._sequence.places)
+        token = self._authority.token
+        self._health = safety.health(inputs, None if token is None else token.epoch, now, trouble)
+        self._body.take(inputs)
+        self._body.surroundings.work_at(self._sequence.places)
         self._clearance.take(inputs.obstacles)
         if bridge is not None:
             for text in self._sequence.watch(bridge, None if inputs.look is None else inputs.look.message, now):
@@ -197,37 +189,49 @@ class Controller:
 
     def _supervise(self, now: float) -> None:
         bridge = self._inputs.bridge.message if self._inputs.bridge is not None else None
-        latched = self._stops.take(self._inputs.stops, bridge)
+        latched = self._stops.take(self._inputs.stops, bridge, self._inputs.wall_time)
         if latched:
             self._event(Event.STOP, now, latched)
         elif self._stops.released(bridge):
             self._event(Event.RESET, now, self._stops.reset_reason, modes.OPERATOR)
+        if lost := self._authority.review(self._inputs.presence, self._setpoints.at_rest, now):
+            self._pause(lost, now)
         verdict = safety.check(self._state.mode, self._homing is not None, self._health, self._config)
         if verdict.action == "fault":
             self._event(Event.FAULT, now, verdict.reason)
         elif verdict.action == "protect":
             self._event(Event.PROTECT, now, verdict.reason)
         elif verdict.action == "pause":
-            self._homing = None
-            if self._state.mode in modes.MOVING:
-                self._event(Event.LOST, now, verdict.reason)
-            else:
-                self._say("warning", f"bringing the arm home was stopped: {verdict.reason}")
+            self._pause(verdict.reason, now)
+        self._sequence.wind_up(self._authority.unwatched(now))
         self._state = modes.observe(self._state, self._cause(), now)
         self._supervise_hold(now)
 
+    def _pause(self, reason: str, now: float) -> None:
+        """What moves comes to rest, and nothing resumes by itself."""
+        if self._state.mode in modes.MOVING:
+            self._event(Event.LOST, now, reason)
+        elif self._homing is not None:
+            self._homing = None
+            self._say("warning", f"bringing the arm home was stopped: {reason}")
+
     def _supervise_hold(self, now: float) -> None:
         holding = self._teleoperation.holding(self._inputs.teleop, now)
+        client = self._teleoperation.client
+        not_theirs = self._authority.refusal(client, "operator") if holding else ""
+        holding = holding and not (not_theirs and self._state.mode == "TELEOP")
         if self._state.mode == "TELEOP" and not holding:
             self._event(Event.RELEASE, now, "the hold was released")
         elif self._state.mode == "READY" and holding and self._teleoperation.pressed:
-            why = self._busy() or safety.sensors(self._health, self._config)
+            why = not_theirs or self._busy() or safety.sensors(self._health, self._config)
             why = why or safety.supervision(self._health, self._config, True)
             if why:
                 self._teleoperation.refuse()
                 self._say("warning", f"teleoperation refused: {why}")
             else:
-                self._event(Event.HOLD, now, f"{self._teleoperation.user} moves the robot", modes.OPERATOR)
+                self._authority.claim(client, now)
+                rights = self._authority.rights(client, "operator")
+                self._event(Event.HOLD, now, f"{client.user} moves the robot", rights)
 
     def _busy(self) -> str:
         """What has to end before a motion may begin; empty when nothing."""
@@ -270,9 +274,9 @@ class Controller:
     def _move(self, now: float) -> tuple[Array, m.CutCommand | None]:
         """ξ̇ (9) for this period, and the cut to command."""
         self._tracking = None
-        robot, mode = self._measured, self._state.mode
-        if robot is None or mode not in ("READY", "TELEOP", "AUTO"):
-            return self._saturation.ramp(self._sent), None
+        robot, mode = self._body.measured, self._state.mode
+        if robot is None or not self._authority.held or mode not in ("READY", "TELEOP", "AUTO"):
+            return self._saturation.ramp(self._setpoints.sent), None
         if mode == "TELEOP":
             self._tracking = self._teleoperation.step(robot)
             return self._tracking.xi, None
@@ -286,14 +290,19 @@ class Controller:
             self._event(Event.LOST, now, work.pause)
         elif work.finished:
             self._event(Event.FINISHED, now, "no accepted point is left")
-        cut = None
-        if work.cut is not None and self._epoch is not None and self._state.mode == "AUTO":
-            cut = m.CutCommand(epoch=self._epoch, cut_id=work.cut[0], point_id=work.cut[1])
-        return work.xi, cut
+        return work.xi, self._cut(*work.cut) if work.cut is not None and self._state.mode == "AUTO" else None
+
+    def _cut(self, cut_id: str, point_id: str) -> m.CutCommand | None:
+        token, joints = self._authority.token, self._inputs.joints
+        if token is None or joints is None:
+            return None
+        return m.CutCommand(
+            epoch=token.epoch, token=token.nonce, echo=joints.message.sequence, cut_id=cut_id, point_id=point_id
+        )
 
     def _ready(self, robot: Measured) -> Array:
         if self._homing is None:
-            return self._saturation.ramp(self._sent)
+            return self._saturation.ramp(self._setpoints.sent)
         xi = self._homing.step(robot)
         if self._homing.blocked:
             self._say("warning", f"bringing the arm home was stopped: {self._homing.blocked}")
@@ -305,36 +314,32 @@ class Controller:
         return xi
 
     def _picture(self, now: float) -> PictureRequest | None:
-        due = self._sequence.picture(now) if self._epoch is not None else None
-        return None if due is None else PictureRequest(epoch=self._epoch or 0, number=due[0], point_id=due[1])
-
-    def _checked(self, xi: Array) -> Array:
-        """The last gate: what is not finite or outside the limits is not sent; the robot brakes instead."""
-        if not self._saturation.admits(xi, self._sent):
-            self._say("error", "a velocity outside the limits was not sent; the robot brakes")
-            xi = self._saturation.brake(self._sent)
-        return self._saturation.smooth(xi, self._sent, self._before)
-
-    def _motion(self, xi: Array) -> m.MotionCommand | None:
-        joints = self._inputs.joints
-        latched_and_still = self._state.mode == "ESTOP_LATCHED" and not np.any(xi)
-        if self._epoch is None or joints is None or latched_and_still or self._health.overruled:
-            self._sent = self._before = np.zeros(NXI)
+        token = self._authority.token
+        due = None if token is None else self._sequence.picture(now)
+        if token is None or due is None:
             return None
-        self._sent, self._before = xi, self._sent
-        self._sequence_number += 1
-        a, b, c, d, e, f, g, h, i = xi.tolist()
-        return m.MotionCommand(
-            epoch=self._epoch,
-            sequence=self._sequence_number,
-            echo=joints.message.sequence,
-            xi=(a, b, c, d, e, f, g, h, i),
-        )
+        return PictureRequest(epoch=token.epoch, number=due[0], point_id=due[1])
+
+    def _send(self, xi: Array) -> m.MotionCommand | None:
+        """Nothing leaves without a token; what is not finite or outside the limits is not sent, the robot brakes."""
+        if not self._setpoints.admits(xi):
+            self._say("error", BRAKED)
+        xi = self._setpoints.smooth(xi)
+        joints, token = self._inputs.joints, self._authority.token
+        latched_and_still = self._state.mode == "ESTOP_LATCHED" and not np.any(xi)
+        if token is None or joints is None or latched_and_still or self._health.overruled:
+            self._setpoints.withhold()
+            return None
+        return self._setpoints.command(xi, token, joints.message.sequence)
 
     # --- operator ----------------------------------------------------------------------------------------------------
 
-    def _situation(self) -> Situation:
+    def _situation(self, intent: intents.Intent | None = None) -> Situation:
+        client, authority = Client("", "") if intent is None else client_of(intent), self._authority
         return Situation(
+            rights=modes.OPERATOR if intent is None else authority.rights(client, intent.role),
+            not_theirs="" if intent is None else authority.refusal(client, intent.role),
+            unwatched=authority.unwatched(self._now),
             config=self._config,
             state=self._state,
             health=self._health,
@@ -353,9 +358,12 @@ class Controller:
             self._state = replace(self._state, reason=f"bringing the arm home was stopped by {intent.user}")
             self._say("info", self._state.reason)
             return ""
-        event = EVENTS.get(type(intent))
+        client, event = client_of(intent), EVENTS.get(type(intent))
+        if isinstance(intent, MOTION):
+            self._authority.claim(client, now)
         if event is not None:
-            refused = self._event(event, now, f"{event.value} by {intent.user}", modes.OPERATOR)
+            rights = self._authority.rights(client, intent.role)
+            refused = self._event(event, now, f"{event.value} by {intent.user}", rights)
             if isinstance(intent, intents.Start) and not refused:
                 self._sequence.begin()
             return refused
@@ -370,9 +378,9 @@ class Controller:
         obstacles = self._inputs.obstacles
         return self._session.review(
             made=self._inputs.plan,
-            q=None if self._measured is None else self._sequence.clear_of_canes(self._measured.q),
+            q=None if self._body.measured is None else self._sequence.clear_of_canes(self._body.measured.q),
             obstacles=() if obstacles is None else obstacles.message.capsules,
-            at_rest=self._homing is None and self._state.mode != "TELEOP" and not np.any(self._sent),
+            at_rest=self._homing is None and self._state.mode != "TELEOP" and self._setpoints.at_rest,
             working=self._state.mode == "AUTO",
             now=now,
         )
@@ -386,7 +394,7 @@ class Controller:
             state=self._state,
             phase=self._sequence.phase,
             active=self._sequence.active,
-            measured=self._measured,
+            measured=self._body.measured,
             tracking=self._tracking,
             allowed=allowed(now, self._situation()),
             inputs=self._inputs,

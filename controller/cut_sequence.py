@@ -75,6 +75,7 @@ class CutSequence:
         self._cut_point = ""
         #: Where perception had the point when it was looked at closely, which shows it better.
         self._looked_at: m.Vector3 | None = None
+        self._ending = ""
         self._forget()
 
     @property
@@ -111,7 +112,12 @@ class CutSequence:
         self._forget()
         # Since a plan was made the robot may have been moved by hand.
         self._coming.forget()
+        self._ending = ""
         self._stage = Stage.ESCAPE
+
+    def wind_up(self, why: str) -> None:
+        """Begin no further cut, come out of the canes and pause, where there is a reason; empty = work goes on."""
+        self._ending = why
 
     def abort(self) -> None:
         """Leave the work; a cut under way is still watched, an accepted point stays accepted."""
@@ -137,6 +143,10 @@ class CutSequence:
         self._events = []
         if self._stage in (Stage.SEARCH, Stage.TRAVEL, Stage.LOOK, Stage.ADVANCE):
             self._check_acceptance(robot)
+        if self._ending and self._stage in (Stage.SEARCH, Stage.TRAVEL, Stage.LOOK):
+            return Work(self._saturation.ramp(robot.sent), pause=self._ending)
+        if self._ending and self._stage is Stage.ADVANCE:
+            self._retreat_from(robot)
         if self._stage is Stage.ADVANCE or (self._stage is Stage.TRAVEL and not self._config.confirm):
             self._refine()
         if self._stage in (Stage.RETREAT, Stage.TRAVEL):
@@ -171,6 +181,8 @@ class CutSequence:
 
     def _next(self, robot: Measured) -> Work:
         """Choose the next point and look for a posture; stand still while looking."""
+        if self._ending:
+            return Work(self._saturation.ramp(robot.sent), pause=self._ending)
         self._forget()
         if not self._coming.look(robot.q):
             # The last cut may still have to be made once more.
@@ -312,7 +324,7 @@ class CutSequence:
         back = self._ways.out(self._plan, robot.q)
         ticket, plan = self._queue.get(self._point_id), self._coming.found
         unsure = ticket is not None and ticket.state == "UNKNOWN"
-        stands = isinstance(plan, CutPlan) and self._coming.stands and not unsure
+        stands = isinstance(plan, CutPlan) and self._coming.stands and not unsure and not self._ending
         onwards = self._way_to(plan, back.goal, back.q_goal) if stands and isinstance(plan, CutPlan) else ()
         if not onwards:
             self._coming.forget()

@@ -6,6 +6,7 @@ from typing import Generic, TypeVar
 from controller.journal import LedgerState, Record
 from controller.work_plan import PlanRequest, WorkPlan
 from rolling_panda import messages as m
+from rolling_panda.control_messages import ControlState, Presence, StopState
 from rolling_panda.look_messages import CloseLook, PictureRequest
 from rolling_panda.plan_messages import SessionPlan
 from rolling_panda.row_messages import Obstacles
@@ -33,10 +34,12 @@ class Inputs:
         points: What perception holds true.
         obstacles: What perception sees standing in the way.
         teleop: Where the held gizmo is.
+        presence: Who is there.
         server_seen: When the server's newest heartbeat came in (s).
         perception_seen: The same of perception.
         present: Processes connected now.
         stops: Stop requests that came in since the last step.
+        wall_time: Now (s since 1970), for people alone.
         plan: Newest answer of the planner.
         ledger: How much of what was recorded is durable.
         look: What the newest picture that was asked for shows.
@@ -51,10 +54,12 @@ class Inputs:
     points: Sample[m.PruningPoints] | None = None
     obstacles: Sample[Obstacles] | None = None
     teleop: Sample[TeleopTarget] | None = None
+    presence: Sample[Presence] | None = None
     server_seen: float | None = None
     perception_seen: float | None = None
     present: frozenset[str] = frozenset()
     stops: tuple[m.StopRequest, ...] = ()
+    wall_time: float = 0.0
     plan: WorkPlan | None = None
     ledger: LedgerState = LedgerState()
     look: Sample[CloseLook] | None = None
@@ -79,3 +84,5 @@ class Outputs:
     request: PlanRequest | None = None
     records: tuple[Record, ...] = ()
     picture: PictureRequest | None = None
+    control: ControlState | None = None
+    stops: StopState | None = None

@@ -13,11 +13,13 @@ from controller.intent_desk import IntentDesk
 from controller.interface import Inputs, Outputs, Sample
 from controller.ledger_writer import LedgerWriter
 from controller.plan_worker import PlanWorker
+from controller.stop_file import StopFile
 from rolling_panda import messages as m
 from rolling_panda.errors import ServiceError
 from rolling_panda.loop_clock import LoopClock
 from rolling_panda.topics import (
     BRIDGE,
+    CONTROL,
     CONTROLLER,
     CUT,
     EVENT,
@@ -31,8 +33,10 @@ from rolling_panda.topics import (
     PICTURE,
     PLAN,
     POINTS,
+    PRESENCE,
     RELEASE,
     STOP,
+    STOPS,
     TELEOP,
     Topic,
 )
@@ -71,6 +75,7 @@ class Loop:
         rate_hz: float,
         ledger: LedgerWriter,
         planner: PlanWorker | None = None,
+        stop_file: StopFile | None = None,
     ) -> None:
         """Subscribe and announce; nothing runs before `run`.
 
@@ -80,6 +85,7 @@ class Loop:
             rate_hz: Of control.
             ledger: Records what is decided and done.
             planner: Answers plan requests; without one, work goes on without a plan.
+            stop_file: Keeps what is latched for the next start; without one, nothing is kept.
         """
         self._planner, self._ledger = planner, ledger
         self._acknowledged = Acknowledged()
@@ -89,6 +95,7 @@ class Loop:
         self._joints, self._odometry = self._newest(JOINTS), self._newest(ODOMETRY)
         self._bridge, self._points = self._newest(BRIDGE), self._newest(POINTS)
         self._obstacles = self._newest(OBSTACLES)
+        self._presence = self._newest(PRESENCE)
         self._teleop, self._stops = self._newest(TELEOP), transport.feed(STOP, 32)
         self._beats: dict[m.Process, tuple[int, float]] = {}
         transport.subscribe(HEARTBEAT, self._on_heartbeat)
@@ -99,7 +106,8 @@ class Loop:
         self._look, self._picture = self._newest(LOOK), transport.publisher(PICTURE)
         self._motion, self._cut = transport.publisher(MOTION), transport.publisher(CUT)
         self._state, self._event = transport.publisher(CONTROLLER), transport.publisher(EVENT)
-        self._plan = transport.publisher(PLAN)
+        self._plan, self._control = transport.publisher(PLAN), transport.publisher(CONTROL)
+        self._latched, self._stop_file = transport.publisher(STOPS), stop_file or StopFile()
         self._ticks: deque[float] = deque(maxlen=min(round(rate_hz), _TIMED))
         self._tick_s = 0.0
         self._count = self._late = 0
@@ -114,10 +122,12 @@ class Loop:
             points=self._points.sample(),
             obstacles=self._obstacles.sample(),
             teleop=self._teleop.sample(),
+            presence=self._presence.sample(),
             server_seen=beats["server"][1] if "server" in beats else None,
             perception_seen=beats["perception"][1] if "perception" in beats else None,
             present=self._transport.present(),
             stops=tuple(stop.message for stop in self._stops.drain()),
+            wall_time=time.time(),
             plan=None if self._planner is None else self._planner.newest,
             ledger=self._ledger.state,
             look=self._look.sample(),
@@ -141,6 +151,11 @@ class Loop:
             state = outputs.state
             self._acknowledged.hold(self._controller.recorded, now, lambda _: self._state.put(state))
             self._tick_s = statistics.median(self._ticks) if self._ticks else 0.0
+        if outputs.stops is not None:
+            self._latched.put(outputs.stops)
+            self._stop_file.keep(outputs.stops)
+        if outputs.control is not None:
+            self._control.put(outputs.control)
         if outputs.request is not None and self._planner is not None:
             self._planner.ask(outputs.request)
         if outputs.plan is not None:

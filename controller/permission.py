@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from controller import modes, safety
+from controller.authority import MOTION
 from controller.config import ControllerConfig
 from controller.modes import Event
 from rolling_panda import intents
@@ -44,6 +45,9 @@ class Situation:
         homing: True while the arm is brought home.
         busy: What has to end before a motion may begin; empty when nothing.
         work: Whether a point is accepted.
+        rights: What who asks counts as.
+        not_theirs: Why who asks may not move the robot, in words; empty when they may.
+        unwatched: Why automatic work may not begin for want of somebody who sees the robot; empty when it may.
     """
 
     config: ControllerConfig
@@ -52,6 +56,9 @@ class Situation:
     homing: bool
     busy: str
     work: bool
+    rights: modes.Rights = modes.ANYBODY
+    not_theirs: str = ""
+    unwatched: str = ""
 
 
 def refusal(intent: intents.Intent, now: float, situation: Situation) -> str:
@@ -63,9 +70,13 @@ def refusal(intent: intents.Intent, now: float, situation: Situation) -> str:
         situation: Of the robot.
     """
     config, health, mode = situation.config, situation.health, situation.state.mode
+    if "operator" not in situation.rights:
+        return situation.not_theirs or "only who may operate may ask for this"
+    if isinstance(intent, MOTION) and mode != "FAULT" and situation.not_theirs:
+        return situation.not_theirs
     event = EVENTS.get(type(intent))
     if event is not None and not (event is Event.PAUSE and situation.homing):
-        refused = modes.step(situation.state, event, now, by=modes.OPERATOR).refused
+        refused = modes.step(situation.state, event, now, by=situation.rights).refused
         if refused:
             return refused
     if isinstance(intent, intents.Arm | intents.Start | intents.Home):
@@ -79,7 +90,9 @@ def refusal(intent: intents.Intent, now: float, situation: Situation) -> str:
         if why:
             return why
     if isinstance(intent, intents.Start):
-        return safety.perception(health, config) if situation.work else "no point is accepted"
+        if not situation.work:
+            return "no point is accepted"
+        return safety.perception(health, config) or situation.unwatched
     if isinstance(intent, intents.Home) and mode != "READY":
         return f"the arm is brought home in READY; the mode is {mode}"
     return ""

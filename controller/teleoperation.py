@@ -6,6 +6,7 @@ import numpy as np
 
 from controller.config import ControllerConfig
 from controller.interface import Sample
+from controller.lease import Client
 from controller.motion import Follower, Measured, Tracking
 from rolling_panda.differential_drive import NXI, Array, DifferentialDrive
 from rolling_panda.errors import ModelError
@@ -24,7 +25,7 @@ class Teleoperation:
         self._message: TeleopTarget | None = None
         self._goal: Any = None
         self.pressed = True
-        self.user = ""
+        self.client = Client("", "")
 
     def holding(self, teleop: Sample[TeleopTarget] | None, now: float) -> bool:
         """Whether the operator holds now: the newest demand says so, is fresh, and is one that can be followed."""
@@ -40,7 +41,7 @@ class Teleoperation:
                     self._goal = placement(message.target)
                 except ModelError:
                     self._message = None
-        self.user = message.user
+        self.client = Client(message.client or message.user, message.user)
         return self._message is not None and _means_something(message)
 
     def _take(self, teleop: Sample[TeleopTarget] | None) -> Sample[TeleopTarget] | None:

@@ -78,9 +78,13 @@ class Acknowledge(Intent, frozen=True, kw_only=True):
 
 
 class Reset(Intent, frozen=True, kw_only=True):
-    """ESTOP_LATCHED → IDLE, with a reason. It moves nothing."""
+    """ESTOP_LATCHED → IDLE, with a reason. It moves nothing.
+
+    With `stop_id`, the newest stop that was looked at: one that was pressed since is not reset with it.
+    """
 
     reason: Annotated[str, Meta(min_length=1, max_length=500)]
+    stop_id: Annotated[str, Meta(max_length=64)] = ""
 
 
 class TakeControl(Intent, frozen=True, kw_only=True):

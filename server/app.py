@@ -15,6 +15,7 @@ from rolling_panda import __version__
 from rolling_panda.page_messages import PageEvents, PagePoints, PageState
 from rolling_panda.plan_messages import SessionPlan
 from rolling_panda.resources import resource
+from server.control_api import control_router
 from server.desk import Desk, Result
 from server.guard import Guard, is_protected
 from server.operator_api import answer, operator_router
@@ -70,6 +71,7 @@ def create_app(desk: Desk, origins: frozenset[str]) -> ASGIApp:
     app.include_router(site_router(desk, web))
     app.include_router(operator_router(desk))
     app.include_router(plant_router(desk))
+    app.include_router(control_router(desk))
     app.include_router(pages_router(desk))
     app.include_router(viser_router(desk.scene, dropped))
     app.router.routes.append(_PageFiles("/", StaticFiles(directory=web), name="web"))

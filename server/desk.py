@@ -7,6 +7,8 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
+import msgspec
+
 from rolling_panda import intents
 from rolling_panda import messages as m
 from rolling_panda.errors import InputError, ServiceError
@@ -17,6 +19,7 @@ from server.event_log import EventLog
 from server.motion_rate import MotionRate
 from server.page_view import PageView
 from server.passwords import Passwords
+from server.presence import PresentPeople
 from server.robot_link import RobotLink
 from server.scene import Scene
 from server.sessions import Session, Sessions
@@ -38,6 +41,7 @@ class Listener(Protocol):
     """An open page."""
 
     session: Session
+    view: str
 
     def wake(self) -> None:
         """There may be something new to send."""
@@ -65,6 +69,7 @@ class Desk:
     sessions: Sessions
     log: EventLog
     teleop: TeleopHold
+    people: PresentPeople
     address: str
     cookie: str
     passwords: Passwords | None = None
@@ -87,21 +92,26 @@ class Desk:
         posture = self.link.posture(now)
         self._seen_at.append((state.number, float("-inf") if posture is None else now - posture.age_s))
 
-    def drew(self, session: Session, number: int) -> None:
-        """A page of this session has drawn state `number`."""
+    def drew(self, session: Session, view: str, number: int, now: float) -> None:
+        """A page of this session, its `view`, has drawn state `number`."""
+        self.people.heard(session, now)
         for known, seen_at in reversed(self._seen_at):
             if known == number:
-                self.teleop.drew(session.session_id, seen_at)
+                self.teleop.drew(view, seen_at, now)
+                self.people.saw(session, seen_at)
                 return
 
-    def fetched(self, session: Session) -> None:
+    def fetched(self, session: Session, now: float) -> None:
         """A script has fetched the state that was made last."""
         if self._seen_at:
-            self.teleop.drew(session.session_id, self._seen_at[-1][1])
+            seen_at = self._seen_at[-1][1]
+            self.teleop.drew(session.session_id, seen_at, now)
+            self.people.saw(session, seen_at)
 
     async def ask(self, session: Session, intent: intents.Intent) -> Result:
         """Ask the controller, which logs what it does or why it refuses."""
-        return await self._asked(session, type(intent).__name__, "the controller", lambda: self.link.ask(intent))
+        theirs = msgspec.structs.replace(intent, role=session.role, client=session.client)
+        return await self._asked(session, type(intent).__name__, "the controller", lambda: self.link.ask(theirs))
 
     async def ask_perception(self, session: Session, request: PlantRequest) -> Result:
         """Ask perception for another rule or a point, and log what came of it."""
@@ -142,15 +152,15 @@ class Desk:
             503, False, "The stop was sent, but the bridge has not confirmed it: use the robot's emergency stop."
         )
 
-    def hold(self, session: Session, now: float) -> Result:
-        """Start or renew this session's hold on the tool."""
+    def hold(self, session: Session, now: float, view: str = "") -> Result:
+        """Start or renew this session's hold on the tool, by what its `view` shows; a script is its own view."""
         key = session.session_id
         if not session.may_operate:
             return self._refuse_hold(session, f"a {session.role} may look and stop, not operate", 403)
         self.end_lapsed_hold(now)
         was_holding = self.teleop.holder == key
         try:
-            self.teleop.hold(key, session.user, now)
+            self.teleop.hold(key, session.user, now, view or key, session.client)
         except InputError as error:
             return self._refuse_hold(session, str(error), 409)
         self._refused_holds.pop(key, None)
@@ -217,6 +227,7 @@ class Desk:
         self.let_go(session)
         self.teleop.forget(session.session_id)
         self.motion.forget(session.session_id)
+        self.people.forget(session)
         self.scene.forget(session.session_id)
         self.sessions.end(session)
         self.note("info", f"{session.user} signed out")
@@ -252,12 +263,14 @@ class Desk:
     def page_closed(self, page: Listener, holding: bool) -> None:
         """A page has gone; with the last one of its session goes the gizmo, and with a holding one the hold."""
         self.pages.discard(page)
+        self.teleop.unseen(page.view)
         if holding:
             self.let_go(page.session)
         if page.placing:
             self._take_clicks(page.session)
         if not any(other.session is page.session for other in self.pages):
             self.show_gizmo(page.session, False)
+            self.people.forget(page.session)
 
     def _refuse_hold(self, session: Session, reason: str, status: int) -> Result:
         # Held buttons repeat at 20 Hz; one line for each new reason is enough.

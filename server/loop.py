@@ -10,7 +10,7 @@ from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
 from rolling_panda.robot_model import configuration
-from rolling_panda.topics import HEARTBEAT
+from rolling_panda.topics import HEARTBEAT, PRESENCE
 from server.desk import Desk
 
 #: Posture older than this (s) is drawn grey: it is only the last known one.
@@ -37,6 +37,7 @@ class Loop:
         config = self._desk.config
         return [
             _every(1 / HEARTBEAT.rate_hz, self._beat),
+            _every(1 / PRESENCE.rate_hz, self._presence),
             _every(1 / config.page_rate_hz, self._state),
             _every(1 / config.scene_rate_hz, self._scene),
             _every(1 / config.teleop_rate_hz, self._teleop),
@@ -51,6 +52,9 @@ class Loop:
 
     async def _accounts(self, now: float) -> None:
         self._desk.end_void_sessions()
+
+    async def _presence(self, now: float) -> None:
+        self._desk.link.presence_of(self._desk.people.message(now))
 
     async def _state(self, now: float) -> None:
         self._number += 1

@@ -5,6 +5,7 @@ header with the server's own address on every POST. `POST /api/invite` makes the
 """
 
 import time
+from collections.abc import Callable
 from typing import Annotated, Any
 
 import msgspec
@@ -35,7 +36,8 @@ def _session(request: Request) -> Session:
 
 Caller = Annotated[Session, Depends(_session)]
 
-_ANSWERS: dict[int | str, dict[str, Any]] = {
+#: How every request is answered.
+ANSWERS: dict[int | str, dict[str, Any]] = {
     200: {"model": body.Outcome, "description": "Done."},
     401: {"model": body.Outcome, "description": "Not signed in."},
     403: {"model": body.Outcome, "description": "The role may not, or the Origin header is missing or foreign."},
@@ -45,9 +47,20 @@ _ANSWERS: dict[int | str, dict[str, Any]] = {
 }
 
 
+def heard(desk: Desk) -> Callable[[Request], None]:
+    """What notes that somebody asks, which is how a script shows that it is there."""
+
+    def note(request: Request) -> None:
+        session: Session | None = request.state.session
+        if session is not None:
+            desk.people.heard(session, time.monotonic())
+
+    return note
+
+
 def operator_router(desk: Desk) -> APIRouter:
     """Everything under `/api` that needs a session."""
-    router = APIRouter(prefix="/api", responses=_ANSWERS)
+    router = APIRouter(prefix="/api", responses=ANSWERS, dependencies=[Depends(heard(desk))])
 
     async def ask(session: Session, intent: intents.Intent) -> JSONResponse:
         return answer(await desk.ask(session, intent))
@@ -121,7 +134,7 @@ def operator_router(desk: Desk) -> APIRouter:
         """Release the latched stop, with a reason; moves nothing. Supervisors only."""
         if session.role != "supervisor":
             return answer(Result(403, False, "only a supervisor may release a stop"))
-        return await ask(session, intents.Reset(user=session.user, reason=request.reason))
+        return await ask(session, intents.Reset(user=session.user, reason=request.reason, stop_id=request.stop_id))
 
     @router.post("/teleop", tags=["teleoperation"])
     async def teleop(session: Caller, request: body.Teleop) -> Response:
@@ -154,7 +167,7 @@ def operator_router(desk: Desk) -> APIRouter:
         """The newest state of the robot: what the page gets 10 times a second."""
         if desk.state is None:
             return answer(Result(503, False, "The server is starting; ask again."))
-        desk.fetched(session)
+        desk.fetched(session, time.monotonic())
         return _json(addressed(desk.state, session))
 
     @router.get("/points", tags=["state"], responses=_schema("PagePoints"))

@@ -31,7 +31,7 @@ class PageView:
         """The state of this moment, addressed to nobody yet."""
         controller, bridge = self._link.controller.peek(), self._link.bridge.peek()
         joints, odometry = self._link.joints.peek(), self._link.odometry.peek()
-        camera = self._link.camera.peek()
+        camera, control = self._link.camera.peek(), self._link.control.peek()
         return PageState(
             number=number,
             user="",
@@ -45,6 +45,8 @@ class PageView:
             joints=joints.message if joints else None,
             base=odometry.message.pose if odometry else None,
             camera_frame=camera.message.sequence if camera else 0,
+            control=control.message if control else None,
+            stops=tuple(self._link.stops[process].message for process in sorted(self._link.stops)),
         )
 
     def tool(self, now: float) -> m.Pose | None:
@@ -119,7 +121,7 @@ class PageView:
 def addressed(state: PageState, session: Session) -> PageState:
     """The same state for one reader."""
     role: Role = session.role
-    return msgspec.structs.replace(state, user=session.user, role=role)
+    return msgspec.structs.replace(state, user=session.user, role=role, client=session.client)
 
 
 def project(

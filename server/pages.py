@@ -1,6 +1,7 @@
 """The page's WebSocket `/ws`: states out, newest wins; heartbeats, holds and gestures in, strict."""
 
 import asyncio
+import secrets
 import time
 
 import msgspec
@@ -56,6 +57,8 @@ class OpenPage:
         self._held_at = 0.0
         #: The button is still pressed, but its hold is over: only a new press starts another.
         self._spent = False
+        #: Tells this page from others of the same session.
+        self.view = f"page {secrets.token_hex(8)}"
 
     async def run(self) -> None:
         """Serve the page until it goes, breaks the rules, or the session ends."""
@@ -151,7 +154,7 @@ class OpenPage:
     def _take(self, message: FromPage) -> None:
         match message:
             case Ping(number=number, rendered=rendered):
-                self._desk.drew(self.session, rendered)
+                self._desk.drew(self.session, self.view, rendered, time.monotonic())
                 self._pong = Pong(number=number)
                 self.wake()
             case Hold(sequence=sequence, hold=hold):
@@ -187,7 +190,7 @@ class OpenPage:
             self._desk.end_lapsed_hold(now)
             self._spend("The hold ended: the page or its link was too slow. Press again to go on.")
             return
-        held = self._desk.hold(self.session, now)
+        held = self._desk.hold(self.session, now, self.view)
         if held.ok:
             self._holding, self._held_at = True, now
         elif not self._holding:

@@ -93,10 +93,23 @@ class Stop(_Body):
         return cls(reason=text[:STOP_REASON_LENGTH]) if text else cls()
 
 
+class TakeControl(_Body):
+    """`confirm` that control is to be taken from who holds it."""
+
+    confirm: bool = False
+
+
+class HardwareStop(_Body):
+    """Press or release the emergency stop button of the simulated robot."""
+
+    pressed: bool
+
+
 class Reset(_Body):
-    """Why it is safe again."""
+    """Why it is safe again; with `stop_id`, a stop that was pressed after that one is not reset with it."""
 
     reason: Annotated[str, Field(min_length=1, max_length=500)]
+    stop_id: Annotated[str, Field(max_length=64)] = ""
 
 
 class Target(_JsonTuples):

@@ -13,11 +13,12 @@ from dataclasses import dataclass
 
 from rolling_panda import intents, topics
 from rolling_panda import messages as m
+from rolling_panda.control_messages import Presence, StopState
 from rolling_panda.crop_messages import PointCrop
 from rolling_panda.page_messages import ProcessPresence
 from rolling_panda.plant_requests import PlantRequest
 from rolling_panda.teleop_messages import TeleopTarget
-from rolling_panda.transport import Transport
+from rolling_panda.transport import Received, Transport
 
 _STOP_REPEATS = 5
 _STOP_SPACING_S = 0.025
@@ -56,12 +57,16 @@ class RobotLink:
         self.crops: dict[str, PointCrop] = {}
         """The newest picture of each point, by its id."""
         transport.subscribe(topics.CROPS, self._on_crop)
+        self.control = transport.slot(topics.CONTROL)
+        self.stops: dict[str, Received[StopState]] = {}
+        transport.subscribe(topics.STOPS, self._on_stops)
         self.events = transport.feed(topics.EVENT, 500)
         self._heard: dict[str, float] = {}
         transport.subscribe(topics.HEARTBEAT, self._on_heartbeat)
         self._stop = transport.publisher(topics.STOP)
         self._teleop = transport.publisher(topics.TELEOP)
         self._beat = transport.publisher(topics.HEARTBEAT)
+        self._presence = transport.publisher(topics.PRESENCE)
         self._event = transport.publisher(topics.EVENT)
         # Its own thread, so that a controller that does not answer can never delay anything else.
         self._callers = ThreadPoolExecutor(max_workers=4, thread_name_prefix="intent")
@@ -106,6 +111,10 @@ class RobotLink:
     def teleop(self, target: TeleopTarget) -> None:
         """Publish where the held gizmo is."""
         self._teleop.put(target)
+
+    def presence_of(self, people: Presence) -> None:
+        """Say who is there."""
+        self._presence.put(people)
 
     def beat(self, sequence: int) -> None:
         """Say that the server's loop has turned."""
@@ -154,6 +163,9 @@ class RobotLink:
         self.crops[message.point_id] = message
         if len(self.crops) > _MOST_CROPS:
             del self.crops[next(iter(self.crops))]
+
+    def _on_stops(self, message: StopState, at: float) -> None:
+        self.stops[message.process] = Received(message, at)
 
     def _on_heartbeat(self, message: m.Heartbeat, at: float) -> None:
         self._heard[message.process] = at

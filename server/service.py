@@ -24,6 +24,7 @@ from server.event_log import EventLog
 from server.loop import Loop
 from server.page_view import PageView
 from server.passwords import Passwords
+from server.presence import PresentPeople
 from server.robot_link import RobotLink
 from server.robot_meshes import robot_parts
 from server.scene import Scene
@@ -107,6 +108,7 @@ async def serve(
         sessions,
         EventLog(config.log_lines),
         TeleopHold(config),
+        PresentPeople(),
         address,
         # Cookies do not know ports: two servers on one machine must not sign each other's people out.
         f"rolling_panda_{port}",

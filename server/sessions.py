@@ -36,6 +36,7 @@ class Session:
         used_at: When the session was last used (s).
         account: Fingerprint of the account that was signed in to with a password; empty for a link's session.
         ended: Set when the session is over; its sockets close.
+        client: Tells this session from others of the same name, on the wire and on pages; says nothing of the cookie.
     """
 
     session_id: str
@@ -44,6 +45,7 @@ class Session:
     used_at: float
     account: str = ""
     ended: asyncio.Event = field(default_factory=asyncio.Event)
+    client: str = field(default_factory=lambda: secrets.token_hex(8))
 
     @property
     def may_operate(self) -> bool:

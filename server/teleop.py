@@ -24,6 +24,8 @@ class Aim:
 class _Hold:
     holder: str
     user: str
+    view: str
+    client: str
     renewed_at: float
     aim: Aim
 
@@ -44,15 +46,23 @@ class TeleopHold:
         self._sequence = 0
         self._aims: dict[str, Aim] = {}
         self._drawn_at: dict[str, float] = {}
+        self._lag: dict[str, float] = {}
 
     @property
     def holder(self) -> str | None:
         """Key of who holds now."""
         return None if self._hold is None else self._hold.holder
 
-    def drew(self, holder: str, seen_at: float) -> None:
-        """`holder` has drawn the robot in the posture that was measured at this time (s)."""
-        self._drawn_at[holder] = seen_at
+    def drew(self, view: str, seen_at: float, now: float) -> None:
+        """A view says at `now` that it has drawn the robot in the posture that was measured at `seen_at` (s)."""
+        if seen_at > self._drawn_at.get(view, float("-inf")):
+            self._drawn_at[view] = seen_at
+            self._lag[view] = max(0.0, now - seen_at)
+
+    def unseen(self, view: str) -> None:
+        """A view has gone."""
+        self._drawn_at.pop(view, None)
+        self._lag.pop(view, None)
 
     def aim(self, holder: str, target: m.Pose) -> None:
         """Set where this holder's gizmo is; the newest wins."""
@@ -64,8 +74,8 @@ class TeleopHold:
         if self._hold is not None and self._hold.holder == holder:
             self._hold.aim = aim
 
-    def hold(self, holder: str, user: str, now: float) -> None:
-        """Start or renew a hold.
+    def hold(self, holder: str, user: str, now: float, view: str = "", client: str = "") -> None:
+        """Start or renew a hold, by what `view` shows: the page that holds, not another one of the same person.
 
         Raises:
             InputError: Somebody else holds, the holder's view is old, or there is no target.
@@ -73,14 +83,15 @@ class TeleopHold:
         self.expire(now)
         if self._hold is not None and self._hold.holder != holder:
             raise InputError(f"{self._hold.user} is holding the robot; wait until they let go")
-        age = now - self._drawn_at.get(holder, float("-inf"))
+        view = view or holder
+        age = now - self._drawn_at.get(view, float("-inf"))
         if age > self._config.view_timeout_s:
             raise InputError("the view of the robot is not current; teleoperation needs one younger than 0.5 s")
         if holder not in self._aims:
             raise InputError("there is no target yet; show the gizmo first")
         if self._hold is None:
-            self._hold = _Hold(holder, user, now, self._aims[holder])
-        self._hold.renewed_at = now
+            self._hold = _Hold(holder, user, view, client, now, self._aims[holder])
+        self._hold.renewed_at, self._hold.view = now, view
 
     def release(self, holder: str) -> bool:
         """End this holder's hold at once; True when they were holding."""
@@ -95,7 +106,7 @@ class TeleopHold:
         """The holder has gone: end the hold and drop what is known of it; True when they were holding."""
         held = self.release(holder)
         self._aims.pop(holder, None)
-        self._drawn_at.pop(holder, None)
+        self.unseen(holder)
         return held
 
     def expire(self, now: float) -> str | None:
@@ -103,7 +114,7 @@ class TeleopHold:
         hold = self._hold
         if hold is None:
             return None
-        seen_at = self._drawn_at.get(hold.holder, float("-inf"))
+        seen_at = self._drawn_at.get(hold.view, float("-inf"))
         if now - hold.renewed_at <= self._config.hold_timeout_s and now - seen_at <= self._config.view_timeout_s:
             return None
         self.release(hold.holder)
@@ -129,4 +140,6 @@ class TeleopHold:
             target=aim.target,
             base=aim.base,
             joints=aim.joints,
+            client=hold.client,
+            round_trip_s=min(self._lag.get(hold.view, 0.0), 1e3),
         )

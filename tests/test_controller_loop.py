@@ -144,7 +144,7 @@ def test_operator_is_answered_a_stop_latches_and_a_reset_releases_it(rest):
     assert "dog in the row" in rest.state.peek().message.reason or "eve" in rest.state.peek().message.reason
     rest.motion.drain()
     rest.until(lambda: True)
-    assert rest.server.call(INTENT, intents.Reset(user="ada", reason="dog gone")).ok
+    assert rest.server.call(INTENT, intents.Reset(user="ada", role="supervisor", reason="dog gone")).ok
     rest.until(lambda: rest.mode() == "IDLE")
     assert [release.stop_id for release in rest.releases] == ["s1"]
     said = " ".join(received.message.text for received in rest.events.drain())

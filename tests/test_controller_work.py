@@ -149,7 +149,7 @@ def test_stop_ends_motion_latches_and_the_reset_moves_nothing():
     assert r.state.mode == "ESTOP_LATCHED"
     assert "ada" in r.state.reason
     assert not r.ask(intents.Arm(user="ada")).ok
-    assert r.ask(intents.Reset(user="ada", reason="looked at it")).ok
+    assert r.ask(intents.Reset(user="ada", role="supervisor", reason="looked at it")).ok
     q = r.q.copy()
     r.run(1.0)
     assert r.state.mode == "IDLE"

@@ -27,7 +27,7 @@ def judged(orders: CutOrders, cut_id: str, inhibited: str = "") -> tuple[str, st
     """What comes of an order that is repeated until something does."""
     end = time.monotonic() + 20.0
     while True:
-        verdict, reason = orders.judge(order(cut_id), 3, True, inhibited)
+        verdict, reason = orders.judge(order(cut_id), None, True, inhibited)
         if verdict != "wait":
             return verdict, reason
         assert time.monotonic() < end
@@ -58,8 +58,8 @@ def test_an_order_that_was_spent_stays_so_after_a_restart(tmp_path: Path) -> Non
 def test_a_stop_between_two_repetitions_spends_the_order(tmp_path: Path) -> None:
     memory = CutFile(tmp_path)
     orders = CutOrders(memory)
-    assert orders.judge(order("a"), 3, True, "")[0] in ("wait", "cut")
-    orders.judge(order("b"), 3, True, "stopped")
+    assert orders.judge(order("a"), None, True, "")[0] in ("wait", "cut")
+    orders.judge(order("b"), None, True, "stopped")
     assert judged(orders, "b") == ("known", "")
     memory.close()
 
@@ -70,7 +70,7 @@ def test_a_disk_that_hangs_keeps_nobody_waiting_but_the_blades(tmp_path: Path, m
     monkeypatch.setattr(os, "fsync", lambda descriptor: (go.wait(20.0), real(descriptor)))
     orders = CutOrders(memory)
     began = time.monotonic()
-    verdicts = {orders.judge(order("a"), 3, True, "")[0] for _ in range(1000)}
+    verdicts = {orders.judge(order("a"), None, True, "")[0] for _ in range(1000)}
     assert verdicts == {"wait"} and time.monotonic() - began < 1.0
     go.set()
     assert judged(orders, "a") == ("cut", "")
@@ -123,7 +123,7 @@ print("up", flush=True)
 # The controller repeats the orders that it has had no word of, and then gives new ones.
 for number in range(max(0, first - 3), 10**9):
     while True:
-        verdict, _ = orders.judge(CutCommand(epoch=3, cut_id=f"run-{number}", point_id="p"), 3, True, "")
+        verdict, _ = orders.judge(CutCommand(epoch=3, cut_id=f"run-{number}", point_id="p"), None, True, "")
         if verdict == "cut":
             os.write(blades, f"{number}\\n".encode())
         if verdict != "wait":

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from bridge import gate as g
 from bridge.gate import Gate
-from rolling_panda.messages import MotionCommand
+from rolling_panda.messages import CutCommand, MotionCommand
 from rolling_panda.robot_model import RobotModel
 
 LIMIT = RobotModel().limits.velocity
@@ -15,8 +15,14 @@ REST = (0.0,) * 9
 MOVE = (1.0, 1.0, 0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def command(sequence: int, xi: tuple[float, ...] = MOVE, epoch: int = 1, echo: int = 1) -> MotionCommand:
-    return MotionCommand(epoch=epoch, sequence=sequence, echo=echo, xi=xi)  # type: ignore[arg-type]
+def command(
+    sequence: int, xi: tuple[float, ...] = MOVE, epoch: int = 1, echo: int = 1, token: str = "aa"
+) -> MotionCommand:
+    return MotionCommand(epoch=epoch, sequence=sequence, echo=echo, xi=xi, token=token)  # type: ignore[arg-type]
+
+
+def cut(epoch: int = 1, echo: int = 1, token: str = "aa") -> CutCommand:
+    return CutCommand(epoch=epoch, echo=echo, token=token, cut_id="c", point_id="p")
 
 
 @pytest.fixture
@@ -38,6 +44,8 @@ def test_a_fresh_newer_command_passes(awake: Gate) -> None:
     [
         (command(1), 0.1, g.OLD_SEQUENCE),
         (command(9, epoch=0), 0.1, g.OLD_EPOCH),
+        (command(9, token="bb"), 0.1, g.OTHER_TOKEN),
+        (command(9, epoch=2), 0.1, g.NOT_AT_REST),
         (command(2), 0.21, g.TOO_OLD),
         (command(2, echo=7), 0.1, g.UNSENT_ECHO),
         (command(2, (math.nan, *REST[1:])), 0.1, g.NOT_FINITE),
@@ -53,8 +61,38 @@ def test_a_refused_command_changes_nothing(awake: Gate, message: MotionCommand, 
 
 def test_a_new_controller_starts_its_sequence_again_and_silences_the_old_one(awake: Gate) -> None:
     assert awake.refuse(command(500), 0.1) is None
-    assert awake.refuse(command(1, epoch=2), 0.1) is None
+    assert awake.refuse(command(1, REST, epoch=2, token="bb"), 0.1) is None
     assert awake.refuse(command(501), 0.1) == g.OLD_EPOCH
+    assert awake.refuse(command(2, epoch=2, token="bb"), 0.1) is None
+
+
+def test_control_changes_hands_only_at_rest(awake: Gate) -> None:
+    assert awake.refuse(command(2), 0.1) is None
+    assert awake.refuse(command(3, REST, epoch=2), 0.1, at_rest=False) == g.MOVING
+    assert awake.refuse(command(3), 0.1, at_rest=False) is None
+    assert awake.refuse(command(4, REST, epoch=2), 0.1, at_rest=True) is None
+
+
+def test_two_controllers_that_count_alike_are_told_apart(awake: Gate) -> None:
+    assert awake.refuse(command(7, token="bb"), 0.1) == g.OTHER_TOKEN
+    assert awake.refuse(command(7, REST, token="bb"), 0.1) == g.OTHER_TOKEN
+
+
+def test_after_a_restart_the_bridge_knows_which_token_was_the_newest() -> None:
+    gate = Gate(LIMIT, 0.2, epoch=5, token="aa")
+    gate.sent(1, 0.0)
+    assert gate.refuse(command(1, REST, epoch=4), 0.0) == g.OLD_EPOCH
+    assert gate.refuse(command(1, REST, epoch=5, token="bb"), 0.0) == g.OTHER_TOKEN
+    assert gate.refuse(command(1, REST, epoch=5), 0.0) is None
+
+
+def test_a_cut_needs_the_token_of_the_newest_motion_and_a_fresh_view(awake: Gate) -> None:
+    assert awake.refuse_cut(cut(), 0.1) is None
+    assert awake.refuse_cut(cut(epoch=0), 0.1) == g.OLD_EPOCH
+    assert "no motion command" in (awake.refuse_cut(cut(epoch=2), 0.1) or "")
+    assert awake.refuse_cut(cut(token="bb"), 0.1) == g.OTHER_TOKEN
+    assert awake.refuse_cut(cut(echo=2), 0.1) == g.UNSENT_ECHO
+    assert awake.refuse_cut(cut(), 0.21) == g.TOO_OLD
 
 
 def test_exactly_the_limit_passes(awake: Gate) -> None:

@@ -73,12 +73,20 @@ def client(server):
         ("home", None, intents.Home(user="ann")),
         ("acknowledge", None, intents.Acknowledge(user="ann")),
         ("reset", {"reason": "checked"}, intents.Reset(user="ann", reason="checked")),
+        ("control/take", {"confirm": True}, intents.TakeControl(user="ann", confirmed=True)),
+        ("control/take", {}, intents.TakeControl(user="ann")),
+        ("control/request", None, intents.RequestControl(user="ann")),
+        ("control/grant", None, intents.GrantControl(user="ann")),
+        ("control/return", None, intents.ReturnControl(user="ann")),
     ],
 )
 def test_each_request_becomes_its_intent(server, client, path, body, intent):
     answer = client.post(f"/api/{path}", json=body)
     assert (answer.status_code, answer.json()) == (200, {"ok": True, "reason": "done"})
-    assert server.wire.asked == [intent]
+    (asked,) = server.wire.asked
+    # The role comes from the session, whatever a request says; the client is a key that is not the cookie's.
+    assert asked.role == "supervisor" and asked.client and asked.client not in server.cookie(client)
+    assert msgspec.structs.replace(asked, client="", role="operator") == intent
 
 
 def test_a_refusal_comes_with_its_reason_and_is_left_to_the_controller_to_log(server, client):

@@ -19,7 +19,7 @@ WELL = replace(
 
 def situation(mode: str = "READY", **changes: object) -> Situation:
     state = replace(modes.boot(), mode=mode)
-    usual = Situation(ControllerConfig(), state, WELL, homing=False, busy="", work=True)
+    usual = Situation(ControllerConfig(), state, WELL, homing=False, busy="", work=True, rights=modes.OPERATOR)
     return replace(usual, **changes)
 
 

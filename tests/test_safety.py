@@ -40,7 +40,7 @@ def test_without_the_robots_own_data_motion_stops_protectively(mode, changes, wo
     ("mode", "changes"),
     [
         ("TELEOP", {"server": 0.31}),
-        ("AUTO", {"server": 1.01}),
+        ("AUTO", {"server": 2.01}),
         ("TELEOP", {"present": ALL - {"server"}}),
         ("AUTO", {"present": ALL - {"server"}}),
     ],

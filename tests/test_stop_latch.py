@@ -16,7 +16,7 @@ BRIDGE = m.BridgeState(
     outcome="",
     real_time_factor=1.0,
 )
-RESET = intents.Reset(user="ada", reason="looked at it")
+RESET = intents.Reset(user="ada", role="supervisor", reason="looked at it")
 
 
 def stop(stop_id):
@@ -57,6 +57,45 @@ def test_echoes_of_a_released_stop_latch_nothing_but_the_bridges_latch_always_co
     assert latch.released(BRIDGE)
     assert latch.take((stop("a"),), BRIDGE) == ""
     assert latch.take((), bridge("a")) != ""
+
+
+def test_every_stop_is_kept_with_who_pressed_it_and_when_and_survives_a_restart():
+    latch = StopLatch()
+    assert latch.changed
+    latch.take((stop("a"),), BRIDGE, 100.0)
+    latch.take((stop("b"), stop("a")), bridge("a"), 101.0)
+    assert latch.changed
+    told = latch.message()
+    assert [(each.stop_id, each.user, each.wall_time) for each in told.stops] == [
+        ("b", "eve", 101.0),
+        ("a", "eve", 100.0),
+    ]
+    assert not latch.changed and told.process == "controller"
+    again = StopLatch(told.stops)
+    assert "dog in the row" in again.latched
+    assert again.message().stops == told.stops
+    assert again.take((stop("b"),), BRIDGE) == ""
+
+
+def test_a_reset_of_a_stop_that_is_not_the_newest_any_more_is_refused():
+    latch = StopLatch()
+    latch.take((stop("a"),), bridge("a"))
+    latch.take((stop("b"),), bridge("b"))
+    looked_at_a = intents.Reset(user="ada", role="supervisor", reason="looked at it", stop_id="a")
+    assert "another stop was pressed" in latch.ask_release(looked_at_a, bridge("b"), 1.0)
+    assert latch.release_due() is None
+    looked_at_b = intents.Reset(user="ada", role="supervisor", reason="looked at it", stop_id="b")
+    assert latch.ask_release(looked_at_b, bridge("b"), 1.0) == ""
+    assert latch.release_due().stop_id == "b"
+    assert latch.released(BRIDGE)
+    assert latch.message().released_by == "ada: looked at it"
+
+
+def test_without_a_bridge_nothing_is_released():
+    latch = StopLatch()
+    latch.take((stop("a"),), None)
+    latch.ask_release(RESET, None, 1.0)
+    assert not latch.released(None)
 
 
 def test_of_two_stops_the_one_that_the_bridge_holds_is_released():

@@ -14,7 +14,7 @@ THERE = m.Pose((0.4, 0.2, 0.3), (0.0, 0.0, 0.0, 1.0))
 
 def holding(now=10.0):
     teleop = TeleopHold(ServerConfig())
-    teleop.drew("a", now)
+    teleop.drew("a", now, now)
     teleop.aim("a", HERE)
     teleop.hold("a", "ann", now)
     return teleop
@@ -32,7 +32,7 @@ def test_the_newest_target_is_published_with_a_growing_sequence():
 
 def test_nothing_is_published_before_anybody_holds():
     teleop = TeleopHold(ServerConfig())
-    teleop.drew("a", 10.0)
+    teleop.drew("a", 10.0, 10.0)
     teleop.aim("a", HERE)
     assert teleop.due(10.0) is None
 
@@ -66,7 +66,7 @@ def test_a_page_that_no_longer_draws_the_robot_ends_the_hold():
 
 def test_the_first_holder_wins():
     teleop = holding()
-    teleop.drew("b", 10.0)
+    teleop.drew("b", 10.0, 10.0)
     teleop.aim("b", THERE)
     with pytest.raises(InputError, match="ann is holding"):
         teleop.hold("b", "bob", 10.1)
@@ -89,7 +89,7 @@ def test_a_hold_needs_a_target_and_an_eye_on_the_robot():
     with pytest.raises(InputError, match="view"):
         teleop.hold("a", "ann", 10.0)
     teleop = TeleopHold(ServerConfig())
-    teleop.drew("a", 10.0)
+    teleop.drew("a", 10.0, 10.0)
     with pytest.raises(InputError, match="gizmo"):
         teleop.hold("a", "ann", 10.0)
 
@@ -111,7 +111,7 @@ def test_a_target_goes_out_only_while_somebody_holds_with_a_fresh_view(steps):
     for action, who, pause in steps:
         now += pause
         if action == "drew":
-            teleop.drew(who, now)
+            teleop.drew(who, now, now)
             drawn[who] = now
         elif action == "aim":
             teleop.aim(who, HERE)
@@ -128,3 +128,30 @@ def test_a_target_goes_out_only_while_somebody_holds_with_a_fresh_view(steps):
         if message is not None and message.hold:
             assert now - renewed[message.user] <= 0.1501
             assert now - drawn[message.user] <= 0.5001
+
+
+def test_a_page_holds_by_what_it_shows_itself_and_not_by_another_page_of_the_same_person():
+    teleop = TeleopHold(ServerConfig())
+    teleop.aim("ann", HERE)
+    teleop.drew("page 1", 10.0, 10.0)
+    with pytest.raises(InputError, match="view"):
+        teleop.hold("ann", "ann", 10.0, view="page 2")
+    teleop.hold("ann", "ann", 10.0, view="page 1", client="c1")
+    teleop.drew("page 2", 10.45, 10.5)
+    for now in (10.1, 10.2, 10.3, 10.4, 10.5):
+        teleop.hold("ann", "ann", now, view="page 1", client="c1")
+    assert teleop.due(10.51).hold is False
+
+
+def test_how_late_the_holders_view_is_goes_out_with_the_target():
+    teleop = TeleopHold(ServerConfig())
+    teleop.aim("ann", HERE)
+    teleop.drew("page 1", 10.0, 10.21)
+    teleop.drew("page 2", 10.0, 10.05)
+    teleop.hold("ann", "ann", 10.25, view="page 1", client="c1")
+    target = teleop.due(10.25)
+    assert target.client == "c1"
+    assert target.round_trip_s == pytest.approx(0.21)
+    # The same state said again says nothing new.
+    teleop.drew("page 1", 10.0, 10.4)
+    assert teleop.due(10.26).round_trip_s == pytest.approx(0.21)

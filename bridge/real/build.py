@@ -11,6 +11,7 @@ from msgspec.structs import replace
 from bridge.config import BridgeConfig
 from bridge.core import TICK_S, BridgeCore
 from bridge.cut_memory import CutMemory
+from bridge.memory import Memory
 from bridge.odometer import Odometer
 from bridge.real.config import CutterConfig, RealConfig
 from bridge.real.cutter import Cutter, CutterStatus
@@ -104,7 +105,11 @@ def open_devices(config_path: Path, model: RobotModel, moving: bool) -> Devices:
 
 
 def real_bridge(
-    config_path: Path, moving: bool = True, rejections: Rejections | None = None, cuts: CutMemory | None = None
+    config_path: Path,
+    moving: bool = True,
+    rejections: Rejections | None = None,
+    cuts: CutMemory | None = None,
+    memory: Memory | None = None,
 ) -> BridgeCore:
     """A bridge with the real robot.
 
@@ -113,6 +118,7 @@ def real_bridge(
         moving: False only reads.
         rejections: Table to count refusals in, shared with the transport.
         cuts: Remembers cuts through restarts; None for as long as this lives.
+        memory: What else survives a restart; None forgets.
 
     Raises:
         ConfigError: A section is wrong.
@@ -129,7 +135,7 @@ def real_bridge(
         raise
     robot = RealRobot(devices.base, devices.arm, devices.blades, devices.camera, moving)
     odometer = Odometer(model.drive, config.odometry, TICK_S)
-    return BridgeCore(robot, config, model.limits, odometer, "real", None, rejections, cuts)
+    return BridgeCore(robot, config, model.limits, odometer, "real", None, rejections, cuts, memory)
 
 
 def wait_for_states(devices: Devices, limit_s: float = _FIRST_STATE_S) -> None:

@@ -6,6 +6,7 @@ from typing import Literal
 from bridge.config import BridgeConfig
 from bridge.core import TICK_S, BridgeCore
 from bridge.cut_memory import CutMemory
+from bridge.memory import Memory
 from bridge.odometer import Odometer
 from bridge.sim.camera_config import CameraConfig
 from bridge.sim.photographer import InlinePhotographer, Photographer, ProcessPhotographer
@@ -13,9 +14,11 @@ from bridge.sim.robot import SimulatedRobot
 from bridge.sim.trace import TraceWriter
 from bridge.sim.vineyard import grow
 from bridge.sim.vineyard_config import VineyardConfig
+from rolling_panda import topics
 from rolling_panda.config import RobotConfig, load_section
+from rolling_panda.control_messages import HardwareStop
 from rolling_panda.robot_model import RobotModel
-from rolling_panda.transport import Rejections
+from rolling_panda.transport import Onlooker, Rejections
 
 
 def simulated_bridge(
@@ -25,6 +28,7 @@ def simulated_bridge(
     camera: Literal["inline", "process"] = "inline",
     rejections: Rejections | None = None,
     cuts: CutMemory | None = None,
+    memory: Memory | None = None,
 ) -> BridgeCore:
     """A bridge with the simulated robot beside a row grown from `seed`.
 
@@ -36,6 +40,7 @@ def simulated_bridge(
             renders beside it, so that the physics keeps time.
         rejections: Table to count refusals in, shared with the transport.
         cuts: Remembers cuts through restarts; None for as long as this lives.
+        memory: What survives a restart; None forgets.
 
     Raises:
         ConfigError: A section is wrong, or the trace cannot be written.
@@ -50,4 +55,15 @@ def simulated_bridge(
     )
     odometer = Odometer(model.drive, config.odometry, TICK_S, seed)
     robot = SimulatedRobot(config, row, photographer, writer)
-    return BridgeCore(robot, config, model.limits, odometer, "sim", robot.scenery, rejections, cuts)
+    return BridgeCore(robot, config, model.limits, odometer, "sim", robot.scenery, rejections, cuts, memory)
+
+
+def subscribe_button(core: BridgeCore, transport: Onlooker) -> None:
+    """Let the wire press the emergency stop button that the simulated robot would have."""
+    robot = core.robot
+
+    def press(message: HardwareStop, at: float) -> None:
+        if isinstance(robot, SimulatedRobot):
+            robot.emergency = message.pressed
+
+    transport.subscribe(topics.HARDWARE_STOP, press)

@@ -77,6 +77,8 @@ class SimulatedRobot:
         self._heading = 0.0
         self._scenery: tuple[int, tuple[Capsule, ...]] = (-1, ())
         self.contacts = self.self_contacts = 0
+        #: The emergency stop button that the simulated robot would have is pressed.
+        self.emergency = False
 
     @property
     def time(self) -> float:
@@ -87,7 +89,13 @@ class SimulatedRobot:
         """Encoders and cutter."""
         data, plant, cutter = self._data, self._plant, self._cutter
         return Measurement(
-            data.qpos[plant.xi_q], data.qvel[plant.xi_v], cutter.state, cutter.cut_id, cutter.outcome, cutter.detail
+            data.qpos[plant.xi_q],
+            data.qvel[plant.xi_v],
+            cutter.state,
+            cutter.cut_id,
+            cutter.outcome,
+            cutter.detail,
+            emergency=self.emergency,
         )
 
     def write(self, setpoint: Setpoint) -> None:

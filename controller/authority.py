@@ -1,0 +1,139 @@
+"""Who may do what now: the lease, who is there, and whether somebody watches. Pure: `now` is an argument."""
+
+import math
+from collections.abc import Callable
+from typing import Final
+
+from controller.interface import Sample
+from controller.lease import Client, Lease, Token, first_epoch
+from controller.modes import Rights
+from rolling_panda import intents
+from rolling_panda.control_messages import ControlState, Person, Presence
+from rolling_panda.messages import Role
+
+#: Intents about control itself.
+ABOUT_CONTROL: Final = (intents.TakeControl, intents.RequestControl, intents.GrantControl, intents.ReturnControl)
+#: Intents that move the robot or lead to it: for who holds control.
+MOTION: Final = (intents.Arm, intents.Start, intents.Resume, intents.Home, intents.Acknowledge)
+
+
+class Authority:
+    """Keeps the lease by what the server says of who is there."""
+
+    def __init__(self, draw: Callable[[], str], supervision_s: float, starts: int = 0) -> None:
+        """Nobody is there.
+
+        Args:
+            draw: Gives the random part of a new token.
+            supervision_s: Automatic work goes on for so long without anybody who sees the robot (s).
+            starts: How often a controller of this robot has started, this time included.
+        """
+        self._lease, self._starts = Lease(draw), starts
+        self._supervision_s = supervision_s
+        self._newest: Sample[Presence] | None = None
+        self._seen = -math.inf
+
+    @property
+    def token(self) -> Token | None:
+        """Of the commands; None before the bridge has been heard."""
+        return self._lease.token
+
+    @property
+    def held(self) -> bool:
+        """Whether somebody holds control, and keeps it."""
+        return self._lease.holder is not None and self._lease.coming is None
+
+    def begin(self, seen: int) -> None:
+        """Count tokens from above the newest epoch that the bridge has accepted, and above all of earlier starts."""
+        self._lease.begin(first_epoch(self._starts, seen))
+
+    def review(self, presence: Sample[Presence] | None, at_rest: bool, now: float) -> str:
+        """Take in who is there. Returns why the robot must stop; empty when nobody lost control.
+
+        Args:
+            presence: Newest word of the server.
+            at_rest: Whether the robot stands still.
+            now: Monotonic time (s).
+        """
+        last = self._newest
+        if presence is not None and presence is not last:
+            # A number that does not grow is a repetition, unless the server was away for longer than a lease lives.
+            if last is None or presence.message.sequence > last.message.sequence or presence.at - last.at > 1.0:
+                self._newest = presence
+                self._lease.renew(frozenset(person.key for person in presence.message.people), presence.at)
+                self._watched(presence)
+        lost = self._lease.review(at_rest, now)
+        if self._lease.coming is not None:
+            lost = lost or f"{self._lease.coming.user} takes control"
+        return lost
+
+    def unwatched(self, now: float) -> str:
+        """Why automatic work may not go on; empty while somebody who may operate has seen the robot lately."""
+        age = now - self._seen
+        if age <= self._supervision_s:
+            return ""
+        since = "yet" if age == math.inf else f"for {age:.1f} s"
+        return f"nobody who may operate has seen the robot {since}, allowed are {self._supervision_s} s"
+
+    def rights(self, client: Client, role: Role) -> Rights:
+        """What a client counts as to the machine of modes. Control that nobody holds is anybody's to have."""
+        out = {"anyone"}
+        if role != "viewer":
+            out.add("operator")
+            if not self._lease.refusal(client):
+                out.add("holder")
+        if role == "supervisor":
+            out.add("supervisor")
+        return frozenset(out)  # type: ignore[arg-type]
+
+    def refusal(self, client: Client, role: Role) -> str:
+        """Why a client may not move the robot; empty when it may."""
+        return "a viewer may look and stop, not operate" if role == "viewer" else self._lease.refusal(client)
+
+    def claim(self, client: Client, now: float) -> None:
+        """Who moves a robot that nobody controls gets control of it."""
+        self._lease.claim(client, now)
+
+    def ask(self, intent: intents.Intent, now: float) -> str:
+        """Take, request, grant or return control; why not, empty when done."""
+        client, lease = client_of(intent), self._lease
+        if intent.role == "viewer":
+            return "a viewer may look and stop, not operate"
+        if isinstance(intent, intents.TakeControl):
+            return lease.take(client, intent.confirmed, now)
+        if isinstance(intent, intents.RequestControl):
+            return lease.request(client, now)
+        if isinstance(intent, intents.GrantControl):
+            return lease.grant(client)
+        return lease.give_back(client)
+
+    def message(self, now: float) -> ControlState:
+        """For the wire."""
+        lease = self._lease
+        holder, requested, coming = lease.holder, lease.requested, lease.coming
+        return ControlState(
+            holder="" if holder is None else holder.key,
+            user="" if holder is None else holder.user,
+            epoch=0 if lease.token is None else lease.token.epoch,
+            expires_s=lease.left(now),
+            requested_by="" if requested is None else requested.user,
+            requested_key="" if requested is None else requested.key,
+            coming="" if coming is None else coming.user,
+            told=lease.told[:500],
+            told_number=lease.told_number,
+            supervised=not self.unwatched(now),
+        )
+
+    def _watched(self, presence: Sample[Presence]) -> None:
+        views = [person.view_age_s for person in presence.message.people if _may_operate(person)]
+        if views:
+            self._seen = max(self._seen, presence.at - min(views))
+
+
+def client_of(intent: intents.Intent) -> Client:
+    """Who asks; where nothing else tells clients apart, the name does."""
+    return Client(intent.client or intent.user, intent.user)
+
+
+def _may_operate(person: Person) -> bool:
+    return person.role != "viewer"

@@ -1,0 +1,55 @@
+"""Who is there, for the controller: it renews the lease and tells whether somebody sees the robot. No clock here."""
+
+from dataclasses import dataclass
+
+from rolling_panda.control_messages import Person, Presence
+from server.sessions import Session
+
+#: Who has been silent for so long (s) is not there any more.
+HEARD_S = 1.0
+#: A view that nobody knows the age of counts as this old (s).
+_NEVER_S = 1e6
+
+
+@dataclass
+class _Client:
+    session: Session
+    heard_at: float
+    seen_at: float
+
+
+class PresentPeople:
+    """When each session was heard from, and how old the robot was as it was last drawn or fetched."""
+
+    def __init__(self) -> None:
+        """Nobody is there."""
+        self._clients: dict[str, _Client] = {}
+        self._sequence = 0
+
+    def heard(self, session: Session, now: float) -> None:
+        """A page or a script of this session has said something."""
+        self._of(session).heard_at = now
+
+    def saw(self, session: Session, seen_at: float) -> None:
+        """Something of this session has drawn or fetched the robot as it was at this time (s)."""
+        client = self._of(session)
+        client.seen_at = max(client.seen_at, seen_at)
+
+    def forget(self, session: Session) -> None:
+        """The last of this session has gone."""
+        self._clients.pop(session.client, None)
+
+    def message(self, now: float) -> Presence:
+        """Who is there now (s)."""
+        self._clients = {key: client for key, client in self._clients.items() if now - client.heard_at <= HEARD_S}
+        self._sequence += 1
+        return Presence(
+            sequence=self._sequence,
+            people=tuple(
+                Person(key, client.session.user, client.session.role, min(max(0.0, now - client.seen_at), _NEVER_S))
+                for key, client in self._clients.items()
+            ),
+        )
+
+    def _of(self, session: Session) -> _Client:
+        return self._clients.setdefault(session.client, _Client(session, float("-inf"), float("-inf")))

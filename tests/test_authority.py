@@ -1,0 +1,91 @@
+from controller.authority import Authority
+from controller.interface import Sample
+from controller.lease import Client
+from rolling_panda import intents
+from rolling_panda.control_messages import Person, Presence
+
+ADA, BOB = Client("a", "Ada"), Client("b", "Bob")
+
+
+def authority():
+    out = Authority(lambda: "00", 2.0)
+    out.begin(0)
+    return out
+
+
+def presence(number, at, *people):
+    return Sample(Presence(sequence=number, people=people), at)
+
+
+def ada(age=0.0, role="operator"):
+    return Person("a", "Ada", role, age)
+
+
+def test_rights_follow_role_and_lease():
+    it = authority()
+    assert it.rights(ADA, "viewer") == {"anyone"}
+    assert it.rights(ADA, "operator") == {"anyone", "operator", "holder"}
+    assert it.rights(ADA, "supervisor") == {"anyone", "operator", "holder", "supervisor"}
+    it.claim(ADA, 0.0)
+    assert it.rights(ADA, "operator") >= {"holder"}
+    assert it.rights(BOB, "supervisor") == {"anyone", "operator", "supervisor"}
+
+
+def test_the_servers_word_renews_the_lease_and_its_silence_ends_it():
+    it = authority()
+    it.claim(ADA, 0.0)
+    for number in range(1, 20):
+        assert it.review(presence(number, number * 0.2, ada()), False, number * 0.2) == ""
+    assert it.held
+    assert "Ada" in it.review(None, False, 19 * 0.2 + 1.0)
+    assert not it.held
+
+
+def test_a_repeated_or_older_word_renews_nothing():
+    it = authority()
+    it.claim(ADA, 0.0)
+    it.review(presence(5, 0.1, ada()), False, 0.1)
+    it.review(presence(5, 0.6, ada()), False, 0.6)
+    it.review(presence(4, 0.9, ada()), False, 0.9)
+    assert it.review(None, False, 1.1)
+
+
+def test_a_server_that_has_started_again_counts_from_one():
+    it = authority()
+    it.review(presence(900, 0.0, ada()), True, 0.0)
+    it.claim(ADA, 5.0)
+    it.review(presence(1, 5.1, ada()), True, 5.1)
+    assert it.review(presence(2, 5.9, ada()), True, 6.05) == ""
+
+
+def test_work_is_watched_by_who_may_operate_and_sees_the_robot():
+    it = authority()
+    assert "yet" in it.unwatched(0.0)
+    it.review(presence(1, 1.0, ada(role="viewer")), True, 1.0)
+    assert it.unwatched(1.0)
+    it.review(presence(2, 2.0, ada(age=0.3)), True, 2.0)
+    assert it.unwatched(3.6) == ""
+    assert "for 2.1 s" in it.unwatched(3.8)
+    # Heard, but nothing that is new has been drawn.
+    it.review(presence(3, 3.8, ada(age=2.1)), True, 3.8)
+    assert it.unwatched(3.8)
+
+
+def test_a_viewer_has_no_say_in_control():
+    it = authority()
+    assert "viewer" in it.ask(intents.TakeControl(user="eve", role="viewer", confirmed=True), 0.0)
+    assert not it.held
+
+
+def test_the_old_holder_is_told_before_and_after_control_goes_over():
+    it = authority()
+    it.claim(ADA, 0.0)
+    before = it.message(0.0)
+    assert it.ask(intents.TakeControl(user="Bob", client="b", confirmed=True), 0.1) == ""
+    assert it.message(0.1).coming == "Bob" and it.message(0.1).holder == "a"
+    assert it.review(None, False, 0.1) == "Bob takes control"
+    it.review(None, True, 0.2)
+    after = it.message(0.2)
+    assert (after.holder, after.user, after.coming) == ("b", "Bob", "")
+    assert after.told_number > before.told_number and "Bob" in after.told
+    assert after.epoch > before.epoch

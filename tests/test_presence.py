@@ -1,0 +1,43 @@
+import pytest
+
+from server.presence import PresentPeople
+from server.sessions import Session
+
+
+def session(user="ann", role="operator"):
+    return Session("cookie of " + user, user, role, 0.0)
+
+
+def test_who_says_something_is_there_for_a_second():
+    people, ann = PresentPeople(), session()
+    assert people.message(0.0).people == ()
+    people.heard(ann, 1.0)
+    (person,) = people.message(1.9).people
+    assert (person.key, person.user, person.role) == (ann.client, "ann", "operator")
+    assert people.message(2.1).people == ()
+
+
+def test_the_age_of_the_view_is_that_of_the_newest_state_drawn():
+    people, ann = PresentPeople(), session()
+    people.heard(ann, 5.0)
+    assert people.message(5.0).people[0].view_age_s == 1e6
+    people.saw(ann, 4.8)
+    people.saw(ann, 4.5)
+    assert people.message(5.0).people[0].view_age_s == pytest.approx(0.2)
+
+
+def test_numbers_grow_and_who_leaves_is_forgotten_at_once():
+    people, ann = PresentPeople(), session()
+    people.heard(ann, 1.0)
+    first = people.message(1.0)
+    people.forget(ann)
+    second = people.message(1.0)
+    assert second.sequence > first.sequence and second.people == ()
+
+
+def test_two_of_the_same_name_are_told_apart_and_the_cookie_is_not_told():
+    people, one, two = PresentPeople(), session(), session()
+    people.heard(one, 1.0)
+    people.heard(two, 1.0)
+    keys = {person.key for person in people.message(1.0).people}
+    assert len(keys) == 2 and not any("cookie" in key for key in keys)
