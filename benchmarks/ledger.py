@@ -23,6 +23,7 @@ from controller.ledger_check import verify
 from controller.ledger_writer import LedgerWriter
 from rolling_panda import intents
 from rolling_panda import messages as m
+from rolling_panda.priority import take_priority
 
 _PERIOD_S = 0.01
 _SLOW_S = 0.2
@@ -99,9 +100,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures here")
     parser.add_argument("--seconds", type=float, default=10.0, help="of each kind in each round (default: %(default)s)")
     parser.add_argument("--rounds", type=int, default=3, help="of all three kinds in turn (default: %(default)s)")
+    parser.add_argument(
+        "--real-time", action="store_true", help="scheduled before other programs, as the controller is"
+    )
     arguments = parser.parse_args(argv)
     if arguments.seconds <= 0.0 or arguments.rounds < 1:
         parser.error("--seconds and --rounds must be positive")
+    if arguments.real_time:
+        take_priority("control")
     durations: dict[str, list[float]] = {"no disk": [], "disk": [], "slow disk": []}
     with tempfile.TemporaryDirectory() as folder:
         for number, name in itertools.product(range(arguments.rounds), durations):
