@@ -1,10 +1,11 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from controller.config import ControllerConfig
 from controller.cut_clearance import CutClearance
 from controller.interface import Sample
-from controller.planning.limits import PlanLimits
 from controller.reach import CutPlan, PostureSearch, Unreachable
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.obstacle import Obstacle
@@ -89,21 +90,25 @@ def cane(x, y=0.785, top=1.159, spur=1):
 
 
 def test_the_spur_that_is_cut_is_in_nothings_way_and_another_one_as_near_is():
-    free, own = find(), find(cane(POINT[0]))
+    def beside(spur):
+        return find(cane(POINT[0]), cane(POINT[0] + 0.02, top=1.3, spur=spur))
+
+    free, own, crossed = find(), beside(1), beside(2)
     assert isinstance(own, CutPlan)
     np.testing.assert_array_equal(free.q_cut, own.q_cut)
-    # Where a cane crosses the cut that is not of the nearest spur, the straight approach is not taken.
-    crossed = find(cane(POINT[0]), cane(POINT[0] + 0.02, top=1.3, spur=2))
+    # Where the cane is of another spur, the straight approach is not taken.
     assert not isinstance(crossed, CutPlan) or not np.allclose(crossed.q_cut, free.q_cut)
 
 
 def test_clear_of_the_canes_there_is_room_for_a_plan_to_lead_on():
-    """Blades may come nearer to something at the cut than where ways begin and end."""
+    """The blades may come nearer to something at the cut than where ways begin and end."""
     free = find()
     x, y, z = free.poses.clear.translation.tolist()
     beside = Capsule("wire", (x + 0.047, y, z - 0.03), (x + 0.047, y, z + 0.03), 0.002, 0.002)
-    plan = find(beside)
-    model = CollisionModel(RobotModel())
-    model.set_obstacles([Obstacle("wire 0", "wire", beside.start, beside.end, 0.002)])
-    assert SETTINGS.blade_distance + 0.003 < model.least(free.q_clear).distance < PlanLimits.clearance
-    assert isinstance(plan, Unreachable) or model.least(plan.q_clear).distance >= PlanLimits.clearance
+    clearance = CutClearance(RobotModel(), CONFIG)
+    clearance.take(Sample(Obstacles(header=m.Header(0.0, "odom"), capsules=(beside,)), 0.0))
+    near, far = free.q_clear.copy(), free.q_clear.copy()
+    far[0] += 1.0
+    assert clearance.admits(replace(free, q_clear=far, q_stand_off=far, q_cut=near))
+    assert not clearance.admits(replace(free, q_clear=near, q_stand_off=far, q_cut=far))
+    assert clearance.lacking.startswith("clear of it 17 mm") and "20 mm are needed" in clearance.lacking

@@ -3,12 +3,14 @@
 from collections.abc import Callable, Sequence
 
 from controller.config import ControllerConfig
+from controller.whole_body.braked import Braked
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.decoupled import Decoupled
 from controller.whole_body.guards.collision import CollisionGuard
 from controller.whole_body.guards.tipping import TippingGuard
 from controller.whole_body.hierarchy import Hierarchy
 from controller.whole_body.nullspace import Nullspace
+from controller.whole_body.saturation import Saturation
 from controller.whole_body.task import Guard, Method
 from controller.whole_body.tipping import Tipping
 from rolling_panda.errors import ConfigError
@@ -26,7 +28,8 @@ def make_method(
         robot: Its model.
         config: Of the controller.
         dt: Control period (s).
-        collision: What knows the obstacles, on the same `robot`; None makes one without obstacles where it is needed.
+        collision: What knows the obstacles, on the same `robot`. With None `hierarchy` keeps its distance to itself and
+            the ground, and the other methods to nothing.
 
     Raises:
         ConfigError: There is no method of that name; the text lists those there are.
@@ -52,9 +55,20 @@ def _hierarchy(robot: RobotModel, config: ControllerConfig, dt: float, collision
     return Hierarchy(robot, config, dt, guards(robot, config, dt, collision))
 
 
-#: The methods that know no inequalities beyond the limits leave the collision model alone.
+def _braked(make: Callable[[RobotModel, ControllerConfig, float], Method]) -> Maker:
+    """Methods that know no inequalities beyond the limits are braked where obstacles are known."""
+
+    def maker(robot: RobotModel, config: ControllerConfig, dt: float, collision: CollisionModel | None) -> Method:
+        method = make(robot, config, dt)
+        if collision is None or not config.hierarchy.collisions:
+            return method
+        return Braked(method, CollisionGuard(collision, config.hierarchy, dt), Saturation(robot, config, dt))
+
+    return maker
+
+
 METHODS: dict[str, Maker] = {
     Hierarchy.name: _hierarchy,
-    Nullspace.name: lambda robot, config, dt, _: Nullspace(robot, config, dt),
-    Decoupled.name: lambda robot, config, dt, _: Decoupled(robot, config, dt),
+    Nullspace.name: _braked(Nullspace),
+    Decoupled.name: _braked(Decoupled),
 }
