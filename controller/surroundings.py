@@ -45,7 +45,10 @@ class Surroundings:
         self._allow()
 
     def work_at(self, places: tuple[Array, ...]) -> None:
-        """Let the blades, and nothing else of the robot, touch the spurs that are cut at these places (3, m, odom)."""
+        """Let the blades touch the spurs that are cut at these places (3, m, odom), and nothing else of the robot.
+
+        Beside a cut they may also push aside canes of which it is not decided that they stay.
+        """
         if len(places) == len(self._places) and all(map(np.array_equal, places, self._places)):
             return
         self._places = places
@@ -57,10 +60,12 @@ class Surroundings:
             gaps = self._axes.gaps(np.array(self._places), np.zeros(len(self._places)))
             for row in gaps:
                 nearest = int(np.argmin(row))
-                if row[nearest] < _ON_SPUR:
-                    spur = self._canes[nearest].vine, self._canes[nearest].spur
-                    same = ((c.vine, c.spur) == spur for c in self._canes)
-                    allowed |= {name for name, is_same in zip(self._names, same, strict=True) if is_same}
+                if row[nearest] >= _ON_SPUR:
+                    continue
+                spur = self._canes[nearest].vine, self._canes[nearest].spur
+                for cane, name, gap in zip(self._canes, self._names, row.tolist(), strict=True):
+                    if (cane.vine, cane.spur) == spur or cane.undecided and gap < _ON_SPUR:
+                        allowed.add(name)
         self.model.allow(allowed)
 
 

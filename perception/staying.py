@@ -142,7 +142,8 @@ class StayingCanes:
                 if goes or not often:
                     cane.withdraw()
                 else:
-                    _tell(cane, known, _end(cane, known, rule), spur.number)
+                    open_choice = rule.system == "spur" and not decided
+                    _tell(cane, known, _end(cane, known, rule), spur.number, open_choice)
 
     def _glance(self, cane: _Cane, view: View, labels: NDArray[np.uint8]) -> None:
         assert cane.axis is not None
@@ -167,18 +168,19 @@ def _end(cane: _Cane, known: KnownCane, rule: RuleConfig) -> float:
     return rule.basal_reach + kept * _INTERNODE
 
 
-def _tell(cane: _Cane, known: KnownCane, end: float, number: SpurNumber) -> None:
+def _tell(cane: _Cane, known: KnownCane, end: float, number: SpurNumber, undecided: bool) -> None:
     """Put what is known now in place of what was told, where it is something else."""
     axis, radius = _sampled(known, end), float(known.radius.mean[0])
     if float(np.linalg.norm(axis[-1] - axis[0])) < _SHORTEST:
         cane.withdraw()
         return
-    if cane.axis is not None and abs(radius - cane.radius) < _THICKER and _apart(axis, cane.axis) < _MOVED:
+    same = cane.axis is not None and cane.capsules[0].undecided == undecided and abs(radius - cane.radius) < _THICKER
+    if same and cane.axis is not None and _apart(axis, cane.axis) < _MOVED:
         return
     cane.axis, cane.radius = axis, radius
     corners = _corners(axis)
     cane.capsules = tuple(
-        Capsule("cane", _vector(start), _vector(stop), radius, radius, number.vine, number.spur)
+        Capsule("cane", _vector(start), _vector(stop), radius, radius, number.vine, number.spur, undecided)
         for start, stop in zip(corners, corners[1:], strict=False)
     )
 

@@ -14,6 +14,7 @@ class Capsule(Struct, frozen=True, forbid_unknown_fields=True):
     """A rod with round ends: axis from `start` to `end` (m), radii at both (m).
 
     `vine` and `spur`, numbers as pruning points have them, are of the spur that it grows from; -1 where there is none.
+    `undecided` wood may yet be cut off: which cane of that spur stays was left to a person.
     """
 
     kind: WoodClass
@@ -23,6 +24,7 @@ class Capsule(Struct, frozen=True, forbid_unknown_fields=True):
     end_radius: NonNegative
     vine: Number = -1
     spur: Number = -1
+    undecided: bool = False
 
 
 class Scenery(Message, frozen=True, kw_only=True):

@@ -84,6 +84,7 @@ def test_what_stays_is_the_keeper_to_just_below_its_cut():
 
 def test_where_the_choice_is_open_every_cane_counts_as_far_as_the_rule_would_leave_it():
     capsules = told(known(cane(), cane(0.05, nodes=(0.02, 0.09, 0.15, 0.22))))
+    assert all(c.undecided for c in capsules) and not any(c.undecided for c in told(known(cane()), cut(0.2)))
     ends = sorted({(round(c.end[0], 2), round(top([c]), 3)) for c in capsules})
     assert ends == [(0.0, 0.19), (0.05, 0.16)]
     # Nodes that were not seen may be farther up than those that were.
@@ -94,6 +95,7 @@ def test_a_guyot_spur_keeps_both_canes():
     plants = known(cane(), cane(0.05))
     capsules = told(plants, cut(0.20), cut(0.30, 0.05, "cane cut"), rule=GUYOT)
     assert {(round(c.end[0], 2), round(top([c]), 2)) for c in capsules} == {(0.0, 0.19), (0.05, 0.29)}
+    assert not any(c.undecided for c in capsules)
     # The fruiting cane stays where no cut on it was found, as long as it is known.
     assert top(told(plants, cut(0.20), rule=GUYOT)) == pytest.approx(0.35, abs=0.002)
 
@@ -134,8 +136,10 @@ def test_noise_moves_nothing_and_a_cane_that_has_moved_is_told_anew():
 def test_a_proposal_that_is_taken_back_is_no_cut_and_one_that_was_made_is():
     staying, plants = StayingCanes(CONFIG), known(cane(), cane(0.05))
     assert {round(c.end[0], 2) for c in told(plants, cut(0.2), staying=staying)} == {0.0}
-    assert {round(c.end[0], 2) for c in told(plants, staying=staying)} == {0.0, 0.05}
+    open_again = told(plants, staying=staying)
+    assert {round(c.end[0], 2) for c in open_again} == {0.0, 0.05} and all(c.undecided for c in open_again)
     before = told(plants, cut(0.2), staying=staying)
+    assert not any(c.undecided for c in before)
     assert plants.sever(cut(0.2).cut.position)
     assert told(plants, staying=staying) == before, "the keeper's stump stands, the other cane still goes"
 

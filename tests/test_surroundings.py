@@ -72,6 +72,17 @@ def test_what_is_cut_stays_known_when_canes_are_told_anew_under_other_numbers() 
     assert "blades" not in parts_near(around, HOME, "cane 1 of vine 1, spur 2")
 
 
+def test_beside_a_cut_the_blades_may_push_aside_what_may_yet_be_cut_off() -> None:
+    around = Surroundings(CollisionModel(RobotModel()))
+    open_choice = [msgspec.structs.replace(cane(x, spur=spur), undecided=True) for x, spur in ((1.02, 3), (1.08, 4))]
+    around.take(told(cane(1.0), *open_choice))
+    beside, away = "cane 1 of vine 1, spur 3", "cane 2 of vine 1, spur 4"
+    assert "blades" in parts_near(around, HOME, beside)
+    around.work_at((np.array([1.0, 0.0, 1.22]),))
+    assert "blades" not in parts_near(around, HOME, beside) and "cutter" in parts_near(around, HOME, beside)
+    assert "blades" in parts_near(around, HOME, away)
+
+
 def test_a_cut_far_from_every_cane_exempts_none() -> None:
     around = Surroundings(CollisionModel(RobotModel()))
     around.take(told(cane(1.0)))
