@@ -50,6 +50,7 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         reach_timeout_s: A motion that has not ended this long after its planned end has failed (s).
         cut_timeout_s: A cut without outcome for this long is UNKNOWN (s).
         largest_radius: Canes thicker than this are refused (m).
+        survey_speed: Of the base on a survey (m/s).
         confirm: Whether each point is looked at from near before it is cut.
         verify: Whether each cut is looked at afterwards; else the cutter's word is taken for it.
         look_within: The look before a cut is taken this near to the place clear of the canes (m).
@@ -120,6 +121,7 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
     reach_timeout_s: Positive = 6.0
     cut_timeout_s: Positive = 3.0
     largest_radius: Positive = 0.0075
+    survey_speed: Positive = 0.15
     confirm: bool = True
     verify: bool = True
     look_within: Positive = 0.08

@@ -2,8 +2,14 @@
 
 import numpy as np
 
+from controller.config import ControllerConfig
+from controller.motion import Measured
 from controller.queue import Ticket
+from controller.tool_motion import ToolMotion
 from rolling_panda.look_messages import CloseLook
+
+#: From farther away the base has to come first, before the canes are entered (m).
+_BASE_NEAR = 0.1
 
 
 def not_as_accepted(look: CloseLook, ticket: Ticket | None, tolerance: float) -> str:
@@ -26,3 +32,17 @@ def not_as_accepted(look: CloseLook, ticket: Ticket | None, tolerance: float) ->
     if moved > tolerance:
         return f"moved {1e3 * moved:.0f} mm on a closer look: accept it again"
     return ""
+
+
+def camera_ready(robot: Measured, motion: ToolMotion, config: ControllerConfig) -> bool:
+    """Whether the camera has the point in view from near, and hardly moves.
+
+    Args:
+        robot: Measured robot.
+        motion: To where the tool is clear of the canes.
+        config: How near, and how slow.
+    """
+    away = robot.kinematics.T_odom_tool.translation - motion.goal.translation
+    speed = float(np.linalg.norm(robot.kinematics.J_xi[:3] @ robot.sent))
+    base = float(np.linalg.norm(robot.q[:2] - motion.q_goal[:2]))
+    return float(np.linalg.norm(away)) < config.look_within and base < _BASE_NEAR and speed < config.look_speed

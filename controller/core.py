@@ -289,7 +289,7 @@ class Controller:
         if work.pause:
             self._event(Event.LOST, now, work.pause)
         elif work.finished:
-            self._event(Event.FINISHED, now, "no accepted point is left")
+            self._event(Event.FINISHED, now, work.summary)
         return work.xi, self._cut(*work.cut) if work.cut is not None and self._state.mode == "AUTO" else None
 
     def _cut(self, cut_id: str, point_id: str) -> m.CutCommand | None:
@@ -363,9 +363,9 @@ class Controller:
             self._authority.claim(client, now)
         if event is not None:
             rights = self._authority.rights(client, intent.role)
-            refused = self._event(event, now, f"{event.value} by {intent.user}", rights)
+            refused = self._event(event, now, f"{type(intent).__name__.lower()} by {intent.user}", rights)
             if isinstance(intent, intents.Start) and not refused:
-                self._sequence.begin()
+                self._sequence.begin(intent.distance if isinstance(intent, intents.Survey) else 0.0)
             return refused
         if isinstance(intent, intents.Home):
             self._homing = Homing(self._config, self._follower, self._dt)

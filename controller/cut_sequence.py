@@ -12,7 +12,7 @@ import numpy as np
 
 from controller.blades import Blades
 from controller.config import ControllerConfig
-from controller.confirmation import not_as_accepted
+from controller.confirmation import camera_ready, not_as_accepted
 from controller.cut_pose import escape_pose
 from controller.eye import Eye
 from controller.motion import Follower, Measured, Tracking
@@ -20,6 +20,7 @@ from controller.next_cut import Known, NextCut
 from controller.queue import PointQueue
 from controller.reach import CutPlan, PostureSearch, Unreachable
 from controller.stages import PHASES, Stage, Work
+from controller.survey import Survey
 from controller.tool_motion import Leg, ToolMotion
 from controller.verification import Verification
 from controller.ways import Ways, at_base
@@ -32,8 +33,6 @@ from rolling_panda.look_messages import CloseLook
 _REFINED = 0.0003
 #: A look that does not show its point is taken once more.
 _PICTURES = 2
-#: From farther away the base has to come first, before the canes are entered (m).
-_BASE_NEAR = 0.1
 #: Between motions without an end to hold: near enough to go on (m).
 _NEAR = 0.02
 
@@ -64,6 +63,7 @@ class CutSequence:
         self._motion: ToolMotion | None = None
         self._plan: CutPlan | None = None
         self._accepted: m.PruningPoint | None = None
+        self._survey = Survey(config, follower, saturation, queue, 0.0)
         self._places: tuple[Array, ...] = ()
         self._ways = Ways(config, follower.flows)
         self._eye = Eye(config.look_timeout_s, _PICTURES)
@@ -107,13 +107,14 @@ class CutSequence:
         """Whether a cut has been asked for and how it ends is not known yet: the blades may be closing."""
         return self._blades.busy
 
-    def begin(self) -> None:
-        """Start with getting the tool clear of the canes."""
+    def begin(self, survey: float = 0.0) -> None:
+        """Start with getting the tool clear of the canes, or a survey of so much of the row (m)."""
         self._forget()
         # Since a plan was made the robot may have been moved by hand.
         self._coming.forget()
         self._ending = ""
-        self._stage = Stage.ESCAPE
+        self._stage = Stage.SURVEY if survey > 0.0 else Stage.ESCAPE
+        self._survey = Survey(self._config, self._follower, self._saturation, self._queue, survey)
 
     def wind_up(self, why: str) -> None:
         """Begin no further cut, come out of the canes and pause, where there is a reason; empty = work goes on."""
@@ -143,7 +144,7 @@ class CutSequence:
         self._events = []
         if self._stage in (Stage.SEARCH, Stage.TRAVEL, Stage.LOOK, Stage.ADVANCE):
             self._check_acceptance(robot)
-        if self._ending and self._stage in (Stage.SEARCH, Stage.TRAVEL, Stage.LOOK):
+        if self._ending and self._stage in (Stage.SEARCH, Stage.TRAVEL, Stage.LOOK, Stage.SURVEY):
             return Work(self._saturation.ramp(robot.sent), pause=self._ending)
         if self._ending and self._stage is Stage.ADVANCE:
             self._retreat_from(robot)
@@ -208,7 +209,7 @@ class CutSequence:
         last = self._motion.leg == self._motion.legs - 1
         if last and not self._config.confirm:
             self._stage = Stage.ADVANCE
-        elif last and self._slow_near(robot):
+        elif last and camera_ready(robot, self._motion, self._config):
             self._eye.ask(self._point_id, now)
             self._started, self._stage = None, Stage.LOOK
         elif self._config.confirm and not self._over(tracking, now, 0.0) and self._late(now):
@@ -279,6 +280,9 @@ class CutSequence:
             return Work(tracking.xi, tracking, pause=f"{self._point_id} is UNKNOWN: {ticket.reason}")
         return self._next(robot)
 
+    def _surveying(self, robot: Measured, now: float) -> Work:
+        return self._survey.step(robot, now)
+
     def _rest(self, robot: Measured, now: float) -> Work:
         return self._next(robot)
 
@@ -334,15 +338,6 @@ class CutSequence:
         """From a pose of the tool (pin.SE3) at q (12) to a cut; where a look comes first, to where it is taken."""
         there = self._ways.there(plan, T_odom_tool, q)
         return there if self._config.confirm else (*there, self._ways.into(plan))
-
-    def _slow_near(self, robot: Measured) -> bool:
-        """Whether the camera has the point in view from near, and hardly moves."""
-        assert self._motion is not None
-        away = robot.kinematics.T_odom_tool.translation - self._motion.goal.translation
-        speed = float(np.linalg.norm(robot.kinematics.J_xi[:3] @ robot.sent))
-        base = float(np.linalg.norm(robot.q[:2] - self._motion.q_goal[:2]))
-        near = float(np.linalg.norm(away)) < self._config.look_within and base < _BASE_NEAR
-        return near and speed < self._config.look_speed
 
     def _ended(self, point_id: str, outcome: m.Outcome, word: str, now: float) -> None:
         self._verification.begin(point_id, outcome, word, now)
@@ -400,4 +395,5 @@ _STEPS = {
     Stage.ADVANCE: CutSequence._advance,
     Stage.CUT: CutSequence._cutting,
     Stage.RETREAT: CutSequence._retreat,
+    Stage.SURVEY: CutSequence._surveying,
 }

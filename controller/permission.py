@@ -12,6 +12,7 @@ from rolling_panda import intents
 EVENTS: dict[type[intents.Intent], Event] = {
     intents.Arm: Event.ARM,
     intents.Start: Event.START,
+    intents.Survey: Event.START,
     intents.Pause: Event.PAUSE,
     intents.Resume: Event.RESUME,
     intents.Acknowledge: Event.ACKNOWLEDGE,
@@ -26,6 +27,7 @@ _PROBES: dict[type[intents.Intent], intents.Intent | None] = {
     intents.ResolvePoint: None,
     intents.AcceptAll: None,
     intents.Start: intents.Start(user=""),
+    intents.Survey: intents.Survey(user=""),
     intents.Pause: intents.Pause(user=""),
     intents.Resume: intents.Resume(user=""),
     intents.Home: intents.Home(user=""),
@@ -90,7 +92,7 @@ def refusal(intent: intents.Intent, now: float, situation: Situation) -> str:
         if why:
             return why
     if isinstance(intent, intents.Start):
-        if not situation.work:
+        if not situation.work and not isinstance(intent, intents.Survey):
             return "no point is accepted"
         return safety.perception(health, config) or situation.unwatched
     if isinstance(intent, intents.Home) and mode != "READY":

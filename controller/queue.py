@@ -55,6 +55,8 @@ class PointQueue:
         """Start empty; changes are recorded in `journal`."""
         self._config = config
         self._journal = journal or Journal()
+        self.perceived: PruningPoints | None = None
+        """What perception told last."""
         self._along = np.array([np.cos(config.row_heading), np.sin(config.row_heading), 0.0])
         self._tickets: dict[str, Ticket] = {}
         self._order: list[str] = []
@@ -71,6 +73,7 @@ class PointQueue:
                 elsewhere than accepted it is void like any other.
         """
         voided: list[str] = []
+        self.perceived = points
         seen = {point.point_id for point in points.points}
         for point in points.points:
             ticket = self._tickets.get(point.point_id)

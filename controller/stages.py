@@ -19,6 +19,7 @@ class Stage(Enum):
     ADVANCE = "straight in"
     CUT = "cutting"
     RETREAT = "straight back"
+    SURVEY = "driving along the row"
 
 
 PHASES: dict[Stage, m.Phase] = {
@@ -30,6 +31,7 @@ PHASES: dict[Stage, m.Phase] = {
     Stage.ADVANCE: "ADVANCE",
     Stage.CUT: "CUT",
     Stage.RETREAT: "RETREAT",
+    Stage.SURVEY: "SURVEY",
 }
 
 
@@ -41,7 +43,8 @@ class Work:
         xi: ξ̇ to send (9).
         tracking: Of the motion, None while standing.
         cut: The cut to command now: (cut_id, point_id) as a message without its epoch, else None.
-        finished: True when no accepted point is left.
+        finished: True when there is nothing more to do.
+        summary: Why, in words.
         pause: Why work must pause, empty when it goes on.
         events: What happened, in words.
     """
@@ -50,6 +53,7 @@ class Work:
     tracking: Tracking | None = None
     cut: tuple[str, str] | None = None
     finished: bool = False
+    summary: str = "no accepted point is left"
     pause: str = ""
     events: tuple[str, ...] = ()
 

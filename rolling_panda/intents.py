@@ -61,6 +61,12 @@ class Start(Intent, frozen=True, kw_only=True):
     """READY → AUTO on the accepted points."""
 
 
+class Survey(Start, frozen=True, kw_only=True):
+    """READY → AUTO along the row with the arm in its looking posture; nothing is cut. `distance` ahead (m)."""
+
+    distance: Annotated[float, Meta(ge=0.1, le=500.0)] = 4.0
+
+
 class Pause(Intent, frozen=True, kw_only=True):
     """AUTO or TELEOP → PAUSED."""
 
@@ -113,6 +119,7 @@ AnyIntent = (
     | ResolvePoint
     | AcceptAll
     | Start
+    | Survey
     | Pause
     | Resume
     | Home

@@ -36,7 +36,7 @@ Process = Literal["bridge", "controller", "perception", "server"]
 PROCESSES: tuple[Process, ...] = ("bridge", "controller", "perception", "server")
 
 Mode = Literal["IDLE", "READY", "TELEOP", "AUTO", "PAUSED", "PROTECTIVE_STOP", "FAULT", "ESTOP_LATCHED"]
-Phase = Literal["", "APPROACH", "LOOK", "ADVANCE", "CUT", "RETREAT"]
+Phase = Literal["", "APPROACH", "LOOK", "ADVANCE", "CUT", "RETREAT", "SURVEY"]
 PointState = Literal["PROPOSED", "ACCEPTED", "INTENT", "DONE", "FAILED_NOT_CUT", "UNKNOWN", "REJECTED"]
 Severity = Literal["info", "warning", "error"]
 Outcome = Literal["", "DONE", "FAILED_NOT_CUT", "UNKNOWN"]

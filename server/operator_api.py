@@ -101,6 +101,11 @@ def operator_router(desk: Desk) -> APIRouter:
         """Start automatic work on the accepted points."""
         return await ask(session, intents.Start(user=session.user))
 
+    @router.post("/survey", tags=["mode"])
+    async def survey(session: Caller, request: body.Survey) -> Response:
+        """Drive along the row with the camera on the vines; cuts nothing. Ends with what was found."""
+        return await ask(session, intents.Survey(user=session.user, distance=request.distance))
+
     @router.post("/pause", tags=["mode"])
     async def pause(session: Caller) -> Response:
         """Pause; nothing resumes by itself."""

@@ -70,6 +70,12 @@ class ResolvePoint(_Body):
     reason: Annotated[str, Field(min_length=1, max_length=400)]
 
 
+class Survey(_Body):
+    """How far ahead along the row (m)."""
+
+    distance: Annotated[float, Field(ge=0.1, le=500.0)] = 4.0
+
+
 class AcceptAll(_Body):
     """Least confidence, 0…1."""
 

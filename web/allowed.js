@@ -8,6 +8,7 @@ import { MODE_WORDS } from "./words.js";
 const NEEDS = Object.freeze({
   Arm: "Arming starts from Idle",
   Start: "Starting needs Ready",
+  Survey: "A survey needs Ready",
   Pause: "There is nothing to pause",
   Resume: "Resuming needs Paused",
   Home: "Going home needs Ready",

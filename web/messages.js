@@ -17,7 +17,7 @@ export const SEVERITIES = Object.freeze(["info", "warning", "error"]);
 export const ROLES = Object.freeze(["viewer", "operator", "supervisor"]);
 
 /** What `ControllerState.allowed` may contain. */
-export const INTENTS = Object.freeze(["Arm", "AcceptPoint", "RejectPoint", "ReconsiderPoint", "ResolvePoint", "AcceptAll", "Start", "Pause", "Resume", "Home", "Acknowledge", "Reset", "TakeControl", "RequestControl", "GrantControl", "ReturnControl"]);
+export const INTENTS = Object.freeze(["Arm", "AcceptPoint", "RejectPoint", "ReconsiderPoint", "ResolvePoint", "AcceptAll", "Start", "Survey", "Pause", "Resume", "Home", "Acknowledge", "Reset", "TakeControl", "RequestControl", "GrantControl", "ReturnControl"]);
 
 export const TEXT_MAX_LENGTH = 500;
 
@@ -39,7 +39,7 @@ export const TEXT_MAX_LENGTH = 500;
 
 /** @typedef {"IDLE"|"READY"|"TELEOP"|"AUTO"|"PAUSED"|"PROTECTIVE_STOP"|"FAULT"|"ESTOP_LATCHED"} Mode */
 
-/** @typedef {""|"APPROACH"|"LOOK"|"ADVANCE"|"CUT"|"RETREAT"} Phase */
+/** @typedef {""|"APPROACH"|"LOOK"|"ADVANCE"|"CUT"|"RETREAT"|"SURVEY"} Phase */
 
 /** @typedef {"PROPOSED"|"ACCEPTED"|"INTENT"|"DONE"|"FAILED_NOT_CUT"|"UNKNOWN"|"REJECTED"} PointState */
 

@@ -31,6 +31,7 @@ export const PHASE_WORDS = Object.freeze({
   ADVANCE: "advance",
   CUT: "cut",
   RETREAT: "retreat",
+  SURVEY: "survey",
 });
 
 /** @type {Readonly<Record<string, string>>} */

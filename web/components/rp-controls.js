@@ -9,6 +9,7 @@ import { drawOn } from "../store.js";
 /** @type {readonly (readonly [id: string, intent: string, word: string, hint: string])[]} */
 const BUTTONS = Object.freeze([
   ["arm", "Arm", "Arm", "Switch the drives on; nothing moves yet"],
+  ["survey", "Survey", "Survey", "Drive along the row and look at every vine; nothing is cut"],
   ["start", "Start", "Start", "Work through the accepted points"],
   ["pause", "Pause", "Pause", "Stop working and hold still"],
   ["resume", "Resume", "Resume", "Leave Paused; nothing moves until Start"],

@@ -1,0 +1,128 @@
+"""The survey drive: with the arm in its looking posture slowly along the row, so that perception sees every vine.
+
+Where places need another look at the end of the way, the robot goes back over it and looks from the other side.
+"""
+
+import math
+
+import numpy as np
+
+from controller.config import ControllerConfig
+from controller.homing import Homing
+from controller.motion import Follower, Measured, Tracking
+from controller.queue import PointQueue
+from controller.stages import Work
+from controller.whole_body.saturation import Saturation
+from rolling_panda.differential_drive import NXI, Array
+
+#: How the base slows down towards the end of the way (m/s²), and how near is there (m).
+_BRAKING, _NEAR = 0.2, 0.005
+#: Back to the line along the row: of the heading (1/s), and of the distance from it (1/m², times the speed squared).
+_GAIN_HEADING, _GAIN_ASIDE = 1.2, 6.0
+#: At the end of a way the last pictures are waited for (s).
+_PICTURES_S = 2.0
+#: What moves by less than this in the time (m, s) is held back by something.
+_LEAST, _PATIENCE_S = 0.01, 3.0
+
+
+class Survey:
+    """One survey of a stretch. `step` it each period until its work is finished, drop it to stop."""
+
+    def __init__(
+        self, config: ControllerConfig, follower: Follower, saturation: Saturation, queue: PointQueue, distance: float
+    ) -> None:
+        """Bind the parts.
+
+        Args:
+            config: Of the controller.
+            follower: Moves arm and base within the limits.
+            saturation: Brings to rest.
+            queue: Knows what perception holds true.
+            distance: Length of the stretch, ahead along the row from where the robot is (m).
+        """
+        self._config, self._follower, self._saturation, self._queue = config, follower, saturation, queue
+        self._homing: Homing | None = Homing(config, follower, 1.0 / config.rate_hz)
+        c, s = math.cos(config.row_heading), math.sin(config.row_heading)
+        self._along, self._left = np.array([c, s]), np.array([-s, c])
+        self._distance = distance
+        self._line: tuple[float, float] | None = None
+        self._goal = 0.0
+        self._again = False
+        self._there_at: float | None = None
+        self._moved: tuple[float, float] | None = None
+
+    def step(self, robot: Measured, now: float) -> Work:
+        """One period.
+
+        Args:
+            robot: Measured robot.
+            now: Monotonic time (s).
+        """
+        if self._homing is not None:
+            xi = self._homing.step(robot)
+            if self._homing.blocked:
+                return Work(self._saturation.ramp(robot.sent), pause=f"survey: {self._homing.blocked}")
+            if self._homing.done:
+                self._homing = None
+            return Work(xi)
+        x, aside = float(robot.q[:2] @ self._along), float(robot.q[:2] @ self._left)
+        if self._line is None:
+            self._line, self._goal = (x, aside), x + self._distance
+        if abs(self._goal - x) > _NEAR and self._there_at is None:
+            return self._drive(robot, x, aside - self._line[1], now)
+        return self._wait(robot, now)
+
+    def _drive(self, robot: Measured, x: float, aside: float, now: float) -> Work:
+        left = self._goal - x
+        speed = math.copysign(min(self._config.survey_speed, math.sqrt(2.0 * _BRAKING * abs(left))), left)
+        turned = math.remainder(float(robot.q[2]) - self._config.row_heading, math.tau)
+        turning = -_GAIN_HEADING * turned - _GAIN_ASIDE * speed * aside
+        xi = np.zeros(NXI)
+        xi[:2] = _wheels(robot, speed, turning)
+        tracking: Tracking = self._follower.jog(xi, robot)
+        if self._moved is None or abs(x - self._moved[0]) > _LEAST:
+            self._moved = x, now
+        elif now - self._moved[1] > _PATIENCE_S:
+            why = tracking.reason or "something holds the base back"
+            return Work(self._saturation.ramp(robot.sent), pause=f"survey: {why}")
+        return Work(tracking.xi)
+
+    def _wait(self, robot: Measured, now: float) -> Work:
+        xi = self._saturation.ramp(robot.sent)
+        if self._there_at is None:
+            self._there_at = now
+        if now - self._there_at < _PICTURES_S:
+            return Work(xi)
+        if self._line is not None and not self._again and self._unclear() > 0:
+            self._again, self._goal, self._there_at, self._moved = True, self._line[0], None, None
+            text = f"{_counted(self._unclear(), 'place')} to be looked at again: the survey goes back over its way"
+            return Work(xi, events=(text,))
+        return Work(xi, finished=True, summary=self._summary())
+
+    def _unclear(self) -> int:
+        perceived = self._queue.perceived
+        return 0 if perceived is None else sum(each.needs == "another look" for each in perceived.abstained)
+
+    def _summary(self) -> str:
+        perceived = self._queue.perceived
+        if perceived is None:
+            return "the survey has ended; perception has told nothing"
+        named = [(point.vine, point.spur) for point in perceived.points]
+        named += [(each.vine, each.spur) for each in perceived.abstained if each.vine > 0]
+        vines, spurs = len({vine for vine, _ in named}), len(set(named))
+        asking = sum(each.needs == "operator" for each in perceived.abstained)
+        found = f"{_counted(vines, 'vine')}, {_counted(spurs, 'spur')}, {_counted(len(perceived.points), 'point')}"
+        left = f"{_counted(self._unclear(), 'place')} still unclear, {_counted(asking, 'place')} for you to decide"
+        return f"surveyed: {found}; {left}"
+
+
+def _wheels(robot: Measured, speed: float, turning: float) -> Array:
+    """Wheel velocities (2, rad/s) that give the base a forward speed (m/s) and a yaw rate (rad/s)."""
+    S, heading = robot.kinematics.S, float(robot.q[2])
+    forward = math.cos(heading) * S[0, :2] + math.sin(heading) * S[1, :2]
+    out: Array = np.linalg.solve(np.stack([forward, S[2, :2]]), np.array([speed, turning]))
+    return out
+
+
+def _counted(number: int, word: str) -> str:
+    return f"{number} {word}" if number == 1 else f"{number} {word}s"
