@@ -6,12 +6,14 @@ from perception.config import RuleConfig
 from perception.keep_out import near_wire
 from perception.numbering import SpurNumber
 from perception.plant import Array
-from perception.plant_map import KnownSpur, PlantMap
+from perception.plant_map import KnownCane, KnownSpur, PlantMap
 from perception.rule import Cut, count_nodes, nearest_node
 from rolling_panda.row_messages import Capsule
 
 #: A click this far beside a cane means it (m).
 _BESIDE = 0.025
+#: A point this far from a cane's axis is on it (m).
+_ON_CANE = 0.012
 #: Buds keep this distance from the blades (m).
 _FROM_NODE = 0.010
 
@@ -38,6 +40,47 @@ def point_by_hand(
     if found is None:
         return f"no known cane within {1000 * _BESIDE:.0f} mm of there; click on a cane that is drawn"
     spur, number, arc = found
+    cut = _cut_at(spur, number, arc, config, obstacles, f"Placed by {user}")
+    return cut if isinstance(cut, str) else (cut, spur.number)
+
+
+def moved_by_hand(
+    known: PlantMap,
+    position: Array,
+    along: float,
+    config: RuleConfig,
+    obstacles: tuple[Capsule, ...],
+    user: str,
+) -> Cut | str:
+    """The cut so far along the cane from another one, or why there is none.
+
+    Args:
+        known: The vines.
+        position: Of the cut as it is (3, m, odom).
+        along: Away from the cordon (m).
+        config: The rule's numbers.
+        obstacles: Wires among them are kept away from.
+        user: Who moves it.
+    """
+    best: tuple[float, KnownSpur, int, float] | None = None
+    for spur in known.spurs:
+        for number, cane in enumerate(spur.canes):
+            arcs, axis = _samples(cane)
+            gaps = np.linalg.norm(axis - position, axis=1)
+            k = int(np.argmin(gaps))
+            if gaps[k] < _ON_CANE and (best is None or gaps[k] < best[0]):
+                best = float(gaps[k]), spur, number, float(arcs[k])
+    if best is None:
+        return "it is on no cane that is known; reject it, and place one by hand"
+    _, spur, number, arc = best
+    if arc + along <= float(spur.canes[number].best.arc[0]):
+        return "the cane begins there"
+    return _cut_at(spur, number, arc + along, config, obstacles, f"Moved by {user}")
+
+
+def _cut_at(
+    spur: KnownSpur, number: int, arc: float, config: RuleConfig, obstacles: tuple[Capsule, ...], whose: str
+) -> Cut | str:
     cane = spur.canes[number].as_cane()
     if arc > cane.length:
         return "the cane has been cut there already"
@@ -52,7 +95,7 @@ def point_by_hand(
         return f"a wire passes within {1000 * config.wire_distance:.0f} mm of there; cut this one by hand"
     below = [node for node in nodes if node.arc < arc]
     where = f"{1000 * (arc - below[-1].arc):.0f} mm past node {len(below)}" if below else "below the first node"
-    cut = Cut(
+    return Cut(
         kind="by hand",
         position=position,
         tangent=cane.tangent(arc),
@@ -60,20 +103,23 @@ def point_by_hand(
         confidence=1.0,
         nodes_seen=len(nodes),
         nodes_kept=len(below),
-        reason=f"Placed by {user}: {where} on this cane.",
+        reason=f"{whose}: {where} on this cane.",
         offset=arc - below[-1].arc if below else None,
         node_distance=nearest_node(cane, tuple(below), position),
     )
-    return cut, spur.number
+
+
+def _samples(cane: KnownCane) -> tuple[Array, Array]:
+    """Arc lengths (N, m) and places (N×3, odom) along a cane, closer than its axis's own samples are apart."""
+    arcs = np.arange(float(cane.best.arc[0]), cane.best.length, 0.001)
+    return arcs, np.stack([np.interp(arcs, cane.best.arc, cane.best.axis[:, i]) for i in range(3)], axis=1)
 
 
 def _nearest(known: PlantMap, origin: Array, direction: Array) -> tuple[KnownSpur, int, float] | None:
     best: tuple[float, KnownSpur, int, float] | None = None
     for spur in known.spurs:
         for number, cane in enumerate(spur.canes):
-            # Closer than the axis's samples are apart.
-            arcs = np.arange(float(cane.best.arc[0]), cane.best.length, 0.001)
-            axis = np.stack([np.interp(arcs, cane.best.arc, cane.best.axis[:, i]) for i in range(3)], axis=1)
+            arcs, axis = _samples(cane)
             ahead = (axis - origin) @ direction
             gaps = np.linalg.norm(axis - origin - ahead[:, None] * direction, axis=1)
             gaps[ahead <= 0.0] = np.inf

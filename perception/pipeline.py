@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from perception.abstention import OpenPlaces, abstention
 from perception.album import Album, Crop
-from perception.by_hand import point_by_hand
+from perception.by_hand import moved_by_hand, point_by_hand
 from perception.centreline import centrelines
 from perception.clearance import clearance
 from perception.close_look import look_closely, no_look
@@ -30,7 +30,7 @@ from rolling_panda import messages as m
 from rolling_panda.crop_messages import PointCrop
 from rolling_panda.errors import InputError
 from rolling_panda.look_messages import CloseLook
-from rolling_panda.plant_requests import AddPoint, AddPointInImage, PlantRequest, SetRule
+from rolling_panda.plant_requests import AddPoint, AddPointInImage, MovePoint, PlantRequest, SetRule
 from rolling_panda.robot_model import RobotModel
 from rolling_panda.row_messages import Capsule
 
@@ -147,6 +147,8 @@ class Perception:
         """Do what an operator asks for; a refusal changes nothing."""
         if isinstance(request, SetRule):
             return self._set_rule(request)
+        if isinstance(request, MovePoint):
+            return self._move(request)
         if isinstance(request, AddPoint):
             origin, direction = np.array(request.origin), np.array(request.direction)
         elif isinstance(request, AddPointInImage):
@@ -216,6 +218,19 @@ class Perception:
             )
             for point in points
         )
+
+    def _move(self, request: MovePoint) -> m.Answer:
+        points = {point.point_id: point for point in self._tracker.points()}
+        point = points.pop(request.point_id, None)
+        if point is None:
+            return m.Answer(ok=False, reason=f"perception does not see {request.point_id} any more")
+        if point.kind == "renewal cut":
+            return m.Answer(ok=False, reason="a renewal cut is on the old stub; reject it, and place one by hand")
+        place, rule = np.array(point.position), self._config.rule
+        cut = moved_by_hand(self.known, place, request.along, rule, self.obstacles, request.user)
+        if isinstance(cut, str):
+            return m.Answer(ok=False, reason=cut)
+        return m.Answer(ok=True, reason=self._tracker.move(request.point_id, cut).reason)
 
     def _set_rule(self, request: SetRule) -> m.Answer:
         asked = request.rule

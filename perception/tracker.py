@@ -61,6 +61,8 @@ class _Track:
     misses: int = 0
     gone: int = 0
     shown: m.PruningPoint | None = None
+    instead_of: CutKind | None = None
+    """Kind of the cut that a person has moved to become this one."""
     scatter: Array = field(default_factory=lambda: np.zeros((3, 3)))
     turns: Array = field(default_factory=lambda: np.zeros((3, 3)))
     """Scatter of single looks around the means: of places (m²) and of tangents."""
@@ -132,6 +134,22 @@ class Tracker:
         self._tracks.append(track)
         return track.shown
 
+    def move(self, point_id: str, cut: Cut) -> m.PruningPoint:
+        """Put a shown point where a person wants it. Its spur gets no other cut of the kind that it was.
+
+        Args:
+            point_id: Of the point; it must be shown.
+            cut: By hand.
+        """
+        old = next(track for track in self._tracks if track.point_id == point_id)
+        track = _Track(point_id, old.number, cut, cut.position, cut.tangent, cut.radius)
+        track.instead_of = old.instead_of or old.cut.kind
+        shown = self._message(track)
+        revised = replace(shown, revision=1 + (old.shown.revision if old.shown is not None else 0))
+        track.shown = replace(revised, digest=point_digest(revised))
+        self._tracks[self._tracks.index(old)] = track
+        return track.shown
+
     def restart(self, proposals: list[Proposal]) -> None:
         """Show these, and what persons placed, instead of all else: the rule has changed, the vines have not.
 
@@ -142,6 +160,8 @@ class Tracker:
         for proposal in proposals:
             cut = proposal.cut
             place = (proposal.number, cut.kind)
+            if place in self._moved():
+                continue
             same = [track for track in old if track.shown is not None and (track.number, track.cut.kind) == place]
             if not same:
                 self.add(proposal)
@@ -234,7 +254,7 @@ class Tracker:
 
     def _show(self, supported: list[_Track], looks: Mapping[SpurNumber, int]) -> None:
         places = Counter((track.number, track.cut.kind) for track in self._tracks)
-        taken = {(track.number, track.cut.kind) for track in self._tracks if track.shown is not None}
+        taken = {(track.number, track.cut.kind) for track in self._tracks if track.shown is not None} | self._moved()
         for track in self._tracks:
             place = (track.number, track.cut.kind)
             if track.shown is None:
@@ -245,6 +265,10 @@ class Tracker:
                 continue
             taken.add(place)
             track.shown = self._message(track)
+
+    def _moved(self) -> set[tuple[SpurNumber, CutKind]]:
+        """Spurs' cuts that a person has moved: the rule gives no others in their place."""
+        return {(track.number, track.instead_of) for track in self._tracks if track.instead_of is not None}
 
     def _message(self, track: _Track) -> m.PruningPoint:
         """The wire form; what is cut and where changes only together with the revision."""

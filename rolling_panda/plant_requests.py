@@ -4,7 +4,7 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from rolling_panda.messages import Count, PruningRule, Text, UnitVector3, Vector3
+from rolling_panda.messages import Count, Name, PruningRule, Text, UnitVector3, Vector3
 
 
 class PlantRequest(Struct, frozen=True, kw_only=True, tag=True, forbid_unknown_fields=True):
@@ -45,4 +45,16 @@ class AddPointInImage(PlantRequest, frozen=True, kw_only=True):
     v: Annotated[float, Meta(ge=0.0, le=1.0)]
 
 
-AnyPlantRequest = SetRule | AddPoint | AddPointInImage
+class MovePoint(PlantRequest, frozen=True, kw_only=True):
+    """Move a point along its cane; it is judged anew, and from now on it is where a person wants it.
+
+    Attributes:
+        point_id: Of the point.
+        along: So far (m), away from the cordon; negative towards it.
+    """
+
+    point_id: Name
+    along: Annotated[float, Meta(ge=-0.1, le=0.1)]
+
+
+AnyPlantRequest = SetRule | AddPoint | AddPointInImage | MovePoint

@@ -183,8 +183,8 @@ RELEASE: Service[m.ReleaseStop] = Service(
 )
 PLANT: Service[plant_requests.PlantRequest] = Service(
     "service/plant",
-    (plant_requests.SetRule, plant_requests.AddPoint, plant_requests.AddPointInImage),
-    "perception", 2.0, "another pruning rule, or a point by hand",
+    (plant_requests.SetRule, plant_requests.AddPoint, plant_requests.AddPointInImage, plant_requests.MovePoint),
+    "perception", 2.0, "another pruning rule, or a point by hand, or moved by hand",
 )
 SERVICES: tuple[Service[Any], ...] = (INTENT, RELEASE, PLANT)
 # fmt: on

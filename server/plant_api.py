@@ -34,6 +34,12 @@ def plant_router(desk: Desk) -> APIRouter:
             await desk.ask_perception(session, ask.AddPointInImage(user=session.user, **request.model_dump()))
         )
 
+    @router.post("/points/{point_id}/move")
+    async def move(session: Caller, point_id: PointId, request: body.Move) -> Response:
+        """Move a point along its cane; `reason` says what it is now. An acceptance of it may be void then."""
+        wanted = ask.MovePoint(user=session.user, point_id=point_id, along=request.along)
+        return answer(await desk.ask_perception(session, wanted))
+
     @router.get("/points/{point_id}/crop", response_class=Response)
     async def crop(session: Caller, point_id: PointId, revision: Annotated[int, Query(ge=0)] | None = None) -> Response:
         """What the camera saw around a point, the cut in the middle, as JPEG; of one revision where that is said."""

@@ -204,6 +204,12 @@ class Rule(_Body):
     offset: Annotated[float, Field(ge=0.005, le=0.05)] = 0.020
 
 
+class Move(_Body):
+    """So far along the cane (m): away from the cordon, or towards it where negative."""
+
+    along: Annotated[float, Field(ge=-0.1, le=0.1)]
+
+
 class Ray(_JsonTuples):
     """A line of sight in odom (m): the point goes on the known cane that it passes nearest."""
 

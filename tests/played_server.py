@@ -139,6 +139,8 @@ class PlayedServer:
         elif path == "/api/me":
             status, body = self.answers.get(path, (200, {"user": "Ada", "role": self.role}))
             route.fulfill(status=status, json=body)
+        elif path == "/api/sign-in":
+            route.fulfill(json={"password": False})
         elif path == "/viser/":
             route.fulfill(body=VIEW, content_type="text/html")
         elif path.startswith("/api/points/") and path.endswith("/crop"):

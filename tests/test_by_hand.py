@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from test_plant_map import NUMBER, cane, known, plant
 
-from perception.by_hand import point_by_hand
+from perception.by_hand import moved_by_hand, point_by_hand
 from perception.config import RuleConfig
 from rolling_panda.row_messages import Capsule
 
@@ -46,6 +46,26 @@ def test_a_wire_a_thick_cane_and_a_cut_one_are_refused():
     cut = known(*[plant(cane())] * 3)
     cut.sever(np.array([0.0, 0.0, 1.10]))
     assert "cut there already" in place(0.0, 1.17, cut)
+
+
+def move(from_height, along, known_map=MAP, obstacles=()):
+    return moved_by_hand(known_map, np.array([0.003, 0.002, from_height]), along, RULE, obstacles, "Ada")
+
+
+@pytest.mark.parametrize("along", [0.005, -0.01, 0.02])
+def test_a_point_is_moved_along_its_cane_and_judged_anew(along):
+    cut = move(1.17, along)
+    np.testing.assert_allclose(cut.position, [0.0, 0.0, 1.17 + along], atol=1.5e-3)
+    assert cut.kind == "by hand" and cut.nodes_kept == 2
+    assert cut.offset == pytest.approx(0.04 + along, abs=1.5e-3)
+    assert cut.reason.startswith("Moved by Ada: ")
+
+
+def test_where_it_cannot_be_moved_to_there_is_a_reason():
+    assert "from a node" in move(1.17, -0.035)
+    assert "cut there already" in move(1.17, 2.0)
+    assert "begins there" in move(1.17, -0.5)
+    assert "no cane that is known" in moved_by_hand(MAP, np.array([0.5, 0.0, 1.17]), 0.01, RULE, (), "Ada")
 
 
 def test_a_cane_behind_the_viewer_is_not_meant():

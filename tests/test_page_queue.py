@@ -84,6 +84,20 @@ def test_a_decision_that_was_refused_cannot_be_taken_back(page: Page, server: Pl
     expect(page.locator("#undo")).to_be_disabled()
 
 
+def test_a_point_is_moved_along_its_cane_by_millimetres_and_back(page: Page, server: PlayedServer) -> None:
+    page.locator('[data-point-id="p1"]').click()
+    page.get_by_role("button", name="+5").click()
+    until(page, lambda: ("/api/points/p1/move", {"along": 0.005}) in server.posted)
+    page.locator("#undo").click()
+    until(page, lambda: ("/api/points/p1/move", {"along": -0.005}) in server.posted)
+    server.answers["/api/points/p1/move"] = (409, {"ok": False, "reason": "4 mm from a node: the blades need 10 mm"})
+    page.get_by_role("button", name="−1").click()
+    expect(page.locator(".toast").last).to_contain_text("4 mm from a node")
+    expect(page.locator("#undo")).to_be_disabled()
+    page.locator('[data-point-id="p2"]').click()
+    expect(page.get_by_role("button", name="+1")).to_have_attribute("title", "It is accepted; take that back first")
+
+
 def many(count: int) -> tuple[p.PagePoint, ...]:
     rows = (
         point(number, "PROPOSED", vine=1 + number // 20, spur=1 + number // 2 % 10) for number in range(1, count + 1)

@@ -16,7 +16,7 @@ from perception.segmenter import LabelImageSegmenter
 from rolling_panda import messages as m
 from rolling_panda.codec import StrictDecoder, encode
 from rolling_panda.errors import MessageError
-from rolling_panda.plant_requests import AddPoint, AddPointInImage, SetRule
+from rolling_panda.plant_requests import AddPoint, AddPointInImage, MovePoint, SetRule
 from rolling_panda.point_digest import point_digest
 from rolling_panda.robot_model import RobotModel, configuration
 
@@ -209,3 +209,24 @@ def test_another_rule_keeps_the_names_of_the_spurs_cuts(model, frames):
         moved = np.linalg.norm(np.subtract(old.position, new.position))
         assert new.point_id == old.point_id
         assert (new.revision > old.revision) is bool(moved > PerceptionConfig().tracker.moved)
+
+
+def test_a_point_that_a_person_moves_stays_there_and_its_spur_gets_no_other(model, frames):
+    seen, before = shown(model, frames)
+    point = next(each for each in before if each.kind == "spur cut")
+    refused = seen.answer(MovePoint(user="Ada", point_id="p999", along=0.005))
+    assert not refused.ok and "p999" in refused.reason
+    answer = seen.answer(MovePoint(user="Ada", point_id=point.point_id, along=0.005))
+    assert answer.ok, answer.reason
+    moved = {each.point_id: each for each in seen.points().points}[point.point_id]
+    assert moved.revision == point.revision + 1 and moved.digest == point_digest(moved) != point.digest
+    step = np.subtract(moved.position, point.position)
+    assert step @ np.array(point.tangent) == pytest.approx(0.005, abs=0.002)
+    for frame in frames:
+        points = seen.process(frame).points
+    there = [each for each in points if (each.vine, each.spur) == (point.vine, point.spur)]
+    assert [each.position for each in there if each.point_id == point.point_id] == [moved.position]
+    assert not [each for each in there if each.kind == "spur cut"]
+    seen.answer(SetRule(user="Ada", rule=m.PruningRule(offset=0.03)))
+    there = [each for each in seen.points().points if (each.vine, each.spur) == (point.vine, point.spur)]
+    assert [each.kind for each in there if each.kind in ("spur cut", "by hand")] == ["by hand"]

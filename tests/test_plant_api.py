@@ -8,7 +8,7 @@ from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.crop_messages import PointCrop
 from rolling_panda.errors import ServiceError
-from rolling_panda.plant_requests import AddPoint, AddPointInImage, SetRule
+from rolling_panda.plant_requests import AddPoint, AddPointInImage, MovePoint, SetRule
 
 pytestmark = pytest.mark.alone
 
@@ -45,6 +45,7 @@ def server(running):
             {"origin": [0.0, -0.5, 1.0], "direction": [0.0, 1.0, 0.0]},
             AddPoint(user="ann", origin=(0.0, -0.5, 1.0), direction=(0.0, 1.0, 0.0)),
         ),
+        ("points/p4/move", {"along": -0.005}, MovePoint(user="ann", point_id="p4", along=-0.005)),
         (
             "points/by-hand-in-image",
             {"sequence": 4, "u": 0.25, "v": 0.5},
@@ -69,6 +70,7 @@ def test_each_request_goes_to_perception(server, path, body, request_):
         ("rule", {"system": "pergola"}),
         ("rule", {"offset": 0.5}),
         ("rule", {"more": 1}),
+        ("points/p4/move", {"along": 0.5}),
         ("points/by-hand", {"origin": [0, 0], "direction": [0, 1, 0]}),
         ("points/by-hand-in-image", {"sequence": 1, "u": 1.2, "v": 0.5}),
     ],

@@ -1,8 +1,8 @@
 // What a person decides about points, and how it is taken back.
 
-import { whyNot } from "./allowed.js";
+import { whyNot, whyNothing } from "./allowed.js";
 import { ask } from "./api.js";
-import { points, say } from "./state.js";
+import { isLive, points, say } from "./state.js";
 import { signal } from "./store.js";
 import { POINT_WORDS, counted } from "./words.js";
 
@@ -76,6 +76,28 @@ export async function acceptAll(confidence) {
       return back.every(Boolean);
     });
   }
+  return done;
+}
+
+/**
+ * Why a point cannot be moved now; empty when it can. What is accepted stays as it was accepted.
+ *
+ * @param {PagePoint} row
+ */
+export function whyNotMove(row) {
+  if (row.entry.state === "ACCEPTED") return "It is accepted; take that back first";
+  if (!CAN_ACCEPT.has(row.entry.state)) return `It is ${POINT_WORDS[row.entry.state].toLowerCase()}`;
+  return whyNothing() || (isLive("perception") ? "" : "Perception is not there");
+}
+
+/**
+ * @param {PagePoint} row
+ * @param {number} millimetres Along the cane, away from the cordon.
+ */
+export async function move(row, millimetres) {
+  const done = await send(row, "Moving", "move", { along: millimetres / 1000 });
+  const words = `moved ${row.point.point_id} by ${millimetres} mm`;
+  if (done) remember(words, () => send(row, "Moving back", "move", { along: -millimetres / 1000 }));
   return done;
 }
 

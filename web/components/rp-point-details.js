@@ -1,6 +1,7 @@
 // What is known of the chosen point: the picture it was found in, and the figures behind the cut.
 
-import { element, setText } from "../element.js";
+import { move, whyNotMove } from "../decisions.js";
+import { element, setEnabled, setText } from "../element.js";
 import { newtons, uncertainty } from "../words.js";
 
 /** @typedef {import("../messages.js").PagePoint} PagePoint */
@@ -9,6 +10,8 @@ import { newtons, uncertainty } from "../words.js";
 /** A picture that has not come yet is asked for again after so long (ms), so many times. */
 const AGAIN_MS = 1500;
 const TRIES = 20;
+/** How far a press moves the cut along its cane (mm). */
+const STEPS = Object.freeze([-5, -1, 1, 5]);
 
 /** @type {readonly (readonly [word: string, hint: string, value: (point: PruningPoint) => string])[]} */
 const FACTS = Object.freeze([
@@ -58,8 +61,15 @@ export class RpPointDetails extends HTMLElement {
     this.picture = element("img", { attributes: { alt: "What the camera saw of this spur, the cut in the middle" } });
     this.frame = element("figure", { class: "crop" }, this.picture);
     this.facts = element("dl", { class: "number" });
-    /** @type {HTMLElement[]} */
-    this.values = [];
+    this.values = FACTS.map(() => element("dd"));
+    this.moves = element("div", { class: "moves", attributes: { role: "group", "aria-label": "Move along the cane" } });
+    /** @type {PagePoint|null} */
+    this.row = null;
+    this.buttons = STEPS.map((step) => {
+      const words = `${step > 0 ? "+" : "−"}${Math.abs(step)}`;
+      return element("button", { class: "quiet", text: words, attributes: { type: "button" }, onclick: () => this.move(step) });
+    });
+    this.moves.append(element("span", { text: "Move, mm" }), ...this.buttons);
     this.shown = "";
     this.tries = 0;
     this.timer = 0;
@@ -67,21 +77,33 @@ export class RpPointDetails extends HTMLElement {
 
   connectedCallback() {
     if (this.childElementCount > 0) return;
-    for (const [word, hint] of FACTS) {
-      const value = element("dd");
-      this.values.push(value);
+    FACTS.forEach(([word, hint], at) => {
+      const value = this.values[at] ?? "";
       this.facts.append(element("div", { attributes: { title: hint } }, element("dt", { text: word }), value));
-    }
+    });
     this.picture.addEventListener("load", () => this.frame.classList.add("loaded"));
     this.picture.addEventListener("error", () => {
       if (this.tries++ >= TRIES) return;
       this.timer = window.setTimeout(() => this.fetch(), AGAIN_MS);
     });
-    this.append(this.frame, this.facts);
+    this.append(this.frame, this.facts, this.moves);
+  }
+
+  /** @param {number} step */
+  move(step) {
+    if (this.row) void move(this.row, step);
   }
 
   /** @param {PagePoint} row */
-  show({ point }) {
+  show(row) {
+    this.row = row;
+    const { point } = row;
+    const why = whyNotMove(row);
+    this.buttons.forEach((button, at) => {
+      const step = STEPS[at] ?? 0;
+      const where = step > 0 ? "away from the cordon" : "towards the cordon";
+      setEnabled(button, why, `Move the cut ${Math.abs(step)} mm ${where}; it is judged anew`);
+    });
     FACTS.forEach(([, , value], at) => {
       const node = this.values[at];
       if (node) setText(node, value(point));
