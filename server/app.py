@@ -1,5 +1,6 @@
 """The application: routes, error answers and the guard around them."""
 
+import time
 from typing import Any
 
 import msgspec
@@ -25,6 +26,8 @@ from server.sessions import Session
 from server.site import site_router
 from server.viser_proxy import viser_router
 
+#: Frames that were dropped are told this often for each session (s).
+_TELL_S = 1.0
 _ABOUT = (
     "Everything that the page can do. Sign in with `POST /api/sign-in` and the token of a sign-in link, keep the "
     "cookie, and send an `Origin` header with the server's own address on every POST. A link signs in once; "
@@ -65,7 +68,14 @@ def create_app(desk: Desk, origins: frozenset[str]) -> ASGIApp:
         redirect_slashes=False,
     )
 
+    told: dict[str, float] = {}
+
     def dropped(session: Session, kind: str) -> None:
+        # A view that sends a thousand of them a second must not fill the log.
+        now = time.monotonic()
+        if now - told.get(session.client, -_TELL_S) < _TELL_S:
+            return
+        told[session.client] = now
         desk.note("warning", f"a view of {session.user} sent {kind!r} to the 3-D view; dropped")
 
     app.include_router(site_router(desk, web))
@@ -73,7 +83,7 @@ def create_app(desk: Desk, origins: frozenset[str]) -> ASGIApp:
     app.include_router(plant_router(desk))
     app.include_router(control_router(desk))
     app.include_router(pages_router(desk))
-    app.include_router(viser_router(desk.scene, dropped))
+    app.include_router(viser_router(desk.scene, desk.may_move, dropped))
     app.router.routes.append(_PageFiles("/", StaticFiles(directory=web), name="web"))
     app.add_exception_handler(RequestValidationError, _invalid)
     app.add_exception_handler(HTTPException, _failed)

@@ -152,6 +152,12 @@ class Desk:
             503, False, "The stop was sent, but the bridge has not confirmed it: use the robot's emergency stop."
         )
 
+    def may_move(self, session: Session) -> bool:
+        """May this session lead the tool: by its role, and unless somebody else holds control."""
+        control = self.link.control.peek()
+        holder = "" if control is None else control.message.holder
+        return session.may_operate and holder in ("", session.client)
+
     def hold(self, session: Session, now: float, view: str = "") -> Result:
         """Start or renew this session's hold on the tool, by what its `view` shows; a script is its own view."""
         key = session.session_id

@@ -87,12 +87,13 @@ _DECODER: msgspec.msgpack.Decoder[_Admitted] = msgspec.msgpack.Decoder(_Admitted
 _ENCODER = msgspec.msgpack.Encoder()
 
 
-def admit(frame: bytes, may_operate: bool) -> bytes | None:
-    """The frame to pass on to viser, or None to drop it.
+def admit(frame: bytes, may_operate: bool, may_move: bool = True) -> bytes | None:
+    """The frame to pass on to viser; None to drop it as forged, empty to leave it out.
 
     Args:
         frame: One binary WebSocket frame from a browser.
         may_operate: May this session point at things and drag the gizmo?
+        may_move: May it now, or does somebody else hold control? To let go is always heard.
     """
     try:
         message = _DECODER.decode(frame)
@@ -100,6 +101,8 @@ def admit(frame: bytes, may_operate: bool) -> bytes | None:
         return None
     if not may_operate and not isinstance(message, ViewerCamera):
         return None
+    if not may_move and isinstance(message, GizmoUpdate | GizmoDragStart):
+        return b""
     # Encoded anew, so that viser reads what was checked here and nothing else.
     return _ENCODER.encode(message)
 

@@ -21,8 +21,16 @@ _STYLE = b"<style>[data-floating-window],.mantine-Notifications-root{display:non
 _SCRIPT = b'<script src="/view.js"></script>'
 
 
-def viser_router(scene: Scene, on_drop: Callable[[Session, str], None]) -> APIRouter:
-    """Routes `/viser/` and the WebSocket `/viser`; `on_drop(session, kind)` hears of refused frames."""
+def viser_router(
+    scene: Scene, may_move: Callable[[Session], bool], on_drop: Callable[[Session, str], None]
+) -> APIRouter:
+    """Routes `/viser/` and the WebSocket `/viser`.
+
+    Args:
+        scene: What is shown.
+        may_move: Whether this session may lead the tool now.
+        on_drop: Hears of refused frames: whose, and what they said they were.
+    """
     router = APIRouter(include_in_schema=False)
     page = view_page().replace(b"<head>", b"<head>" + _SCRIPT + _STYLE, 1)
     compressed = gzip.compress(page, 6)
@@ -58,7 +66,7 @@ def viser_router(scene: Scene, on_drop: Callable[[Session, str], None]) -> APIRo
                     proxy=None,
                 ) as upstream:
                     await websocket.accept(subprotocol=upstream.subprotocol)
-                    await _relay(websocket, upstream, session, on_drop)
+                    await _relay(websocket, upstream, session, may_move, on_drop)
             except (OSError, websockets.InvalidHandshake):
                 await websocket.close(1013, "the 3-D view is not running")
             finally:
@@ -68,11 +76,15 @@ def viser_router(scene: Scene, on_drop: Callable[[Session, str], None]) -> APIRo
 
 
 async def _relay(
-    websocket: WebSocket, upstream: ClientConnection, session: Session, on_drop: Callable[[Session, str], None]
+    websocket: WebSocket,
+    upstream: ClientConnection,
+    session: Session,
+    may_move: Callable[[Session], bool],
+    on_drop: Callable[[Session, str], None],
 ) -> None:
     """Carry frames both ways until either side closes or the session ends."""
     legs = [
-        asyncio.create_task(_to_viser(websocket, upstream, session, on_drop)),
+        asyncio.create_task(_to_viser(websocket, upstream, session, may_move, on_drop)),
         asyncio.create_task(_to_browser(websocket, upstream)),
         asyncio.create_task(session.ended.wait()),
     ]
@@ -90,15 +102,19 @@ async def _relay(
 
 
 async def _to_viser(
-    websocket: WebSocket, upstream: ClientConnection, session: Session, on_drop: Callable[[Session, str], None]
+    websocket: WebSocket,
+    upstream: ClientConnection,
+    session: Session,
+    may_move: Callable[[Session], bool],
+    on_drop: Callable[[Session, str], None],
 ) -> None:
     try:
         while True:
             frame = await websocket.receive_bytes()
-            admitted = admit(frame, session.may_operate)
+            admitted = admit(frame, session.may_operate, may_move(session))
             if admitted is None:
                 on_drop(session, kind(frame))
-            else:
+            elif admitted:
                 await upstream.send(admitted)
     except (WebSocketDisconnect, KeyError, websockets.ConnectionClosed):
         # KeyError: a text frame, which viser's client never sends.

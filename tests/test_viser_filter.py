@@ -45,6 +45,13 @@ def test_a_viewer_may_only_look(message):
     assert admit(frame(CAMERA), may_operate=False) is not None
 
 
+def test_the_gizmo_is_led_by_who_holds_control_alone():
+    for message in (DRAG, GRAB):
+        assert admit(frame(message), may_operate=True, may_move=False) == b""
+    for message in (CAMERA, CLICK, POINTER, LET_GO):
+        assert admit(frame(message), may_operate=True, may_move=False)
+
+
 @pytest.mark.parametrize("name", sorted(each.__name__ for each in _messages.Message.get_subclasses()))
 def test_every_other_message_that_viser_knows_is_dropped(name):
     allowed = {message["type"] for message in (CAMERA, CLICK, POINTER, DRAG, GRAB, LET_GO)}
