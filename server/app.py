@@ -1,6 +1,7 @@
 """The application: routes, error answers and the guard around them."""
 
 import time
+from collections import defaultdict, deque
 from typing import Any
 
 import msgspec
@@ -26,8 +27,8 @@ from server.sessions import Session
 from server.site import site_router
 from server.viser_proxy import viser_router
 
-#: Frames that were dropped are told this often for each session (s).
-_TELL_S = 1.0
+#: Of the frames of a session that were dropped, so many are told in so long (s).
+_TOLD, _TOLD_S = 10, 10.0
 _ABOUT = (
     "Everything that the page can do. Sign in with `POST /api/sign-in` and the token of a sign-in link, keep the "
     "cookie, and send an `Origin` header with the server's own address on every POST. A link signs in once; "
@@ -68,14 +69,14 @@ def create_app(desk: Desk, origins: frozenset[str]) -> ASGIApp:
         redirect_slashes=False,
     )
 
-    told: dict[str, float] = {}
+    told: defaultdict[str, deque[float]] = defaultdict(lambda: deque(maxlen=_TOLD))
 
     def dropped(session: Session, kind: str) -> None:
         # A view that sends a thousand of them a second must not fill the log.
-        now = time.monotonic()
-        if now - told.get(session.client, -_TELL_S) < _TELL_S:
+        now, times = time.monotonic(), told[session.client]
+        if len(times) == _TOLD and now - times[0] < _TOLD_S:
             return
-        told[session.client] = now
+        times.append(now)
         desk.note("warning", f"a view of {session.user} sent {kind!r} to the 3-D view; dropped")
 
     app.include_router(site_router(desk, web))
