@@ -65,29 +65,36 @@ def centrelines(view: View, wood: Wood, chains: list[Array], config: SkeletonCon
     if not lines:
         return []
     samples = np.concatenate(lines)
-    owner = np.repeat(np.arange(len(lines)), [len(line) for line in lines])
     distance, nearest = cKDTree(samples).query(wood.points, workers=1, distance_upper_bound=0.02)
-    found = np.isfinite(distance)
-    pixel_owner = np.full(len(wood.rows), -1, dtype=np.intp)
-    pixel_owner[found] = owner[nearest[found]]
+    pixels = np.nonzero(np.isfinite(distance))[0]
+    pixels = pixels[np.argsort(nearest[pixels], kind="stable")]
+    first = np.concatenate([[0], np.cumsum([len(line) for line in lines])])
+    bounds = np.searchsorted(nearest[pixels], first)
     cane = np.zeros(view.depth.shape, dtype=bool)
     cane[wood.rows, wood.cols] = True
     out = []
     for k, line in enumerate(lines):
-        members = np.nonzero(pixel_owner == k)[0]
-        measured = _measure(view, wood, cane, members, line, config)
+        members = pixels[bounds[k] : bounds[k + 1]]
+        measured = _measure(view, wood, cane, members, nearest[members] - first[k], line, config)
         if measured is not None:
             out.append(measured)
     return out
 
 
 def _measure(
-    view: View, wood: Wood, cane: NDArray[np.bool_], members: Index, line: Array, config: SkeletonConfig
+    view: View,
+    wood: Wood,
+    cane: NDArray[np.bool_],
+    members: Index,
+    nearest: Index,
+    line: Array,
+    config: SkeletonConfig,
 ) -> Centreline | None:
+    """A line with its pixels, and the sample of the line that is nearest to each of them."""
     if len(members) < 20:
         return None
     stations = _arc(line)
-    along = _project(line, stations, wood.points[members])
+    along = _project(line, stations, wood.points[members], nearest)
     length = float(stations[-1])
     width_arc, width = _widths(view, wood, members, along, line, stations, config.widening)
     radius = float(np.clip(np.median(width) / 2, 0.001, 0.05)) if len(width) else _FALLBACK_RADIUS
@@ -129,9 +136,8 @@ def _resample(chain: Array, step: float) -> Array | None:
     return np.stack([np.interp(stations, arc, smooth[:, i]) for i in range(3)], axis=1)
 
 
-def _project(line: Array, stations: Array, points: Array) -> Array:
-    """Arc length of the foot of each point on the line; beyond the ends it runs on straight."""
-    _, k = cKDTree(line).query(points, workers=1)
+def _project(line: Array, stations: Array, points: Array, k: Index) -> Array:
+    """Arc length of the foot of each point on the line, `k` being nearest; beyond the ends it runs on straight."""
     before, after = np.maximum(k - 1, 0), np.minimum(k + 1, len(line) - 1)
     chord = line[after] - line[before]
     chord /= np.linalg.norm(chord, axis=1, keepdims=True)

@@ -5,11 +5,10 @@ is cut there. Joining what belongs together is the next step (`perception.linkin
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage, sparse
+from scipy import sparse
 from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 from skimage.morphology import skeletonize
@@ -20,8 +19,9 @@ from perception.plant import Array
 from rolling_panda.messages import WOOD_CLASSES
 
 CANE, NODE = WOOD_CLASSES.index("cane"), WOOD_CLASSES.index("node")
-_EIGHT = np.ones((3, 3), dtype=bool)
 _HALF = ((0, 1), (1, 0), (1, 1), (1, -1))
+#: A pixel of a skeleton with so many neighbours is a fork.
+_FORK = 3
 #: Skeleton pixels averaged into one point of a fragment.
 _BIN = 4
 
@@ -84,73 +84,60 @@ def find_fragments(wood: Wood, shape: tuple[int, ...], config: SkeletonConfig) -
     layer = _layers(wood, shape)
     for number in range(int(layer.max()) + 1):
         chosen = np.nonzero(layer == number)[0]
-        image = np.zeros(shape, dtype=bool)
-        image[wood.rows[chosen], wood.cols[chosen]] = True
-        out += _layer_fragments(wood, chosen, skeletonize(image), config)
+        # Only the part of the image in which there is cane costs time.
+        rows, cols = wood.rows[chosen], wood.cols[chosen]
+        rows, cols = rows - (rows.min() - 1), cols - (cols.min() - 1)
+        image = np.zeros((rows.max() + 2, cols.max() + 2), dtype=bool)
+        image[rows, cols] = True
+        out += _layer_fragments(wood.points[chosen], rows, cols, skeletonize(image), config)
     return out
 
 
-def _layer_fragments(wood: Wood, chosen: Index, skeleton: Any, config: SkeletonConfig) -> list[Fragment]:
-    neighbours = ndimage.convolve(skeleton.astype(np.uint8), _EIGHT.astype(np.uint8), mode="constant") - 1
-    forks = skeleton & (neighbours >= 3)
-    paths = skeleton & ~forks
-    labelled, count = ndimage.label(paths, structure=_EIGHT)
-    if count == 0:
+def _layer_fragments(
+    points: Array, rows: Index, cols: Index, skeleton: NDArray[np.bool_], config: SkeletonConfig
+) -> list[Fragment]:
+    """Fragments of one layer: surface points of its pixels and where these are in an image with an empty border."""
+    at, beside = np.nonzero(skeleton)
+    neighbours = sum(skeleton[at + dr, beside + dc].astype(np.int8) for dr in (-1, 0, 1) for dc in (-1, 0, 1)) - 1
+    simple = neighbours < _FORK
+    at, beside = at[simple], beside[simple]
+    if not len(at):
         return []
-    rows, cols = np.nonzero(paths)
-    owner = labelled[rows, cols] - 1
-    order = np.zeros(len(rows), dtype=np.intp)
-    by_owner = np.argsort(owner, kind="stable")
-    starts = np.searchsorted(owner[by_owner], np.arange(count + 1))
-    for k in range(count):
-        members = by_owner[starts[k] : starts[k + 1]]
-        order[members[_walk(rows[members], cols[members])]] = np.arange(len(members))
+    owner, order, lengths = _paths(skeleton.shape, at, beside)
     # Every cane pixel joins the skeleton pixel nearest to it.
-    _, nearest = cKDTree(np.stack([rows, cols], axis=1)).query(
-        np.stack([wood.rows[chosen], wood.cols[chosen]], axis=1), workers=1
-    )
-    pixel_owner = owner[nearest]
-    pixel_bin = order[nearest] // _BIN
+    _, nearest = cKDTree(np.stack([at, beside], axis=1)).query(np.stack([rows, cols], axis=1), workers=1)
+    bins = np.maximum(1, lengths // _BIN)
+    first = np.concatenate([[0], np.cumsum(bins)])
+    joined = owner[nearest]
+    into = first[joined] + np.minimum(order[nearest] // _BIN, bins[joined] - 1)
+    weight = np.bincount(into, minlength=first[-1])
+    sums = np.stack([np.bincount(into, points[:, i], minlength=first[-1]) for i in range(3)], axis=1)
+    line = sums / np.maximum(weight, 1)[:, None]
     out = []
-    by_pixel = np.argsort(pixel_owner, kind="stable")
-    bounds = np.searchsorted(pixel_owner[by_pixel], np.arange(count + 1))
-    for k in range(count):
-        length = int(starts[k + 1] - starts[k])
-        if length < config.least_pixels:
-            continue
-        members = by_pixel[bounds[k] : bounds[k + 1]]
-        bins = np.minimum(pixel_bin[members], max(0, length // _BIN - 1))
-        weight = np.bincount(bins)
-        points = wood.points[chosen[members]]
-        line = np.stack([np.bincount(bins, points[:, i]) for i in range(3)], axis=1)[weight > 0]
-        out.append(Fragment(line / weight[weight > 0][:, None], length))
+    for k in np.flatnonzero(lengths >= config.least_pixels):
+        part = slice(first[k], first[k + 1])
+        out.append(Fragment(line[part][weight[part] > 0], int(lengths[k])))
     return out
 
 
-def _walk(rows: Index, cols: Index) -> Index:
-    """Indices of the pixels of one simple path, in order from one end."""
-    index = {(int(r), int(c)): i for i, (r, c) in enumerate(zip(rows, cols, strict=True))}
-    steps = ((0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1))
-    start = 0
-    for i, (r, c) in enumerate(index):
-        if sum((r + dr, c + dc) in index for dr, dc in steps) <= 1:
-            start = i
-            break
-    keys = list(index)
-    here, seen, out = keys[start], {start}, [start]
-    while True:
-        for dr, dc in steps:
-            beside = index.get((here[0] + dr, here[1] + dc))
-            if beside is not None and beside not in seen:
-                break
-        else:
-            break
-        seen.add(beside)
-        out.append(beside)
-        here = keys[beside]
-    # What a walk cannot reach (a corner of a loop) is put at its end.
-    out += [i for i in range(len(keys)) if i not in seen]
-    return np.array(out, dtype=np.intp)
+def _paths(shape: tuple[int, ...], rows: Index, cols: Index) -> tuple[Index, Index, Index]:
+    """Pixels of simple paths: the path of each, its place along it from one end, and the number of pixels of each path.
+
+    A closed loop is walked both ways from one of its pixels.
+    """
+    mask = np.zeros(shape, dtype=bool)
+    mask[rows, cols] = True
+    pairs = _neighbours(mask, rows, cols)
+    size = len(rows)
+    graph = sparse.coo_matrix((np.ones(len(pairs), dtype=bool), (pairs[:, 0], pairs[:, 1])), (size, size))
+    count, owner = csgraph.connected_components(graph, directed=False)
+    degree = np.bincount(pairs.ravel(), minlength=size)
+    # The last written stays: of each path the pixel with the fewest neighbours.
+    ends = np.zeros(count, dtype=np.intp)
+    inwards = np.argsort(-degree, kind="stable")
+    ends[owner[inwards]] = inwards
+    along = csgraph.dijkstra(graph, directed=False, indices=ends, unweighted=True, min_only=True)
+    return owner.astype(np.intp), along.astype(np.intp), np.bincount(owner, minlength=count)
 
 
 def _components(mask: NDArray[np.bool_], rows: Index, cols: Index, depth: Array, step: float) -> Index:

@@ -129,13 +129,13 @@ def _row_direction(cordon: Array, view: View) -> Array:
     right: Array = view.R[:, 0]
     if len(cordon) < 50:
         return right
-    direction: Array = np.linalg.svd(cordon - cordon.mean(axis=0), full_matrices=False)[2][0]
+    direction: Array = _principal(cordon - cordon.mean(axis=0))[1][0]
     return direction if float(direction[np.argmax(np.abs(direction))]) > 0.0 else -direction
 
 
 def _spur(view: View, cloud: Array, cordon: Array, canes: list[Cane], doubt: str) -> Spur:
     centre = cloud.mean(axis=0)
-    _, spread, axes = np.linalg.svd(cloud - centre, full_matrices=False)
+    spread, axes = _principal(cloud - centre)
     axis, radius = None, 0.0
     if len(cordon) and spread[0] > 1.5 * spread[1]:
         along = (cloud - centre) @ axes[0]
@@ -147,6 +147,12 @@ def _spur(view: View, cloud: Array, cordon: Array, canes: list[Cane], doubt: str
         ray = centre - view.t
         axis = ends + _surface(ray, axes[0]) * radius * np.pi / 4
     return Spur(centre, axis, radius, tuple(sorted(canes, key=lambda cane: -cane.length)), doubt)
+
+
+def _principal(off: Array) -> tuple[Array, Array]:
+    """Spreads along the principal axes of points about their mean, largest first, and the axes as rows."""
+    squares, axes = np.linalg.eigh(off.T @ off)
+    return np.sqrt(np.maximum(squares[::-1], 0.0)), axes.T[::-1]
 
 
 def _doubt(view: View, cloud: Array, stray: bool, config: SkeletonConfig) -> str:
