@@ -55,6 +55,7 @@ class ClosedLoop:
         watch: Callable[["ClosedLoop", Tracking], None] | None = None,
         plans: bool = True,
         looks: bool = True,
+        segmenter: str = "",
     ) -> None:
         """Grow the row and stand the robot beside it.
 
@@ -65,6 +66,7 @@ class ClosedLoop:
             method: Whole-body method; None takes the configured one.
             plans: False leaves the session's plan away.
             looks: False cuts without a closer look before, and takes the cutter's word afterwards.
+            segmenter: Name of the segmenter; empty takes the configured one.
             watch: Called after each control period in which the tool follows a trajectory.
         """
         path = config_path or resource("assets/config/sim.toml")
@@ -85,7 +87,7 @@ class ClosedLoop:
         self._planned: tuple[float, WorkPlan] | None = None
         seeing = load_section(path, "perception", PerceptionConfig)
         weights = Path(seeing.weights) if seeing.weights else None
-        self.perception = Perception(seeing, choose_segmenter(seeing.segmenter, weights))
+        self.perception = Perception(seeing, choose_segmenter(segmenter or seeing.segmenter, weights))
         self.now = 0.0
         self.inputs = Inputs(present=frozenset(m.PROCESSES))
         self.state: m.ControllerState | None = None

@@ -12,105 +12,51 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from msgspec.structs import replace
 
 from benchmarks.cane_touches import Cane, CaneTouches, staying_rods
 from benchmarks.closed_loop import ClosedLoop
+from benchmarks.cut_truth import true_cut
 from benchmarks.documents import one_row_a_line
-from benchmarks.intervals import share
-from benchmarks.row_stages import LIMITS, STAGES, StageClock
+from benchmarks.row_report import Cut, RowRun, mean_stages, summarise, tell, tell_stages
+from benchmarks.row_stages import StageClock
 from benchmarks.row_walk import walk
 from bridge.sim import trace
 from bridge.sim.robot import SimulatedRobot
 from bridge.sim.row import Row
+from bridge.sim.vineyard_truth import judge
 from controller.config import ControllerConfig
 from controller.motion import Tracking
 from controller.whole_body.registry import METHODS
+from perception.segmenter_choice import SEGMENTERS
 from rolling_panda import intents
 from rolling_panda import messages as m
 from rolling_panda.config import load_section
 from rolling_panda.resources import resource
 
-#: A cut is at the right place when the cane was severed within this of the accepted point (m).
-RIGHT_PLACE = 0.010
-_ENDED: tuple[m.PointState, ...] = ("DONE", "FAILED_NOT_CUT", "UNKNOWN")
+#: A point in another state than these has ended: cut, given up, or void after a closer look.
+_OPEN: tuple[m.PointState, ...] = ("ACCEPTED", "INTENT")
 _SURVEY_S = 6.0
 _LOOK_S, _LIMIT_S = 3.0, 120.0
 #: Periods between two looks at what touches a cane.
 _LOOK_EVERY = 4
 
 
-@dataclass(frozen=True)
-class Cut:
-    """One accepted point and how it ended.
-
-    Attributes:
-        method: Whole-body method.
-        seed: Of the row.
-        point_id: Its name.
-        state: How it ended.
-        reason: Why, in words.
-        distance: From the accepted point to what was severed (m); None when nothing was.
-        tool_error: From the accepted point to the middle of the blades as they closed (m); None when they did not.
-        duration_s: Since the cut before it, or since the start (s, simulated).
-    """
-
-    method: str
-    seed: int
-    point_id: str
-    state: str
-    reason: str
-    distance: float | None
-    tool_error: float | None
-    duration_s: float
-
-    @property
-    def right(self) -> bool:
-        """Severed at the right place."""
-        return self.distance is not None and self.distance <= RIGHT_PLACE
-
-
-@dataclass(frozen=True)
-class RowRun:
-    """One row worked off by one method.
-
-    Attributes:
-        method: Whole-body method.
-        seed: Of the row.
-        cuts: The accepted points.
-        work_s: Of automatic work, from the start to the end of the last one (s, simulated).
-        other_s: Of looking and of driving on by hand between stretches of work, of a whole row (s, simulated).
-        path_rms: Of the true tool against its trajectory, over all followed motion (m).
-        contacts: Physics steps in which the robot met posts, trunks, cordons or wires.
-        self_contacts: Physics steps in which it met itself.
-        stops: Times it stopped by itself.
-        stages: Seconds by stage (simulated).
-        limits: Seconds under way between cuts by what held the motion back.
-        canes_touched: Canes, not the ones cut, that a part of the robot other than the blades overlapped with, and
-            which parts these were.
-        staying_touched: The same of wood that stays when the row is pruned, on canes that were cut too.
-    """
-
-    method: str
-    seed: int
-    cuts: tuple[Cut, ...]
-    work_s: float
-    other_s: float
-    path_rms: float
-    contacts: int
-    self_contacts: int
-    stops: int
-    stages: dict[str, float]
-    limits: dict[str, float]
-    canes_touched: dict[str, str]
-    staying_touched: dict[str, str]
-
-
-def cut_row(seed: int, points: int, method: str, pictures: float, along: float = 0.0, plans: bool = True) -> RowRun:
+def cut_row(
+    seed: int,
+    points: int,
+    method: str,
+    pictures: float,
+    along: float = 0.0,
+    plans: bool = True,
+    looks: bool = True,
+    segmenter: str = "",
+) -> RowRun:
     """Survey from the start posture, accept up to `points` of what was detected, work through them.
 
     A refused acceptance is not among the cuts, as an operator sees the refusal.
@@ -123,6 +69,8 @@ def cut_row(seed: int, points: int, method: str, pictures: float, along: float =
         along: With a distance (m), not these points but the whole row is worked off until the base has come so far,
             with everything that is found on the way.
         plans: False works without the session's plan.
+        looks: False cuts without the closer looks before and after.
+        segmenter: In place of the configured one.
     """
     errors: list[float] = []
     clock = StageClock(load_section(resource("assets/config/sim.toml"), "controller", ControllerConfig))
@@ -138,8 +86,8 @@ def cut_row(seed: int, points: int, method: str, pictures: float, along: float =
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "trace"
         config = _config(Path(folder) / "row.toml", pictures)
-        with ClosedLoop(seed, path, config, method, watch, plans) as loop:
-            touches = CaneTouches(staying_rods(_row(loop)))
+        with ClosedLoop(seed, path, config, method, watch, plans, looks, segmenter) as loop:
+            touches, truths = CaneTouches(staying_rods(_row(loop))), judge(_row(loop))
             accepted = [] if along else _accept(loop, points)
             begin, other_s = loop.now, 0.0
             if along:
@@ -157,12 +105,16 @@ def cut_row(seed: int, points: int, method: str, pictures: float, along: float =
             stops = sum("PROTECTIVE_STOP" in event.text for event in loop.events)
         record = trace.read(path)
     events = {event["point_id"]: event for event in record.events if event["event"] == "cut"}
+    severed: dict[str, list[dict[str, Any]]] = {}
+    for bite in record.events:
+        severed.setdefault(bite.get("point_id", ""), []).extend(bite.get("severed", ()))
     cuts = []
     for entry in accepted:
         event, where = events.get(entry.point_id), entry.accepted_position
         assert where is not None
-        pieces = [] if event is None else event["severed"]
-        end = ends[entry.point_id]
+        pieces = severed.get(entry.point_id, [])
+        end = ends.get(entry.point_id, replace(entry, state="PROPOSED", reason="perception does not see it any more"))
+        truth = true_cut(truths, pieces)
         cuts.append(
             Cut(
                 method=method,
@@ -173,6 +125,8 @@ def cut_row(seed: int, points: int, method: str, pictures: float, along: float =
                 distance=min((math.dist(piece["point"], where) for piece in pieces), default=None),
                 tool_error=None if event is None else math.dist(event["blade"], where),
                 duration_s=durations.get(entry.point_id, 0.0),
+                true_right=truth.right,
+                harm=truth.harm,
             )
         )
     return RowRun(
@@ -238,15 +192,14 @@ def _work(loop: ClosedLoop, todo: list[str]) -> dict[str, float]:
     begin = loop.now
     while len(durations) < len(todo):
 
-        def ended() -> bool:
-            return any(e.point_id in todo and e.point_id not in durations for e in loop.queue(*_ENDED))
+        def ended() -> set[str]:
+            return set(todo) - set(durations) - {entry.point_id for entry in loop.queue(*_OPEN)}
 
-        if not loop.run_until(ended, _LIMIT_S):
+        if not loop.run_until(lambda: bool(ended()), _LIMIT_S):
             break
-        for entry in loop.queue(*_ENDED):
-            if entry.point_id in todo and entry.point_id not in durations:
-                durations[entry.point_id] = loop.now - begin
-                begin = loop.now
+        for point_id in ended():
+            durations[point_id] = loop.now - begin
+            begin = loop.now
     loop.run(3.0)
     return durations
 
@@ -273,6 +226,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--pictures", type=float, default=0.7, help="pictures a second while the robot moves (default: 0.7)"
     )
+    parser.add_argument("--no-looks", action="store_true", help="cut without the closer looks before and after")
+    parser.add_argument("--segmenter", default="", choices=SEGMENTERS, help="in place of the configured one")
     parser.add_argument("--stages", action="store_true", help="say where the time of a cut goes")
     parser.add_argument("--no-plan", action="store_true", help="work along the row without the session's plan")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows and the summary here")
@@ -284,9 +239,18 @@ def main(argv: Sequence[str] | None = None) -> int:
     for seed in range(arguments.seed, arguments.seed + arguments.count):
         for method in methods:
             begin = time.perf_counter()
-            run = cut_row(seed, arguments.points, method, arguments.pictures, arguments.along, not arguments.no_plan)
+            run = cut_row(
+                seed,
+                arguments.points,
+                method,
+                arguments.pictures,
+                arguments.along,
+                not arguments.no_plan,
+                not arguments.no_looks,
+                arguments.segmenter,
+            )
             runs.append(run)
-            _tell(run, (run.work_s + _SURVEY_S) / (time.perf_counter() - begin))
+            tell(run, (run.work_s + _SURVEY_S) / (time.perf_counter() - begin))
     print()
     summary = {method: summarise([run for run in runs if run.method == method]) for method in methods}
     names = list(next(iter(summary.values())))
@@ -294,7 +258,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     for name in names:
         print(f"{name:<18}" + "".join(f"{summary[method][name]:>12}" for method in methods))
     if arguments.stages:
-        _tell_stages({method: [run for run in runs if run.method == method] for method in methods})
+        tell_stages({method: [run for run in runs if run.method == method] for method in methods})
     if arguments.plot is not None:
         # Drawing is for development; without its library the rest works.
         from benchmarks.row_plot import draw
@@ -303,78 +267,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     if arguments.json is not None:
         document = {
             "pictures_hz": arguments.pictures,
+            "looks": not arguments.no_looks,
+            "segmenter": arguments.segmenter,
             "machine": f"{platform.platform()}, {os.cpu_count()} cores",
             "summary": summary,
             "results": [asdict(run) for run in runs],
         }
         arguments.json.write_text(one_row_a_line(document), encoding="utf-8")
     return 0
-
-
-def _tell(run: RowRun, speed: float) -> None:
-    right = sum(cut.right for cut in run.cuts)
-    each = run.work_s / max(len(run.cuts), 1)
-    contacts = f"{run.contacts}+{run.self_contacts}"
-    print(
-        f"{run.method:<10} {run.seed:>4} {len(run.cuts):>8} {right:>6} {each:>8.1f} {contacts:>8} {speed:>11.1f}",
-        flush=True,
-    )
-    for cut in run.cuts:
-        if not cut.right:
-            print(f"       {cut.point_id}: {cut.state}, {cut.reason or 'no reason'}; distance {cut.distance}")
-
-
-def mean_stages(runs: list[RowRun]) -> dict[str, float]:
-    """Seconds a cut by stage, over all rows of one method."""
-    return {stage: _mean(runs, "stages", stage) for stage in STAGES}
-
-
-def _tell_stages(runs: dict[str, list[RowRun]]) -> None:
-    for title, field, names in (
-        ("s a cut by stage", "stages", STAGES),
-        ("s a cut under way, by what held it", "limits", LIMITS),
-    ):
-        print(f"\n{title:<36}" + "".join(f"{method:>12}" for method in runs))
-        for name in names:
-            print(f"{name:<36}" + "".join(f"{_mean(done, field, name):>12.2f}" for done in runs.values()))
-
-
-def _mean(runs: list[RowRun], field: str, name: str) -> float:
-    cuts = sum(len(run.cuts) for run in runs)
-    return sum(float(getattr(run, field)[name]) for run in runs) / max(cuts, 1)
-
-
-def summarise(runs: list[RowRun]) -> dict[str, float | int]:
-    """Share severed at the right place, seconds a cut, distances and contacts, over all rows of one method."""
-    cuts = [cut for run in runs for cut in run.cuts]
-    durations = [cut.duration_s for cut in cuts if cut.right and cut.duration_s > 0.0]
-    distances = [cut.distance for cut in cuts if cut.distance is not None]
-    tool = [cut.tool_error for cut in cuts if cut.tool_error is not None]
-
-    def quantile(values: list[float], share: float, digits: int) -> float:
-        return round(float(np.quantile(values, share)), digits) if values else 0.0
-
-    right = sum(cut.right for cut in cuts)
-    at_place = share(right, len(cuts))
-    return {
-        "accepted": len(cuts),
-        "right": right,
-        "right_place": round(right / max(len(cuts), 1), 3),
-        "right_place_low": round(at_place.low or 0.0, 3),
-        "right_place_high": round(1.0 if at_place.high is None else at_place.high, 3),
-        "cut_s_mean": round(sum(run.work_s for run in runs) / max(len(cuts), 1), 2),
-        "cut_s_median": quantile(durations, 0.5, 2),
-        "other_s_mean": round(sum(run.other_s for run in runs) / max(len(cuts), 1), 2),
-        "distance_mm_median": quantile([1e3 * d for d in distances], 0.5, 2),
-        "distance_mm_max": quantile([1e3 * d for d in distances], 1.0, 2),
-        "tool_mm_p95": quantile([1e3 * d for d in tool], 0.95, 2),
-        "path_mm_rms": round(1e3 * math.sqrt(float(np.mean([run.path_rms**2 for run in runs]))), 2) if runs else 0.0,
-        "contact_steps": sum(run.contacts for run in runs),
-        "self_contact_steps": sum(run.self_contacts for run in runs),
-        "canes_touched": sum(len(run.canes_touched) for run in runs),
-        "staying_touched": sum(len(run.staying_touched) for run in runs),
-        "stops": sum(run.stops for run in runs),
-    }
 
 
 if __name__ == "__main__":
