@@ -31,7 +31,7 @@ from rolling_panda.look_messages import CloseLook
 
 #: A point that perception has refined by less than this is aimed at as it was (m).
 _REFINED = 0.0003
-#: A look that does not show its point is taken once more.
+#: A look that does not show what was expected is taken once more.
 _PICTURES = 2
 #: Between motions without an end to hold: near enough to go on (m).
 _NEAR = 0.02
@@ -210,7 +210,7 @@ class CutSequence:
         if last and not self._config.confirm:
             self._stage = Stage.ADVANCE
         elif last and camera_ready(robot, self._motion, self._config):
-            self._eye.ask(self._point_id, now)
+            self._eye.ask(self._point_id, "seen", now)
             self._started, self._stage = None, Stage.LOOK
         elif self._config.confirm and not self._over(tracking, now, 0.0) and self._late(now):
             return self._fail(robot, self._missed("the stand-off", tracking))

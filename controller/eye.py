@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from rolling_panda import messages as m
-from rolling_panda.look_messages import CloseLook
+from rolling_panda.look_messages import CloseLook, Finding
 
 #: A request is repeated this often until its picture has come (s).
 _REPEAT_S = 0.05
@@ -14,8 +14,9 @@ _LOST_S = 1.5
 
 @dataclass
 class _Asked:
-    """A look under way: the request that counts now, and how many more may follow."""
+    """A look under way: what it should show, the request that counts now, and how many more may follow."""
 
+    expected: Finding
     number: int
     more: int
     begun: float
@@ -32,16 +33,17 @@ class Eye:
 
         Args:
             timeout_s: A look ends after this time, whatever has come (s).
-            pictures: Of one look at most that come; another one is taken where the last did not show the point.
+            pictures: Of one look at most that come; another one is taken where the last
+                did not show what was expected.
         """
         self._timeout_s, self._pictures = timeout_s, pictures
         self._asked: dict[str, _Asked] = {}
         self._number = 0
 
-    def ask(self, point_id: str, now: float) -> None:
-        """Look at a point from now on."""
+    def ask(self, point_id: str, expected: Finding, now: float) -> None:
+        """Look at a point from now on; what is not as expected is looked at once more before it is believed."""
         self._number += 1
-        self._asked[point_id] = _Asked(self._number, self._pictures - 1, now, now)
+        self._asked[point_id] = _Asked(expected, self._number, self._pictures - 1, now, now)
 
     def forget(self, point_id: str) -> None:
         """What a look at this point shows is not wanted any more."""
@@ -52,7 +54,7 @@ class Eye:
         asked = self._asked.get(look.point_id)
         if asked is None or asked.number != look.number or asked.answer is not None:
             return
-        if look.finding == "unseen" and asked.more > 0:
+        if look.finding != asked.expected and asked.more > 0:
             asked.more -= 1
             self._again(asked, now)
         else:

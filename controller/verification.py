@@ -56,7 +56,7 @@ class Verification:
         ended = self._ended.get(point_id)
         if ended is not None and not ended.looking:
             ended.looking = True
-            self._eye.ask(point_id, now)
+            self._eye.ask(point_id, "severed", now)
 
     def step(self, now: float) -> list[str]:
         """Settle what can be settled; what became of it, in words."""

@@ -11,7 +11,7 @@ def look(number: int, finding: Finding = "seen", point_id: str = "a") -> CloseLo
 
 def test_the_request_is_repeated_until_the_picture_comes_and_no_longer() -> None:
     eye = Eye(2.0, 2)
-    eye.ask("a", 0.0)
+    eye.ask("a", "seen", 0.0)
     sent = [request for tick in range(20) if (request := eye.due(0.01 * tick)) is not None]
     assert 3 <= len(sent) <= 5 and set(sent) == {(1, "a")}
     assert eye.answer("a", 0.2) is None
@@ -23,7 +23,7 @@ def test_the_request_is_repeated_until_the_picture_comes_and_no_longer() -> None
 
 def test_a_picture_that_shows_nothing_is_taken_once_more_under_a_new_number() -> None:
     eye = Eye(2.0, 2)
-    eye.ask("a", 0.0)
+    eye.ask("a", "seen", 0.0)
     eye.due(0.0)
     eye.take(look(1, "unseen"), 0.1)
     assert eye.due(0.11) == (2, "a") and eye.answer("a", 0.11) is None
@@ -36,7 +36,7 @@ def test_a_picture_that_shows_nothing_is_taken_once_more_under_a_new_number() ->
 
 def test_a_lost_picture_is_asked_for_anew_and_a_look_ends_whatever_comes() -> None:
     eye = Eye(5.0, 1)
-    eye.ask("a", 0.0)
+    eye.ask("a", "seen", 0.0)
     numbers = {request[0] for tick in range(490) if (request := eye.due(0.01 * tick)) is not None}
     assert numbers == {1, 2, 3, 4}
     assert eye.answer("a", 4.9) is None
@@ -46,8 +46,8 @@ def test_a_lost_picture_is_asked_for_anew_and_a_look_ends_whatever_comes() -> No
 
 def test_two_points_are_looked_at_at_once_and_what_nobody_asked_for_is_nobodys() -> None:
     eye = Eye(2.0, 1)
-    eye.ask("a", 0.0)
-    eye.ask("b", 0.0)
+    eye.ask("a", "seen", 0.0)
+    eye.ask("b", "severed", 0.0)
     assert {eye.due(0.0), eye.due(0.001)} == {(1, "a"), (2, "b")}
     eye.take(look(2, "severed", "b"), 0.1)
     eye.take(look(9, "seen", "c"), 0.1)
@@ -56,3 +56,13 @@ def test_two_points_are_looked_at_at_once_and_what_nobody_asked_for_is_nobodys()
     assert answer is not None and answer.finding == "severed"
     eye.forget("b")
     assert eye.answer("b", 0.1) is None
+
+
+def test_what_is_not_as_expected_is_believed_after_a_second_picture_only() -> None:
+    eye = Eye(2.0, 2)
+    eye.ask("a", "severed", 0.0)
+    eye.take(look(1, "seen"), 0.1)
+    assert eye.answer("a", 0.1) is None and eye.due(0.1) == (2, "a")
+    eye.take(look(2, "severed"), 0.2)
+    answer = eye.answer("a", 0.2)
+    assert answer is not None and answer.finding == "severed"
