@@ -68,6 +68,34 @@ def test_a_telephone_scrolls_one_column_and_keeps_the_stop(page: Page, server: P
     until(page, lambda: len(server.stops()) == 1)
 
 
+@pytest.mark.parametrize("size", [(820, 1180), (390, 844)])
+def test_on_small_screens_neither_banner_hides_the_view(
+    page: Page, server: PlayedServer, size: tuple[int, int]
+) -> None:
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    server.bridge = bridge(stop_id="s1", stopped_by="Ada: stop button")
+    expect(page.locator("rp-stop-banner")).to_be_visible()
+    server.online = False
+    server.sockets[-1].close()
+    expect(page.locator("rp-link-banner")).to_contain_text("No link to the server")
+    view, lost = page.locator("rp-scene").bounding_box(), page.locator("rp-link-banner").bounding_box()
+    stopped = page.locator("rp-stop-banner").bounding_box()
+    assert view is not None and lost is not None and stopped is not None
+    assert lost["y"] + lost["height"] <= view["y"]
+    assert stopped["height"] <= 0.3 * view["height"]
+    assert view["height"] >= 300
+
+
+def test_on_a_telephone_the_stop_lies_over_nothing(page: Page, server: PlayedServer) -> None:
+    page.set_viewport_size({"width": 390, "height": 844})
+    stop = page.locator("#stop").bounding_box()
+    assert stop is not None
+    assert page.evaluate("document.body.getBoundingClientRect().bottom") <= stop["y"]
+    page.locator("rp-teleoperation .hint").scroll_into_view_if_needed()
+    hint = page.locator("rp-teleoperation .hint").bounding_box()
+    assert hint is not None and hint["y"] + hint["height"] <= stop["y"]
+
+
 def test_without_a_link_nothing_is_pushed_off_a_tablet(page: Page, server: PlayedServer) -> None:
     page.set_viewport_size({"width": 820, "height": 1180})
     server.bridge = bridge(stop_id="s1", stopped_by="Ada: stop button")
