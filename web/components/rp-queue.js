@@ -17,6 +17,8 @@ import { RpReason } from "./rp-reason.js";
 
 /** What a row's buttons depend on. */
 const MAY = Object.freeze(["AcceptPoint", "RejectPoint", "ResolvePoint"]);
+/** How long a process has been gone is in the reasons too, and grows all the time. */
+const AGE = /[\d.]+ (s|min|h)\b/g;
 /** How many rows a page of the list is. */
 const PAGE = 6;
 /** Keys that go to another row: from one, of so many. @type {Readonly<Record<string, (at: number, last: number) => number>>} */
@@ -58,7 +60,7 @@ class RpQueue extends HTMLElement {
       setText(source, page?.segmenter ?? "");
       setText(empty, emptyWords());
       // States come ten times a second; the rows change with the points, and with what may be done with them.
-      const may = MAY.map(whyNot).concat(pageState.get()?.controller?.active_point_id ?? "").join("\n");
+      const may = MAY.map(whyNot).concat(pageState.get()?.controller?.active_point_id ?? "").join("\n").replace(AGE, "");
       if (page === drawnPage && may === drawn) return;
       drawnPage = page;
       drawn = may;
