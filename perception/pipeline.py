@@ -4,7 +4,7 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from perception.abstention import OpenPlaces, abstention
+from perception.abstention import MoreToSee, OpenPlaces, abstention
 from perception.album import Album, Crop
 from perception.by_hand import moved_by_hand, point_by_hand
 from perception.centreline import centrelines
@@ -103,7 +103,8 @@ class Perception:
             tracked = self._tracker.update(view, labels, [])
             self._take(tracked)
             self._tell_obstacles(view, labels, rods, ())
-            return self._message(view, tracked.points, self._left_open(tracked.points), self._canes)
+            told = self._left_open(tracked.points) if self.known.spurs else (abstention(self._no_survey()),)
+            return self._message(view, tracked.points, told, self._canes)
         plant = perceive(view, labels, self._config)
         numbers = self._numbers.number(plant, view.R[:, 0])
         spurs = self.known.update(plant, numbers)
@@ -286,6 +287,13 @@ class Perception:
             return False
         config = self._config
         return bool(config.survey_nearest <= np.median(view.depth[wood]) <= config.survey_farthest)
+
+    def _no_survey(self) -> MoreToSee:
+        near, far = self._config.survey_nearest, self._config.survey_farthest
+        return MoreToSee(
+            f"no cordon is seen {near:g} to {far:g} m away: go there, or is the camera covered, or its depth missing "
+            "or in another unit?"
+        )
 
     def _message(
         self,
