@@ -119,9 +119,8 @@ class KinematicRobot:
         return msgspec.structs.replace(teleop, sequence=round(self.now / self.dt))
 
     def _around(self) -> Sample[Obstacles] | None:
-        if not self.obstacles:
-            return None
-        if self._told is None or self._told.message.capsules is not self.obstacles:
+        told = self._told
+        if told is None or told.message.capsules is not self.obstacles or self.now - told.at > 1.0:
             self._told = Sample(Obstacles(header=m.Header(self.now, "odom"), capsules=self.obstacles), self.now)
         return self._told
 

@@ -4,6 +4,7 @@ import numpy as np
 
 from controller.config import ControllerConfig
 from controller.estimate import BaseEstimate, wheels_ahead
+from controller.following import Following
 from controller.interface import Inputs
 from controller.motion import Follower, Measured
 from controller.setpoints import Setpoints
@@ -43,10 +44,13 @@ class Body:
         self._method = TwoRates(arm, base, config.base_every)
         self.follower = Follower(config, self._method, self.dt)
         self._base = BaseEstimate(self.robot.drive)
+        self.following = Following()
         self.measured: Measured | None = None
 
     def take(self, inputs: Inputs) -> None:
         """Take in what was measured and what stands around."""
+        if inputs.joints is not None:
+            self.following.take(inputs.joints.message, self.setpoints.sent)
         if inputs.joints is not None and inputs.odometry is not None:
             sent = self.setpoints.sent
             q = self._base.configuration(inputs.joints.message, inputs.odometry.message)

@@ -78,6 +78,8 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         hold_link_max_age_s: Older server heartbeats end teleoperation (s).
         perception_max_age_s: Older perception heartbeats stop automatic work (s).
         ledger_max_age_s: Work whose record is not durable after this long is a fault (s).
+        obstacles_max_age_s: Automatic work stops when the picture behind what is known to stand around is older (s);
+            the camera rests for two of them when nothing moves.
         hold_max_age_s: Teleoperation ends after this silence (s).
         teleop_speed: Limit of the tool in teleoperation (m/s).
         teleop_turn: The same for turning (rad/s).
@@ -147,6 +149,7 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
     hold_link_max_age_s: Positive = 0.3
     perception_max_age_s: Positive = 1.0
     ledger_max_age_s: Positive = 0.6
+    obstacles_max_age_s: Positive = 6.0
     hold_max_age_s: Positive = 0.15
     teleop_speed: Positive = 0.25
     teleop_turn: Positive = 0.6

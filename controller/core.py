@@ -174,9 +174,9 @@ class Controller:
         self._journal.observe(inputs.ledger, now)
         self._journal.stops(inputs.stops)
         trouble = self._journal.trouble(now, self._config.ledger_max_age_s)
-        token = self._authority.token
-        self._health = safety.health(inputs, None if token is None else token.epoch, now, trouble)
         self._body.take(inputs)
+        token, astray = self._authority.token, self._body.following.astray
+        self._health = safety.health(inputs, None if token is None else token.epoch, now, trouble, astray)
         self._body.surroundings.work_at(self._sequence.places)
         self._clearance.take(inputs.obstacles)
         if bridge is not None:
@@ -204,7 +204,7 @@ class Controller:
         elif verdict.action == "pause":
             self._pause(verdict.reason, now)
         self._sequence.wind_up(self._authority.unwatched(now))
-        self._state = modes.observe(self._state, self._cause(), now)
+        self._state = modes.observe(self._state, safety.cause(self._health, self._config), now)
         self._supervise_hold(now)
 
     def _pause(self, reason: str, now: float) -> None:
@@ -241,16 +241,6 @@ class Controller:
         if self._sequence.cutting or (bridge is not None and bridge.message.cutter == "closing"):
             return "the blades are closing; wait until the cut has ended"
         return ""
-
-    def _cause(self) -> str:
-        """Why a PROTECTIVE_STOP or FAULT could not be left now; empty when its cause is gone."""
-        if self._health.overruled:
-            return "another controller commands this robot"
-        return (
-            self._health.ledger
-            or safety.sensors(self._health, self._config)
-            or ("watchdog" if self._health.watchdog else "")
-        )
 
     def _event(self, event: Event, now: float, reason: str, by: modes.Rights = modes.SYSTEM) -> str:
         """Put an event to the machine; what it changes is logged. Returns the refusal."""

@@ -112,7 +112,6 @@ class CutSequence:
         self._forget()
         # Since a plan was made the robot may have been moved by hand.
         self._coming.forget()
-        self._ending = ""
         self._stage = Stage.SURVEY if survey > 0.0 else Stage.ESCAPE
         self._survey = Survey(self._config, self._follower, self._saturation, self._queue, survey)
 
@@ -182,8 +181,6 @@ class CutSequence:
 
     def _next(self, robot: Measured) -> Work:
         """Choose the next point and look for a posture; stand still while looking."""
-        if self._ending:
-            return Work(self._saturation.ramp(robot.sent), pause=self._ending)
         self._forget()
         if not self._coming.look(robot.q):
             # The last cut may still have to be made once more.

@@ -117,7 +117,7 @@ class Follower:
         demand = Demand(robot.q, robot.kinematics, robot.sent, ActuatorTask(xi), Posture(robot.q), "free")
         return _tracking(self._method.solve(demand), None, np.zeros(6), False)
 
-    def carry(self, goal: Any, linear: float, angular: float, robot: Measured) -> Tracking:
+    def carry(self, goal: Any, linear: float, angular: float, robot: Measured, pace: float = 1.0) -> Tracking:
         """One period with the tool kept to a pose while the base moves under it, as far as the arm allows.
 
         Args:
@@ -125,13 +125,14 @@ class Follower:
             linear: Forward velocity of the base (m/s).
             angular: Its yaw rate (rad/s).
             robot: Measured robot.
+            pace: Share of the tool's speed to use.
         """
         rate = np.zeros(len(robot.q))
         heading = float(robot.q[2])
         rate[:3] = linear * math.cos(heading), linear * math.sin(heading), angular
-        return self._towards(goal, Posture(robot.q, rate), robot, "row")
+        return self._towards(goal, Posture(robot.q, rate), robot, "row", pace)
 
-    def seek(self, goal: Any, q_goal: Array, robot: Measured, base: BaseMode = "free") -> Tracking:
+    def seek(self, goal: Any, q_goal: Array, robot: Measured, base: BaseMode = "free", pace: float = 1.0) -> Tracking:
         """One period towards a pose that may move (teleoperation): proportional, at a bounded speed and turn.
 
         Args:
@@ -139,15 +140,17 @@ class Follower:
             q_goal: Configuration (12) of which heading and arm posture are kept to.
             robot: Measured robot.
             base: What the base is for.
+            pace: Share of the tool's speed to use.
         """
         posture = q_goal.copy()
         posture[:2] = robot.q[:2]
-        return self._towards(goal, Posture(posture), robot, base)
+        return self._towards(goal, Posture(posture), robot, base, pace)
 
-    def _towards(self, goal: Any, posture: Posture, robot: Measured, base: BaseMode) -> Tracking:
+    def _towards(self, goal: Any, posture: Posture, robot: Measured, base: BaseMode, pace: float) -> Tracking:
         error = tool_error(robot.kinematics.T_odom_tool, goal)
         twist = self._gains * error
-        for part, bound in ((slice(0, 3), self._config.teleop_speed), (slice(3, 6), self._config.teleop_turn)):
+        bounds = pace * self._config.teleop_speed, pace * self._config.teleop_turn
+        for part, bound in zip((slice(0, 3), slice(3, 6)), bounds, strict=True):
             size = _length(twist[part])
             if size > bound:
                 twist[part] *= bound / size
@@ -158,7 +161,7 @@ class Follower:
             ToolTask(twist, keep_path=False),
             posture,
             base,
-            self._config.teleop_speed,
+            bounds[0],
         )
         return _tracking(self._method.solve(demand), goal, error, False)
 

@@ -25,6 +25,8 @@ class Health:
         watchdog: The bridge says that its watchdog holds the robot.
         overruled: The bridge has accepted a newer controller than this one.
         ledger: Why what is done cannot be recorded; empty when it can.
+        astray: Why the robot does not do what it is told; empty when it does.
+        obstacles: Age of the picture behind what is known to stand around.
     """
 
     joints: float
@@ -36,9 +38,11 @@ class Health:
     watchdog: bool
     overruled: bool
     ledger: str = ""
+    astray: str = ""
+    obstacles: float = 0.0
 
 
-def health(inputs: Inputs, epoch: int | None, now: float, ledger: str = "") -> Health:
+def health(inputs: Inputs, epoch: int | None, now: float, ledger: str = "", astray: str = "") -> Health:
     """How fresh the inputs are.
 
     Args:
@@ -46,6 +50,7 @@ def health(inputs: Inputs, epoch: int | None, now: float, ledger: str = "") -> H
         epoch: Of this controller, None before the first bridge state.
         now: Monotonic time (s).
         ledger: Why what is done cannot be recorded.
+        astray: Why the robot does not do what it is told.
     """
 
     def age(at: float | None) -> float:
@@ -62,7 +67,21 @@ def health(inputs: Inputs, epoch: int | None, now: float, ledger: str = "") -> H
         watchdog=bridge is not None and bridge.message.watchdog,
         overruled=bridge is not None and epoch is not None and bridge.message.epoch > epoch,
         ledger=ledger,
+        astray=astray,
+        obstacles=_picture_age(inputs, now),
     )
+
+
+def _picture_age(inputs: Inputs, now: float) -> float:
+    """The greater of how long ago the obstacles came, and how far their picture's stamp is from the newest joints'.
+
+    Both stamps are of the bridge's clock. Perception repeats its newest message, so that its arrival alone says little;
+    and a stamp from the future is as wrong as an old one.
+    """
+    obstacles, joints = inputs.obstacles, inputs.joints
+    if obstacles is None or joints is None:
+        return math.inf
+    return max(now - obstacles.at, abs(joints.message.header.stamp - obstacles.message.header.stamp))
 
 
 @dataclass(frozen=True)
@@ -91,19 +110,28 @@ def check(mode: Mode, moving: bool, health: Health, config: ControllerConfig) ->
         return Verdict("fault", health.ledger)
     if not moving and mode not in ("AUTO", "TELEOP"):
         return FINE
-    cause = sensors(health, config)
-    if cause:
-        return Verdict("protect", cause)
+    why = sensors(health, config)
+    if why:
+        return Verdict("protect", why)
     if health.watchdog:
         return Verdict("protect", "the bridge's watchdog holds the robot: no valid command reached it in time")
-    cause = supervision(health, config, teleoperated=mode == "TELEOP")
-    if not cause and mode == "AUTO":
-        cause = perception(health, config)
-    return Verdict("pause", cause) if cause else FINE
+    why = supervision(health, config, teleoperated=mode == "TELEOP")
+    if not why and mode == "AUTO":
+        why = perception(health, config)
+    return Verdict("pause", why) if why else FINE
+
+
+def cause(health: Health, config: ControllerConfig) -> str:
+    """Why a PROTECTIVE_STOP or FAULT could not be left now; empty when its cause is gone."""
+    if health.overruled:
+        return "another controller commands this robot"
+    return health.ledger or sensors(health, config) or ("watchdog" if health.watchdog else "")
 
 
 def sensors(health: Health, config: ControllerConfig) -> str:
     """Why the robot's own data do not allow motion; empty when they do."""
+    if health.astray:
+        return health.astray
     if health.joints > config.joints_max_age_s:
         return f"joint states are {_age(health.joints)} old, allowed are {config.joints_max_age_s} s"
     if health.odometry > config.odometry_max_age_s:
@@ -128,6 +156,11 @@ def supervision(health: Health, config: ControllerConfig, teleoperated: bool) ->
 
 def perception(health: Health, config: ControllerConfig) -> str:
     """Why perception does not allow automatic work; empty when it does."""
+    if health.obstacles > config.obstacles_max_age_s:
+        return (
+            f"the newest picture of what stands around is {_age(health.obstacles)} old, "
+            f"allowed are {config.obstacles_max_age_s} s"
+        )
     return _process("perception", health.perception, config.perception_max_age_s, health.present)
 
 

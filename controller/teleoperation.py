@@ -13,6 +13,9 @@ from rolling_panda.errors import ModelError
 from rolling_panda.robot_model import ARM_XI, placement
 from rolling_panda.teleop_messages import TeleopTarget
 
+#: Who sees the robot no later than this (s) moves it at full speed, who sees it later than that at the slowest.
+_PROMPT_S, _LATE_S, _SLOWEST = 0.25, 0.5, 0.25
+
 
 class Teleoperation:
     """Watches the hold and follows it. A hold must be pressed anew after anything else has ended it."""
@@ -66,17 +69,23 @@ class Teleoperation:
         """One period of what is held."""
         message = self._message
         assert message is not None
-        xi = np.zeros(NXI)
+        xi, pace = np.zeros(NXI), pace_of(message.round_trip_s)
         if message.joints is not None:
-            xi[ARM_XI] = message.joints
+            xi[ARM_XI] = pace * np.array(message.joints)
             return self._follower.jog(xi, robot)
         if self._goal is None:
             assert message.base is not None
-            xi[:2] = self._drive.wheels(message.base.linear, message.base.angular)
+            xi[:2] = self._drive.wheels(pace * message.base.linear, pace * message.base.angular)
             return self._follower.jog(xi, robot)
         if message.base is None:
-            return self._follower.seek(self._goal, self._posture, robot, self._config.teleop_base)
-        return self._follower.carry(self._goal, message.base.linear, message.base.angular, robot)
+            return self._follower.seek(self._goal, self._posture, robot, self._config.teleop_base, pace)
+        return self._follower.carry(self._goal, pace * message.base.linear, pace * message.base.angular, robot, pace)
+
+
+def pace_of(round_trip_s: float) -> float:
+    """Share of the speed that a hand gets, by how late it sees the robot: all up to 0.25 s, a quarter from 0.5 s on."""
+    slow = (round_trip_s - _PROMPT_S) / (_LATE_S - _PROMPT_S)
+    return 1.0 - (1.0 - _SLOWEST) * min(max(slow, 0.0), 1.0)
 
 
 def _means_something(message: TeleopTarget) -> bool:

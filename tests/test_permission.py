@@ -13,6 +13,7 @@ WELL = replace(
     bridge=0.0,
     server=0.0,
     perception=0.0,
+    obstacles=0.0,
     present=frozenset({"bridge", "controller", "perception", "server"}),
 )
 

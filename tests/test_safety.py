@@ -3,7 +3,10 @@ from dataclasses import replace
 import pytest
 
 from controller.config import ControllerConfig
-from controller.safety import FINE, Health, check
+from controller.interface import Inputs, Sample
+from controller.safety import FINE, Health, check, health
+from rolling_panda import messages as m
+from rolling_panda.row_messages import Obstacles
 
 CONFIG = ControllerConfig()
 ALL = frozenset({"bridge", "controller", "perception", "server"})
@@ -71,3 +74,27 @@ def test_the_most_severe_of_several_counts():
     found = verdict("AUTO", present=frozenset(), joints=1.0, overruled=True)
     assert found.action == "fault"
     assert verdict("AUTO", present=frozenset(), joints=1.0).action == "protect"
+
+
+def test_old_pictures_of_what_stands_around_stop_automatic_work_alone():
+    old = verdict("AUTO", obstacles=6.5)
+    assert old.action == "pause" and "stands around is 6.50 s old" in old.reason
+    assert verdict("TELEOP", obstacles=6.5) == FINE
+
+
+def test_the_age_of_a_picture_is_told_by_its_stamp_however_often_it_is_repeated():
+    def seen(stamp, at=100.0):
+        joints = m.JointState(header=m.Header(50.0), sequence=1, position=(0.0,) * 9, velocity=(0.0,) * 9)
+        told = Obstacles(header=m.Header(stamp), capsules=())
+        return health(Inputs(joints=Sample(joints, 100.0), obstacles=Sample(told, at)), None, 100.0).obstacles
+
+    assert seen(49.0) == 1.0
+    assert seen(40.0) == 10.0
+    assert seen(60.0) == 10.0, "a stamp from the future is as wrong"
+    assert seen(50.0, at=90.0) == 10.0
+    assert health(Inputs(), None, 0.0).obstacles == float("inf")
+
+
+def test_a_robot_that_does_not_follow_is_stopped_protectively():
+    found = verdict("AUTO", astray="joint 3 does not follow")
+    assert found.action == "protect" and "joint 3" in found.reason

@@ -9,7 +9,7 @@ from benchmarks.kinematic_robot import KinematicRobot
 from controller.config import ControllerConfig
 from controller.core import Controller
 from controller.interface import Sample
-from controller.teleoperation import Teleoperation
+from controller.teleoperation import Teleoperation, pace_of
 from rolling_panda import intents
 from rolling_panda.config import RobotConfig
 from rolling_panda.robot_model import pose_message
@@ -207,3 +207,21 @@ def test_a_demand_for_nothing_or_for_two_things_moves_nothing():
         held(r, **wanted)
         r.run(0.3)
         assert r.state.mode == "READY" and not np.any(r.record)
+
+
+def test_who_sees_the_robot_late_moves_it_slowly():
+    assert [pace_of(late) for late in (0.0, 0.25, 0.5, 9.0)] == [1.0, 1.0, 0.25, 0.25]
+    assert pace_of(0.375) == pytest.approx(0.625)
+    speeds = []
+    for late in (0.1, 0.6):
+        r = robot()
+        goal = pose_message(moved(tool(r), 0.5, 0, 0))
+        r.teleop = TeleopTarget(sequence=1, hold=True, user="ada", target=goal, round_trip_s=late)
+        before = tool(r).translation.copy()
+        r.run(1.5)
+        speeds.append(np.linalg.norm(tool(r).translation - before) / 1.5)
+        r.teleop = TeleopTarget(sequence=1, hold=True, user="ada", base=BaseVelocity(0.2, 0.0), round_trip_s=late)
+        r.run(1.0)
+        speeds.append(abs(r.xi[0]) * r.model.drive.wheel_radius)
+    assert speeds[2] < 0.35 * speeds[0]
+    assert speeds[1] == pytest.approx(0.2, rel=0.05) and speeds[3] == pytest.approx(0.05, rel=0.05)
