@@ -68,13 +68,15 @@ class PageState(PageMessage, frozen=True, kw_only=True):
 class PagePoint(Struct, frozen=True, forbid_unknown_fields=True):
     """One row of the queue: the point as perceived and its life in the controller's queue.
 
-    `pixel` is its place in the newest camera image (px, None when outside), for drawing. `plan` is what the session's
-    plan says of it, None where no plan that holds does.
+    `pixel` is its place in the newest camera image (px, None when outside), `cane_angle` the direction of the cane in
+    that image (rad, from rightwards to downwards), for drawing. `plan` is what the session's plan says of it, None
+    where no plan that holds does.
     """
 
     point: m.PruningPoint
     entry: m.QueueEntry
     pixel: tuple[float, float] | None = None
+    cane_angle: m.Angle | None = None
     plan: PointPlan | None = None
 
 

@@ -1,5 +1,7 @@
 """What the page is shown, put together from the newest messages of the robot."""
 
+import math
+
 import msgspec
 import numpy as np
 
@@ -12,6 +14,8 @@ from server.sessions import Session
 
 #: A count of frames alone is not worth sending every point again more often than this (s).
 _RECOUNT_S = 5.0
+#: The cane's direction in an image is told from a place so far along its tangent (m).
+_BEYOND = 0.05
 _NOT_QUEUED = "the controller has not taken it up yet"
 
 
@@ -101,13 +105,20 @@ class PageView:
             if point.point_id not in queued
         ]
         pixels = project([point.position for point, _ in rows], camera, self._model)
+        beyond = project([_beyond(point) for point, _ in rows], camera, self._model)
         planned = (
             {} if plan is None or plan.state != "valid" else {each.plan.point_id: each.plan for each in plan.points}
         )
         return PagePoints(
             points=tuple(
-                PagePoint(point, entry, pixel, planned.get(point.point_id) if entry.state == "ACCEPTED" else None)
-                for (point, entry), pixel in zip(rows, pixels, strict=True)
+                PagePoint(
+                    point,
+                    entry,
+                    pixel,
+                    _angle(pixel, further),
+                    planned.get(point.point_id) if entry.state == "ACCEPTED" else None,
+                )
+                for (point, entry), pixel, further in zip(rows, pixels, beyond, strict=True)
             ),
             abstained=perceived.abstained if perceived else (),
             segmenter=perceived.segmenter if perceived else "",
@@ -116,6 +127,19 @@ class PageView:
             plan=PagePlan(plan.state, plan.reason, plan.plan_hash, plan.duration_s) if plan else None,
             rule=perceived.rule if perceived else None,
         )
+
+
+def _beyond(point: m.PruningPoint) -> m.Vector3:
+    """A place on the cane's tangent, past the cut."""
+    x, y, z = (np.array(point.position) + _BEYOND * np.array(point.tangent)).tolist()
+    return x, y, z
+
+
+def _angle(here: tuple[float, float] | None, there: tuple[float, float] | None) -> float | None:
+    """Direction from one pixel to another (rad); None where the cane points at the camera or leaves the image."""
+    if here is None or there is None or here == there:
+        return None
+    return round(math.atan2(there[1] - here[1], there[0] - here[0]), 2)
 
 
 def addressed(state: PageState, session: Session) -> PageState:

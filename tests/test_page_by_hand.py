@@ -1,5 +1,6 @@
 """Points that a person places on the page, and the camera's image held still."""
 
+import msgspec
 import pytest
 from played_page import until
 from played_server import PlayedServer, point
@@ -85,3 +86,13 @@ def test_a_frozen_image_stays_with_its_points_and_is_the_one_that_is_clicked(pag
     page.locator("#freeze").click()
     until(page, lambda: len(server.frames_fetched) > count)
     expect(page.locator("rp-camera .mark").first).to_have_attribute("transform", "translate(9.0 9.0)")
+
+
+def test_a_mark_shows_where_the_blades_close_across_the_cane(page: Page, server: PlayedServer) -> None:
+    first, second, *_ = server.points
+    server.points = (msgspec.structs.replace(first, cane_angle=-1.57), msgspec.structs.replace(second, cane_angle=None))
+    server.tell(server.page_points())
+    marks = page.locator("rp-camera .mark")
+    expect(marks).to_have_count(2)
+    expect(marks.nth(0).locator("path.ring")).to_have_attribute("transform", "rotate(-90) scale(1.5)")
+    expect(marks.nth(1).locator("path.ring")).to_have_attribute("visibility", "hidden")

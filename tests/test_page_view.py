@@ -132,3 +132,16 @@ def test_an_accepted_point_comes_with_what_the_plan_that_holds_says_of_it(wire, 
     wire.deliver(topics.PLAN, plan_of(first, refused, done, state="void"))
     shown = view.points(0.0)
     assert [row.plan for row in shown.points] == [None, None, None] and shown.plan.state == "void"
+
+
+@pytest.mark.parametrize(
+    ("along", "angle"), [((1, 0, 0), 0.0), ((0, 1, 0), 1.57), ((-1, -1, 0), -2.36), ((0, 0, 1), None)]
+)
+def test_a_canes_direction_in_the_image_goes_with_its_point(wire, view, along, angle):
+    tangent = np.subtract(in_camera(*along), in_camera(0.0, 0.0, 0.0)) / np.linalg.norm(along)
+    point = msgspec.structs.replace(pruning_point(position=in_camera(0.0, 0.0, 0.8)), tangent=tuple(tangent.tolist()))
+    wire.deliver(topics.CAMERA, frame())
+    wire.deliver(topics.POINTS, pruning_points(point))
+    (row,) = view.points(0.0).points
+    assert row.pixel == (320.0, 240.0)
+    assert row.cane_angle == (None if angle is None else pytest.approx(angle, abs=0.01))

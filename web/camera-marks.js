@@ -19,6 +19,9 @@ const SIGNS = Object.freeze({
   REJECTED: "M-3 -3l6 6M3 -3l-6 6",
 });
 
+/** Where the blades close, square to a cane that runs to the right. */
+const BLADES = "M0 -14V-7M0 7V14";
+
 export class CameraMarks {
   /** @param {SVGSVGElement} overlay */
   constructor(overlay) {
@@ -51,13 +54,15 @@ export class CameraMarks {
    * @param {Pixel} pixel
    * @param {number} unit
    */
-  draw({ point, entry }, [x, y], unit) {
+  draw({ point, entry, cane_angle: angle }, [x, y], unit) {
     let mark = this.marks.get(point.point_id);
     if (!mark) {
       mark = svg("g", { class: "mark" });
       mark.append(
         svg("circle", { class: "target", r: 14 * unit }),
         svg("circle", { class: "halo", r: 7 * unit }),
+        svg("path", { class: "halo", d: BLADES }),
+        svg("path", { class: "ring", d: BLADES }),
         svg("circle", { class: "ring", r: 7 * unit }),
         svg("path", { class: "sign" }),
         svg("title"),
@@ -69,7 +74,11 @@ export class CameraMarks {
     mark.dataset.state = entry.state;
     mark.classList.toggle("selected", selected.get() === point.point_id);
     mark.setAttribute("transform", `translate(${x.toFixed(1)} ${y.toFixed(1)})`);
-    const [, , , sign, title] = mark.children;
+    const [, , halo, blades, , sign, title] = mark.children;
+    for (const each of [halo, blades]) {
+      each?.setAttribute("visibility", angle === null ? "hidden" : "visible");
+      each?.setAttribute("transform", `rotate(${((angle ?? 0) * (180 / Math.PI)).toFixed(0)}) scale(${unit})`);
+    }
     sign?.setAttribute("d", SIGNS[entry.state]);
     sign?.setAttribute("transform", `scale(${unit})`);
     if (title) setText(title, `${point.point_id}: ${POINT_WORDS[entry.state]}`);

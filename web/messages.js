@@ -277,12 +277,13 @@ export const TEXT_MAX_LENGTH = 500;
  */
 
 /**
- * One row of the queue: the point as perceived and its life in the controller's queue. `pixel` is its place in the newest camera image (px, None when outside), for drawing. `plan` is what the session's plan says of it, None where no plan that holds does.
+ * One row of the queue: the point as perceived and its life in the controller's queue. `pixel` is its place in the newest camera image (px, None when outside), `cane_angle` the direction of the cane in that image (rad, from rightwards to downwards), for drawing. `plan` is what the session's plan says of it, None where no plan that holds does.
  *
  * @typedef {object} PagePoint
  * @property {PruningPoint} point
  * @property {QueueEntry} entry
  * @property {[number, number]|null} pixel
+ * @property {number|null} cane_angle
  * @property {PointPlan|null} plan
  */
 
