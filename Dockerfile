@@ -21,10 +21,11 @@ COPY server server
 COPY benchmarks benchmarks
 RUN /tools/bin/pip wheel --no-cache-dir --no-deps --no-build-isolation --wheel-dir /wheel .
 
-# What runs: locked dependencies first, as they change seldom.
+# What runs: locked dependencies first, as they change seldom. LOCK=requirements-real.lock brings the real robot's drivers.
 FROM ${BASE_IMAGE} AS install
-COPY requirements-run.lock /
-RUN python -m venv /app && /app/bin/pip install --no-cache-dir --require-hashes -r /requirements-run.lock
+ARG LOCK=requirements-run.lock
+COPY requirements-run.lock requirements-real.lock /
+RUN python -m venv /app && /app/bin/pip install --no-cache-dir --require-hashes -r /${LOCK}
 COPY --from=wheel /wheel /wheel
 RUN /app/bin/pip install --no-cache-dir --no-deps /wheel/*.whl
 

@@ -15,7 +15,11 @@ RUN = PROJECT["dependencies"]
 
 @pytest.mark.parametrize(
     ("lock", "declared"),
-    [("requirements-run.lock", RUN), ("requirements.lock", RUN + PROJECT["optional-dependencies"]["dev"])],
+    [
+        ("requirements-run.lock", RUN),
+        ("requirements-real.lock", RUN + PROJECT["optional-dependencies"]["real"]),
+        ("requirements.lock", RUN + PROJECT["optional-dependencies"]["dev"]),
+    ],
 )
 def test_every_declared_dependency_is_locked_at_an_allowed_version(lock: str, declared: list[str]) -> None:
     pinned = dict(re.findall(r"^([A-Za-z0-9_.-]+)==(\S+)", (ROOT / lock).read_text(), re.MULTILINE))
@@ -27,7 +31,7 @@ def test_every_declared_dependency_is_locked_at_an_allowed_version(lock: str, de
         assert wanted.specifier.contains(version), f"{lock} has {wanted.name} {version}; run `make lock`"
 
 
-@pytest.mark.parametrize("lock", ["requirements-run.lock", "requirements.lock"])
+@pytest.mark.parametrize("lock", ["requirements-run.lock", "requirements-real.lock", "requirements.lock"])
 def test_a_lock_has_hashes_and_no_index_address(lock: str) -> None:
     text = (ROOT / lock).read_text()
     assert text.count("--hash=sha256:") >= len(re.findall(r"^\S+==", text, re.MULTILINE))
