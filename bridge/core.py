@@ -42,6 +42,9 @@ _STOPS_TICKS = round(1 / STOPS.rate_hz / TICK_S)
 # the tool in place takes.
 _CUT_WHEELS, _CUT_JOINTS = 0.04, 0.1
 MOVING_CUT = "the robot is not at rest"
+# A robot that nobody has stepped for so long (s) has come to rest by its own deadlines, or is on its way: what is sent
+# begins with how it really moves.
+_STANDSTILL_S = 0.05
 # Faster than this (rad/s) is motion that the camera should follow.
 _MOVING = 0.01
 
@@ -114,6 +117,7 @@ class BridgeCore:
         self._joint_ticks = round(1 / config.joints_hz / TICK_S)
         self._round_trip = RoundTrip()
         self._clock = self._wall = 0.0
+        self._stepped = float("-inf")
         self._stops_due = True
         self._desired: Array = np.zeros_like(limits.velocity)
         self._was_tripped = True
@@ -208,6 +212,10 @@ class BridgeCore:
     def step(self, now: float, clock: float | None = None, wall_time: float = 0.0) -> BridgeOutputs:
         """Advance one tick of 1 ms; `clock` is `now` unless given, `wall_time` (s since 1970) is for people."""
         self._clock, self._wall = now if clock is None else clock, wall_time
+        if now - self._stepped > _STANDSTILL_S:
+            self._measured = self.robot.read()
+            self._limiter.restart(self._measured.velocity)
+        self._stepped = now
         self._watch_button(now)
         tripped = self._watch(now)
         stopped = bool(self._latch.stop_id)

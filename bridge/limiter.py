@@ -34,6 +34,11 @@ class Limiter:
         self._last = np.zeros_like(self._jerk)
         self.sent = np.zeros_like(self._velocity)
 
+    def restart(self, velocity: Array) -> None:
+        """The robot moves like this now (9, rad/s), whatever was sent before."""
+        self.sent = np.minimum(np.maximum(velocity, -self._velocity), self._velocity)
+        self._last = np.zeros_like(self._last)
+
     def go_on_from(self, velocity: Array, change: Array) -> None:
         """The arm took this as its last velocity (7, rad/s) and change in a period, whatever was sent."""
         self.sent[ARM_XI] = velocity

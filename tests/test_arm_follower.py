@@ -55,6 +55,19 @@ def test_it_comes_to_rest_within_its_deadline_when_no_target_comes() -> None:
     assert np.abs(arm.dq).max() < 1e-9
 
 
+def test_a_target_after_silence_does_not_wake_the_one_before_it() -> None:
+    arm = Arm()
+    for _ in range(100):
+        arm.follower.aim(np.full(7, 0.3), arm.now)
+        arm.run(5)
+    arm.run(500)
+    arm.taken.clear()
+    for _ in range(20):
+        arm.follower.aim(np.zeros(7), arm.now)
+        arm.run(5)
+    assert np.abs(arm.taken).max() == 0.0
+
+
 def test_it_holds_when_told_to_whatever_the_target_is() -> None:
     arm = Arm()
     arm.follower.aim(np.full(7, 0.3), arm.now)

@@ -374,3 +374,11 @@ def test_a_picture_is_taken_at_once_for_the_controller_whose_commands_are_taken_
     assert look(bench.epoch + 1, 1) == []
     assert any("picture" in refusal.topic for refusal in bench.core.refusals.counts())
     assert look(bench.epoch, 2) == [("p4", 2)]
+
+
+def test_after_a_standstill_of_the_bridge_what_is_sent_begins_with_how_the_robot_really_moves(bench: Bench) -> None:
+    bench.drive_on()
+    bench.robot.now = replace(bench.robot.now, velocity=np.zeros(9))
+    bench.now += 0.5
+    bench.run(0.2, FORWARD)
+    assert bench.moved_within(0.2) == 0.0

@@ -36,7 +36,8 @@ class ArmFollower:
 
     def aim(self, target: Array, at: float) -> None:
         """A target (7, rad/s) was written at `at`."""
-        self._start = self._goal(at)
+        # After silence it begins where the fading has led, not at the target from before.
+        self._start = self._watchdog.trust(at) * self._goal(at)
         self._span = min(max(at - self._began, TICK_S), _LONGEST_SPAN)
         self._target, self._began = target, at
         self._watchdog.feed(at)

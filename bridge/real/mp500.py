@@ -45,6 +45,7 @@ class BaseState:
         fault: Why the base may not move now; empty when it may.
         severe: Whether a person has to release the fault.
         battery: Charge 0…1; NaN when unknown.
+        emergency: Whether its emergency stop, pressed or tripped by the scanner, is not confirmed as over yet.
     """
 
     position: Array
@@ -52,6 +53,7 @@ class BaseState:
     fault: str
     severe: bool
     battery: float
+    emergency: bool
 
 
 class Mp500:
@@ -76,7 +78,7 @@ class Mp500:
         self._target = self._sent = np.zeros(2)
         self._position = self._velocity = np.zeros(2)
         self._stamp = self._wheels_at = self._emergency_at = float("-inf")
-        self._emergency, self._cause = FREE, ""
+        self._emergency, self._cause, self._pressed = FREE, "", False
         self._rest_since: float | None = None
         self._runaway = ""
         self._battery = float("nan")
@@ -106,7 +108,7 @@ class Mp500:
         now = time.monotonic()
         with self._lock:
             fault, severe = self._fault(now)
-            return BaseState(self._position, self._velocity, fault, severe, self._battery)
+            return BaseState(self._position, self._velocity, fault, severe, self._battery, self._pressed)
 
     def write(self, wheels: Array) -> None:
         """Speeds of the wheels from now on (2, rad/s), until the deadline."""
@@ -216,7 +218,7 @@ class Mp500:
         stopped = message.software_stop or message.emergency_state != FREE
         with self._lock:
             self._emergency = int(message.emergency_state) or int(message.software_stop)
-            self._emergency_at = at
+            self._emergency_at, self._pressed = at, message.emergency_state != FREE
             self._cause = f"base: emergency stop ({names or 'being confirmed'})" if stopped else ""
 
     def _on_battery(self, data: bytes, at: float) -> None:

@@ -100,6 +100,7 @@ class RealRobot:
             blades.detail,
             fault="; ".join(filter(None, ["" if self._moving else READ_ONLY, base.fault, arm.fault])),
             severe=base.severe or arm.severe,
+            emergency=base.emergency,
         )
 
     def write(self, setpoint: Setpoint) -> None:
