@@ -15,6 +15,7 @@ BENCHMARKS = {
     "ledger": ("benchmarks.ledger", "what recording costs the control step, on a slow disk too"),
     "live": ("benchmarks.live", "the running demo: control periods on time, round trip, tool error"),
     "perception": ("benchmarks.perception", "surveys of unseen rows, every pruning point judged"),
+    "faults": ("benchmarks.faults", "random faults in motion, judged by what the actuators were sent"),
     "plots": ("benchmarks.plots", "pictures of what the others wrote with --json"),
 }
 
