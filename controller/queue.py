@@ -18,6 +18,8 @@ _TURNED_TOLERANCE = 0.35
 #: A name that comes back further away than this is another cane's (m).
 _ELSEWHERE = 0.03
 _INTERRUPTED = "the controller ended before it knew whether this was cut; look, and say"
+#: Of what perception does not show these are shown from the record: somebody has to decide.
+_ASKED: frozenset[PointState] = frozenset({"ACCEPTED", "UNKNOWN"})
 _WAITS = "accepted before a restart; waits until perception sees it again"
 _UNBOUND = "its record does not fit its hash; accept it anew"
 _ACCEPTABLE: frozenset[PointState] = frozenset({"PROPOSED", "REJECTED", "FAILED_NOT_CUT"})
@@ -330,4 +332,5 @@ def _entry(ticket: Ticket, note: str) -> QueueEntry:
         cut_id=ticket.cut_id,
         accepted_position=None if ticket.accepted is None else ticket.accepted.position,
         digest="" if ticket.accepted is None else ticket.accepted.digest,
+        recorded=ticket.point if not ticket.seen and ticket.state in _ASKED else None,
     )

@@ -187,7 +187,10 @@ class BridgeState(Message, frozen=True, kw_only=True):
 
 
 class QueueEntry(Struct, frozen=True, forbid_unknown_fields=True):
-    """A pruning point in the controller's queue: its life, why it is where it is, the `digest` that was accepted."""
+    """A pruning point in the controller's queue: its life, why it is where it is, the `digest` that was accepted.
+
+    `recorded` is the point as the ledger has it, where perception does not show it and somebody has to decide.
+    """
 
     point_id: Name
     state: PointState
@@ -196,6 +199,7 @@ class QueueEntry(Struct, frozen=True, forbid_unknown_fields=True):
     cut_id: Annotated[str, Meta(max_length=64)] = ""
     accepted_position: Vector3 | None = None
     digest: Digest = ""
+    recorded: "PruningPoint | None" = None
 
 
 class ControllerState(Message, frozen=True, kw_only=True):

@@ -97,7 +97,8 @@ class PageView:
         points = perceived.points if perceived else ()
         queued = {entry.point_id for entry in queue}
         current = {point.point_id: point for point in points}
-        self._seen = {key: point for key, point in self._seen.items() if key in queued} | current
+        recorded = {entry.point_id: entry.recorded for entry in queue if entry.recorded is not None}
+        self._seen = recorded | {key: point for key, point in self._seen.items() if key in queued} | current
         rows = [(self._seen[entry.point_id], entry) for entry in queue if entry.point_id in self._seen]
         rows += [
             (point, m.QueueEntry(point.point_id, "PROPOSED", _NOT_QUEUED))

@@ -90,6 +90,14 @@ def test_a_point_that_was_cut_off_stays_while_the_queue_knows_it(wire, view):
     assert view.points(0.0).points == ()
 
 
+def test_what_perception_does_not_show_after_a_restart_is_shown_as_recorded(wire, view):
+    wire.deliver(topics.POINTS, pruning_points())
+    entry = m.QueueEntry("a", "UNKNOWN", "look", recorded=pruning_point("a"))
+    wire.deliver(topics.CONTROLLER, controller_state((entry,)))
+    (row,) = view.points(0.0).points
+    assert row.point == pruning_point("a") and row.entry.state == "UNKNOWN"
+
+
 def test_the_same_points_are_the_same_object(wire, view):
     wire.deliver(topics.POINTS, pruning_points(pruning_point("a")))
     first = view.points(0.0)

@@ -82,6 +82,17 @@ def test_an_acceptance_that_does_not_fit_its_hash_is_none():
     assert life.state() == "REJECTED" and "does not fit its hash" in life.queue.get("a").reason
 
 
+def test_what_a_person_is_asked_about_is_told_with_its_point_until_perception_shows_it():
+    life = begun(point(), point("b", position=(2.0, 0.85, 1.0)))
+    life.queue.accept("a", 3, "ada")
+    life.queue.reject("b", "ada", "no")
+    life = life.restarted()
+    entries = {entry.point_id: entry for entry in life.queue.entries()}
+    assert entries["a"].recorded == POINT and entries["b"].recorded is None
+    life.queue.update(shown(point()))
+    assert all(entry.recorded is None for entry in life.queue.entries())
+
+
 def test_what_is_done_or_rejected_stays_so():
     life = begun(point(), point("b", position=(2.0, 0.85, 1.0)))
     life.queue.accept("a", 3, "ada")

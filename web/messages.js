@@ -85,7 +85,33 @@ export const TEXT_MAX_LENGTH = 500;
  */
 
 /**
- * A pruning point in the controller's queue: its life, why it is where it is, the `digest` that was accepted.
+ * Where to cut, and why.
+ *
+ * @typedef {object} PruningPoint
+ * @property {string} point_id Stable while the point is tracked from frame to frame.
+ * @property {number} revision Grows when what is cut changes: its kind, the nodes kept, or by more than noise its place or tangent.
+ * @property {Vector3} position On the cane's axis, in odom (m).
+ * @property {UnitVector3} tangent Unit vector along the cane, pointing away from the cordon, in odom.
+ * @property {number} radius Of the cane (m).
+ * @property {number} confidence 0…1.
+ * @property {number} nodes_seen Count nodes seen on the cane (the basal bud is not counted).
+ * @property {number} nodes_kept Count nodes that stay below the cut.
+ * @property {number} vine Number of the vine along the row, as perceived.
+ * @property {number} spur Number of the spur position on that vine, as perceived.
+ * @property {string} reason Why here, in one sentence a grower understands.
+ * @property {CutKind} kind Shortens the cane that stays, takes the old stub off, tips the cane that will fruit, or is a person's.
+ * @property {Covariance|null} position_covariance
+ * @property {Covariance|null} tangent_covariance
+ * @property {number|null} offset Past the last kept node, along the cane (m); None where no kept node is below the cut.
+ * @property {number} force Predicted cutting force (N).
+ * @property {number|null} wire_distance To the surface of the nearest known wire (m); None while none is known.
+ * @property {number|null} cordon_distance The same for cordons.
+ * @property {number|null} node_distance To the nearest node that stays (m); None where none is known.
+ * @property {string} digest Hash of what is cut and where, as `rolling_panda.point_digest` makes it; one for each revision.
+ */
+
+/**
+ * A pruning point in the controller's queue: its life, why it is where it is, the `digest` that was accepted. `recorded` is the point as the ledger has it, where perception does not show it and somebody has to decide.
  *
  * @typedef {object} QueueEntry
  * @property {string} point_id
@@ -95,6 +121,7 @@ export const TEXT_MAX_LENGTH = 500;
  * @property {string} cut_id
  * @property {Vector3|null} accepted_position
  * @property {string} digest
+ * @property {PruningPoint|null} recorded
  */
 
 /**
@@ -229,32 +256,6 @@ export const TEXT_MAX_LENGTH = 500;
  * @property {string} client The reader's own key, to be compared with the holder's.
  * @property {ControlState|null} control Who holds control of the robot's motion.
  * @property {StopState[]} stops What bridge and controller hold latched.
- */
-
-/**
- * Where to cut, and why.
- *
- * @typedef {object} PruningPoint
- * @property {string} point_id Stable while the point is tracked from frame to frame.
- * @property {number} revision Grows when what is cut changes: its kind, the nodes kept, or by more than noise its place or tangent.
- * @property {Vector3} position On the cane's axis, in odom (m).
- * @property {UnitVector3} tangent Unit vector along the cane, pointing away from the cordon, in odom.
- * @property {number} radius Of the cane (m).
- * @property {number} confidence 0…1.
- * @property {number} nodes_seen Count nodes seen on the cane (the basal bud is not counted).
- * @property {number} nodes_kept Count nodes that stay below the cut.
- * @property {number} vine Number of the vine along the row, as perceived.
- * @property {number} spur Number of the spur position on that vine, as perceived.
- * @property {string} reason Why here, in one sentence a grower understands.
- * @property {CutKind} kind Shortens the cane that stays, takes the old stub off, tips the cane that will fruit, or is a person's.
- * @property {Covariance|null} position_covariance
- * @property {Covariance|null} tangent_covariance
- * @property {number|null} offset Past the last kept node, along the cane (m); None where no kept node is below the cut.
- * @property {number} force Predicted cutting force (N).
- * @property {number|null} wire_distance To the surface of the nearest known wire (m); None while none is known.
- * @property {number|null} cordon_distance The same for cordons.
- * @property {number|null} node_distance To the nearest node that stays (m); None where none is known.
- * @property {string} digest Hash of what is cut and where, as `rolling_panda.point_digest` makes it; one for each revision.
  */
 
 /**
