@@ -67,7 +67,7 @@ def obstacles() -> list[Obstacle]:
         rods.append(Obstacle(f"cordon{i}", "cordon", (x, _ROW_Y, 0.9), (x + 1.0, _ROW_Y, 0.9), 0.02))
     for i in range(46):
         x = low + 6.0 * (i + 0.5) / 46
-        rods.append(Obstacle(f"cane{i}", "cane", (x, _ROW_Y, 0.9), (x + 0.05, _ROW_Y + 0.05, 1.5), 0.004))
+        rods.append(Obstacle(f"cane {i}", "cane", (x, _ROW_Y, 0.9), (x + 0.05, _ROW_Y + 0.05, 1.5), 0.004))
     return rods
 
 
