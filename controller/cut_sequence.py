@@ -17,6 +17,7 @@ from controller.cut_pose import escape_pose
 from controller.eye import Eye
 from controller.motion import Follower, Measured, Tracking
 from controller.next_cut import Known, NextCut
+from controller.patience import Patience, missed
 from controller.queue import PointQueue
 from controller.reach import CutPlan, PostureSearch, Unreachable
 from controller.stages import PHASES, Stage, Work
@@ -61,6 +62,7 @@ class CutSequence:
         self._left = np.array([-np.sin(heading), np.cos(heading), 0.0])
         self._events: list[str] = []
         self._motion: ToolMotion | None = None
+        self._patience = Patience(config.reach_timeout_s, 1.0 / config.rate_hz)
         self._plan: CutPlan | None = None
         self._accepted: m.PruningPoint | None = None
         self._survey = Survey(config, follower, saturation, queue, 0.0)
@@ -69,7 +71,6 @@ class CutSequence:
         self._eye = Eye(config.look_timeout_s, _PICTURES)
         self._verification = Verification(queue, self._eye, config.verify)
         self._coming = NextCut(search, queue, config.search_steps_each, known)
-        self._started: float | None = None
         #: Where the blades closed last (m, odom), and on which point.
         self._cut_at: Array = np.zeros(3)
         self._cut_point = ""
@@ -173,10 +174,10 @@ class CutSequence:
                 return self._next(robot)
             self._go(robot, Leg(escape_pose(pose, self._left, depth), robot.q, self._config.advance_speed, math.inf))
         tracking = self._track(robot)
-        if self._over(tracking, now, _NEAR):
+        if self._patience.over(tracking, now, _NEAR):
             return self._next(robot)
-        if self._late(now):
-            return Work(self._saturation.ramp(robot.sent), pause=self._missed("a place clear of the canes", tracking))
+        if self._patience.late(now):
+            return Work(self._saturation.ramp(robot.sent), pause=missed("a place clear of the canes", tracking))
         return Work(tracking.xi, tracking)
 
     def _next(self, robot: Measured) -> Work:
@@ -208,9 +209,10 @@ class CutSequence:
             self._stage = Stage.ADVANCE
         elif last and camera_ready(robot, self._motion, self._config):
             self._eye.ask(self._point_id, "seen", now)
-            self._started, self._stage = None, Stage.LOOK
-        elif self._config.confirm and not self._over(tracking, now, 0.0) and self._late(now):
-            return self._fail(robot, self._missed("the stand-off", tracking))
+            self._patience.again()
+            self._stage = Stage.LOOK
+        elif not (self._config.confirm and self._patience.over(tracking, now, 0.0)) and self._patience.late(now):
+            return self._fail(robot, missed("the stand-off", tracking))
         return Work(tracking.xi, tracking)
 
     def _look(self, robot: Measured, now: float) -> Work:
@@ -232,19 +234,20 @@ class CutSequence:
         moved = np.array(look.position) - self._motion.goal.translation
         if float(np.linalg.norm(moved)) > _REFINED:
             self._motion.shift(moved)
-        self._started, self._stage = None, Stage.ADVANCE
+        self._patience.begin(self._motion.duration)
+        self._stage = Stage.ADVANCE
         return Work(tracking.xi, tracking)
 
     def _advance(self, robot: Measured, now: float) -> Work:
         tracking = self._track(robot)
         config = self._config
-        there = self._over(tracking, now, config.position_tolerance, config.rotation_tolerance)
+        there = self._patience.over(tracking, now, config.position_tolerance, config.rotation_tolerance)
         # Where it comes to rest, not where it passes by.
         if there and float(np.linalg.norm(robot.kinematics.J_xi[:3] @ tracking.xi)) < config.settle_speed:
             self._blades.begin(self._point_id, now)
             self._stage = Stage.CUT
-        elif self._late(now):
-            reason = self._missed("the cut", tracking)
+        elif self._patience.late(now):
+            reason = missed("the cut", tracking)
             self._queue.resolve(self._point_id, "FAILED_NOT_CUT", reason)
             self._events.append(f"{self._point_id}: not cut: {reason}")
             self._retreat_from(robot)
@@ -268,10 +271,10 @@ class CutSequence:
             self._plan, self._stage = plan, Stage.TRAVEL
             self._point_id, self._accepted = self._coming.point_id, self._coming.accepted
             return Work(tracking.xi, tracking)
-        if not self._over(tracking, now, _NEAR):
-            if not self._late(now):
+        if not self._patience.over(tracking, now, _NEAR):
+            if not self._patience.late(now):
                 return Work(tracking.xi, tracking)
-            return Work(self._saturation.ramp(robot.sent), pause=self._missed("the way back", tracking))
+            return Work(self._saturation.ramp(robot.sent), pause=missed("the way back", tracking))
         ticket = self._queue.get(self._point_id)
         if ticket is not None and ticket.state == "UNKNOWN":
             return Work(tracking.xi, tracking, pause=f"{self._point_id} is UNKNOWN: {ticket.reason}")
@@ -291,7 +294,7 @@ class CutSequence:
         self._accepted = None
         self._looked_at = None
         self._motion = self._plan = None
-        self._started = None
+        self._patience.again()
 
     def _check_acceptance(self, robot: Measured) -> None:
         ticket = self._queue.get(self._point_id)
@@ -358,29 +361,13 @@ class CutSequence:
             flows=self._follower.flows,
             waits=to_cut and looks,
         )
-        self._started = None
+        self._patience.begin(self._motion.duration)
 
     def _track(self, robot: Measured) -> Tracking:
         assert self._motion is not None
-        return self._follower.follow(self._motion, robot)
-
-    def _over(self, tracking: Tracking, now: float, near: float, turn: float = 0.2) -> bool:
-        """Whether the motion has run out and the tool is in place."""
-        if self._started is None:
-            self._started = now
-        return tracking.done and tracking.position_error <= near and tracking.rotation_error <= turn
-
-    def _late(self, now: float) -> bool:
-        if self._started is None or self._motion is None:
-            return False
-        return now - self._started > 2.5 * self._motion.duration + self._config.reach_timeout_s
-
-    def _missed(self, what: str, tracking: Tracking) -> str:
-        why = f": {tracking.reason}" if tracking.reason else ""
-        return (
-            f"{what} was not reached in time: {1e3 * tracking.position_error:.1f} mm and "
-            f"{np.degrees(tracking.rotation_error):.1f}° are missing{why}"
-        )
+        tracking = self._follower.follow(self._motion, robot)
+        self._patience.note(tracking)
+        return tracking
 
 
 _STEPS = {
