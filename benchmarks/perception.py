@@ -22,6 +22,7 @@ import numpy as np
 from benchmarks.intervals import Figure, quantile, share
 from benchmarks.perception_gallery import save_failure
 from benchmarks.perception_judge import JudgedPoint, RowJudge
+from benchmarks.perception_looks import CloseCamera, Looks, look_again, summarise_looks
 from benchmarks.perception_points import camera_frame, survey_arm
 from bridge.sim.camera import Camera
 from bridge.sim.camera_config import CameraConfig
@@ -66,6 +67,7 @@ def survey_row(
     camera_config: CameraConfig,
     into: Survey,
     gallery: Path | None = None,
+    looks: Looks | None = None,
 ) -> None:
     """Drive along one row.
 
@@ -77,6 +79,7 @@ def survey_row(
         camera_config: Of the camera.
         into: Takes the result.
         gallery: Folder for pictures of wrong points.
+        looks: Takes what a second look at each point comes to; None leaves it at the survey.
     """
     config = VineyardConfig(vines=vines)
     row = grow(config, seed)
@@ -106,6 +109,9 @@ def survey_row(
             image = camera.render(row, place, 10**6)
             view = decode_frame(camera_frame(image, camera, base, position, 0), model)
             save_failure(gallery, verdict, point, row, camera, place, perception.segmenter.segment(view), image.color)
+    if looks is not None:
+        eye = CloseCamera(camera, perception.segmenter, perception.config, model)
+        look_again(points, row, eye, opinion, looks)
     into.points += judged
     into.abstained += left_open
     for vine, spur in opinion.spurs():
@@ -156,25 +162,29 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--weights", type=Path, help="ONNX file for the network (default: the one that is shipped)")
     parser.add_argument("--fuse", action="store_true", help="apply the rule to what all frames have shown of a spur")
+    parser.add_argument(
+        "--looks", choices=("one", "two"), default="one", help="look at each point again from near, and after its cut"
+    )
     parser.add_argument("--gallery", type=Path, metavar="DIR", help="put pictures of wrong points here")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write summary and results here")
     words = parser.parse_args(argv)
     if words.seed < 0 or words.vines < 1:
         parser.error(f"--seed {words.seed} --vines {words.vines}: give a seed of 0 or more and at least one vine")
     model, survey = RobotModel(), Survey()
+    looks = Looks() if words.looks == "two" else None
     try:
         for number, done in enumerate(range(0, words.vines, ROW_VINES)):
             segmenter = choose_segmenter(words.segmenter, words.weights)
             perception = Perception(PerceptionConfig(fuse=words.fuse), segmenter, model)
             seed, vines = words.seed + number, min(ROW_VINES, words.vines - done)
             before = len(survey.points)
-            survey_row(seed, vines, perception, model, CameraConfig(), survey, words.gallery)
+            survey_row(seed, vines, perception, model, CameraConfig(), survey, words.gallery, looks)
             new = survey.points[before:]
             print(f"seed {seed}: {vines} vines, {len(new)} points, {sum(p.right for p in new)} right", flush=True)
     except RollingPandaError as error:
         print(f"rolling-panda bench perception: {error}", file=sys.stderr)
         return 1
-    summary = summarise(survey)
+    summary = summarise(survey) | ({} if looks is None else summarise_looks(looks))
     for name, figure in summary.items():
         print(_line(name, figure))
     for need in get_args(m.Need):
@@ -186,6 +196,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             "vines": words.vines,
             "segmenter": words.segmenter,
             "fuse": words.fuse,
+            "looks": words.looks,
+            "voided": [] if looks is None else [*looks.right_voided, *looks.wrong_voided],
             "summary": {name: asdict(figure) for name, figure in summary.items()},
             "by_visibility": {
                 kind: {name: asdict(figure) for name, figure in summarise(survey, kind).items()}

@@ -144,6 +144,11 @@ class Perception:
             self._tracker.refine(point.point_id, np.array(look.position), np.array(look.tangent))
         return look
 
+    @property
+    def config(self) -> PerceptionConfig:
+        """As it is now: with the segmenter's widening, and the rule that was set last."""
+        return self._config
+
     def answer(self, request: PlantRequest) -> m.Answer:
         """Do what an operator asks for; a refusal changes nothing."""
         if isinstance(request, SetRule):
