@@ -136,26 +136,25 @@ def lost(folder, operator):
 
 @pytest.mark.parametrize("kills", [8, pytest.param(500, marks=pytest.mark.slow)])
 def test_no_acknowledged_decision_is_lost(tmp_path, kills):
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
-    router = Router(TransportConfig(mode="router", connect=(), listen=(endpoint,)))
     chance = random.Random(3)
-    try:
-        for begin in range(0, kills, ROUND):
-            folder = tmp_path / str(begin)
-            folder.mkdir()
-            operator = Operator(endpoint)
-            try:
-                for kill in range(begin, min(kills, begin + ROUND)):
-                    killed(folder, endpoint, operator, chance)
-                    assert verify(folder).problem == ""
-                    assert lost(folder, operator) == set(), f"after kill {kill + 1}"
-                assert operator.done
-            finally:
-                operator.wire.close()
-    finally:
-        router.close()
+    for begin in range(0, kills, ROUND):
+        folder = tmp_path / str(begin)
+        folder.mkdir()
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+        # Each round has its own: what a router keeps for clients that were killed goes with it.
+        router = Router(TransportConfig(mode="router", connect=(), listen=(endpoint,)))
+        operator = Operator(endpoint)
+        try:
+            for kill in range(begin, min(kills, begin + ROUND)):
+                killed(folder, endpoint, operator, chance)
+                assert verify(folder).problem == ""
+                assert lost(folder, operator) == set(), f"after kill {kill + 1}"
+            assert operator.done
+        finally:
+            operator.wire.close()
+            router.close()
 
 
 def killed(folder, endpoint, operator, chance):
