@@ -12,6 +12,7 @@ from playwright.sync_api import Page, Route, WebSocketRoute
 
 from rolling_panda import messages as m
 from rolling_panda import page_messages as p
+from rolling_panda.control_messages import ControlState
 from rolling_panda.resources import resource
 
 ORIGIN = "http://panda.test"
@@ -110,6 +111,7 @@ class PlayedServer:
     abstained: tuple[m.Abstention, ...] = ()
     gone: dict[str, float] = field(default_factory=dict)
     role: p.Role = "supervisor"
+    control: ControlState | None = None
     online: bool = True
     silent: bool = False
     answers: dict[str, tuple[int, Any]] = field(default_factory=dict)
@@ -200,6 +202,8 @@ class PlayedServer:
             ),
             base=m.PlanarPose(x=0.021 * self.number),
             camera_frame=1 + self.number // 5,
+            client="me",
+            control=self.control,
         )
 
     def page_points(self) -> p.PagePoints:

@@ -159,7 +159,7 @@ def test_a_stop_says_who_and_who_latched_it_and_is_reset_with_a_reason(page: Pag
     expect(page.locator("#reset")).to_be_disabled()
     page.locator("#reset-reason").press_sequentially("row is clear")
     page.locator("#reset").click()
-    until(page, lambda: ("/api/reset", {"reason": "row is clear"}) in server.posted)
+    until(page, lambda: ("/api/reset", {"reason": "row is clear", "stop_id": "s1"}) in server.posted)
     assert server.stops() == [], "a space in the reason is a character"
 
 

@@ -1,6 +1,7 @@
 // Starts the page: components, link, clock, keys.
 
 import "./components/rp-camera.js";
+import "./components/rp-control.js";
 import "./components/rp-controls.js";
 import "./components/rp-invite.js";
 import "./components/rp-link-banner.js";

@@ -30,7 +30,9 @@ class RpStopBanner extends HTMLElement {
     const hint = element("p", { class: "hint", text: "The reset moves nothing: arm and start again afterwards." });
     form.addEventListener("submit", async (event) => {
       event.preventDefault();
-      if (await ask("Reset", "/api/reset", { reason: reason.value.trim() })) reason.value = "";
+      // With the stop that is shown: one that was pressed since is not reset unseen.
+      const body = { reason: reason.value.trim(), stop_id: pageState.get()?.bridge?.stop_id ?? "" };
+      if (await ask("Reset", "/api/reset", body)) reason.value = "";
     });
     this.append(
       element("div", { class: "banner-head" }, icon("ESTOP_LATCHED"), element("h2", { text: "Software stop" }), who),

@@ -1,0 +1,48 @@
+"""On the page: who holds control, and how it changes hands."""
+
+import msgspec
+import pytest
+from played_page import until
+from played_server import PlayedServer
+from playwright.sync_api import Page, expect
+
+from rolling_panda.control_messages import ControlState
+
+pytestmark = [pytest.mark.browser, pytest.mark.alone]
+
+FREE = ControlState(
+    holder="", user="", epoch=7, expires_s=0.0, requested_by="", requested_key="", coming="", told="", told_number=0,
+    supervised=True,
+)  # fmt: skip
+
+
+def held(holder: str, user: str, **changes: object) -> ControlState:
+    return msgspec.structs.replace(FREE, holder=holder, user=user, expires_s=0.8, **changes)
+
+
+def test_alone_there_is_nothing_to_see_of_it(page: Page, server: PlayedServer) -> None:
+    server.control = held("me", "Ada")
+    expect(page.locator("#mode")).to_be_visible()
+    until(page, lambda: server.number > 5)
+    expect(page.locator("rp-control")).to_be_hidden()
+
+
+def test_control_is_taken_from_somebody_only_by_a_second_press(page: Page, server: PlayedServer) -> None:
+    server.control = held("other", "Bob")
+    control = page.locator("rp-control")
+    expect(control).to_contain_text("Bob holds control")
+    page.locator("#take-control").click()
+    expect(page.locator("#take-control")).to_have_text("Really take it?")
+    assert not any(path == "/api/control/take" for path, _ in server.posted)
+    page.locator("#take-control").click()
+    until(page, lambda: ("/api/control/take", {"confirm": True}) in server.posted)
+
+
+def test_a_request_is_shown_and_granted_and_who_gave_is_told(page: Page, server: PlayedServer) -> None:
+    server.control = held("me", "Ada", requested_by="Bob", requested_key="other")
+    expect(page.locator("rp-control")).to_contain_text("Bob asks for control")
+    page.locator("#grant-control").click()
+    until(page, lambda: any(path == "/api/control/grant" for path, _ in server.posted))
+    server.control = held("other", "Bob", told="Bob holds control, before Ada", told_number=3)
+    expect(page.locator("rp-toasts")).to_contain_text("You no longer hold control")
+    expect(page.locator("#request-control")).to_be_visible()

@@ -1,0 +1,88 @@
+// Who holds control of the robot's motion, and how it changes hands. Out of the way while there is nobody else.
+
+import { ask } from "../api.js";
+import { element, setText } from "../element.js";
+import { pageState, showToast } from "../state.js";
+import { drawOn } from "../store.js";
+
+/** How long a second press confirms that control is to be taken from somebody (ms). */
+const CONFIRM_MS = 4000;
+
+class RpControl extends HTMLElement {
+  give = button("grant-control", () => void ask("Granting control", "/api/control/grant"));
+  request = button("request-control", () => void ask("Asking for control", "/api/control/request"));
+  take = button("take-control", () => this.taken());
+  /** Until when the second press counts (ms). */
+  armed = 0;
+  /** @type {number | null} */
+  told = null;
+  mine = false;
+
+  connectedCallback() {
+    this.setAttribute("role", "group");
+    this.setAttribute("aria-label", "Control of the robot");
+    const words = element("span", { class: "control-words", attributes: { role: "status" } });
+    this.append(words, this.give, this.request, this.take);
+    drawOn([pageState], () => this.draw(words));
+  }
+
+  /** @param {HTMLElement} words */
+  draw(words) {
+    const state = pageState.get();
+    const control = state?.control ?? null;
+    const operates = state !== null && state.role !== "viewer";
+    const held = control !== null && control.holder !== "";
+    const mine = held && control?.holder === state?.client;
+    const asked = control?.requested_by ?? "";
+    const mineAsked = asked !== "" && control?.requested_key === state?.client;
+    const coming = control?.coming ?? "";
+    this.hidden = control === null || !((held && !mine) || asked || coming || (state?.viewers ?? 0) > 1);
+    const who = mine ? "You hold control" : held ? `${control?.user} holds control` : "Nobody holds control";
+    setText(words, coming ? `Control goes to ${coming}` : mine && asked ? `${asked} asks for control` : who);
+    this.give.hidden = !(mine && asked !== "" && !coming);
+    setText(this.give, `Give to ${asked}`);
+    this.request.hidden = !(operates && held && !mine && !coming);
+    setText(this.request, mineAsked ? "Asked" : "Ask");
+    this.request.disabled = asked !== "";
+    this.take.hidden = !operates || mine || coming !== "";
+    const sure = performance.now() < this.armed;
+    setText(this.take, !held ? "Take control" : sure ? "Really take it?" : "Take");
+    this.take.title = held ? `Takes control from ${control?.user}: the robot stops first, and they are told` : "";
+    this.tell(mine, control?.told_number ?? 0, control?.told ?? "");
+  }
+
+  /** The first press on somebody else's control asks whether it is meant. */
+  taken() {
+    const held = (pageState.get()?.control?.holder ?? "") !== "";
+    if (held && performance.now() >= this.armed) {
+      this.armed = performance.now() + CONFIRM_MS;
+      setText(this.take, "Really take it?");
+      return;
+    }
+    this.armed = 0;
+    void ask("Taking control", "/api/control/take", { confirm: held });
+  }
+
+  /**
+   * Who had control is told when they have it no longer.
+   *
+   * @param {boolean} mine
+   * @param {number} number
+   * @param {string} told
+   */
+  tell(mine, number, told) {
+    if (this.told !== null && number !== this.told && this.mine && !mine) showToast("warning", `You no longer hold control: ${told}`);
+    this.told = number;
+    this.mine = mine;
+  }
+}
+
+/**
+ * @param {string} id
+ * @param {() => void} press
+ */
+function button(id, press) {
+  return element("button", { id, class: "quiet", attributes: { type: "button" }, onclick: press });
+}
+
+customElements.define("rp-control", RpControl);
