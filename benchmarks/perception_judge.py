@@ -9,6 +9,7 @@ from bridge.sim.camera import RgbdImage
 from bridge.sim.row import Array, Rod, Row
 from bridge.sim.vineyard_truth import RightCut, SpurTruth, judge
 from rolling_panda import messages as m
+from rolling_panda.camera_messages import Intrinsics
 
 #: A point this near to the axis is on the wood (m).
 ON_AXIS = 0.010
@@ -91,7 +92,7 @@ class RowJudge:
             inside = np.array([_buried(self.row, rod, share) for _, rod in rods for share in _PLACES])
             self._sights[truth.vine, truth.spur] = _Sight(truth, places[~inside], numbers[~inside])
 
-    def look(self, image: RgbdImage, k: m.Intrinsics, T_world_camera: Array) -> None:
+    def look(self, image: RgbdImage, k: Intrinsics, T_world_camera: Array) -> None:
         """Take note of what one frame shows."""
         for sight in self._sights.values():
             x, y, z = ((sight.places - T_world_camera[:3, 3]) @ T_world_camera[:3, :3]).T

@@ -27,6 +27,7 @@ from perception.config import PerceptionConfig
 from perception.pipeline import Perception
 from perception.segmenter import LabelImageSegmenter
 from rolling_panda import messages as m
+from rolling_panda.camera_messages import CameraFrame
 from rolling_panda.resources import resource
 from rolling_panda.robot_model import RobotModel, configuration
 
@@ -90,10 +91,10 @@ class Score:
 
 def camera_frame(
     image: RgbdImage, camera: Camera, base: m.PlanarPose, position: m.Actuated, sequence: int
-) -> m.CameraFrame:
+) -> CameraFrame:
     """What the bridge would send for an image."""
     picture = encode_picture(camera.intrinsics, image.color, image.depth, image.labels)
-    return m.CameraFrame(
+    return CameraFrame(
         header=m.Header(float(sequence), "camera"),
         sequence=sequence,
         intrinsics=camera.intrinsics,

@@ -26,6 +26,7 @@ from bridge.round_trip import RoundTrip
 from bridge.shutter import Shutter
 from bridge.watchdog import Watchdog
 from rolling_panda import messages as m
+from rolling_panda.camera_messages import CameraFrame
 from rolling_panda.control_messages import StopState
 from rolling_panda.differential_drive import Array
 from rolling_panda.look_messages import PictureRequest
@@ -58,7 +59,7 @@ class BridgeOutputs:
     joints: m.JointState | None = None
     odometry: m.Odometry | None = None
     state: m.BridgeState | None = None
-    frame: m.CameraFrame | None = None
+    frame: CameraFrame | None = None
     scenery: Scenery | None = None
     events: tuple[m.LogEvent, ...] = ()
     stops: StopState | None = None
@@ -342,7 +343,7 @@ class BridgeCore:
             rejections=self.refusals.counts(),
         )
 
-    def _frame(self, now: float) -> m.CameraFrame | None:
+    def _frame(self, now: float) -> CameraFrame | None:
         measured: Measurement = self._measured
         if bool(np.abs(measured.velocity).max() > _MOVING):
             self._shutter.wake(self._ticks)

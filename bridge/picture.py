@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from rolling_panda.messages import Intrinsics
+from rolling_panda.camera_messages import Intrinsics
 
 #: Metres a depth count: 0.5 mm resolves the sensor's noise at 0.3 m and reaches 32 m.
 DEPTH_UNIT = 0.0005

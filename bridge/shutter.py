@@ -2,6 +2,7 @@
 
 from bridge.picture import Picture
 from rolling_panda import messages as m
+from rolling_panda.camera_messages import CameraFrame
 from rolling_panda.look_messages import PictureRequest
 
 # After motion or a cut the plant model wants some more pictures before the camera rests (s).
@@ -43,14 +44,14 @@ class Shutter:
         self._waiting = (header, base, position, self._wanted)
         self._wanted = None
 
-    def frame(self, picture: Picture) -> m.CameraFrame | None:
+    def frame(self, picture: Picture) -> CameraFrame | None:
         """The message for the picture of the last exposure; None for one that nobody asked for."""
         if self._waiting is None:
             return None
         header, base, position, wanted = self._waiting
         self._waiting = None
         self._sequence += 1
-        return m.CameraFrame(
+        return CameraFrame(
             header=header,
             sequence=self._sequence,
             intrinsics=picture.intrinsics,

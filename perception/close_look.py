@@ -19,6 +19,7 @@ from perception.mending import mended
 from perception.plant import Array
 from perception.segmenter import Segmenter
 from rolling_panda import messages as m
+from rolling_panda.camera_messages import CameraFrame
 from rolling_panda.look_messages import CloseLook, Finding
 
 #: Places at which an axis is compared are so far apart (m).
@@ -113,7 +114,7 @@ def look_closely(
     return told("seen", "the node before the cut was not seen", cane)
 
 
-def no_look(frame: m.CameraFrame, reason: str) -> CloseLook:
+def no_look(frame: CameraFrame, reason: str) -> CloseLook:
     """Nothing can be said of the point that a picture was asked for."""
     return CloseLook(
         header=m.Header(frame.header.stamp, "odom"),

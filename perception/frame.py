@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from rolling_panda import messages as m
+from rolling_panda.camera_messages import CameraFrame, Intrinsics
 from rolling_panda.errors import MessageError
 from rolling_panda.robot_model import RobotModel, configuration
 
@@ -35,7 +36,7 @@ class View:
 
     sequence: int
     stamp: float
-    intrinsics: m.Intrinsics
+    intrinsics: Intrinsics
     depth: NDArray[np.float32]
     labels: NDArray[np.uint8] | None
     color_jpeg: bytes
@@ -76,7 +77,7 @@ class View:
             jpeg = out.getvalue()
         return replace(
             self,
-            intrinsics=m.Intrinsics(right - left, bottom - top, k.fx, k.fy, k.cx - left, k.cy - top),
+            intrinsics=Intrinsics(right - left, bottom - top, k.fx, k.fy, k.cx - left, k.cy - top),
             depth=self.depth[window],
             labels=None if self.labels is None else self.labels[window],
             color_jpeg=jpeg,
@@ -98,7 +99,7 @@ class View:
             raise MessageError(f"colour image is not a JPEG: {error}") from error
 
 
-def decode_frame(frame: m.CameraFrame, model: RobotModel) -> View:
+def decode_frame(frame: CameraFrame, model: RobotModel) -> View:
     """Unpack a frame and place its camera by forward kinematics of the measured posture.
 
     Args:
@@ -137,7 +138,7 @@ def decode_frame(frame: m.CameraFrame, model: RobotModel) -> View:
     )
 
 
-def _image(data: bytes, k: m.Intrinsics, kind: str, name: str, sequence: int) -> NDArray[Any]:
+def _image(data: bytes, k: Intrinsics, kind: str, name: str, sequence: int) -> NDArray[Any]:
     expected = k.width * k.height * np.dtype(kind).itemsize
     unpack = zlib.decompressobj()
     try:

@@ -13,6 +13,7 @@ from perception.pipeline import Perception
 from perception.worker import Worker
 from rolling_panda import messages as m
 from rolling_panda import topics
+from rolling_panda.camera_messages import CameraFrame
 from rolling_panda.crop_messages import PointCrop
 from rolling_panda.look_messages import CloseLook
 from rolling_panda.plant_requests import PlantRequest
@@ -34,7 +35,7 @@ class _Asked:
     answer: Future[m.Answer]
 
 
-_Job = m.CameraFrame | _Asked
+_Job = CameraFrame | _Asked
 #: How long an operator's question waits for the worker (s); less than the service's timeout.
 _ANSWER_S = 1.8
 
@@ -67,7 +68,7 @@ class Loop:
         self._pictures: dict[tuple[str, int], PointCrop] = {}
         """In the order in which they are repeated, the next one first."""
         self._sightings = perception.sightings
-        self._noted: Received[m.CameraFrame] | None = None
+        self._noted: Received[CameraFrame] | None = None
         self._sequence = 0
         self._sent = self._sent_obstacles = self._sent_crop = -1e9
         self._last_error = ""

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from PIL import Image, ImageOps
 
 from perception.frame import View
+from rolling_panda.camera_messages import Intrinsics
 from rolling_panda.errors import InputError
-from rolling_panda.messages import Intrinsics
 
 #: Wider photographs are made smaller to this, which is what the network is used to (px).
 WIDEST, _SMALLEST = 848, 64

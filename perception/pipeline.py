@@ -27,6 +27,7 @@ from perception.staying import StayingCanes
 from perception.topology import build_plant
 from perception.tracker import Proposal, Tracked, Tracker
 from rolling_panda import messages as m
+from rolling_panda.camera_messages import CameraFrame
 from rolling_panda.crop_messages import PointCrop
 from rolling_panda.errors import InputError
 from rolling_panda.look_messages import CloseLook
@@ -79,7 +80,7 @@ class Perception:
         self.obstacles: tuple[Capsule, ...] = ()
         """What stands in the way, as far as it was seen."""
 
-    def process(self, frame: m.CameraFrame) -> m.PruningPoints:
+    def process(self, frame: CameraFrame) -> m.PruningPoints:
         """Take one frame in and tell everything held true now.
 
         Args:
@@ -123,7 +124,7 @@ class Perception:
         self._canes = tuple(_polyline(cane) for spur in plant.spurs for cane in spur.canes)
         return self._message(view, tracked.points, self._left_open(tracked.points), self._canes)
 
-    def look_closely(self, frame: m.CameraFrame) -> CloseLook:
+    def look_closely(self, frame: CameraFrame) -> CloseLook:
         """What a picture that the controller asked for shows of its point, which is known better from then on.
 
         Args:

@@ -7,6 +7,7 @@ import numpy as np
 
 from perception.plant import Array
 from rolling_panda import messages as m
+from rolling_panda.camera_messages import CameraFrame, Intrinsics
 from rolling_panda.robot_model import RobotModel, configuration
 
 #: Frames that may be clicked: ten minutes of moving, so that a picture can be looked at in peace.
@@ -26,10 +27,10 @@ class Sightings:
 
     def __init__(self) -> None:
         """Nothing has been seen."""
-        self._seen: dict[int, tuple[m.Intrinsics, m.PlanarPose, m.Actuated]] = {}
+        self._seen: dict[int, tuple[Intrinsics, m.PlanarPose, m.Actuated]] = {}
         self._lock = threading.Lock()
 
-    def note(self, frame: m.CameraFrame) -> None:
+    def note(self, frame: CameraFrame) -> None:
         """Remember where a frame was taken."""
         with self._lock:
             self._seen[frame.sequence] = frame.intrinsics, frame.base, frame.position

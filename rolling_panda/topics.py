@@ -9,6 +9,7 @@ from typing import Any, Generic, Literal, TypeVar
 from msgspec import Struct
 
 from rolling_panda import (
+    camera_messages,
     control_messages,
     crop_messages,
     intents,
@@ -138,7 +139,7 @@ EVENT = Topic(
     "what happened, and why something was refused",
 )
 CAMERA = Topic(
-    "camera/frame", m.CameraFrame, "bridge", 2, "DATA_LOW", "DROP",
+    "camera/frame", camera_messages.CameraFrame, "bridge", 2, "DATA_LOW", "DROP",
     "RGB-D frame with the posture it was taken in",
 )
 POINTS = Topic(

@@ -6,6 +6,7 @@ import msgspec
 import numpy as np
 
 from rolling_panda import messages as m
+from rolling_panda.camera_messages import CameraFrame
 from rolling_panda.page_messages import PagePlan, PagePoint, PagePoints, PageState, Role
 from rolling_panda.plan_messages import SessionPlan
 from rolling_panda.robot_model import RobotModel, configuration, pose_message
@@ -91,7 +92,7 @@ class PageView:
         self,
         perceived: m.PruningPoints | None,
         queue: tuple[m.QueueEntry, ...],
-        camera: m.CameraFrame | None,
+        camera: CameraFrame | None,
         plan: SessionPlan | None,
     ) -> PagePoints:
         points = perceived.points if perceived else ()
@@ -150,7 +151,7 @@ def addressed(state: PageState, session: Session) -> PageState:
 
 
 def project(
-    positions: list[m.Vector3], frame: m.CameraFrame | None, model: RobotModel
+    positions: list[m.Vector3], frame: CameraFrame | None, model: RobotModel
 ) -> list[tuple[float, float] | None]:
     """Pixels of points in odom (m) in a camera frame, whole numbers; None where outside the image or behind."""
     if frame is None or not positions:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 from rolling_panda import intents, topics
 from rolling_panda import messages as m
+from rolling_panda.camera_messages import CameraFrame
 from rolling_panda.control_messages import Presence, StopState
 from rolling_panda.crop_messages import PointCrop
 from rolling_panda.page_messages import ProcessPresence
@@ -152,7 +153,7 @@ class RobotLink:
         self._callers.shutdown(wait=False, cancel_futures=True)
         self._writer.shutdown(wait=False, cancel_futures=True)
 
-    def _on_frame(self, message: m.CameraFrame, at: float) -> None:
+    def _on_frame(self, message: CameraFrame, at: float) -> None:
         self.images[message.sequence] = message.color_jpeg
         if len(self.images) > _MOST_IMAGES:
             del self.images[next(iter(self.images))]

@@ -13,13 +13,14 @@ from bridge.picture import Picture
 from bridge.robot_time import RobotTime
 from bridge.sim.robot import SimulatedRobot
 from rolling_panda import messages as m
+from rolling_panda.camera_messages import Intrinsics
 from rolling_panda.differential_drive import Array
 from rolling_panda.robot_model import RobotModel
 
 MODEL = RobotModel()
 REST = (0.0,) * 9
 FORWARD = (*MODEL.drive.wheels(0.2, 0.0), 0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.1)
-PICTURE = Picture(m.Intrinsics(4, 4, 1.0, 1.0, 2.0, 2.0), b"c", b"d", b"")
+PICTURE = Picture(Intrinsics(4, 4, 1.0, 1.0, 2.0, 2.0), b"c", b"d", b"")
 
 
 class Plant(Protocol):

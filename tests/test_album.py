@@ -10,11 +10,11 @@ from perception.album import Album
 from perception.frame import View
 from perception.numbering import SpurNumber
 from perception.plant import Plant, Spur
-from rolling_panda import messages as m
+from rolling_panda.camera_messages import Intrinsics
 from rolling_panda.crop_messages import CROP_BYTES
 
 NUMBER = SpurNumber(1, 1)
-K = m.Intrinsics(640, 480, 400.0, 400.0, 320.0, 240.0)
+K = Intrinsics(640, 480, 400.0, 400.0, 320.0, 240.0)
 
 
 def view(sequence, place, noise=0):

@@ -12,6 +12,7 @@ from bridge.memory import Memory
 from bridge.odometer import Odometer
 from bridge.picture import Picture
 from rolling_panda import messages as m
+from rolling_panda.camera_messages import Intrinsics
 from rolling_panda.look_messages import PictureRequest
 from rolling_panda.robot_model import RobotModel
 
@@ -19,7 +20,7 @@ MODEL = RobotModel()
 MIDDLE = (MODEL.limits.lower[5:] + MODEL.limits.upper[5:]) / 2
 REST = (0.0,) * 9
 FORWARD = (*MODEL.drive.wheels(0.3, 0.0), 0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.2)
-PICTURE = Picture(m.Intrinsics(4, 4, 1.0, 1.0, 2.0, 2.0), b"c", b"d", b"l")
+PICTURE = Picture(Intrinsics(4, 4, 1.0, 1.0, 2.0, 2.0), b"c", b"d", b"l")
 
 
 class IdealRobot:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from perception.fragments import CANE
 from perception.frame import View
 from perception.glance import glance
-from rolling_panda import messages as m
+from rolling_panda.camera_messages import Intrinsics
 
 AT = np.array([0.0, 0.0, 0.8])
 
@@ -19,7 +19,7 @@ def view(behind=3.0, cane_depth=0.8, cols=slice(78, 83)):
     """A camera at the origin of odom, looking along z at one upright cane before something."""
     labels, depth = np.zeros((120, 160), np.uint8), np.full((120, 160), behind, np.float32)
     labels[:, cols], depth[:, cols] = CANE, cane_depth
-    return View(0, 0.0, m.Intrinsics(160, 120, 200.0, 200.0, 79.5, 59.5), depth, labels, b"", np.eye(3), np.zeros(3))
+    return View(0, 0.0, Intrinsics(160, 120, 200.0, 200.0, 79.5, 59.5), depth, labels, b"", np.eye(3), np.zeros(3))
 
 
 @pytest.mark.parametrize(

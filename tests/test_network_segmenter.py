@@ -15,8 +15,9 @@ from perception.frame import View
 from perception.network_input import network_input
 from perception.network_segmenter import NetworkSegmenter, NoSegmenter
 from perception.segmenter_choice import SHIPPED, choose_segmenter
+from rolling_panda.camera_messages import Intrinsics
 from rolling_panda.errors import ConfigError, InputError, MessageError, ModelError
-from rolling_panda.messages import WOOD_CLASSES, Intrinsics
+from rolling_panda.messages import WOOD_CLASSES
 from rolling_panda.resources import resource
 
 CLASSES = list(WOOD_CLASSES)

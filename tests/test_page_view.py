@@ -5,6 +5,7 @@ from fake_wire import ARM, HEADER, FakeWire, controller_state, joints, odometry,
 
 from rolling_panda import messages as m
 from rolling_panda import topics
+from rolling_panda.camera_messages import CameraFrame, Intrinsics
 from rolling_panda.page_messages import PagePlan
 from rolling_panda.plan_messages import PlannedPoint, PointPlan, SessionPlan
 from rolling_panda.robot_model import RobotModel, configuration
@@ -27,8 +28,8 @@ def view(wire):
 
 
 def frame(base=None, sequence=1):
-    return m.CameraFrame(
-        header=HEADER, sequence=sequence, intrinsics=m.Intrinsics(640, 480, 600.0, 600.0, 320.0, 240.0),
+    return CameraFrame(
+        header=HEADER, sequence=sequence, intrinsics=Intrinsics(640, 480, 600.0, 600.0, 320.0, 240.0),
         base=base or m.PlanarPose(), position=(0.0, 0.0, *ARM), color_jpeg=b"", depth_zlib=b"", depth_unit=1e-4,
     )  # fmt: skip
 

@@ -17,6 +17,7 @@ from perception.config import PerceptionConfig
 from perception.pipeline import Perception
 from perception.segmenter_choice import choose_segmenter
 from rolling_panda import messages as m
+from rolling_panda.camera_messages import CameraFrame
 from rolling_panda.errors import MessageError
 from rolling_panda.robot_model import RobotModel, configuration
 
@@ -45,7 +46,7 @@ def model() -> RobotModel:
 
 
 @pytest.fixture(scope="module")
-def good(model: RobotModel) -> m.CameraFrame:
+def good(model: RobotModel) -> CameraFrame:
     camera = Camera(CameraConfig(), 1)
     base, position = m.PlanarPose(), msgspec.convert((0.0, 0.0, *survey_arm()), m.Actuated)
     place = model.pose(configuration(base, position), model.camera_id).homogeneous
@@ -62,7 +63,7 @@ def jpeg(grey: int, height: int, width: int) -> bytes:
     return data.getvalue()
 
 
-def bad(good: m.CameraFrame, what: str) -> m.CameraFrame:
+def bad(good: CameraFrame, what: str) -> CameraFrame:
     k = good.intrinsics
     counts = np.frombuffer(zlib.decompress(good.depth_zlib), "<u2")
     noise = np.random.default_rng(0).integers(0, 2**16, counts.size).astype("<u2")
@@ -85,13 +86,13 @@ def bad(good: m.CameraFrame, what: str) -> m.CameraFrame:
 
 
 @pytest.mark.parametrize("name", ["network", "labels"])
-def test_the_same_frame_makes_points_where_it_is_good(model: RobotModel, good: m.CameraFrame, name: str) -> None:
+def test_the_same_frame_makes_points_where_it_is_good(model: RobotModel, good: CameraFrame, name: str) -> None:
     seen = perception(model, name)
     assert [bool(seen.process(good).points) for _ in range(AGAIN)][-1]
 
 
 @pytest.mark.parametrize("what", REFUSED)
-def test_what_cannot_be_a_frame_is_refused(model: RobotModel, good: m.CameraFrame, what: str) -> None:
+def test_what_cannot_be_a_frame_is_refused(model: RobotModel, good: CameraFrame, what: str) -> None:
     with pytest.raises(MessageError, match="image|depth_unit"):
         perception(model, "network").process(bad(good, what))
 
@@ -102,7 +103,7 @@ def test_what_cannot_be_a_frame_is_refused(model: RobotModel, good: m.CameraFram
     + [(what, name) for what in WRONG_DEPTH for name in ("network", "labels")],
 )
 def test_what_shows_nothing_makes_no_point_and_says_why(
-    model: RobotModel, good: m.CameraFrame, what: str, name: str
+    model: RobotModel, good: CameraFrame, what: str, name: str
 ) -> None:
     seen = perception(model, name)
     for _ in range(AGAIN):

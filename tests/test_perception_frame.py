@@ -7,6 +7,7 @@ import pytest
 from perception.frame import decode_frame
 from perception.segmenter import LabelImageSegmenter
 from rolling_panda import messages as m
+from rolling_panda.camera_messages import CameraFrame, Intrinsics
 from rolling_panda.errors import InputError, MessageError
 from rolling_panda.robot_model import RobotModel
 
@@ -20,10 +21,10 @@ def model():
 
 def good_frame(**changes):
     depth = np.full((HEIGHT, WIDTH), 800, dtype="<u2")
-    frame = m.CameraFrame(
+    frame = CameraFrame(
         header=m.Header(1.0, "camera"),
         sequence=1,
-        intrinsics=m.Intrinsics(WIDTH, HEIGHT, 20.0, 20.0, 15.5, 11.5),
+        intrinsics=Intrinsics(WIDTH, HEIGHT, 20.0, 20.0, 15.5, 11.5),
         base=m.PlanarPose(0.3, 0.0, 0.1),
         position=(0.0, 0.0, 0.0, -0.3, 0.0, -2.2, 1.7, 1.4, 0.0),
         color_jpeg=b"",
@@ -56,7 +57,7 @@ def test_points_and_pixels_are_inverse(model):
         ({"position": (float("nan"),) * 9}, "finite"),
         ({"position": (0.0,) * 8}, "posture"),
         ({"base": m.PlanarPose(float("inf"), 0.0, 0.0)}, "finite"),
-        ({"intrinsics": m.Intrinsics(WIDTH, HEIGHT, 0.0, 20.0, 15.5, 11.5)}, "focal"),
+        ({"intrinsics": Intrinsics(WIDTH, HEIGHT, 0.0, 20.0, 15.5, 11.5)}, "focal"),
         ({"depth_unit": float("nan")}, "depth_unit"),
     ],
 )

@@ -11,11 +11,12 @@ from perception.config import RuleConfig
 from perception.frame import View
 from perception.keep_out import as_known, in_view, wire_near
 from rolling_panda import messages as m
+from rolling_panda.camera_messages import Intrinsics
 from rolling_panda.row_messages import Capsule
 
 WIRE, HOSE, CANE = (m.WOOD_CLASSES.index(kind) for kind in ("wire", "hose", "cane"))
 RULE = RuleConfig()
-LENS = m.Intrinsics(width=320, height=240, fx=400.0, fy=400.0, cx=159.5, cy=119.5)
+LENS = Intrinsics(width=320, height=240, fx=400.0, fy=400.0, cx=159.5, cy=119.5)
 CUT = np.array([0.0, 0.0, 0.8])
 
 

@@ -7,8 +7,9 @@ from perception.config import PerceptionConfig
 from perception.frame import View
 from perception.pipeline import perceive
 from rolling_panda import messages as m
+from rolling_panda.camera_messages import Intrinsics
 
-LENS = m.Intrinsics(width=320, height=320, fx=450.0, fy=450.0, cx=159.5, cy=159.5)
+LENS = Intrinsics(width=320, height=320, fx=450.0, fy=450.0, cx=159.5, cy=159.5)
 KIND = m.WOOD_CLASSES.index
 #: Pixels from one end of a 20 mm stretch to the other, 0.8 m away.
 CAP = 11

@@ -10,7 +10,7 @@ from perception.numbering import RowNumbers, SpurNumber
 from perception.plant import Plant, Spur
 from perception.rule import Cut
 from perception.tracker import Proposal, Tracker
-from rolling_panda import messages as m
+from rolling_panda.camera_messages import Intrinsics
 
 CONFIG = TrackerConfig()
 UP = np.array([0.0, -1.0, 0.0])
@@ -23,7 +23,7 @@ def view(cane=True, depth=0.8):
     if cane:
         labels[:, 78:83] = CANE
         image[:, 78:83] = depth
-    intrinsics = m.Intrinsics(160, 120, 200.0, 200.0, 79.5, 59.5)
+    intrinsics = Intrinsics(160, 120, 200.0, 200.0, 79.5, 59.5)
     return View(0, 0.0, intrinsics, image, labels, b"", np.eye(3), np.zeros(3))
 
 

@@ -5,7 +5,7 @@ import numpy as np
 from PIL import Image
 
 from bridge.picture import encode_picture
-from rolling_panda.messages import Intrinsics
+from rolling_panda.camera_messages import Intrinsics
 
 INTRINSICS = Intrinsics(6, 4, 5.0, 5.0, 2.5, 1.5)
 

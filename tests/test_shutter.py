@@ -1,9 +1,10 @@
 from bridge.picture import Picture
 from bridge.shutter import Shutter
 from rolling_panda import messages as m
+from rolling_panda.camera_messages import Intrinsics
 from rolling_panda.look_messages import PictureRequest
 
-PICTURE = Picture(m.Intrinsics(4, 4, 1.0, 1.0, 2.0, 2.0), b"c", b"d", b"l")
+PICTURE = Picture(Intrinsics(4, 4, 1.0, 1.0, 2.0, 2.0), b"c", b"d", b"l")
 Q = (0.0,) * 9
 
 

@@ -6,6 +6,7 @@ from websockets.sync.client import connect
 
 from rolling_panda import messages as m
 from rolling_panda import topics
+from rolling_panda.camera_messages import CameraFrame, Intrinsics
 
 pytestmark = pytest.mark.alone
 
@@ -85,8 +86,8 @@ def test_the_camera_image_is_the_newest_one(server, visitor):
     visitor.post("/api/sign-in", json={"token": server.sessions.invite("ann", "viewer")})
     assert visitor.get("/camera/color.jpg").status_code == 404
     for number in (1, 2):
-        frame = m.CameraFrame(
-            header=HEADER, sequence=number, intrinsics=m.Intrinsics(640, 480, 600.0, 600.0, 320.0, 240.0),
+        frame = CameraFrame(
+            header=HEADER, sequence=number, intrinsics=Intrinsics(640, 480, 600.0, 600.0, 320.0, 240.0),
             base=m.PlanarPose(), position=(0.0,) * 9, color_jpeg=b"jpeg%d" % number, depth_zlib=b"", depth_unit=1e-4,
         )  # fmt: skip
         server.wire.deliver(topics.CAMERA, frame)

@@ -25,6 +25,7 @@ from perception.segmenter import LabelImageSegmenter
 from perception.staying import StayingCanes
 from perception.tracker import Proposal
 from rolling_panda import messages as m
+from rolling_panda.camera_messages import Intrinsics
 from rolling_panda.plant_requests import SetRule
 from rolling_panda.robot_model import RobotModel, configuration
 
@@ -60,7 +61,7 @@ def view(*columns):
     for x in columns:
         middle = round(159.5 + 300.0 * x / 0.8)
         labels[:, middle - 2 : middle + 3], depth[:, middle - 2 : middle + 3] = CANE, 0.8
-    lens = m.Intrinsics(320, 240, 300.0, 300.0, 159.5, 119.5)
+    lens = Intrinsics(320, 240, 300.0, 300.0, 159.5, 119.5)
     return View(0, 0.0, lens, depth, labels, b"", np.eye(3), np.zeros(3))
 
 

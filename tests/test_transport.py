@@ -13,6 +13,7 @@ import pytest
 
 from rolling_panda import intents
 from rolling_panda import messages as m
+from rolling_panda.camera_messages import CameraFrame, Intrinsics
 from rolling_panda.config import TransportConfig
 from rolling_panda.errors import ServiceError, TransportError
 from rolling_panda.topics import CAMERA, HEARTBEAT, INTENT, MOTION, Service, Topic
@@ -147,11 +148,11 @@ def test_a_message_without_end_is_refused(controller: Transport, bridge: Transpo
     assert slot.peek() is None
 
 
-def frame(color: bytes) -> m.CameraFrame:
-    return m.CameraFrame(
+def frame(color: bytes) -> CameraFrame:
+    return CameraFrame(
         header=m.Header(frame_id="camera"),
         sequence=1,
-        intrinsics=m.Intrinsics(width=4, height=4, fx=1.0, fy=1.0, cx=2.0, cy=2.0),
+        intrinsics=Intrinsics(width=4, height=4, fx=1.0, fy=1.0, cx=2.0, cy=2.0),
         base=m.PlanarPose(),
         position=(0.0,) * 9,
         color_jpeg=color,

@@ -57,6 +57,8 @@ export const TEXT_MAX_LENGTH = 500;
 
 /** @typedef {"none"|"planning"|"valid"|"void"} PlanState */
 
+/** @typedef {"seen"|"changed"|"severed"|"unseen"} Finding */
+
 /** @typedef {[number, number, number, number, number, number, number]} ArmVelocities */
 
 /**

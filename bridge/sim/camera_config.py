@@ -6,8 +6,8 @@ from typing import Annotated
 from msgspec import Meta, Struct
 from msgspec.structs import replace
 
+from rolling_panda.camera_messages import Intrinsics
 from rolling_panda.config import Positive
-from rolling_panda.messages import Intrinsics
 
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 Pixels = Annotated[int, Meta(ge=16, le=4096)]

@@ -10,8 +10,10 @@ from typing import Any, Literal, Union, get_args, get_origin
 import msgspec
 
 from rolling_panda import (
+    camera_messages,
     control_messages,
     crop_messages,
+    look_messages,
     messages,
     page_messages,
     plan_messages,
@@ -96,8 +98,10 @@ def aliases() -> dict[str, Any]:
     for module in (
         messages,
         page_messages,
+        camera_messages,
         control_messages,
         crop_messages,
+        look_messages,
         plan_messages,
         row_messages,
         teleop_messages,
