@@ -1,6 +1,7 @@
 """The table of what is on the wire is complete and consistent."""
 
 from rolling_panda import (
+    camera_messages,
     control_messages,
     crop_messages,
     intents,
@@ -26,6 +27,7 @@ def test_every_message_is_on_the_wire_once() -> None:
     assert len(carried) == len(set(carried))
     modules = (
         m,
+        camera_messages,
         control_messages,
         crop_messages,
         look_messages,
