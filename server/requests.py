@@ -105,12 +105,6 @@ class TakeControl(_Body):
     confirm: bool = False
 
 
-class HardwareStop(_Body):
-    """Press or release the emergency stop button of the simulated robot."""
-
-    pressed: bool
-
-
 class Reset(_Body):
     """Why it is safe again; with `stop_id`, a stop that was pressed after that one is not reset with it."""
 
