@@ -29,7 +29,7 @@ def test_a_failure_is_a_fault_and_the_robot_rests_within_a_second():
     run_until(r, lambda s: s.mode == "FAULT", r.now + 0.1)
     at_rest(r, 1.0)
     assert "disk is full" in r.state.reason and r.cuts == []
-    assert "cause is still there" in r.ask(intents.Acknowledge(user="ada")).reason
+    assert "cause is still there" in r.ask(intents.Acknowledge(user="ada", role="supervisor")).reason
     r.stop()
     run_until(r, lambda s: s.mode == "ESTOP_LATCHED", r.now + 0.2)
 
@@ -70,7 +70,7 @@ def test_work_goes_on_when_the_cause_has_gone_and_somebody_says_so():
     r.run(0.5)
     r.ledger = LedgerState(r.controller.recorded)
     r.run(1.2)
-    assert r.ask(intents.Acknowledge(user="ada")).ok
+    assert r.ask(intents.Acknowledge(user="ada", role="supervisor")).ok
     for intent in (intents.Arm(user="ada"), intents.Start(user="ada")):
         assert r.ask(intent).ok, r.state
     finish(r, r.now + 60.0)
