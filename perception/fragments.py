@@ -15,6 +15,7 @@ from skimage.morphology import skeletonize
 
 from perception.config import SkeletonConfig
 from perception.frame import Index, View
+from perception.pixels import pixels_of
 from perception.plant import Array
 from rolling_panda.messages import WOOD_CLASSES
 
@@ -37,6 +38,7 @@ class Wood:
         points: On the surface, N×3 in odom (m).
         node: Which pixels were classed as a node.
         component: Connected component by depth, one number a pixel.
+        touching: Pairs of pixels that touch in the image, P×2.
     """
 
     rows: Index
@@ -45,6 +47,7 @@ class Wood:
     points: Array
     node: NDArray[np.bool_]
     component: Index
+    touching: Index
 
 
 @dataclass(frozen=True)
@@ -57,16 +60,19 @@ class Fragment:
 
 def find_wood(view: View, labels: NDArray[np.uint8], config: SkeletonConfig) -> Wood:
     """Cane and node pixels within range, and how they hang together without a step in depth."""
-    mask = ((labels == CANE) | (labels == NODE)) & (view.depth > config.nearest) & (view.depth < config.farthest)
-    rows, cols = np.nonzero(mask)
-    depth = view.depth[rows, cols].astype(float)
+    rows, cols = pixels_of(labels, (CANE, NODE))
+    near = view.depth[rows, cols]
+    kept = (near > config.nearest) & (near < config.farthest)
+    rows, cols, depth = rows[kept], cols[kept], near[kept].astype(float)
+    touching = _neighbours(labels.shape, rows, cols)
     return Wood(
         rows,
         cols,
         depth,
         view.points(rows, cols, depth),
         labels[rows, cols] == NODE,
-        _components(mask, rows, cols, depth, config.depth_step),
+        _components(touching, depth, config.depth_step),
+        touching,
     )
 
 
@@ -81,7 +87,7 @@ def find_fragments(wood: Wood, shape: tuple[int, ...], config: SkeletonConfig) -
     if not len(wood.rows):
         return []
     out: list[Fragment] = []
-    layer = _layers(wood, shape)
+    layer = _layers(wood)
     for number in range(int(layer.max()) + 1):
         chosen = np.nonzero(layer == number)[0]
         # Only the part of the image in which there is cane costs time.
@@ -125,9 +131,7 @@ def _paths(shape: tuple[int, ...], rows: Index, cols: Index) -> tuple[Index, Ind
 
     A closed loop is walked both ways from one of its pixels.
     """
-    mask = np.zeros(shape, dtype=bool)
-    mask[rows, cols] = True
-    pairs = _neighbours(mask, rows, cols)
+    pairs = _neighbours(shape, rows, cols)
     size = len(rows)
     graph = sparse.coo_matrix((np.ones(len(pairs), dtype=bool), (pairs[:, 0], pairs[:, 1])), (size, size))
     count, owner = csgraph.connected_components(graph, directed=False)
@@ -140,37 +144,35 @@ def _paths(shape: tuple[int, ...], rows: Index, cols: Index) -> tuple[Index, Ind
     return owner.astype(np.intp), along.astype(np.intp), np.bincount(owner, minlength=count)
 
 
-def _components(mask: NDArray[np.bool_], rows: Index, cols: Index, depth: Array, step: float) -> Index:
-    pairs = _neighbours(mask, rows, cols)
+def _components(pairs: Index, depth: Array, step: float) -> Index:
+    if not len(depth):
+        return np.zeros(0, dtype=np.intp)
     near = np.abs(depth[pairs[:, 0]] - depth[pairs[:, 1]]) < step
     joined = pairs[near]
-    graph = sparse.coo_matrix((np.ones(len(joined), dtype=bool), (joined[:, 0], joined[:, 1])), (len(rows), len(rows)))
-    if not len(rows):
-        return np.zeros(0, dtype=np.intp)
+    graph = sparse.coo_matrix((np.ones(len(joined)), (joined[:, 0], joined[:, 1])), (len(depth), len(depth)))
     _, labels = csgraph.connected_components(graph, directed=False)
     return np.asarray(labels, dtype=np.intp)
 
 
-def _neighbours(mask: NDArray[np.bool_], rows: Index, cols: Index) -> Index:
+def _neighbours(shape: tuple[int, ...], rows: Index, cols: Index) -> Index:
     """Pairs of cane pixels that touch, as indices, P×2."""
-    height, width = mask.shape
-    number = np.full(mask.shape, -1, dtype=np.intp)
-    number[rows, cols] = np.arange(len(rows))
+    height, width = shape
+    # With an empty border, row after row: every pixel's neighbours are a fixed step away.
+    stride = width + 2
+    number = np.full((height + 1) * stride, -1, dtype=np.int32)
+    at = rows * stride + cols + 1
+    number[at] = np.arange(len(rows))
     out = []
     for dr, dc in _HALF:
-        r, c = rows + dr, cols + dc
-        inside = (r < height) & (c >= 0) & (c < width)
-        beside = number[r[inside], c[inside]]
-        here = np.nonzero(inside)[0]
-        out.append(np.stack([here[beside >= 0], beside[beside >= 0]], axis=1))
+        beside = number[at + dr * stride + dc]
+        here = np.flatnonzero(beside >= 0)
+        out.append(np.stack([here, beside[here].astype(np.intp)], axis=1))
     return np.concatenate(out)
 
 
-def _layers(wood: Wood, shape: tuple[int, ...]) -> Index:
+def _layers(wood: Wood) -> Index:
     """A layer number for each pixel, so that components that touch in the image lie in different layers."""
-    mask = np.zeros(shape, dtype=bool)
-    mask[wood.rows, wood.cols] = True
-    pairs = wood.component[_neighbours(mask, wood.rows, wood.cols)]
+    pairs = wood.component[wood.touching]
     pairs = np.unique(np.sort(pairs[pairs[:, 0] != pairs[:, 1]], axis=1), axis=0)
     sizes = np.bincount(wood.component)
     # Specks from noise would only add layers; they are put with the first and cost nothing.

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from perception.config import SkeletonConfig
 from perception.frame import View
+from perception.pixels import pixels_of
 from rolling_panda.messages import WOOD_CLASSES
 
 _THIN = tuple(WOOD_CLASSES.index(kind) for kind in ("cane", "node", "spur"))
@@ -28,30 +29,32 @@ def mended(view: View, labels: NDArray[np.uint8], config: SkeletonConfig) -> Vie
         labels: H×W class indices.
         config: Range, and what counts as a step in depth.
     """
-    wood = np.isin(labels, _THIN)
-    depth = np.where(wood & (view.depth > config.nearest) & (view.depth < config.farthest), view.depth, np.float32(0.0))
-    rows, cols = np.nonzero(wood)
+    rows, cols = pixels_of(labels, _THIN)
     height, width = labels.shape
-    padded = np.pad(depth, _REACH)
-    own = depth[rows, cols]
+    own = view.depth[rows, cols]
+    own = np.where((own > config.nearest) & (own < config.farthest), own, np.float32(0.0))
+    # With an empty border, row after row: every pixel's neighbours are a fixed step away.
+    stride = width + 2 * _REACH
+    depth = np.zeros((height + 2 * _REACH) * stride, np.float32)
+    at = (rows + _REACH) * stride + cols + _REACH
+    depth[at] = own
     support = np.zeros(len(rows), dtype=np.int8)
     for dr in (-1, 0, 1):
         for dc in (-1, 0, 1):
             if dr or dc:
-                beside = padded[rows + _REACH + dr, cols + _REACH + dc]
+                beside = depth[at + dr * stride + dc]
                 support += (beside > 0.0) & (np.abs(beside - own) < config.depth_step)
     good = (own > 0.0) & (support >= _SUPPORT)
-    trusted = np.zeros((height + 2 * _REACH, width + 2 * _REACH), np.float32)
-    trusted[rows[good] + _REACH, cols[good] + _REACH] = own[good]
-    bad_rows, bad_cols = rows[~good], cols[~good]
-    offsets = np.arange(2 * _REACH + 1)
-    window = trusted[bad_rows[:, None, None] + offsets[:, None], bad_cols[:, None, None] + offsets[None, :]]
-    found = np.sort(window.reshape(len(bad_rows), len(offsets) ** 2), axis=1)
+    bad = np.flatnonzero(~good)
+    # What is left is trusted.
+    depth[at[bad]] = 0.0
+    offsets = np.arange(-_REACH, _REACH + 1)
+    found = np.sort(depth[at[bad][:, None] + (offsets[:, None] * stride + offsets).ravel()], axis=1)
     count = np.count_nonzero(found, axis=1)
     # Zeros come first in order: the middle of what is behind them.
     middle = found.shape[1] - count + (count - 1) // 2
     out = view.depth.copy()
-    out[bad_rows, bad_cols] = np.where(
+    out[rows[bad], cols[bad]] = np.where(
         count > 0, found[np.arange(len(found)), np.minimum(middle, found.shape[1] - 1)], np.float32(0.0)
     )
     return replace(view, depth=out)

@@ -11,12 +11,24 @@ from numpy.typing import NDArray
 
 from perception.config import ObstacleConfig
 from perception.frame import View
+from perception.pixels import pixels_of
 from perception.plant import Array
 from rolling_panda.messages import WOOD_CLASSES, WoodClass
 from rolling_panda.row_messages import Capsule
 
 #: How a class of rods stands: `upright`, `along` the row as one straight line, or along it in bent `pieces`.
 _SHAPES: dict[WoodClass, str] = {"post": "upright", "trunk": "upright", "cordon": "pieces", "wire": "along"}
+
+
+@dataclass(frozen=True)
+class _Rod:
+    start: Array
+    end: Array
+    radius: float
+
+    @property
+    def length(self) -> float:
+        return float(np.linalg.norm(self.end - self.start))
 
 
 class ObstacleMap:
@@ -26,6 +38,7 @@ class ObstacleMap:
         """Start with nothing seen."""
         self._config = config
         self._seen: dict[WoodClass, _Cells] = {kind: _Cells(config.cell) for kind in _SHAPES}
+        self._fitted: dict[WoodClass, list[tuple[Array, _Rod]]] = {}
         self._capsules: tuple[Capsule, ...] = ()
 
     def update(self, view: View, labels: NDArray[np.uint8]) -> tuple[Capsule, ...]:
@@ -40,12 +53,11 @@ class ObstacleMap:
         """
         config, grown = self._config, False
         for kind, cells in self._seen.items():
-            mask = labels == WOOD_CLASSES.index(kind)
-            mask &= (view.depth > config.nearest) & (view.depth < config.farthest)
-            rows, cols = np.nonzero(mask)
-            every = max(1, len(rows) // config.points)
-            rows, cols = rows[::every], cols[::every]
-            grown |= cells.add(view.points(rows, cols, view.depth[rows, cols]))
+            rows, cols = pixels_of(labels, (WOOD_CLASSES.index(kind),))
+            depth = view.depth[rows, cols]
+            used = np.flatnonzero((depth > config.nearest) & (depth < config.farthest))
+            used = used[:: max(1, len(used) // config.points)]
+            grown |= cells.add(view.points(rows[used], cols[used], depth[used]))
         if grown:
             away = view.R[:, 2]
             self._capsules = tuple(
@@ -62,24 +74,23 @@ class ObstacleMap:
         elif shape == "along":
             groups = _groups(points, 2, config.wire_apart)
         else:
-            groups = [points[np.floor(points[:, 0] / config.piece) == k] for k in _pieces(points, config.piece)]
-        rods = (_fit(group, away, thin=kind == "wire") for group in groups if len(group) >= config.least)
+            groups = _pieces(points, config.piece)
+        rods = self._fits(kind, [group for group in groups if len(group) >= config.least], away)
         return [
             Capsule(kind, _vector(rod.start), _vector(rod.end), rod.radius, rod.radius)
             for rod in rods
             if rod.length >= config.shortest
         ]
 
-
-@dataclass(frozen=True)
-class _Rod:
-    start: Array
-    end: Array
-    radius: float
-
-    @property
-    def length(self) -> float:
-        return float(np.linalg.norm(self.end - self.start))
+    def _fits(self, kind: WoodClass, groups: list[Array], away: Array) -> list[_Rod]:
+        """A rod for each group; one that no new look has changed stays, so that a long row costs no more than a short."""
+        old = self._fitted.get(kind, [])
+        new = []
+        for group in groups:
+            same = (rod for other, rod in old if len(other) == len(group) and np.array_equal(other, group))
+            new.append((group, next(same, None) or _fit(group, away, thin=kind == "wire")))
+        self._fitted[kind] = new
+        return [rod for _, rod in new]
 
 
 class _Cells:
@@ -87,27 +98,35 @@ class _Cells:
 
     def __init__(self, size: float) -> None:
         self._size = size
-        self._cells: dict[tuple[int, int, int], tuple[Array, int]] = {}
+        self._number: dict[tuple[int, int, int], int] = {}
+        self._mean, self._times = np.zeros((256, 3)), np.zeros(256, dtype=int)
 
     def add(self, points: Array) -> bool:
         """Take the points of one frame; whether anything was among them."""
         if len(points) == 0:
             return False
-        keys, inverse, counts = np.unique(
-            np.floor(points / self._size).astype(int), axis=0, return_inverse=True, return_counts=True
-        )
-        sums = np.zeros((len(keys), 3))
-        np.add.at(sums, inverse.ravel(), points)
-        for key, mean in zip(keys.tolist(), sums / counts[:, None], strict=True):
-            old, times = self._cells.get(tuple(key), (mean, 0))
-            # A running mean over the frames, the noise of one frame being most of what there is.
-            self._cells[tuple(key)] = (old + (mean - old) / (times + 1), min(times + 1, 50))
+        keys = np.floor(points / self._size).astype(int)
+        least = keys.min(axis=0)
+        _, deep, high = (keys.max(axis=0) - least + 1).tolist()
+        # One number for each cell of the box around them, which sorts faster than three.
+        places = (keys - least) @ np.array([deep * high, high, 1])
+        _, first, inverse, counts = np.unique(places, return_index=True, return_inverse=True, return_counts=True)
+        sums = np.stack([np.bincount(inverse, points[:, i]) for i in range(3)], axis=1)
+        number = self._number
+        cells = np.array([number.setdefault((x, y, z), len(number)) for x, y, z in keys[first].tolist()])
+        while len(number) > len(self._times):
+            self._mean = np.concatenate([self._mean, np.zeros_like(self._mean)])
+            self._times = np.concatenate([self._times, np.zeros_like(self._times)])
+        # A running mean over the frames, the noise of one frame being most of what there is.
+        times = self._times[cells] + 1
+        self._mean[cells] += (sums / counts[:, None] - self._mean[cells]) / times[:, None]
+        self._times[cells] = np.minimum(times, 50)
         return True
 
     def often(self, hits: int) -> Array:
         """Means of the cells seen in at least `hits` frames, N×3."""
-        means = [mean for mean, times in self._cells.values() if times >= hits]
-        return np.array(means) if means else np.zeros((0, 3))
+        out: Array = self._mean[self._times >= hits]
+        return out
 
 
 def _groups(points: Array, axis: int, apart: float) -> list[Array]:
@@ -118,8 +137,13 @@ def _groups(points: Array, axis: int, apart: float) -> list[Array]:
     return np.split(points, np.nonzero(np.diff(points[:, axis]) > apart)[0] + 1)
 
 
-def _pieces(points: Array, piece: float) -> Array:
-    return np.unique(np.floor(points[:, 0] / piece))
+def _pieces(points: Array, piece: float) -> list[Array]:
+    """Points in groups by the stretch of the row, `piece` long, that they are in."""
+    if len(points) == 0:
+        return []
+    number = np.floor(points[:, 0] / piece)
+    order = np.argsort(number, kind="stable")
+    return np.split(points[order], np.nonzero(np.diff(number[order]))[0] + 1)
 
 
 def _fit(points: Array, away: Array, thin: bool) -> _Rod:

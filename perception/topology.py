@@ -9,6 +9,7 @@ from perception.abstention import MoreToSee
 from perception.centreline import Centreline, base_radius
 from perception.config import SkeletonConfig
 from perception.frame import View
+from perception.pixels import pixels_of
 from perception.plant import Array, Cane, Node, Plant, Span, Spur
 from rolling_panda.messages import WOOD_CLASSES
 
@@ -39,10 +40,9 @@ def build_plant(view: View, labels: NDArray[np.uint8], lines: list[Centreline], 
     if clouds:
         tree = cKDTree(np.concatenate(clouds))
         owner = np.repeat(np.arange(len(clouds)), [len(cloud) for cloud in clouds])
-        for line in lines:
-            if line.arc[-1] < config.least_cane:
-                continue
-            gaps, nearest = tree.query(np.stack([line.axis[0], line.axis[-1]]))
+        canes = [line for line in lines if line.arc[-1] >= config.least_cane]
+        ends = np.array([(line.axis[0], line.axis[-1]) for line in canes]).reshape(-1, 2, 3)
+        for line, gaps, nearest in zip(canes, *tree.query(ends), strict=True):
             end = int(np.argmin(gaps))
             if gaps[end] > config.reach:
                 loose.append(line.axis)
@@ -53,8 +53,9 @@ def build_plant(view: View, labels: NDArray[np.uint8], lines: list[Centreline], 
     else:
         loose = [line.axis for line in lines]
     along = _row_direction(cordon, view)
+    old_wood = cKDTree(cordon) if len(cordon) else None
     spurs = [
-        _spur(view, cloud, cordon, canes, _doubt(view, cloud, k in strays, config))
+        _spur(view, cloud, old_wood, canes, _doubt(view, cloud, k in strays, config))
         for k, (cloud, canes) in enumerate(zip(clouds, rooted, strict=True))
     ]
     spurs.sort(key=lambda spur: float(spur.position @ along))
@@ -87,7 +88,7 @@ def _clouds(
     view: View, labels: NDArray[np.uint8], kinds: tuple[int, ...], least: int, config: SkeletonConfig
 ) -> list[Array]:
     """Surface points of each blob of some classes that has enough pixels of the first, each N×3 in odom (m)."""
-    rows, cols = np.nonzero(np.isin(labels, kinds))
+    rows, cols = pixels_of(labels, kinds)
     depth = view.depth[rows, cols]
     near = (depth > config.nearest) & (depth < config.farthest)
     rows, cols, depth = rows[near], cols[near], depth[near].astype(float)
@@ -119,9 +120,10 @@ def _merge(clouds: list[Array]) -> list[Array]:
 
 
 def _cordon(view: View, labels: NDArray[np.uint8], config: SkeletonConfig) -> Array:
-    rows, cols = np.nonzero((labels == _CORDON) & (view.depth > config.nearest) & (view.depth < config.farthest))
-    rows, cols = rows[::4], cols[::4]
-    return view.points(rows, cols, view.depth[rows, cols].astype(float))
+    rows, cols = pixels_of(labels, (_CORDON,))
+    depth = view.depth[rows, cols]
+    near = np.flatnonzero((depth > config.nearest) & (depth < config.farthest))[::4]
+    return view.points(rows[near], cols[near], depth[near].astype(float))
 
 
 def _row_direction(cordon: Array, view: View) -> Array:
@@ -133,17 +135,18 @@ def _row_direction(cordon: Array, view: View) -> Array:
     return direction if float(direction[np.argmax(np.abs(direction))]) > 0.0 else -direction
 
 
-def _spur(view: View, cloud: Array, cordon: Array, canes: list[Cane], doubt: str) -> Spur:
+def _spur(view: View, cloud: Array, cordon: cKDTree | None, canes: list[Cane], doubt: str) -> Spur:
     centre = cloud.mean(axis=0)
     spread, axes = _principal(cloud - centre)
     axis, radius = None, 0.0
-    if len(cordon) and spread[0] > 1.5 * spread[1]:
+    if cordon is not None and spread[0] > 1.5 * spread[1]:
         along = (cloud - centre) @ axes[0]
         ends = centre + np.outer(np.percentile(along, [2, 98]), axes[0])
-        gaps, _ = cKDTree(cordon).query(ends)
+        gaps, _ = cordon.query(ends)
         ends = ends if gaps[0] <= gaps[1] else ends[::-1]
         across = (cloud - centre) @ axes[1]
-        radius = float(np.percentile(across, 95) - np.percentile(across, 5)) / 2 * 1.05
+        least, most = np.percentile(across, [5, 95])
+        radius = float(most - least) / 2 * 1.05
         ray = centre - view.t
         axis = ends + _surface(ray, axes[0]) * radius * np.pi / 4
     return Spur(centre, axis, radius, tuple(sorted(canes, key=lambda cane: -cane.length)), doubt)
