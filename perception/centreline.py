@@ -70,33 +70,50 @@ def centrelines(view: View, wood: Wood, chains: list[Array], config: SkeletonCon
     pixels = pixels[np.argsort(nearest[pixels], kind="stable")]
     first = np.concatenate([[0], np.cumsum([len(line) for line in lines])])
     bounds = np.searchsorted(nearest[pixels], first)
+    stations = [_arc(line) for line in lines]
+    along = _project(samples, np.concatenate(stations), first, wood.points[pixels], nearest[pixels])
+    u, v, _ = view.pixels(samples).T
     cane = np.zeros(view.depth.shape, dtype=bool)
     cane[wood.rows, wood.cols] = True
     out = []
     for k, line in enumerate(lines):
-        members = pixels[bounds[k] : bounds[k + 1]]
-        measured = _measure(view, wood, cane, members, nearest[members] - first[k], line, config)
+        own, part = slice(bounds[k], bounds[k + 1]), slice(first[k], first[k + 1])
+        rough = _Rough(line, stations[k], u[part], v[part], pixels[own], along[own])
+        measured = _measure(view, wood, cane, rough, config)
         if measured is not None:
             out.append(measured)
     return out
 
 
+@dataclass(frozen=True)
+class _Rough:
+    """A line before it is measured.
+
+    Attributes:
+        line: Samples of it, N×3 in odom (m).
+        stations: Arc length of each (N, m).
+        u: Column of each in the image (N, px).
+        v: Row of each (N, px).
+        members: The pixels that are nearest to it (M).
+        along: Arc length at each of them (M, m).
+    """
+
+    line: Array
+    stations: Array
+    u: Array
+    v: Array
+    members: Index
+    along: Array
+
+
 def _measure(
-    view: View,
-    wood: Wood,
-    cane: NDArray[np.bool_],
-    members: Index,
-    nearest: Index,
-    line: Array,
-    config: SkeletonConfig,
+    view: View, wood: Wood, cane: NDArray[np.bool_], rough: _Rough, config: SkeletonConfig
 ) -> Centreline | None:
-    """A line with its pixels, and the sample of the line that is nearest to each of them."""
+    line, stations, members, along = rough.line, rough.stations, rough.members, rough.along
     if len(members) < 20:
         return None
-    stations = _arc(line)
-    along = _project(line, stations, wood.points[members], nearest)
     length = float(stations[-1])
-    width_arc, width = _widths(view, wood, members, along, line, stations, config.widening)
+    width_arc, width = _widths(view, wood, rough, config.widening)
     radius = float(np.clip(np.median(width) / 2, 0.001, 0.05)) if len(width) else _FALLBACK_RADIUS
     axis = _smooth(line, stations, along, wood.points[members], config.smoothing)
     steps = np.linalg.norm(np.diff(axis, axis=0), axis=1)
@@ -111,7 +128,7 @@ def _measure(
         width=width,
         nodes=_nodes(wood, members, along, config),
         hidden=_hidden(along, length),
-        ends=(_why(view, cane, axis[0], axis[0] - axis[1]), _why(view, cane, axis[-1], axis[-1] - axis[-2])),
+        ends=_ends(view, cane, axis),
     )
 
 
@@ -136,12 +153,16 @@ def _resample(chain: Array, step: float) -> Array | None:
     return np.stack([np.interp(stations, arc, smooth[:, i]) for i in range(3)], axis=1)
 
 
-def _project(line: Array, stations: Array, points: Array, k: Index) -> Array:
-    """Arc length of the foot of each point on the line, `k` being nearest; beyond the ends it runs on straight."""
-    before, after = np.maximum(k - 1, 0), np.minimum(k + 1, len(line) - 1)
-    chord = line[after] - line[before]
+def _project(samples: Array, stations: Array, first: Index, points: Array, k: Index) -> Array:
+    """Arc length of the foot of each point on its line, sample `k` being nearest; beyond the ends it runs on straight.
+
+    The samples of all lines stand one after the other, those of each from one `first` to the next.
+    """
+    before, after = np.arange(len(samples)) - 1, np.arange(len(samples)) + 1
+    before[first[:-1]], after[first[1:] - 1] = first[:-1], first[1:] - 1
+    chord = samples[after] - samples[before]
     chord /= np.linalg.norm(chord, axis=1, keepdims=True)
-    out: Array = stations[k] + np.einsum("ij,ij->i", points - line[k], chord)
+    out: Array = stations[k] + np.einsum("ij,ij->i", points - samples[k], chord[k])
     return out
 
 
@@ -199,16 +220,14 @@ def base_radius(line: Centreline, reverse: bool) -> float:
     return float(np.clip(width_at_base / 2, 0.001, 0.05))
 
 
-def _widths(
-    view: View, wood: Wood, members: Index, along: Array, line: Array, stations: Array, widening: float
-) -> tuple[Array, Array]:
+def _widths(view: View, wood: Wood, rough: _Rough, widening: float) -> tuple[Array, Array]:
     """Arc lengths and widths (m) of stretches without nodes: pixels a unit of length of the image, scaled by depth."""
-    u, v, _ = view.pixels(line).T
-    pixel_arc = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(u), np.diff(v)))])
+    line, stations, along = rough.line, rough.stations, rough.along
+    pixel_arc = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(rough.u), np.diff(rough.v)))])
     edges = np.arange(0.0, float(stations[-1]) + 1e-9, _WIDTH_STEP)
     bins = np.floor(along / _WIDTH_STEP).astype(int)
     inside = (bins >= 0) & (bins < len(edges) - 1)
-    bins, pixels, size = bins[inside], members[inside], max(0, len(edges) - 1)
+    bins, pixels, size = bins[inside], rough.members[inside], max(0, len(edges) - 1)
     count = np.bincount(bins, minlength=size)
     node = np.bincount(bins, wood.node[pixels], minlength=size)
     depth = np.bincount(bins, wood.depth[pixels], minlength=size) / np.maximum(count, 1)
@@ -222,15 +241,17 @@ def _widths(
 
 def _squareness(view: View, line: Array, stations: Array, arc: Array) -> Array:
     """True width over width in the image plane at some arc lengths: away from its middle an image is drawn out."""
-    point = np.stack([np.interp(arc, stations, line[:, i]) for i in range(3)], axis=1)
-    beyond = np.stack([np.interp(arc + 0.01, stations, line[:, i]) for i in range(3)], axis=1)
-    before = np.stack([np.interp(arc - 0.01, stations, line[:, i]) for i in range(3)], axis=1)
+    places = np.concatenate([arc, arc + 0.01, arc - 0.01])
+    point, beyond, before = np.stack([np.interp(places, stations, line[:, i]) for i in range(3)], axis=1).reshape(
+        3, -1, 3
+    )
     ray = (point - view.t) @ view.R
     along = (beyond - before) @ view.R
     # Directions in the image plane: along the cane's image, and square to it.
     drawn = along[:, :2] * ray[:, 2:] - ray[:, :2] * along[:, 2:]
     across = np.stack([-drawn[:, 1], drawn[:, 0]], axis=1) / np.linalg.norm(drawn, axis=1, keepdims=True)
-    square = np.cross(along, ray)
+    (a, b, c), (x, y, z) = along.T, ray.T
+    square = np.stack([b * z - c * y, c * x - a * z, a * y - b * x], axis=1)
     square /= np.linalg.norm(square, axis=1, keepdims=True)
     out: Array = np.abs(np.einsum("ij,ij->i", across, square[:, :2]))
     return out
@@ -252,10 +273,17 @@ def _hidden(along: Array, length: float) -> tuple[Span, ...]:
     return tuple(Span(float(seen[g]), float(seen[g + 1])) for g in gaps)
 
 
-def _why(view: View, cane: NDArray[np.bool_], tip: Array, outward: Array) -> CaneEnd:
-    """Why a cane is seen no further than `tip`; where cane pixels go on, it runs into another one."""
-    beyond = tip + outward / max(float(np.linalg.norm(outward)), 1e-9) * 0.008
-    u, v, z = view.pixels(beyond)[0]
+def _ends(view: View, cane: NDArray[np.bool_], axis: Array) -> tuple[CaneEnd, CaneEnd]:
+    """Why a cane is seen no further than its first and its last point."""
+    tips = axis[[0, -1]]
+    outward = tips - axis[[1, -2]]
+    length = np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-9)
+    first, last = view.pixels(tips + outward / length * 0.008)
+    return _why(view, cane, *first.tolist()), _why(view, cane, *last.tolist())
+
+
+def _why(view: View, cane: NDArray[np.bool_], u: float, v: float, z: float) -> CaneEnd:
+    """Why a cane is not seen at a pixel and depth just beyond; where cane pixels go on, it runs into another one."""
     height, width = view.depth.shape
     col, row = round(u), round(v)
     if not (3 <= col < width - 3 and 3 <= row < height - 3 and z > 0.0):

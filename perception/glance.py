@@ -29,7 +29,15 @@ def glance(view: View, labels: NDArray[np.uint8], place: Array) -> Glance:
         labels: Its classes, H×W.
         place: On the wood's axis (3, m, odom).
     """
-    u, v, z = view.pixels(place)[0]
+    return glances(view, labels, place)[0]
+
+
+def glances(view: View, labels: NDArray[np.uint8], places: Array) -> list[Glance]:
+    """The same for many places at once (N×3, m, odom)."""
+    return [_at(view, labels, u, v, z) for u, v, z in view.pixels(places).tolist()]
+
+
+def _at(view: View, labels: NDArray[np.uint8], u: float, v: float, z: float) -> Glance:
     height, width = view.depth.shape
     reach = max(2, round(view.intrinsics.fx * _AROUND / max(z, 0.1)))
     if z < _NEAREST or not (reach <= u < width - reach - 1 and reach <= v < height - reach - 1):

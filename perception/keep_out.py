@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from perception.clearance import clearance
+from perception.clearance import Rods, clearance
 from perception.config import RuleConfig
 from perception.frame import View
 from perception.plant import Array
@@ -38,24 +38,24 @@ def in_view(view: View, labels: NDArray[np.uint8], obstacles: tuple[Capsule, ...
         obstacles: Known from all frames.
         rule: Distances to keep.
     """
+    wood = _old_wood(obstacles)
 
     def reason(place: Array) -> str:
         if wire_near(view, labels, place, rule.wire_distance):
             return _beside_wire(rule)
-        return _beside_wood(obstacles, place, rule)
+        return _beside_wood(wood, place, rule)
 
     return reason
 
 
 def as_known(obstacles: tuple[Capsule, ...], rule: RuleConfig) -> KeepOut:
     """The same from what is known of all frames, without an image."""
+    wood = _old_wood(obstacles)
 
     def reason(place: Array) -> str:
-        return (
-            _beside_wire(rule)
-            if near_wire(obstacles, place, rule.wire_distance)
-            else _beside_wood(obstacles, place, rule)
-        )
+        if near_wire(obstacles, place, rule.wire_distance):
+            return _beside_wire(rule)
+        return _beside_wood(wood, place, rule)
 
     return reason
 
@@ -90,9 +90,13 @@ def _beside_wire(rule: RuleConfig) -> str:
     return f"a wire or hose passes within {1000 * rule.wire_distance:.0f} mm of the cut; cut this one by hand"
 
 
-def _beside_wood(obstacles: tuple[Capsule, ...], place: Array, rule: RuleConfig) -> str:
-    for kind in _OLD_WOOD:
-        gap = clearance(obstacles, kind, place)
+def _old_wood(obstacles: tuple[Capsule, ...]) -> dict[WoodClass, Rods]:
+    return {kind: Rods(obstacles, kind) for kind in _OLD_WOOD}
+
+
+def _beside_wood(wood: dict[WoodClass, Rods], place: Array, rule: RuleConfig) -> str:
+    for kind, rods in wood.items():
+        gap = rods.clearance(place)
         if gap is not None and gap < rule.cordon_distance:
             return f"the {kind} is within {1000 * rule.cordon_distance:.0f} mm of the cut; cut this one by hand"
     return ""

@@ -38,7 +38,7 @@ def link(view: View, fragments: list[Fragment], seen: NDArray[np.bool_], config:
         config: How far and how straight to join.
     """
     long = [fragment for fragment in fragments if fragment.pixels >= _SHORT and len(fragment.line) >= 2]
-    ends = [_end(k, fragment, last) for k, fragment in enumerate(long) for last in (False, True)]
+    ends = _ends(long)
     partner = _match(view, ends, seen, config)
     chains, used = [], set()
     for start in range(len(long)):
@@ -62,13 +62,21 @@ def link(view: View, fragments: list[Fragment], seen: NDArray[np.bool_], config:
     return chains
 
 
-def _end(number: int, fragment: Fragment, last: bool) -> _End:
-    tail = fragment.line[-_TAIL:] if last else fragment.line[:_TAIL][::-1]
-    centre = tail.mean(axis=0)
-    axis = np.linalg.svd(tail - centre, full_matrices=False)[2][0]
-    outward = axis if float(np.dot(axis, tail[-1] - tail[0])) > 0.0 else -axis
-    point = centre + outward * float(np.dot(tail[-1] - centre, outward))
-    return _End(number, last, point, outward)
+def _ends(fragments: list[Fragment]) -> list[_End]:
+    """Both ends of each fragment, in order. Tails of the same length are worked on together."""
+    tails = [tail for each in fragments for tail in (each.line[:_TAIL][::-1], each.line[-_TAIL:])]
+    sizes = np.array([len(tail) for tail in tails], dtype=int)
+    points, outward = np.zeros((len(tails), 3)), np.zeros((len(tails), 3))
+    for size in np.unique(sizes):
+        those = np.flatnonzero(sizes == size)
+        tail = np.array([tails[k] for k in those])
+        centre = tail.mean(axis=1)
+        axis = np.linalg.svd(tail - centre[:, None], full_matrices=False)[2][:, 0]
+        forwards = np.einsum("ij,ij->i", axis, tail[:, -1] - tail[:, 0]) > 0.0
+        axis = np.where(forwards[:, None], axis, -axis)
+        outward[those] = axis
+        points[those] = centre + axis * np.einsum("ij,ij->i", tail[:, -1] - centre, axis)[:, None]
+    return [_End(k // 2, k % 2 == 1, points[k], outward[k]) for k in range(len(tails))]
 
 
 def _match(view: View, ends: list[_End], seen: NDArray[np.bool_], config: SkeletonConfig) -> list[int]:

@@ -83,12 +83,15 @@ class ObstacleMap:
         ]
 
     def _fits(self, kind: WoodClass, groups: list[Array], away: Array) -> list[_Rod]:
-        """A rod for each group; one that no new look has changed stays, so that a long row costs no more than a short."""
-        old = self._fitted.get(kind, [])
+        """A rod for each group; where no look has changed a group its rod stays, with the side that was seen then."""
+        old = {(len(group), group[0].tobytes()): (group, rod) for group, rod in self._fitted.get(kind, [])}
         new = []
         for group in groups:
-            same = (rod for other, rod in old if len(other) == len(group) and np.array_equal(other, group))
-            new.append((group, next(same, None) or _fit(group, away, thin=kind == "wire")))
+            before = old.get((len(group), group[0].tobytes()))
+            if before is not None and np.array_equal(before[0], group):
+                new.append(before)
+            else:
+                new.append((group, _fit(group, away, thin=kind == "wire")))
         self._fitted[kind] = new
         return [rod for _, rod in new]
 

@@ -8,7 +8,7 @@ from perception.abstention import MoreToSee, OpenPlaces, abstention
 from perception.album import Album, Crop
 from perception.by_hand import moved_by_hand, point_by_hand
 from perception.centreline import centrelines
-from perception.clearance import clearance
+from perception.clearance import Rods
 from perception.close_look import look_closely, no_look
 from perception.config import PerceptionConfig
 from perception.fragments import find_fragments, find_wood
@@ -217,11 +217,12 @@ class Perception:
             if crop is not None:
                 crops[point.point_id] = crop
         self._crops = crops
+        wires, cordons = Rods(self.obstacles, "wire"), Rods(self.obstacles, "cordon")
         return tuple(
             replace(
                 point,
-                wire_distance=clearance(self.obstacles, "wire", np.array(point.position)),
-                cordon_distance=clearance(self.obstacles, "cordon", np.array(point.position)),
+                wire_distance=wires.clearance(np.array(point.position)),
+                cordon_distance=cordons.clearance(np.array(point.position)),
             )
             for point in points
         )
@@ -288,11 +289,12 @@ class Perception:
 
     def _is_survey(self, view: View, labels: NDArray[np.uint8]) -> bool:
         """Whether the frame looks at the cordon from where spurs can be read as a whole."""
-        wood = (labels == _CORDON) & (view.depth > 0.0)
-        if np.count_nonzero(wood) < _LEAST_CORDON:
+        depth = view.depth[labels == _CORDON]
+        depth = depth[depth > 0.0]
+        if len(depth) < _LEAST_CORDON:
             return False
         config = self._config
-        return bool(config.survey_nearest <= np.median(view.depth[wood]) <= config.survey_farthest)
+        return bool(config.survey_nearest <= np.median(depth) <= config.survey_farthest)
 
     def _no_survey(self) -> MoreToSee:
         near, far = self._config.survey_nearest, self._config.survey_farthest

@@ -8,7 +8,7 @@ from collections import deque
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
 
 from perception.numbering import SpurNumber
 from perception.plant import Array, Cane, Node, Plant, Spur
@@ -139,8 +139,10 @@ class PlantMap:
                     known.best = spur
             canes = tuple(_add_cane(known, cane).steadied(cane) for cane in spur.canes)
             steadied.append(replace(spur, canes=canes))
+        stand = np.array([spur.position.mean[:2] for spur in self._spurs.values()]).reshape(-1, 2)
+        vines = np.array([number.vine for number in self._spurs], dtype=int)
         for place in plant.trunks:
-            near = [n.vine for n in self._spurs if np.linalg.norm(self._spurs[n].position.mean[:2] - place[:2]) < 0.4]
+            near = vines[np.linalg.norm(stand - place[:2], axis=1) < 0.4].tolist()
             if near:
                 vine = max(set(near), key=near.count)
                 if vine in self._trunks:
@@ -215,7 +217,7 @@ def _gap(first: Cane, second: Cane) -> float:
     near = second.axis[second.arc < 0.25]
     if len(near) < 2:
         near = second.axis
-    return float(np.median(cKDTree(first.axis).query(near)[0]))
+    return float(np.median(cdist(near, first.axis).min(axis=1)))
 
 
 def _unseen(cane: Cane) -> float:

@@ -12,10 +12,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.distance import cdist
 
 from perception.config import ObstacleConfig, RuleConfig
 from perception.frame import View
-from perception.glance import glance
+from perception.glance import glances
 from perception.numbering import SpurNumber
 from perception.plant import Array
 from perception.plant_map import KnownCane, KnownSpur
@@ -147,9 +148,9 @@ class StayingCanes:
 
     def _glance(self, cane: _Cane, view: View, labels: NDArray[np.uint8]) -> None:
         assert cane.axis is not None
-        glances = [glance(view, labels, place) for place in cane.axis[2::_GLANCE_EVERY]]
-        gone, seen = glances.count("gone"), len(glances) - glances.count("unseen")
-        if seen < min(_LEAST_SEEN, len(glances)) or seen == 0:
+        said = glances(view, labels, cane.axis[2::_GLANCE_EVERY])
+        gone, seen = said.count("gone"), len(said) - said.count("unseen")
+        if seen < min(_LEAST_SEEN, len(said)) or seen == 0:
             return
         cane.gone = cane.gone + 1 if gone >= _SHARE_GONE * seen else 0
         if cane.gone >= _FRAMES_GONE:
@@ -196,7 +197,7 @@ def _sampled(known: KnownCane, end: float) -> Array:
 
 def _apart(first: Array, second: Array) -> float:
     """How far the farthest sample of either axis is from the other one (m)."""
-    gaps = np.linalg.norm(first[:, None] - second[None], axis=2)
+    gaps = cdist(first, second)
     return float(max(gaps.min(axis=0).max(), gaps.min(axis=1).max()))
 
 
