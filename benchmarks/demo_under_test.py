@@ -2,8 +2,10 @@
 
 import re
 import subprocess
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,9 @@ import psutil
 
 from rolling_panda.errors import InputError
 from rolling_panda.launch import child_environment, python_command
+
+#: How often somebody who looks on asks for the robot's state (s).
+_LOOK_S = 0.2
 
 
 class Demo:
@@ -85,6 +90,24 @@ class Demo:
         self.wait(lambda: self.mode() == "READY", 20.0)
         self.post("points/accept-all", confidence=0.0)
         self.post("start")
+
+    @contextmanager
+    def watched(self) -> Iterator[None]:
+        """Somebody looks on: without anybody who asks for the robot's state, work is paused after a second."""
+        ended = threading.Event()
+
+        def look() -> None:
+            with httpx.Client(base_url=self.client.base_url, cookies=self.client.cookies, timeout=10) as client:
+                while not ended.wait(_LOOK_S):
+                    client.get("/api/state")
+
+        thread = threading.Thread(target=look, name="somebody who looks on")
+        thread.start()
+        try:
+            yield
+        finally:
+            ended.set()
+            thread.join()
 
     def close(self) -> None:
         """End it as Ctrl-C does."""

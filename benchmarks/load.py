@@ -149,11 +149,12 @@ def main(argv: Sequence[str] | None = None) -> int:
             print(f"one idle page, {arguments.seconds:.0f} s", flush=True)
             page = page_cost(demo, chromium, arguments.seconds, idle)
         demo.begin_work()
-        time.sleep(3.0)
-        print(f"moving, {arguments.seconds:.0f} s", flush=True)
-        moving = cost(demo.tree, arguments.seconds)
-        still_working = demo.mode() == "AUTO"
-        factor = demo.state()["bridge"]["real_time_factor"]
+        with demo.watched():
+            time.sleep(3.0)
+            print(f"moving, {arguments.seconds:.0f} s", flush=True)
+            moving = cost(demo.tree, arguments.seconds)
+            still_working = demo.mode() == "AUTO"
+            factor = demo.state()["bridge"]["real_time_factor"]
     finally:
         demo.close()
     _show(idle, moving, page, factor, still_working)

@@ -8,8 +8,6 @@ from running_server import running_server
 
 from rolling_panda import topics
 
-pytestmark = pytest.mark.alone
-
 #: What the server answers without a session.
 PUBLIC = {"/api/health", "/version", "/api/sign-in", "/api/sign-out"}
 OPERATIONS = 40

@@ -1,6 +1,7 @@
 """Whatever else arrives where motion commands belong moves nothing, is counted, and can be read in the log."""
 
 import math
+import queue
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +20,10 @@ pytestmark = pytest.mark.alone
 FAST = [0.5] * 9
 
 
-def bad_commands(epoch: int, echo: int) -> dict[str, bytes]:
+def bad_commands(token: str, epoch: int, echo: int) -> dict[str, bytes]:
     """Messages that would move the robot if any part of them were believed, by what is wrong with them."""
     good: dict[str, Any] = {"type": "MotionCommand", "epoch": epoch, "sequence": 2**40, "echo": echo, "xi": FAST}
+    good["token"] = token
 
     def spoilt(**changes: Any) -> bytes:
         return msgspec.msgpack.encode(good | changes)
@@ -35,11 +37,21 @@ def bad_commands(epoch: int, echo: int) -> dict[str, bytes]:
         "unknown field": spoilt(force=True),
         "old sequence": spoilt(sequence=0),
         "old epoch": spoilt(epoch=0),
+        "another token": spoilt(token="guessed"),
         "out of limits": spoilt(xi=[50.0, *FAST[1:]]),
         "another type": spoilt(type="TeleopTarget"),
         "not msgpack": b"\xc1 move",
         "nothing": b"",
     }
+
+
+def overheard_token(session: zenoh.Session) -> str:
+    """The token of the controller's own commands: who listens on the wire knows it."""
+    heard: queue.Queue[bytes] = queue.Queue()
+    subscriber = session.declare_subscriber(key(ROBOT_ID, MOTION.name), lambda sample: heard.put(bytes(sample.payload)))
+    command = msgspec.msgpack.decode(heard.get(timeout=10))
+    subscriber.undeclare()
+    return str(command.get("token", ""))
 
 
 def test_bad_commands_move_nothing_and_are_told(tmp_path: Path) -> None:
@@ -54,12 +66,13 @@ def test_bad_commands_move_nothing_and_are_told(tmp_path: Path) -> None:
         config.insert_json5("mode", '"client"')
         config.insert_json5("connect/endpoints", f'["{robot.endpoint}"]')
         with zenoh.open(config) as session:
-            for name in bad_commands(0, 0):
+            token = overheard_token(session)
+            for name in bad_commands(token, 0, 0):
                 known = reasons()
 
                 def counted(name: str = name, known: int = known) -> bool:
                     state = robot.state()
-                    bad = bad_commands(state["bridge"]["epoch"], state["joints"]["sequence"])
+                    bad = bad_commands(token, state["bridge"]["epoch"], state["joints"]["sequence"])
                     # Again until it is seen: newest wins, so a good command close behind replaces it.
                     session.put(key(ROBOT_ID, MOTION.name), bad[name])
                     return reasons() > known

@@ -22,8 +22,6 @@ from rolling_panda.errors import ServiceError
 from rolling_panda.plan_messages import PlannedPoint, PlanRow, PointPlan, SessionPlan
 from rolling_panda.teleop_messages import BaseVelocity
 
-pytestmark = pytest.mark.alone
-
 
 @pytest.fixture(scope="module")
 def running():

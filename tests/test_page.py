@@ -9,7 +9,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from rolling_panda import page_messages as p
 
-pytestmark = [pytest.mark.browser, pytest.mark.alone]
+pytestmark = pytest.mark.browser
 
 
 def test_shows_the_queue_by_vine_and_spur_and_selects(page: Page, server: PlayedServer) -> None:

@@ -8,7 +8,7 @@ from playwright.sync_api import Page, expect
 
 from rolling_panda.control_messages import ControlState
 
-pytestmark = [pytest.mark.browser, pytest.mark.alone]
+pytestmark = pytest.mark.browser
 
 FREE = ControlState(
     holder="", user="", epoch=7, expires_s=0.0, requested_by="", requested_key="", coming="", told="", told_number=0,

@@ -10,7 +10,7 @@ from playwright.sync_api import Page, expect
 from rolling_panda import page_messages as p
 from rolling_panda.resources import resource
 
-pytestmark = [pytest.mark.browser, pytest.mark.alone]
+pytestmark = pytest.mark.browser
 
 
 @pytest.mark.parametrize("size", [(1280, 800), (1024, 768), (820, 1180)])

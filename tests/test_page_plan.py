@@ -10,7 +10,7 @@ from playwright.sync_api import Page, expect, sync_playwright
 
 from rolling_panda.plan_messages import PointPlan
 
-pytestmark = [pytest.mark.browser, pytest.mark.alone]
+pytestmark = pytest.mark.browser
 WAY = PointPlan(
     point_id="p1",
     revision=4,

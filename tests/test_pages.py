@@ -18,8 +18,6 @@ from rolling_panda import messages as m
 from rolling_panda import topics
 from server.config import ServerConfig
 
-pytestmark = pytest.mark.alone
-
 
 @pytest.fixture(scope="module")
 def server():

@@ -10,8 +10,6 @@ from rolling_panda.crop_messages import PointCrop
 from rolling_panda.errors import ServiceError
 from rolling_panda.plant_requests import AddPoint, AddPointInImage, MovePoint, SetRule
 
-pytestmark = pytest.mark.alone
-
 
 @pytest.fixture(scope="module")
 def running():

@@ -4,8 +4,6 @@ import pytest
 from fake_wire import FakeWire
 from running_server import running_server
 
-pytestmark = pytest.mark.alone
-
 #: What everybody who is signed in may do, and what everybody may do.
 ANYBODY_SIGNED_IN = {"/api/stop"}
 PUBLIC = {"/api/sign-in", "/api/sign-out"}
@@ -40,7 +38,7 @@ def example(schema, document):
         case "boolean":
             return True
         case _:
-            return max(schema.get("minimum", 1), 1)
+            return min(max(schema.get("minimum", 1), 1), schema.get("maximum", 1))
 
 
 def posts(server):

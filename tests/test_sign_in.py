@@ -14,8 +14,6 @@ from rolling_panda import topics
 from server.access import Access, Tls
 from server.users import UserFile
 
-pytestmark = pytest.mark.alone
-
 PASSWORD = "correct horse battery"
 
 

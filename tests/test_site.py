@@ -8,8 +8,6 @@ from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.camera_messages import CameraFrame, Intrinsics
 
-pytestmark = pytest.mark.alone
-
 
 @pytest.fixture(scope="module")
 def server():

@@ -30,8 +30,6 @@ from controller.operator import Operator
 from controller.queue import PointQueue
 from rolling_panda import messages as m
 
-pytestmark = pytest.mark.alone
-
 NAMES = ("p0", "p1")
 PEOPLE = {"ada": "supervisor", "bob": "operator", "vic": "viewer"}
 #: Mostly those who may.

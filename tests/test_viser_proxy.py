@@ -14,8 +14,6 @@ from websockets.sync.client import connect
 
 from rolling_panda import topics
 
-pytestmark = pytest.mark.alone
-
 _PLACING = ("SetPositionMessage", "SetOrientationMessage")
 
 
