@@ -201,7 +201,8 @@ class PerceptionConfig(Struct, frozen=True, forbid_unknown_fields=True):
         survey_farthest: The same for a cordon farther away, where canes are too thin in the image (m).
         segmenter: Says which pixel shows what: `network`, or `labels`, the simulated camera's own, for comparison.
         weights: ONNX file for the network; empty takes the one that is shipped.
-        threads: Of the network.
+        threads: Of the network. With fewer than the machine has cores a frame takes longer; the loop that drives the
+            robot goes first either way.
         fuse: Whether the rule is applied to what all frames have shown of a spur, or to each frame alone.
         rule: Where to cut.
         skeleton: Pixels to canes.
@@ -216,7 +217,7 @@ class PerceptionConfig(Struct, frozen=True, forbid_unknown_fields=True):
     survey_farthest: Positive = 1.1
     segmenter: Literal["network", "labels"] = "labels"
     weights: str = ""
-    threads: Annotated[int, Meta(ge=1, le=64)] = 1
+    threads: Annotated[int, Meta(ge=1, le=64)] = 2
     fuse: bool = False
     rule: RuleConfig = RuleConfig()
     skeleton: SkeletonConfig = SkeletonConfig()
