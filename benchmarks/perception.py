@@ -21,6 +21,7 @@ import numpy as np
 
 from benchmarks.intervals import Figure, quantile, share
 from benchmarks.perception_gallery import save_failure
+from benchmarks.perception_growth import grow_long, table
 from benchmarks.perception_judge import JudgedPoint, RowJudge
 from benchmarks.perception_looks import CloseCamera, Looks, look_again, summarise_looks
 from benchmarks.perception_points import camera_frame, survey_arm
@@ -165,12 +166,19 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--looks", choices=("one", "two"), default="one", help="look at each point again from near, and after its cut"
     )
+    parser.add_argument(
+        "--growth",
+        action="store_true",
+        help="survey one row of so many vines instead, and tell what each vine's frames cost",
+    )
     parser.add_argument("--gallery", type=Path, metavar="DIR", help="put pictures of wrong points here")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write summary and results here")
     words = parser.parse_args(argv)
     if words.seed < 0 or words.vines < 1:
         parser.error(f"--seed {words.seed} --vines {words.vines}: give a seed of 0 or more and at least one vine")
     model, survey = RobotModel(), Survey()
+    if words.growth:
+        return _growth(words)
     looks = Looks() if words.looks == "two" else None
     try:
         for number, done in enumerate(range(0, words.vines, ROW_VINES)):
@@ -208,6 +216,21 @@ def main(argv: Sequence[str] | None = None) -> int:
             "open": {need: sum(a.needs == need for a in survey.abstained) for need in get_args(m.Need)},
             "abstained": [msgspec.to_builtins(each) for each in survey.abstained],
         }
+        words.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    return 0
+
+
+def _growth(words: argparse.Namespace) -> int:
+    try:
+        perception = Perception(PerceptionConfig(fuse=words.fuse), choose_segmenter(words.segmenter, words.weights))
+    except RollingPandaError as error:
+        print(f"rolling-panda bench perception: {error}", file=sys.stderr)
+        return 1
+    stretches = grow_long(words.seed, words.vines, STEP, perception, RobotModel())
+    print(table(stretches))
+    if words.json is not None:
+        document = {"machine": f"{platform.platform()}, {os.cpu_count()} cores", "seed": words.seed}
+        document |= {"segmenter": words.segmenter, "stretches": [asdict(stretch) for stretch in stretches]}
         words.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
     return 0
 

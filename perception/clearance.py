@@ -8,16 +8,16 @@ from rolling_panda.row_messages import Capsule
 
 
 class Rods:
-    """All known rods of a kind, ready to be asked about many places."""
+    """All known rods, or those of a kind, ready to be asked about many places."""
 
-    def __init__(self, obstacles: tuple[Capsule, ...], kind: WoodClass) -> None:
+    def __init__(self, obstacles: tuple[Capsule, ...], kind: WoodClass | None = None) -> None:
         """Pick them out.
 
         Args:
             obstacles: Rods of all kinds.
-            kind: Of those that count.
+            kind: Of those that count; None counts all.
         """
-        rods = [rod for rod in obstacles if rod.kind == kind]
+        rods = [rod for rod in obstacles if kind in (None, rod.kind)]
         self._start = np.array([rod.start for rod in rods]).reshape(-1, 3)
         self._axis = np.array([rod.end for rod in rods]).reshape(-1, 3) - self._start
         self._radii = np.array([(rod.start_radius, rod.end_radius) for rod in rods]).reshape(-1, 2)
@@ -28,13 +28,23 @@ class Rods:
 
         It is negative inside a rod.
         """
+        return self.clearances(place[None])[0]
+
+    def clearances(self, places: Array) -> list[float | None]:
+        """The same for many places (N×3)."""
         if not len(self._start):
-            return None
-        off = place - self._start
-        share = np.clip(np.einsum("ij,ij->i", off, self._axis) / self._length, 0.0, 1.0)
-        gaps = np.linalg.norm(off - share[:, None] * self._axis, axis=1)
+            return [None] * len(places)
+        out: list[float | None] = self.gaps(places).min(axis=1).tolist()
+        return out
+
+    def gaps(self, places: Array) -> Array:
+        """Distance (m) from each of K places (K×3) to the surface of each of N rods, K×N."""
+        off = places[:, None] - self._start
+        share = np.clip(np.einsum("kij,ij->ki", off, self._axis) / self._length, 0.0, 1.0)
+        gaps = np.linalg.norm(off - share[..., None] * self._axis, axis=2)
         first, last = self._radii.T
-        return float(np.min(gaps - first - share * (last - first)))
+        out: Array = gaps - first - share * (last - first)
+        return out
 
 
 def clearance(obstacles: tuple[Capsule, ...], kind: WoodClass, place: Array) -> float | None:

@@ -64,11 +64,9 @@ class RowNumbers:
         return max(0, nearest.number + round(float((place - nearest.place) @ along) / self._spacing))
 
     def _site(self, place: Array, along: Array, taken: set[int]) -> SpurNumber:
-        gaps = [
-            float(np.linalg.norm(site.place - place)) if k not in taken else np.inf
-            for k, site in enumerate(self._sites)
-        ]
-        k = int(np.argmin(gaps)) if gaps else -1
+        gaps = np.linalg.norm(np.array([site.place for site in self._sites]).reshape(-1, 3) - place, axis=1)
+        gaps[list(taken)] = np.inf
+        k = int(np.argmin(gaps)) if len(gaps) else -1
         if k >= 0 and gaps[k] < self._separation:
             site = self._sites[k]
             site.seen += 1

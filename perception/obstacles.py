@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from perception.clearance import Rods
 from perception.config import ObstacleConfig
 from perception.frame import View
 from perception.pixels import pixels_of
@@ -16,6 +17,8 @@ from perception.plant import Array
 from rolling_panda.messages import WOOD_CLASSES, WoodClass
 from rolling_panda.row_messages import Capsule
 
+#: Share of all that is told that rods may be: on a long row the nearest, so that canes have room too.
+_RODS = 0.75
 #: How a class of rods stands: `upright`, `along` the row as one straight line, or along it in bent `pieces`.
 _SHAPES: dict[WoodClass, str] = {"post": "upright", "trunk": "upright", "cordon": "pieces", "wire": "along"}
 
@@ -49,7 +52,7 @@ class ObstacleMap:
             labels: H×W class indices.
 
         Returns:
-            Rods in odom (m), each with the larger of the radii seen along it.
+            Rods in odom (m), each with the larger of the radii seen along it; where they are too many the nearest ones.
         """
         config, grown = self._config, False
         for kind, cells in self._seen.items():
@@ -64,8 +67,12 @@ class ObstacleMap:
                 capsule
                 for kind, cells in self._seen.items()
                 for capsule in self._rods(kind, cells.often(config.hits), away)
-            )[: config.most]
-        return self._capsules
+            )
+        most = max(1, int(_RODS * config.most))
+        if len(self._capsules) <= most:
+            return self._capsules
+        gaps = Rods(self._capsules).gaps(view.t[None])[0]
+        return tuple(self._capsules[k] for k in np.sort(np.argsort(gaps, kind="stable")[:most]).tolist())
 
     def _rods(self, kind: WoodClass, points: Array, away: Array) -> list[Capsule]:
         config, shape = self._config, _SHAPES[kind]

@@ -217,14 +217,12 @@ class Perception:
             if crop is not None:
                 crops[point.point_id] = crop
         self._crops = crops
-        wires, cordons = Rods(self.obstacles, "wire"), Rods(self.obstacles, "cordon")
+        places = np.array([point.position for point in points]).reshape(-1, 3)
+        wires = Rods(self.obstacles, "wire").clearances(places)
+        cordons = Rods(self.obstacles, "cordon").clearances(places)
         return tuple(
-            replace(
-                point,
-                wire_distance=wires.clearance(np.array(point.position)),
-                cordon_distance=cordons.clearance(np.array(point.position)),
-            )
-            for point in points
+            replace(point, wire_distance=wire, cordon_distance=cordon)
+            for point, wire, cordon in zip(points, wires, cordons, strict=True)
         )
 
     def _move(self, request: MovePoint) -> m.Answer:

@@ -111,8 +111,9 @@ class Tracker:
         contradicted = {(track.number, track.cut.kind) for track in supported}
         withdrawn: list[str] = []
         keep = []
+        known = {id(track) for track in supported}
         for track in self._tracks:
-            reason = None if track in supported else self._doubt(track, view, labels, contradicted)
+            reason = None if id(track) in known else self._doubt(track, view, labels, contradicted)
             if reason is None:
                 keep.append(track)
                 continue
@@ -122,7 +123,8 @@ class Tracker:
                     withdrawn.append(f"{track.point_id} (vine {track.number.vine}, spur {track.number.spur}) {reason}")
         before, self._tracks = self._tracks, keep
         self._show(supported, looks)
-        severed = tuple(t.position for t in before if t not in keep and t.gone >= self._config.gone)
+        kept = {id(track) for track in keep}
+        severed = tuple(t.position for t in before if id(t) not in kept and t.gone >= self._config.gone)
         return Tracked(self.points(), tuple(withdrawn), severed)
 
     def add(self, proposal: Proposal) -> m.PruningPoint:
@@ -211,11 +213,14 @@ class Tracker:
     def _associate(self, proposals: list[Proposal]) -> list[_Track]:
         """Each proposal joins the nearest track of its kind, or starts one; returns the tracks supported."""
         known = list(self._tracks)
+        places = np.array([track.position for track in known]).reshape(-1, 3)
+        cuts = np.array([proposal.cut.position for proposal in proposals]).reshape(-1, 3)
+        # Most points are far from everything that a frame shows.
+        close = np.argwhere(np.linalg.norm(places[:, None] - cuts, axis=2) <= self._config.association)
         pairs = sorted(
-            (float(np.linalg.norm(track.position - proposal.cut.position)), t, p)
-            for t, track in enumerate(known)
-            for p, proposal in enumerate(proposals)
-            if track.cut.kind == proposal.cut.kind
+            (float(np.linalg.norm(known[t].position - proposals[p].cut.position)), t, p)
+            for t, p in close.tolist()
+            if known[t].cut.kind == proposals[p].cut.kind
         )
         supported: list[_Track] = []
         used: set[int] = set()

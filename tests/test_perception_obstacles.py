@@ -72,3 +72,20 @@ def blank_view():
     place = model.pose(configuration(base, position), model.camera_id).homogeneous
     empty = grow(VineyardConfig(first_vine_x=500.0), 0)
     return decode_frame(camera_frame(camera.render(empty, place, 0), camera, base, position, 0), model)
+
+
+def test_of_too_many_rods_the_nearest_are_told():
+    camera, model = Camera(CameraConfig(), 1), RobotModel()
+    row, base, position = grow(VineyardConfig(), 1), m.PlanarPose(), (0.0, 0.0, *survey_arm())
+    place = model.pose(configuration(base, position), model.camera_id).homogeneous
+    every, few = ObstacleMap(ObstacleConfig()), ObstacleMap(ObstacleConfig(most=8))
+    for k in range(4):
+        view = decode_frame(camera_frame(camera.render(row, place, k), camera, base, position, k), model)
+        labels = LabelImageSegmenter().segment(view)
+        known, told = every.update(view, labels), few.update(view, labels)
+    assert len(told) == 6 < len(known) and set(told) <= set(known)
+
+    def away(capsule):
+        return distance(view.t, np.array(capsule.start), np.array(capsule.end)) - capsule.start_radius
+
+    assert max(map(away, told)) <= min(away(capsule) for capsule in known if capsule not in told)
