@@ -14,7 +14,7 @@ __all__ = ["browser", "page", "server"]
 
 # A time limit for each example would judge how busy the machine is, not the code. The same examples each time, so that
 # a change fails for what it changed; `HYPOTHESIS_PROFILE=explore make test` looks for new ones.
-settings.register_profile("same", deadline=None, derandomize=True)
+settings.register_profile("same", deadline=None, derandomize=True, max_examples=40)
 settings.register_profile("explore", deadline=None, max_examples=500)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
 
