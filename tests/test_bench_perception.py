@@ -118,6 +118,7 @@ def test_the_command_writes_what_it_measured(tmp_path, capsys):
     assert "cannot load" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_wrong_points_are_pictured(tmp_path, monkeypatch):
     monkeypatch.setattr("benchmarks.perception_judge.ON_AXIS", -1.0)
     words = ["--seed", "100", "--vines", "1", "--segmenter", "labels", "--gallery", str(tmp_path)]

@@ -146,6 +146,7 @@ def test_goals_near_the_end_of_the_reach_are_kept_to_although_the_arm_is_almost_
     assert row.quality.omega_least < 0.04
 
 
+@pytest.mark.slow
 def test_driving_first_takes_longer_and_a_straight_screw_reaches_less():
     targets = reach_targets.draw(21, 4, "none")
     by_method = {method: reach.run(targets, method, 0, 1) for method in ("hierarchy", "decoupled", "nullspace")}
