@@ -5,8 +5,8 @@ from pathlib import Path
 import msgspec
 
 from rolling_panda.control_messages import StopRecord
-from rolling_panda.errors import InputError
 from rolling_panda.keeper import Keeper
+from rolling_panda.state_folder import read_kept
 
 _NAME = "bridge.json"
 
@@ -63,11 +63,5 @@ def open_memory(folder: Path) -> Memory:
         InputError: It cannot be read: a bridge that does not know what was stopped must not start.
     """
     path = folder / _NAME
-    try:
-        content = path.read_bytes() if path.exists() else b"{}"
-        remembered = msgspec.json.decode(content, type=Remembered)
-    except (OSError, msgspec.MsgspecError) as error:
-        raise InputError(
-            f"cannot read what the bridge remembers in {path}: {error}; look whether the robot may move, then remove it"
-        ) from error
+    remembered = read_kept(path, Remembered, Remembered(), "what the bridge remembers")
     return Memory(remembered, Keeper(path))

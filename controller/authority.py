@@ -6,7 +6,7 @@ from typing import Final
 
 from controller.interface import Sample
 from controller.lease import Client, Lease, Token, first_epoch
-from controller.modes import Rights
+from controller.modes import Rights, Who
 from rolling_panda import intents
 from rolling_panda.control_messages import ControlState, Person, Presence
 from rolling_panda.messages import Role
@@ -77,14 +77,14 @@ class Authority:
 
     def rights(self, client: Client, role: Role) -> Rights:
         """What a client counts as to the machine of modes. Control that nobody holds is anybody's to have."""
-        out = {"anyone"}
+        out: set[Who] = {"anyone"}
         if role != "viewer":
             out.add("operator")
             if not self._lease.refusal(client):
                 out.add("holder")
         if role == "supervisor":
             out.add("supervisor")
-        return frozenset(out)  # type: ignore[arg-type]
+        return frozenset(out)
 
     def refusal(self, client: Client, role: Role) -> str:
         """Why a client may not move the robot; empty when it may."""

@@ -90,7 +90,8 @@ class Ledger:
         """
         with _told(self.path, "write"):
             self._database.execute("BEGIN IMMEDIATE")
-            try:
+            # Commits at the end, or takes everything back.
+            with self._database:
                 number, previous = self._newest()
                 rows = []
                 for entry in entries:
@@ -98,11 +99,6 @@ class Ledger:
                     previous = chained(previous, number, entry)
                     rows.append((number, entry.at, entry.kind, entry.name, entry.body, previous))
                 self._database.executemany(f"INSERT INTO audit ({_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?)", rows)
-                self._database.execute("COMMIT")
-            except BaseException:
-                with contextlib.suppress(sqlite3.Error):
-                    self._database.execute("ROLLBACK")
-                raise
         self._point_head_at(number, previous)
         return number
 

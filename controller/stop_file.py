@@ -5,8 +5,8 @@ from pathlib import Path
 import msgspec
 
 from rolling_panda.control_messages import StopRecord, StopState
-from rolling_panda.errors import InputError
 from rolling_panda.keeper import Keeper
+from rolling_panda.state_folder import read_kept
 
 _NAME = "controller-stops.json"
 
@@ -40,11 +40,5 @@ def open_stop_file(folder: Path) -> StopFile:
         InputError: It cannot be read: a controller that does not know what was stopped must not start.
     """
     path = folder / _NAME
-    try:
-        content = path.read_bytes() if path.exists() else b"[]"
-        stops = msgspec.json.decode(content, type=tuple[StopRecord, ...])
-    except (OSError, msgspec.MsgspecError) as error:
-        raise InputError(
-            f"cannot read which stops were latched in {path}: {error}; look whether the robot may move, then remove it"
-        ) from error
+    stops = read_kept(path, tuple[StopRecord, ...], (), "which stops were latched")
     return StopFile(stops, Keeper(path))

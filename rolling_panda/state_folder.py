@@ -2,8 +2,13 @@
 
 import os
 from pathlib import Path
+from typing import TypeVar
+
+import msgspec
 
 from rolling_panda.errors import InputError
+
+Kept = TypeVar("Kept")
 
 
 def usual_state_folder(robot_id: str) -> Path:
@@ -27,6 +32,26 @@ def open_state_folder(folder: Path) -> Path:
             f"cannot keep state in {folder}: {error.strerror}; give another folder with --state"
         ) from error
     return folder
+
+
+def read_kept(path: Path, kind: type[Kept], nothing: Kept, what: str) -> Kept:
+    """What `replace_durably` last wrote as JSON; `nothing` where it has never written.
+
+    Args:
+        path: Of the file.
+        kind: What it must decode to.
+        nothing: What there is before the first time.
+        what: What it says, in words, for the error.
+
+    Raises:
+        InputError: It cannot be read: a program that does not know what was stopped must not start.
+    """
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=kind) if path.exists() else nothing
+    except (OSError, msgspec.MsgspecError) as error:
+        raise InputError(
+            f"cannot read {what} in {path}: {error}; look whether the robot may move, then remove it"
+        ) from error
 
 
 def replace_durably(path: Path, content: bytes) -> None:
