@@ -1,4 +1,4 @@
-"""What the server and the operator's page say to each other over `/ws`, as JSON; `web/messages.js` is made from it."""
+"""What the server and the operator's page say to each other over `/ws`, as JSON; `web/messages.*` are made from it."""
 
 from typing import Annotated
 

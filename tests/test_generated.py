@@ -11,7 +11,7 @@ from rolling_panda.errors import MessageError
 from rolling_panda.generate import markdown
 from rolling_panda.generate.__main__ import ROOT, generated, main, stale
 from rolling_panda.generate.description import describe, reachable
-from rolling_panda.generate.javascript import js_type, messages_module
+from rolling_panda.generate.javascript import js_type, messages_module, messages_types
 from rolling_panda.topics import SERVICES, TOPICS
 
 
@@ -50,17 +50,24 @@ def test_every_link_of_the_wire_document_leads_somewhere() -> None:
 
 
 def test_the_page_knows_every_message_of_its_socket() -> None:
-    text = messages_module()
-    state = text.split("@typedef {object} PageState")[1].split("*/")[0]
-    assert '{"PageState"} type' in state
-    assert "{ControllerState|null} controller" in state
-    assert "{number|null} controller_age_s" in state
+    text = messages_types()
+    state = text.split("export interface PageState {")[1].split("\n}")[0]
+    assert '\n  type: "PageState";' in state
+    assert "\n  controller: ControllerState|null;" in state
+    assert "\n  controller_age_s: number|null;" in state
     for union in (page.FromServer, page.FromPage):
         for member in union.__args__:
-            assert f"@typedef {{object}} {member.__name__}\n" in text
+            assert f"\nexport interface {member.__name__} {{" in text
+
+
+def test_a_browser_fetches_words_and_no_types() -> None:
+    text = messages_module()
     listed = re.search(r"MODES = Object.freeze\((\[.*\])\)", text)
     assert listed is not None
     assert "ESTOP_LATCHED" in json.loads(listed[1])
+    assert "typedef" not in text and "interface" not in text
+    declared = set(re.findall(r"^export const (\w+)", messages_types(), re.MULTILINE))
+    assert set(re.findall(r"^export const (\w+)", text, re.MULTILINE)) == declared
 
 
 def test_docstrings_give_each_attribute_its_words() -> None:

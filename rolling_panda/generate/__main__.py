@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rolling_panda.errors import RollingPandaError
 from rolling_panda.generate import modes
-from rolling_panda.generate.javascript import messages_module
+from rolling_panda.generate.javascript import messages_module, messages_types
 from rolling_panda.generate.markdown import fill
 from rolling_panda.generate.router import router_config
 
@@ -19,6 +19,7 @@ def generated(root: Path = ROOT) -> dict[Path, str]:
     wire, safety = root / "docs" / "wire.md", root / "docs" / "safety.md"
     return {
         root / "web" / "messages.js": messages_module(),
+        root / "web" / "messages.d.ts": messages_types(),
         root / "assets" / "config" / "router.json5": router_config(),
         wire: fill(wire.read_text(encoding="utf-8")),
         safety: fill(safety.read_text(encoding="utf-8"), modes.BLOCKS, "docs/safety.md"),

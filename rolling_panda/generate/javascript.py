@@ -1,4 +1,7 @@
-"""`web/messages.js`: JSDoc types of what travels between server and page, and the words they may contain."""
+"""`web/messages.js` and `.d.ts`: the words that messages to the page may contain, and the types of these messages.
+
+Types stand apart, since a browser has no use for them and would fetch them all the same.
+"""
 
 from typing import Annotated, Any, Literal, get_args, get_origin
 
@@ -32,26 +35,35 @@ _HEADER = """\
 
 
 def messages_module() -> str:
-    """Text of `web/messages.js`."""
-    structs = reachable((*union_members(page_messages.FromServer), *union_members(page_messages.FromPage)))
-    parts = [_HEADER]
+    """Text of `web/messages.js`: what the page needs of them as it runs."""
+    parts = [_HEADER + "// Their types are in messages.d.ts.\n"]
     for name, list_name in CONSTANTS.items():
         values = ", ".join(f'"{value}"' for value in get_args(aliases()[name]))
-        parts.append(f"/** @type {{readonly {name}[]}} */\nexport const {list_name} = Object.freeze([{values}]);\n")
+        parts.append(f"export const {list_name} = Object.freeze([{values}]);\n")
     allowed = ", ".join(f'"{intent.__name__}"' for intent in union_members(intents.AnyIntent))
     parts.append(
         f"/** What `ControllerState.allowed` may contain. */\nexport const INTENTS = Object.freeze([{allowed}]);\n"
     )
     parts.append(f"export const TEXT_MAX_LENGTH = {_text_length()};\n")
-    parts.extend(_alias(name, hint) for name, hint in aliases().items() if _is_worth_a_name(hint))
-    parts.extend(_typedef(describe(struct)) for struct in structs)
-    parts.append(_union("FromServer", page_messages.FromServer))
-    parts.append(_union("FromPage", page_messages.FromPage))
+    return "\n".join(parts)
+
+
+def messages_types() -> str:
+    """Text of `web/messages.d.ts`: what the type checker needs."""
+    structs = reachable((*union_members(page_messages.FromServer), *union_members(page_messages.FromPage)))
+    parts = [_HEADER]
+    parts.extend(f"export const {list_name}: readonly {name}[];\n" for name, list_name in CONSTANTS.items())
+    parts.append("export const INTENTS: readonly string[];\n")
+    parts.append("export const TEXT_MAX_LENGTH: number;\n")
+    parts.extend(_type(name, _spelled_out(hint)) for name, hint in aliases().items() if _is_worth_a_name(hint))
+    parts.extend(_interface(describe(struct)) for struct in structs)
+    for name, union in (("FromServer", page_messages.FromServer), ("FromPage", page_messages.FromPage)):
+        parts.append(_type(name, "|".join(struct.__name__ for struct in union_members(union))))
     return "\n".join(parts)
 
 
 def js_type(hint: Any) -> str:
-    """JSDoc type of an annotation.
+    """Type of an annotation in TypeScript, which JSDoc takes too.
 
     Raises:
         MessageError: JSON has no such type, or this generator does not know it.
@@ -86,22 +98,20 @@ def _is_worth_a_name(hint: Any) -> bool:
     return get_origin(hint) in (Literal, tuple)
 
 
-def _alias(name: str, hint: Any) -> str:
-    return f"/** @typedef {{{_spelled_out(hint)}}} {name} */\n"
+def _type(name: str, spelled_out: str) -> str:
+    return f"export type {name} = {spelled_out};\n"
 
 
-def _typedef(struct: StructDescription) -> str:
-    lines = ["/**", f" * {struct.about}", " *", f" * @typedef {{object}} {struct.name}"]
+def _interface(struct: StructDescription) -> str:
+    lines = [f"/** {struct.about} */", f"export interface {struct.name} {{"]
     if struct.tag is not None:
-        lines.append(f' * @property {{"{struct.tag}"}} type')
+        lines.append(f'  type: "{struct.tag}";')
     for field in struct.fields:
+        if field.about:
+            lines.append(f"  /** {field.about} */")
         # Defaults are written out by the server, so every property is there.
-        lines.append(f" * @property {{{js_type(field.hint)}}} {field.name} {field.about}".rstrip())
-    return "\n".join([*lines, " */", ""])
-
-
-def _union(name: str, union: Any) -> str:
-    return f"/** @typedef {{{'|'.join(struct.__name__ for struct in union_members(union))}}} {name} */\n"
+        lines.append(f"  {field.name}: {js_type(field.hint)};")
+    return "\n".join([*lines, "}", ""])
 
 
 def _text_length() -> int:
