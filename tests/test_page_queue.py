@@ -105,6 +105,7 @@ def many(count: int) -> tuple[p.PagePoint, ...]:
     return tuple(msgspec.structs.replace(row, pixel=None) for row in rows)
 
 
+@pytest.mark.alone  # It is about time: how long the page keeps a person waiting.
 def test_two_thousand_points_are_listed_and_walked_through_without_a_standstill(
     page: Page, server: PlayedServer
 ) -> None:
