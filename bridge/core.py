@@ -23,7 +23,7 @@ from bridge.pace import Pace
 from bridge.refusals import Refusals
 from bridge.robot_faults import RobotFaults
 from bridge.round_trip import RoundTrip
-from bridge.shutter import Shutter
+from bridge.shutter import Posture, Shutter
 from bridge.watchdog import Watchdog
 from rolling_panda import messages as m
 from rolling_panda.camera_messages import CameraFrame
@@ -347,10 +347,11 @@ class BridgeCore:
         measured: Measurement = self._measured
         if bool(np.abs(measured.velocity).max() > _MOVING):
             self._shutter.wake(self._ticks)
+        posture = Posture(self._clock, m.Header(now, "camera"), self._odometer.pose, _actuated(measured.position))
+        self._shutter.follow(posture)
         expose = self._shutter.due(self._ticks)
         if expose:
-            header, posture = m.Header(now, "camera"), _actuated(measured.position)
-            self._shutter.exposed(self._ticks, header, self._odometer.pose, posture)
+            self._shutter.exposed(self._ticks, posture)
         picture = self.robot.capture(expose)
         return None if picture is None else self._shutter.frame(picture)
 

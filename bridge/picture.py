@@ -18,13 +18,18 @@ _JPEG_QUALITY = 80
 
 @dataclass(frozen=True)
 class Picture:
-    """One RGB-D exposure, encoded as in `CameraFrame`."""
+    """One RGB-D exposure, encoded as in `CameraFrame`.
+
+    `taken_at` is when it was exposed (s, the machine's monotonic clock); None where the camera does not tell, or where
+    that was the moment at which it was asked for.
+    """
 
     intrinsics: Intrinsics
     color_jpeg: bytes
     depth_zlib: bytes
     labels_zlib: bytes
     depth_unit: float = DEPTH_UNIT
+    taken_at: float | None = None
 
 
 def encode_picture(

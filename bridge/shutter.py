@@ -1,5 +1,8 @@
 """When the camera takes a picture, and the posture that belongs to it."""
 
+from collections import deque
+from typing import NamedTuple
+
 from bridge.picture import Picture
 from rolling_panda import messages as m
 from rolling_panda.camera_messages import CameraFrame
@@ -7,6 +10,17 @@ from rolling_panda.look_messages import PictureRequest
 
 # After motion or a cut the plant model wants some more pictures before the camera rests (s).
 _AWAKE_S = 4.0
+# A picture that is older than this (s) gets the oldest posture that is remembered.
+_REMEMBERED_S = 2.0
+
+
+class Posture(NamedTuple):
+    """Where the robot was when: the machine's clock (s), and what a frame says of it."""
+
+    clock: float
+    header: m.Header
+    base: m.PlanarPose
+    position: m.Actuated
 
 
 class Shutter:
@@ -19,7 +33,8 @@ class Shutter:
         self._awake = round(_AWAKE_S / tick_s)
         self._awake_until = self._awake
         self._last = -self._resting
-        self._waiting: tuple[m.Header, m.PlanarPose, m.Actuated, PictureRequest | None] | None = None
+        self._waiting: tuple[Posture, PictureRequest | None] | None = None
+        self._postures: deque[Posture] = deque()
         self._wanted: PictureRequest | None = None
         self._taken = (-1, -1)
         self._sequence = 0
@@ -38,25 +53,34 @@ class Shutter:
         period = self._moving if ticks < self._awake_until else self._resting
         return self._waiting is None and (self._wanted is not None or ticks - self._last >= period)
 
-    def exposed(self, ticks: int, header: m.Header, base: m.PlanarPose, position: m.Actuated) -> None:
-        """An exposure begins in this posture."""
+    def follow(self, posture: Posture) -> None:
+        """The robot is here now: a camera that exposes at moments of its own tells later when that was."""
+        self._postures.append(posture)
+        while posture.clock - self._postures[0].clock > _REMEMBERED_S:
+            self._postures.popleft()
+
+    def exposed(self, ticks: int, posture: Posture) -> None:
+        """An exposure is asked for in this posture."""
         self._last = ticks
-        self._waiting = (header, base, position, self._wanted)
+        self._waiting = (posture, self._wanted)
         self._wanted = None
 
     def frame(self, picture: Picture) -> CameraFrame | None:
         """The message for the picture of the last exposure; None for one that nobody asked for."""
         if self._waiting is None:
             return None
-        header, base, position, wanted = self._waiting
+        posture, wanted = self._waiting
         self._waiting = None
+        taken_at = picture.taken_at
+        if taken_at is not None and self._postures:
+            posture = min(self._postures, key=lambda known: abs(known.clock - taken_at))
         self._sequence += 1
         return CameraFrame(
-            header=header,
+            header=posture.header,
             sequence=self._sequence,
             intrinsics=picture.intrinsics,
-            base=base,
-            position=position,
+            base=posture.base,
+            position=posture.position,
             color_jpeg=picture.color_jpeg,
             depth_zlib=picture.depth_zlib,
             depth_unit=picture.depth_unit,

@@ -2,33 +2,34 @@
 
 import json
 import subprocess
-import sys
-from pathlib import Path
 from typing import Any
 
-from rolling_panda.launch import child_environment
-
-TESTS = Path(__file__).resolve().parent
+from rolling_panda.launch import child_environment, python_command
 
 
 class DeviceProcess:
-    def __init__(self, script: str, *arguments: str) -> None:
-        environment = {**child_environment(), "PYTHONPATH": f"{TESTS.parent}:{TESTS}"}
+    def __init__(self, device: str, *options: str) -> None:
+        """Of `bridge.fakes`: `arm` at `--arm ADDRESS`, or `base` (beside it the cutter) behind `--connect ENDPOINT`."""
+        self.device = device
         self.process = subprocess.Popen(
-            [sys.executable, str(TESTS / script), *arguments],
+            python_command("bridge.fakes", options),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
-            env=environment,
+            env=child_environment(),
         )
         assert self._line() == "ready"
 
     def tell(self, line: str = "report") -> dict[str, Any]:
         """Do something; what the device then says of itself."""
+        return self.tell_all(f"{self.device} {line}")[self.device]
+
+    def tell_all(self, line: str) -> dict[str, dict[str, Any]]:
+        """The same with the device's name in the line; what every device says."""
         assert self.process.stdin is not None
         self.process.stdin.write(line + "\n")
         self.process.stdin.flush()
-        answer: dict[str, Any] = json.loads(self._line())
+        answer: dict[str, dict[str, Any]] = json.loads(self._line())
         return answer
 
     def close(self) -> None:

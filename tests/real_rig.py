@@ -12,7 +12,6 @@ from bridge.config import BridgeConfig, OdometryConfig
 from bridge.core import TICK_S, BridgeCore
 from bridge.odometer import Odometer
 from bridge.picture import Picture
-from bridge.real import ros_messages as ros
 from bridge.real.config import ArmConfig, BaseConfig, CutterConfig
 from bridge.real.cutter import Cutter
 from bridge.real.mp500 import Mp500
@@ -46,11 +45,8 @@ class RealPlant:
     def __init__(self) -> None:
         self.endpoint = f"tcp/127.0.0.1:{free_port()}"
         self.router = Router(TransportConfig(mode="router", connect=(), listen=(self.endpoint,)))
-        self.base = DeviceProcess("fake_mp500.py", self.endpoint)
-        self.arm = DeviceProcess("fake_panda.py", ADDRESS)
-        self.wire = ForeignWire(self.transport)
-        self.wire.serve(SERVICE, self._blades)
-        self._bites = 0
+        self.base = DeviceProcess("base", "--connect", self.endpoint)
+        self.arm = DeviceProcess("arm", "--arm", ADDRESS)
         self.robot: RealRobot | None = None
 
     @property
@@ -80,16 +76,9 @@ class RealPlant:
         return [*self.base.tell()["breaches"], *self.arm.tell()["breaches"]]
 
     def bites(self) -> int:
-        return self._bites
+        return int(self.base.tell_all("report")["cutter"]["bites"])
 
     def close(self) -> None:
         self.base.close()
         self.arm.close()
-        self.wire.close()
         self.router.close()
-
-    def _blades(self, request: bytes) -> bytes:
-        if ros.decode(ros.SET_BOOL, request).data:
-            self._bites += 1
-            time.sleep(0.2)
-        return ros.encode(ros.make(ros.SET_BOOL_REPLY, success=True, message=""))

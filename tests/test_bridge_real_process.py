@@ -39,8 +39,8 @@ class Site:
         self.folder = folder
         self.endpoint = f"tcp/127.0.0.1:{free_port()}"
         self.router = Router(TransportConfig(mode="router", connect=(), listen=(self.endpoint,)))
-        self.base = DeviceProcess("fake_mp500.py", self.endpoint)
-        self.arm = DeviceProcess("fake_panda.py", ADDRESS)
+        self.base = DeviceProcess("base", "--connect", self.endpoint)
+        self.arm = DeviceProcess("arm", "--arm", ADDRESS)
         text = resource("assets/config/real.toml").read_text()
         text = text.replace("tcp/127.0.0.1:7447", self.endpoint).replace('address = ""', f'address = "{ADDRESS}"')
         text = text.replace('realtime = "enforce"', 'realtime = "ignore"').replace("width = 848", "enabled = false", 1)

@@ -30,7 +30,7 @@ LEFT = np.array(DRIVE.wheels(0.2, 0.4))
 def device() -> Iterator[tuple[str, DeviceProcess]]:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     router = Router(TransportConfig(mode="router", connect=(), listen=(endpoint,)))
-    device = DeviceProcess("fake_mp500.py", endpoint)
+    device = DeviceProcess("base", "--connect", endpoint)
     yield endpoint, device
     device.close()
     router.close()

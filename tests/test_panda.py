@@ -14,7 +14,7 @@ import pytest
 
 pytest.importorskip("panda_py", reason="the extra `real` is not installed: pip install '.[real]'")
 
-from device_process import TESTS, DeviceProcess  # noqa: E402
+from device_process import DeviceProcess  # noqa: E402
 
 from bridge.real.config import ArmConfig  # noqa: E402
 from bridge.real.panda import Panda  # noqa: E402
@@ -33,7 +33,7 @@ ADDRESS = f"127.0.{os.getpid() % 250 + 1}.9"
 
 @pytest.fixture
 def box() -> Iterator[DeviceProcess]:
-    box = DeviceProcess("fake_panda.py", ADDRESS)
+    box = DeviceProcess("arm", "--arm", ADDRESS)
     yield box
     box.close()
 
@@ -146,7 +146,7 @@ def test_an_arm_that_is_only_read_is_never_commanded(box: DeviceProcess) -> None
 def test_without_a_control_box_it_says_so_and_connects_when_there_is_one() -> None:
     arm = Panda(ArmConfig(address=ADDRESS, realtime="ignore"), LIMITS)
     until(lambda: "refused" in arm.read().fault, 15.0)
-    box = DeviceProcess("fake_panda.py", ADDRESS)
+    box = DeviceProcess("arm", "--arm", ADDRESS)
     until(lambda: arm.read().fault == "" and arm.read().commands > 10, 15.0)
     arm.close()
     box.close()
@@ -168,8 +168,7 @@ if __name__ == "__main__":
 def test_a_killed_bridge_leaves_an_arm_at_rest_and_no_process(box: DeviceProcess, tmp_path: Path) -> None:
     script = tmp_path / "killed.py"
     script.write_text(BRIDGE.format(address=ADDRESS))
-    environment = {**child_environment(), "PYTHONPATH": str(TESTS.parent)}
-    killed = subprocess.Popen([sys.executable, str(script)], env=environment)
+    killed = subprocess.Popen([sys.executable, str(script)], env=child_environment())
     try:
         until(lambda: np.abs(box.tell()["dq"]).max() > 0.25, 20.0)
     finally:

@@ -7,8 +7,7 @@ import pytest
 
 pytest.importorskip("rosbags", reason="the extra `real` is not installed: pip install '.[real]'")
 
-from fake_mp500 import battery  # noqa: E402
-
+from bridge.fakes.mp500 import battery  # noqa: E402
 from bridge.real import ros_messages as ros  # noqa: E402
 from rolling_panda.errors import MessageError  # noqa: E402
 

@@ -1,5 +1,7 @@
+from dataclasses import replace
+
 from bridge.picture import Picture
-from bridge.shutter import Shutter
+from bridge.shutter import Posture, Shutter
 from rolling_panda import messages as m
 from rolling_panda.camera_messages import Intrinsics
 from rolling_panda.look_messages import PictureRequest
@@ -8,11 +10,15 @@ PICTURE = Picture(Intrinsics(4, 4, 1.0, 1.0, 2.0, 2.0), b"c", b"d", b"l")
 Q = (0.0,) * 9
 
 
+def posture(clock: float, x: float = 0.0) -> Posture:
+    return Posture(clock, m.Header(clock, "camera"), m.PlanarPose(x), Q)
+
+
 def exposures(shutter: Shutter, first: int, last: int, step: int = 10) -> list[int]:
     out = []
     for ticks in range(first, last, step):
         if shutter.due(ticks):
-            shutter.exposed(ticks, m.Header(ticks * 1e-3), m.PlanarPose(), Q)
+            shutter.exposed(ticks, posture(ticks * 1e-3))
             assert shutter.frame(PICTURE) is not None
             out.append(ticks)
     return out
@@ -28,7 +34,7 @@ def test_two_a_second_while_awake_then_one_in_two_seconds() -> None:
 
 def test_never_two_exposures_at_once_and_the_posture_is_that_of_the_exposure() -> None:
     shutter = Shutter(2.0, 0.5, 1e-3)
-    shutter.exposed(0, m.Header(0.25, "camera"), m.PlanarPose(1.0, 2.0, 3.0), Q)
+    shutter.exposed(0, posture(0.25, 1.0))
     assert not shutter.due(5000)
     frame = shutter.frame(PICTURE)
     assert frame is not None
@@ -41,13 +47,27 @@ def test_a_picture_that_is_asked_for_is_taken_at_once_and_once_and_carries_its_p
     assert exposures(shutter, 0, 10) == [0]
     shutter.want(PictureRequest(epoch=1, number=4, point_id="p7"))
     assert shutter.due(20)
-    shutter.exposed(20, m.Header(0.02), m.PlanarPose(), Q)
+    shutter.exposed(20, posture(0.02))
     shutter.want(PictureRequest(epoch=1, number=4, point_id="p7"))
     frame = shutter.frame(PICTURE)
     assert frame is not None and (frame.point_id, frame.number) == ("p7", 4)
     assert not shutter.due(30), "a repetition takes no second picture"
     shutter.want(PictureRequest(epoch=1, number=3, point_id="p6"))
     assert not shutter.due(30), "an older request comes too late"
-    shutter.exposed(600, m.Header(0.6), m.PlanarPose(), Q)
+    shutter.exposed(600, posture(0.6))
     usual = shutter.frame(PICTURE)
     assert usual is not None and usual.point_id == ""
+
+
+def test_a_picture_that_knows_when_it_was_taken_gets_the_posture_of_that_moment() -> None:
+    shutter = Shutter(2.0, 0.5, 1e-3)
+    for k in range(300):
+        shutter.follow(posture(k * 0.01, k * 0.003))
+        if k == 100:
+            shutter.exposed(1000, posture(1.0, 0.3))
+    frame = shutter.frame(replace(PICTURE, taken_at=1.504))
+    assert frame is not None
+    assert (frame.header.stamp, frame.base.x) == (1.5, 0.45)
+    shutter.exposed(3000, posture(3.0, 0.9))
+    frame = shutter.frame(replace(PICTURE, taken_at=-5.0))
+    assert frame is not None and frame.header.stamp == 0.99, "of two seconds the oldest"

@@ -2,6 +2,7 @@
 
 import threading
 import time
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -39,6 +40,7 @@ class RealSense:
         self._frames, self._align = frames, align
         self._fault = ""
         self._asked, self._closing = threading.Event(), threading.Event()
+        self._asked_at = 0.0
         self._ready: Picture | None = None
         self._newest = time.monotonic()
         self.taken = 0
@@ -48,6 +50,7 @@ class RealSense:
     def capture(self, expose: bool) -> Picture | None:
         """Take the next frame if `expose` is set; returns a picture that has become ready, each once."""
         if expose:
+            self._asked_at = time.monotonic()
             self._asked.set()
         picture, self._ready = self._ready, None
         return picture
@@ -73,9 +76,11 @@ class RealSense:
                 if not (depth and color):
                     continue
                 self._newest, self.taken = time.monotonic(), self.taken + 1
-                if self._asked.is_set():
+                taken_at = _taken_at(color)
+                # What was exposed before it was asked for shows the robot somewhere else, or the cane before the cut.
+                if self._asked.is_set() and (taken_at is None or taken_at >= self._asked_at):
                     self._asked.clear()
-                    self._ready = self._picture(frames)
+                    self._ready = replace(self._picture(frames), taken_at=taken_at)
             except RuntimeError as error:
                 # librealsense tells everything so: no frame in time, a cable that was pulled.
                 self._fault = "" if "arrive" in str(error) else f"camera: {error}"
@@ -90,6 +95,13 @@ class RealSense:
             np.asanyarray(depth.get_data()).astype(np.float32) * np.float32(depth.get_units()),
             None,
         )
+
+
+def _taken_at(frame: Any) -> float | None:
+    """When it was exposed on the machine's monotonic clock (s); None where only the camera's own clock tells."""
+    if frame.get_frame_timestamp_domain().name == "hardware_clock":
+        return None
+    return time.monotonic() - (time.time() - 1e-3 * float(frame.get_timestamp()))
 
 
 class _Pipeline:

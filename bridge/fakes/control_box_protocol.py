@@ -41,10 +41,11 @@ Joints = NDArray[np.float64]
 
 @dataclass
 class State:
-    """What changes in the state that is sent each millisecond."""
+    """What changes in the state that is sent each millisecond; `dq_d` and `ddq_d` are commanded, the rest measured."""
 
     number: int = 0
     q: Joints = field(default_factory=lambda: np.zeros(7))
+    dq: Joints = field(default_factory=lambda: np.zeros(7))
     dq_d: Joints = field(default_factory=lambda: np.zeros(7))
     ddq_d: Joints = field(default_factory=lambda: np.zeros(7))
     mode: int = IDLE
@@ -56,7 +57,8 @@ class State:
         """The 1 kHz state message."""
         moving = self.mode == MOVING
         poses = _IDENTITY * 6
-        q, dq, ddq = self.q.tolist(), self.dq_d.tolist(), self.ddq_d.tolist()
+        q, dq = self.q.tolist(), self.dq.tolist()
+        dq_d, ddq_d = self.dq_d.tolist(), self.ddq_d.tolist()
         return _STATE.pack(
             self.number,
             *poses,
@@ -65,8 +67,8 @@ class State:
             *q,
             *q,
             *dq,
-            *dq,
-            *ddq,
+            *dq_d,
+            *ddq_d,
             *[0.0] * _AFTER_DDQ,
             *q,
             *dq,

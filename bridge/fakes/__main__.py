@@ -1,0 +1,106 @@
+"""`python -m bridge.fakes`: the robot's devices as fakes, in a process of their own.
+
+It prints `ready`, and ends when its standard input closes. Each line that comes in there tells a device something
+(`base press`, `base free`, `base mute TOPIC`, `base stuck`, `arm collide`, `arm press`, `arm drop COUNT`, `report`, …)
+and is answered by a line of JSON: what every device does, and what its monitor has seen.
+"""
+
+import argparse
+import json
+import sys
+import threading
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Protocol
+
+from bridge.fakes.bodies import AirBlades, ExactArm, LaggingWheels
+from bridge.fakes.control_box import ControlBox
+from bridge.fakes.cutter import FakeCutter
+from bridge.fakes.mp500 import FakeMp500
+from bridge.real.config import RealConfig
+from rolling_panda.config import RobotConfig, TransportConfig, load_section
+from rolling_panda.errors import RollingPandaError
+from rolling_panda.process import stop_on_signals
+from rolling_panda.resources import resource
+from rolling_panda.robot_model import RobotModel
+from rolling_panda.transport import ForeignWire
+
+
+class Device(Protocol):
+    """What every fake can be asked from outside."""
+
+    def tell(self, words: list[str]) -> None:
+        """Something happens to it."""
+
+    def report(self) -> dict[str, object]:
+        """What it does and has seen."""
+
+    def close(self) -> None:
+        """It goes."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the fakes; returns the exit code."""
+    arguments = _parser().parse_args(argv)
+    try:
+        _run(arguments)
+    except RollingPandaError as error:
+        print(f"fakes: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m bridge.fakes", description=__doc__)
+    default = resource("assets/config/fakes.toml")
+    parser.add_argument("--config", type=Path, default=default, help="TOML configuration (default: the fakes')")
+    parser.add_argument(
+        "--connect", metavar="ENDPOINT", help="router that base and cutter are behind; without it none is"
+    )
+    parser.add_argument(
+        "--arm", metavar="ADDRESS", help="loopback address of the arm's control box; without it none is"
+    )
+    return parser
+
+
+def _run(arguments: argparse.Namespace) -> None:
+    ended = stop_on_signals()
+    # The control box must not wait long for the other threads.
+    sys.setswitchinterval(0.0005)
+    devices: dict[str, Device] = {}
+    box: ControlBox | None = None
+    with ExitStack() as stack:
+        if arguments.arm is not None:
+            box = devices["arm"] = ControlBox(arguments.arm, ExactArm())
+            stack.callback(box.close)
+        if arguments.connect is not None:
+            wire = TransportConfig(connect=(arguments.connect,))
+            drive = RobotModel(load_section(arguments.config, "robot", RobotConfig)).drive
+            base = devices["base"] = FakeMp500(ForeignWire(wire), LaggingWheels(), drive)
+            stack.callback(base.close)
+            service = load_section(arguments.config, "real", RealConfig).cutter.service
+            cutter = devices["cutter"] = FakeCutter(ForeignWire(wire), service, AirBlades())
+            stack.callback(cutter.close)
+            turning = threading.Thread(target=base.run, args=(ended,), name="mp500")
+            turning.start()
+            stack.callback(turning.join)
+            stack.callback(ended.set)
+        threading.Thread(target=_listen, args=(devices, ended), name="lines", daemon=True).start()
+        print("ready", flush=True)
+        if box is not None:
+            box.run(ended)
+        ended.wait()
+
+
+def _listen(devices: dict[str, Device], ended: threading.Event) -> None:
+    for line in sys.stdin:
+        name, *words = line.split()
+        if name in devices:
+            devices[name].tell(words)
+        print(json.dumps({name: device.report() for name, device in devices.items()}), flush=True)
+    ended.set()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,293 @@
+"""An arm's control box that the unmodified libfranka connects to.
+
+It judges every command as the control box does: velocity, acceleration and jerk within the data sheet, or a reflex; a
+missing command is extrapolated with the last acceleration; after 20 in a row it stops. Its millisecond lasts until the
+command has come, for `PATIENCE_S` at most, so that a busy machine loses no packets.
+"""
+
+import select
+import socket
+import struct
+import threading
+import time
+
+import numpy as np
+
+from bridge.fakes import control_box_protocol as p
+from bridge.fakes.bodies import TICK_S, ArmBody
+from rolling_panda.differential_drive import Array
+from rolling_panda.errors import InputError
+
+PATIENCE_S = 0.03
+# Behind by more than this (s), what was missed is left out.
+_LATEST_S = 0.005
+_LOST_IN_A_ROW = 20
+_RECOVERY_TICKS = 50
+# Data sheet of the Panda.
+_VELOCITY = np.array([2.175] * 4 + [2.61] * 3)
+_ACCELERATION = np.array([15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0])
+_JERK = 500.0 * _ACCELERATION
+_LOWER = np.array([-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973])
+_UPPER = np.array([2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973])
+_LIMITS = (
+    ("velocity", p.VELOCITY_LIMIT, _VELOCITY),
+    ("acceleration", p.VELOCITY_STEP, _ACCELERATION),
+    ("jerk", p.ACCELERATION_STEP, _JERK),
+)
+# Rounding of the client's arithmetic.
+_SLACK = 1.0 + 1e-6
+# Slower than this (rad/s) the arm is at rest.
+_REST = 1e-3
+
+
+class ControlBox:
+    """One client at a time; `run` is its millisecond, `tell` its buttons."""
+
+    def __init__(self, address: str, body: ArmBody) -> None:
+        """Listen.
+
+        Args:
+            address: Where libfranka finds it; every loopback address has a port 1337 of its own.
+            body: What moves.
+
+        Raises:
+            InputError: The address cannot be listened on.
+        """
+        self._body = body
+        self._lock = threading.Lock()
+        self._state = p.State(q=body.q, dq=body.dq)
+        self._motion: int | None = None
+        self._begun = self._pressed = False
+        self._in_a_row = self._lost = self._commands = self._to_drop = self._recoveries = 0
+        self._recovery: tuple[int, int] | None = None
+        self._worst = np.zeros(3)
+        self._breaches: list[str] = []
+        self._load = 0.0
+        self._still_at: float | None = None
+        self._client: socket.socket | None = None
+        self._target: tuple[str, int] | None = None
+        try:
+            self._listener = socket.create_server((address, p.PORT))
+            self._udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+            self._udp.bind((address, 0))
+        except OSError as error:
+            raise InputError(
+                f"the fake control box cannot listen on {address}:{p.PORT} ({error.strerror}); "
+                "give another loopback address in [real.arm] address"
+            ) from error
+
+    def run(self, ended: threading.Event) -> None:
+        """Serve, millisecond by millisecond, until `ended` is set."""
+        due = time.monotonic()
+        while not ended.is_set():
+            self._accept()
+            self._requests()
+            self._tick()
+            now = time.monotonic()
+            due = max(due + TICK_S, now - _LATEST_S)
+            time.sleep(max(0.0, due - now))
+
+    def tell(self, words: list[str]) -> None:
+        """Collide, press or free the user stop, lose the next packets, or forget what was monitored."""
+        with self._lock:
+            match words:
+                case ["collide"]:
+                    self._reflex(p.JOINT_REFLEX, "collision")
+                case ["press"]:
+                    self._press()
+                case ["free"]:
+                    self._pressed = False
+                    if self._state.mode == p.USER_STOPPED:
+                        self._state.mode = p.IDLE
+                case ["drop", count]:
+                    self._to_drop = int(count)
+                case ["clear"]:
+                    self._breaches, self._worst, self._lost = [], np.zeros(3), 0
+
+    def report(self) -> dict[str, object]:
+        """What it does, and what its monitors have seen."""
+        with self._lock:
+            return {
+                "q": self._state.q.tolist(),
+                "dq": self._state.dq_d.tolist(),
+                "mode": self._state.mode,
+                "commands": self._commands,
+                "lost": self._lost,
+                "breaches": self._breaches,
+                "worst": self._worst.tolist(),
+                "load": self._load,
+                "recoveries": self._recoveries,
+                "ticks": self._state.number,
+                "still_s": -1.0 if self._still_at is None else time.monotonic() - self._still_at,
+            }
+
+    def close(self) -> None:
+        """Hang up."""
+        for door in (self._client, self._listener, self._udp):
+            if door is not None:
+                door.close()
+
+    def _accept(self) -> None:
+        if self._client is None and select.select([self._listener], [], [], 0.0)[0]:
+            self._client, _ = self._listener.accept()
+            self._client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+    def _gone(self, client: socket.socket) -> None:
+        """The client has left: brake, as the box does."""
+        client.close()
+        self._client = self._target = None
+        with self._lock:
+            self._motion = None
+            self._rest()
+            if self._state.mode == p.MOVING:
+                self._state.mode = p.IDLE
+
+    def _rest(self) -> None:
+        self._state.dq_d, self._state.ddq_d = np.zeros(7), np.zeros(7)
+
+    def _requests(self) -> None:
+        client = self._client
+        while client is not None and select.select([client], [], [], 0.0)[0]:
+            head = client.recv(p.HEADER.size, socket.MSG_WAITALL)
+            if len(head) < p.HEADER.size:
+                self._gone(client)
+                return
+            command, number, size = p.HEADER.unpack(head)
+            body = client.recv(size - p.HEADER.size, socket.MSG_WAITALL) if size > p.HEADER.size else b""
+            with self._lock:
+                self._request(client, command, number, body)
+
+    def _request(self, client: socket.socket, command: int, number: int, body: bytes) -> None:
+        if command == p.CONNECT:
+            version, port = struct.unpack("<HH", body)
+            self._target = (client.getpeername()[0], port)
+            self._say(command, number, int(version != p.VERSION), struct.pack("<H", p.VERSION))
+        elif command == p.MOVE:
+            generator = struct.unpack_from("<II", body)[1]
+            if self._state.mode != p.IDLE or generator != p.JOINT_VELOCITY:
+                self._say(command, number, p.REJECTED)
+                return
+            self._motion, self._begun, self._in_a_row = number, False, 0
+            self._state.mode, self._state.reflex = p.MOVING, frozenset()
+            self._say(command, number, p.MOTION_STARTED)
+        elif command == p.STOP_MOVE:
+            self._finish(p.PREEMPTED)
+            self._rest()
+            self._say(command, number, p.SUCCESS)
+        elif command == p.RECOVER:
+            if self._pressed:
+                self._say(command, number, p.REJECTED)
+            else:
+                self._state.mode, self._recovery = p.RECOVERING, (number, _RECOVERY_TICKS)
+        elif command in p.SETTERS:
+            if command == p.SET_LOAD:
+                self._load = struct.unpack_from("<d", body)[0]
+            self._say(command, number, p.SUCCESS)
+        else:
+            raise RuntimeError(f"command {command} is not part of this control box")
+
+    def _say(self, command: int, number: int, status: int, more: bytes = b"") -> None:
+        if self._client is not None:
+            self._client.sendall(p.reply(command, number, status, more))
+
+    def _finish(self, status: int) -> None:
+        if self._motion is not None:
+            self._say(p.MOVE, self._motion, status)
+            self._motion = None
+            self._state.mode = p.IDLE
+
+    def _tick(self) -> None:
+        target = self._target
+        with self._lock:
+            state = self._state
+            state.number += 1
+            self._recover()
+            message = state.pack() if target is not None else b""
+            moving = state.mode == p.MOVING
+        if target is not None:
+            self._udp.sendto(message, target)
+        # While the client thinks.
+        self._body.move(state.dq_d)
+        command = self._receive() if moving and target is not None else None
+        with self._lock:
+            state.q, state.dq = self._body.q, self._body.dq
+            if moving and state.mode == p.MOVING:
+                self._follow(command)
+            if float(np.abs(state.dq_d).max()) >= _REST:
+                self._still_at = None
+            elif self._still_at is None:
+                self._still_at = time.monotonic()
+
+    def _recover(self) -> None:
+        if self._recovery is not None:
+            number, left = self._recovery
+            self._recovery = (number, left - 1)
+            if left == 0:
+                self._recovery = None
+                self._state.mode, self._state.errors = p.IDLE, frozenset()
+                self._recoveries += 1
+                self._say(p.RECOVER, number, p.SUCCESS)
+
+    def _receive(self) -> tuple[object, ...] | None:
+        """The answer to the state just sent; None when it has not come in time or gets lost."""
+        end = time.monotonic() + PATIENCE_S
+        while select.select([self._udp], [], [], max(0.0, end - time.monotonic()))[0]:
+            command = p.COMMAND.unpack(self._udp.recv(4096))
+            if command[0] == self._state.number:
+                if self._to_drop > 0:
+                    self._to_drop -= 1
+                    return None
+                return command
+        return None
+
+    def _follow(self, command: tuple[object, ...] | None) -> None:
+        state = self._state
+        if command is None:
+            if not self._begun:
+                return
+            self._lost += 1
+            self._in_a_row += 1
+            state.success_rate = max(0.0, state.success_rate - 0.01)
+            if self._in_a_row >= _LOST_IN_A_ROW:
+                self._reflex(p.COMMUNICATION, "20 packets lost in a row")
+                return
+            wanted = np.clip(state.dq_d + state.ddq_d * TICK_S, -_VELOCITY, _VELOCITY)
+        else:
+            self._begun, self._in_a_row = True, 0
+            self._commands += 1
+            state.success_rate = min(1.0, state.success_rate + 0.01)
+            wanted = np.array(command[p.VELOCITY], float)
+            if not self._judge(wanted):
+                return
+        state.ddq_d = (wanted - state.dq_d) / TICK_S
+        state.dq_d = wanted
+        if np.any(state.q < _LOWER) or np.any(state.q > _UPPER):
+            self._reflex(p.POSITION_LIMIT, f"joints at {state.q}")
+        elif command is not None and command[p.FINISHED]:
+            self._rest()
+            self._finish(p.SUCCESS)
+
+    def _judge(self, wanted: Array) -> bool:
+        acceleration = (wanted - self._state.dq_d) / TICK_S
+        jerk = (acceleration - self._state.ddq_d) / TICK_S
+        for i, (value, (name, kind, limit)) in enumerate(zip((wanted, acceleration, jerk), _LIMITS, strict=True)):
+            share = np.abs(value) / limit
+            if not np.all(share <= _SLACK):
+                self._reflex(kind, f"{name} is {np.max(share):.3f} of what joint {int(np.argmax(share)) + 1} may have")
+                return False
+            self._worst[i] = max(self._worst[i], float(share.max()))
+        return True
+
+    def _reflex(self, kind: int, why: str) -> None:
+        """Stop by itself: the brakes are faster than any command."""
+        self._breaches.append(why)
+        self._rest()
+        self._state.errors = self._state.reflex = frozenset({kind})
+        self._finish(p.REFLEX_ABORTED)
+        self._state.mode = p.REFLEX
+
+    def _press(self) -> None:
+        self._pressed = True
+        self._rest()
+        self._finish(p.EMERGENCY_ABORTED)
+        self._state.mode = p.USER_STOPPED

@@ -1,0 +1,179 @@
+"""A base that the driver takes for an MP-500: the maker's topics and services over Zenoh, and a monitor of commands."""
+
+import math
+import threading
+import time
+
+import numpy as np
+
+from bridge.fakes.bodies import WheelBody
+from bridge.real import mp500
+from bridge.real import ros_messages as ros
+from rolling_panda.differential_drive import DifferentialDrive
+from rolling_panda.transport import ForeignWire
+
+RATE_HZ = 50.0
+# The maker's own.
+_WATCHDOG_S = 1.0
+# What the base can take (maker's figures: m/s, m/s²), and what the monitor calls a breach.
+_SPEED, _ACCELERATION = 1.5, 2.4
+_REST = 0.05
+# CDR of a request without arguments: a header, and one byte since a structure has at least one.
+_NO_ARGUMENTS = b"\x00\x01\x00\x00\x00"
+_CHARGE = 0.8
+
+
+class FakeMp500:
+    """Follows `cmd_vel` as the maker's nodes do: its watchdog of 1 s, its stops; `tell` presses its buttons."""
+
+    def __init__(self, wire: ForeignWire, wheels: WheelBody, drive: DifferentialDrive) -> None:
+        """Answer on the wire, which is closed with the base; nothing turns before `run`.
+
+        Args:
+            wire: Where the maker's nodes would be.
+            wheels: What moves.
+            drive: Geometry of the base.
+        """
+        # Zenoh closes a session that nobody holds.
+        self._wire, self._wheels, self._drive = wire, wheels, drive
+        self._lock = threading.Lock()
+        self._command, self._command_at, self._commands = (0.0, 0.0), -math.inf, 0
+        self._state, self._soft, self._stuck = mp500.FREE, False, False
+        self._muted: set[str] = set()
+        self._breaches: list[str] = []
+        self._fastest = self._steepest = 0.0
+        self._still_at: float | None = None
+        wire.subscribe(mp500.COMMAND, self._on_command)
+        wire.serve(mp500.SOFT_STOP, lambda request: self._on_soft(request, True))
+        wire.serve(mp500.SOFT_RELEASE, lambda request: self._on_soft(request, False))
+        names = (mp500.WHEELS, mp500.ODOMETRY, mp500.EMERGENCY, mp500.BATTERY)
+        self._put = {name: wire.publisher(name) for name in names}
+
+    def run(self, ended: threading.Event) -> None:
+        """Turn and tell until `ended` is set."""
+        last = time.monotonic()
+        while not ended.wait(max(0.0, last + 1 / RATE_HZ - time.monotonic())):
+            now = time.monotonic()
+            self._turn(now - last, now)
+            last = now
+
+    def tell(self, words: list[str]) -> None:
+        """Press, confirm or free a button, silence a topic, let the wheels run away, or forget what was monitored."""
+        with self._lock:
+            match words:
+                case ["press"]:
+                    self._state = 1
+                case ["confirm"]:
+                    self._state = 2
+                case ["free"]:
+                    self._state, self._muted, self._stuck = mp500.FREE, set(), False
+                case ["mute", name]:
+                    self._muted.add(name)
+                case ["stuck"]:
+                    self._stuck = True
+                case ["clear"]:
+                    self._breaches, self._fastest, self._steepest = [], 0.0, 0.0
+
+    def report(self) -> dict[str, object]:
+        """What it does, and what its monitor has seen."""
+        with self._lock:
+            return {
+                "wheels": self._wheels.speed.tolist(),
+                "travel": self._wheels.turned.tolist(),
+                "command": list(self._command),
+                "commands": self._commands,
+                "breaches": self._breaches,
+                "worst": [self._fastest, self._steepest],
+                "still_s": -1.0 if self._still_at is None else time.monotonic() - self._still_at,
+                "soft": self._soft,
+            }
+
+    def close(self) -> None:
+        """Let go of the wire."""
+        self._wire.close()
+
+    def _on_command(self, data: bytes, at: float) -> None:
+        message = ros.decode(ros.TWIST, data)
+        v, omega = message.linear.x, message.angular.z
+        with self._lock:
+            powered = self._state == mp500.FREE and not self._soft
+            if not (math.isfinite(v) and math.isfinite(omega)) or abs(v) > _SPEED:
+                self._breaches.append(f"velocity {v}, {omega}")
+            step = abs(v - self._command[0]) * RATE_HZ if powered and self._commands else 0.0
+            # Two commands may come in closer together than they were sent.
+            if step > 1.5 * _ACCELERATION:
+                self._breaches.append(f"from {self._command[0]:.3f} to {v:.3f} m/s in one command")
+            self._fastest = max(self._fastest, abs(v) / _SPEED)
+            self._steepest = max(self._steepest, step / _ACCELERATION)
+            self._command, self._command_at = (v, omega), at
+            self._commands += 1
+
+    def _on_soft(self, request: bytes, stop: bool) -> bytes:
+        understood = request == _NO_ARGUMENTS
+        if understood:
+            with self._lock:
+                self._soft = stop
+        return ros.encode(ros.make(ros.SUCCESS, success=understood))
+
+    def _turn(self, dt: float, now: float) -> None:
+        with self._lock:
+            goal = np.array(self._drive.wheels(*self._command))
+            if self._state != mp500.FREE or self._soft or now - self._command_at > _WATCHDOG_S:
+                goal = np.zeros(2)
+            if self._stuck and not self._soft:
+                goal = np.array([1.0, 1.0])
+            self._wheels.drive(goal, dt)
+            if np.abs(self._wheels.speed).max() > _REST:
+                self._still_at = None
+            elif self._still_at is None:
+                self._still_at = now
+            state, soft, muted = self._state, self._soft, set(self._muted)
+        for name, message in self._messages(state, soft).items():
+            if name not in muted:
+                self._put[name](ros.encode(message))
+
+    def _messages(self, state: int, soft: bool) -> dict[str, object]:
+        own, speed = self._wheels.time, self._wheels.speed
+        stamp = ros.make("builtin_interfaces/msg/Time", sec=int(own), nanosec=int(own % 1 * 1e9))
+        header = ros.make("std_msgs/msg/Header", stamp=stamp, frame_id="")
+        wheels = ros.make(
+            ros.JOINT_STATE,
+            header=header,
+            name=["wheel_front_left_joint", "wheel_front_right_joint"],
+            # Raw counts of the encoders, as the relay board tells them.
+            position=np.array([137.0, -137.0]),
+            velocity=np.array([speed[0], -speed[1]]),
+            effort=np.zeros(0),
+        )
+        stop = ros.make(
+            ros.EMERGENCY_STOP,
+            header=header,
+            emergency_button_stop=state == 1,
+            scanner_stop=False,
+            software_stop=soft,
+            emergency_state=state,
+        )
+        return {mp500.WHEELS: wheels, mp500.EMERGENCY: stop, mp500.BATTERY: battery(header, _CHARGE)}
+
+
+def battery(header: object, share: float) -> object:
+    """The maker's battery message with this charge (0…1)."""
+    return ros.make(
+        ros.BATTERY_STATE,
+        header=header,
+        voltage=24.5,
+        temperature=math.nan,
+        current=0.0,
+        charge=math.nan,
+        capacity=math.nan,
+        design_capacity=100.0,
+        percentage=share,
+        power_supply_status=2,
+        power_supply_health=0,
+        power_supply_technology=1,
+        present=True,
+        cell_voltage=np.zeros(0, np.float32),
+        cell_temperature=np.zeros(0, np.float32),
+        location="slot1",
+        serial_number="neobattery1",
+    )
