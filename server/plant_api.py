@@ -42,10 +42,17 @@ def plant_router(desk: Desk) -> APIRouter:
 
     @router.get("/points/{point_id}/crop", response_class=Response)
     async def crop(session: Caller, point_id: PointId, revision: Annotated[int, Query(ge=0)] | None = None) -> Response:
-        """What the camera saw around a point, the cut in the middle, as JPEG; of one revision where that is said."""
+        """What the camera saw around a point, the cut in the middle, as JPEG; of one revision where that is said.
+
+        204 while no picture of a known point has come: ask again.
+        """
         found = desk.link.crops.get(point_id)
         if found is None or revision not in (None, found.revision):
-            return answer(Result(404, False, "no picture of this point has come yet"))
+            known = desk.points.points if desk.points is not None else ()
+            if any(row.point.point_id == point_id for row in known):
+                # Nothing is wrong yet, and a browser's console should not say so.
+                return Response(status_code=204)
+            return answer(Result(404, False, f"there is no point {point_id!r}"))
         return Response(found.jpeg, media_type="image/jpeg")
 
     return router

@@ -150,7 +150,7 @@ class PlayedServer:
             if self.crop:
                 route.fulfill(body=self.crop, content_type="image/jpeg")
             else:
-                route.fulfill(status=404, json={"ok": False, "reason": "no picture of this point has come yet"})
+                route.fulfill(status=204)
         elif path == "/camera/color.jpg":
             self.frames_fetched.append(int(route.request.url.split("n=")[1]))
             route.fulfill(body=self.image, content_type="image/jpeg")

@@ -1,8 +1,8 @@
 """What an operator asks of perception over REST."""
 
 import pytest
-from fake_wire import FakeWire
-from running_server import running_server
+from fake_wire import FakeWire, pruning_point, pruning_points
+from running_server import eventually, running_server
 
 from rolling_panda import messages as m
 from rolling_panda import topics
@@ -97,11 +97,14 @@ def test_a_viewer_may_not_ask_and_a_refusal_or_silence_is_told(server):
 
 def test_the_picture_of_a_point_is_given_for_its_revision(server):
     with server.client(role="viewer", user="bob") as client:
-        assert client.get("/api/points/p1/crop").status_code == 404
+        unknown = client.get("/api/points/p1/crop")
+        assert (unknown.status_code, unknown.json()["reason"]) == (404, "there is no point 'p1'")
+        server.wire.deliver(topics.POINTS, pruning_points(pruning_point("p1")))
+        eventually(lambda: client.get("/api/points/p1/crop").status_code == 204)
         server.wire.deliver(topics.CROPS, PointCrop(point_id="p1", revision=3, sequence=7, jpeg=b"picture"))
         answer = client.get("/api/points/p1/crop?revision=3")
         assert (answer.content, answer.headers["content-type"]) == (b"picture", "image/jpeg")
-        assert client.get("/api/points/p1/crop?revision=4").status_code == 404
+        assert client.get("/api/points/p1/crop?revision=4").status_code == 204
         server.wire.deliver(topics.CROPS, PointCrop(point_id="p1", revision=4, sequence=9, jpeg=b"newer"))
         assert client.get("/api/points/p1/crop").content == b"newer"
     with server.visitor() as stranger:

@@ -1,36 +1,37 @@
-// What happened, and why something was refused.
+// What happened, and why something was refused; by severity, by process, and by words.
 
 import { element, setText } from "../element.js";
 import { icon } from "../icons.js";
+import { PROCESSES } from "../messages.js";
 import { log } from "../state.js";
 import { drawOn } from "../store.js";
 import { clockWords, inWords } from "../words.js";
 
 /** @typedef {import("../messages.js").PageEvent} PageEvent */
 
-const FILTERS = Object.freeze([
+const LEAST = Object.freeze([
   ["info", "Everything"],
   ["warning", "Warnings and errors"],
   ["error", "Errors"],
 ]);
+/** The page's own lines too. */
+const FROM = Object.freeze([["", "All processes"], ...[...PROCESSES, "page"].map((name) => [name, name])]);
 
 class RpLog extends HTMLElement {
   connectedCallback() {
-    const filter = element("select", { id: "log-filter", attributes: { "aria-label": "Show in the log" } });
-    for (const [value, words] of FILTERS) filter.append(element("option", { text: words, attributes: { value } }));
-    const list = element("ol", {
-      class: "lines",
-      attributes: { role: "log", "aria-live": "polite", "aria-label": "Event log", tabindex: "0" },
+    const least = choice("log-filter", "Least severity shown in the log", LEAST);
+    const from = choice("log-process", "Process shown in the log", FROM);
+    const words = element("input", {
+      id: "log-words",
+      attributes: { type: "search", placeholder: "Find", "aria-label": "Words shown in the log", autocomplete: "off" },
     });
+    const list = element("ol", { class: "lines", attributes: { "aria-label": "Event log", tabindex: "0" } });
+    const live = element("div", { class: "live", attributes: { role: "log", "aria-live": "polite" } }, list);
     const empty = element("p", { class: "empty" });
     this.id = "log";
-    this.dataset.least = "info";
-    this.append(element("div", { class: "panel-head" }, element("h2", { text: "Log" }), filter), list, empty);
-    filter.addEventListener("change", () => {
-      this.dataset.least = filter.value;
-      draw();
-      toEnd();
-    });
+    const tools = element("div", { class: "log-tools" }, words, from, least);
+    this.append(element("div", { class: "panel-head" }, element("h2", { text: "Log" }), tools), live, empty);
+
     // Follow the newest line until somebody scrolls away from it; turning the screen is no such wish.
     let following = true;
     const toEnd = () => {
@@ -41,17 +42,24 @@ class RpLog extends HTMLElement {
     });
     new ResizeObserver(() => following && toEnd()).observe(list);
 
+    /** @param {PageEvent} line */
+    const isWanted = (line) =>
+      (least.value === "info" || line.severity === "error" || line.severity === least.value) &&
+      (from.value === "" || line.process === from.value) &&
+      inWords(line.text).toLowerCase().includes(words.value.trim().toLowerCase());
+
     /** @type {Map<PageEvent, HTMLElement>} */
     const rows = new Map();
     const draw = () => {
       const lines = log.get();
-      const wanted = new Set(lines);
+      const kept = new Set(lines);
       for (const [line, row] of rows) {
-        if (wanted.has(line)) continue;
+        if (kept.has(line)) continue;
         row.remove();
         rows.delete(line);
       }
       let previous = /** @type {HTMLElement|null} */ (null);
+      let left = 0;
       for (const line of lines) {
         let row = rows.get(line);
         if (!row) {
@@ -60,15 +68,34 @@ class RpLog extends HTMLElement {
           if (previous) previous.after(row);
           else list.prepend(row);
         }
+        const wanted = isWanted(line);
+        if (row.hidden === wanted) row.hidden = !wanted;
+        left += Number(wanted);
         previous = row;
       }
-      const left = lines.filter((line) => filter.value === "info" || line.severity === "error" || line.severity === filter.value);
-      empty.hidden = left.length > 0;
-      setText(empty, lines.length === 0 ? "Nothing has happened yet." : "Nothing of this severity.");
+      empty.hidden = left > 0;
+      setText(empty, lines.length === 0 ? "Nothing has happened yet." : "Nothing in the log is like that.");
       if (following) toEnd();
     };
+    for (const control of [least, from, words]) {
+      control.addEventListener("input", () => {
+        draw();
+        toEnd();
+      });
+    }
     drawOn([log], draw);
   }
+}
+
+/**
+ * @param {string} id
+ * @param {string} label
+ * @param {readonly (readonly string[])[]} options Value and words.
+ */
+function choice(id, label, options) {
+  const select = element("select", { id, attributes: { "aria-label": label } });
+  for (const [value, words] of options) select.append(element("option", { text: words, attributes: { value: value ?? "" } }));
+  return select;
 }
 
 /** @param {PageEvent} line */

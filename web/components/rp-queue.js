@@ -37,7 +37,7 @@ class RpQueue extends HTMLElement {
     const source = element("span", { class: "tag", attributes: { title: "What tells cane, node and post apart in the image" } });
     const { head, note } = panelHead("Pruning points", source, undoButton());
     const summary = element("p", { class: "summary number" });
-    const list = element("div", { class: "groups", attributes: { "aria-label": "Pruning points" } });
+    const list = element("div", { class: "groups", attributes: { role: "group", "aria-label": "Pruning points" } });
     const empty = element("div", { class: "empty", attributes: { role: "status" } });
     const open = [
       abstainedList("another look", (count) => `${counted(count, "place")} ${count === 1 ? "needs" : "need"} another look`),
@@ -136,7 +136,9 @@ class RpQueue extends HTMLElement {
       const name = groupOf(row);
       let group = groups.get(name);
       if (!group) {
-        group = element("div", { class: "group", attributes: { role: "list", "aria-label": name } }, element("h3", { text: name }));
+        // The list has its name already; a heading inside it would be no item of it.
+        const heading = element("h3", { text: name, attributes: { role: "presentation" } });
+        group = element("div", { class: "group", attributes: { role: "list", "aria-label": name } }, heading);
         groups.set(name, group);
       }
       if (group !== lastGroup) {
