@@ -16,6 +16,7 @@ BENCHMARKS = {
     "live": ("benchmarks.live", "the running demo: control periods on time, round trip, tool error"),
     "perception": ("benchmarks.perception", "surveys of unseen rows, every pruning point judged"),
     "faults": ("benchmarks.faults", "random faults in motion, judged by what the actuators were sent"),
+    "checks": ("benchmarks.checks", "each check of safety taken away on a copy: its test has to fail"),
     "plots": ("benchmarks.plots", "pictures of what the others wrote with --json"),
 }
 

@@ -18,7 +18,7 @@ class ServerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         hold_resume_s: A page that paused for no longer than this, with the button still pressed, holds on; after that
             only a new press starts a hold.
         view_timeout_s: A page that has not drawn a state younger than this may not move the robot.
-        stop_confirm_s: How long a stop waits for the bridge to say that it has latched.
+        stop_confirm_s: How long a stop waits for bridge and controller to say that they have latched it.
         session_idle_s: A session unused for this long has ended.
         invite_s: Life of a sign-in link that a supervisor makes for somebody else.
         log_lines: Log lines kept in memory.

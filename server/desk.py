@@ -135,22 +135,22 @@ class Desk:
         return Result(200 if answer.ok else 409, answer.ok, answer.reason)
 
     async def stop(self, session: Session, reason: str) -> Result:
-        """Send the software stop at once and wait for the bridge to confirm its latch."""
+        """Send the software stop at once and wait for bridge and controller to say that they have latched it."""
         sent_at = time.monotonic()
-        self.link.stop(session.user, reason)
+        stop_id = self.link.stop(session.user, reason)
         holder = self.teleop.holder
         if holder is not None:
             self.teleop.release(holder)
             self._held_out(holder, "The robot was stopped.")
         self.note("warning", f"software stop by {session.user}: {reason}")
-        while time.monotonic() - sent_at < self.config.stop_confirm_s:
-            bridge = self.link.bridge.peek()
-            if bridge is not None and bridge.at >= sent_at and bridge.message.stop_id:
-                return Result(200, True, "stopped: the bridge has latched the stop")
+        while (missing := self.link.not_latched(stop_id)) and time.monotonic() - sent_at < self.config.stop_confirm_s:
             await asyncio.sleep(_CONFIRM_POLL_S)
-        return Result(
-            503, False, "The stop was sent, but the bridge has not confirmed it: use the robot's emergency stop."
-        )
+        if "bridge" in missing:
+            said = "The stop was sent, but the bridge has not confirmed it: use the robot's emergency stop."
+            return Result(503, False, said)
+        if missing:
+            return Result(200, True, "stopped: the bridge has latched the stop; the controller has not confirmed it")
+        return Result(200, True, "stopped: bridge and controller have latched the stop")
 
     def may_move(self, session: Session) -> bool:
         """May this session lead the tool: by its role, and unless somebody else holds control."""

@@ -130,7 +130,7 @@ def operator_router(desk: Desk) -> APIRouter:
     async def stop(session: Caller, request: Request) -> Response:
         """Software stop, by every role. It goes straight to bridge and controller; 503 = the bridge did not confirm.
 
-        Without a body, or with one that cannot be read, it stops all the same.
+        `reason` says who has latched it. Without a body, or with one that cannot be read, it stops all the same.
         """
         return answer(await desk.stop(session, body.Stop.read(await request.body()).reason))
 

@@ -109,6 +109,14 @@ class RobotLink:
         threading.Thread(target=send, name="stop", daemon=True).start()
         return request.stop_id
 
+    def not_latched(self, stop_id: str) -> tuple[str, ...]:
+        """Of bridge and controller those that have not said that they hold this stop latched."""
+        told = {process: {stop.stop_id for stop in state.message.stops} for process, state in self.stops.items()}
+        bridge = self.bridge.peek()
+        if bridge is not None:
+            told.setdefault("bridge", set()).add(bridge.message.stop_id)
+        return tuple(process for process in ("bridge", "controller") if stop_id not in told.get(process, ()))
+
     def teleop(self, target: TeleopTarget) -> None:
         """Publish where the held gizmo is."""
         self._teleop.put(target)

@@ -12,7 +12,7 @@ from playwright.sync_api import Page, Route, WebSocketRoute
 
 from rolling_panda import messages as m
 from rolling_panda import page_messages as p
-from rolling_panda.control_messages import ControlState
+from rolling_panda.control_messages import ControlState, StopState
 from rolling_panda.resources import resource
 
 ORIGIN = "http://panda.test"
@@ -112,6 +112,7 @@ class PlayedServer:
     gone: dict[str, float] = field(default_factory=dict)
     role: p.Role = "supervisor"
     control: ControlState | None = None
+    stopped: tuple[StopState, ...] = ()
     online: bool = True
     silent: bool = False
     answers: dict[str, tuple[int, Any]] = field(default_factory=dict)
@@ -204,6 +205,7 @@ class PlayedServer:
             camera_frame=1 + self.number // 5,
             client="me",
             control=self.control,
+            stops=self.stopped,
         )
 
     def page_points(self) -> p.PagePoints:

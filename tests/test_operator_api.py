@@ -18,6 +18,7 @@ from running_server import eventually, running_server
 
 from rolling_panda import intents, topics
 from rolling_panda import messages as m
+from rolling_panda.control_messages import StopRecord, StopState
 from rolling_panda.errors import ServiceError
 from rolling_panda.plan_messages import PlannedPoint, PlanRow, PointPlan, SessionPlan
 from rolling_panda.teleop_messages import BaseVelocity
@@ -151,18 +152,31 @@ def test_what_is_no_json_object_is_refused(server, client, content):
     assert server.wire.asked == []
 
 
-def test_stop_is_sent_several_times_and_confirmed_by_the_bridge(server, client):
+@pytest.mark.parametrize(
+    ("latching", "status", "words"),
+    [
+        (("bridge", "controller"), 200, "bridge and controller have latched"),
+        (("bridge",), 200, "the controller has not confirmed"),
+        (("controller",), 503, "the bridge has not confirmed"),
+    ],
+)
+def test_stop_is_sent_several_times_and_says_who_has_latched_it(server, client, latching, status, words):
     sent = server.wire.sent[topics.STOP.name]
+    # A stop that was latched before confirms nothing.
+    server.wire.deliver(topics.BRIDGE, bridge_state("an older one"))
 
     def latch():
-        eventually(lambda: sent)
-        server.wire.deliver(topics.BRIDGE, bridge_state(sent[0].stop_id))
+        stop = eventually(lambda: sent)[0]
+        record = StopRecord(stop.stop_id, stop.source, stop.user, stop.reason, 5.0)
+        for process in latching:
+            server.wire.deliver(topics.STOPS, StopState(process=process, stops=(record,)))
 
-    bridge = threading.Thread(target=latch)
-    bridge.start()
+    robot = threading.Thread(target=latch)
+    robot.start()
     answer = client.post("/api/stop", json={"reason": "branch"})
-    bridge.join()
-    assert (answer.status_code, answer.json()["ok"]) == (200, True)
+    robot.join()
+    assert (answer.status_code, answer.json()["ok"]) == (status, status == 200)
+    assert words in answer.json()["reason"]
     eventually(lambda: len(sent) == 5)
     assert {(stop.stop_id, stop.user, stop.reason) for stop in sent} == {(sent[0].stop_id, "ann", "branch")}
 

@@ -8,11 +8,13 @@ import { TEXT_MAX_LENGTH } from "../messages.js";
 import { isLive, link, now, pageState, staleWords } from "../state.js";
 import { drawOn } from "../store.js";
 import { stopProgress } from "../stop.js";
+import { buttonPressed, earlierWords, sinceWords } from "../stops.js";
 
 class RpStopBanner extends HTMLElement {
   connectedCallback() {
     this.hidden = true;
     const who = element("p", { class: "who" });
+    const earlier = element("p", { class: "hint earlier" });
     const bridge = acknowledgement("bridge");
     const controller = acknowledgement("controller");
     const reason = element("input", {
@@ -37,6 +39,7 @@ class RpStopBanner extends HTMLElement {
     this.append(
       element("div", { class: "banner-head" }, icon("ESTOP_LATCHED"), element("h2", { text: "Software stop" }), who),
       element("ul", { class: "acknowledgements" }, bridge.row, controller.row),
+      earlier,
       form,
       hint,
     );
@@ -55,9 +58,14 @@ class RpStopBanner extends HTMLElement {
       form.hidden = hint.hidden = link.get().status !== "open";
       const told = state?.bridge?.stopped_by || (byController ? state?.controller?.reason : "") || "";
       setText(who, told ? `Pressed by ${told}` : "Pressed on this page; waiting for the robot to say so");
-      bridge.show(byBridge);
-      controller.show(byController);
-      const why = whyNot("Reset") || (reason.value.trim() === "" ? "Write a reason first" : "");
+      const newest = state?.bridge?.stop_id ?? "";
+      bridge.show(byBridge, sinceWords(state, "bridge", newest));
+      controller.show(byController, sinceWords(state, "controller", newest));
+      const before = earlierWords(state);
+      earlier.hidden = before === "";
+      setText(earlier, before);
+      const pressed = buttonPressed(state) ? "Release the emergency stop button on the robot first" : "";
+      const why = pressed || whyNot("Reset") || (reason.value.trim() === "" ? "Write a reason first" : "");
       setEnabled(reset, why, "Release the latched stop; nothing moves");
     };
     reason.addEventListener("input", draw);
@@ -77,12 +85,15 @@ function acknowledgement(process) {
   const row = element("li", { data: { acknowledged: "false", by: process } }, shape, words);
   return {
     row,
-    /** @param {boolean} latched */
-    show(latched) {
+    /**
+     * @param {boolean} latched
+     * @param {string} since
+     */
+    show(latched, since) {
       row.dataset.acknowledged = String(latched);
       setIcon(shape, latched ? "present" : "warning");
       const old = isLive(process) ? "" : ` (${staleWords(process)})`;
-      setText(words, `${process}: ${latched ? "stopped and latched" : "not confirmed yet"}${old}`);
+      setText(words, `${process}: ${latched ? `stopped and latched${since}` : "not confirmed yet"}${old}`);
     },
   };
 }
