@@ -96,7 +96,7 @@ def _garbage(world: World) -> None:
     values = (math.nan, math.inf, -math.inf, 1e308, 50.0)
 
     def send(world: World) -> None:
-        token = world.controller._authority.token
+        token = world.controller._supervisor.authority.token
         if world.ticks % 5 or token is None:
             return
         a, b, c, d, e, f, g, h = (world.rng.choice(values) if world.rng.random() < 0.5 else 0.1 for _ in range(8))

@@ -1,0 +1,57 @@
+import numpy as np
+import pytest
+from controller_at_work import CONFIG, robot
+
+from controller.config import ControllerConfig
+from controller.journal import Journal
+from controller.lease import Token
+from controller.lines import Lines
+from controller.movement import Movement
+from controller.queue import PointQueue
+from rolling_panda import intents
+from rolling_panda.config import RobotConfig
+from rolling_panda.robot_model import ARM_Q
+
+
+@pytest.fixture(scope="module")
+def movement():
+    config, lines = ControllerConfig(), Lines(Journal())
+    return Movement(config, RobotConfig(), PointQueue(config), lines, "run", lambda _: None)
+
+
+def test_an_unmeasured_robot_is_not_moved(movement):
+    moved = movement.step("AUTO", held=True, now=0.0)
+    assert not moved.xi.any()
+    assert moved.event is None and moved.cut is None
+
+
+def test_without_a_token_nothing_is_sent_and_the_robot_counts_as_still(movement):
+    joints = robot().inputs().joints
+    slowly = np.full(9, 1e-3)
+    command = movement.send(slowly, Token(1, "t"), joints, latched=False)
+    assert command.token == "t" and not movement.at_rest
+    assert movement.send(slowly, None, joints, latched=False) is None
+    assert movement.at_rest
+
+
+def test_under_a_latched_stop_braking_is_sent_and_rest_is_not(movement):
+    joints = robot().inputs().joints
+    assert movement.send(np.full(9, 1e-3), Token(1, "t"), joints, latched=True) is not None
+    assert movement.send(np.zeros(9), Token(1, "t"), joints, latched=True) is None
+
+
+def test_nobody_in_control_means_rest_whatever_the_mode():
+    r = robot()
+    r.q[ARM_Q] = CONFIG.reach
+    r.step()
+    assert r.ask(intents.Arm(user="ada")).ok
+    assert r.ask(intents.Home(user="ada")).ok
+    for _ in range(20):
+        out = r.step()
+    movement = r.controller._movement
+    assert movement.homing
+    sent = np.abs(out.motion.xi)
+    assert sent.max() > 0.1
+    slower = np.abs(movement.step("READY", held=False, now=r.now).xi)
+    assert (slower <= 0.99 * sent).all()
+    assert (np.abs(movement.step("READY", held=True, now=r.now).xi) > slower + 1e-6).any()
