@@ -69,7 +69,7 @@ class Teleoperation:
         """One period of what is held."""
         message = self._message
         assert message is not None
-        xi, pace = np.zeros(NXI), pace_of(message.round_trip_s)
+        xi, pace = np.zeros(NXI), message.share * pace_of(message.round_trip_s)
         if message.joints is not None:
             xi[ARM_XI] = pace * np.array(message.joints)
             return self._follower.jog(xi, robot)

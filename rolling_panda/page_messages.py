@@ -1,15 +1,18 @@
 """What the server and the operator's page say to each other over `/ws`, as JSON; `web/messages.*` are made from it."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
 from rolling_panda import messages as m
 from rolling_panda.control_messages import ClientKey, ControlState, StopState
 from rolling_panda.plan_messages import PlanState, PointPlan
+from rolling_panda.teleop_messages import ArmVelocities, BaseVelocity, SpeedShare
 
 Role = m.Role
 Age = Annotated[float, Meta(ge=0.0, le=1e9)]
+#: Whose axes the gizmo's arrows lie along.
+GizmoAxes = Literal["tool", "base", "world"]
 
 
 class PageMessage(Struct, frozen=True, kw_only=True, tag=True, forbid_unknown_fields=True):
@@ -153,16 +156,33 @@ class Ping(PageMessage, frozen=True, kw_only=True):
 
 
 class Hold(PageMessage, frozen=True, kw_only=True):
-    """20 Hz while the operator holds: the tool may follow the gizmo. `hold` false, or silence, ends it."""
+    """20 Hz while the operator holds: the tool may follow the gizmo. `hold` false, or silence, ends it.
+
+    Attributes:
+        sequence: Grows by one a message.
+        hold: Whether they still hold.
+        base: The base moves so, instead of the tool.
+        joints: The arm's joints turn so (rad/s), instead of the tool.
+        share: Of the usual speed.
+    """
 
     sequence: m.Count
     hold: bool
+    base: BaseVelocity | None = None
+    joints: ArmVelocities | None = None
+    share: SpeedShare = 1.0
+
+    def __post_init__(self) -> None:
+        """Refuse both at once."""
+        if self.base is not None and self.joints is not None:
+            raise ValueError("either the base moves or the joints turn: leave out one of them")
 
 
 class ShowGizmo(PageMessage, frozen=True, kw_only=True):
-    """Show or hide this session's gizmo in the 3-D view; shown, it starts at the tool."""
+    """Show or hide this session's gizmo in the 3-D view; shown, it starts at the tool, along these axes."""
 
     visible: bool
+    axes: GizmoAxes = "tool"
 
 
 class PlaceByHand(PageMessage, frozen=True, kw_only=True):

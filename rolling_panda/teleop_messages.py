@@ -7,6 +7,8 @@ from msgspec import Meta, Struct
 from rolling_panda.messages import Count, Message, NonNegative, Pose, Text
 
 JointVelocity = Annotated[float, Meta(ge=-10.0, le=10.0)]
+#: Share of the robot's usual speed by hand.
+SpeedShare = Annotated[float, Meta(ge=0.05, le=1.0)]
 ArmVelocities = tuple[
     JointVelocity, JointVelocity, JointVelocity, JointVelocity, JointVelocity, JointVelocity, JointVelocity
 ]
@@ -34,6 +36,7 @@ class TeleopTarget(Message, frozen=True, kw_only=True):
         base: Velocity of the base.
         joints: Velocities of the arm's joints (7, rad/s).
         client: Tells apart who has the same name, as in an intent.
+        share: Of the usual speed, for all of the above.
         round_trip_s: From the holder's page to the server and back, as the server measured it (s).
     """
 
@@ -44,4 +47,5 @@ class TeleopTarget(Message, frozen=True, kw_only=True):
     base: BaseVelocity | None = None
     joints: ArmVelocities | None = None
     client: Annotated[str, Meta(max_length=64)] = ""
+    share: SpeedShare = 1.0
     round_trip_s: NonNegative = 0.0

@@ -12,7 +12,7 @@ import msgspec
 from rolling_panda import intents
 from rolling_panda import messages as m
 from rolling_panda.errors import InputError, ServiceError
-from rolling_panda.page_messages import PagePoints, PageState, Sightline
+from rolling_panda.page_messages import GizmoAxes, PagePoints, PageState, Sightline
 from rolling_panda.plant_requests import PlantRequest
 from server.config import ServerConfig
 from server.event_log import EventLog
@@ -158,7 +158,7 @@ class Desk:
         holder = "" if control is None else control.message.holder
         return session.may_operate and holder in ("", session.client)
 
-    def hold(self, session: Session, now: float, view: str = "") -> Result:
+    def hold(self, session: Session, now: float, view: str = "", share: float = 1.0) -> Result:
         """Start or renew this session's hold on the tool, by what its `view` shows; a script is its own view."""
         key = session.session_id
         if not session.may_operate:
@@ -166,7 +166,7 @@ class Desk:
         self.end_lapsed_hold(now)
         was_holding = self.teleop.holder == key
         try:
-            self.teleop.hold(key, session.user, now, view or key, session.client)
+            self.teleop.hold(key, session.user, now, view or key, session.client, share)
         except InputError as error:
             return self._refuse_hold(session, str(error), 409)
         self._refused_holds.pop(key, None)
@@ -198,8 +198,8 @@ class Desk:
             self.scene.gizmos.reset(owner, tool)
             self.teleop.aim(owner, tool)
 
-    def show_gizmo(self, session: Session, visible: bool) -> None:
-        """Show this session's gizmo at the tool, or hide it and end its hold."""
+    def show_gizmo(self, session: Session, visible: bool, axes: GizmoAxes = "tool") -> None:
+        """Show this session's gizmo at the tool, along these axes, or hide it and end its hold."""
         if not visible:
             self.let_go(session)
             self.scene.gizmos.hide(session.session_id)
@@ -208,7 +208,8 @@ class Desk:
         if not session.may_operate or tool is None:
             self.note("warning", f"no gizmo for {session.user}: the tool's place is not known, or the role is viewer")
             return
-        self.scene.show_gizmo(session.session_id, tool)
+        self.let_go(session)
+        self.scene.show_gizmo(session.session_id, tool, axes)
         self.teleop.aim(session.session_id, tool)
 
     def end_void_sessions(self) -> None:

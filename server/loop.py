@@ -93,7 +93,8 @@ class Loop:
             desk.scene.show_row(scenery.message)
         tool = desk.view.tool(now)
         if tool is not None:
-            for owner in desk.scene.gizmos.follow(tool, desk.teleop.holder):
+            led = desk.teleop.holder if desk.teleop.leads_gizmo else None
+            for owner in desk.scene.gizmos.follow(tool, led):
                 desk.teleop.aim(owner, tool)
 
     async def _log(self, now: float) -> None:

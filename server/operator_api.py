@@ -165,7 +165,7 @@ def operator_router(desk: Desk) -> APIRouter:
         )
         if aim != Aim():
             desk.teleop.want(session.session_id, aim)
-        return answer(desk.hold(session, time.monotonic()))
+        return answer(desk.hold(session, time.monotonic(), share=request.share))
 
     @router.get("/state", tags=["state"], responses=_schema("PageState"))
     async def state(session: Caller) -> Response:

@@ -9,6 +9,7 @@ from fastapi import APIRouter
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from rolling_panda.errors import InputError
+from rolling_panda.messages import Pose
 from rolling_panda.page_messages import (
     FromPage,
     Hold,
@@ -28,6 +29,7 @@ from rolling_panda.page_messages import (
 from server.desk import Desk
 from server.page_view import addressed
 from server.sessions import Session
+from server.teleop import Aim
 
 _ENCODER = msgspec.json.Encoder()
 _DECODER: msgspec.json.Decoder[FromPage] = msgspec.json.Decoder(FromPage, strict=True)
@@ -162,26 +164,26 @@ class OpenPage:
                     return
                 self._hold_sequence = sequence
                 if hold:
-                    self._renew(time.monotonic())
+                    self._renew(message, time.monotonic())
                 else:
                     self._holding = self._spent = False
                     self._desk.let_go(self.session)
-            case ShowGizmo(visible=visible):
-                self._desk.show_gizmo(self.session, visible)
+            case ShowGizmo(visible=visible, axes=axes):
+                self._desk.show_gizmo(self.session, visible, axes)
             case PlaceByHand(active=active):
                 self._desk.place_by_hand(self, active)
             case Select(point_id=point_id):
                 self._desk.scene.select(self.session.session_id, point_id)
 
-    def _renew(self, now: float) -> None:
+    def _renew(self, held: Hold, now: float) -> None:
         try:
             self._desk.motion.count(self.session.session_id, now)
         except InputError:
             # A renewal too many renews nothing; one in time follows, or the hold ends.
             return
-        self._hold(now)
+        self._hold(held, now)
 
-    def _hold(self, now: float) -> None:
+    def _hold(self, message: Hold, now: float) -> None:
         if self._spent:
             return
         # A moment's pause of a slow browser goes on by itself; after a longer one it takes a new press.
@@ -190,7 +192,10 @@ class OpenPage:
             self._desk.end_lapsed_hold(now)
             self._spend("The hold ended: the page or its link was too slow. Press again to go on.")
             return
-        held = self._desk.hold(self.session, now, self.view)
+        aim = aim_of(message, self._desk.scene.gizmos.pose(self.session.session_id))
+        if aim is not None:
+            self._desk.teleop.want(self.session.session_id, aim)
+        held = self._desk.hold(self.session, now, self.view, message.share)
         if held.ok:
             self._holding, self._held_at = True, now
         elif not self._holding:
@@ -206,6 +211,13 @@ class OpenPage:
             await self._websocket.close(_POLICY, reason)
         except RuntimeError:
             return
+
+
+def aim_of(held: Hold, gizmo: Pose | None) -> Aim | None:
+    """What a page that holds wants of the robot; None where it wants nothing, as without a gizmo."""
+    if held.base is not None or held.joints is not None:
+        return Aim(None, held.base, held.joints)
+    return None if gizmo is None else Aim(gizmo)
 
 
 def pages_router(desk: Desk) -> APIRouter:

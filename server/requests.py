@@ -141,10 +141,11 @@ class Teleop(_JsonTuples):
     """Hold, and what for; with none of the three the last demand stays.
 
     `target`: the tool goes there. With `base` too: the tool keeps to it while the base moves. `base` alone: the base
-    drives, the arm stands. `joints` alone (rad/s): joints turn, the base stands.
+    drives, the arm stands. `joints` alone (rad/s): joints turn, the base stands. All at `share` of the usual speed.
     """
 
     hold: bool
+    share: Annotated[float, Field(ge=0.05, le=1.0)] = 1.0
     target: Target | None = None
     base: BaseVelocity | None = None
     joints: (

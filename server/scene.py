@@ -11,7 +11,7 @@ import viser
 
 from rolling_panda import messages as m
 from rolling_panda.differential_drive import Array
-from rolling_panda.page_messages import PagePoint
+from rolling_panda.page_messages import GizmoAxes, PagePoint
 from rolling_panda.row_messages import Capsule, Scenery
 from server.robot_meshes import Part
 from server.scene_clicks import SceneClicks
@@ -123,9 +123,9 @@ class Scene:
         self._selected[owner] = point_id
         self._draw_selection(owner)
 
-    def show_gizmo(self, owner: str, tool: m.Pose) -> None:
-        """Show the gizmo of `owner` at the tool (pose in odom)."""
-        self.gizmos.show(owner, tool, self._clients(owner))
+    def show_gizmo(self, owner: str, tool: m.Pose, axes: GizmoAxes = "tool") -> None:
+        """Show the gizmo of `owner` at the tool (pose in odom), along these axes."""
+        self.gizmos.show(owner, tool, self._clients(owner), axes)
 
     def take_clicks(self, owner: str, taken: bool) -> None:
         """Take the clicks of `owner` anywhere into the view for lines of sight, or no more."""
@@ -142,6 +142,7 @@ class Scene:
 
     def move(self, q: Array) -> bool:
         """Show the robot at q (12); True when something was sent."""
+        self.gizmos.heading = float(q[2])
         return self.robot.move(q)
 
     def close(self) -> None:

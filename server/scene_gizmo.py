@@ -1,13 +1,17 @@
 """The gizmos of the 3-D view: one a session, shown on that session's views alone."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import viser
 
 from rolling_panda import messages as m
-from server.scene_markers import quat_wxyz
+from rolling_panda.page_messages import GizmoAxes
+from rolling_panda.robot_model import placement
 
 #: Length of the gizmo's arrows, seen from the side (CSS px).
 GIZMO_PX = 110.0
@@ -18,7 +22,12 @@ _FOLLOW = 1e-3
 
 @dataclass
 class _Gizmo:
+    """One session's. Its arrows may lie along other axes than the tool's: `offset` is the tool's rotation in them."""
+
     pose: m.Pose
+    axes: GizmoAxes = "tool"
+    drawn: Any = field(default_factory=pin.Quaternion.Identity)
+    offset: Any = field(default_factory=pin.Quaternion.Identity)
     dragged: bool = False
     handles: dict[int, viser.TransformControlsHandle] = field(default_factory=dict)
 
@@ -30,17 +39,20 @@ class SceneGizmos:
         """`on_aim(owner, target)` is called on viser's thread when `owner` has dragged their gizmo."""
         self._on_aim = on_aim
         self._gizmos: dict[str, _Gizmo] = {}
+        self.heading = 0.0
+        """Of the base in odom (rad), for gizmos along its axes."""
 
     def shown(self, owner: str) -> bool:
         """Has this session a gizmo now?"""
         return owner in self._gizmos
 
-    def show(self, owner: str, pose: m.Pose, clients: list[viser.ClientHandle]) -> None:
-        """Show the gizmo of `owner` at a pose in odom on these views."""
+    def show(self, owner: str, pose: m.Pose, clients: list[viser.ClientHandle], axes: GizmoAxes = "tool") -> None:
+        """Show the gizmo of `owner` at a pose in odom on these views, its arrows along these axes."""
         gizmo = self._gizmos.setdefault(owner, _Gizmo(pose))
+        gizmo.axes = axes
+        self._place(gizmo, pose)
         for client in clients:
             self.attach(owner, client)
-        self._place(gizmo, pose)
 
     def attach(self, owner: str, client: viser.ClientHandle) -> None:
         """Add the gizmo of `owner`, if it is shown, to a view that has just opened."""
@@ -54,15 +66,18 @@ class SceneGizmos:
             scale=GIZMO_PX,
             line_width=4.0,
             depth_test=False,
-            wxyz=quat_wxyz(gizmo.pose.quat_xyzw),
+            wxyz=_wxyz(gizmo.drawn),
             position=gizmo.pose.position,
         )
         gizmo.handles[client.client_id] = handle
 
         async def dragged(event: viser.TransformControlsEvent) -> None:
             x, y, z = (float(value) for value in event.target.position)
-            quaternion = np.array(event.target.wxyz)
-            qw, qx, qy, qz = (float(value) for value in quaternion / max(float(np.linalg.norm(quaternion)), 1e-9))
+            drawn = pin.Quaternion(*(float(value) for value in event.target.wxyz))
+            if drawn.norm() < 1e-9:
+                return
+            drawn.normalize()
+            qx, qy, qz, qw = ((drawn * gizmo.offset).coeffs()).tolist()
             gizmo.pose = m.Pose((x, y, z), (qx, qy, qz, qw))
             gizmo.dragged = True
             self._on_aim(owner, gizmo.pose)
@@ -103,9 +118,18 @@ class SceneGizmos:
 
     def _place(self, gizmo: _Gizmo, pose: m.Pose) -> None:
         gizmo.pose, gizmo.dragged = pose, False
+        tool = pin.Quaternion(placement(pose).rotation)
+        heading = 0.5 * self.heading
+        base = pin.Quaternion(math.cos(heading), 0.0, 0.0, math.sin(heading))
+        gizmo.drawn = {"tool": tool, "base": base, "world": pin.Quaternion.Identity()}[gizmo.axes]
+        gizmo.offset = gizmo.drawn.inverse() * tool
         for handle in list(gizmo.handles.values()):
             handle.position = pose.position
-            handle.wxyz = quat_wxyz(pose.quat_xyzw)
+            handle.wxyz = _wxyz(gizmo.drawn)
+
+
+def _wxyz(quaternion: Any) -> tuple[float, float, float, float]:
+    return (quaternion.w, quaternion.x, quaternion.y, quaternion.z)
 
 
 def _apart(a: m.Pose, b: m.Pose) -> float:

@@ -28,6 +28,7 @@ class _Hold:
     client: str
     renewed_at: float
     aim: Aim
+    share: float = 1.0
 
 
 class TeleopHold:
@@ -65,8 +66,9 @@ class TeleopHold:
         self._lag.pop(view, None)
 
     def aim(self, holder: str, target: m.Pose) -> None:
-        """Set where this holder's gizmo is; the newest wins."""
-        self.want(holder, Aim(target))
+        """Set where this holder's gizmo is; the newest wins. While base or joints are held it leads nothing."""
+        if not self._holds_otherwise(holder):
+            self.want(holder, Aim(target))
 
     def want(self, holder: str, aim: Aim) -> None:
         """Set what this holder wants; the newest wins."""
@@ -74,8 +76,24 @@ class TeleopHold:
         if self._hold is not None and self._hold.holder == holder:
             self._hold.aim = aim
 
-    def hold(self, holder: str, user: str, now: float, view: str = "", client: str = "") -> None:
+    @property
+    def leads_gizmo(self) -> bool:
+        """Whether the hold that there is follows a target: then the gizmo stays where it was dragged."""
+        return self._hold is not None and self._hold.aim.target is not None
+
+    def _holds_otherwise(self, holder: str) -> bool:
+        return self.holder == holder and not self.leads_gizmo
+
+    def hold(self, holder: str, user: str, now: float, view: str = "", client: str = "", share: float = 1.0) -> None:
         """Start or renew a hold, by what `view` shows: the page that holds, not another one of the same person.
+
+        Args:
+            holder: Key of who holds.
+            user: Their name.
+            now: Monotonic time (s).
+            view: What shows them the robot; empty for their own key.
+            client: Who, as the controller knows them.
+            share: Of the usual speed, 0…1.
 
         Raises:
             InputError: Somebody else holds, the holder's view is old, or there is no target.
@@ -91,7 +109,7 @@ class TeleopHold:
             raise InputError("there is no target yet; show the gizmo first")
         if self._hold is None:
             self._hold = _Hold(holder, user, view, client, now, self._aims[holder])
-        self._hold.renewed_at, self._hold.view = now, view
+        self._hold.renewed_at, self._hold.view, self._hold.share = now, view, share
 
     def release(self, holder: str) -> bool:
         """End this holder's hold at once; True when they were holding."""
@@ -141,5 +159,6 @@ class TeleopHold:
             base=aim.base,
             joints=aim.joints,
             client=hold.client,
+            share=hold.share,
             round_trip_s=min(self._lag.get(hold.view, 0.0), 1e3),
         )

@@ -4,8 +4,9 @@ from hypothesis import strategies as st
 
 from rolling_panda import messages as m
 from rolling_panda.errors import InputError
+from rolling_panda.teleop_messages import BaseVelocity
 from server.config import ServerConfig
-from server.teleop import TeleopHold
+from server.teleop import Aim, TeleopHold
 
 HERE = m.Pose((0.1, 0.2, 0.3), (0.0, 0.0, 0.0, 1.0))
 _ACTIONS = st.sampled_from(["hold", "drew", "aim", "release"])
@@ -155,3 +156,26 @@ def test_how_late_the_holders_view_is_goes_out_with_the_target():
     # The same state said again says nothing new.
     teleop.drew("page 1", 10.0, 10.4)
     assert teleop.due(10.26).round_trip_s == pytest.approx(0.21)
+
+
+def test_while_the_base_is_held_the_gizmo_leads_nothing():
+    teleop = holding()
+    drive = Aim(base=BaseVelocity(0.2, 0.0))
+    teleop.want("a", drive)
+    teleop.hold("a", "ann", 10.0)
+    teleop.aim("a", THERE)
+    sent = teleop.due(10.01)
+    assert (sent.target, sent.base) == (None, drive.base)
+    assert not teleop.leads_gizmo
+    teleop.release("a")
+    teleop.aim("a", THERE)
+    teleop.hold("a", "ann", 10.02)
+    assert teleop.due(10.03).target == THERE and teleop.leads_gizmo
+
+
+def test_the_share_of_the_speed_goes_out_and_is_that_of_the_newest_renewal():
+    teleop = holding()
+    assert teleop.due(10.0).share == 1.0
+    teleop.hold("a", "ann", 10.01, share=0.25)
+    teleop.aim("a", THERE)
+    assert teleop.due(10.02).share == 0.25

@@ -56,6 +56,28 @@ def test_tool_follows_the_gizmo_within_its_speed():
     assert 0.1 < fastest <= 1.08 * CONFIG.teleop_speed
 
 
+@pytest.mark.parametrize("about", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)])
+def test_tool_turns_with_the_gizmo_about_each_axis_and_stays_where_it_is(about):
+    r = robot()
+    start = tool(r)
+    target = pin.SE3(start.rotation @ pin.exp3(0.35 * np.array(about)), start.translation)
+    hold(r, target)
+    r.run(6.0)
+    assert np.linalg.norm(pin.log3(tool(r).rotation.T @ target.rotation)) < 0.01
+    assert np.linalg.norm(tool(r).translation - target.translation) < 0.003
+
+
+@pytest.mark.parametrize("share", [1.0, 0.3])
+def test_the_tool_keeps_to_its_share_of_the_speed(share):
+    r = robot()
+    hold(r, moved(tool(r), 0.6, 0.0, 0.0))
+    r.teleop = msgspec.structs.replace(r.teleop, share=share)
+    before = tool(r).translation
+    r.run(1.5)
+    way = float(np.linalg.norm(tool(r).translation - before))
+    assert 0.6 * share * 1.5 * CONFIG.teleop_speed < way <= 1.08 * share * 1.5 * CONFIG.teleop_speed
+
+
 def test_base_comes_along_when_the_gizmo_goes_far_and_stays_parallel_to_the_row():
     r = robot()
     target = moved(tool(r), 1.2, 0.1, 0.05)

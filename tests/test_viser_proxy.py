@@ -203,6 +203,36 @@ def test_the_gizmo_is_on_the_holders_view_alone_and_its_drags_become_targets(ser
         assert moved_back[-1]["position"] != [0.31, 0.52, 0.93]
 
 
+def test_a_page_holds_base_or_joints_at_a_share_of_the_speed(server):
+    sent = server.wire.sent[topics.TELEOP.name]
+    del sent[:]
+    with telling(server.wire), server.client(user="eve") as client, open_socket(server, client, "/ws") as page:
+        sequence = 0
+
+        def holds(**wanted):
+            def once():
+                nonlocal sequence
+                message = json.loads(page.recv(timeout=PATIENCE_S))
+                if message["type"] in ("PageState", "HoldEnded"):
+                    sequence += 1
+                    page.send(json.dumps({"type": "Ping", "number": sequence, "rendered": message.get("number", 0)}))
+                    held = {"hold": message["type"] == "PageState", **wanted, "share": 0.5}
+                    page.send(json.dumps({"type": "Hold", "sequence": sequence, **held}))
+                newest = [each for each in sent if each.hold and each.share == 0.5][-1:]
+                return bool(newest) and msgspec.to_builtins(newest[0]).items() >= wanted.items()
+
+            return once
+
+        drive = {"linear": 0.2, "angular": -0.1}
+        eventually(holds(base=drive))
+        eventually(holds(joints=(0.0, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0)))
+        both = {"type": "Hold", "sequence": sequence + 1, "hold": True, "base": drive, "joints": [0.0] * 7}
+        page.send(json.dumps(both))
+        with pytest.raises(ConnectionClosed):
+            while True:
+                page.recv(timeout=PATIENCE_S)
+
+
 def places_gizmo(message):
     return message["type"] == "SetPositionMessage" and message["name"] == "/gizmo"
 

@@ -51,9 +51,11 @@ export type Covariance = [number, number, number, number, number, number];
 
 export type PlanState = "none"|"planning"|"valid"|"void";
 
-export type Finding = "seen"|"changed"|"severed"|"unseen";
-
 export type ArmVelocities = [number, number, number, number, number, number, number];
+
+export type GizmoAxes = "tool"|"base"|"world";
+
+export type Finding = "seen"|"changed"|"severed"|"unseen";
 
 /** Is a process connected, and how old is its last word (s; None before the first). */
 export interface ProcessPresence {
@@ -429,17 +431,32 @@ export interface Ping {
   rendered: number;
 }
 
+/** Forward velocity (m/s) and yaw rate (rad/s) of the base. */
+export interface BaseVelocity {
+  linear: number;
+  angular: number;
+}
+
 /** 20 Hz while the operator holds: the tool may follow the gizmo. `hold` false, or silence, ends it. */
 export interface Hold {
   type: "Hold";
+  /** Grows by one a message. */
   sequence: number;
+  /** Whether they still hold. */
   hold: boolean;
+  /** The base moves so, instead of the tool. */
+  base: BaseVelocity|null;
+  /** The arm's joints turn so (rad/s), instead of the tool. */
+  joints: ArmVelocities|null;
+  /** Of the usual speed. */
+  share: number;
 }
 
-/** Show or hide this session's gizmo in the 3-D view; shown, it starts at the tool. */
+/** Show or hide this session's gizmo in the 3-D view; shown, it starts at the tool, along these axes. */
 export interface ShowGizmo {
   type: "ShowGizmo";
   visible: boolean;
+  axes: GizmoAxes;
 }
 
 /** From now on clicks into the 3-D view are meant for new points, each answered with a `Sightline`; or no more. */
