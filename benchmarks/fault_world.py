@@ -7,8 +7,9 @@ the plant's actuators, in the form of the simulator's trace, and nothing that th
 import random
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, cast
 
+import msgspec
 import numpy as np
 
 from bridge.config import BridgeConfig, OdometryConfig
@@ -26,7 +27,7 @@ from rolling_panda import intents
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
 from rolling_panda.control_messages import Person, Presence
-from rolling_panda.robot_model import RobotModel
+from rolling_panda.robot_model import RobotModel, configuration, pose_message
 from rolling_panda.row_messages import Obstacles
 from rolling_panda.teleop_messages import BaseVelocity, TeleopTarget
 
@@ -110,10 +111,12 @@ class Link:
 class World:
     """Bridge, controller and what the server and perception say, stepped by milliseconds."""
 
-    def __init__(self, seed: int) -> None:
-        """Everything is well; nothing moves yet."""
+    def __init__(self, seed: int, hand_speed: float | None = None) -> None:
+        """Everything is well; nothing moves yet. `hand_speed` (m/s) is in place of the configured one."""
         self.rng = random.Random(seed)
         self.config = ControllerConfig()
+        if hand_speed is not None:
+            self.config = msgspec.structs.replace(self.config, teleop_base_speed=hand_speed)
         self.robot = LaggedRobot(self.config.home)
         self.memory = Memory()
         self.bridge = self.new_bridge()
@@ -124,8 +127,10 @@ class World:
         self.ticks = 0
         self.inputs = Inputs(present=frozenset(m.PROCESSES))
         self.alive = self.server = self.heard = self.watched = self.perception = True
-        self.held_base: float | None = None
+        self.held: BaseVelocity | m.Pose | None = None
+        self.holds = True
         self.modes: list[str] = []
+        self.commanded: m.MotionCommand | None = None
         self.intruder: Callable[[World], None] = lambda world: None
         self._people: tuple[str, ...] = ()
 
@@ -192,22 +197,37 @@ class World:
         self.run(0.02)
         for intent in (intents.Arm(user=_USER), intents.AcceptAll(user=_USER), intents.Start(user=_USER)):
             self.ask(intent)
-        self._until_it_moves()
+        self._until_it_moves(1.2)
 
-    def hold(self) -> None:
+    def drive(self) -> None:
         """An operator drives the base by hand at its greatest speed."""
+        self._armed()
+        self.held = BaseVelocity(self.config.base_speed, 0.0)
+        wheel = self.config.teleop_base_speed / MODEL.drive.wheel_radius
+        self._until_it_moves(0.95 * wheel)
+
+    def lead(self) -> None:
+        """An operator leads the tool along the row, far ahead of it."""
+        self._armed()
+        joints, odometry = self.inputs.joints, self.inputs.odometry
+        assert joints is not None and odometry is not None
+        q = configuration(odometry.message.pose, joints.message.position)
+        here = MODEL.pose(q, MODEL.tool_id)
+        here.translation[0] += 2.0
+        self.held = pose_message(here)
+        self._until_it_moves(0.6)
+
+    def _armed(self) -> None:
         self._people = (_USER,)
         self.run(0.3)
         self.ask(intents.Arm(user=_USER))
         # A hold from before arming would count for nothing.
         self.run(0.05)
-        self.held_base = self.config.base_speed
-        self._until_it_moves()
 
-    def _until_it_moves(self) -> None:
+    def _until_it_moves(self, wheel: float) -> None:
         for _ in range(600):
             self.run(0.01)
-            if abs(self.robot.now.velocity[:2]).min() > (1.2 if self.held_base is None else 2.0):
+            if abs(self.robot.now.velocity[:2]).min() > wheel:
                 return
         raise RuntimeError(f"the robot does not move: {self.controller.mode}")
 
@@ -228,9 +248,10 @@ class World:
             changes["server_seen"] = self.now
             if self.ticks % 200 == 0:
                 changes["presence"] = Sample(Presence(sequence=self.ticks, people=people), self.now)
-            if self.held_base is not None and self.heard:
-                base = BaseVelocity(self.held_base, 0.0)
-                target = TeleopTarget(sequence=self.ticks, hold=self.held_base > 0.0, user=_USER, base=base)
+            if self.held is not None and self.heard:
+                base = self.held if isinstance(self.held, BaseVelocity) else None
+                pose = None if base is not None else cast(m.Pose, self.held)
+                target = TeleopTarget(sequence=self.ticks, hold=self.holds, user=_USER, base=base, target=pose)
                 changes["teleop"] = Sample(target, self.now)
         if self.perception:
             stamp = m.Header(self.now, "odom")
@@ -243,6 +264,7 @@ class World:
 
     def _send(self, out: Outputs) -> None:
         if out.motion is not None:
+            self.commanded = out.motion
             self.motion.push(out.motion, self.now)
         if out.cut is not None:
             self.bridge.on_cut(out.cut, self.now)

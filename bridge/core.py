@@ -143,9 +143,9 @@ class BridgeCore:
             return
         if command.epoch != epoch:
             self._remember()
-        self._watchdog.feed(now)
-        self._round_trip.back(command.echo, self._clock if clock is None else clock)
         self._desired = np.array(command.xi)
+        self._watchdog.feed(now, self._limiter.braking_s(self._desired))
+        self._round_trip.back(command.echo, self._clock if clock is None else clock)
 
     def on_cut(self, command: m.CutCommand, now: float) -> None:
         """Close the blades, once for a `cut_id`."""

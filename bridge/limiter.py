@@ -22,7 +22,7 @@ class Limiter:
             joint_margin: Distance to an arm joint's limit at which motion towards it has ended (rad).
             dt: Period of `step` (s).
         """
-        self._velocity = limits.velocity
+        self._velocity, self._dt = limits.velocity, dt
         acceleration = limits.acceleration.copy()
         acceleration[:2] = np.minimum(acceleration[:2], wheel_acceleration)
         self._change = acceleration * dt
@@ -38,6 +38,10 @@ class Limiter:
         """The robot moves like this now (9, rad/s), whatever was sent before."""
         self.sent = np.minimum(np.maximum(velocity, -self._velocity), self._velocity)
         self._last = np.zeros_like(self._last)
+
+    def braking_s(self, velocity: Array) -> float:
+        """How long coming to rest from a velocity (9, rad/s) takes (s), but for the arm's jerk."""
+        return float((np.abs(velocity) / self._change).max()) * self._dt
 
     def go_on_from(self, velocity: Array, change: Array) -> None:
         """The arm took this as its last velocity (7, rad/s) and change in a period, whatever was sent."""

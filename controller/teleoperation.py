@@ -11,7 +11,7 @@ from controller.motion import Follower, Measured, Tracking
 from rolling_panda.differential_drive import NXI, Array, DifferentialDrive
 from rolling_panda.errors import ModelError
 from rolling_panda.robot_model import ARM_XI, placement
-from rolling_panda.teleop_messages import TeleopTarget
+from rolling_panda.teleop_messages import BaseVelocity, TeleopTarget
 
 #: Who sees the robot no later than this (s) moves it at full speed, who sees it later than that at the slowest.
 _PROMPT_S, _LATE_S, _SLOWEST = 0.25, 0.5, 0.25
@@ -75,11 +75,17 @@ class Teleoperation:
             return self._follower.jog(xi, robot)
         if self._goal is None:
             assert message.base is not None
-            xi[:2] = self._drive.wheels(pace * message.base.linear, pace * message.base.angular)
+            xi[:2] = self._drive.wheels(*self._driven(message.base, pace))
             return self._follower.jog(xi, robot)
         if message.base is None:
             return self._follower.seek(self._goal, self._posture, robot, self._config.teleop_base, pace)
-        return self._follower.carry(self._goal, pace * message.base.linear, pace * message.base.angular, robot, pace)
+        return self._follower.carry(self._goal, *self._driven(message.base, pace), robot, pace)
+
+    def _driven(self, base: BaseVelocity, pace: float) -> tuple[float, float]:
+        """Forward velocity (m/s) and yaw rate (rad/s), slowed alike until no wheel is too fast to brake in time."""
+        fastest = abs(base.linear) + abs(base.angular) * self._drive.half_track
+        share = pace * min(1.0, self._config.teleop_base_speed / fastest) if fastest > 0.0 else 0.0
+        return share * base.linear, share * base.angular
 
 
 def pace_of(round_trip_s: float) -> float:

@@ -178,8 +178,15 @@ class Desk:
         """End this session's hold at once; its gizmo goes back to the tool."""
         self._refused_holds.pop(session.session_id, None)
         if self.teleop.release(session.session_id):
+            self._say_release()
             self._held_out(session.session_id, "The hold was ended from elsewhere. Press again to go on.")
             self.note("info", f"{session.user} let go of the tool")
+
+    def _say_release(self) -> None:
+        """At once: the robot brakes from when it hears of it, and the next turn of the loop repeats it."""
+        ended = self.teleop.due(time.monotonic())
+        if ended is not None:
+            self.link.teleop(ended)
 
     def end_lapsed_hold(self, now: float) -> None:
         """End the hold of whoever no longer renews it or no longer sees the robot."""

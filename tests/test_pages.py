@@ -188,8 +188,14 @@ def late_page():
             page.say("ShowGizmo", visible=True)
             page.hold(True)
             page.hear_event("ann holds the tool")
+            page.sent = wire.sent[topics.TELEOP.name]
             page.told = lambda: [event["text"] for event in client.get("/api/events").json()["events"]]
             yield page
+
+
+def test_letting_go_is_said_at_once_not_with_the_next_turn(late_page):
+    late_page.hold(False)
+    eventually(lambda: late_page.sent and not late_page.sent[-1].hold, 1.0)
 
 
 def test_a_hold_that_paused_for_a_moment_begins_anew_from_the_tool(late_page):

@@ -1,0 +1,62 @@
+"""Faults in full motion, judged by what the actuators were sent; `rolling-panda bench faults` has all of them."""
+
+import json
+from collections import Counter
+from dataclasses import replace
+
+import pytest
+
+from benchmarks.fault_kinds import FAULTS
+from benchmarks.faults import deal, main, run_trial
+
+NAMED = {fault.name: fault for fault in FAULTS}
+SHORT = ("software stop", "controller killed, base at full speed", "an older controller's commands")
+
+
+@pytest.mark.parametrize("name", SHORT)
+def test_the_most_important_ones_hold(name):
+    trial = run_trial(NAMED[name], seed=5)
+    assert trial.held, trial
+
+
+def test_trials_are_dealt_out_to_the_faults_of_a_requirement_each_with_a_seed_of_its_own():
+    count, seeds = Counter(), []
+    for fault, those in deal(FAULTS, seed=7, trials=10):
+        count[fault.requirement] += len(those)
+        seeds += those
+    assert set(count.values()) == {10} and {fault.requirement for fault in FAULTS} == set(count)
+    assert len(set(seeds)) == len(seeds)
+
+
+def test_a_fault_that_is_not_survived_in_time_is_told_and_counted(tmp_path, monkeypatch, capsys):
+    # With a limit that nothing can keep, the same stop is a failure.
+    strict = replace(NAMED["software stop in automatic work"], limit_s=0.001)
+    monkeypatch.setattr("benchmarks.faults.FAULTS", (strict,))
+    file = tmp_path / "faults.json"
+    assert main(["--seed", "4", "--trials", "1", "--json", str(file)]) == 1
+    document = json.loads(file.read_text())
+    summary, (row,) = document["summary"]["R3"], document["results"]
+    assert summary["n"] == 1 and not summary["held"] and summary["worst_s"] > summary["limit_s"] == 0.001
+    assert row["fault"] == strict.name and row["quiet_s"] == pytest.approx(summary["worst_s"])
+    assert "NOT HELD" in capsys.readouterr().out
+
+
+#: What is not met, and by how much, is in docs/safety.md.
+UNMET = {"release of the tool": "the base may be as fast as in automatic work, and brakes for 0.2 s from there"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "fault",
+    [
+        pytest.param(fault, marks=pytest.mark.xfail(strict=True, reason=UNMET[fault.name]))
+        if fault.name in UNMET
+        else fault
+        for fault in FAULTS
+    ],
+    ids=lambda fault: fault.name,
+)
+def test_every_fault_holds(fault):
+    for seed in range(20):
+        trial = run_trial(fault, seed)
+        assert trial.held, trial
