@@ -243,5 +243,6 @@ class Controller:
             allowed=allowed(now, self._situation(now)),
             inputs=self._inputs,
             queue=self._queue.entries(),
+            nearest=movement.body.surroundings.model.nearest,
             now=now,
         )

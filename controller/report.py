@@ -4,6 +4,7 @@ from controller.config import ControllerConfig
 from controller.interface import Inputs
 from controller.modes import State
 from controller.motion import Measured, Tracking
+from controller.whole_body.collision import Clearance
 from controller.whole_body.joint_limits import margin
 from controller.whole_body.manipulability import arm_omega
 from rolling_panda import messages as m
@@ -22,6 +23,7 @@ def controller_state(
     allowed: tuple[str, ...],
     inputs: Inputs,
     queue: tuple[m.QueueEntry, ...],
+    nearest: Clearance | None,
     now: float,
 ) -> m.ControllerState:
     """The message of what the controller does and sees now.
@@ -37,6 +39,7 @@ def controller_state(
         allowed: Intents that would be taken.
         inputs: Newest of everything.
         queue: Points in the order of work.
+        nearest: What the last step's method found nearest to the robot.
         now: Monotonic time (s).
     """
     omega = 0.0
@@ -65,4 +68,10 @@ def controller_state(
         ticks=inputs.ticks,
         late_ticks=inputs.late_ticks,
         queue=queue,
+        held_by="" if tracking is None else tracking.reason[:500],
+        near=None if tracking is None or nearest is None else _nearness(nearest),
     )
+
+
+def _nearness(nearest: Clearance) -> m.Nearness:
+    return m.Nearness(nearest.distance, " and ".join(nearest.pair)[:500])

@@ -202,6 +202,13 @@ class QueueEntry(Struct, frozen=True, forbid_unknown_fields=True):
     recorded: "PruningPoint | None" = None
 
 
+class Nearness(Struct, frozen=True, forbid_unknown_fields=True):
+    """The least distance (m) between two things that must not touch, and which; negative where they overlap."""
+
+    distance: Metre
+    what: Text
+
+
 class ControllerState(Message, frozen=True, kw_only=True):
     """Controller → all: mode, queue and the quality of tracking.
 
@@ -222,6 +229,8 @@ class ControllerState(Message, frozen=True, kw_only=True):
         ticks: Control periods since the start.
         late_ticks: Those of them that lasted more than half as long again as they should.
         queue: Every point known, in the order of work.
+        held_by: What keeps the robot from doing all that is asked of it now, by name; empty where nothing does.
+        near: What it is nearest to touching while it moves; None where nothing is near.
     """
 
     header: Header
@@ -241,6 +250,8 @@ class ControllerState(Message, frozen=True, kw_only=True):
     ticks: Count
     late_ticks: Count
     queue: tuple[QueueEntry, ...]
+    held_by: Text = ""
+    near: Nearness | None = None
 
 
 class Heartbeat(Message, frozen=True, kw_only=True):

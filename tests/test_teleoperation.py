@@ -13,6 +13,7 @@ from controller.teleoperation import Teleoperation, pace_of
 from rolling_panda import intents
 from rolling_panda.config import RobotConfig
 from rolling_panda.robot_model import pose_message
+from rolling_panda.row_messages import Capsule
 from rolling_panda.teleop_messages import BaseVelocity, TeleopTarget
 
 CONFIG = ControllerConfig()
@@ -76,6 +77,28 @@ def test_the_tool_keeps_to_its_share_of_the_speed(share):
     r.run(1.5)
     way = float(np.linalg.norm(tool(r).translation - before))
     assert 0.6 * share * 1.5 * CONFIG.teleop_speed < way <= 1.08 * share * 1.5 * CONFIG.teleop_speed
+
+
+def test_a_hand_is_told_how_near_it_is_to_what_and_what_holds_it():
+    r = robot()
+    here = tool(r).translation
+    hold(r, moved(tool(r), 0.0, 0.0, 0.0))
+    r.run(0.2)
+    assert r.state.near is None or r.state.near.distance > 0.03
+    assert r.state.held_by == ""
+    ahead = here + tool(r).rotation @ np.array([0.0, 0.0, 0.25])
+    bottom, top = ahead - [0.0, 0.0, 0.4], ahead + [0.0, 0.0, 0.4]
+    r.obstacles = (Capsule("post", tuple(bottom.tolist()), tuple(top.tolist()), 0.04, 0.04),)
+    target = pin.SE3(tool(r).rotation, tool(r).translation + tool(r).rotation @ np.array([0.0, 0.0, 0.3]))
+    r.run(0.2)
+    r.teleop = TeleopTarget(sequence=2, hold=True, user="ada", target=pose_message(target))
+    r.run(3.0)
+    assert r.state.mode == "TELEOP"
+    assert "post 0" in r.state.near.what and 0.0 < r.state.near.distance < 0.05
+    assert "post 0" in r.state.held_by
+    r.teleop = TeleopTarget(sequence=3, hold=False, user="ada")
+    r.run(0.2)
+    assert (r.state.near, r.state.held_by) == (None, ""), "nothing is said of what nobody moves"
 
 
 def test_base_comes_along_when_the_gizmo_goes_far_and_stays_parallel_to_the_row():

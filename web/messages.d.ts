@@ -130,6 +130,12 @@ export interface QueueEntry {
   recorded: PruningPoint|null;
 }
 
+/** The least distance (m) between two things that must not touch, and which; negative where they overlap. */
+export interface Nearness {
+  distance: number;
+  what: string;
+}
+
 /** Controller → all: mode, queue and the quality of tracking. */
 export interface ControllerState {
   type: "ControllerState";
@@ -166,6 +172,10 @@ export interface ControllerState {
   late_ticks: number;
   /** Every point known, in the order of work. */
   queue: QueueEntry[];
+  /** What keeps the robot from doing all that is asked of it now, by name; empty where nothing does. */
+  held_by: string;
+  /** What it is nearest to touching while it moves; None where nothing is near. */
+  near: Nearness|null;
 }
 
 /** How many messages of a topic were refused for one reason. */

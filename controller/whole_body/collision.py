@@ -87,6 +87,8 @@ class CollisionModel:
     _known: list[int]
     _known_for: float
     _known_at: Array
+    nearest: Clearance | None = None
+    """Of what the last `dampers` found; None where nothing was near."""
 
     def __init__(self, robot: RobotModel) -> None:
         """Build the robot's shapes and decide by sampling which of its pairs to watch (about 0.2 s)."""
@@ -200,12 +202,15 @@ class CollisionModel:
         near, results = self._nearer(self._known, influence), self._results
         jacobian, distance = np.empty((len(near), NXI)), np.empty(len(near))
         if not near:
+            self.nearest = None
             return Dampers(jacobian, distance, ())
         J, S = robot.data.J, kinematics.S
         for row, p in enumerate(near):
             result = results[p]
             distance[row] = result.min_distance
             _damper(self._normals[p], result.getNearestPoint1(), J, self._moves[p], S, jacobian[row])
+        closest = int(distance.argmin())
+        self.nearest = Clearance(float(distance[closest]), self._pair(near[closest]))
         return Dampers(jacobian, distance, tuple([self._pair(p) for p in near]))
 
     def _place(self, q: Array) -> None:
