@@ -1,6 +1,6 @@
 """`rolling-panda certificates`: an authority of one's own and a certificate for each process, to begin with.
 
-Whoever has an authority already makes these with it instead: what counts is the common name, which is the process's.
+Whoever has an authority already makes these with it instead: what counts is the common name, PROCESS.ROBOT.
 """
 
 import argparse
@@ -18,7 +18,8 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from rolling_panda import messages as m
 from rolling_panda.errors import InputError, RollingPandaError
-from rolling_panda.wire_access import ONLOOKER
+from rolling_panda.topics import ROBOT_ID
+from rolling_panda.wire_access import ONLOOKER, common_name
 
 ROUTER = "router"
 NAMES = (ROUTER, *m.PROCESSES, ONLOOKER)
@@ -39,9 +40,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--host", action="append", default=[], help="further name or address of the router; may be given several times"
     )
+    parser.add_argument(
+        "--robot", default=ROBOT_ID, metavar="ID", help="robot that they are for (default: %(default)s)"
+    )
     arguments = parser.parse_args(argv)
     try:
-        make(arguments.out, (*_HOSTS, *arguments.host), arguments.days)
+        make(arguments.out, (*_HOSTS, *arguments.host), arguments.days, arguments.robot)
     except RollingPandaError as error:
         print(f"rolling-panda certificates: {error}", file=sys.stderr)
         return 1
@@ -50,13 +54,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
-def make(folder: Path, hosts: Sequence[str], days: int) -> None:
+def make(folder: Path, hosts: Sequence[str], days: int, robot_id: str = ROBOT_ID) -> None:
     """Write ca.pem and a certificate with its key for each of `NAMES`.
 
     Args:
         folder: Is made; must not exist yet.
         hosts: Names and addresses by which the router is reached.
         days: How long they are good for.
+        robot_id: The robot whose processes they are for.
 
     Raises:
         InputError: The folder is there already or cannot be made, or a value makes no sense.
@@ -80,12 +85,14 @@ def make(folder: Path, hosts: Sequence[str], days: int) -> None:
     )
     _write(folder / "ca.pem", root.public_bytes(serialization.Encoding.PEM), 0o644)
     for name in NAMES:
-        _issue(folder, name, hosts if name == ROUTER else (name,), authority, issuer, end)
+        common = ROUTER if name == ROUTER else common_name(name, robot_id)
+        _issue(folder, name, common, hosts if name == ROUTER else (name,), authority, issuer, end)
 
 
 def _issue(
     folder: Path,
     name: str,
+    common: str,
     hosts: Sequence[str],
     authority: ec.EllipticCurvePrivateKey,
     issuer: x509.Name,
@@ -94,7 +101,7 @@ def _issue(
     key = ec.generate_private_key(ec.SECP256R1())
     purpose = ExtendedKeyUsageOID.SERVER_AUTH if name == ROUTER else ExtendedKeyUsageOID.CLIENT_AUTH
     certificate = (
-        _certificate(_name(name), issuer, key.public_key(), end)
+        _certificate(_name(common), issuer, key.public_key(), end)
         .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
         .add_extension(_usage(authority=False), critical=True)
         .add_extension(x509.ExtendedKeyUsage([purpose]), critical=False)

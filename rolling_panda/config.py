@@ -28,6 +28,7 @@ class TransportConfig(Struct, frozen=True, forbid_unknown_fields=True):
         listen: Endpoints to listen on.
         connect_timeout_s: How long to try before giving up at the start; later losses are retried for ever.
         certificates: Folder with ca.pem and this process's NAME.pem and NAME.key, for mutual TLS; empty for none.
+        robots: Ids of the robots that a router with certificates serves.
     """
 
     mode: Literal["client", "peer", "router"] = "client"
@@ -35,6 +36,7 @@ class TransportConfig(Struct, frozen=True, forbid_unknown_fields=True):
     listen: tuple[str, ...] = ()
     connect_timeout_s: Positive = 10.0
     certificates: str = ""
+    robots: tuple[str, ...] = ("rp1",)
 
 
 class RobotConfig(Struct, frozen=True, forbid_unknown_fields=True):

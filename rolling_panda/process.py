@@ -18,9 +18,9 @@ from rolling_panda.errors import RollingPandaError
 from rolling_panda.priority import Role, take_priority
 from rolling_panda.resources import resource
 from rolling_panda.state_folder import open_state_folder, usual_state_folder
+from rolling_panda.topics import ROBOT_ID as ROBOT_ID
 from rolling_panda.transport import Transport
 
-ROBOT_ID = "rp1"
 _PRIORITY: dict[m.Process, Role] = {
     "bridge": "control",
     "controller": "control",

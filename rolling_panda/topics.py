@@ -21,6 +21,9 @@ from rolling_panda import (
 )
 from rolling_panda import messages as m
 
+#: A robot that nobody has named otherwise.
+ROBOT_ID = "rp1"
+
 Priority = Literal["REAL_TIME", "INTERACTIVE_HIGH", "DATA_LOW", "BACKGROUND"]
 Congestion = Literal["DROP", "BLOCK"]
 Msg = TypeVar("Msg", bound=m.Message)
@@ -34,7 +37,7 @@ class Topic(Generic[Msg]):
     Attributes:
         name: Last part of the key.
         message: The only type accepted on it.
-        sender: Process that publishes, or "any".
+        sender: Process that publishes, several with commas between, or "any".
         rate_hz: Nominal rate; 0 = when something happens.
         priority: Zenoh priority.
         congestion: What happens to a message when the wire is full.
@@ -52,6 +55,10 @@ class Topic(Generic[Msg]):
     about: str
     express: bool = False
     latched: bool = False
+
+    def said_by(self, process: m.Process) -> bool:
+        """Whether this process may publish it."""
+        return self.sender == "any" or process in self.sender.split(", ")
 
 
 @dataclass(frozen=True)
@@ -119,7 +126,7 @@ CONTROL = Topic(
     "who holds control of the robot's motion",
 )
 STOPS = Topic(
-    "state/stops", control_messages.StopState, "any", 2, "INTERACTIVE_HIGH", "DROP",
+    "state/stops", control_messages.StopState, "bridge, controller", 2, "INTERACTIVE_HIGH", "DROP",
     "stops latched by the bridge and by the controller, at once when they change", latched=True,
 )
 HARDWARE_STOP = Topic(

@@ -1,13 +1,15 @@
 """Who may say what on the robot's wire: the router's access control, made from the table of topics and services.
 
-Everything that is not listed is refused by the router. A process is known by the common name of its certificate, so
-this needs mutual TLS (`rolling_panda.certificates`).
+Everything that is not listed is refused by the router. A process of a robot is known by the common name of its
+certificate, so this needs mutual TLS (`rolling_panda.certificates`); with the certificate of one robot nothing can be
+said to another at the same router.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 from rolling_panda import messages as m
-from rolling_panda.topics import SERVICES, TOPICS, key
+from rolling_panda.topics import ROBOT_ID, SERVICES, TOPICS, key
 
 #: May listen and say nothing: `rolling-panda status`, a recorder.
 ONLOOKER = "onlooker"
@@ -17,8 +19,6 @@ CALLERS: dict[str, tuple[m.Process, ...]] = {
     "service/release": ("controller",),
     "service/plant": ("server",),
 }
-#: Any robot: keys begin with its name.
-_EVERY_ROBOT = "*"
 _LISTENING = ("declare_subscriber", "liveliness_query", "declare_liveliness_subscriber")
 _EVERYTHING = (
     "put",
@@ -33,44 +33,54 @@ _EVERYTHING = (
 )
 
 
-def access_control() -> dict[str, Any]:
-    """Zenoh's `access_control` for the router: default deny, one policy a process."""
-    every = key(_EVERY_ROBOT, "**")
-    rules = [
+def common_name(name: str, robot_id: str) -> str:
+    """What the certificate of a robot's process, or of its onlooker, says its bearer is."""
+    return f"{name}.{robot_id}"
+
+
+def access_control(robots: Sequence[str] = (ROBOT_ID,)) -> dict[str, Any]:
+    """Zenoh's `access_control` for a router: default deny, one policy for each process of each robot."""
+    rules: list[dict[str, Any]] = []
+    policies: list[dict[str, Any]] = []
+    names: list[str] = []
+    for robot in robots:
+        every = [key(robot, "**")]
+        shared = [f"{robot}: hear", f"{robot}: listen"]
         # What reaches a process was let in by its sender's rules; who has no rules is sent nothing.
-        _rule("hear", "egress", _EVERYTHING, [every]),
-        _rule("listen", "ingress", _LISTENING, [every]),
-    ]
-    policies = [{"rules": ["hear", "listen"], "subjects": [ONLOOKER]}]
-    for process in m.PROCESSES:
-        own = {
-            "put": (("put",), _published(process)),
-            "answer": (("declare_queryable", "reply"), _answered(process)),
-            "ask": (("query",), _asked(process)),
-            "alive": (("liveliness_token",), [key(_EVERY_ROBOT, f"alive/{process}")]),
-        }
-        named = {f"{process} may {what}": told for what, told in own.items() if told[1]}
-        rules += [_rule(name, "ingress", messages, keys) for name, (messages, keys) in named.items()]
-        policies.append({"rules": ["hear", "listen", *named], "subjects": [process]})
+        rules.append(_rule(shared[0], "egress", _EVERYTHING, every))
+        rules.append(_rule(shared[1], "ingress", _LISTENING, every))
+        policies.append({"rules": shared, "subjects": [common_name(ONLOOKER, robot)]})
+        for process in m.PROCESSES:
+            own = _own(process, robot)
+            rules += own
+            told = [*shared, *(rule["id"] for rule in own)]
+            policies.append({"rules": told, "subjects": [common_name(process, robot)]})
+        names += [common_name(name, robot) for name in (*m.PROCESSES, ONLOOKER)]
     return {
         "enabled": True,
         "default_permission": "deny",
         "rules": rules,
-        "subjects": [{"id": name, "cert_common_names": [name]} for name in (*m.PROCESSES, ONLOOKER)],
+        "subjects": [{"id": name, "cert_common_names": [name]} for name in names],
         "policies": policies,
     }
 
 
-def _published(process: m.Process) -> list[str]:
-    return [key(_EVERY_ROBOT, topic.name) for topic in TOPICS if topic.sender in (process, "any")]
-
-
-def _answered(process: m.Process) -> list[str]:
-    return [key(_EVERY_ROBOT, service.name) for service in SERVICES if service.server == process]
-
-
-def _asked(process: m.Process) -> list[str]:
-    return [key(_EVERY_ROBOT, name) for name, callers in CALLERS.items() if process in callers]
+def _own(process: m.Process, robot: str) -> list[dict[str, Any]]:
+    """Rules for what is a process's own to say, answer and ask."""
+    own: dict[str, tuple[tuple[str, ...], list[str]]] = {
+        "put": (("put",), [topic.name for topic in TOPICS if topic.said_by(process)]),
+        "answer": (
+            ("declare_queryable", "reply"),
+            [service.name for service in SERVICES if service.server == process],
+        ),
+        "ask": (("query",), [name for name, callers in CALLERS.items() if process in callers]),
+        "alive": (("liveliness_token",), [f"alive/{process}"]),
+    }
+    return [
+        _rule(f"{robot}: {process} may {what}", "ingress", messages, [key(robot, name) for name in names])
+        for what, (messages, names) in own.items()
+        if names
+    ]
 
 
 def _rule(name: str, flow: str, messages: tuple[str, ...], keys: list[str]) -> dict[str, Any]:

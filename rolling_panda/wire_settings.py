@@ -47,5 +47,5 @@ def _secure(config: TransportConfig, name: str) -> dict[str, Any]:
         f"transport/link/tls/{side}_private_key": str(private),
     }
     if config.mode == "router":
-        settings["access_control"] = access_control()
+        settings["access_control"] = access_control(config.robots)
     return settings

@@ -1,7 +1,5 @@
 """The application: routes, error answers and the guard around them."""
 
-import time
-from collections import defaultdict, deque
 from typing import Any
 
 import msgspec
@@ -27,8 +25,6 @@ from server.sessions import Session
 from server.site import site_router
 from server.viser_proxy import viser_router
 
-#: Of the frames of a session that were dropped, so many are told in so long (s).
-_TOLD, _TOLD_S = 10, 10.0
 _ABOUT = (
     "Everything that the page can do. Sign in with `POST /api/sign-in` and the token of a sign-in link, keep the "
     "cookie, and send an `Origin` header with the server's own address on every POST. A link signs in once; "
@@ -69,15 +65,8 @@ def create_app(desk: Desk, origins: frozenset[str]) -> ASGIApp:
         redirect_slashes=False,
     )
 
-    told: defaultdict[str, deque[float]] = defaultdict(lambda: deque(maxlen=_TOLD))
-
     def dropped(session: Session, kind: str) -> None:
-        # A view that sends a thousand of them a second must not fill the log.
-        now, times = time.monotonic(), told[session.client]
-        if len(times) == _TOLD and now - times[0] < _TOLD_S:
-            return
-        times.append(now)
-        desk.note("warning", f"a view of {session.user} sent {kind!r} to the 3-D view; dropped")
+        desk.note("warning", f"a view of {session.user} sent {kind!r} to the 3-D view; dropped", session.client)
 
     app.include_router(site_router(desk, web))
     app.include_router(operator_router(desk))
@@ -94,7 +83,7 @@ def create_app(desk: Desk, origins: frozenset[str]) -> ASGIApp:
         origins,
         desk.cookie,
         desk.config.max_body_bytes,
-        on_refusal=lambda text: desk.note("warning", text),
+        on_refusal=lambda text: desk.note("warning", text, "a foreign page"),
     )
 
 

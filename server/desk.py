@@ -20,6 +20,7 @@ from server.motion_rate import MotionRate
 from server.page_view import PageView
 from server.passwords import Passwords
 from server.presence import PresentPeople
+from server.quiet import Quiet
 from server.robot_link import RobotLink
 from server.scene import Scene
 from server.sessions import Session, Sessions
@@ -74,6 +75,7 @@ class Desk:
     cookie: str
     passwords: Passwords | None = None
     motion: MotionRate = field(default_factory=MotionRate)
+    quiet: Quiet = field(default_factory=Quiet)
     pages: set["Listener"] = field(default_factory=set)
     state: PageState | None = None
     points: PagePoints | None = None
@@ -81,8 +83,11 @@ class Desk:
     _users_trouble: str = ""
     _refused_holds: dict[str, str] = field(default_factory=dict)
 
-    def note(self, severity: m.Severity, text: str) -> None:
-        """Write a line of the server's own into the log, here and on the wire."""
+    def note(self, severity: m.Severity, text: str, by: str = "") -> None:
+        """Write a line of the server's own into the log, here and on the wire; `by` whom, who must not fill it."""
+        text = self.quiet.line(by, text, time.monotonic()) if by else text
+        if not text:
+            return
         self.log.add("server", severity, text[:500], time.time())
         self.link.event(severity, text, time.monotonic())
 
@@ -119,7 +124,9 @@ class Desk:
         result = await self._asked(session, name, "perception", lambda: self.link.ask_perception(request))
         if result.status in (200, 409):
             self.note(
-                "info", f"{name} by {session.user}: {result.reason if result.ok else 'refused, ' + result.reason}"
+                "info",
+                f"{name} by {session.user}: {result.reason if result.ok else 'refused, ' + result.reason}",
+                session.client,
             )
         return result
 
@@ -130,7 +137,7 @@ class Desk:
         try:
             answer = await ask()
         except ServiceError as error:
-            self.note("error", f"{name} by {session.user}: no answer from {whom}")
+            self.note("error", f"{name} by {session.user}: no answer from {whom}", session.client)
             return Result(503, False, f"{whom[0].upper()}{whom[1:]} does not answer: {error}")
         return Result(200 if answer.ok else 409, answer.ok, answer.reason)
 
@@ -142,7 +149,7 @@ class Desk:
         if holder is not None:
             self.teleop.release(holder)
             self._held_out(holder, "The robot was stopped.")
-        self.note("warning", f"software stop by {session.user}: {reason}")
+        self.note("warning", f"software stop by {session.user}: {reason}", f"stop {session.client}")
         while (missing := self.link.not_latched(stop_id)) and time.monotonic() - sent_at < self.config.stop_confirm_s:
             await asyncio.sleep(_CONFIRM_POLL_S)
         if "bridge" in missing:
@@ -163,6 +170,9 @@ class Desk:
         key = session.session_id
         if not session.may_operate:
             return self._refuse_hold(session, f"a {session.role} may look and stop, not operate", 403)
+        if not self.may_move(session):
+            # Whoever may not move the robot must not keep the tool from who may.
+            return self._refuse_hold(session, "somebody else holds control of the robot; ask for it, or take it", 409)
         self.end_lapsed_hold(now)
         was_holding = self.teleop.holder == key
         try:
@@ -171,7 +181,7 @@ class Desk:
             return self._refuse_hold(session, str(error), 409)
         self._refused_holds.pop(key, None)
         if not was_holding:
-            self.note("info", f"{session.user} holds the tool")
+            self.note("info", f"{session.user} holds the tool", session.client)
         return Result(200, True, "holding")
 
     def let_go(self, session: Session) -> None:
@@ -180,7 +190,7 @@ class Desk:
         if self.teleop.release(session.session_id):
             self._say_release()
             self._held_out(session.session_id, "The hold was ended from elsewhere. Press again to go on.")
-            self.note("info", f"{session.user} let go of the tool")
+            self.note("info", f"{session.user} let go of the tool", session.client)
 
     def _say_release(self) -> None:
         """At once: the robot brakes from when it hears of it, and the next turn of the loop repeats it."""
@@ -213,7 +223,8 @@ class Desk:
             return
         tool = self.view.tool(time.monotonic())
         if not session.may_operate or tool is None:
-            self.note("warning", f"no gizmo for {session.user}: the tool's place is not known, or the role is viewer")
+            why = "the tool's place is not known, or the role is viewer"
+            self.note("warning", f"no gizmo for {session.user}: {why}", session.client)
             return
         self.let_go(session)
         self.scene.show_gizmo(session.session_id, tool, axes)
@@ -290,5 +301,5 @@ class Desk:
         # Held buttons repeat at 20 Hz; one line for each new reason is enough.
         if self._refused_holds.get(session.session_id) != reason:
             self._refused_holds[session.session_id] = reason
-            self.note("warning", f"hold by {session.user} refused: {reason}")
+            self.note("warning", f"hold by {session.user} refused: {reason}", session.client)
         return Result(status, False, reason)

@@ -27,6 +27,7 @@ from rolling_panda.page_messages import (
     Sightline,
 )
 from server.desk import Desk
+from server.frame_rate import FRAMES_HZ, Frames
 from server.page_view import addressed
 from server.sessions import Session
 from server.teleop import Aim
@@ -59,6 +60,7 @@ class OpenPage:
         self._held_at = 0.0
         #: The button is still pressed, but its hold is over: only a new press starts another.
         self._spent = False
+        self._frames = Frames()
         #: Tells this page from others of the same session.
         self.view = f"page {secrets.token_hex(8)}"
 
@@ -142,16 +144,23 @@ class OpenPage:
         try:
             while True:
                 text = await self._websocket.receive_text()
+                if not self._frames.admits(time.monotonic()):
+                    self._closed_for("it said too much")
+                    await self._close(f"a page may say {FRAMES_HZ:.0f} things a second")
+                    return
                 try:
                     message = _DECODER.decode(text)
                 except (msgspec.MsgspecError, UnicodeEncodeError, RecursionError) as error:
-                    self._desk.note("warning", f"a page of {self.session.user} was closed: {str(error)[:200]}")
+                    self._closed_for(str(error)[:200])
                     await self._close("this message is not one that a page may send")
                     return
                 self._take(message)
         except (WebSocketDisconnect, KeyError, RuntimeError):
             # KeyError: a binary frame, which no page sends.
             return
+
+    def _closed_for(self, reason: str) -> None:
+        self._desk.note("warning", f"a page of {self.session.user} was closed: {reason}", self.session.client)
 
     def _take(self, message: FromPage) -> None:
         match message:

@@ -153,6 +153,8 @@ async def _site(
             access_log=False,
             lifespan="off",
             server_header=False,
+            # Whoever says in a header that they come from elsewhere is still who connects.
+            proxy_headers=False,
             ws_max_size=config.max_body_bytes,
             ws_per_message_deflate=False,
             timeout_graceful_shutdown=1,

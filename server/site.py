@@ -56,7 +56,7 @@ def site_router(desk: Desk, web: Path) -> APIRouter:
             session = await _signed_in(request, address)
         except SignInError as error:
             whose = f" as {request.user!r}" if request.user is not None else ""
-            desk.note("warning", f"sign-in{whose} from {address} refused: {error}")
+            desk.note("warning", f"sign-in{whose} from {address} refused: {error}", f"sign-in {address}")
             if error.wait_s > 0:
                 refused = answer(Result(429, False, str(error)))
                 refused.headers["Retry-After"] = str(max(1, round(error.wait_s)))

@@ -5,6 +5,7 @@ import subprocess
 import time
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -21,6 +22,8 @@ from rolling_panda.transport import Onlooker, Router, Transport
 from rolling_panda.wire_access import CALLERS, ONLOOKER, access_control
 
 pytestmark = pytest.mark.alone
+
+ROBOTS = ("rp1", "rp2")
 
 
 def free_port() -> int:
@@ -74,7 +77,7 @@ def test_each_topic_carries_what_its_sender_says_and_nobody_elses_word(certifica
         finally:
             for sender in senders:
                 sender.close()
-    allowed = {(process, topic.name) for topic in TOPICS for process in m.PROCESSES if topic.sender in (process, "any")}
+    allowed = {(process, topic.name) for topic in TOPICS for process in m.PROCESSES if topic.said_by(process)}
     assert got == allowed
 
 
@@ -108,7 +111,39 @@ def test_the_table_names_the_callers_of_every_service() -> None:
     assert INTENT.name in CALLERS
     told = access_control()
     assert told["default_permission"] == "deny"
-    assert {subject["cert_common_names"][0] for subject in told["subjects"]} == {*m.PROCESSES, ONLOOKER}
+    names = {subject["cert_common_names"][0] for subject in told["subjects"]}
+    assert names == {f"{name}.rp1" for name in (*m.PROCESSES, ONLOOKER)}
+
+
+def test_every_rule_is_for_one_robot() -> None:
+    told = access_control(ROBOTS)
+    for rule in told["rules"]:
+        robot = rule["id"].split(":")[0]
+        assert all(expression.startswith(f"rp/{robot}/") for expression in rule["key_exprs"]), rule
+    for policy in told["policies"]:
+        robot = policy["subjects"][0].rsplit(".", 1)[1]
+        assert policy["rules"] and all(rule.startswith(f"{robot}:") for rule in policy["rules"])
+
+
+def test_one_robots_certificates_say_nothing_to_another_robot(tmp_path: Path) -> None:
+    """Two robots at one router: a process is heard on its own robot's keys."""
+    endpoint, folder = f"tls/127.0.0.1:{free_port()}", tmp_path / "two"
+    make(folder, ("127.0.0.1",), 2, "rp2")
+    settings = config(endpoint, folder)
+    router = Router(msgspec.structs.replace(settings, mode="router", connect=(), listen=(endpoint,), robots=ROBOTS))
+    got: set[str] = set()
+    # The router's own session hears whatever the router lets in.
+    router._session.declare_subscriber("rp/**", lambda sample: got.add(str(sample.key_expr)))
+    try:
+        with Transport(settings, "controller", "rp2") as controller:
+            end = time.monotonic() + 10.0
+            while key("rp2", MOTION.name) not in got and time.monotonic() < end:
+                for robot in ROBOTS:
+                    controller._session.put(key(robot, MOTION.name), b"")
+                time.sleep(0.05)
+        assert got == {key("rp2", MOTION.name)}
+    finally:
+        router.close()
 
 
 def test_without_a_certificate_of_this_authority_nobody_comes_in(
