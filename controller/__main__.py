@@ -30,7 +30,8 @@ def _run(context: ProcessContext) -> None:
     folder = context.state_folder
     controller = Controller(config, robot_config, run_id, starts=count_start(folder))
     stop_file = open_stop_file(folder)
-    controller.restore(restored(folder), stop_file.stops)
+    tickets, order = restored(folder)
+    controller.restore(tickets, stop_file.stops, order)
     ledger = LedgerWriter(lambda: Ledger(folder))
     ledger.write([start_record(context.config_path, run_id)])
     planner = PlanWorker(config, robot_config)

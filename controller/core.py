@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from controller.authority import ABOUT_CONTROL, MOTION, client_of
 from controller.config import ControllerConfig
 from controller.interface import Inputs, Outputs
-from controller.journal import Journal, RequestRow, TicketRow
+from controller.journal import Journal, OrderRow, RequestRow, TicketRow
 from controller.lines import Lines
 from controller.modes import Event
 from controller.motion import Tracking
@@ -88,8 +88,12 @@ class Controller:
         """Of the motion that the last step followed; None while nothing was followed."""
         return self._movement.tracking
 
-    def restore(self, rows: Iterable[TicketRow], stops: tuple[StopRecord, ...] = ()) -> None:
-        """Take up the queue and the latched stops of an earlier start; nothing resumes by itself."""
+    def restore(
+        self, rows: Iterable[TicketRow], stops: tuple[StopRecord, ...] = (), order: OrderRow | None = None
+    ) -> None:
+        """Take up the queue, its order and the latched stops of an earlier start; nothing resumes by itself."""
+        if order is not None:
+            self._queue.order.restore(order)
         self._queue.restore(rows)
         self._supervisor.restore(stops)
 
@@ -244,5 +248,6 @@ class Controller:
             inputs=self._inputs,
             queue=self._queue.entries(),
             nearest=movement.body.surroundings.model.nearest,
+            order=self._queue.order.state,
             now=now,
         )

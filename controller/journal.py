@@ -10,8 +10,9 @@ import msgspec
 from rolling_panda import intents
 from rolling_panda import messages as m
 
-#: What a row is about: a life of a point, what somebody asked and how it was answered, a stop, a log line, a start.
-Kind = Literal["ticket", "request", "stop", "event", "start"]
+#: What a row is about: a life of a point, an order of work, what somebody asked and how it was answered, a stop, a
+#: log line, a start.
+Kind = Literal["ticket", "order", "request", "stop", "event", "start"]
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,14 @@ class TicketRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     accepted: m.PruningPoint | None = None
     hash: str = ""
     cut_id: str = ""
+
+
+class OrderRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The order of work as `user` has put it, none where the plan says; `revision` counts people's changes of it."""
+
+    order: tuple[str, ...]
+    revision: int
+    user: str = ""
 
 
 class RequestRow(msgspec.Struct, frozen=True, kw_only=True):

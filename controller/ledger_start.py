@@ -6,7 +6,7 @@ from pathlib import Path
 
 import msgspec
 
-from controller.journal import Record, TicketRow
+from controller.journal import OrderRow, Record, TicketRow
 from controller.ledger import Ledger
 from rolling_panda import __version__
 from rolling_panda.errors import LedgerError
@@ -35,20 +35,25 @@ def start_record(config: Path, run_id: str) -> Record:
     return Record(0, "start", "controller", row)
 
 
-def restored(folder: Path) -> tuple[TicketRow, ...]:
-    """The newest row of each point in the ledger of a folder.
+def restored(folder: Path) -> tuple[tuple[TicketRow, ...], OrderRow | None]:
+    """The newest row of each point in the ledger of a folder, and the order of work if people have put one.
 
     Raises:
         LedgerError: The ledger cannot be opened, or a row is not what this version writes.
     """
     with Ledger(folder) as ledger:
-        found = []
-        for name, body in ledger.newest("ticket"):
+        found: list[TicketRow] = []
+        order: OrderRow | None = None
+        told = [(kind, *row) for kind in ("ticket", "order") for row in ledger.newest(kind)]
+        for kind, name, body in told:
             try:
-                found.append(msgspec.json.decode(body, type=TicketRow))
+                if kind == "ticket":
+                    found.append(msgspec.json.decode(body, type=TicketRow))
+                else:
+                    order = msgspec.json.decode(body, type=OrderRow)
             except msgspec.MsgspecError as error:
                 raise LedgerError(
-                    f"the ledger {ledger.path} tells of point {name} what this version does not understand: {error}; "
+                    f"the ledger {ledger.path} tells of {kind} {name} what this version does not understand: {error}; "
                     f"keep the folder, and give another one with --state"
                 ) from error
-        return tuple(found)
+        return tuple(found), order

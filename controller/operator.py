@@ -24,6 +24,10 @@ class Operator:
             return self._queue.decide(intent.point_id, intent.outcome, intent.user, intent.reason)
         if isinstance(intent, intents.AcceptAll):
             return self._accept_all(intent)
+        if isinstance(intent, intents.MoveInQueue):
+            return self._queue.move(intent.point_id, intent.before, intent.revision, intent.user)
+        if isinstance(intent, intents.PlannersOrder):
+            return self._queue.order.give_back(intent.revision) or self._queue.sort()
         return f"{type(intent).__name__} is not something this controller does"
 
     def told(self, intent: intents.Intent) -> str:
@@ -40,6 +44,10 @@ class Operator:
         if isinstance(intent, intents.AcceptAll):
             points = "1 point" if self._accepted == 1 else f"{self._accepted} points"
             return f"accepted {points} of confidence {intent.confidence:.2f} and more"
+        if isinstance(intent, intents.MoveInQueue):
+            return f"moved {intent.point_id} {f'before {intent.before}' if intent.before else 'to the end'}"
+        if isinstance(intent, intents.PlannersOrder):
+            return "gave the order of work back to the plan"
         return "home" if isinstance(intent, intents.Home) else ""
 
     def _accept_all(self, intent: intents.AcceptAll) -> str:

@@ -26,6 +26,8 @@ _PROBES: dict[type[intents.Intent], intents.Intent | None] = {
     intents.ReconsiderPoint: None,
     intents.ResolvePoint: None,
     intents.AcceptAll: None,
+    intents.MoveInQueue: None,
+    intents.PlannersOrder: None,
     intents.Start: intents.Start(user=""),
     intents.Survey: intents.Survey(user=""),
     intents.Pause: intents.Pause(user=""),

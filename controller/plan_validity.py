@@ -29,12 +29,13 @@ _SHARES = np.linspace(0.0, 1.0, 9)
 _WORKED: frozenset[PointState] = frozenset({"INTENT", "DONE", "FAILED_NOT_CUT", "UNKNOWN"})
 
 
-def points_changed(plan: WorkPlan, tickets: Iterable[Ticket]) -> str:
-    """How the accepted points differ from the planned ones; empty where they do not.
+def points_changed(plan: WorkPlan, tickets: Iterable[Ticket], order: tuple[str, ...] = ()) -> str:
+    """How the accepted points and their order differ from the planned ones; empty where they do not.
 
     Args:
         plan: The plan.
         tickets: All of the queue.
+        order: That people want them in.
     """
     planned = {point.point_id: point for point in plan.request.points}
     now = {ticket.point.point_id: ticket for ticket in tickets}
@@ -48,7 +49,7 @@ def points_changed(plan: WorkPlan, tickets: Iterable[Ticket]) -> str:
     for point_id in planned:
         if point_id not in now or now[point_id].state not in {"ACCEPTED", *_WORKED}:
             return f"{point_id} is no longer accepted"
-    return ""
+    return "" if plan.request.order == order else "the order of work was changed after it was made"
 
 
 def place_changed(plan: WorkPlan, q: Array) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 
 from controller.config import ControllerConfig
 from controller.journal import Journal, TicketRow
+from controller.work_order import WorkOrder
 from rolling_panda.differential_drive import Array
 from rolling_panda.messages import PointState, PruningPoint, PruningPoints, QueueEntry
 from rolling_panda.point_digest import point_digest
@@ -63,7 +64,8 @@ class PointQueue:
         self._tickets: dict[str, Ticket] = {}
         self._order: list[str] = []
         self._entries: tuple[QueueEntry, ...] | None = None
-        self._wanted: tuple[str, ...] = ()
+        self.order = WorkOrder(self._journal)
+        """How the accepted points are ordered; `sort` after it has changed."""
         self._notes: dict[str, str] = {}
 
     def update(self, points: PruningPoints, keep: str = "") -> list[str]:
@@ -103,7 +105,7 @@ class PointQueue:
                 self._drop(point_id)
             else:
                 self._put(point_id, gone)
-        self._sort()
+        self.sort()
         return voided
 
     def get(self, point_id: str) -> Ticket | None:
@@ -197,8 +199,9 @@ class PointQueue:
             order: Ids of accepted points; none for the order along the row.
             notes: What is said of accepted points meanwhile, by id.
         """
-        self._wanted, self._notes, self._entries = order, notes or {}, None
-        self._sort()
+        self.order.plan(order)
+        self._notes, self._entries = notes or {}, None
+        self.sort()
 
     def intend(self, point_id: str, cut_id: str) -> int:
         """ACCEPTED → INTENT: the blades are about to move. Returns the number of its record."""
@@ -237,7 +240,7 @@ class PointQueue:
                 self._put(point_id, replace(self._tickets[point_id], state="REJECTED", reason=_UNBOUND, accepted=None))
             elif row.state == "ACCEPTED":
                 self._put(point_id, replace(self._tickets[point_id], reason=_WAITS))
-        self._sort()
+        self.sort()
 
     def decide(self, point_id: str, outcome: PointState, user: str, reason: str) -> str:
         """Somebody has looked how an UNKNOWN cut ended; returns why that is not taken, empty when it is."""
@@ -271,14 +274,25 @@ class PointQueue:
         voided.append(f"{ticket.point.point_id}: {text}")
         return replace(ticket, state="PROPOSED", reason=text, accepted=None, hash="")
 
-    def _sort(self) -> None:
-        self._order.sort(key=self._place)
-        wanted = [i for i in self._wanted if i in self._tickets and self._tickets[i].state == "ACCEPTED"]
-        among = set(wanted)
-        following = iter(wanted)
-        order = [next(following) if point_id in among else point_id for point_id in self._order]
+    def move(self, point_id: str, before: str, revision: int, user: str) -> str:
+        """Work on an accepted point before another one, or last; returns why not, empty when done.
+
+        Args:
+            point_id: What is moved.
+            before: What is worked on after it; empty for the end.
+            revision: Of the order that the operator saw.
+            user: Who moves it.
+        """
+        accepted = [name for name in self._order if self._tickets[name].state == "ACCEPTED"]
+        return self.order.move(point_id, before, revision, user, accepted) or self.sort()
+
+    def sort(self) -> str:
+        """Put everything where it belongs; nothing keeps that from being done."""
+        along = sorted(self._order, key=self._place)
+        order = self.order.arranged(along, lambda name: self._tickets[name].state == "ACCEPTED")
         if order != self._order:
             self._order, self._entries = order, None
+        return ""
 
     def _place(self, point_id: str) -> tuple[float, str]:
         ticket = self._tickets[point_id]

@@ -24,6 +24,7 @@ def controller_state(
     inputs: Inputs,
     queue: tuple[m.QueueEntry, ...],
     nearest: Clearance | None,
+    order: m.QueueOrder,
     now: float,
 ) -> m.ControllerState:
     """The message of what the controller does and sees now.
@@ -40,6 +41,7 @@ def controller_state(
         inputs: Newest of everything.
         queue: Points in the order of work.
         nearest: What the last step's method found nearest to the robot.
+        order: Whose order that is.
         now: Monotonic time (s).
     """
     omega = 0.0
@@ -70,6 +72,7 @@ def controller_state(
         queue=queue,
         held_by="" if tracking is None else tracking.reason[:500],
         near=None if tracking is None or nearest is None else _nearness(nearest),
+        order=order,
     )
 
 

@@ -9,7 +9,6 @@ from controller.plan_validity import ObstacleWatch, place_changed, points_change
 from controller.queue import PointQueue, Ticket
 from controller.reach import CutPlan, Unreachable
 from controller.work_plan import PlannedCut, PlanRequest, WorkPlan
-from rolling_panda import messages as m
 from rolling_panda.differential_drive import Array
 from rolling_panda.plan_messages import PlanState, SessionPlan
 from rolling_panda.row_messages import Capsule
@@ -37,7 +36,7 @@ class Session:
         self._asked: PlanRequest | None = None
         self._number = 0
         self._quiet_since = self._asked_at = -np.inf
-        self._wanted: tuple[m.PruningPoint, ...] = ()
+        self._wanted: tuple[object, ...] = ()
         self._fresh = True
         self._said_at = -np.inf
         self._watch = ObstacleWatch(WorkPlan(PlanRequest(0, np.zeros(0), ())))
@@ -74,9 +73,9 @@ class Session:
         """
         if made is not None and self._asked is not None and made.request.number == self._asked.number:
             self._take(made)
-        accepted = self._queue.accepted()
-        if accepted != self._wanted:
-            self._wanted, self._quiet_since = accepted, now
+        accepted, order = self._queue.accepted(), self._queue.order.by_hand
+        if (accepted, order) != self._wanted:
+            self._wanted, self._quiet_since = (accepted, order), now
         why = self._why_void(q, obstacles, at_rest, working)
         self._judge(why, bool(accepted))
         pause = _AGAIN_S if self._plan is not None and self._plan.failure else _PAUSE_S
@@ -84,7 +83,7 @@ class Session:
         if self.valid or not due or not accepted or q is None or not (at_rest or working):
             return None
         self._number += 1
-        self._asked, self._asked_at = PlanRequest(self._number, q.copy(), accepted, tuple(obstacles)), now
+        self._asked, self._asked_at = PlanRequest(self._number, q.copy(), accepted, tuple(obstacles), order), now
         self._judge(why, True)
         return self._asked
 
@@ -118,7 +117,7 @@ class Session:
             return ""
         if plan.failure:
             return f"planning failed: {plan.failure}"
-        why = points_changed(plan, self._queue.tickets())
+        why = points_changed(plan, self._queue.tickets(), self._queue.order.by_hand)
         if not why:
             if self._compared is not obstacles:
                 self._compared = obstacles

@@ -19,12 +19,14 @@ class PlanRequest:
         q: Configuration (12) at the start.
         points: Accepted points, each as it was accepted.
         obstacles: What stands in the way.
+        order: Points in the order that people want them in; of none the plan chooses it.
     """
 
     number: int
     q: Array
     points: tuple[PruningPoint, ...]
     obstacles: tuple[Capsule, ...] = ()
+    order: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -57,6 +57,20 @@ class AcceptAll(Intent, frozen=True, kw_only=True):
     confidence: Fraction = 0.0
 
 
+class MoveInQueue(Intent, frozen=True, kw_only=True):
+    """Work on an accepted point before another one, or last; `revision` is that of the order the operator saw."""
+
+    point_id: Name
+    before: Annotated[str, Meta(max_length=64)] = ""
+    revision: Count
+
+
+class PlannersOrder(Intent, frozen=True, kw_only=True):
+    """Work in the plan's order again; `revision` is that of the order the operator saw."""
+
+    revision: Count
+
+
 class Start(Intent, frozen=True, kw_only=True):
     """READY → AUTO on the accepted points."""
 
@@ -118,6 +132,8 @@ AnyIntent = (
     | ReconsiderPoint
     | ResolvePoint
     | AcceptAll
+    | MoveInQueue
+    | PlannersOrder
     | Start
     | Survey
     | Pause

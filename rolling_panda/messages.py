@@ -209,6 +209,13 @@ class Nearness(Struct, frozen=True, forbid_unknown_fields=True):
     what: Text
 
 
+class QueueOrder(Struct, frozen=True, forbid_unknown_fields=True):
+    """Whose order of work it is: that of `user`, or the plan's where empty; `revision` counts people's changes."""
+
+    revision: Count = 0
+    user: Text = ""
+
+
 class ControllerState(Message, frozen=True, kw_only=True):
     """Controller → all: mode, queue and the quality of tracking.
 
@@ -231,6 +238,7 @@ class ControllerState(Message, frozen=True, kw_only=True):
         queue: Every point known, in the order of work.
         held_by: What keeps the robot from doing all that is asked of it now, by name; empty where nothing does.
         near: What it is nearest to touching while it moves; None where nothing is near.
+        order: Whose order that is.
     """
 
     header: Header
@@ -252,6 +260,7 @@ class ControllerState(Message, frozen=True, kw_only=True):
     queue: tuple[QueueEntry, ...]
     held_by: Text = ""
     near: Nearness | None = None
+    order: QueueOrder = QueueOrder()
 
 
 class Heartbeat(Message, frozen=True, kw_only=True):

@@ -180,7 +180,7 @@ INTENT: Service[intents.Intent] = Service(
     "service/intent",
     (
         intents.Arm, intents.AcceptPoint, intents.RejectPoint, intents.ReconsiderPoint, intents.ResolvePoint,
-        intents.AcceptAll, intents.Start, intents.Survey,
+        intents.AcceptAll, intents.MoveInQueue, intents.PlannersOrder, intents.Start, intents.Survey,
         intents.Pause, intents.Resume, intents.Home, intents.Acknowledge, intents.Reset, intents.TakeControl,
         intents.RequestControl, intents.GrantControl, intents.ReturnControl,
     ),

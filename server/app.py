@@ -19,6 +19,7 @@ from server.control_api import control_router
 from server.desk import Desk, Result
 from server.guard import Guard, is_protected
 from server.operator_api import answer, operator_router
+from server.order_api import order_router
 from server.pages import pages_router
 from server.plant_api import plant_router
 from server.sessions import Session
@@ -71,6 +72,7 @@ def create_app(desk: Desk, origins: frozenset[str]) -> ASGIApp:
     app.include_router(site_router(desk, web))
     app.include_router(operator_router(desk))
     app.include_router(plant_router(desk))
+    app.include_router(order_router(desk))
     app.include_router(control_router(desk))
     app.include_router(pages_router(desk))
     app.include_router(viser_router(desk.scene, desk.may_move, dropped))

@@ -76,6 +76,19 @@ class Survey(_Body):
     distance: Annotated[float, Field(ge=0.1, le=500.0)] = 4.0
 
 
+class MoveInQueue(_Body):
+    """Before which point; empty for the end. With the revision of the order that was seen, from `GET /api/state`."""
+
+    before: Annotated[str, Field(max_length=64)] = ""
+    revision: Annotated[int, Field(ge=0, le=2**62)]
+
+
+class PlannersOrder(_Body):
+    """The revision of the order that was seen."""
+
+    revision: Annotated[int, Field(ge=0, le=2**62)]
+
+
 class AcceptAll(_Body):
     """Least confidence, 0…1."""
 

@@ -16,6 +16,8 @@ const NEEDS = Object.freeze({
   Reset: "There is no stop to reset",
   AcceptPoint: "Points cannot be accepted",
   AcceptAll: "Points cannot be accepted",
+  MoveInQueue: "The order cannot be changed",
+  PlannersOrder: "The order cannot be changed",
   RejectPoint: "Points cannot be rejected",
   ReconsiderPoint: "Decisions cannot be taken back",
   ResolvePoint: "How a cut ended cannot be said",

@@ -7,6 +7,7 @@ import "./components/rp-invite.js";
 import "./components/rp-link-banner.js";
 import "./components/rp-log.js";
 import "./components/rp-mode.js";
+import "./components/rp-order.js";
 import "./components/rp-placing.js";
 import "./components/rp-queue.js";
 import "./components/rp-rule.js";

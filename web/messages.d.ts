@@ -136,6 +136,12 @@ export interface Nearness {
   what: string;
 }
 
+/** Whose order of work it is: that of `user`, or the plan's where empty; `revision` counts people's changes. */
+export interface QueueOrder {
+  revision: number;
+  user: string;
+}
+
 /** Controller → all: mode, queue and the quality of tracking. */
 export interface ControllerState {
   type: "ControllerState";
@@ -176,6 +182,8 @@ export interface ControllerState {
   held_by: string;
   /** What it is nearest to touching while it moves; None where nothing is near. */
   near: Nearness|null;
+  /** Whose order that is. */
+  order: QueueOrder;
 }
 
 /** How many messages of a topic were refused for one reason. */

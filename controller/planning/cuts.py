@@ -80,7 +80,7 @@ class CutPlanner:
                 continue
             cuts[point.point_id] = found
             targets.append(self._target(point.point_id, found))
-        schedule = self._sessions.plan(request.q, targets)
+        schedule = self._sessions.plan(request.q, targets, wanted=request.order)
         refused |= schedule.refused
         points = {point.point_id: point for point in request.points}
         planned = []
@@ -146,7 +146,7 @@ class CutPlanner:
     def _digest(self, request: PlanRequest, cuts: list[PlannedCut], refused: dict[str, str]) -> str:
         encode = msgspec.msgpack.Encoder(order="deterministic").encode
         out = hashlib.sha256()
-        for part in (self._config, self._robot_config, request.points, request.obstacles, refused):
+        for part in (self._config, self._robot_config, request.points, request.obstacles, request.order, refused):
             out.update(encode(part))
         out.update(np.ascontiguousarray(request.q, dtype="<f8").tobytes())
         for cut in cuts:

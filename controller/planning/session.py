@@ -113,13 +113,17 @@ class SessionPlanner:
         """
         self._planner, self._base, self._limits, self._tool_speed = planner, base, limits, tool_speed
 
-    def plan(self, q: Array, targets: Sequence[Target], required: Requirements | None = None) -> Schedule:
+    def plan(
+        self, q: Array, targets: Sequence[Target], required: Requirements | None = None, wanted: Sequence[str] = ()
+    ) -> Schedule:
         """A schedule from rest at a configuration (12) over all targets that can be worked on.
 
         Args:
             q: Configuration (12) at the start.
             targets: In any order; names must differ.
             required: What each has to offer.
+            wanted: Names in the order that somebody wants; those that it does not name come last. Without it the order
+                is the quickest that is found.
         """
         required = required or Requirements()
         refused: dict[str, str] = {}
@@ -145,7 +149,11 @@ class SessionPlanner:
             elif isinstance(planned, Planned):
                 stands.append((target, planned.stand))
         stands = [pair for pair in stands if pair[0].name not in refused]
-        order = shortest(self._costs(q, [stand for _, stand in stands]))
+        if wanted:
+            places = {name: place for place, name in enumerate(wanted)}
+            order = sorted(range(len(stands)), key=lambda i: places.get(stands[i][0].name, len(places)))
+        else:
+            order = shortest(self._costs(q, [stand for _, stand in stands]))
         return self._schedule(q, [stands[i] for i in order], required, refused)
 
     def _schedule(

@@ -45,7 +45,7 @@ class RpQueue extends HTMLElement {
     ];
     list.addEventListener("keydown", (event) => this.key(event));
     list.addEventListener("reject", (event) => this.askWhy(/** @type {RpPoint} */ (event.target)));
-    this.append(head, document.createElement("rp-rule"), element("div", { class: "queue-tools" }, summary, ...acceptEvery(), addByHand()), list, empty, element("div", { class: "open-places" }, ...open.map((each) => each.box)));
+    this.append(head, document.createElement("rp-rule"), document.createElement("rp-order"), element("div", { class: "queue-tools" }, summary, ...acceptEvery(), addByHand()), list, empty, element("div", { class: "open-places" }, ...open.map((each) => each.box)));
 
     /** @type {Map<string, HTMLElement>} */
     const groups = new Map();

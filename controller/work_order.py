@@ -1,0 +1,100 @@
+"""The order of work on accepted points: as people have put it, else as the plan says, else along the row."""
+
+from collections.abc import Callable, Sequence
+
+from controller.journal import Journal, OrderRow
+from rolling_panda.messages import QueueOrder
+
+
+class WorkOrder:
+    """What order is wanted. People's changes are counted, so that two of them at once do not undo each other."""
+
+    def __init__(self, journal: Journal) -> None:
+        """Along the row; changes by people are recorded in `journal`."""
+        self._journal = journal
+        self._by_hand: tuple[str, ...] = ()
+        self._planned: tuple[str, ...] = ()
+        self._state = QueueOrder()
+
+    @property
+    def state(self) -> QueueOrder:
+        """For the wire."""
+        return self._state
+
+    @property
+    def by_hand(self) -> tuple[str, ...]:
+        """Points in the order that people have put them in; empty while the plan says."""
+        return self._by_hand
+
+    def restore(self, row: OrderRow) -> None:
+        """Take up the order of an earlier start."""
+        self._by_hand, self._state = row.order, QueueOrder(row.revision, row.user)
+
+    def plan(self, order: tuple[str, ...]) -> None:
+        """The plan works in this order; none, and it is that along the row."""
+        self._planned = order
+
+    def move(self, point_id: str, before: str, revision: int, user: str, accepted: Sequence[str]) -> str:
+        """Put a point before another one, or at the end; returns why not, empty when done.
+
+        Args:
+            point_id: What is moved.
+            before: What is worked on after it; empty for the end.
+            revision: Of the order that the operator saw.
+            user: Who moves it.
+            accepted: Accepted points in the order of now.
+        """
+        if why := self._outdated(revision):
+            return why
+        for name in (point_id, before):
+            if name and name not in accepted:
+                return f"{name} is not accepted; only accepted points have a place in the order of work"
+        if point_id == before:
+            return f"{point_id} cannot come before itself"
+        order = [name for name in accepted if name != point_id]
+        order.insert(order.index(before) if before else len(order), point_id)
+        self._change(tuple(order), user)
+        return ""
+
+    def give_back(self, revision: int) -> str:
+        """Work in the plan's order again; returns why not, empty when done."""
+        if why := self._outdated(revision):
+            return why
+        if not self._by_hand:
+            return "the order is the plan's already"
+        self._change((), "")
+        return ""
+
+    def arranged(self, along: Sequence[str], accepted: Callable[[str], bool]) -> list[str]:
+        """All points in their order.
+
+        By hand, those that people have not seen in their order come after it. By plan, accepted points that it does
+        not name stay in their places along the row.
+
+        Args:
+            along: All points along the row.
+            accepted: Whether a point is accepted.
+        """
+        places = [name for name in along if accepted(name)]
+        known = set(places)
+        wanted = [name for name in self._planned if name in known]
+        if self._by_hand:
+            among = set(wanted)
+            following = iter(wanted)
+            planned = [next(following) if name in among else name for name in places]
+            first = [name for name in self._by_hand if name in known]
+            begun = set(first)
+            wanted = [*first, *(name for name in planned if name not in begun)]
+        among = set(wanted)
+        following = iter(wanted)
+        return [next(following) if name in among else name for name in along]
+
+    def _outdated(self, revision: int) -> str:
+        if revision == self._state.revision:
+            return ""
+        by = f"{self._state.user} has" if self._state.user else "somebody has"
+        return f"{by} changed the order since: number {revision} was seen, it is {self._state.revision} now"
+
+    def _change(self, order: tuple[str, ...], user: str) -> None:
+        self._by_hand, self._state = order, QueueOrder(self._state.revision + 1, user)
+        self._journal.add("order", "order", OrderRow(order=order, revision=self._state.revision, user=user))

@@ -1,0 +1,26 @@
+"""REST for the order in which accepted points are worked off."""
+
+from fastapi import APIRouter, Response
+
+from rolling_panda import intents
+from server import requests as body
+from server.desk import Desk
+from server.operator_api import ANSWERS, Caller, PointId, answer
+
+
+def order_router(desk: Desk) -> APIRouter:
+    """Both ways to change the order; `order` in the controller's state says whose it is, and its revision."""
+    router = APIRouter(prefix="/api", tags=["points"], responses=ANSWERS)
+
+    @router.post("/points/{point_id}/work-before")
+    async def work_before(session: Caller, point_id: PointId, request: body.MoveInQueue) -> Response:
+        """Work on an accepted point before another one, or last."""
+        wanted = intents.MoveInQueue(user=session.user, point_id=point_id, **request.model_dump())
+        return answer(await desk.ask(session, wanted))
+
+    @router.post("/order/planners")
+    async def planners(session: Caller, request: body.PlannersOrder) -> Response:
+        """Work in the plan's order again."""
+        return answer(await desk.ask(session, intents.PlannersOrder(user=session.user, revision=request.revision)))
+
+    return router

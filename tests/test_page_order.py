@@ -1,0 +1,104 @@
+"""The order of work on the page: whose it is, changed by dragging and by keys, and with many points."""
+
+import msgspec
+import pytest
+from played_page import until
+from played_server import PlayedServer, controller, point
+from playwright.sync_api import Page, expect
+
+from rolling_panda import messages as m
+
+pytestmark = pytest.mark.browser
+ALLOWED = ("MoveInQueue", "PlannersOrder")
+
+
+@pytest.fixture
+def server() -> PlayedServer:
+    state = controller(order=m.QueueOrder(7, ""))
+    state = msgspec.structs.replace(state, allowed=(*state.allowed, *ALLOWED))
+    rows = tuple(point(number, "ACCEPTED", spur=number) for number in range(1, 6))
+    return PlayedServer(controller=state, points=rows)
+
+
+def shown(page: Page) -> list[str]:
+    return page.locator(".order-row").evaluate_all(
+        "rows => rows.sort((a, b) => a.offsetTop - b.offsetTop).map(row => row.dataset.pointId)"
+    )
+
+
+def opened(page: Page) -> None:
+    page.locator("rp-order summary").click()
+    expect(page.locator(".order-row").first).to_be_visible()
+
+
+def test_the_list_is_in_the_order_of_work_and_says_whose_it_is(page: Page, server: PlayedServer) -> None:
+    expect(page.locator("rp-order summary")).to_have_text("Order of work: 5 points, by the plan")
+    opened(page)
+    assert shown(page) == ["p1", "p2", "p3", "p4", "p5"]
+    back = page.locator("#planners-order")
+    expect(back).to_have_attribute("title", "It is the plan's order already")
+    server.controller = msgspec.structs.replace(server.controller, order=m.QueueOrder(8, "Bob"))
+    expect(page.locator("rp-order summary")).to_contain_text("by Bob")
+    back.click()
+    until(page, lambda: ("/api/order/planners", {"revision": 8}) in server.posted)
+
+
+def test_a_row_is_dragged_to_another_place(page: Page, server: PlayedServer) -> None:
+    opened(page)
+    grip = page.locator('.order-row[data-point-id="p4"] .order-grip').bounding_box()
+    goal = page.locator('.order-row[data-point-id="p2"]').bounding_box()
+    assert grip and goal
+    page.mouse.move(grip["x"] + 10, grip["y"] + 20)
+    page.mouse.down()
+    page.mouse.move(goal["x"] + 10, goal["y"] + 8, steps=4)
+    expect(page.locator(".order-mark")).to_be_visible()
+    page.mouse.up()
+    until(page, lambda: ("/api/points/p4/work-before", {"before": "p2", "revision": 7}) in server.posted)
+
+
+def test_a_drag_that_ends_where_it_began_asks_for_nothing(page: Page, server: PlayedServer) -> None:
+    opened(page)
+    grip = page.locator('.order-row[data-point-id="p3"] .order-grip').bounding_box()
+    assert grip
+    page.mouse.move(grip["x"] + 10, grip["y"] + 20)
+    page.mouse.down()
+    page.mouse.move(grip["x"] + 10, grip["y"] + 24, steps=2)
+    page.mouse.up()
+    page.wait_for_timeout(100)
+    assert server.posted == []
+
+
+def test_keys_move_the_chosen_point(page: Page, server: PlayedServer) -> None:
+    opened(page)
+    page.locator(".order-list").focus()
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("ArrowDown")
+    expect(page.locator('.order-row[data-point-id="p2"]')).to_have_attribute("aria-selected", "true")
+    page.keyboard.press("Alt+ArrowDown")
+    until(page, lambda: ("/api/points/p2/work-before", {"before": "p4", "revision": 7}) in server.posted)
+    page.keyboard.press("Alt+Home")
+    until(page, lambda: ("/api/points/p2/work-before", {"before": "p1", "revision": 7}) in server.posted)
+    page.keyboard.press("Alt+End")
+    until(page, lambda: ("/api/points/p2/work-before", {"before": "", "revision": 7}) in server.posted)
+
+
+def test_who_may_not_change_it_changes_nothing(page: Page, server: PlayedServer) -> None:
+    opened(page)
+    server.role = "viewer"
+    expect(page.locator("#planners-order")).to_have_attribute("title", "You are signed in as a viewer")
+    page.locator(".order-list").focus()
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("Alt+ArrowDown")
+    page.wait_for_timeout(100)
+    assert server.posted == []
+
+
+def test_of_many_points_only_those_in_view_are_there(page: Page, server: PlayedServer) -> None:
+    opened(page)
+    server.points = tuple(point(number, "ACCEPTED", spur=number) for number in range(300))
+    server.tell(server.page_points())
+    expect(page.locator("rp-order summary")).to_contain_text("300 points")
+    page.locator(".order-list").focus()
+    page.keyboard.press("End")
+    expect(page.locator('.order-row[data-point-id="p299"]')).to_be_visible()
+    assert page.locator(".order-row").count() < 30

@@ -1,0 +1,87 @@
+import msgspec
+from hypothesis import given
+from hypothesis import strategies as st
+
+from controller.journal import Journal, OrderRow
+from controller.work_order import WorkOrder
+
+NAMES = tuple("abcdef")
+
+
+def everything(_):
+    return True
+
+
+def test_without_a_plan_or_a_person_the_row_says():
+    assert WorkOrder(Journal()).arranged(NAMES, everything) == list(NAMES)
+
+
+def test_a_plan_orders_what_it_names_and_leaves_the_rest_in_its_place():
+    order = WorkOrder(Journal())
+    order.plan(("e", "b"))
+    assert order.arranged(NAMES, everything) == list("aecdbf")
+
+
+def test_who_moves_a_point_orders_all_that_is_accepted_and_the_next_one_comes_last():
+    order = WorkOrder(Journal())
+    order.plan(tuple("cba"))
+    assert order.move("a", "c", 0, "ada", tuple("cba")) == ""
+    assert order.state.user == "ada" and order.state.revision == 1
+    assert order.arranged(NAMES, set("abc").__contains__) == list("acbdef")
+    assert order.arranged(NAMES, set("abcd").__contains__) == list("acbdef")
+    assert order.arranged(("0", *NAMES), set("0abc").__contains__) == ["a", "c", "b", "0", "d", "e", "f"]
+
+
+def test_of_two_people_who_move_at_once_the_second_is_told():
+    order = WorkOrder(Journal())
+    assert order.move("a", "", 0, "ada", NAMES) == ""
+    why = order.move("b", "", 0, "bob", NAMES)
+    assert "ada" in why and "0 was seen" in why and "1 now" in why
+    assert order.move("b", "", 1, "bob", NAMES) == ""
+
+
+def test_what_cannot_be_moved_is_refused_and_changes_nothing():
+    order = WorkOrder(Journal())
+    assert "x is not accepted" in order.move("x", "", 0, "ada", NAMES)
+    assert "x is not accepted" in order.move("a", "x", 0, "ada", NAMES)
+    assert "itself" in order.move("a", "a", 0, "ada", NAMES)
+    assert "plan's already" in order.give_back(0)
+    assert order.state.revision == 0 and order.by_hand == ()
+
+
+def test_the_plans_order_is_one_press_away():
+    order = WorkOrder(Journal())
+    order.plan(tuple("fedcba"))
+    order.move("a", "f", 0, "ada", tuple("fedcba"))
+    assert order.arranged(NAMES, everything)[0] == "a"
+    assert order.give_back(1) == ""
+    assert order.arranged(NAMES, everything) == list("fedcba")
+
+
+def test_a_restart_keeps_the_order_and_its_count():
+    journal = Journal()
+    before = WorkOrder(journal)
+    before.move("d", "a", 0, "ada", NAMES)
+    (record,) = journal.take()
+    assert (record.kind, record.name) == ("order", "order")
+    row = msgspec.json.decode(msgspec.json.encode(record.body), type=OrderRow)
+    after = WorkOrder(Journal())
+    after.restore(row)
+    assert after.arranged(NAMES, everything) == before.arranged(NAMES, everything) == list("dabcef")
+    assert after.state == before.state
+
+
+@given(st.lists(st.tuples(st.sampled_from(NAMES), st.sampled_from(("", *NAMES))), max_size=8), st.permutations(NAMES))
+def test_nothing_is_lost_or_doubled_and_each_move_is_what_was_asked(moves, planned):
+    order = WorkOrder(Journal())
+    order.plan(tuple(planned))
+    for name, before in moves:
+        accepted = order.arranged(NAMES, everything)
+        if order.move(name, before, order.state.revision, "ada", accepted):
+            assert name == before
+            continue
+        after = order.arranged(NAMES, everything)
+        assert sorted(after) == sorted(NAMES)
+        place = after.index(name)
+        assert after[place + 1 : place + 2] == ([before] if before else [])
+        assert [each for each in after if each != name] == [each for each in accepted if each != name]

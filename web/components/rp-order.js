@@ -1,0 +1,183 @@
+// The order of work, to be changed by dragging or by keys. Only rows in view are there, so that thousands cost nothing.
+
+import { element, setEnabled, setText } from "../element.js";
+import { moveTo, orderWords, plannersOrder, whyNoMove, whyNoPlannersOrder, workOrder } from "../order.js";
+import { link, now, pageState, points, selected } from "../state.js";
+import { drawOn } from "../store.js";
+import { select } from "../teleoperation.js";
+import { inWords } from "../words.js";
+
+/** @typedef {import("../messages.js").PagePoint} PagePoint */
+
+/** Height of a row (px), as in order.css. */
+const ROW = 44;
+/** Rows above and below those in view. */
+const SPARE = 4;
+/** Near an end of the list a drag scrolls it: within so much of it, by so much a frame (px). */
+const EDGE = 30;
+const SCROLL = 8;
+const HINT = "Arrows choose; Alt and an arrow move the chosen point, Alt and Home or End to the first or last place";
+
+/** Keys that move the chosen row, with Alt, or else the choice: from one place, of so many. @type {Readonly<Record<string, (at: number, last: number) => number>>} */
+const STEPS = Object.freeze({
+  ArrowDown: (at, last) => Math.min(at + 1, last),
+  ArrowUp: (at) => Math.max(at - 1, 0),
+  Home: () => 0,
+  End: (_, last) => last,
+});
+
+class RpOrder extends HTMLElement {
+  /** @type {readonly PagePoint[]} */
+  order = [];
+  /** Rows that are there, by their place. @type {Map<number, HTMLElement>} */
+  rows = new Map();
+  /** Where the dragged point comes, counted without itself; -1 while nothing is dragged. */
+  target = -1;
+  dragged = "";
+
+  connectedCallback() {
+    const words = element("span");
+    const back = element("button", { id: "planners-order", class: "quiet", text: "Plan's order", attributes: { type: "button" }, onclick: () => void plannersOrder() });
+    this.space = element("div", { class: "order-space" });
+    this.mark = element("div", { class: "order-mark" });
+    this.mark.hidden = true;
+    this.list = element("div", { class: "order-list", attributes: { role: "listbox", tabindex: "0", "aria-label": "Order of work", "aria-description": HINT, title: HINT } }, this.space, this.mark);
+    this.said = element("p", { class: "order-said", attributes: { role: "status" } });
+    this.box = element("details", { class: "rule order" }, element("summary", {}, words), element("div", { class: "order-body" }, this.list, element("div", { class: "order-foot" }, element("span", { text: "Drag, or Alt + arrows" }), back)), this.said);
+    this.append(this.box);
+    this.list.addEventListener("scroll", () => this.draw());
+    this.list.addEventListener("keydown", (event) => this.key(event));
+    this.list.addEventListener("click", (event) => this.choose(event));
+    this.list.addEventListener("pointerdown", (event) => this.drag(event));
+    this.box.addEventListener("toggle", () => this.draw());
+    drawOn([points, pageState, link, now, selected], () => {
+      setText(words, orderWords());
+      setEnabled(back, whyNoPlannersOrder(), "Work in the order that the plan finds the quickest");
+      this.order = workOrder();
+      this.draw();
+    });
+  }
+
+  /** Draw the rows in view. */
+  draw() {
+    const { list, space } = this;
+    if (!this.box?.open || !list || !space) return;
+    space.style.setProperty("height", `${this.order.length * ROW}px`);
+    const first = Math.max(0, Math.floor(list.scrollTop / ROW) - SPARE);
+    const last = Math.min(this.order.length - 1, Math.ceil((list.scrollTop + list.clientHeight) / ROW) + SPARE);
+    for (const [at, row] of this.rows) {
+      if (at >= first && at <= last) continue;
+      row.remove();
+      this.rows.delete(at);
+    }
+    for (let at = first; at <= last; at += 1) this.show(at);
+    const chosen = this.place(selected.get());
+    list.setAttribute("aria-activedescendant", this.rows.has(chosen) ? `order-${chosen}` : "");
+  }
+
+  /** @param {number} at */
+  show(at) {
+    const point = this.order[at];
+    if (!point) return;
+    let row = this.rows.get(at);
+    if (!row) {
+      row = element("div", { id: `order-${at}`, class: "order-row", attributes: { role: "option" } }, element("span", { class: "order-grip", text: "⠿", attributes: { "aria-hidden": "true" } }), element("span", { class: "order-number number" }), element("span", { class: "order-name" }), element("span", { class: "order-way number" }));
+      row.style.setProperty("top", `${at * ROW}px`);
+      this.rows.set(at, row);
+      this.space?.append(row);
+    }
+    const [, number, name, way] = row.children;
+    const refused = point.plan && !point.plan.order ? point.plan.reason : "";
+    const why = inWords([refused, point.entry.reason].filter(Boolean).join(" · "));
+    if (number) setText(number, `${at + 1}`);
+    if (name) setText(name, `${point.point.point_id} · vine ${point.point.vine}, spur ${point.point.spur}`);
+    if (way) setText(way, refused ? "refused" : point.plan ? `${point.plan.duration_s.toFixed(1)} s` : "");
+    row.dataset.pointId = point.point.point_id;
+    row.title = why || point.point.reason;
+    row.classList.toggle("refused", why !== "");
+    row.classList.toggle("dragged", point.point.point_id === this.dragged);
+    row.setAttribute("aria-selected", String(point.point.point_id === selected.get()));
+  }
+
+  /** @param {string} pointId */
+  place(pointId) {
+    return this.order.findIndex((row) => row.point.point_id === pointId);
+  }
+
+  /** @param {MouseEvent} event */
+  choose(event) {
+    const row = /** @type {Element} */ (event.target).closest(".order-row");
+    if (row instanceof HTMLElement) select(row.dataset.pointId ?? "");
+  }
+
+  /** @param {KeyboardEvent} event */
+  key(event) {
+    const step = STEPS[event.key];
+    if (!step || event.ctrlKey || event.metaKey || this.order.length === 0) return;
+    event.preventDefault();
+    const at = this.place(selected.get());
+    const to = step(at, this.order.length - 1);
+    const point = this.order[at];
+    if (event.altKey && point) {
+      if (to !== at && !whyNoMove()) void this.move(point.point.point_id, to);
+    } else {
+      select(this.order[to]?.point.point_id ?? "");
+    }
+    this.reveal(to);
+  }
+
+  /** @param {number} at */
+  reveal(at) {
+    const { list } = this;
+    if (!list) return;
+    if (at * ROW < list.scrollTop) list.scrollTop = at * ROW;
+    else if ((at + 1) * ROW > list.scrollTop + list.clientHeight) list.scrollTop = (at + 1) * ROW - list.clientHeight;
+  }
+
+  /**
+   * @param {string} pointId
+   * @param {number} to
+   */
+  async move(pointId, to) {
+    if ((await moveTo(pointId, to)) && this.said) setText(this.said, `${pointId} is number ${to + 1} now`);
+  }
+
+  /** @param {PointerEvent} event */
+  drag(event) {
+    const grip = /** @type {Element} */ (event.target).closest(".order-grip");
+    const row = grip?.closest(".order-row");
+    const { list, mark } = this;
+    if (!(row instanceof HTMLElement) || !list || !mark || !event.isPrimary || event.button !== 0) return;
+    event.preventDefault();
+    const pointId = row.dataset.pointId ?? "";
+    select(pointId);
+    if (whyNoMove()) return;
+    this.dragged = pointId;
+    const follow = (/** @type {PointerEvent} */ moved) => {
+      const box = list.getBoundingClientRect();
+      if (moved.clientY < box.top + EDGE) list.scrollTop -= SCROLL;
+      if (moved.clientY > box.bottom - EDGE) list.scrollTop += SCROLL;
+      const gap = Math.round((moved.clientY - box.top + list.scrollTop) / ROW);
+      const place = Math.max(0, Math.min(gap, this.order.length));
+      const from = this.place(pointId);
+      this.target = place > from ? place - 1 : place;
+      mark.hidden = this.target === from;
+      mark.style.setProperty("top", `${place * ROW}px`);
+    };
+    const end = (/** @type {Event} */ ended) => {
+      const to = ended.type === "pointerup" ? this.target : -1;
+      for (const kind of ["pointermove", "pointerup", "pointercancel"]) list.removeEventListener(kind, kind === "pointermove" ? /** @type {EventListener} */ (follow) : end);
+      this.dragged = "";
+      this.target = -1;
+      mark.hidden = true;
+      if (to >= 0 && to !== this.place(pointId)) void this.move(pointId, to);
+      this.draw();
+    };
+    list.setPointerCapture(event.pointerId);
+    list.addEventListener("pointermove", /** @type {EventListener} */ (follow));
+    list.addEventListener("pointerup", end);
+    list.addEventListener("pointercancel", end);
+    this.draw();
+  }
+}
+customElements.define("rp-order", RpOrder);
