@@ -28,8 +28,9 @@ class Trial:
         fault: Name.
         requirement: That it tests.
         seed: Of the trial.
-        limit_s: Allowed; infinite where the robot must go on.
-        mode: Of the controller at the end, for people; it is not judged.
+        limit_s: Allowed; infinite where the robot must go on, NaN where it may.
+        note: For people, and not judged: the controller's mode at the end, or the hop.
+        braking_s: From the fault until the wheels are slower than they were, for good; infinite if never.
         quiet_s: From the fault until nothing but zero is sent; infinite if never.
         replayed: Rows with an older token or number than a row before.
         beyond: Rows outside velocity, acceleration, jerk or joint limits.
@@ -40,7 +41,8 @@ class Trial:
     requirement: str
     seed: int
     limit_s: float
-    mode: str
+    note: str
+    braking_s: float
     quiet_s: float
     replayed: int
     beyond: int
@@ -54,11 +56,11 @@ def judge(rows: Rows, begun: Sequence[int], since: float, limit_s: float) -> tup
         rows: Of the trace.
         begun: Indices at which another bridge began, which knows nothing of the last one's acceleration.
         since: Time from which `quiet_s` runs (s, the trace's clock).
-        limit_s: Allowed; infinite where the robot must go on.
+        limit_s: Allowed; infinite where the robot must go on, NaN where it may.
     """
     quiet, replayed = quiet_after(rows, since), replays(rows)
     beyond = sum(violations(life) for life in np.split(rows, list(begun)))
-    in_time = quiet <= limit_s + 1e-6 if math.isfinite(limit_s) else math.isinf(quiet)
+    in_time = math.isnan(limit_s) or (math.isinf(quiet) if math.isinf(limit_s) else quiet <= limit_s + 1e-6)
     return quiet, replayed, beyond, in_time and not replayed and not beyond
 
 
@@ -127,7 +129,17 @@ def summary(trials: Sequence[Trial]) -> dict[str, dict[str, object]]:
             "failed": sum(not trial.held for trial in those),
             "worst_s": None if worst is None or math.isinf(worst.quiet_s) else worst.quiet_s,
             "limit_s": None if worst is None else worst.limit_s,
+            "p99_s": _share(timed, "quiet_s"),
+            "braking_p99_s": _share(timed, "braking_s"),
             "replayed": sum(trial.replayed for trial in those),
             "beyond": sum(trial.beyond for trial in those),
         }
     return out
+
+
+def _share(trials: Sequence[Trial], name: str) -> float | None:
+    """The 99th percentile of one of the times, the nearest that was measured; None where that is infinite."""
+    if not trials:
+        return None
+    found = sorted(getattr(trial, name) for trial in trials)[max(0, math.ceil(0.99 * len(trials)) - 1)]
+    return float(found) if math.isfinite(found) else None

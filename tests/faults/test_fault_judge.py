@@ -53,6 +53,8 @@ def test_the_judge_sees_when_braking_began_and_when_the_last_command_was_taken()
 def test_a_robot_that_must_go_on_has_failed_when_it_rests():
     assert judge(rows(0.1, 0.1, 0.1), (), 0.0, math.inf)[3]
     assert not judge(rows(0.1, 0.1, 0.0), (), 0.0, math.inf)[3]
+    for last in (0.0, 0.001):
+        assert judge(rows(0.001, 0.001, last), (), 0.0, math.nan)[3]
 
 
 def test_what_a_new_bridge_begins_with_is_no_jump_of_the_old_one():
@@ -61,10 +63,11 @@ def test_what_a_new_bridge_begins_with_is_no_jump_of_the_old_one():
 
 
 def test_the_summary_names_the_worst_against_its_own_limit_and_counts_what_failed():
-    good = Trial("a", "R3", 1, 0.2, "IDLE", 0.1, 0, 0, True)
-    near = Trial("b", "R3", 2, 0.5, "IDLE", 0.3, 0, 0, True)
-    never = Trial("c", "R3", 3, 0.5, "AUTO", math.inf, 1, 0, False)
+    good = Trial("a", "R3", 1, 0.2, "IDLE", 0.05, 0.1, 0, 0, True)
+    near = Trial("b", "R3", 2, 0.5, "IDLE", 0.02, 0.3, 0, 0, True)
+    never = Trial("c", "R3", 3, 0.5, "AUTO", math.inf, math.inf, 1, 0, False)
     found = summary([good, near])["R3"]
     assert (found["n"], found["held"], found["worst_s"], found["limit_s"]) == (2, True, 0.3, 0.5)
+    assert (found["p99_s"], found["braking_p99_s"]) == (0.3, 0.05)
     found = summary([good, near, never])["R3"]
     assert (found["held"], found["failed"], found["worst_s"], found["replayed"]) == (False, 1, None, 1)

@@ -3,11 +3,13 @@
 import json
 from collections import Counter
 from dataclasses import replace
+from functools import partial
 
 import pytest
 
+from benchmarks.apart import apart
 from benchmarks.fault_kinds import FAULTS
-from benchmarks.faults import deal, main, run_trial
+from benchmarks.faults import deal, main, run_trial, start
 
 NAMED = {fault.name: fault for fault in FAULTS}
 SHORT = ("software stop", "controller killed, base at full speed", "an older controller's commands")
@@ -15,7 +17,7 @@ SHORT = ("software stop", "controller killed, base at full speed", "an older con
 
 @pytest.mark.parametrize("name", SHORT)
 def test_the_most_important_ones_hold(name):
-    trial = run_trial(NAMED[name], seed=5)
+    trial = run_trial(NAMED[name], start(NAMED[name]), seed=5)
     assert trial.held, trial
 
 
@@ -57,6 +59,7 @@ UNMET = {"release of the tool": "the base may be as fast as in automatic work, a
     ids=lambda fault: fault.name,
 )
 def test_every_fault_holds(fault):
+    world = start(fault)
     for seed in range(20):
-        trial = run_trial(fault, seed)
+        trial = apart(partial(run_trial, fault, world, seed))
         assert trial.held, trial
