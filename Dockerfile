@@ -17,6 +17,7 @@ COPY rolling_panda rolling_panda
 COPY bridge bridge
 COPY controller controller
 COPY perception perception
+COPY recorder recorder
 COPY server server
 COPY benchmarks benchmarks
 RUN /tools/bin/pip wheel --no-cache-dir --no-deps --no-build-isolation --wheel-dir /wheel .

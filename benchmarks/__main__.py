@@ -15,6 +15,7 @@ BENCHMARKS = {
     "ledger": ("benchmarks.ledger", "what recording costs the control step, on a slow disk too"),
     "live": ("benchmarks.live", "the running demo: control periods on time, round trip, tool error"),
     "perception": ("benchmarks.perception", "surveys of unseen rows, every pruning point judged"),
+    "real": ("benchmarks.real", "random commands and faults, the real bridge on fakes with monitors"),
     "faults": ("benchmarks.faults", "random faults in motion, judged by what the actuators were sent"),
     "checks": ("benchmarks.checks", "each check of safety taken away on a copy: its test has to fail"),
     "plots": ("benchmarks.plots", "pictures of what the others wrote with --json"),

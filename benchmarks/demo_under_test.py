@@ -22,18 +22,19 @@ _LOOK_S = 0.2
 class Demo:
     """A demo under measurement, and a script signed in to it."""
 
-    def __init__(self, port: int, seed: int, config: Path | None = None) -> None:
+    def __init__(self, port: int, seed: int, config: Path | None = None, *more: str) -> None:
         """Start it and wait until detections have come.
 
         Args:
             port: Of the page.
             seed: Of the row.
             config: TOML configuration; None takes the simulation's.
+            more: Other options of the demo.
 
         Raises:
             InputError: It did not come up; the text is what it said.
         """
-        words = ["demo", "--port", str(port), "--seed", str(seed)]
+        words = ["demo", "--port", str(port), "--seed", str(seed), *more]
         if config is not None:
             words += ["--config", str(config)]
         self._popen = subprocess.Popen(

@@ -23,7 +23,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 def with_usual_config(argv: Sequence[str]) -> list[str]:
     """The command line; for the real robot with its own configuration where none is given."""
     given = any(word == "--config" or word.startswith("--config=") for word in argv)
-    usual = ["--config", str(resource("assets/config/real.toml"))] if "real" in argv and not given else []
+    own = "assets/config/fakes.toml" if "--fakes" in argv else "assets/config/real.toml"
+    usual = ["--config", str(resource(own))] if "real" in argv and not given else []
     return [*argv, *usual]
 
 
@@ -32,6 +33,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=_seed, default=0, help="of the simulated vineyard (default: 0)")
     parser.add_argument("--trace", type=Path, metavar="FILE", help="record what the simulation really actuates")
     parser.add_argument("--check", action="store_true", help="real: look at every device, move none, print a table")
+    parser.add_argument("--fakes", action="store_true", help="real: drivers on fakes of the devices, and it says so")
     parser.add_argument("--readonly", action="store_true", help="real: tell the robot's state, command nothing")
 
 
@@ -46,7 +48,7 @@ def _run(context: ProcessContext) -> None:
     if arguments.kind == "real" and arguments.check:
         from bridge.real.check_command import check
 
-        check(context.config_path)
+        check(context.config_path, context.wire, arguments.fakes)
         return
     cuts, memory = CutFile(context.state_folder), open_memory(context.state_folder)
     try:
@@ -67,7 +69,8 @@ def _core(context: ProcessContext, cuts: CutFile, memory: Memory) -> BridgeCore:
     if arguments.kind == "real":
         from bridge.real.build import real_bridge
 
-        return real_bridge(context.config_path, not arguments.readonly, rejections, cuts, memory)
+        moving, fakes = not arguments.readonly, arguments.fakes
+        return real_bridge(context.config_path, context.wire, moving, rejections, cuts, memory, fakes)
     from bridge.sim.build import simulated_bridge, subscribe_button
 
     seed, trace = arguments.seed, arguments.trace

@@ -6,7 +6,6 @@ The latch, the watchdog and the limits are here and are the bridge's own: no oth
 import secrets
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
@@ -78,7 +77,7 @@ class BridgeCore:
         config: BridgeConfig,
         limits: Limits,
         odometer: Odometer,
-        kind: Literal["sim", "real"],
+        kind: m.BridgeKind,
         scenery: SceneryOf | None = None,
         rejections: Rejections | None = None,
         cuts: CutMemory | None = None,
@@ -341,6 +340,7 @@ class BridgeCore:
             round_trip_s=self._round_trip.median,
             round_trip_worst_s=self._round_trip.worst,
             rejections=self.refusals.counts(),
+            battery=self._measured.battery,
         )
 
     def _frame(self, now: float) -> CameraFrame | None:

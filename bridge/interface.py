@@ -15,7 +15,7 @@ class Measurement:
     """What the robot's sensors say: ξ and its rates over [θ_l, θ_r, q₁…q₇] (rad, rad/s), and the cutter.
 
     `fault` is why the robot itself does not move, empty when it does; a `severe` one has to be released by a person.
-    `emergency` is whether its emergency stop button is pressed.
+    `emergency` is whether its emergency stop button is pressed; `battery` the charge (0…1), None when unknown.
     """
 
     position: Array
@@ -27,6 +27,7 @@ class Measurement:
     fault: str = ""
     severe: bool = False
     emergency: bool = False
+    battery: float | None = None
 
 
 @dataclass(frozen=True)

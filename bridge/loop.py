@@ -23,7 +23,7 @@ class BridgeLoop:
         self._lock = threading.Lock()
         self._wake_s = max(TICK_S, core.joints_s / _WAKES)
         clock = time.monotonic()
-        self._time: RobotTime = RealTime(clock, TICK_S) if core.kind == "real" else SteppedTime(clock, TICK_S)
+        self._time: RobotTime = RealTime(clock, TICK_S) if core.kind != "sim" else SteppedTime(clock, TICK_S)
         transport.on_reject = core.refusals.log
         self._motion = transport.slot(topics.MOTION)
         self._cuts = transport.feed(topics.CUT, 32)

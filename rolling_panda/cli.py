@@ -19,6 +19,7 @@ FORWARDED = {
     "controller": ("controller", "whole-body control and the supervision state machine"),
     "perception": ("perception", "camera frames to pruning points"),
     "server": ("server", "the operator's page and its REST interface"),
+    "record": ("recorder.record", "write down all that is on the robot's wire, for Foxglove and for `replay`"),
     "audit": ("controller.audit", "what was decided, refused and done: check the record or write it out"),
     "user": ("server.user_command", "who may sign in with a password"),
     "certificates": ("rolling_panda.certificates", "certificates of one's own for mutual TLS on the robot's wire"),

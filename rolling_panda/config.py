@@ -43,6 +43,8 @@ class RobotConfig(Struct, frozen=True, forbid_unknown_fields=True):
     """Numbers of the robot that its URDF does not carry. Sources stand beside the values in `assets/config`.
 
     Attributes:
+        wheel_radius: Effective rolling radius of the wheels (m), as calibrated; 0 takes the URDF's.
+        track: Distance between the wheels' contacts (m), as calibrated; 0 takes the URDF's.
         rho: Distance of the base's reference point ahead of the wheel axle (m); 0 puts (x, y) on the axle.
         wheel_velocity: Limit of each wheel (rad/s).
         wheel_acceleration: Limit of each wheel (rad/s²).
@@ -50,6 +52,8 @@ class RobotConfig(Struct, frozen=True, forbid_unknown_fields=True):
         arm_jerk: Limit of each arm joint (rad/s³).
     """
 
+    wheel_radius: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.0
+    track: Annotated[float, Meta(ge=0.0, le=3.0)] = 0.0
     rho: Annotated[float, Meta(ge=-1.0, le=1.0)] = 0.0
     wheel_velocity: Positive = 11.2
     wheel_acceleration: Positive = 17.9

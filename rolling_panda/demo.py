@@ -34,13 +34,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--state", type=Path, metavar="DIR", help="keep there what survives a restart (default: nothing is kept)"
     )
+    parser.add_argument("--bridge", choices=("sim", "real"), default="sim", help="which bridge (default: sim)")
     parser.add_argument(
-        "--config",
-        type=Path,
-        default=resource("assets/config/sim.toml"),
-        metavar="FILE",
-        help="TOML configuration (default: the simulation's)",
+        "--fakes",
+        action="store_true",
+        help="with --bridge real: its drivers on fakes of the devices",
     )
+    parser.add_argument("--config", type=Path, metavar="FILE", help="TOML configuration (default: the bridge's own)")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -53,11 +53,13 @@ def run(arguments: argparse.Namespace) -> int:
         InputError: The port is taken, or a file cannot be used.
         ConfigError: The configuration is missing or wrong.
     """
+    arguments.config = arguments.config or usual_config(arguments)
     check(arguments)
     stopping = stop_on_signals()
     folder = Path(tempfile.mkdtemp(prefix="rolling-panda-"))
     supervisor = Supervisor(folder)
-    _say(f"Rolling Panda {__version__}: simulation, seed {arguments.seed}")
+    what = "the real bridge on fakes of the devices" if arguments.fakes else "simulation"
+    _say(f"Rolling Panda {__version__}: {what}, seed {arguments.seed}")
     _say(f"Logs of the processes are in {folder}, for as long as it runs and after a failure")
     token_file = folder / "sign-in-token"
     try:
@@ -75,13 +77,23 @@ def run(arguments: argparse.Namespace) -> int:
     return 1
 
 
+def usual_config(arguments: argparse.Namespace) -> Path:
+    """The configuration that belongs to the bridge asked for."""
+    return resource("assets/config/fakes.toml" if arguments.bridge == "real" else "assets/config/sim.toml")
+
+
 def check(arguments: argparse.Namespace) -> None:
     """Refuse what cannot work before anything is started.
 
     Raises:
-        InputError: The port is taken, or a file cannot be used.
+        InputError: The port is taken, a file cannot be used, or a real robot would move.
         ConfigError: The configuration is missing or wrong.
     """
+    if (arguments.bridge == "real") != arguments.fakes:
+        raise InputError(
+            "the demo moves no real robot: `--bridge real --fakes` runs its drivers on fakes of the devices; for the "
+            "robot itself start `rolling-panda bridge real` and the other processes one by one (docs/deployment.md)"
+        )
     load_section(arguments.config, "transport", TransportConfig)
     load_section(arguments.config, "robot", RobotConfig)
     if not 1 <= arguments.port <= 65535:
@@ -129,6 +141,8 @@ def _start_and_watch(
     _progress("router", began)
     _say(f"  The robot's wire is at {endpoint}: rolling-panda status --connect {endpoint}")
 
+    if arguments.fakes:
+        supervisor.start("fakes", python_command("bridge.fakes", _fakes_arguments(arguments, endpoint)))
     token = secrets.token_urlsafe(32)
     write_secret(token_file, token)
     for name, own in _own_arguments(arguments, token_file).items():
@@ -167,10 +181,19 @@ def write_secret(path: Path, text: str) -> None:
         file.write(text)
 
 
+def _fakes_arguments(arguments: argparse.Namespace, endpoint: str) -> list[str]:
+    words = ["--config", str(arguments.config.resolve()), "--connect", endpoint, "--seed", str(arguments.seed)]
+    return words + _trace_arguments(arguments)
+
+
+def _trace_arguments(arguments: argparse.Namespace) -> list[str]:
+    return [] if arguments.trace is None else ["--trace", str(arguments.trace.resolve())]
+
+
 def _own_arguments(arguments: argparse.Namespace, token_file: Path) -> dict[str, list[str]]:
-    trace = [] if arguments.trace is None else ["--trace", str(arguments.trace.resolve())]
+    simulated = ["sim", "--seed", str(arguments.seed), *_trace_arguments(arguments)]
     return {
-        "bridge": ["--seed", str(arguments.seed), *trace],
+        "bridge": ["real", "--fakes"] if arguments.fakes else simulated,
         "controller": [],
         "perception": [],
         "server": ["--port", str(arguments.port), "--sign-in-token-file", str(token_file)],

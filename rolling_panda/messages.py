@@ -46,6 +46,7 @@ WoodClass = Literal[
 ]
 #: Index = value in a label image.
 WOOD_CLASSES: tuple[WoodClass, ...] = get_args(WoodClass)
+BridgeKind = Literal["sim", "real", "fakes"]
 CutKind = Literal["spur cut", "renewal cut", "cane cut", "by hand"]
 Digest = Annotated[str, Meta(max_length=64, pattern=r"^[0-9a-f]*(?!\n)$")]
 Covariance = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
@@ -157,7 +158,7 @@ class BridgeState(Message, frozen=True, kw_only=True):
     """Bridge → all: its own latch, watchdog and cutter; the controller cannot overrule any of them.
 
     Attributes:
-        kind: `sim` or `real`.
+        kind: `sim`, `real`, or `fakes`: the real robot's drivers with fakes in place of the devices.
         epoch: Newest controller epoch accepted.
         watchdog: True while no valid setpoint has come for the deadline: base 0, arm holds, cutter inhibited.
         stop_id: The latched software stop, empty when none.
@@ -169,10 +170,11 @@ class BridgeState(Message, frozen=True, kw_only=True):
         round_trip_s: From a joint state to the command that answers it, median over the last second; 0 without any.
         round_trip_worst_s: The longest of them.
         rejections: Messages refused since the start, by reason.
+        battery: Charge of the base; None where nobody tells, as in the simulation.
     """
 
     header: Header
-    kind: Literal["sim", "real"]
+    kind: BridgeKind
     epoch: Count
     watchdog: bool
     stop_id: Annotated[str, Meta(max_length=64)]
@@ -184,6 +186,7 @@ class BridgeState(Message, frozen=True, kw_only=True):
     round_trip_s: NonNegative = 0.0
     round_trip_worst_s: NonNegative = 0.0
     rejections: tuple[RejectionCount, ...] = ()
+    battery: Fraction | None = None
 
 
 class QueueEntry(Struct, frozen=True, forbid_unknown_fields=True):

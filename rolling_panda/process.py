@@ -46,6 +46,11 @@ class ProcessContext:
     stopping: threading.Event
 
     @property
+    def wire(self) -> TransportConfig:
+        """The robot's wire, as configuration and command line have it together."""
+        return wire_config(self.arguments)
+
+    @property
     def state_folder(self) -> Path:
         """Where this robot's processes keep what must survive a restart; made when first asked for.
 
@@ -80,18 +85,27 @@ def run_process(
     if arguments.exit_with_parent:
         end_with_parent(stopping)
     try:
-        transport_config = load_section(arguments.config, "transport", TransportConfig)
-        if arguments.connect is not None:
-            transport_config = msgspec.structs.replace(transport_config, connect=(arguments.connect,))
-        if arguments.certificates is not None:
-            transport_config = msgspec.structs.replace(transport_config, certificates=str(arguments.certificates))
         take_priority(_PRIORITY[process])
-        with Transport(transport_config, process, arguments.robot_id) as transport:
+        with Transport(wire_config(arguments), process, arguments.robot_id) as transport:
             run(ProcessContext(arguments, arguments.config, transport, stopping))
     except RollingPandaError as error:
         print(f"rolling-panda {process}: {error}", file=sys.stderr)
         return 1
     return 0
+
+
+def wire_config(arguments: argparse.Namespace) -> TransportConfig:
+    """Section `[transport]`, with the command line's own words where it has any.
+
+    Raises:
+        ConfigError: The section is wrong.
+    """
+    config = load_section(arguments.config, "transport", TransportConfig)
+    if arguments.connect is not None:
+        config = msgspec.structs.replace(config, connect=(arguments.connect,))
+    if arguments.certificates is not None:
+        config = msgspec.structs.replace(config, certificates=str(arguments.certificates))
+    return config
 
 
 def add_common_arguments(parser: argparse.ArgumentParser) -> None:

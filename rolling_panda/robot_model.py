@@ -143,7 +143,8 @@ def _drive(model: Any, config: RobotConfig) -> DifferentialDrive:
     left = model.jointPlacements[model.getJointId("wheel_left")].translation
     right = model.jointPlacements[model.getJointId("wheel_right")].translation
     # The wheels roll on the floor, so the height of their axle is their radius.
-    return DifferentialDrive(float(left[2]), float(left[1] - right[1]) / 2, config.rho)
+    radius, track = config.wheel_radius or float(left[2]), config.track or float(left[1] - right[1])
+    return DifferentialDrive(radius, track / 2, config.rho)
 
 
 def _limits(model: Any, config: RobotConfig) -> Limits:

@@ -112,6 +112,11 @@ def test_demo_refuses_a_trace_that_cannot_be_written(capsys: pytest.CaptureFixtu
     assert_one_clear_line(capsys, ["demo", "--trace", str(tmp_path / "no" / "x")], "there is no folder")
 
 
+@pytest.mark.parametrize("words", [["--bridge", "real"], ["--fakes"]])
+def test_demo_moves_no_real_robot(capsys: pytest.CaptureFixture[str], words: list[str]) -> None:
+    assert_one_clear_line(capsys, ["demo", *words], "--bridge real --fakes")
+
+
 def test_router_refuses_a_port_in_use(capsys: pytest.CaptureFixture[str], busy_port: int) -> None:
     endpoint = f"tcp/127.0.0.1:{busy_port}"
     assert_one_clear_line(capsys, ["router", "--listen", endpoint], endpoint, "another port")

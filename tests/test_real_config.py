@@ -1,5 +1,7 @@
 """The real robot's configuration says what every process of it reads."""
 
+from pathlib import Path
+
 import msgspec
 import pytest
 
@@ -7,6 +9,8 @@ from bridge.__main__ import with_usual_config
 from bridge.config import BridgeConfig
 from bridge.real.build import open_devices
 from bridge.real.config import RealConfig
+from bridge.sim.camera_config import CameraConfig
+from bridge.sim.vineyard_config import VineyardConfig
 from controller.config import ControllerConfig
 from perception.config import PerceptionConfig
 from rolling_panda.config import RobotConfig, TransportConfig, load_section
@@ -16,6 +20,7 @@ from rolling_panda.robot_model import RobotModel
 from server.config import ServerConfig
 
 REAL, SIM = resource("assets/config/real.toml"), resource("assets/config/sim.toml")
+FAKES = resource("assets/config/fakes.toml")
 SECTIONS: list[tuple[str, type[msgspec.Struct]]] = [
     ("transport", TransportConfig),
     ("robot", RobotConfig),
@@ -47,15 +52,40 @@ def test_the_real_robot_has_its_own_configuration_unless_another_is_given() -> N
     assert with_usual_config(["real", "--config", "mine.toml"]) == ["real", "--config", "mine.toml"]
     assert with_usual_config(["real", "--config=mine.toml"]) == ["real", "--config=mine.toml"]
     assert with_usual_config(["sim"]) == ["sim"]
+    assert with_usual_config(["real", "--fakes"])[-1] == str(FAKES)
 
 
 def test_without_the_drivers_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("bridge.real.build.importlib.util.find_spec", lambda name: None)
     with pytest.raises(InputError, match=r"panda_py, pyrealsense2, rosbags.*pip install 'rolling-panda\[real\]'"):
-        open_devices(REAL, RobotModel(), moving=False)
+        open_devices(REAL, TransportConfig(), RobotModel(), moving=False)
 
 
 def test_without_an_address_of_the_arm_it_says_which_key_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("bridge.real.build.importlib.util.find_spec", lambda name: True)
     with pytest.raises(InputError, match=r"\[real.arm\] address"):
-        open_devices(REAL, RobotModel(), moving=False)
+        open_devices(REAL, TransportConfig(), RobotModel(), moving=False)
+
+
+@pytest.mark.parametrize(("name", "kind"), [*SECTIONS, ("vineyard", VineyardConfig), ("camera", CameraConfig)])
+def test_the_fakes_are_told_what_the_simulation_is(name: str, kind: type[msgspec.Struct]) -> None:
+    assert load_section(FAKES, name, kind) == load_section(SIM, name, kind)
+
+
+def test_the_fakes_differ_from_the_real_devices_in_where_they_are_and_how_often_they_look() -> None:
+    fakes, real = load_section(FAKES, "real", RealConfig), load_section(REAL, "real", RealConfig)
+    assert fakes.base == real.base
+    same = msgspec.structs.replace(fakes.arm, address=real.arm.address, realtime=real.arm.realtime)
+    assert same == real.arm
+    assert msgspec.structs.replace(fakes.cutter, service="") == real.cutter
+    assert msgspec.structs.replace(fakes.camera, rate_hz=30) == real.camera
+
+
+def test_fakes_at_an_address_where_a_real_arm_may_be_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("bridge.real.build.importlib.util.find_spec", lambda name: True)
+    config = tmp_path / "mixed.toml"
+    config.write_text('[real.arm]\naddress = "172.16.0.2"\n')
+    with pytest.raises(InputError, match="172.16.0.2 may be a real arm"):
+        open_devices(config, TransportConfig(), RobotModel(), moving=True, fakes=True)

@@ -21,6 +21,12 @@ def posture(seed):
     return q
 
 
+def test_calibrated_wheels_stand_before_those_of_the_description():
+    drive = RobotModel(RobotConfig(wheel_radius=0.1345, track=0.512)).drive
+    assert (drive.wheel_radius, drive.half_track) == (0.1345, 0.256)
+    assert RobotModel(RobotConfig(track=0.512)).drive.wheel_radius == ROBOT.drive.wheel_radius
+
+
 def test_coordinates_are_those_of_the_paper():
     names = [name for name in ROBOT.model.names][1:]
     assert names[:5] == ["base_x", "base_y", "base_phi", "wheel_left", "wheel_right"]

@@ -45,6 +45,8 @@ export type Need = "another look"|"operator";
 
 export type WoodClass = "background"|"ground"|"post"|"trunk"|"cordon"|"spur"|"cane"|"node"|"wire"|"hose"|"old cut";
 
+export type BridgeKind = "sim"|"real"|"fakes";
+
 export type CutKind = "spur cut"|"renewal cut"|"cane cut"|"by hand";
 
 export type Covariance = [number, number, number, number, number, number];
@@ -197,8 +199,8 @@ export interface RejectionCount {
 export interface BridgeState {
   type: "BridgeState";
   header: Header;
-  /** `sim` or `real`. */
-  kind: "sim"|"real";
+  /** `sim`, `real`, or `fakes`: the real robot's drivers with fakes in place of the devices. */
+  kind: BridgeKind;
   /** Newest controller epoch accepted. */
   epoch: number;
   /** True while no valid setpoint has come for the deadline: base 0, arm holds, cutter inhibited. */
@@ -221,6 +223,8 @@ export interface BridgeState {
   round_trip_worst_s: number;
   /** Messages refused since the start, by reason. */
   rejections: RejectionCount[];
+  /** Charge of the base; None where nobody tells, as in the simulation. */
+  battery: number|null;
 }
 
 /** Bridge → all: measured actuated coordinates, [θ_l, θ_r, q₁…q₇] (rad, rad/s), as sensor_msgs/JointState. */

@@ -11,16 +11,19 @@ import sys
 import threading
 from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from bridge.fakes.bodies import AirBlades, ExactArm, LaggingWheels
+from bridge.fakes.bodies import AirBlades, ArmBody, BladeBody, ExactArm, LaggingWheels, WheelBody
+from bridge.fakes.camera import KEY, pack
 from bridge.fakes.control_box import ControlBox
 from bridge.fakes.cutter import FakeCutter
 from bridge.fakes.mp500 import FakeMp500
 from bridge.real.config import RealConfig
 from rolling_panda.config import RobotConfig, TransportConfig, load_section
-from rolling_panda.errors import RollingPandaError
+from rolling_panda.errors import InputError, RollingPandaError
+from rolling_panda.priority import take_priority
 from rolling_panda.process import stop_on_signals
 from rolling_panda.resources import resource
 from rolling_panda.robot_model import RobotModel
@@ -59,28 +62,60 @@ def _parser() -> argparse.ArgumentParser:
         "--connect", metavar="ENDPOINT", help="router that base and cutter are behind; without it none is"
     )
     parser.add_argument(
-        "--arm", metavar="ADDRESS", help="loopback address of the arm's control box; without it none is"
+        "--arm", metavar="ADDRESS", help="loopback address of the arm's control box (with --seed: the configuration's)"
     )
+    parser.add_argument("--seed", type=int, help="all devices on one simulated robot beside the row of this seed")
+    parser.add_argument("--trace", type=Path, metavar="FILE", help="record what the simulation really actuates")
     return parser
+
+
+@dataclass(frozen=True)
+class _Bodies:
+    """What the devices move."""
+
+    arm: ArmBody
+    wheels: WheelBody
+    blades: BladeBody
+
+
+def _bodies(arguments: argparse.Namespace, picture_hz: float, stack: ExitStack) -> _Bodies:
+    if arguments.seed is None:
+        return _Bodies(ExactArm(), LaggingWheels(), AirBlades())
+    # Here and not above: the devices alone need no simulator.
+    from bridge.fakes.vineyard_plant import VineyardPlant
+    from bridge.sim.build import simulated_robot
+
+    take_priority("control")
+    wire = ForeignWire(TransportConfig(connect=(arguments.connect,)))
+    stack.callback(wire.close)
+    send = wire.publisher(KEY)
+    robot = simulated_robot(arguments.config, arguments.seed, arguments.trace, "process")
+    plant = VineyardPlant(robot, picture_hz, lambda picture, at: send(pack(picture, at)))
+    stack.callback(plant.close)
+    return _Bodies(plant, plant, plant)
 
 
 def _run(arguments: argparse.Namespace) -> None:
     ended = stop_on_signals()
     # The control box must not wait long for the other threads.
     sys.setswitchinterval(0.0005)
+    if arguments.seed is not None and arguments.connect is None:
+        raise InputError("--seed puts all devices on one robot: give --connect too")
+    real = load_section(arguments.config, "real", RealConfig)
+    address = arguments.arm or (None if arguments.seed is None else real.arm.address)
     devices: dict[str, Device] = {}
     box: ControlBox | None = None
     with ExitStack() as stack:
-        if arguments.arm is not None:
-            box = devices["arm"] = ControlBox(arguments.arm, ExactArm())
+        bodies = _bodies(arguments, real.camera.rate_hz, stack)
+        if address is not None:
+            box = devices["arm"] = ControlBox(address, bodies.arm)
             stack.callback(box.close)
         if arguments.connect is not None:
             wire = TransportConfig(connect=(arguments.connect,))
             drive = RobotModel(load_section(arguments.config, "robot", RobotConfig)).drive
-            base = devices["base"] = FakeMp500(ForeignWire(wire), LaggingWheels(), drive)
+            base = devices["base"] = FakeMp500(ForeignWire(wire), bodies.wheels, drive)
             stack.callback(base.close)
-            service = load_section(arguments.config, "real", RealConfig).cutter.service
-            cutter = devices["cutter"] = FakeCutter(ForeignWire(wire), service, AirBlades())
+            cutter = devices["cutter"] = FakeCutter(ForeignWire(wire), real.cutter.service, bodies.blades)
             stack.callback(cutter.close)
             turning = threading.Thread(target=base.run, args=(ended,), name="mp500")
             turning.start()

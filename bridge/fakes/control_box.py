@@ -64,6 +64,7 @@ class ControlBox:
         self._breaches: list[str] = []
         self._load = 0.0
         self._still_at: float | None = None
+        self._moved = 0
         self._client: socket.socket | None = None
         self._target: tuple[str, int] | None = None
         try:
@@ -118,6 +119,7 @@ class ControlBox:
                 "load": self._load,
                 "recoveries": self._recoveries,
                 "ticks": self._state.number,
+                "moved_tick": self._moved,
                 "still_s": -1.0 if self._still_at is None else time.monotonic() - self._still_at,
             }
 
@@ -214,7 +216,7 @@ class ControlBox:
             if moving and state.mode == p.MOVING:
                 self._follow(command)
             if float(np.abs(state.dq_d).max()) >= _REST:
-                self._still_at = None
+                self._still_at, self._moved = None, state.number
             elif self._still_at is None:
                 self._still_at = time.monotonic()
 

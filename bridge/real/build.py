@@ -13,7 +13,7 @@ from bridge.core import TICK_S, BridgeCore
 from bridge.cut_memory import CutMemory
 from bridge.memory import Memory
 from bridge.odometer import Odometer
-from bridge.real.config import CutterConfig, RealConfig
+from bridge.real.config import CameraConfig, CutterConfig, RealConfig
 from bridge.real.cutter import Cutter, CutterStatus
 from bridge.real.mp500 import Mp500
 from bridge.real.panda import Panda
@@ -21,10 +21,12 @@ from bridge.real.realsense import RealSense, open_realsense
 from bridge.real.robot import RealRobot
 from rolling_panda.config import RobotConfig, TransportConfig, load_section
 from rolling_panda.errors import InputError
+from rolling_panda.messages import BridgeKind
 from rolling_panda.robot_model import RobotModel
 from rolling_panda.transport import ForeignWire, Rejections
 
 _FIRST_STATE_S = 15.0
+_LOOPBACK = "127."
 _DRIVERS = ("panda_py", "pyrealsense2", "rosbags")
 
 
@@ -67,13 +69,17 @@ class Devices:
                     stack.callback(device.close)
 
 
-def open_devices(config_path: Path, model: RobotModel, moving: bool) -> Devices:
+def open_devices(
+    config_path: Path, wire: TransportConfig, model: RobotModel, moving: bool, fakes: bool = False
+) -> Devices:
     """Open every configured device.
 
     Args:
-        config_path: TOML file with the sections transport, bridge and real.
+        config_path: TOML file with the sections bridge and real.
+        wire: Of this program.
         model: Of the robot.
         moving: False sends no command to any device.
+        fakes: The devices are `bridge.fakes`: the camera's pictures come over the wire.
 
     Raises:
         ConfigError: A section is wrong.
@@ -87,12 +93,15 @@ def open_devices(config_path: Path, model: RobotModel, moving: bool) -> Devices:
             f"the real robot's drivers are not installed ({names}); run: pip install 'rolling-panda[real]'"
         )
     real = load_section(config_path, "real", RealConfig)
-    wire = load_section(config_path, "transport", TransportConfig)
     acceleration = load_section(config_path, "bridge", BridgeConfig).wheel_acceleration
     if not real.arm.address:
         raise InputError(f'{config_path} does not say where the arm\'s control box is: [real.arm] address = "…"')
+    if fakes and not real.arm.address.startswith(_LOOPBACK):
+        raise InputError(
+            f"{real.arm.address} may be a real arm: with --fakes [real.arm] address has to begin with {_LOOPBACK}"
+        )
     with ExitStack() as opened:
-        camera = open_realsense(real.camera) if real.camera.enabled else None
+        camera = _camera(wire, real.camera, fakes) if real.camera.enabled else None
         if camera is not None:
             opened.callback(camera.close)
         base = Mp500(ForeignWire(_reached(wire, real.base.connect)), model.drive, acceleration, real.base, moving)
@@ -106,19 +115,23 @@ def open_devices(config_path: Path, model: RobotModel, moving: bool) -> Devices:
 
 def real_bridge(
     config_path: Path,
+    wire: TransportConfig,
     moving: bool = True,
     rejections: Rejections | None = None,
     cuts: CutMemory | None = None,
     memory: Memory | None = None,
+    fakes: bool = False,
 ) -> BridgeCore:
     """A bridge with the real robot.
 
     Args:
-        config_path: TOML file with the sections transport, robot, bridge and real.
+        config_path: TOML file with the sections robot, bridge and real.
+        wire: Of this program.
         moving: False only reads.
         rejections: Table to count refusals in, shared with the transport.
         cuts: Remembers cuts through restarts; None for as long as this lives.
         memory: What else survives a restart; None forgets.
+        fakes: The devices are `bridge.fakes`, and the bridge says so.
 
     Raises:
         ConfigError: A section is wrong.
@@ -127,7 +140,7 @@ def real_bridge(
     """
     config = load_section(config_path, "bridge", BridgeConfig)
     model = RobotModel(load_section(config_path, "robot", RobotConfig))
-    devices = open_devices(config_path, model, moving)
+    devices = open_devices(config_path, wire, model, moving, fakes)
     try:
         wait_for_states(devices)
     except InputError:
@@ -135,7 +148,8 @@ def real_bridge(
         raise
     robot = RealRobot(devices.base, devices.arm, devices.blades, devices.camera, moving)
     odometer = Odometer(model.drive, config.odometry, TICK_S)
-    return BridgeCore(robot, config, model.limits, odometer, "real", None, rejections, cuts, memory)
+    kind: BridgeKind = "fakes" if fakes else "real"
+    return BridgeCore(robot, config, model.limits, odometer, kind, None, rejections, cuts, memory)
 
 
 def wait_for_states(devices: Devices, limit_s: float = _FIRST_STATE_S) -> None:
@@ -155,6 +169,15 @@ def wait_for_states(devices: Devices, limit_s: float = _FIRST_STATE_S) -> None:
 def _reached(wire: TransportConfig, connect: str) -> TransportConfig:
     """The program's own router, or another one that asks for no certificates."""
     return replace(wire, connect=(connect,), certificates="") if connect else wire
+
+
+def _camera(wire: TransportConfig, config: CameraConfig, fakes: bool) -> RealSense:
+    if not fakes:
+        return open_realsense(config)
+    # Here and not above: nothing of the fakes is loaded where there are none.
+    from bridge.fakes.software_camera import open_fake_realsense
+
+    return open_fake_realsense(ForeignWire(wire), config.rate_hz)
 
 
 def _blades(wire: TransportConfig, config: CutterConfig, moving: bool) -> Cutter | NoCutter:

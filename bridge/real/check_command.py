@@ -6,7 +6,7 @@ from pathlib import Path
 from bridge.real.build import open_devices, wait_for_states
 from bridge.real.commissioning import inspect, table
 from bridge.real.config import RealConfig
-from rolling_panda.config import RobotConfig, load_section
+from rolling_panda.config import RobotConfig, TransportConfig, load_section
 from rolling_panda.errors import InputError
 from rolling_panda.robot_model import RobotModel
 
@@ -14,14 +14,14 @@ from rolling_panda.robot_model import RobotModel
 _SETTLE_S = 6.0
 
 
-def check(config_path: Path) -> None:
+def check(config_path: Path, wire: TransportConfig, fakes: bool = False) -> None:
     """Print what was found.
 
     Raises:
         InputError: Something is not as it has to be; the text counts how many.
     """
     model = RobotModel(load_section(config_path, "robot", RobotConfig))
-    devices = open_devices(config_path, model, moving=False)
+    devices = open_devices(config_path, wire, model, False, fakes)
     try:
         # Which of them is silent is in the table.
         with contextlib.suppress(InputError):

@@ -93,7 +93,7 @@ class CameraConfig(Struct, frozen=True, forbid_unknown_fields=True):
     serial: Key = ""
     width: Annotated[int, Meta(ge=160, le=1920)] = 848
     height: Annotated[int, Meta(ge=120, le=1080)] = 480
-    rate_hz: Annotated[int, Meta(ge=6, le=90)] = 30
+    rate_hz: Annotated[int, Meta(ge=1, le=90)] = 30
 
 
 class RealConfig(Struct, frozen=True, forbid_unknown_fields=True):

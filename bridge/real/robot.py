@@ -101,6 +101,7 @@ class RealRobot:
             fault="; ".join(filter(None, ["" if self._moving else READ_ONLY, base.fault, arm.fault])),
             severe=base.severe or arm.severe,
             emergency=base.emergency,
+            battery=base.battery if 0.0 <= base.battery <= 1.0 else None,
         )
 
     def write(self, setpoint: Setpoint) -> None:

@@ -46,16 +46,28 @@ def simulated_bridge(
         ConfigError: A section is wrong, or the trace cannot be written.
     """
     config = load_section(config_path, "bridge", BridgeConfig)
+    model = RobotModel(load_section(config_path, "robot", RobotConfig))
+    odometer = Odometer(model.drive, config.odometry, TICK_S, seed)
+    robot = simulated_robot(config_path, seed, trace, camera)
+    return BridgeCore(robot, config, model.limits, odometer, "sim", robot.scenery, rejections, cuts, memory)
+
+
+def simulated_robot(
+    config_path: Path, seed: int, trace: Path | None, camera: Literal["inline", "process"]
+) -> SimulatedRobot:
+    """The simulated robot beside a row grown from `seed`; arguments as of `simulated_bridge`.
+
+    Raises:
+        ConfigError: A section is wrong, or the trace cannot be written.
+    """
+    config = load_section(config_path, "bridge", BridgeConfig)
     row = grow(load_section(config_path, "vineyard", VineyardConfig), seed)
     lens = load_section(config_path, "camera", CameraConfig)
-    model = RobotModel(load_section(config_path, "robot", RobotConfig))
     writer = None if trace is None else TraceWriter(trace)
     photographer: Photographer = (
         InlinePhotographer(lens, seed) if camera == "inline" else ProcessPhotographer(lens, seed)
     )
-    odometer = Odometer(model.drive, config.odometry, TICK_S, seed)
-    robot = SimulatedRobot(config, row, photographer, writer)
-    return BridgeCore(robot, config, model.limits, odometer, "sim", robot.scenery, rejections, cuts, memory)
+    return SimulatedRobot(config, row, photographer, writer)
 
 
 def subscribe_button(core: BridgeCore, transport: Onlooker) -> None:

@@ -9,6 +9,12 @@ import { ageWords } from "../words.js";
 
 /** @typedef {import("../camera-marks.js").Pixel} Pixel */
 
+/** What is said of where the image comes from, and why, by the bridge's kind. */
+const SOURCES = {
+  sim: ["simulation", "The robot and its camera are simulated"],
+  fakes: ["fakes", "The real robot's drivers run on fakes of its devices; nothing real moves"],
+  real: ["", ""],
+};
 /** Frames come at 2 Hz; one that is this old (ms) is called old. */
 const OLD_MS = 2500;
 
@@ -27,7 +33,7 @@ class RpCamera extends HTMLElement {
   }
 
   connectedCallback() {
-    const source = element("span", { class: "tag", attributes: { title: "The robot and its camera are simulated" } });
+    const source = element("span", { class: "tag" });
     const freeze = element("button", { id: "freeze", class: "quiet", text: "Freeze", attributes: { type: "button" } });
     const { head, note } = panelHead("Camera", source, freeze);
     this.picture.append(this.overlay);
@@ -44,7 +50,9 @@ class RpCamera extends HTMLElement {
       setText(note, words);
       this.classList.toggle("stale", words !== "" && !held);
       this.classList.toggle("frozen", held);
-      setText(source, pageState.get()?.bridge?.kind === "sim" ? "simulation" : "");
+      const [name, about] = SOURCES[pageState.get()?.bridge?.kind ?? "real"];
+      setText(source, name);
+      source.title = about;
     });
 
     freeze.addEventListener("click", () => {

@@ -67,6 +67,16 @@ const READINGS = Object.freeze([
     read: (/** @type {PageState} */ state) => speed.take(state.base, state.joints),
   },
   {
+    id: "battery",
+    label: "Battery",
+    unit: "%",
+    about: "Charge of the base's battery",
+    full: 100,
+    warnBelow: 20,
+    write: (/** @type {number} */ value) => value.toFixed(0),
+    read: (/** @type {PageState} */ state) => scaled(state.bridge?.battery ?? undefined, 100),
+  },
+  {
     id: "real-time-factor",
     label: "Real time",
     unit: "×",
@@ -117,6 +127,9 @@ class RpTelemetry extends HTMLElement {
       if (state === null) return;
       values = READINGS.map((reading) => reading.read(state));
       values.forEach((value, index) => gauges[index]?.show(value));
+      // A simulated base has none.
+      const battery = gauges[READINGS.findIndex((reading) => reading.id === "battery")];
+      if (battery) battery.hidden = state.bridge?.kind === "sim";
       const warnings = gauges.filter((gauge) => gauge.parentElement === engineers && gauge.dataset.warning).length;
       setText(title, `For engineers${warnings > 0 ? ` · ${counted(warnings, "warning")}` : ""}`);
     });
