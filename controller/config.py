@@ -83,7 +83,7 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         hold_max_age_s: Teleoperation ends after this silence (s).
         teleop_speed: Limit of the tool in teleoperation (m/s).
         teleop_turn: The same for turning (rad/s).
-        teleop_base_speed: Limit of each wheel on the ground where the base is driven by hand (m/s): from it
+        teleop_base_speed: Limit of each wheel on the ground where base or tool are led by hand (m/s): from it
             `base_braking` has the base at rest within 0.15 s of letting go.
         teleop_base: What the base does in teleoperation: `free` keeps it parallel to the row, in `transit` the tool's
             sideways motion steers it.

@@ -162,6 +162,7 @@ class Follower:
             posture,
             base,
             bounds[0],
+            wheel_cap=self._config.teleop_base_speed,
         )
         return _tracking(self._method.solve(demand), goal, error, False)
 

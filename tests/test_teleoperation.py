@@ -281,3 +281,14 @@ def test_the_base_is_driven_no_faster_than_it_comes_to_rest_from_in_time():
         assert wheels.max() == pytest.approx(CONFIG.teleop_base_speed, rel=0.02)
         v, omega = r.model.drive.twist(*r.xi[:2])
         assert v * base.angular == pytest.approx(omega * base.linear, abs=1e-3), "slowed alike"
+
+
+def test_a_tool_that_is_led_along_the_row_takes_the_base_no_faster_than_that():
+    r = robot()
+    held(r, target=pose_message(moved(tool(r), 2.0, 0, 0)))
+    fastest = 0.0
+    for _ in range(400):
+        r.step()
+        fastest = max(fastest, np.abs(r.xi[:2]).max() * r.model.drive.wheel_radius)
+    assert fastest == pytest.approx(CONFIG.teleop_base_speed, rel=0.02)
+    assert r.q[0] > 0.3, "and it does take it along"

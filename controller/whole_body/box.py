@@ -84,11 +84,16 @@ class Box:
         k["acceleration"], k["arm_step"], k["arm_speed"] = acceleration, self._arm_step, self.speed[ARM_XI]
         k["jerk_step"] = limits.jerk[ARM_XI] * config.arm_jerk_share * dt * dt
         k["base_speed"], k["base_step"], k["base_brake"] = self.speed[:2], base_step, base_brake
-        k["wheel_speed"], k["wheel_step"] = float(limits.velocity[0]), self._wheel_step
+        self._wheel_speed, self._radius = float(limits.velocity[0]), R
+        k["wheel_speed"], k["wheel_step"] = self._wheel_speed, self._wheel_step
         k["twist"] = Actuation(robot.drive).twist
 
-    def at(self, q: Array, sent: Array, before: Array) -> Bounds:
-        """The bounds at q (12) after ξ̇ `sent` (9), and `before` (9) in the period before that."""
+    def at(self, q: Array, sent: Array, before: Array, wheel_cap: float = math.inf) -> Bounds:
+        """The bounds at q (12) after ξ̇ `sent` (9), and `before` (9) in the period before that.
+
+        No wheel turns faster than `wheel_cap` (m/s on the ground), or brakes until it is so.
+        """
+        self._constants[0]["wheel_speed"] = min(self._wheel_speed, wheel_cap / self._radius)
         lower, upper = np.empty(NXI), np.empty(NXI)
         wheel_lower, wheel_upper, ramp = np.empty(2), np.empty(2), np.empty(2)
         _bounds(self._constants, q, sent, before, lower, upper, wheel_lower, wheel_upper, ramp)

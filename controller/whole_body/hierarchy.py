@@ -92,7 +92,7 @@ class Hierarchy:
         """The actuator velocities that answer the demand; see `Method.solve`."""
         if not demand.finite:
             return self._brake(demand, "the demand holds a number that is not finite", _NOWHERE)
-        bounds = self._box.at(demand.q, demand.sent, demand.sent_before)
+        bounds = self._box.at(demand.q, demand.sent, demand.sent_before, demand.wheel_cap)
         self._climb.now = manipulability = self._manipulability.at(demand.kinematics.J)
         base = bounds.ramp if demand.held is None else self._actuation.twist @ demand.held
         for task, jacobian, target in self._tasks:

@@ -75,6 +75,7 @@ class Demand:
         posture: Last priority.
         base: What the base is for.
         speed_cap: Largest speed of the tool's origin (m/s).
+        wheel_cap: Largest speed of each wheel on the ground (m/s); the method `hierarchy` keeps to it.
         scale: Rate of the motion's clock in the last period, 0…1.
         before: ξ̇ sent in the period before the last (9); None where nothing accelerates.
         held: Velocities that the wheels really have (2, rad/s) in a period in which only the arm is solved for and the
@@ -91,6 +92,7 @@ class Demand:
     scale: float = 1.0
     before: Array | None = None
     held: Array | None = None
+    wheel_cap: float = math.inf
 
     @property
     def arm_only(self) -> bool:

@@ -43,21 +43,8 @@ def test_a_fault_that_is_not_survived_in_time_is_told_and_counted(tmp_path, monk
     assert "NOT HELD" in capsys.readouterr().out
 
 
-#: What is not met, and by how much, is in docs/safety.md.
-UNMET = {"release of the tool": "the base may be as fast as in automatic work, and brakes for 0.2 s from there"}
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "fault",
-    [
-        pytest.param(fault, marks=pytest.mark.xfail(strict=True, reason=UNMET[fault.name]))
-        if fault.name in UNMET
-        else fault
-        for fault in FAULTS
-    ],
-    ids=lambda fault: fault.name,
-)
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
 def test_every_fault_holds(fault):
     world = start(fault)
     for seed in range(20):
