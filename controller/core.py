@@ -206,6 +206,8 @@ class Controller:
             supervisor.remark(f"bringing the arm home was stopped by {intent.user}")
             self._lines.say("info", supervisor.state.reason)
             return ""
+        if isinstance(intent, intents.Survey) and (unknown := self._operator.unknown_place(intent)):
+            return unknown
         client, event = client_of(intent), EVENTS.get(type(intent))
         if isinstance(intent, MOTION):
             supervisor.authority.claim(client, now)
@@ -213,7 +215,7 @@ class Controller:
             rights = supervisor.authority.rights(client, intent.role)
             refused = supervisor.event(event, now, f"{type(intent).__name__.lower()} by {intent.user}", rights)
             if isinstance(intent, intents.Start) and not refused:
-                movement.sequence.begin(intent.distance if isinstance(intent, intents.Survey) else 0.0)
+                movement.sequence.begin(intent if isinstance(intent, intents.Survey) else None)
             return refused
         if isinstance(intent, intents.Home):
             movement.go_home()

@@ -1,5 +1,7 @@
 """Whether a cut can be made without coming nearer to anything than the robot will go."""
 
+import math
+
 from controller.config import ControllerConfig
 from controller.interface import Sample
 from controller.planning.limits import PlanLimits
@@ -20,7 +22,12 @@ class CutClearance:
         """Nothing is known to stand around yet."""
         self._settings = config.hierarchy
         self._surroundings = Surroundings(CollisionModel(robot))
-        #: What the last plan that was looked at lacks, in words; empty where it lacks nothing.
+        self.forget()
+
+    def forget(self) -> None:
+        """Of plans that are looked at from now on it is remembered what the best of them lacks."""
+        self._least = math.inf
+        #: What it lacks, in words; empty where nothing was refused.
         self.lacking = ""
 
     def take(self, obstacles: Sample[Obstacles] | None) -> None:
@@ -33,13 +40,16 @@ class CutClearance:
         The blades may touch the spur that is cut.
         """
         self._surroundings.work_at((plan.poses.cut.translation,))
-        self.lacking = self._nearer(plan) if self._settings.collisions else ""
-        return not self.lacking
+        worst, words = self._nearer(plan) if self._settings.collisions else (0.0, "")
+        if words and worst < self._least:
+            self._least, self.lacking = worst, words
+        return not words
 
-    def _nearer(self, plan: CutPlan) -> str:
-        """What is nearer than it may be, in words; empty where nothing is."""
+    def _nearer(self, plan: CutPlan) -> tuple[float, str]:
+        """By how much what is nearest is nearer than it may be (m), and what that is; empty where nothing is."""
         settings = self._settings
         within = max(settings.collision_distance + _ROOM, PlanLimits.clearance)
+        worst, words = 0.0, ""
         places = (("at the cut", plan.q_cut), ("at the stand-off", plan.q_stand_off), ("clear of it", plan.q_clear))
         for where, q in places:
             near = self._surroundings.model.distances(q, within)
@@ -48,9 +58,10 @@ class CutClearance:
                 if q is plan.q_clear:
                     # From here a plan leads on.
                     needed = max(needed, PlanLimits.clearance)
-                if distance < needed:
-                    return (
+                if needed - distance > worst:
+                    worst = needed - distance
+                    words = (
                         f"{where} {1e3 * distance:.0f} mm would be between {pair[0]} and {pair[1]}, "
                         f"{1e3 * needed:.0f} mm are needed"
                     )
-        return ""
+        return worst, words

@@ -26,6 +26,7 @@ from controller.tool_motion import Leg, ToolMotion
 from controller.verification import Verification
 from controller.ways import Ways, at_base
 from controller.whole_body.saturation import Saturation
+from rolling_panda import intents
 from rolling_panda import messages as m
 from rolling_panda.differential_drive import Array
 from rolling_panda.look_messages import CloseLook
@@ -65,7 +66,7 @@ class CutSequence:
         self._patience = Patience(config.reach_timeout_s, 1.0 / config.rate_hz)
         self._plan: CutPlan | None = None
         self._accepted: m.PruningPoint | None = None
-        self._survey = Survey(config, follower, saturation, queue, 0.0)
+        self._survey = Survey(config, follower, saturation, queue)
         self._places: tuple[Array, ...] = ()
         self._ways = Ways(config, follower.flows)
         self._eye = Eye(config.look_timeout_s, _PICTURES)
@@ -108,12 +109,12 @@ class CutSequence:
         """Whether a cut has been asked for and how it ends is not known yet: the blades may be closing."""
         return self._blades.busy
 
-    def begin(self, survey: float = 0.0) -> None:
-        """Start with getting the tool clear of the canes, or a survey of so much of the row (m)."""
+    def begin(self, survey: intents.Survey | None = None) -> None:
+        """Start with getting the tool clear of the canes, or a survey."""
         self._forget()
         # Since a plan was made the robot may have been moved by hand.
         self._coming.forget()
-        self._stage = Stage.SURVEY if survey > 0.0 else Stage.ESCAPE
+        self._stage = Stage.SURVEY if survey is not None else Stage.ESCAPE
         self._survey = Survey(self._config, self._follower, self._saturation, self._queue, survey)
 
     def wind_up(self, why: str) -> None:

@@ -1,6 +1,7 @@
 """What operators ask of the queue, and how the log tells it."""
 
 from controller.queue import PointQueue
+from controller.survey import open_place
 from rolling_panda import intents
 
 
@@ -29,6 +30,12 @@ class Operator:
         if isinstance(intent, intents.PlannersOrder):
             return self._queue.order.give_back(intent.revision) or self._queue.sort()
         return f"{type(intent).__name__} is not something this controller does"
+
+    def unknown_place(self, intent: intents.Survey) -> str:
+        """Why the place of a survey cannot be looked at again; empty where it can, or where it has none."""
+        if intent.vine == 0 or open_place(self._queue.perceived, intent.vine, intent.spur) is not None:
+            return ""
+        return f"nothing is left open at vine {intent.vine}, spur {intent.spur}"
 
     def told(self, intent: intents.Intent) -> str:
         """The log's words for what was done; empty where the change of mode that comes of it is logged."""

@@ -10,8 +10,12 @@ from perception.plant_map import KnownCane, KnownSpur, PlantMap
 from perception.rule import Cut, count_nodes, nearest_node
 from rolling_panda.row_messages import Capsule
 
-#: A click this far beside a cane means it (m).
-_BESIDE = 0.025
+#: A click this far beside a cane means it (m); from afar also one that is so far beside it in the picture (rad).
+_BESIDE, _BESIDE_ANGLE = 0.025, 0.012
+#: A cut slides this far along the cane from a click to where the blades may be (m), in such steps.
+_SLIDE, _SLIDE_STEP = 0.016, 0.001
+#: Where no cane is known this near to the line of sight (m), that part of the row has not been seen.
+_SEEN = 0.3
 #: A point this far from a cane's axis is on it (m).
 _ON_CANE = 0.012
 #: Buds keep this distance from the blades (m).
@@ -37,11 +41,18 @@ def point_by_hand(
         user: Who placed it.
     """
     found = _nearest(known, origin, direction)
-    if found is None:
-        return f"no known cane within {1000 * _BESIDE:.0f} mm of there; click on a cane that is drawn"
-    spur, number, arc = found
-    cut = _cut_at(spur, number, arc, config, obstacles, f"Placed by {user}")
-    return cut if isinstance(cut, str) else (cut, spur.number)
+    if found is None or found[0] > _SEEN:
+        return "this part of the row has not been seen yet: drive there, with Survey for instance, and click again"
+    gap, spur, number, arc, away = found
+    if gap > max(_BESIDE, _BESIDE_ANGLE * away):
+        return f"the nearest cane that was seen passes {1000 * gap:.0f} mm beside there: click on a blue line"
+    whose, why = f"Placed by {user}", ""
+    for slide in sorted(np.arange(-_SLIDE, _SLIDE + _SLIDE_STEP / 2, _SLIDE_STEP).tolist(), key=abs):
+        cut = _cut_at(spur, number, arc + slide, config, obstacles, whose)
+        if isinstance(cut, Cut):
+            return cut, spur.number
+        why = why or cut
+    return f"{why}; click {1000 * _SLIDE:.0f} mm or more away along the cane"
 
 
 def moved_by_hand(
@@ -73,8 +84,6 @@ def moved_by_hand(
     if best is None:
         return "it is on no cane that is known; reject it, and place one by hand"
     _, spur, number, arc = best
-    if arc + along <= float(spur.canes[number].best.arc[0]):
-        return "the cane begins there"
     return _cut_at(spur, number, arc + along, config, obstacles, f"Moved by {user}")
 
 
@@ -84,6 +93,8 @@ def _cut_at(
     cane = spur.canes[number].as_cane()
     if arc > cane.length:
         return "the cane has been cut there already"
+    if arc < float(cane.arc[0]):
+        return "the cane begins there"
     position = cane.at(arc)
     nodes = count_nodes(cane, config)
     gaps = [abs(node.arc - arc) for node in cane.nodes]
@@ -92,7 +103,7 @@ def _cut_at(
     if 2 * cane.radius > config.largest_diameter:
         return f"the cane is {2000 * cane.radius:.0f} mm thick, more than the shears may cut"
     if near_wire(obstacles, position, config.wire_distance):
-        return f"a wire passes within {1000 * config.wire_distance:.0f} mm of there; cut this one by hand"
+        return f"a wire passes within {1000 * config.wire_distance:.0f} mm of there"
     below = [node for node in nodes if node.arc < arc]
     where = f"{1000 * (arc - below[-1].arc):.0f} mm past node {len(below)}" if below else "below the first node"
     return Cut(
@@ -115,8 +126,12 @@ def _samples(cane: KnownCane) -> tuple[Array, Array]:
     return arcs, np.stack([np.interp(arcs, cane.best.arc, cane.best.axis[:, i]) for i in range(3)], axis=1)
 
 
-def _nearest(known: PlantMap, origin: Array, direction: Array) -> tuple[KnownSpur, int, float] | None:
-    best: tuple[float, KnownSpur, int, float] | None = None
+def _nearest(known: PlantMap, origin: Array, direction: Array) -> tuple[float, KnownSpur, int, float, float] | None:
+    """Of all canes the one that a line passes nearest: how far beside it (m), its spur and number, and where.
+
+    That is the arc length there and the distance from the line's beginning (m).
+    """
+    best: tuple[float, KnownSpur, int, float, float] | None = None
     for spur in known.spurs:
         for number, cane in enumerate(spur.canes):
             arcs, axis = _samples(cane)
@@ -124,6 +139,6 @@ def _nearest(known: PlantMap, origin: Array, direction: Array) -> tuple[KnownSpu
             gaps = np.linalg.norm(axis - origin - ahead[:, None] * direction, axis=1)
             gaps[ahead <= 0.0] = np.inf
             k = int(np.argmin(gaps))
-            if gaps[k] < _BESIDE and (best is None or gaps[k] < best[0]):
-                best = float(gaps[k]), spur, number, float(arcs[k])
-    return None if best is None else best[1:]
+            if np.isfinite(gaps[k]) and (best is None or gaps[k] < best[0]):
+                best = float(gaps[k]), spur, number, float(arcs[k]), float(ahead[k])
+    return best

@@ -35,6 +35,9 @@ class RuleConfig(Struct, frozen=True, forbid_unknown_fields=True):
         base_doubt: A cane whose base is hidden over more than this cannot have its nodes counted (m).
         largest_diameter: Thicker wood is refused (m).
         wire_distance: No cut is proposed nearer to a wire or a hose than this: 15 mm, and what a pixel is wide (m).
+        blade_reach: So far to either side of the wood the open blades stand (m).
+        blade_room: Where there is a choice, a wire is this far from the middle of each (m): what the controller keeps,
+            with half a blade's width.
         cordon_distance: The same for cordon and trunk (m).
         node_distance: The same for nodes that stay (m).
     """
@@ -60,6 +63,8 @@ class RuleConfig(Struct, frozen=True, forbid_unknown_fields=True):
     crossing: Positive = 0.015
     largest_diameter: Positive = 0.015
     wire_distance: Positive = 0.0165
+    blade_reach: Positive = 0.021
+    blade_room: Positive = 0.0146
     cordon_distance: Positive = 0.020
     node_distance: Positive = 0.010
 

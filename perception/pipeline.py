@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from perception.abstention import MoreToSee, OpenPlaces, abstention
 from perception.album import Album, Crop
 from perception.by_hand import moved_by_hand, point_by_hand
+from perception.cane_lines import cane_lines
 from perception.centreline import centrelines
 from perception.clearance import Rods
 from perception.close_look import look_closely, no_look
@@ -18,7 +19,7 @@ from perception.linking import link
 from perception.mending import mended
 from perception.numbering import RowNumbers, SpurNumber
 from perception.obstacles import ObstacleMap
-from perception.plant import Cane, Plant
+from perception.plant import Plant
 from perception.plant_map import PlantMap
 from perception.rules import apply_rule
 from perception.segmenter import Segmenter
@@ -35,8 +36,6 @@ from rolling_panda.plant_requests import AddPoint, AddPointInImage, MovePoint, P
 from rolling_panda.robot_model import RobotModel
 from rolling_panda.row_messages import Capsule
 
-#: Every so many samples of a cane's axis go on the wire.
-_THIN_OUT = 4
 _CORDON = m.WOOD_CLASSES.index("cordon")
 #: A point by hand this near to another would be the same cut (m).
 _TAKEN = 0.01
@@ -44,6 +43,8 @@ _TAKEN = 0.01
 _SHORTEST = 1e-6
 #: Fewer pixels of cordon say nothing about how far the row is.
 _LEAST_CORDON = 200
+#: A spur this near to the middle of the picture is before the camera (m).
+_BEFORE_IT = 0.3
 
 
 class Perception:
@@ -116,12 +117,14 @@ class Perception:
         for seen, spur, number in zip(plant.spurs, spurs, numbers, strict=True):
             decision = apply_rule(fused.get(number, spur), self._config.rule, plant.beside(seen), keep_out)
             proposals += [Proposal(cut, number) for cut in decision.cuts]
-            self._open.note(number, bool(decision.cuts), list(decision.abstained))
+            aside = abs(float(view.R[:, 0] @ (spur.position - view.t)))
+            place = _vector(spur.position)
+            self._open.note(number, bool(decision.cuts), list(decision.abstained), place, aside < _BEFORE_IT)
         looks = {spur.number: spur.position.looks for spur in self.known.spurs}
         tracked = self._tracker.update(view, labels, proposals, looks)
         self._take(tracked)
         self._tell_obstacles(view, labels, rods, numbers)
-        self._canes = tuple(_polyline(cane) for spur in plant.spurs for cane in spur.canes)
+        self._canes = cane_lines(self.known)
         return self._message(view, tracked.points, self._left_open(tracked.points), self._canes)
 
     def look_closely(self, frame: CameraFrame) -> CloseLook:
@@ -257,7 +260,8 @@ class Perception:
             beside = [cane.axis for other in spurs.values() if other is not spur for cane in other.canes]
             decision = apply_rule(spur, rule, np.concatenate([np.zeros((0, 3)), *beside]), keep_out)
             proposals += [Proposal(cut, number) for cut in decision.cuts]
-            self._open.note(number, bool(decision.cuts), list(decision.abstained))
+            place = _vector(spur.position)
+            self._open.note(number, bool(decision.cuts), list(decision.abstained), place, before=False)
         self._tracker.restart(proposals)
         self._staying.choose(self.known.spurs, self._tracker.shown(), rule)
         self._told = self._left_open(self._tracker.points())
@@ -347,6 +351,6 @@ def perceive(view: View, labels: "np.ndarray[tuple[int, ...], np.dtype[np.uint8]
     return build_plant(view, labels, lines, config.skeleton)
 
 
-def _polyline(cane: Cane) -> tuple[m.Vector3, ...]:
-    axis = np.concatenate([cane.axis[:-1:_THIN_OUT], cane.axis[-1:]])
-    return tuple((float(x), float(y), float(z)) for x, y, z in axis)
+def _vector(place: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]") -> m.Vector3:
+    x, y, z = place.tolist()
+    return x, y, z

@@ -11,7 +11,7 @@ import numpy as np
 
 from perception.abstention import MoreToSee
 from perception.config import RuleConfig
-from perception.keep_out import KeepOut, anywhere
+from perception.keep_out import ANYWHERE, KeepOut
 from perception.plant import Array, Cane, Node, Spur
 from rolling_panda.messages import CutKind
 
@@ -62,7 +62,7 @@ class _Keeper:
     doubts: tuple[str, ...] = field(default=())
 
 
-def decide(spur: Spur, config: RuleConfig, beside: Array | None = None, keep_out: KeepOut = anywhere) -> Decision:
+def decide(spur: Spur, config: RuleConfig, beside: Array | None = None, keep_out: KeepOut = ANYWHERE) -> Decision:
     """Apply the rule to one spur.
 
     Args:
@@ -178,6 +178,8 @@ def _far_from(start: float, end: float, taken: list[float]) -> float:
 def clear_arc(cane: Cane, arc: float, others: list[Array], config: RuleConfig, keep_out: KeepOut) -> float | str:
     """Arc length nearest to a cut's (m) where nothing else is between the open blades, or why there is none.
 
+    One beside a wire is taken only where no other will do.
+
     Args:
         cane: That is cut.
         arc: Of the cut at its best (m).
@@ -185,7 +187,7 @@ def clear_arc(cane: Cane, arc: float, others: list[Array], config: RuleConfig, k
         config: How near is too near, and how far the cut may move.
         keep_out: Where the blades must not go.
     """
-    why = ""
+    why, tight = "", None
     for share in (0.0, 0.5, -0.5, 1.0, -1.0):
         place = arc + share * config.shift
         if any(abs(node.arc - place) < config.node_distance for node in cane.nodes):
@@ -193,11 +195,12 @@ def clear_arc(cane: Cane, arc: float, others: list[Array], config: RuleConfig, k
         if _nearest(others, cane.at(place)) < config.crossing:
             reason = "another cane passes so close to the cut that the shears would take it too"
         else:
-            reason = keep_out(cane.at(place))
-        if not reason:
+            reason = keep_out.reason(cane.at(place))
+        if not reason and keep_out.fits(cane.at(place), cane.tangent(place)):
             return place
+        tight = place if tight is None and not reason else tight
         why = why or reason
-    return why or "no place for the blades between two nodes"
+    return tight or why or "no place for the blades between two nodes"
 
 
 def _shorten(keeper: _Keeper, others: list[Array], config: RuleConfig, keep_out: KeepOut) -> Cut | str:
@@ -260,7 +263,7 @@ def _renew(spur: Spur, keeper: _Keeper, shorten: Cut, config: RuleConfig, keep_o
     position = root + (stands + room / 2) * along
     if float(np.linalg.norm(keeper.cane.axis - position, axis=1).min()) < config.shears_room:
         return rest + "the shears would touch the cane that stays"
-    if kept_out := keep_out(position):
+    if kept_out := keep_out.reason(position):
         return rest + kept_out
     if 2 * spur.radius > config.largest_diameter:
         return rest + f"the stub is {2000 * spur.radius:.0f} mm thick, more than the shears may cut"

@@ -3,7 +3,7 @@
 from msgspec.structs import replace
 
 from perception.config import RuleConfig
-from perception.keep_out import KeepOut, anywhere
+from perception.keep_out import ANYWHERE, KeepOut
 from perception.plant import Array, Cane, Spur
 from perception.rule import Cut, Decision, clear_arc, count_nodes, cut_arc, cut_confidence, nearest_node
 
@@ -11,7 +11,7 @@ from perception.rule import Cut, Decision, clear_arc, count_nodes, cut_arc, cut_
 _OLD_CANE = "last year's cane is left for a person"
 
 
-def decide_guyot(spur: Spur, config: RuleConfig, beside: Array | None = None, keep_out: KeepOut = anywhere) -> Decision:
+def decide_guyot(spur: Spur, config: RuleConfig, beside: Array | None = None, keep_out: KeepOut = ANYWHERE) -> Decision:
     """Apply the rule to one spur.
 
     Args:

@@ -76,9 +76,14 @@ class Start(Intent, frozen=True, kw_only=True):
 
 
 class Survey(Start, frozen=True, kw_only=True):
-    """READY → AUTO along the row with the arm in its looking posture; nothing is cut. `distance` ahead (m)."""
+    """READY → AUTO along the row with the arm in its looking posture; nothing is cut. `distance` ahead (m).
+
+    With `vine` and `spur` of a place that was left open it is that place alone that is looked at, from both its sides.
+    """
 
     distance: Annotated[float, Meta(ge=0.1, le=500.0)] = 4.0
+    vine: Annotated[int, Meta(ge=0, le=100000)] = 0
+    spur: Annotated[int, Meta(ge=0, le=100000)] = 0
 
 
 class Pause(Intent, frozen=True, kw_only=True):

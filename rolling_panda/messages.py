@@ -340,12 +340,16 @@ class PruningRule(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
 
 
 class Abstention(Struct, frozen=True, forbid_unknown_fields=True):
-    """A place without a point: why, and what it needs. Without vine and spur (0) it is about no spur in particular."""
+    """A place without a point: why, and what it needs. Without vine and spur (0) it is about no spur in particular.
+
+    `position` is where the spur was seen (m, odom).
+    """
 
     reason: Text
     needs: Need
     vine: Annotated[int, Meta(ge=0, le=100000)] = 0
     spur: Annotated[int, Meta(ge=0, le=100000)] = 0
+    position: Vector3 | None = None
 
 
 class PruningPoints(Message, frozen=True, kw_only=True):

@@ -106,6 +106,11 @@ def operator_router(desk: Desk) -> APIRouter:
         """Drive along the row with the camera on the vines; cuts nothing. Ends with what was found."""
         return await ask(session, intents.Survey(user=session.user, distance=request.distance))
 
+    @router.post("/look-again", tags=["mode"])
+    async def look_again(session: Caller, request: body.Place) -> Response:
+        """Drive to a place that was left open and look at it from both its sides; cuts nothing."""
+        return await ask(session, intents.Survey(user=session.user, vine=request.vine, spur=request.spur))
+
     @router.post("/pause", tags=["mode"])
     async def pause(session: Caller) -> Response:
         """Pause; nothing resumes by itself."""

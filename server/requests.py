@@ -89,6 +89,13 @@ class PlannersOrder(_Body):
     revision: Annotated[int, Field(ge=0, le=2**62)]
 
 
+class Place(_Body):
+    """A place that was left open."""
+
+    vine: Annotated[int, Field(ge=1, le=100000)]
+    spur: Annotated[int, Field(ge=0, le=100000)]
+
+
 class AcceptAll(_Body):
     """Least confidence, 0…1."""
 

@@ -25,6 +25,8 @@ VIEW_VERSION = viser.__version__
 _SKY_TOP, _SKY_BOTTOM = np.array([22.0, 27.0, 34.0]), np.array([58.0, 66.0, 76.0])
 _CANE_LINES = "/canes"
 _SELECTION = "/selection"
+#: Lines of canes are drawn beside them, on the robot's side (m): inside the wood they could not be seen.
+_BESIDE_CANE = np.array([0.0, -0.008, 0.0], dtype=np.float32)
 
 
 def view_page() -> bytes:
@@ -110,9 +112,9 @@ class Scene:
         if pairs:
             self._server.scene.add_line_segments(
                 _CANE_LINES,
-                np.array(pairs, dtype=np.float32),
-                colors=(96, 160, 190),
-                thickness=1.0,
+                np.array(pairs, dtype=np.float32) + _BESIDE_CANE,
+                colors=(84, 172, 224),
+                thickness=2.0,
                 thickness_units="screen",
             )
         else:

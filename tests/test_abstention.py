@@ -29,3 +29,27 @@ def test_a_look_that_saw_too_little_is_not_told_of_a_spur_that_has_its_point():
     assert places.told({FIRST}) == () and len(places.told({SECOND})) == 1
     places.note(FIRST, True, ["the other cane is left for a person"])
     assert len(places.told({FIRST})) == 1
+
+
+def test_what_was_seen_from_before_a_place_is_not_taken_back_from_aside():
+    places = OpenPlaces()
+    places.note(FIRST, False, [MoreToSee("at the edge")], (1.0, 0.8, 0.9), before=False)
+    places.note(FIRST, False, ["two canes are alike"], (1.0, 0.8, 0.9))
+    places.note(FIRST, False, [MoreToSee("at the edge")], (1.0, 0.8, 0.9), before=False)
+    (told,) = places.told(set())
+    assert (told.reason, told.needs, told.position) == ("two canes are alike", "operator", (1.0, 0.8, 0.9))
+    places.note(FIRST, True, [], before=False)
+    assert places.told(set()) == ()
+
+
+def test_looks_enough_from_before_a_place_leave_it_to_a_person():
+    places = OpenPlaces()
+    for looks in range(1, 15):
+        places.note(FIRST, False, [MoreToSee("its base is hidden")])
+        (told,) = places.told(set())
+        assert told.needs == ("another look" if looks < 12 else "operator")
+    assert told.reason == "its base is hidden; 14 looks from before it have not shown more: look yourself"
+    aside = OpenPlaces()
+    for _ in range(30):
+        aside.note(FIRST, False, [MoreToSee("at the edge")], before=False)
+    assert aside.told(set())[0].needs == "another look"

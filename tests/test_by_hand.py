@@ -33,15 +33,42 @@ def test_the_nearer_of_two_canes_is_meant():
 
 @pytest.mark.parametrize(
     ("x", "height", "says"),
-    [(0.3, 1.17, "no known cane"), (0.0, 0.95 + 0.185, "from a node"), (0.0, 2.0, "no known cane")],
+    [(0.15, 1.17, "90 mm beside there: click on a blue line"), (0.5, 1.17, "not been seen yet: drive there")],
 )
-def test_where_no_cut_can_be_there_is_a_reason(x, height, says):
+def test_where_no_cane_is_it_says_what_to_do(x, height, says):
     assert says in place(x, height)
+
+
+@pytest.mark.parametrize("beside", [-0.009, -0.004, 0.004, 0.009])
+def test_a_click_at_a_node_slides_along_the_cane_until_the_blades_have_room(beside):
+    node = 0.95 + 0.18
+    cut, _ = place(0.0, node + beside)
+    assert 0.010 <= abs(cut.position[2] - node) <= 0.0115
+    assert np.sign(cut.position[2] - node) == np.sign(beside)
+
+
+def test_no_slide_leads_past_two_nodes_side_by_side():
+    crowded = known(*[plant(cane(nodes=(0.02, 0.10, 0.112, 0.124, 0.136)))] * 3)
+    assert "from a node" in place(0.0, 0.95 + 0.118, crowded)
+    assert "16 mm or more away along the cane" in place(0.0, 0.95 + 0.118, crowded)
+
+
+def test_from_afar_a_click_may_be_farther_beside_the_cane():
+    far = point_by_hand(MAP, np.array([-0.04, -3.5, 1.17]), TOWARDS, RULE, (), "Ada")
+    assert not isinstance(far, str)
+    near = point_by_hand(MAP, np.array([-0.04, -0.7, 1.17]), TOWARDS, RULE, (), "Ada")
+    assert "40 mm beside" in near
+
+
+def test_a_click_beside_a_wire_slides_away_from_it_as_long_as_that_is_near():
+    wire = Capsule("wire", (-1.0, 0.0, 1.18), (1.0, 0.0, 1.18), 0.002, 0.002)
+    cut, _ = place(0.0, 1.163, obstacles=(wire,))
+    assert cut.position[2] <= 1.18 - 0.002 - RULE.wire_distance + 1e-9
 
 
 def test_a_wire_a_thick_cane_and_a_cut_one_are_refused():
     wire = Capsule("wire", (-1.0, 0.0, 1.18), (1.0, 0.0, 1.18), 0.002, 0.002)
-    assert "wire" in place(0.0, 1.17, obstacles=(wire,))
+    assert "wire" in place(0.0, 1.18, obstacles=(wire,))
     assert "thick" in place(0.0, 1.17, known(plant(cane(radius=0.009))))
     cut = known(*[plant(cane())] * 3)
     cut.sever(np.array([0.0, 0.0, 1.10]))
@@ -69,4 +96,4 @@ def test_where_it_cannot_be_moved_to_there_is_a_reason():
 
 
 def test_a_cane_behind_the_viewer_is_not_meant():
-    assert "no known cane" in point_by_hand(MAP, np.array([0.0, 0.7, 1.17]), TOWARDS, RULE, (), "Ada")
+    assert "not been seen" in point_by_hand(MAP, np.array([0.0, 0.7, 1.17]), TOWARDS, RULE, (), "Ada")

@@ -71,6 +71,7 @@ def client(server):
         ("resume", None, intents.Resume(user="ann")),
         ("home", None, intents.Home(user="ann")),
         ("survey", {"distance": 2.5}, intents.Survey(user="ann", distance=2.5)),
+        ("look-again", {"vine": 2, "spur": 3}, intents.Survey(user="ann", vine=2, spur=3)),
         ("acknowledge", None, intents.Acknowledge(user="ann")),
         ("reset", {"reason": "checked"}, intents.Reset(user="ann", reason="checked")),
         ("control/take", {"confirm": True}, intents.TakeControl(user="ann", confirmed=True)),

@@ -25,7 +25,7 @@ def test_a_click_into_the_view_asks_for_a_point_only_while_points_are_placed(pag
     expect(page.locator("rp-placing")).to_be_hidden()
     page.locator("#add-by-hand").click()
     until(page, lambda: p.PlaceByHand(active=True) in server.said)
-    expect(page.locator("rp-placing")).to_contain_text("Click a cane, here or in the camera image")
+    expect(page.locator("rp-placing")).to_contain_text("Click a cane that has been seen")
     assert server.posted == []
     server.tell(line)
     until(page, lambda: bool(server.posted))

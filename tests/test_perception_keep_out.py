@@ -7,6 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from controller.cut_clearance import _ROOM
+from controller.whole_body.collision_geometry import _TOOL_CAPSULES, BLADES
+from controller.whole_body.hierarchy_config import HierarchyConfig
 from perception.config import RuleConfig
 from perception.frame import View
 from perception.keep_out import as_known, in_view, wire_near
@@ -60,7 +63,7 @@ def test_the_drip_hose_is_kept_away_from_like_a_wire(kind: int) -> None:
         seen = view(round(119.5 - above * 400 / 0.8), 0.8)
         assert seen.labels is not None
         seen.labels[seen.labels == WIRE] = kind
-        assert bool(in_view(seen, seen.labels, (), RULE)(CUT)) is near
+        assert bool(in_view(seen, seen.labels, (), RULE).reason(CUT)) is near
 
 
 @pytest.mark.parametrize("kind", ["wire", "hose", "cordon", "trunk"])
@@ -68,5 +71,35 @@ def test_what_was_seen_before_keeps_the_blades_out_too(kind: m.WoodClass) -> Non
     least = 0.020 if kind in ("cordon", "trunk") else 0.015
     for gap, near in ((least - 0.001, True), (0.03, False)):
         rod = Capsule(kind, (-1.0, 0.01 + gap, 0.8), (1.0, 0.01 + gap, 0.8), 0.01, 0.01)
-        assert bool(as_known((rod,), RULE)(CUT)) is near, f"{kind} at {gap} m"
-    assert as_known((), RULE)(CUT) == ""
+        assert bool(as_known((rod,), RULE).reason(CUT)) is near, f"{kind} at {gap} m"
+    assert as_known((), RULE).reason(CUT) == ""
+
+
+@pytest.mark.parametrize(("lean", "fits"), [(0.0, True), (25.0, False), (-25.0, False)])
+def test_on_wood_that_leans_one_blade_is_nearer_to_the_wire_than_the_cut_is(lean: float, fits: bool) -> None:
+    # Odom: x along the row, z up.
+    wire = Capsule("wire", (-1.0, 0.8, 1.022), (1.0, 0.8, 1.022), 0.002, 0.002)
+    tangent = np.array([np.sin(np.radians(lean)), 0.0, np.cos(np.radians(lean))])
+    place = np.array([0.0, 0.8, 1.0])
+    known = as_known((wire,), RULE)
+    assert known.reason(place) == "", "it is far enough from the cut itself"
+    assert known.fits(place, tangent) is fits
+    assert as_known((), RULE).fits(place, tangent)
+
+
+def test_blades_that_fit_are_as_far_from_a_wire_as_the_controller_keeps_them() -> None:
+    blades = [(abs(x), radius) for part, _, (x, _, _), _, radius, _ in _TOOL_CAPSULES if part == BLADES]
+    assert blades
+    for aside, radius in blades:
+        assert RULE.blade_reach >= aside
+        assert RULE.blade_room >= radius + HierarchyConfig().blade_distance + _ROOM
+
+
+@pytest.mark.parametrize(("lean", "fits"), [(0.0, True), (25.0, False), (-25.0, False)])
+def test_so_it_is_with_a_wire_that_only_this_frame_shows(lean: float, fits: bool) -> None:
+    seen = view(round(119.5 - 0.021 * 400 / 0.8), 0.8)
+    assert seen.labels is not None
+    tangent = np.array([np.sin(np.radians(lean)), -np.cos(np.radians(lean)), 0.0])
+    keep_out = in_view(seen, seen.labels, (), RULE)
+    assert keep_out.reason(CUT) == ""
+    assert keep_out.fits(CUT, tangent) is fits

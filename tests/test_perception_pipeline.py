@@ -149,7 +149,7 @@ def test_clicks_that_mean_no_cane_are_refused(model, frames):
     old = seen.answer(AddPointInImage(user="Ada", sequence=999, u=0.5, v=0.5))
     away = seen.answer(AddPoint(user="Ada", origin=(0.0, 0.0, 1.0), direction=(0.0, -1.0, 0.0)))
     assert not (sky.ok or old.ok or away.ok)
-    assert "no known cane" in sky.reason and "newest" in old.reason
+    assert "click on a blue line" in sky.reason and "newest" in old.reason
     assert seen.points().points == before
 
 

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from perception.config import RuleConfig
+from perception.keep_out import KeepOut
 from perception.plant import Cane, Node, Span, Spur
 from perception.rule import choose_keeper, count_nodes, cut_arc, decide
 
@@ -96,9 +97,20 @@ def test_a_cut_gives_way_to_a_cane_or_a_wire_that_crosses_a_little_off_and_stays
         (cut,) = decide(spur(cane()), RULE, crossing).cuts
         assert 0.0 < (1.2 - cut.position[2]) * side <= RULE.shift + 1e-9
         assert np.linalg.norm(crossing - cut.position, axis=1).min() >= RULE.crossing
-    (cut,) = decide(spur(cane()), RULE, None, lambda place: "wire" if abs(place[2] - 1.205) < 0.009 else "").cuts
+    (cut,) = decide(spur(cane()), RULE, None, wire_from(1.196, 1.214)).cuts
     assert cut.position[2] == pytest.approx(1.2 - RULE.shift / 2) and "15 mm past node 2" in cut.reason
-    assert decide(spur(cane()), RULE, None, lambda place: "a wire is there").abstained == ("a wire is there",)
+    assert decide(spur(cane()), RULE, None, wire_from(0.0, 9.0)).abstained == ("a wire is there",)
+
+
+@pytest.mark.parametrize(("tight", "best"), [((1.19, 1.203), 1.20475), ((1.197, 1.21), 1.19525), ((1.1, 1.3), 1.2)])
+def test_where_the_blades_only_just_have_room_a_better_place_nearby_is_taken(tight, best):
+    beside = KeepOut(lambda place: "", lambda place, tangent: not tight[0] < place[2] < tight[1])
+    (cut,) = decide(spur(cane()), RULE, None, beside).cuts
+    assert cut.position[2] == pytest.approx(best)
+
+
+def wire_from(low, high):
+    return KeepOut(lambda place: "a wire is there" if low < place[2] < high else "", lambda place, tangent: True)
 
 
 def test_blades_keep_10_mm_from_the_nodes():
@@ -128,7 +140,8 @@ def test_a_cane_that_runs_into_another_is_cut_where_enough_of_it_is_seen_and_a_p
 
 def test_a_stub_is_not_cut_where_the_blades_must_not_go():
     low, high = cane(base=(0.025, 0.0, 0.93)), cane(base=(0.0, 0.0, 0.99))
-    decision = decide(spur(low, high), RULE, None, lambda place: "the cordon is near" if place[2] < 1.0 else "")
+    cordon = KeepOut(lambda place: "the cordon is near" if place[2] < 1.0 else "", lambda place, tangent: True)
+    decision = decide(spur(low, high), RULE, None, cordon)
     assert [cut.kind for cut in decision.cuts] == ["spur cut"] and "cordon" in decision.abstained[0]
 
 

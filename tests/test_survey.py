@@ -1,15 +1,18 @@
 """A survey is motion like any work: it drives along the row, cuts nothing, and says what perception found."""
 
 import numpy as np
+import pytest
 from controller_at_work import CONFIG, finish, point, robot, run_until
 
 from controller.interface import Sample
+from controller.survey import looked_again
 from rolling_panda import intents
 from rolling_panda import messages as m
-from rolling_panda.robot_model import ARM_Q
+from rolling_panda.robot_model import ARM_Q, RobotModel
 from rolling_panda.row_messages import Capsule
 
 UNCLEAR = m.Abstention("its base is hidden", "another look", 1, 2)
+ROBOT = RobotModel()
 ASKING = m.Abstention("two canes are alike", "operator", 1, 3)
 
 
@@ -106,3 +109,52 @@ def test_what_holds_the_base_back_pauses_it_with_the_reason():
     finish(r, 60.0)
     assert r.state.mode == "PAUSED" and "post" in r.state.reason
     assert r.q[0] < 0.9
+
+
+def test_a_place_left_open_is_looked_at_from_both_sides_and_from_before_it():
+    place = m.Abstention("its base is hidden", "another look", 1, 2, position=(1.9, 0.8, 0.95))
+    r = robot()
+    r.step()
+    tell(r, place)
+    r.step()
+    assert r.ask(intents.Arm(user="ada")).ok
+    unknown = r.ask(intents.Survey(user="ada", vine=1, spur=7))
+    assert not unknown.ok and "nothing is left open at vine 1, spur 7" in unknown.reason
+    assert r.ask(intents.Survey(user="ada", vine=1, spur=2)).ok
+    stood = []
+    run_until(r, lambda s: s is not None and s.mode == "AUTO", 2.0)
+    while r.state.mode == "AUTO":
+        assert r.now < 60.0
+        before = r.q[0]
+        r.step()
+        if abs(r.q[0] - before) < 1e-5 * r.dt and (not stood or abs(stood[-1][0] - r.q[0]) > 0.05):
+            stood.append((float(r.q[0]), 1.9 - tool_ahead(r)))
+    assert not r.cuts
+    places = [x for x, _ in stood if x > 0.1]
+    assert len(places) == 3, stood
+    np.testing.assert_allclose(np.diff(places), 0.22, atol=0.02)
+    assert abs(places[1] - stood[-1][1]) < 0.03, "the camera is before the place once"
+    assert r.state.reason == "looked again at vine 1, spur 2: still unclear: its base is hidden"
+
+
+def tool_ahead(r):
+    """How far ahead of the base the tool is (m)."""
+    q = r.q.copy()
+    q[:3] = 0.0
+    return float(ROBOT.pose(q, ROBOT.tool_id).translation[0])
+
+
+@pytest.mark.parametrize(
+    ("abstained", "points", "says"),
+    [
+        ((), ("p7",), "looked again at vine 1, spur 2: p7 shown"),
+        (("two canes are alike",), (), "looked again at vine 1, spur 2: for you to decide: two canes are alike"),
+        ((), (), "looked again at vine 1, spur 2: nothing is left open"),
+    ],
+)
+def test_what_came_of_the_look_is_told(abstained, points, says):
+    left = tuple(m.Abstention(why, "operator", 1, 2, position=(0.4, 0.8, 0.95)) for why in abstained)
+    shown = tuple(point(name, (0.4, 0.75, 1.0), vine=1, spur=2) for name in points)
+    told = m.PruningPoints(header=m.Header(), segmenter="none", frames=1, points=shown, abstained=left)
+    place = m.Abstention("hidden", "another look", 1, 2, position=(0.4, 0.8, 0.95))
+    assert looked_again(told, place) == says

@@ -369,12 +369,13 @@ export interface PagePoint {
   plan: PointPlan|null;
 }
 
-/** A place without a point: why, and what it needs. Without vine and spur (0) it is about no spur in particular. */
+/** A place without a point: why, and what it needs. Without vine and spur (0) it is about no spur in particular. `position` is where the spur was seen (m, odom). */
 export interface Abstention {
   reason: string;
   needs: Need;
   vine: number;
   spur: number;
+  position: Vector3|null;
 }
 
 /** The session's plan in brief: whether it holds or why not, its hash, and how long it takes (s). */

@@ -96,7 +96,7 @@ class CutPlanner:
 
     def _posture(self, point: PruningPoint, q: Array) -> CutPlan | str:
         """A posture to make the cut from, or why there is none."""
-        self._clearance.lacking = ""
+        self._clearance.forget()
         finding = self._search.find(np.array(point.position), np.array(point.tangent), q)
         try:
             while True:
@@ -107,7 +107,9 @@ class CutPlanner:
             return found
         assert isinstance(found, Unreachable)
         lacking = self._clearance.lacking
-        return f"{found.reason}; in the last one, {lacking}" if lacking else found.reason
+        if not lacking:
+            return found.reason
+        return f"{found.reason}; in the best one, {lacking}: move the point along its cane, or cut this one by hand"
 
     def _target(self, name: str, cut: CutPlan) -> Target:
         config = self._config

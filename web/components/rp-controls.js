@@ -17,16 +17,34 @@ const BUTTONS = Object.freeze([
   ["acknowledge", "Acknowledge", "Acknowledge", "The cause has been seen to"],
 ]);
 
+/** How far a survey may go (m). */
+const DISTANCES = Object.freeze([1, 2, 4, 8, 15, 30, 60, 120]);
+const USUAL_DISTANCE = 4;
+
 class RpControls extends HTMLElement {
   connectedCallback() {
     this.setAttribute("role", "group");
     this.setAttribute("aria-label", "Robot");
+    const distance = surveyDistance();
     for (const [id, intent, word, hint] of BUTTONS) {
       const button = element("button", { id, text: word, attributes: { type: "button" } });
-      button.addEventListener("click", () => void ask(word, `/api/${id}`));
+      button.addEventListener("click", () => {
+        void ask(word, `/api/${id}`, intent === "Survey" ? { distance: Number(distance.value) } : {});
+      });
       this.append(button);
+      if (intent === "Survey") this.append(distance);
       drawOn([pageState, points, link, now], () => setEnabled(button, whyNot(intent), hint));
     }
   }
+}
+
+function surveyDistance() {
+  const select = element("select", {
+    id: "survey-distance",
+    attributes: { "aria-label": "How far ahead the survey goes", title: "How far ahead along the row the survey goes" },
+  });
+  for (const metres of DISTANCES) select.append(element("option", { text: `${metres} m`, attributes: { value: String(metres) } }));
+  select.value = String(USUAL_DISTANCE);
+  return select;
 }
 customElements.define("rp-controls", RpControls);

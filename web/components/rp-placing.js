@@ -8,7 +8,7 @@ class RpPlacing extends HTMLElement {
   connectedCallback() {
     const done = element("button", { id: "placing-done", text: "Done", attributes: { type: "button", "aria-keyshortcuts": "Escape" } });
     done.addEventListener("click", () => setPlacing(false));
-    this.append(element("p", { text: "Click a cane, here or in the camera image.", attributes: { role: "status" } }), done);
+    this.append(element("p", { text: "Click a cane that has been seen: a blue line here, or a cane in the camera image.", attributes: { role: "status" } }), done);
     drawOn([placing], () => {
       this.hidden = !placing.get();
       document.body.classList.toggle("placing", placing.get());

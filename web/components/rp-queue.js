@@ -5,6 +5,7 @@ import { placing, setPlacing, whyNoPlacing } from "../by-hand.js";
 import { accept, acceptAll, decisions, undo, whyNoUndo, whyNotAccept, whyNotReject } from "../decisions.js";
 import { element, panelHead, setEnabled, setText } from "../element.js";
 import { icon } from "../icons.js";
+import { guardLookAgain, placeItem, placeWords } from "../look-again.js";
 import { link, now, pageState, points, selected, staleWords } from "../state.js";
 import { drawOn } from "../store.js";
 import { select } from "../teleoperation.js";
@@ -229,25 +230,22 @@ function abstainedList(needs, title) {
   const summary = element("summary");
   const list = element("ul");
   const box = element("details", { class: "abstained", attributes: { "data-needs": needs } }, summary, list);
+  guardLookAgain(list);
   let shown = "";
   return {
     box,
     /** @param {readonly import("../messages.js").Abstention[]} all */
     show(all) {
-      const lines = all.filter((each) => each.needs === needs).map(placeWords);
+      const places = all.filter((each) => each.needs === needs);
+      const lines = places.map(placeWords);
       box.hidden = lines.length === 0;
       const key = lines.join("\n");
       if (key === shown) return;
       shown = key;
       setText(summary, title(lines.length));
-      list.replaceChildren(...lines.map((text) => element("li", { text })));
+      list.replaceChildren(...places.map(placeItem));
     },
   };
-}
-
-/** @param {import("../messages.js").Abstention} place */
-function placeWords(place) {
-  return place.vine === 0 ? place.reason : `Vine ${place.vine} · spur ${place.spur}: ${place.reason}`;
 }
 
 /** @param {readonly PagePoint[]} rows */
