@@ -127,7 +127,9 @@ def _wire_pixels(
     depth = view.depth[rows, cols]
     wire = np.isin(labels[rows, cols], _LINES) & (depth > z - _WAY_IN) & (depth < z + _BEHIND)
     row, col = np.nonzero(wire)
-    return col + cols.start - u, row + rows.start - v
+    right = np.asarray(col + cols.start - u, dtype=np.float64)
+    down = np.asarray(row + rows.start - v, dtype=np.float64)
+    return right, down
 
 
 def near_wire(obstacles: tuple[Capsule, ...], position: Array, distance: float) -> bool:

@@ -1,9 +1,10 @@
 """Points over time: identities that last, averages that beat the noise, and withdrawal of what has gone."""
 
 import dataclasses
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from statistics import median_high
 from types import MappingProxyType
 
 import numpy as np
@@ -24,6 +25,10 @@ from rolling_panda.point_digest import point_digest
 
 #: Frames without support after which a contradicted point is withdrawn, and one that was never shown is forgotten.
 _PATIENCE, _MEMORY_OF_UNSHOWN = 5, 20
+#: Cuts of single looks are taken for the same one on an internode where they differ by less than this (m).
+_SAME_OFFSET = 0.003
+#: What most of so many newest looks say of it counts.
+_OFFSETS = 7
 
 
 @dataclass(frozen=True)
@@ -66,19 +71,41 @@ class _Track:
     scatter: Array = field(default_factory=lambda: np.zeros((3, 3)))
     turns: Array = field(default_factory=lambda: np.zeros((3, 3)))
     """Scatter of single looks around the means: of places (m²) and of tangents."""
+    offsets: deque[float] = field(default_factory=lambda: deque(maxlen=_OFFSETS))
+    """Of the newest looks, past the last node that stays (m): a look may see what the blades have to give way to."""
+
+    def __post_init__(self) -> None:
+        """The first look counts."""
+        if self.cut.offset is not None:
+            self.offsets.append(self.cut.offset)
 
     def add(self, cut: Cut, memory: int) -> None:
         self.hits += 1
         self.misses = self.gone = 0
         share = 1.0 / min(self.hits, memory)
-        off, turn = cut.position - self.position, cut.tangent - self.tangent
+        # What is averaged is where the cane's nodes are, not where single looks would cut between them.
+        at = self._offset
+        place = cut.position if at is None or cut.offset is None else cut.position + (at - cut.offset) * cut.tangent
+        off, turn = place - self.position, cut.tangent - self.tangent
         self.scatter = (1.0 - share) * (self.scatter + share * np.outer(off, off))
         self.turns = (1.0 - share) * (self.turns + share * np.outer(turn, turn))
         self.position = self.position + share * off
         tangent = self.tangent + share * turn
         self.tangent = tangent / np.linalg.norm(tangent)
         self.radius += share * (cut.radius - self.radius)
-        self.cut = cut
+        if cut.offset is None:
+            self.cut = cut
+            return
+        self.offsets.append(cut.offset)
+        most = median_high(self.offsets)
+        if at is not None:
+            self.position = self.position + (most - at) * self.tangent
+        if abs(cut.offset - most) < _SAME_OFFSET:
+            self.cut = cut
+
+    @property
+    def _offset(self) -> float | None:
+        return median_high(self.offsets) if self.offsets else None
 
 
 class Tracker:

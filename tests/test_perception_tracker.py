@@ -42,6 +42,26 @@ def test_a_point_shows_after_enough_frames_agree():
     assert shown == [0] * (CONFIG.hits - 1) + [1]
 
 
+def test_where_most_looks_cut_an_internode_is_taken_whole_not_half_way_to_where_others_did():
+    def look(offset, noise=0.0):
+        one = proposal(y=0.1 - offset + noise)
+        return replace(one, cut=replace(one.cut, offset=offset, reason=f"{1000 * offset:.0f} mm"))
+
+    tracker, noise = Tracker(CONFIG), (0.001, -0.001, 0.001, -0.001, 0.0)
+    for each in noise[:3]:
+        (point,) = feed(tracker, view(), look(0.02, each)).points or (None,)
+    assert point.offset == 0.02 and point.position[1] == pytest.approx(0.08, abs=1e-3)
+    # A wire comes into view, and the blades give way to it.
+    for each in noise:
+        (point,) = feed(tracker, view(), look(0.0105, each)).points
+    assert point.offset == 0.0105 and point.reason == "10 mm" and point.revision == 2
+    assert point.position[1] == pytest.approx(0.0895, abs=1e-3)
+    # One look that does not see it changes nothing.
+    (point,) = feed(tracker, view(), look(0.02)).points
+    assert point.offset == 0.0105 and point.revision == 2
+    assert point.position[1] == pytest.approx(0.0895, abs=1e-3)
+
+
 def test_after_many_looks_two_that_agree_are_enough_where_none_disagrees():
     def survey(*others):
         tracker, number = Tracker(CONFIG), SpurNumber(1, 1)
