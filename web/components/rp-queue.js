@@ -239,7 +239,7 @@ function abstainedList(needs, title) {
       const places = all.filter((each) => each.needs === needs);
       const lines = places.map(placeWords);
       box.hidden = lines.length === 0;
-      const key = lines.join("\n");
+      const key = places.map((each, k) => `${lines[k]} ${each.position !== null}`).join("\n");
       if (key === shown) return;
       shown = key;
       setText(summary, title(lines.length));
