@@ -8,7 +8,6 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 from starlette.routing import Match, Mount
-from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Scope
 
 from rolling_panda import __version__
@@ -20,8 +19,10 @@ from server.desk import Desk, Result
 from server.guard import Guard, is_protected
 from server.operator_api import answer, operator_router
 from server.order_api import order_router
+from server.page_files import PageFiles
 from server.pages import pages_router
 from server.plant_api import plant_router
+from server.robot_api import robot_router
 from server.sessions import Session
 from server.site import site_router
 from server.viser_proxy import viser_router
@@ -74,9 +75,10 @@ def create_app(desk: Desk, origins: frozenset[str]) -> ASGIApp:
     app.include_router(plant_router(desk))
     app.include_router(order_router(desk))
     app.include_router(control_router(desk))
+    app.include_router(robot_router(desk))
     app.include_router(pages_router(desk))
     app.include_router(viser_router(desk.scene, desk.may_move, dropped))
-    app.router.routes.append(_PageFiles("/", StaticFiles(directory=web), name="web"))
+    app.router.routes.append(_PageFiles("/", PageFiles(web), name="web"))
     app.add_exception_handler(RequestValidationError, _invalid)
     app.add_exception_handler(HTTPException, _failed)
     return Guard(

@@ -219,6 +219,7 @@ class Desk:
         """Show this session's gizmo at the tool, along these axes, or hide it and end its hold."""
         if not visible:
             self.let_go(session)
+            self.teleop.aim_nowhere(session.session_id)
             self.scene.gizmos.hide(session.session_id)
             return
         tool = self.view.tool(time.monotonic())

@@ -9,7 +9,7 @@ from rolling_panda import messages as m
 from rolling_panda.camera_messages import CameraFrame
 from rolling_panda.page_messages import PagePlan, PagePoint, PagePoints, PageState, Role
 from rolling_panda.plan_messages import SessionPlan
-from rolling_panda.robot_model import RobotModel, configuration, pose_message
+from rolling_panda.robot_model import ARM_Q, RobotModel, configuration, pose_message
 from server.robot_link import RobotLink
 from server.sessions import Session
 
@@ -31,6 +31,12 @@ class PageView:
         self._made_from: tuple[object, ...] = ()
         self._made: PagePoints | None = None
         self._made_at = 0.0
+
+    @property
+    def arm_limits(self) -> tuple[tuple[float, float], ...]:
+        """Lower and upper limit of each joint of the arm (rad)."""
+        limits = self._model.limits
+        return tuple(zip(limits.lower[ARM_Q].tolist(), limits.upper[ARM_Q].tolist(), strict=True))
 
     def state(self, number: int, viewers: int, now: float) -> PageState:
         """The state of this moment, addressed to nobody yet."""

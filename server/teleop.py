@@ -120,6 +120,10 @@ class TeleopHold:
         self._aims.pop(holder, None)
         return True
 
+    def aim_nowhere(self, holder: str) -> None:
+        """This holder's gizmo is gone, and where it was means nothing any more."""
+        self._aims.pop(holder, None)
+
     def forget(self, holder: str) -> bool:
         """The holder has gone: end the hold and drop what is known of it; True when they were holding."""
         held = self.release(holder)

@@ -142,6 +142,8 @@ class PlayedServer:
         elif path == "/api/me":
             status, body = self.answers.get(path, (200, {"user": "Ada", "role": self.role}))
             route.fulfill(status=status, json=body)
+        elif path == "/api/robot":
+            route.fulfill(json={"arm_limits": [(-2.9, 2.9)] * 7})
         elif path == "/api/sign-in":
             route.fulfill(json={"password": False})
         elif path == "/viser/":

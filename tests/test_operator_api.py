@@ -320,6 +320,14 @@ def test_base_and_joints_can_be_moved_too_but_not_together(server, robot, client
     assert client.post("/api/teleop", json=fast).status_code == 422
 
 
+def test_the_limits_of_the_arm_are_told_to_who_is_signed_in(server, client):
+    limits = client.get("/api/robot").json()["arm_limits"]
+    assert len(limits) == 7 and all(low < high for low, high in limits)
+    assert limits[3][1] < 0.0, "the elbow of a Panda does not stretch"
+    with server.visitor() as visitor:
+        assert visitor.get("/api/robot").status_code == 401
+
+
 def test_letting_go_by_rest_ends_the_hold(server, robot, client):
     target = {"position": [0.3, 0.5, 1.0], "quat_xyzw": [0, 0, 0, 1]}
     sent = server.wire.sent[topics.TELEOP.name]

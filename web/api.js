@@ -51,6 +51,19 @@ export async function ask(what, path, body) {
   return false;
 }
 
+/**
+ * @param {string} path
+ * @returns {Promise<any>} Null where there is no answer.
+ */
+export async function fetchJson(path) {
+  try {
+    const response = await fetch(path, { credentials: "same-origin", signal: AbortSignal.timeout(4000) });
+    return response.ok ? await response.json() : null;
+  } catch {
+    return null;
+  }
+}
+
 /** Is this browser signed in? Null when the server cannot be reached. */
 export async function isSignedIn() {
   try {

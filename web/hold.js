@@ -1,10 +1,14 @@
-// Hold to move: the tool follows the gizmo only while somebody holds, and stops at once when nobody does.
+// Hold to move: the robot follows a hand only while somebody holds, and stops at once when nobody does.
 
 import { signal } from "./store.js";
 
-/** @typedef {"button"|"key"|"gizmo"} HoldSource */
+/** @typedef {"button"|"key"|"gizmo"|"drive"|"pad"|"gamepad"|"joint"} HoldSource */
+/** @typedef {{ base?: import("./messages.js").BaseVelocity, joints?: import("./messages.js").ArmVelocities }} Wanted */
 
 const PERIOD_MS = 50;
+/** What leads the tool to its gizmo. Any other source moves the robot in its own way, and alone. */
+const TOOL = new Set(["button", "key", "gizmo"]);
+const TWO_AT_ONCE = "Two at once: it stopped. Let go, then hold one of them";
 
 export class HoldToMove {
   /**
@@ -16,8 +20,12 @@ export class HoldToMove {
     this.whyNot = whyNot;
     /** Is somebody holding now? */
     this.holding = signal(false);
+    /** Share of the usual speed. */
+    this.share = signal(1);
     /** @type {Set<HoldSource>} */
     this.sources = new Set();
+    /** @type {() => Wanted} */
+    this.wanted = () => ({});
     this.sequence = 0;
     this.timer = 0;
   }
@@ -27,12 +35,18 @@ export class HoldToMove {
    * starts to move the robot later.
    *
    * @param {HoldSource} source
+   * @param {() => Wanted} [wanted] What the base or the joints shall do; without it the tool follows the gizmo.
    * @returns {string} Why it was refused; empty when it was taken.
    */
-  press(source) {
+  press(source, wanted = () => ({})) {
     const why = this.whyNot();
     if (why) return why;
+    if (this.sources.size > 0 && [...this.sources, source].some((each) => !TOOL.has(each))) {
+      this.releaseAll();
+      return TWO_AT_ONCE;
+    }
     this.sources.add(source);
+    this.wanted = wanted;
     if (this.holding.get()) return "";
     this.holding.set(true);
     this.tell(true);
@@ -65,6 +79,7 @@ export class HoldToMove {
   /** @param {boolean} hold */
   tell(hold) {
     this.sequence += 1;
-    this.send({ type: "Hold", sequence: this.sequence, hold });
+    const { base = null, joints = null } = hold ? this.wanted() : {};
+    this.send({ type: "Hold", sequence: this.sequence, hold, base, joints, share: this.share.get() });
   }
 }

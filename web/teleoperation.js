@@ -1,4 +1,4 @@
-// Moving the tool by hand: whether the gizmo is shown, and who holds.
+// Moving the robot by hand: what moves, whether the gizmo is shown, and who holds.
 
 import { whyNoTeleoperation } from "./allowed.js";
 import { HoldToMove } from "./hold.js";
@@ -10,8 +10,14 @@ import { isTyping } from "./stop.js";
 const scheme = location.protocol === "https:" ? "wss" : "ws";
 export const socket = new Link(`${scheme}://${location.host}/ws`);
 
-/** Is the gizmo shown? */
+/** @typedef {"tool"|"base"|"joints"} Part */
+
+/** Is the robot moved by hand? */
 export const teleoperating = signal(false);
+/** What of it. */
+export const moving = signal(/** @type {Part} */ ("tool"));
+/** Along what the gizmo's arrows lie. */
+export const axes = signal(/** @type {import("./messages.js").GizmoAxes} */ ("tool"));
 
 export const hold = new HoldToMove(
   (message) => socket.send(message),
@@ -23,7 +29,26 @@ export function setTeleoperating(on) {
   if (on === teleoperating.get()) return;
   if (!on) hold.releaseAll();
   teleoperating.set(on);
-  socket.send({ type: "ShowGizmo", visible: on });
+  showGizmo();
+}
+
+function showGizmo() {
+  socket.send({ type: "ShowGizmo", visible: teleoperating.get() && moving.get() === "tool", axes: axes.get() });
+}
+
+/** @param {Part} part */
+export function showMoving(part) {
+  if (part === moving.get()) return;
+  hold.releaseAll();
+  moving.set(part);
+  showGizmo();
+}
+
+/** @param {import("./messages.js").GizmoAxes} along */
+export function showAxes(along) {
+  hold.releaseAll();
+  axes.set(along);
+  showGizmo();
 }
 
 /** @param {string} pointId Empty = none. */
@@ -56,6 +81,7 @@ export function guardHold() {
   window.addEventListener("blur", () => {
     hold.release("button");
     hold.release("key");
+    hold.release("joint");
   });
   listenForHoldKey(window);
 }
@@ -68,7 +94,7 @@ export function guardHold() {
 export function listenForHoldKey(target) {
   target.addEventListener("keydown", (event) => {
     if (event.code !== "KeyH" || event.repeat || event.ctrlKey || event.metaKey || event.altKey) return;
-    if (isTyping(event.target)) return;
+    if (isTyping(event.target) || moving.get() !== "tool") return;
     const why = hold.press("key");
     if (why && teleoperating.get()) showToast("warning", why);
   });
@@ -88,7 +114,7 @@ export function listenForDrag(view) {
   view.addEventListener(
     "pointerdown",
     (event) => {
-      if (teleoperating.get() && event.isPrimary && event.button === 0) hold.press("gizmo");
+      if (teleoperating.get() && moving.get() === "tool" && event.isPrimary && event.button === 0) hold.press("gizmo");
     },
     options,
   );

@@ -47,6 +47,16 @@ export function inWords(text) {
   return text.replace(RAW, (name) => RAW_WORDS[name] ?? name);
 }
 
+/**
+ * What the robot is nearest to touching; empty where nothing is near.
+ *
+ * @param {import("./messages.js").ControllerState|null} controller
+ */
+export function nearWords(controller) {
+  const near = controller?.near ?? null;
+  return near === null ? "" : `${(near.distance * 1000).toFixed(0)} mm between ${near.what}.`;
+}
+
 /** @param {number} seconds */
 export function ageWords(seconds) {
   if (seconds < 99.5) return `${seconds.toFixed(1)} s`;

@@ -1,5 +1,6 @@
 // The 3-D view, in a frame of the same origin. Its keys and drags are watched, because they do not reach this page.
 
+import { listenForDriveKeys } from "../driving.js";
 import { element } from "../element.js";
 import { link } from "../state.js";
 import { listenForSpace } from "../stop.js";
@@ -35,6 +36,7 @@ class RpScene extends HTMLElement {
       }
       listenForSpace(view);
       listenForHoldKey(view);
+      listenForDriveKeys(view);
       listenForDrag(view);
       frame.classList.add("loaded");
       waiting.hidden = true;

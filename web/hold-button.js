@@ -1,0 +1,29 @@
+// A button that means something only while it is held: by a finger, the mouse, or Enter.
+
+import { showToast } from "./state.js";
+
+/**
+ * @param {HTMLElement} button
+ * @param {() => string} press Returns why it was refused.
+ * @param {() => void} release
+ */
+export function holdButton(button, press, release) {
+  const begin = () => {
+    const why = press();
+    if (why) showToast("warning", why);
+  };
+  button.addEventListener("pointerdown", (event) => {
+    if (event.button !== 0) return;
+    button.setPointerCapture(event.pointerId);
+    begin();
+  });
+  for (const name of ["pointerup", "pointercancel", "lostpointercapture", "blur"]) button.addEventListener(name, release);
+  // A long touch must not become a menu that swallows the release.
+  button.addEventListener("contextmenu", (event) => event.preventDefault());
+  button.addEventListener("keydown", (event) => {
+    if (event.code === "Enter" && !event.repeat) begin();
+  });
+  button.addEventListener("keyup", (event) => {
+    if (event.code === "Enter") release();
+  });
+}
