@@ -27,20 +27,23 @@ def free_port() -> int:
 class LiveRobot:
     """Router, bridge, controller, perception and server, each a process of its own."""
 
-    def __init__(self, folder: Path, seed: int = 0, config: Path | None = None) -> None:
+    def __init__(
+        self, folder: Path, seed: int = 0, config: Path | None = None, certificates: Path | None = None
+    ) -> None:
         """Start nothing yet.
 
         Args:
             folder: For logs, state and trace.
             seed: Of the row.
             config: TOML configuration; None takes the simulation's.
+            certificates: Folder of them, for mutual TLS on the wire; None for a plain one.
         """
         self.folder = folder
         self.seed = seed
-        self.config = config
+        self.config, self.certificates = config, certificates
         self.port, self.router_port = free_port(), free_port()
         self.url = f"http://127.0.0.1:{self.port}"
-        self.endpoint = f"tcp/127.0.0.1:{self.router_port}"
+        self.endpoint = f"{'tcp' if certificates is None else 'tls'}/127.0.0.1:{self.router_port}"
         self.trace = folder / "trace"
         self.processes: dict[str, subprocess.Popen[bytes]] = {}
         self._client: httpx.Client | None = None
@@ -79,6 +82,8 @@ class LiveRobot:
             options += ["--connect", self.endpoint_of(name), "--state", str(self.folder / "state")]
             if self.config is not None:
                 options += ["--config", str(self.config)]
+        if self.certificates is not None:
+            options += ["--certificates", str(self.certificates)]
         module, words = ("rolling_panda", ["router", *options]) if name == "router" else (name, options)
         with (self.folder / f"{name}.log").open("ab") as log:
             self.processes[name] = subprocess.Popen(

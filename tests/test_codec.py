@@ -118,6 +118,12 @@ def test_another_type_is_refused(message: Any, name: Any) -> None:
         refused(type(message), {key: value for key, value in tree.items() if key != "type"})
 
 
+def test_an_empty_type_is_refused() -> None:
+    for tree in ({"type": ""}, {"type": "", "ok": True}):
+        with pytest.raises(MessageError):
+            StrictDecoder(m.Answer).decode(msgspec.msgpack.encode(tree))
+
+
 @pytest.mark.parametrize("length", [0, 8, 10])
 def test_a_vector_of_another_length_is_refused(length: int) -> None:
     refused(m.MotionCommand, {"type": "MotionCommand", "epoch": 1, "sequence": 1, "echo": 1, "xi": [0.0] * length})

@@ -95,6 +95,12 @@ def test_the_age_of_a_picture_is_told_by_its_stamp_however_often_it_is_repeated(
     assert health(Inputs(), None, 0.0).obstacles == float("inf")
 
 
+@pytest.mark.parametrize("mode", ["IDLE", "READY", "AUTO"])
+def test_without_a_ledger_there_is_a_fault_in_every_mode(mode):
+    found = verdict(mode, ledger="the disk is full")
+    assert (found.action, found.reason) == ("fault", "the disk is full")
+
+
 def test_a_robot_that_does_not_follow_is_stopped_protectively():
     found = verdict("AUTO", astray="joint 3 does not follow")
     assert found.action == "protect" and "joint 3" in found.reason
