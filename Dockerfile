@@ -30,18 +30,35 @@ RUN python -m venv /app && /app/bin/pip install --no-cache-dir --require-hashes 
 COPY --from=wheel /wheel /wheel
 RUN /app/bin/pip install --no-cache-dir --no-deps /wheel/*.whl
 
+# The bill of materials of what was installed, as CycloneDX.
+FROM wheel AS materials
+COPY --from=install /app /app
+RUN /tools/bin/cyclonedx-py environment --output-reproducible --output-format JSON \
+    --output-file /materials.cdx.json /app/bin/python
+
 FROM ${BASE_IMAGE}
+# Pinocchio is linked against the OpenMP library, which the slim image does not have. Which version of it is the base's
+# choice, as with all that comes with the base.
+# hadolint ignore=DL3008
+RUN apt-get update \
+    && apt-get install --yes --no-install-recommends libgomp1 \
+    && rm -rf /var/lib/apt/lists/*
+# Which state of the source this is, told at /version:  --build-arg REVISION=$(git rev-parse HEAD)
+ARG REVISION=
+LABEL org.opencontainers.image.revision=$REVISION
+ENV ROLLING_PANDA_REVISION=$REVISION
 LABEL org.opencontainers.image.title="Rolling Panda" \
       org.opencontainers.image.description="Browser supervision and teleoperation of a mobile manipulator that prunes grapevines" \
       org.opencontainers.image.licenses="BSD-3-Clause"
-RUN useradd --system --uid 10001 --no-create-home --shell /usr/sbin/nologin panda
+RUN useradd --uid 10001 --no-log-init --no-create-home --shell /usr/sbin/nologin panda
 COPY --from=install /app /app
+COPY --from=materials /materials.cdx.json /usr/share/rolling-panda/materials.cdx.json
 # The control code as machine code: made once here, kept in a folder that a container can write to, since the code is made
 # again on a processor of another kind.
 ENV NUMBA_CACHE_DIR=/var/cache/rolling-panda
-RUN install --directory --owner 10001 --group 10001 $NUMBA_CACHE_DIR
-# What survives a restart: a volume that is mounted here belongs to this user too.
-RUN install --directory --owner 10001 --group 10001 --mode 700 /var/lib/rolling-panda
+# What survives a restart is in a folder of its own: a volume that is mounted here belongs to this user too.
+RUN install --directory --owner 10001 --group 10001 $NUMBA_CACHE_DIR \
+    && install --directory --owner 10001 --group 10001 --mode 700 /var/lib/rolling-panda
 # MuJoCo computes here and draws nothing, so it needs no OpenGL. One thread of linear algebra a process: see launch.py.
 ENV PATH=/app/bin:$PATH \
     PYTHONUNBUFFERED=1 \

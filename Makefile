@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 TYPESCRIPT := typescript@5.9.3
 
-.PHONY: help demo test check bench clean lock browser
+.PHONY: help demo test check bench clean lock materials browser
 .DEFAULT_GOAL := help
 
 help:
@@ -14,6 +14,7 @@ help:
 	@echo "make check   formatting, types, import contracts, generated files"
 	@echo "make bench   measurements                                                     (ARGS='tick --json tick.json')"
 	@echo "make lock    bring the lock files up to date with pyproject.toml"
+	@echo "make materials  the bill of materials, CycloneDX, as build/materials.cdx.json"
 	@echo "make clean   remove the virtual environment and caches"
 
 demo: $(VENV)/.project
@@ -66,6 +67,13 @@ $(VENV)/.locked: requirements.lock
 
 # The control code becomes machine code when it is first imported: better here than at the first start.
 $(VENV)/.project: $(VENV)/.locked pyproject.toml
+	@$(BIN)/python -c 'import ctypes; ctypes.CDLL("libgomp.so.1")' 2>/dev/null || \
+	if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+		echo "installing libgomp1, which Pinocchio needs"; apt-get update -qq; \
+		DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends libgomp1 >/dev/null; \
+	else \
+		echo "libgomp1 is not installed, and Pinocchio needs it: sudo apt-get install libgomp1"; exit 1; \
+	fi
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	$(BIN)/python -c 'import controller.core'
 	@touch $@
@@ -73,6 +81,11 @@ $(VENV)/.project: $(VENV)/.locked pyproject.toml
 # pip-tools lives apart, as it is no part of what the locks describe. No index address is written into them.
 COMPILE = CUSTOM_COMPILE_COMMAND='make lock' build/lock/bin/pip-compile --quiet --generate-hashes --allow-unsafe \
 	--strip-extras --no-emit-index-url --no-emit-trusted-host --no-emit-find-links --no-emit-options
+
+materials: $(VENV)/.project
+	mkdir -p build
+	$(BIN)/cyclonedx-py requirements requirements-run.lock --pyproject pyproject.toml --output-reproducible \
+		--output-format JSON --output-file build/materials.cdx.json
 
 lock:
 	$(PYTHON) -m venv build/lock

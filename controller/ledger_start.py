@@ -1,22 +1,20 @@
 """What a start reads from the ledger and writes into it first."""
 
 import hashlib
-import platform
 from pathlib import Path
 
 import msgspec
 
 from controller.journal import OrderRow, Record, TicketRow
 from controller.ledger import Ledger
-from rolling_panda import __version__
+from rolling_panda.about import About, about
 from rolling_panda.errors import LedgerError
 
 
 class StartRow(msgspec.Struct, frozen=True, kw_only=True):
     """A process has started: which program on which Python, and with which configuration."""
 
-    version: str
-    python: str
+    program: About
     run_id: str
     config_sha256: str
     config: str
@@ -26,8 +24,7 @@ def start_record(config: Path, run_id: str) -> Record:
     """The record of this start, with the whole configuration."""
     content = config.read_bytes()
     row = StartRow(
-        version=__version__,
-        python=platform.python_version(),
+        program=about(),
         run_id=run_id,
         config_sha256=hashlib.sha256(content).hexdigest(),
         config=content.decode("utf-8", "replace"),

@@ -4,10 +4,11 @@ import time
 from pathlib import Path
 from typing import Annotated
 
+import msgspec
 from fastapi import APIRouter, Depends, Header, Query, Request, Response
 from fastapi.responses import FileResponse, JSONResponse
 
-from rolling_panda import __version__
+from rolling_panda.about import about
 from server import requests as body
 from server.desk import Desk, Result
 from server.operator_api import answer
@@ -96,10 +97,12 @@ def site_router(desk: Desk, web: Path) -> APIRouter:
         """The server answers."""
         return {"status": "ok"}
 
+    running = msgspec.to_builtins(about())
+
     @router.get("/version", tags=["server"])
     async def version() -> dict[str, str]:
-        """Version of the program."""
-        return {"name": "rolling-panda", "version": __version__}
+        """Which program runs here: version, revision of its source, Python, and a digest of the installed packages."""
+        return dict(running)
 
     @router.get("/camera/color.jpg", tags=["state"], response_class=Response)
     async def camera(n: Annotated[int, Query(ge=0)] | None = None) -> Response:

@@ -1,6 +1,9 @@
 """What the container files promise, read from the files: no container engine is needed, and none is replaced."""
 
+import json
 import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +25,30 @@ def instructions() -> list[tuple[str, str]]:
     return [(head, " ".join(rest.split())) for head, _, rest in (line.strip().partition(" ") for line in lines) if head]
 
 
+def allowed(compose: Path) -> str:
+    """What the schema of the Compose specification has against a file; empty where nothing."""
+    check = [Path(sys.executable).parent / "check-jsonschema", "--builtin-schema", "vendor.compose-spec", compose]
+    checked = subprocess.run(check, capture_output=True, text=True, timeout=60, check=False)
+    return "" if checked.returncode == 0 else checked.stdout + checked.stderr
+
+
 def last_stage() -> list[tuple[str, str]]:
     steps = instructions()
     return steps[max(i for i, (head, _) in enumerate(steps) if head == "FROM") :]
+
+
+@pytest.mark.parametrize("name", ["compose.yaml", "compose.real.yaml"])
+def test_the_compose_files_are_what_the_compose_specification_allows(name: str, tmp_path: Path) -> None:
+    assert allowed(ROOT / name) == ""
+    wrong = tmp_path / name
+    wrong.write_text((ROOT / name).read_text().replace("    command:", "    comand:", 1))
+    assert "comand" in allowed(wrong)
+
+
+def test_the_linter_of_dockerfiles_finds_nothing() -> None:
+    hadolint = Path(sys.executable).parent / "hadolint"
+    found = subprocess.run([hadolint, ROOT / "Dockerfile"], capture_output=True, text=True, timeout=60, check=False)
+    assert (found.returncode, found.stdout) == (0, "")
 
 
 def test_every_process_has_its_container_and_no_other_runs() -> None:
@@ -92,14 +116,15 @@ def test_the_image_runs_as_somebody_who_is_not_root() -> None:
     assert users == ["10001:10001"]
     after = steps[[head for head, _ in steps].index("USER") :]
     assert [head for head, _ in after if head == "COPY"] == []
-    assert any(head == "RUN" and "useradd --system --uid 10001" in rest for head, rest in steps)
+    assert any(head == "RUN" and "useradd --uid 10001" in rest for head, rest in steps)
     assert ("ENTRYPOINT", '["rolling-panda"]') in steps
 
 
 def test_the_image_is_made_in_stages_from_a_base_that_can_be_pinned() -> None:
     bases = [rest.split(" AS ")[0] for head, rest in instructions() if head == "FROM"]
     assert len(bases) >= 3
-    assert set(bases) == {"${BASE_IMAGE}"}
+    # Or another stage.
+    assert set(bases) == {"${BASE_IMAGE}", "wheel"}
     for service in (COMPOSE["x-process"], REAL["services"]["bridge"]):
         assert "BASE_IMAGE" in service["build"]["args"]
 
@@ -143,3 +168,18 @@ def test_the_real_bridge_has_a_way_to_arm_and_base_and_no_capability_more() -> N
     assert bridge["ulimits"]["rtprio"] == 99
     for name in set(REAL["services"]) - {"bridge"}:
         assert set(REAL["services"][name]) == {"command", "volumes"}
+
+
+@pytest.mark.slow  # Some seconds, for what changes with the lock alone.
+def test_the_bill_of_materials_names_every_locked_package_with_its_hashes(tmp_path: Path) -> None:
+    bill = tmp_path / "materials.json"
+    cyclonedx = [Path(sys.executable).parent / "cyclonedx-py", "requirements", ROOT / "requirements-run.lock"]
+    subprocess.run([*cyclonedx, "--output-format", "JSON", "--output-file", bill], check=True, capture_output=True)
+    listed = {
+        f"{part['name']}=={part['version']}": part["externalReferences"][0]["hashes"]
+        for part in json.loads(bill.read_text())["components"]
+    }
+    locked = re.findall(r"^([A-Za-z0-9._-]+==\S+)", (ROOT / "requirements-run.lock").read_text(), flags=re.MULTILINE)
+    assert len(locked) > 50
+    assert set(listed) == set(locked)
+    assert all(listed.values())
