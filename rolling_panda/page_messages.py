@@ -49,6 +49,7 @@ class PageState(PageMessage, frozen=True, kw_only=True):
         client: The reader's own key, to be compared with the holder's.
         control: Who holds control of the robot's motion.
         stops: What bridge and controller hold latched.
+        speed_shares: Speed of each actuator in parts of its limit, wheels first; empty before the first joint state.
     """
 
     number: m.Count
@@ -66,6 +67,7 @@ class PageState(PageMessage, frozen=True, kw_only=True):
     client: ClientKey = ""
     control: ControlState | None = None
     stops: tuple[StopState, ...] = ()
+    speed_shares: tuple[m.NonNegative, ...] = ()
 
 
 class PagePoint(Struct, frozen=True, forbid_unknown_fields=True):

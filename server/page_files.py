@@ -1,4 +1,4 @@
-"""The page's files as they are sent: scripts without their comments, which are a fifth of them."""
+"""The page's files as they are sent: scripts without comments and indentation, which are a quarter of them."""
 
 import hashlib
 from pathlib import Path
@@ -33,13 +33,16 @@ class PageFiles(StaticFiles):
             full, found = self.lookup_path(path)
             if found is None:
                 raise HTTPException(404)
-            script = without_comments(Path(full).read_text(encoding="utf-8")).encode()
+            script = as_sent(Path(full).read_text(encoding="utf-8")).encode()
             self._scripts[path] = script, f'"{hashlib.sha256(script).hexdigest()[:32]}"'
         return self._scripts[path]
 
 
-def without_comments(script: str) -> str:
-    """A script in which lines that are nothing but comment are empty; comments beside code stay."""
+def as_sent(script: str) -> str:
+    """A script in which lines that are nothing but comment are empty, and no line is indented.
+
+    Comments beside code stay. A template literal has to end on the line where it begins.
+    """
     lines, inside = [], False
     for line in script.split("\n"):
         bare = line.strip()
@@ -49,5 +52,5 @@ def without_comments(script: str) -> str:
         comment = inside or begins or bare.startswith("//")
         if inside or begins:
             inside = "*/" not in bare
-        lines.append("" if comment else line)
+        lines.append("" if comment else bare)
     return "\n".join(lines)

@@ -10,6 +10,7 @@ from rolling_panda.camera_messages import CameraFrame
 from rolling_panda.page_messages import PagePlan, PagePoint, PagePoints, PageState, Role
 from rolling_panda.plan_messages import SessionPlan
 from rolling_panda.robot_model import ARM_Q, RobotModel, configuration, pose_message
+from server.robot_limits import speed_shares
 from server.robot_link import RobotLink
 from server.sessions import Session
 
@@ -58,6 +59,7 @@ class PageView:
             camera_frame=camera.message.sequence if camera else 0,
             control=control.message if control else None,
             stops=tuple(self._link.stops[process].message for process in sorted(self._link.stops)),
+            speed_shares=() if joints is None else speed_shares(joints.message, self._model.limits),
         )
 
     def tool(self, now: float) -> m.Pose | None:

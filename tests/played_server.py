@@ -208,6 +208,7 @@ class PlayedServer:
             client="me",
             control=self.control,
             stops=self.stopped,
+            speed_shares=(0.2, 0.1, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0),
         )
 
     def page_points(self) -> p.PagePoints:

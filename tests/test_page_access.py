@@ -54,6 +54,11 @@ def _rule(page: Page, server: PlayedServer) -> None:
     expect(page.locator("rp-rule input").first).to_be_visible()
 
 
+def _charts(page: Page, server: PlayedServer) -> None:
+    page.locator('[data-opens="charts"]').click()
+    expect(page.locator("rp-charts")).to_be_visible()
+
+
 STATES: dict[str, Callable[[Page, PlayedServer], None]] = {
     "empty": _empty,
     "a point chosen": _chosen,
@@ -61,6 +66,7 @@ STATES: dict[str, Callable[[Page, PlayedServer], None]] = {
     "stopped": _stopped,
     "link lost": _link_lost,
     "rule": _rule,
+    "charts": _charts,
 }
 
 

@@ -4,7 +4,7 @@ import pytest
 from starlette.exceptions import HTTPException
 
 from rolling_panda.resources import resource
-from server.page_files import PageFiles, without_comments
+from server.page_files import PageFiles, as_sent
 
 SCRIPT = """\
 // What this is for.
@@ -31,17 +31,17 @@ const words = "// not a comment"; // beside code
 
 export function twice(x) {
 
-  const two = 2;
-  /** @type {any} */ (globalThis).seen = `a
+const two = 2;
+/** @type {any} */ (globalThis).seen = `a
 *b`;
 
-  return two * x;
+return two * x;
 }
 """
 
 
 def test_lines_of_comment_alone_are_left_out_and_every_other_line_keeps_its_number():
-    assert without_comments(SCRIPT) == SENT
+    assert as_sent(SCRIPT) == SENT
 
 
 def ask(files, path, **headers):
@@ -57,7 +57,7 @@ def test_every_script_of_the_page_is_sent_and_nothing_outside_the_folder():
         name = script.relative_to(folder).as_posix()
         answer = ask(files, name)
         assert answer.status_code == 200 and answer.headers["content-type"].startswith("text/javascript")
-        assert answer.body == without_comments(script.read_text(encoding="utf-8")).encode()
+        assert answer.body == as_sent(script.read_text(encoding="utf-8")).encode()
         assert ask(files, name, if_none_match=answer.headers["etag"]).status_code == 304
         assert ask(files, name, if_none_match='"another"').status_code == 200
     assert ask(files, "style.css").status_code == 200

@@ -1,8 +1,10 @@
 // Starts the page: components, link, clock, keys.
 
+import "./components/rp-alarms.js";
 import "./components/rp-camera.js";
 import "./components/rp-control.js";
 import "./components/rp-controls.js";
+import "./components/rp-drawer.js";
 import "./components/rp-invite.js";
 import "./components/rp-link-banner.js";
 import "./components/rp-log.js";
@@ -21,6 +23,7 @@ import "./components/rp-toasts.js";
 import { guardPlacing } from "./by-hand.js";
 import { listenForDriveKeys, watchGamepad } from "./driving.js";
 import { explainGreyed } from "./greyed.js";
+import { keepHistory } from "./history.js";
 import { now } from "./state.js";
 import { listenForSpace } from "./stop.js";
 import { guardHold, socket } from "./teleoperation.js";
@@ -31,5 +34,6 @@ guardHold();
 listenForDriveKeys(window);
 watchGamepad();
 guardPlacing();
+keepHistory();
 window.setInterval(() => now.set(performance.now()), 250);
 socket.open();

@@ -328,6 +328,8 @@ export interface PageState {
   control: ControlState|null;
   /** What bridge and controller hold latched. */
   stops: StopState[];
+  /** Speed of each actuator in parts of its limit, wheels first; empty before the first joint state. */
+  speed_shares: number[];
 }
 
 /** What the plan says of one accepted point. */
@@ -468,18 +470,18 @@ export interface Hold {
   /** Whether they still hold. */
   hold: boolean;
   /** The base moves so, instead of the tool. */
-  base: BaseVelocity|null;
+  base?: BaseVelocity|null;
   /** The arm's joints turn so (rad/s), instead of the tool. */
-  joints: ArmVelocities|null;
+  joints?: ArmVelocities|null;
   /** Of the usual speed. */
-  share: number;
+  share?: number;
 }
 
 /** Show or hide this session's gizmo in the 3-D view; shown, it starts at the tool, along these axes. */
 export interface ShowGizmo {
   type: "ShowGizmo";
   visible: boolean;
-  axes: GizmoAxes;
+  axes?: GizmoAxes;
 }
 
 /** From now on clicks into the 3-D view are meant for new points, each answered with a `Sightline`; or no more. */

@@ -56,7 +56,8 @@ def messages_types() -> str:
     parts.append("export const INTENTS: readonly string[];\n")
     parts.append("export const TEXT_MAX_LENGTH: number;\n")
     parts.extend(_type(name, _spelled_out(hint)) for name, hint in aliases().items() if _is_worth_a_name(hint))
-    parts.extend(_interface(describe(struct)) for struct in structs)
+    said = union_members(page_messages.FromPage)
+    parts.extend(_interface(describe(struct), struct in said) for struct in structs)
     for name, union in (("FromServer", page_messages.FromServer), ("FromPage", page_messages.FromPage)):
         parts.append(_type(name, "|".join(struct.__name__ for struct in union_members(union))))
     return "\n".join(parts)
@@ -102,15 +103,16 @@ def _type(name: str, spelled_out: str) -> str:
     return f"export type {name} = {spelled_out};\n"
 
 
-def _interface(struct: StructDescription) -> str:
+def _interface(struct: StructDescription, said_by_page: bool) -> str:
     lines = [f"/** {struct.about} */", f"export interface {struct.name} {{"]
     if struct.tag is not None:
         lines.append(f'  type: "{struct.tag}";')
     for field in struct.fields:
         if field.about:
             lines.append(f"  /** {field.about} */")
-        # Defaults are written out by the server, so every property is there.
-        lines.append(f"  {field.name}: {js_type(field.hint)};")
+        # The server writes defaults out, so that every property is there; the page leaves them to the server.
+        may_miss = "?" if said_by_page and not field.required else ""
+        lines.append(f"  {field.name}{may_miss}: {js_type(field.hint)};")
     return "\n".join([*lines, "}", ""])
 
 

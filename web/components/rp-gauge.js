@@ -2,24 +2,14 @@
 
 import { element, setText, svg } from "../element.js";
 
-/**
- * @typedef {object} GaugeKind
- * @property {string} id
- * @property {string} label
- * @property {string} unit
- * @property {string} about
- * @property {number} full Value of a full bar, in the unit shown.
- * @property {number} [warnAbove]
- * @property {number} [warnBelow]
- * @property {(value: number) => string} write
- */
+/** @typedef {import("../readings.js").Reading} Reading */
 
 const SAMPLES = 120;
 const WIDTH = 60;
 const HEIGHT = 18;
 
 export class RpGauge extends HTMLElement {
-  /** @type {GaugeKind|null} */
+  /** @type {Reading|null} */
   kind = null;
   /** @type {(number|null)[]} */
   samples = [];
@@ -28,7 +18,7 @@ export class RpGauge extends HTMLElement {
   line = svg("polyline", { class: "trend" });
   warning = element("span", { class: "gauge-warning" });
 
-  /** @param {GaugeKind} kind */
+  /** @param {Reading} kind */
   begin(kind) {
     this.kind = kind;
     this.dataset.gauge = kind.id;

@@ -1,0 +1,105 @@
+"""Charts of the last minutes and alarms, in a real browser with a server that the test plays."""
+
+import msgspec
+import pytest
+from played_page import until
+from played_server import PlayedServer, bridge, controller, point
+from playwright.sync_api import Page, expect
+
+from rolling_panda.control_messages import StopState
+
+pytestmark = pytest.mark.browser
+
+
+def shown(page: Page, chart: str) -> str:
+    return page.locator(f'[data-chart="{chart}"] .chart-value').inner_text()
+
+
+def inked(page: Page, chart: str) -> int:
+    """How many pixels of a chart are drawn."""
+    count = "each => each.getContext('2d').getImageData(0, 0, each.width, each.height).data.filter(Boolean).length"
+    return int(page.locator(f'[data-chart="{chart}"] canvas').evaluate(count))
+
+
+def test_charts_show_what_was_and_stand_still_when_told_to(page: Page, server: PlayedServer) -> None:
+    page.wait_for_timeout(1200)
+    server.controller = controller("AUTO", position_error=0.0123)
+    page.locator('[data-opens="charts"]').click()
+    expect(page.locator("#drawer")).to_be_focused()
+    until(page, lambda: shown(page, "position-error") == "12.3 mm")
+    assert shown(page, "arm-speed") == "50 %" and shown(page, "wheel-speed") == "20 %"
+    assert shown(page, "presence") == "4 of 4"
+    assert inked(page, "position-error") > 0 and inked(page, "presence") > 0
+    canvas = page.locator('[data-chart="position-error"] canvas')
+    expect(canvas).to_have_attribute("aria-label", "Tool error: 12.3 mm, beyond its limit")
+    page.locator("#pause-charts").click()
+    server.controller = controller("AUTO", position_error=0.0031)
+    page.wait_for_timeout(700)
+    assert shown(page, "position-error") == "12.3 mm", "it was paused"
+    page.locator("#pause-charts").click()
+    until(page, lambda: shown(page, "position-error") == "3.1 mm")
+    # A moment in the past, by keys and by pointing; outside of what was seen there is nothing.
+    box = canvas.bounding_box()
+    assert box is not None
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 10)
+    until(page, lambda: shown(page, "position-error") == "–")
+    expect(page.locator(".drawer-tools .hint")).to_have_text("2 min ago")
+    page.keyboard.press("Escape")
+    expect(page.locator("#drawer")).to_be_hidden()
+    expect(page.locator('[data-opens="charts"]')).to_be_focused()
+
+
+def test_a_gap_is_a_gap_and_who_was_gone_is_seen(page: Page, server: PlayedServer) -> None:
+    server.gone = {"perception": 5.0}
+    page.locator('[data-opens="charts"]').click()
+    until(page, lambda: shown(page, "presence") == "3 of 4")
+    server.gone = {"bridge": 5.0}
+    until(page, lambda: shown(page, "position-error") == "–")
+    assert shown(page, "page-round-trip") != "–", "the page's own link is there"
+
+
+def test_alarms_come_worst_first_with_what_to_do_and_go(page: Page, server: PlayedServer) -> None:
+    expect(page.locator("#alarms .empty")).to_have_text("No alarms")
+    server.points = (point(1, "UNKNOWN"),)
+    server.tell(server.page_points())
+    server.bridge = bridge(cutter="jammed", real_time_factor=0.5)
+    server.controller = controller("FAULT", reason="the ledger cannot be written")
+    rows = page.locator("#alarms li strong")
+    expect(rows).to_have_text(
+        [
+            "Fault: the ledger cannot be written",
+            "The cutter is jammed",
+            "1 cut ended unknown",
+            "The simulation is slower than real time",
+        ]
+    )
+    expect(page.locator("#alarms li .act").nth(1)).to_contain_text("free the blades")
+    expect(page.locator(".alarm-count")).to_have_text("4 alarms")
+    server.bridge, server.controller, server.points = bridge(), controller(), ()
+    server.tell(server.page_points())
+    expect(page.locator("#alarms .empty")).to_be_visible(timeout=5000)
+    expect(page.locator("#alarms li")).to_have_count(0)
+
+
+def test_without_a_link_that_is_the_one_alarm_until_it_is_back(page: Page, server: PlayedServer) -> None:
+    server.gone = {"controller": 3.0}
+    expect(page.locator("#alarms strong")).to_contain_text(["controller gone"])
+    server.online = False
+    server.sockets[-1].close()
+    expect(page.locator("#alarms strong")).to_have_text(["This page has no link to the server"], timeout=6000)
+    expect(page.locator("rp-telemetry .stale-note")).to_contain_text("no link — last state")
+    server.online, server.gone = True, {}
+    expect(page.locator("#alarms .empty")).to_be_visible(timeout=10_000)
+    expect(page.locator("rp-telemetry .stale-note")).to_be_hidden()
+
+
+def test_the_robots_own_button_and_a_joint_at_its_limit_are_alarms(page: Page, server: PlayedServer) -> None:
+    server.stopped = (StopState(process="bridge", stops=(), hardware=True),)
+    server.controller = msgspec.structs.replace(controller(), joint_margin=0.02, manipulability=0.01)
+    expect(page.locator("#alarms li strong")).to_have_text(
+        [
+            "The emergency stop on the robot is pressed",
+            "A joint of the arm is near its limit",
+            "The arm is nearly stretched out",
+        ]
+    )

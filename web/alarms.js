@@ -1,0 +1,130 @@
+// What needs somebody now: how bad it is, what it is, and what to do about it.
+
+import { history } from "./history.js";
+import { isLive, link, pageState, points, roundTrip, staleWords } from "./state.js";
+import { counted, inWords } from "./words.js";
+
+/** @typedef {import("./messages.js").PageState} PageState */
+/** @typedef {{ id: string, severity: "error"|"warning", text: string, act: string }} Alarm */
+
+const DEGREE = 180 / Math.PI;
+/** Pages whose round trip (ms) is longer may not lead the tool. */
+const SLOW_MS = 200;
+/** Share of late control periods, and over how many samples of the history it is counted (10 s). */
+const LATE_SHARE = 0.02;
+const LATE_SAMPLES = 40;
+
+/** @type {Readonly<Record<string, string>>} */
+const GONE = Object.freeze({
+  bridge: "Nothing is known of the robot now. If it moves, press its emergency stop; then start the bridge again.",
+  controller: "The robot has stopped by itself. Start the controller again; what is queued waits.",
+  perception: "Nothing new is seen. Work pauses until it is back: start perception again.",
+});
+
+/**
+ * Every alarm of this moment, the worst first.
+ *
+ * @returns {Alarm[]}
+ */
+export function alarms() {
+  const state = pageState.get();
+  const found = link.get().status === "open" || state === null ? [] : [noLink()];
+  if (state !== null && found.length === 0) found.push(...ofProcesses(), ...ofModes(state), ...ofWork(state));
+  return found.sort((a, b) => Number(a.severity === "warning") - Number(b.severity === "warning"));
+}
+
+/** @returns {Alarm} */
+function noLink() {
+  return alarm("link", "error", "This page has no link to the server", "It tries again by itself. Until then use the emergency stop on the robot.");
+}
+
+/**
+ * @param {string} id
+ * @param {"error"|"warning"} severity
+ * @param {string} text
+ * @param {string} act
+ * @returns {Alarm}
+ */
+function alarm(id, severity, text, act) {
+  return { id, severity, text: inWords(text), act };
+}
+
+/** @returns {Alarm[]} */
+function ofProcesses() {
+  if (!isLive("server")) return [alarm("server", "error", "The server is silent", "Wait, or start it again; the robot stops without it.")];
+  return /** @type {const} */ (["bridge", "controller", "perception"])
+    .filter((process) => !isLive(process))
+    .map((process) => alarm(process, process === "perception" ? "warning" : "error", staleWords(process), GONE[process] ?? ""));
+}
+
+/**
+ * @param {PageState} state
+ * @returns {Alarm[]}
+ */
+function ofModes({ controller, bridge, stops }) {
+  const found = [];
+  if (stops.some((stop) => stop.hardware)) {
+    found.push(alarm("hardware", "error", "The emergency stop on the robot is pressed", "Release it there once the row is clear, then reset here."));
+  }
+  const reason = controller?.reason ? `: ${controller.reason}` : "";
+  switch (controller?.mode) {
+    case "ESTOP_LATCHED":
+      found.push(alarm("stopped", "error", `Stopped${reason}`, "See that the row is clear, write why it is safe to go on, and press Reset."));
+      break;
+    case "PROTECTIVE_STOP":
+      found.push(alarm("protective", "error", `Protective stop${reason}`, "Mend the cause, then press Acknowledge."));
+      break;
+    case "FAULT":
+      found.push(alarm("fault", "error", `Fault${reason}`, "Mend the cause; a supervisor presses Acknowledge."));
+      break;
+  }
+  if (bridge?.cutter === "jammed") {
+    found.push(alarm("jammed", "error", "The cutter is jammed", "Stop, press the robot's emergency stop, and free the blades by hand."));
+  }
+  const atWork = controller?.mode === "AUTO" || controller?.mode === "TELEOP";
+  if (bridge?.watchdog && atWork && isLive("controller")) {
+    found.push(alarm("watchdog", "error", "The bridge gets no commands in time and holds the robot", "See the load of the computer; work goes on when you start it again."));
+  }
+  return found;
+}
+
+/**
+ * @param {PageState} state
+ * @returns {Alarm[]}
+ */
+function ofWork({ controller, bridge, control }) {
+  const found = [];
+  const unknown = points.get()?.points.filter((row) => row.entry.state === "UNKNOWN").length ?? 0;
+  if (unknown > 0) {
+    found.push(alarm("unknown", "warning", `${counted(unknown, "cut")} ended unknown`, "Look at the plant, and say on the row whether it is cut."));
+  }
+  if (control?.requested_by) {
+    found.push(alarm("asked", "warning", `${control.requested_by} asks for control`, "Whoever holds it gives it, or goes on."));
+  }
+  if (bridge && isLive("bridge") && bridge.real_time_factor < 0.9 && bridge.kind === "sim") {
+    found.push(alarm("slow", "warning", "The simulation is slower than real time", "Close other programs on this computer."));
+  }
+  if (controller && isLive("controller")) {
+    if (lateShare() > LATE_SHARE) {
+      found.push(alarm("late", "warning", "Control periods come too late", "Close other programs on the robot's computer."));
+    }
+    if (controller.joint_margin * DEGREE < 5) {
+      found.push(alarm("margin", "warning", "A joint of the arm is near its limit", "Lead the tool back, or press Home."));
+    }
+    if (controller.manipulability < 0.02) {
+      found.push(alarm("singular", "warning", "The arm is nearly stretched out", "Lead the tool back towards the base, or press Home."));
+    }
+  }
+  if ((roundTrip.get() ?? 0) > SLOW_MS) {
+    found.push(alarm("trip", "warning", "The link between this page and the server is slow", "Come nearer to the network; leading the tool may end by itself."));
+  }
+  return found;
+}
+
+/** Share of the control periods of the last seconds that were late. */
+function lateShare() {
+  const late = history.of("late-ticks").slice(-LATE_SAMPLES);
+  const ticks = history.of("ticks").slice(-LATE_SAMPLES);
+  const grown = (/** @type {typeof late} */ samples) => (samples.at(-1)?.value ?? 0) - (samples[0]?.value ?? 0);
+  return grown(ticks) > 0 ? grown(late) / grown(ticks) : 0;
+}
