@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import psutil
 
 from benchmarks.documents import one_row_a_line
@@ -30,6 +31,8 @@ from rolling_panda.transport import Transport
 _REST = (0.0,) * 9
 # Between two faults (s), and how long one is watched.
 _CALM_S, _WATCHED_S = 7.0, 1.5
+# Work goes on at these shares of what wheels (0.3 m/s) and joints can do; the rest of the time anything is commanded.
+_WORK = np.array([0.2] * 2 + [0.6] * 7)
 #: From the fault until base and arm rest (s).
 LIMIT_S = 0.4
 # Words of the fakes' monitors for what was injected; everything else that they say is a breach.
@@ -100,7 +103,7 @@ class Commander:
         self._rng, self._limits = rng, RobotModel().limits
         self._sequence, self._until = 0, 0.0
         self._xi: tuple[float, ...] = _REST
-        self.silent = False
+        self.silent = self.at_work = False
 
     def run(self, seconds: float, moving: bool) -> None:
         """Command for a while: at random, or to rest."""
@@ -108,7 +111,8 @@ class Commander:
         while time.monotonic() < end:
             if (got := self._joints.take()) is not None and not self.silent:
                 self._sequence += 1
-                xi = self._random(time.monotonic()) if moving else _REST
+                # After any silence, of a device too, the robot waits for a command at rest.
+                xi = self._random(time.monotonic()) if moving and self.follows() else _REST
                 echo = got.message.sequence
                 command = m.MotionCommand(epoch=1, sequence=self._sequence, echo=echo, xi=xi)  # type: ignore[arg-type]
                 self._motion.put(command)
@@ -134,14 +138,24 @@ class Commander:
     def _random(self, now: float) -> tuple[float, ...]:
         if now >= self._until:
             share = self._rng.choice([0.1, 0.5, 1.0])
-            self._xi = tuple(self._rng.uniform(-share, share) * float(v) for v in self._limits.velocity)
+            most = self._limits.velocity * (_WORK if self.at_work else share)
+            self._xi = tuple(self._rng.uniform(-v, v) for v in most.tolist())
             self._until = now + self._rng.choice([0.01, 0.05, 0.2, 0.5])
         return self._xi
+
+
+def _moves(site: RealSite, commander: Commander) -> bool:
+    commander.run(0.1, moving=True)
+    report = site.tell()
+    return all(report[device]["still_s"] < 0.0 for device in ("arm", "base"))
 
 
 def trial(site: RealSite, commander: Commander, fault: Fault) -> Trial:
     """Inject one fault into the motion, watch what comes of it, and end it."""
     before = len(site.told_on_the_page())
+    commander.at_work = True
+    commander.run(1.5, moving=True)
+    site.wait(lambda: _moves(site, commander), 20.0, "motion to inject a fault into")
     at, ticks = time.monotonic(), site.tell()["arm"]["ticks"]
     fault.begin(site)
     commander.silent = fault is FAULTS[0]
@@ -152,7 +166,7 @@ def trial(site: RealSite, commander: Commander, fault: Fault) -> Trial:
     arm = 1e-3 * (after["arm"]["moved_tick"] - ticks)
     still = after["arm"]["still_s"] >= 0.0
     fault.end(site)
-    commander.silent = False
+    commander.silent = commander.at_work = False
     end = time.monotonic() + 10.0
     while not commander.follows() and time.monotonic() < end:
         commander.run(0.5, moving=False)

@@ -20,6 +20,7 @@ FORWARDED = {
     "perception": ("perception", "camera frames to pruning points"),
     "server": ("server", "the operator's page and its REST interface"),
     "record": ("recorder.record", "write down all that is on the robot's wire, for Foxglove and for `replay`"),
+    "replay": ("recorder.replay", "a recording on the operator's page, with a scrubber; nothing moves"),
     "audit": ("controller.audit", "what was decided, refused and done: check the record or write it out"),
     "user": ("server.user_command", "who may sign in with a password"),
     "certificates": ("rolling_panda.certificates", "certificates of one's own for mutual TLS on the robot's wire"),

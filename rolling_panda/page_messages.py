@@ -7,6 +7,7 @@ from msgspec import Meta, Struct
 from rolling_panda import messages as m
 from rolling_panda.control_messages import ClientKey, ControlState, StopState
 from rolling_panda.plan_messages import PlanState, PointPlan
+from rolling_panda.replay_messages import ReplayState
 from rolling_panda.teleop_messages import ArmVelocities, BaseVelocity, SpeedShare
 
 Role = m.Role
@@ -50,6 +51,7 @@ class PageState(PageMessage, frozen=True, kw_only=True):
         control: Who holds control of the robot's motion.
         stops: What bridge and controller hold latched.
         speed_shares: Speed of each actuator in parts of its limit, wheels first; empty before the first joint state.
+        replay: The recording that is played; None with a robot.
     """
 
     number: m.Count
@@ -68,6 +70,7 @@ class PageState(PageMessage, frozen=True, kw_only=True):
     control: ControlState | None = None
     stops: tuple[StopState, ...] = ()
     speed_shares: tuple[m.NonNegative, ...] = ()
+    replay: ReplayState | None = None
 
 
 class PagePoint(Struct, frozen=True, forbid_unknown_fields=True):

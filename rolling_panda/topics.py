@@ -16,6 +16,7 @@ from rolling_panda import (
     look_messages,
     plan_messages,
     plant_requests,
+    replay_messages,
     row_messages,
     teleop_messages,
 )
@@ -169,10 +170,14 @@ SCENERY = Topic(
     "scenery", row_messages.Scenery, "bridge", 0.5, "BACKGROUND", "DROP",
     "the simulated row, for display only", latched=True,
 )
+REPLAY = Topic(
+    "replay/state", replay_messages.ReplayState, "controller", 10, "INTERACTIVE_HIGH", "DROP",
+    "a recording is played in the robot's place", latched=True,
+)
 
 TOPICS: tuple[Topic[Any], ...] = (
     MOTION, CUT, PICTURE, STOP, TELEOP, JOINTS, ODOMETRY, BRIDGE, CONTROLLER, PLAN, HEARTBEAT, EVENT, CAMERA,
-    POINTS, CROPS, LOOK, OBSTACLES, SCENERY, PRESENCE, CONTROL, STOPS, HARDWARE_STOP,
+    POINTS, CROPS, LOOK, OBSTACLES, SCENERY, PRESENCE, CONTROL, STOPS, HARDWARE_STOP, REPLAY,
 )
 
 
@@ -194,7 +199,10 @@ PLANT: Service[plant_requests.PlantRequest] = Service(
     (plant_requests.SetRule, plant_requests.AddPoint, plant_requests.AddPointInImage, plant_requests.MovePoint),
     "perception", 2.0, "another pruning rule, or a point by hand, or moved by hand",
 )
-SERVICES: tuple[Service[Any], ...] = (INTENT, RELEASE, PLANT)
+SEEK: Service[replay_messages.SeekReplay] = Service(
+    "service/seek", (replay_messages.SeekReplay,), "controller", 1.0, "another place in the recording that is played",
+)
+SERVICES: tuple[Service[Any], ...] = (INTENT, RELEASE, PLANT, SEEK)
 # fmt: on
 
 

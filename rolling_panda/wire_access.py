@@ -18,6 +18,7 @@ CALLERS: dict[str, tuple[m.Process, ...]] = {
     "service/intent": ("server",),
     "service/release": ("controller",),
     "service/plant": ("server",),
+    "service/seek": ("server",),
 }
 _LISTENING = ("declare_subscriber", "liveliness_query", "declare_liveliness_subscriber")
 _EVERYTHING = (

@@ -42,6 +42,7 @@ class PageView:
     def state(self, number: int, viewers: int, now: float) -> PageState:
         """The state of this moment, addressed to nobody yet."""
         controller, bridge = self._link.controller.peek(), self._link.bridge.peek()
+        replay = self._link.replay.peek()
         joints, odometry = self._link.joints.peek(), self._link.odometry.peek()
         camera, control = self._link.camera.peek(), self._link.control.peek()
         return PageState(
@@ -58,6 +59,7 @@ class PageView:
             base=odometry.message.pose if odometry else None,
             camera_frame=camera.message.sequence if camera else 0,
             control=control.message if control else None,
+            replay=replay.message if replay else None,
             stops=tuple(self._link.stops[process].message for process in sorted(self._link.stops)),
             speed_shares=() if joints is None else speed_shares(joints.message, self._model.limits),
         )

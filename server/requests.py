@@ -225,6 +225,13 @@ class Move(_Body):
     along: Annotated[float, Field(ge=-0.1, le=0.1)]
 
 
+class Seek(_Body):
+    """Where a recording goes on (s from its beginning; where it is when left out), or stands still."""
+
+    position_s: Annotated[float, Field(ge=0.0, le=1e9)] | None = None
+    playing: bool = True
+
+
 class Ray(_JsonTuples):
     """A line of sight in odom (m): the point goes on the known cane that it passes nearest."""
 

@@ -18,6 +18,7 @@ from rolling_panda.control_messages import Presence, StopState
 from rolling_panda.crop_messages import PointCrop
 from rolling_panda.page_messages import ProcessPresence
 from rolling_panda.plant_requests import PlantRequest
+from rolling_panda.replay_messages import SeekReplay
 from rolling_panda.teleop_messages import TeleopTarget
 from rolling_panda.transport import Received, Transport
 
@@ -48,6 +49,7 @@ class RobotLink:
         self.odometry = transport.slot(topics.ODOMETRY)
         self.bridge = transport.slot(topics.BRIDGE)
         self.controller = transport.slot(topics.CONTROLLER)
+        self.replay = transport.slot(topics.REPLAY)
         self.camera = transport.slot(topics.CAMERA)
         self.images: dict[int, bytes] = {}
         """Of the newest few frames, by their sequence."""
@@ -92,6 +94,15 @@ class RobotLink:
         """
         loop = asyncio.get_running_loop()
         return await loop.run_in_executor(self._callers, self._transport.call, topics.PLANT, request)
+
+    async def seek(self, request: SeekReplay) -> m.Answer:
+        """Ask who plays a recording.
+
+        Raises:
+            ServiceError: Nobody does.
+        """
+        loop = asyncio.get_running_loop()
+        return await loop.run_in_executor(self._callers, self._transport.call, topics.SEEK, request)
 
     def stop(self, user: str, reason: str) -> str:
         """Send the software stop now and again a few times over 100 ms; its id. It needs no controller.

@@ -13,6 +13,7 @@ from playwright.sync_api import Page, Route, WebSocketRoute
 from rolling_panda import messages as m
 from rolling_panda import page_messages as p
 from rolling_panda.control_messages import ControlState, StopState
+from rolling_panda.replay_messages import ReplayState
 from rolling_panda.resources import resource
 
 ORIGIN = "http://panda.test"
@@ -113,6 +114,7 @@ class PlayedServer:
     role: p.Role = "supervisor"
     control: ControlState | None = None
     stopped: tuple[StopState, ...] = ()
+    replay: ReplayState | None = None
     online: bool = True
     silent: bool = False
     answers: dict[str, tuple[int, Any]] = field(default_factory=dict)
@@ -209,6 +211,7 @@ class PlayedServer:
             control=self.control,
             stops=self.stopped,
             speed_shares=(0.2, 0.1, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0),
+            replay=self.replay,
         )
 
     def page_points(self) -> p.PagePoints:

@@ -8,6 +8,7 @@ from rolling_panda import (
     look_messages,
     plan_messages,
     plant_requests,
+    replay_messages,
     row_messages,
     teleop_messages,
 )
@@ -36,6 +37,7 @@ def test_every_message_is_on_the_wire_once() -> None:
         teleop_messages,
         intents,
         plant_requests,
+        replay_messages,
     )
     defined = [value for module in modules for value in vars(module).values()]
     known = {

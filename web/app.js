@@ -12,6 +12,7 @@ import "./components/rp-mode.js";
 import "./components/rp-order.js";
 import "./components/rp-placing.js";
 import "./components/rp-queue.js";
+import "./components/rp-replay.js";
 import "./components/rp-rule.js";
 import "./components/rp-scene.js";
 import "./components/rp-status-bar.js";

@@ -295,6 +295,21 @@ export interface StopState {
   hardware: boolean;
 }
 
+/** Replay → server: what is on the wire is a recording. */
+export interface ReplayState {
+  type: "ReplayState";
+  /** Of the file. */
+  name: string;
+  /** When its first message was recorded (s since 1970). */
+  begins_at: number;
+  /** From the first to the last message. */
+  duration_s: number;
+  /** Where it is played now, from its beginning. */
+  position_s: number;
+  /** False while it stands still. */
+  playing: boolean;
+}
+
 /** 10 Hz: everything that changes all the time. The last known state stays, with its age. */
 export interface PageState {
   type: "PageState";
@@ -330,6 +345,8 @@ export interface PageState {
   stops: StopState[];
   /** Speed of each actuator in parts of its limit, wheels first; empty before the first joint state. */
   speed_shares: number[];
+  /** The recording that is played; None with a robot. */
+  replay: ReplayState|null;
 }
 
 /** What the plan says of one accepted point. */

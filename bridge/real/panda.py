@@ -15,7 +15,7 @@ from rolling_panda.errors import InputError
 from rolling_panda.robot_model import Limits
 
 # A state older than this (s) is a fault: the control box tells a thousand a second.
-_STALE_S = 0.25
+_STALE_S = 0.15
 _CLOSE_S = 2.0
 
 

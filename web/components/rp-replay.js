@@ -1,0 +1,68 @@
+// A recording that is played in the robot's place: where it stands, its scrubber, and who accepted which point.
+
+import { ask } from "../api.js";
+import { element, setText } from "../element.js";
+import { pageState, points } from "../state.js";
+import { drawOn } from "../store.js";
+
+class RpReplay extends HTMLElement {
+  toggle = element("button", { id: "replay-toggle", attributes: { type: "button" } });
+  slider = element("input", {
+    id: "replay-position",
+    attributes: { type: "range", min: "0", step: "0.1", value: "0", "aria-label": "Position in the recording" },
+  });
+  time = element("span", { class: "number", attributes: { role: "status" } });
+  words = element("strong");
+  list = element("ul", { id: "replay-accepted" });
+  /** While it is dragged it is the hand that moves it. */
+  dragged = false;
+
+  connectedCallback() {
+    this.setAttribute("role", "group");
+    this.setAttribute("aria-label", "Recording");
+    const who = element("details", {}, element("summary", { text: "Who accepted which" }), this.list);
+    this.append(this.words, this.toggle, this.slider, this.time, who);
+    this.toggle.addEventListener("click", () => {
+      const replay = pageState.get()?.replay;
+      if (!replay) return;
+      const over = replay.position_s >= replay.duration_s;
+      this.seek({ playing: !replay.playing, ...(over ? { position_s: 0 } : {}) });
+    });
+    this.slider.addEventListener("input", () => {
+      this.dragged = true;
+    });
+    this.slider.addEventListener("change", () => {
+      this.dragged = false;
+      this.seek({ position_s: Number(this.slider.value), playing: pageState.get()?.replay?.playing ?? false });
+    });
+    drawOn([pageState], () => this.draw());
+    drawOn([pageState, points], () => this.drawList());
+  }
+
+  /** @param {{ playing: boolean, position_s?: number }} request */
+  seek(request) {
+    void ask("Moving in the recording", "/api/replay", request);
+  }
+
+  draw() {
+    const replay = pageState.get()?.replay ?? null;
+    this.hidden = replay === null;
+    if (replay === null) return;
+    setText(this.words, `Recording ${replay.name}: nothing here moves a robot`);
+    setText(this.toggle, replay.playing ? "Pause" : "Play");
+    this.slider.max = String(replay.duration_s);
+    if (!this.dragged) this.slider.value = String(replay.position_s);
+    const at = new Date(1000 * (replay.begins_at + replay.position_s));
+    setText(this.time, `${replay.position_s.toFixed(1)} of ${replay.duration_s.toFixed(1)} s · ${at.toLocaleString()}`);
+  }
+
+  drawList() {
+    if (this.hidden) return;
+    const rows = (points.get()?.points ?? []).filter((row) => row.entry.user !== "");
+    const lines = rows.map((row) => `${row.entry.point_id}: ${row.entry.user} · ${row.entry.state.toLowerCase()}`);
+    const words = lines.length > 0 ? lines : ["nobody has accepted any yet"];
+    if (words.join("\n") === [...this.list.children].map((item) => item.textContent).join("\n")) return;
+    this.list.replaceChildren(...words.map((text) => element("li", { text })));
+  }
+}
+customElements.define("rp-replay", RpReplay);
