@@ -8,6 +8,7 @@ over the real wire, behind a router that can fail.
 
 import argparse
 import math
+import re
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -22,6 +23,7 @@ from benchmarks.fault_kinds import FAULTS, Fault
 from benchmarks.fault_world import World
 from benchmarks.live_fault_kinds import LIVE_FAULTS, LiveFault
 from benchmarks.live_faults import run_live
+from rolling_panda.resources import resource
 
 
 def start(fault: Fault) -> World:
@@ -87,12 +89,22 @@ def _in_one_process(chosen: Sequence[Fault], seed: int, trials: int) -> list[Tri
     return out
 
 
-def _between_processes(chosen: Sequence[LiveFault], seed: int, seconds: float) -> list[Trial]:
-    print(f"seed {seed}, {len(chosen)} faults with the real processes for {seconds:.0f} s", flush=True)
+def _between_processes(chosen: Sequence[LiveFault], seed: int, seconds: float, pages: int) -> list[Trial]:
+    print(f"seed {seed}, {len(chosen)} faults with the real processes for {seconds:.0f} s, {pages} pages", flush=True)
     with tempfile.TemporaryDirectory() as folder:
-        out = run_live(chosen, seed, seconds, Path(folder))
+        config = None
+        if pages:
+            config = Path(folder) / "loaded.toml"
+            config.write_text(loaded(), encoding="utf-8")
+        out = run_live(chosen, seed, seconds, Path(folder), config, pages)
     tell(sorted(out, key=lambda trial: trial.requirement))
     return out
+
+
+def loaded() -> str:
+    """The simulation's configuration with ten pictures a second."""
+    text = resource("assets/config/sim.toml").read_text(encoding="utf-8")
+    return re.sub(r"^camera_(moving|resting)_hz = .*$", r"camera_\1_hz = 10.0", text, flags=re.MULTILINE)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -104,6 +116,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument(
         "--live", type=float, metavar="SECONDS", help="so long with the real processes instead, faults drawn by --seed"
+    )
+    parser.add_argument(
+        "--pages", type=int, default=0, help="with --live: that look on, a fifth never reading, at 10 pictures a second"
     )
     parser.add_argument("--only", metavar="TEXT", default="", help="faults whose name or requirement has this in it")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write there what was found")
@@ -120,12 +135,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     if arguments.live is None:
         trials = _in_one_process(chosen, arguments.seed, arguments.trials)
     else:
-        trials = _between_processes(live, arguments.seed, arguments.live)
+        trials = _between_processes(live, arguments.seed, arguments.live, arguments.pages)
     found = summary(trials)
     if arguments.json is not None:
         document = {
             "seed": arguments.seed,
             "world": "one process" if arguments.live is None else "real processes",
+            "pages": arguments.pages,
             "summary": found,
             "results": [row_of(trial) for trial in trials],
         }

@@ -5,12 +5,15 @@ import signal
 import subprocess
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Self
 
 import httpx
 
 from benchmarks.live_robot import PROCESSES, LiveRobot, free_port
+from benchmarks.wall_clock import WallClock
 from rolling_panda.errors import RollingPandaError
 from rolling_panda.launch import child_environment, python_command
 
@@ -28,6 +31,7 @@ class FaultyRobot(LiveRobot):
         self._doors = {name: f"tcp/127.0.0.1:{free_port()}" for name in PROCESSES if name != "router"}
         self._router: subprocess.Popen[str] | None = None
         self.traces: list[Path] = []
+        self.wall_clock = WallClock(folder)
 
     def start(self, name: str) -> None:
         """Start (or start again) one process."""
@@ -51,6 +55,10 @@ class FaultyRobot(LiveRobot):
             self.trace = self.folder / f"trace{len(self.traces)}"
             self.traces.append(self.trace)
         super().start(name)
+
+    def environment(self) -> dict[str, str]:
+        """With a wall clock that can be set."""
+        return super().environment() | self.wall_clock.environment
 
     def endpoint_of(self, name: str) -> str:
         """The process's own door."""
@@ -88,13 +96,42 @@ class FaultyRobot(LiveRobot):
         self.processes[name].send_signal(signal.SIGCONT)
         return at
 
+    @contextmanager
+    def looked_at(self, pages: int) -> Iterator[None]:
+        """So many pages look on meanwhile, a fifth of which never read.
+
+        Raises:
+            RollingPandaError: Not all of those that read did so to the end.
+        """
+        if pages == 0:
+            yield
+            return
+        cookie = "; ".join(f"{name}={value}" for name, value in self.client.cookies.items())
+        slow = pages // 5
+        words = [self.url, cookie, "--pages", str(pages), "--slow", str(slow)]
+        with subprocess.Popen(
+            python_command("benchmarks.crowd", words),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env=child_environment(),
+        ) as crowd:
+            assert crowd.stdout is not None
+            if crowd.stdout.readline() != "open\n":
+                raise RollingPandaError("the pages that look on were not let in")
+            yield
+            reading, _ = crowd.communicate(timeout=20)
+        if int(reading) != pages - slow:
+            raise RollingPandaError(f"{reading.strip()} of {pages - slow} pages still read at the end")
+
     def make_ready(self) -> None:
-        """Undo every fault of the ways and lead the robot back to READY, as a supervisor would.
+        """Undo every fault of the ways and the clock, and lead the robot back to READY, as a supervisor would.
 
         Raises:
             RollingPandaError: It does not come back.
         """
         self.order(clear=True)
+        self.wall_clock.set(0)
         end = time.monotonic() + _BACK_S
         mode, said = "", ""
         while time.monotonic() < end:

@@ -2,19 +2,17 @@
 
 import argparse
 import gc
-import itertools
 import platform
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 from benchmarks.documents import one_row_a_line
-from benchmarks.kinematic_robot import KinematicRobot
 from benchmarks.tick import working
 from benchmarks.tick_parts import Times
 from controller.journal import LedgerState, Record
@@ -29,6 +27,7 @@ _PERIOD_S = 0.01
 _SLOW_S = 0.2
 #: An operator's decision every so many periods, and a line of another process's log: more than any work gives.
 _DECISION, _LINE = 20, 5
+_LINE_OF_OTHERS = m.LogEvent(header=m.Header(), process="server", severity="info", text="bench")
 
 
 class SlowDisk(Ledger):
@@ -59,24 +58,18 @@ class NoDisk:
         """Nothing is open."""
 
 
-def measure(seconds: float, make: Callable[[], LedgerWriter | NoDisk]) -> list[float]:
-    """Durations (s) of control steps in automatic work, each with handing its records over, at 100 Hz in real time."""
-    durations: list[float] = []
-    while len(durations) < seconds / _PERIOD_S:
-        # Records are numbered anew with each controller.
-        with closing(make()) as ledger:
-            _work(working(), ledger, round(seconds / _PERIOD_S), durations)
-    return durations
+class Side:
+    """A robot at work and the ledger that its records go to."""
 
+    def __init__(self, ledger: LedgerWriter | NoDisk) -> None:
+        """In automatic work, with nothing recorded."""
+        self.ledger, self.robot = ledger, working()
+        self._steps = 0
 
-def _work(robot: KinematicRobot, ledger: LedgerWriter | NoDisk, steps: int, durations: list[float]) -> None:
-    """Until the work has ended or there are enough steps."""
-    line = m.LogEvent(header=m.Header(), process="server", severity="info", text="bench")
-    gc.collect()
-    gc.freeze()
-    due = time.perf_counter()
-    while len(durations) < steps:
-        if len(durations) % _DECISION == 0:
+    def step(self) -> float | None:
+        """One control step with handing its records over; how long it took (s), None when the work has ended."""
+        robot, ledger = self.robot, self.ledger
+        if self._steps % _DECISION == 0:
             robot.ask(intents.RejectPoint(user="bench", point_id="p999"))
         inputs = replace(robot.inputs(), ledger=ledger.state)
         started = time.perf_counter()
@@ -84,38 +77,62 @@ def _work(robot: KinematicRobot, ledger: LedgerWriter | NoDisk, steps: int, dura
         ledger.write(out.records)
         ended = time.perf_counter()
         if robot.controller.mode != "AUTO":
-            break
-        durations.append(ended - started)
-        if len(durations) % _LINE == 0:
-            ledger.note(line)
+            return None
+        self._steps += 1
+        if self._steps % _LINE == 0:
+            ledger.note(_LINE_OF_OTHERS)
         robot.take(out)
-        due += _PERIOD_S
-        time.sleep(max(0.0, due - time.perf_counter()))
-    gc.unfreeze()
+        return ended - started
+
+
+def measure(kinds: dict[str, Callable[[], LedgerWriter | NoDisk]], steps: int) -> dict[str, list[float]]:
+    """Durations (s) of up to so many control steps of each kind, side by side in the same periods of 10 ms.
+
+    What else the machine does then meets all kinds alike. Each begins a period as often as the others. It ends early
+    when one of the robots has no more work.
+    """
+    durations: dict[str, list[float]] = {name: [] for name in kinds}
+    with ExitStack() as stack:
+        sides = {name: Side(stack.enter_context(closing(make()))) for name, make in kinds.items()}
+        gc.collect()
+        gc.freeze()
+        due = time.perf_counter()
+        for turn in range(steps):
+            first = turn % len(kinds)
+            took = {name: sides[name].step() for name in [*kinds, *kinds][first : first + len(kinds)]}
+            if None in took.values():
+                break
+            for name, duration in took.items():
+                durations[name].append(duration or 0.0)
+            due += _PERIOD_S
+            time.sleep(max(0.0, due - time.perf_counter()))
+        gc.unfreeze()
+    return durations
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Measure, print, and write the figures. Returns the exit code."""
     parser = argparse.ArgumentParser(prog="rolling-panda bench ledger", description=__doc__)
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures here")
-    parser.add_argument("--seconds", type=float, default=10.0, help="of each kind in each round (default: %(default)s)")
-    parser.add_argument("--rounds", type=int, default=3, help="of all three kinds in turn (default: %(default)s)")
+    parser.add_argument("--seconds", type=float, default=30.0, help="of work of each kind (default: %(default)s)")
     parser.add_argument(
         "--real-time", action="store_true", help="scheduled before other programs, as the controller is"
     )
     arguments = parser.parse_args(argv)
-    if arguments.seconds <= 0.0 or arguments.rounds < 1:
-        parser.error("--seconds and --rounds must be positive")
+    if arguments.seconds <= 0.0:
+        parser.error("--seconds must be positive")
     if arguments.real_time:
         take_priority("control")
+    steps = round(arguments.seconds / _PERIOD_S)
     durations: dict[str, list[float]] = {"no disk": [], "disk": [], "slow disk": []}
     with tempfile.TemporaryDirectory() as folder:
-        for number, name in itertools.product(range(arguments.rounds), durations):
-            place = Path(folder) / f"{name} {number}"
-            place.mkdir()
-            durations[name] += measure(arguments.seconds, _ledgers(name, place))
-            if name != "no disk":
-                _check(place)
+        while (left := steps - len(durations["disk"])) > 0:
+            # Records are numbered anew with each controller.
+            place = Path(tempfile.mkdtemp(dir=folder))
+            for name, those in measure({name: _ledgers(name, place / name) for name in durations}, left).items():
+                durations[name] += those
+                if name != "no disk":
+                    _check(place / name)
     figures: dict[str, Any] = {"machine": platform.platform(), "slow_flush_s": _SLOW_S}
     for name, each in durations.items():
         times = Times.of(each)
@@ -129,6 +146,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _ledgers(name: str, place: Path) -> Callable[[], LedgerWriter | NoDisk]:
+    place.mkdir()
     kinds: dict[str, Callable[[], LedgerWriter | NoDisk]] = {
         "no disk": NoDisk,
         "disk": lambda: LedgerWriter(lambda: Ledger(place)),

@@ -13,6 +13,7 @@ Inject = Callable[[FaultyRobot, Hand], float]
 #: Where the robot may go on or rest, and only what is sent is judged.
 EITHER = math.nan
 _GO_ON = math.inf
+_HOUR, _YEAR = 3600, 365 * 86400
 
 
 @dataclass(frozen=True)
@@ -107,6 +108,22 @@ def _silent(robot: FaultyRobot, hand: Hand) -> float:
     return hand.silence()
 
 
+def _jumps(robot: FaultyRobot, hand: Hand) -> float:
+    """The wall clocks of all processes jump by an hour and by ten years, forth and back."""
+    at = time.monotonic()
+    for ahead in (_HOUR, -_HOUR, 10 * _YEAR, -10 * _YEAR):
+        robot.wall_clock.set(ahead)
+        time.sleep(0.4)
+    return at
+
+
+def _jump_and_silence(robot: FaultyRobot, hand: Hand) -> float:
+    """A timeout after a jump of the clock is as long as any other."""
+    robot.wall_clock.set(-_HOUR)
+    time.sleep(0.2)
+    return hand.silence()
+
+
 _MOTION = ("controller", "bridge", "command/motion")
 LIVE_FAULTS: tuple[LiveFault, ...] = (
     LiveFault("software stop through the server", "R3", "browser–bridge", 0.2, _stop),
@@ -165,6 +182,11 @@ LIVE_FAULTS: tuple[LiveFault, ...] = (
         moving="work",
         watched_s=4.0,
     ),
+    LiveFault("wall clocks jump by 1 h and 10 y", "R19", "all", _GO_ON, _jumps, watched_s=2.0),
+    LiveFault(
+        "wall clocks jump by 1 h and 10 y, automatic work", "R19", "all", _GO_ON, _jumps, moving="work", watched_s=2.0
+    ),
+    LiveFault("wall clocks jump by 1 h, then the page is silent", "R19", "all", 0.4, _jump_and_silence),
     LiveFault("controller killed", "R2", "controller", 0.2, _killed("controller"), "setpoint", restart=("controller",)),
     LiveFault(
         "controller killed in automatic work",

@@ -38,9 +38,12 @@ def run_live(
     seconds: float,
     folder: Path,
     config: Path | None = None,
+    pages: int = 0,
     told: Callable[[str], None] = print,
 ) -> list[Trial]:
     """Faults in an order drawn by `seed`, for about `seconds`, in as few starts of the processes as can be.
+
+    Meanwhile so many `pages` look on.
 
     What needs a process to be started again afterwards is drawn less often.
     """
@@ -51,7 +54,7 @@ def run_live(
     while time.monotonic() < end:
         starts += 1
         place = Path(tempfile.mkdtemp(dir=folder))
-        with FaultyRobot(place, config=config) as robot:
+        with FaultyRobot(place, config=config) as robot, robot.looked_at(pages):
             robot.wait(lambda: len(robot.points()) >= 3, 60, "points")
             way = 1.0
             while time.monotonic() < end:
@@ -63,7 +66,8 @@ def run_live(
                 try:
                     happened.append(_happen(robot, fault, draw.uniform(0.0, 0.4), way))
                 except (RollingPandaError, AssertionError) as error:
-                    told(f"no trial of {fault.name}: {str(error).splitlines()[0]}")
+                    lines = str(error).splitlines()
+                    told(f"no trial of {fault.name}: {lines[0]}; {' | '.join(lines[-4:])}")
                     break
     told(f"{len(happened)} faults in {starts} starts of the processes")
     return _judged(happened, seed)

@@ -87,8 +87,12 @@ class LiveRobot:
         module, words = ("rolling_panda", ["router", *options]) if name == "router" else (name, options)
         with (self.folder / f"{name}.log").open("ab") as log:
             self.processes[name] = subprocess.Popen(
-                python_command(module, words), stdout=log, stderr=log, env=child_environment()
+                python_command(module, words), stdout=log, stderr=log, env=self.environment()
             )
+
+    def environment(self) -> dict[str, str]:
+        """Of each process."""
+        return child_environment()
 
     def endpoint_of(self, name: str) -> str:
         """Where a process finds the wire."""
