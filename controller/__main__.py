@@ -30,8 +30,8 @@ def _run(context: ProcessContext) -> None:
     folder = context.state_folder
     controller = Controller(config, robot_config, run_id, starts=count_start(folder))
     stop_file = open_stop_file(folder)
-    tickets, order = restored(folder)
-    controller.restore(tickets, stop_file.stops, order)
+    before = restored(folder)
+    controller.restore(before.tickets, stop_file.stops, before.order, before.preview)
     ledger = LedgerWriter(lambda: Ledger(folder))
     ledger.write([start_record(context.config_path, run_id)])
     planner = PlanWorker(config, robot_config)

@@ -10,14 +10,17 @@ from collections.abc import Iterable
 from controller.authority import ABOUT_CONTROL, MOTION, client_of
 from controller.config import ControllerConfig
 from controller.interface import Inputs, Outputs
-from controller.journal import Journal, OrderRow, RequestRow, TicketRow
+from controller.journal import Journal, OrderRow, PreviewRow, RequestRow, TicketRow
 from controller.lines import Lines
 from controller.modes import Event
 from controller.motion import Tracking
 from controller.movement import Moved, Movement
+from controller.next_cut import Found
 from controller.operator import Operator
 from controller.permission import EVENTS, Situation, allowed, refusal
-from controller.queue import PointQueue
+from controller.preview import ABOUT_PREVIEWS, Previews
+from controller.preview_plan import PreviewRequest
+from controller.queue import PointQueue, Ticket
 from controller.report import controller_state
 from controller.session import Session
 from controller.supervisor import Supervisor
@@ -65,8 +68,9 @@ class Controller:
         self._lines = Lines(self._journal)
         self._queue = PointQueue(config, self._journal)
         self._session = Session(self._queue)
-        known = self._session.known
-        self._movement = Movement(config, robot_config, self._queue, self._lines, run_id, known, method)
+        self._previews = Previews(self._queue, self._journal)
+        permit = self._previews.permit
+        self._movement = Movement(config, robot_config, self._queue, self._lines, run_id, self._known, method, permit)
         self._supervisor = Supervisor(config, self._movement, self._lines, starts)
         self._operator = Operator(self._queue)
         self._inputs = Inputs()
@@ -89,11 +93,17 @@ class Controller:
         return self._movement.tracking
 
     def restore(
-        self, rows: Iterable[TicketRow], stops: tuple[StopRecord, ...] = (), order: OrderRow | None = None
+        self,
+        rows: Iterable[TicketRow],
+        stops: tuple[StopRecord, ...] = (),
+        order: OrderRow | None = None,
+        preview: PreviewRow | None = None,
     ) -> None:
         """Take up the queue, its order and the latched stops of an earlier start; nothing resumes by itself."""
         if order is not None:
             self._queue.order.restore(order)
+        if preview is not None:
+            self._previews.restore(preview)
         self._queue.restore(rows)
         self._supervisor.restore(stops)
 
@@ -113,16 +123,32 @@ class Controller:
         token = None if supervisor.health.overruled else supervisor.authority.token
         motion = self._movement.send(moved.xi, token, inputs.joints, self.mode == "ESTOP_LATCHED")
         release = supervisor.stops.release_due()
-        state = control = stops = plan = request = None
+        state = control = stops = plan = request = preview = shown = wanted = None
         if now >= self._state_due:
             self._state_due = now + _STATE_S
-            request = self._review(now)
+            request, wanted = self._review(now), self._review_preview(now)
+            preview, shown = self._previews.message(now), self._previews.motion(now)
             plan, state, control = self._session.message(now), self._report(now), supervisor.authority.message(now)
         if supervisor.stops.changed or now >= self._stops_due:
             self._stops_due, stops = now + _STOPS_S, supervisor.stops.message()
         picture = self._picture(now)
         events, records = self._lines.take(), self._journal.take()
-        return Outputs(motion, cut, release, state, events, plan, request, records, picture, control, stops)
+        return Outputs(
+            motion=motion,
+            cut=cut,
+            release=release,
+            state=state,
+            events=events,
+            plan=plan,
+            request=request,
+            records=records,
+            picture=picture,
+            control=control,
+            stops=stops,
+            preview=preview,
+            preview_motion=shown,
+            preview_request=wanted,
+        )
 
     def answer(self, intent: intents.Intent, now: float) -> m.Answer:
         """Do what an operator asks, or say why not.
@@ -194,7 +220,8 @@ class Controller:
         return PictureRequest(epoch=token.epoch, number=due[0], point_id=due[1])
 
     def _situation(self, now: float, intent: intents.Intent | None = None) -> Situation:
-        return self._supervisor.situation(self._queue.next() is not None, now, intent)
+        refused = self._previews.start_refused()
+        return self._supervisor.situation(self._queue.next() is not None, refused, now, intent)
 
     def _do(self, intent: intents.Intent, now: float) -> str:
         """Do what was not refused; returns what the content itself is refused for."""
@@ -215,12 +242,15 @@ class Controller:
             rights = supervisor.authority.rights(client, intent.role)
             refused = supervisor.event(event, now, f"{type(intent).__name__.lower()} by {intent.user}", rights)
             if isinstance(intent, intents.Start) and not refused:
+                self._previews.begin()
                 movement.sequence.begin(intent if isinstance(intent, intents.Survey) else None)
             return refused
         if isinstance(intent, intents.Home):
             movement.go_home()
             supervisor.remark("the arm is being brought home")
             return ""
+        if isinstance(intent, ABOUT_PREVIEWS):
+            return self._previews.do(intent, now)
         return self._operator.points(intent)
 
     def _review(self, now: float) -> PlanRequest | None:
@@ -233,6 +263,25 @@ class Controller:
             obstacles=() if obstacles is None else obstacles.message.capsules,
             at_rest=not movement.homing and self.mode != "TELEOP" and movement.at_rest,
             working=self.mode == "AUTO",
+            now=now,
+        )
+
+    def _known(self, ticket: Ticket) -> Found:
+        """What is known of how to make a cut: as an approved preview has shown it, else as the plan says."""
+        return self._previews.known(ticket) or self._session.known(ticket)
+
+    def _review_preview(self, now: float) -> PreviewRequest | None:
+        """Look after the preview."""
+        obstacles, movement = self._inputs.obstacles, self._movement
+        measured = movement.body.measured
+        return self._previews.review(
+            made=self._inputs.preview,
+            q=None if measured is None else measured.q,
+            obstacles=() if obstacles is None else obstacles.message.capsules,
+            cuts=self._session.cuts,
+            at_rest=not movement.homing and self.mode != "TELEOP" and movement.at_rest,
+            working=self.mode == "AUTO",
+            look_s=movement.sequence.look_s,
             now=now,
         )
 

@@ -16,7 +16,7 @@ from controller.confirmation import camera_ready, not_as_accepted
 from controller.cut_pose import escape_pose
 from controller.eye import Eye
 from controller.motion import Follower, Measured, Tracking
-from controller.next_cut import Known, NextCut
+from controller.next_cut import Known, NextCut, Permit
 from controller.patience import Patience, missed
 from controller.queue import PointQueue
 from controller.reach import CutPlan, PostureSearch, Unreachable
@@ -51,10 +51,12 @@ class CutSequence:
         queue: PointQueue,
         run_id: str,
         known: Known = lambda _: None,
+        permit: Permit = lambda _: "",
     ) -> None:
         """Bind the parts.
 
-        `run_id` makes the cut ids of this start unlike those of any other; `known` is what a plan says of a point.
+        `run_id` makes the cut ids of this start unlike those of any other; `known` is what a plan says of a point,
+        `permit` why it may not be gone to.
         """
         self._config, self._follower = config, follower
         self._saturation, self._queue = saturation, queue
@@ -71,7 +73,7 @@ class CutSequence:
         self._ways = Ways(config, follower.flows)
         self._eye = Eye(config.look_timeout_s, _PICTURES)
         self._verification = Verification(queue, self._eye, config.verify)
-        self._coming = NextCut(search, queue, config.search_steps_each, known)
+        self._coming = NextCut(search, queue, config.search_steps_each, known, permit)
         #: Where the blades closed last (m, odom), and on which point.
         self._cut_at: Array = np.zeros(3)
         self._cut_point = ""
@@ -96,9 +98,19 @@ class CutSequence:
         return self._point_id if self._stage in (Stage.ADVANCE, Stage.CUT, Stage.RETREAT) else ""
 
     @property
+    def plan(self) -> CutPlan | None:
+        """Poses and postures of the cut under way; None while there is none."""
+        return self._plan
+
+    @property
     def places(self) -> tuple[Array, ...]:
         """Cuts that the motion under way begins or ends at (3, m, odom): the blades may touch the spurs there."""
         return self._places
+
+    @property
+    def look_s(self) -> float:
+        """From asking for a picture to knowing what it shows, as it was last (s)."""
+        return self._eye.took_s
 
     def clear_of_canes(self, q: Array) -> Array:
         """Configuration (12) that the work under way will be in before it goes on, from q (12): q outside the canes."""
@@ -186,7 +198,9 @@ class CutSequence:
         self._forget()
         if not self._coming.look(robot.q):
             # The last cut may still have to be made once more.
-            return Work(self._saturation.ramp(robot.sent), finished=not self._verification.pending)
+            summary = self._coming.refused or Work.summary
+            finished = not self._verification.pending
+            return Work(self._saturation.ramp(robot.sent), finished=finished, summary=summary)
         self._point_id, self._accepted, self._stage = self._coming.point_id, self._coming.accepted, Stage.SEARCH
         return Work(self._saturation.ramp(robot.sent))
 
@@ -301,9 +315,9 @@ class CutSequence:
         ticket = self._queue.get(self._point_id)
         if ticket is not None and ticket.state == "ACCEPTED":
             # The plan is for one acceptance: of what was accepted anew it knows nothing.
-            if ticket.accepted is self._accepted:
+            why = self._coming.permit(ticket) if ticket.accepted is self._accepted else "it was accepted anew"
+            if not why:
                 return
-            why = "it was accepted anew"
         else:
             why = ticket.reason if ticket is not None else "the point has gone"
         self._events.append(f"{self._point_id}: left: {why}")

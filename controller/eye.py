@@ -39,6 +39,8 @@ class Eye:
         self._timeout_s, self._pictures = timeout_s, pictures
         self._asked: dict[str, _Asked] = {}
         self._number = 0
+        #: From asking for the last picture that came to knowing what it showed (s).
+        self.took_s = 0.5
 
     def ask(self, point_id: str, expected: Finding, now: float) -> None:
         """Look at a point from now on; what is not as expected is looked at once more before it is believed."""
@@ -58,7 +60,7 @@ class Eye:
             asked.more -= 1
             self._again(asked, now)
         else:
-            asked.answer = look
+            asked.answer, self.took_s = look, now - asked.since
 
     def due(self, now: float) -> tuple[int, str] | None:
         """Number and point of the request to send in this period; None when none is due."""

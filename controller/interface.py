@@ -4,11 +4,13 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from controller.journal import LedgerState, Record
+from controller.preview_plan import Preview, PreviewRequest
 from controller.work_plan import PlanRequest, WorkPlan
 from rolling_panda import messages as m
 from rolling_panda.control_messages import ControlState, Presence, StopState
 from rolling_panda.look_messages import CloseLook, PictureRequest
 from rolling_panda.plan_messages import SessionPlan
+from rolling_panda.preview_messages import PreviewMotion, PreviewState
 from rolling_panda.row_messages import Obstacles
 from rolling_panda.teleop_messages import TeleopTarget
 
@@ -41,6 +43,7 @@ class Inputs:
         stops: Stop requests that came in since the last step.
         wall_time: Now (s since 1970), for people alone.
         plan: Newest answer of the planner.
+        preview: Newest preview that was made.
         ledger: How much of what was recorded is durable.
         look: What the newest picture that was asked for shows.
         tick_s: Median time of one control step, measured by the loop (s).
@@ -61,6 +64,7 @@ class Inputs:
     stops: tuple[m.StopRequest, ...] = ()
     wall_time: float = 0.0
     plan: WorkPlan | None = None
+    preview: Preview | None = None
     ledger: LedgerState = LedgerState()
     look: Sample[CloseLook] | None = None
     tick_s: float = 0.0
@@ -72,7 +76,7 @@ class Inputs:
 class Outputs:
     """What to send after one step; None or empty where nothing is due.
 
-    `request` goes to the planner, `records` to the ledger.
+    `request` and `preview_request` go to the planner, `records` to the ledger.
     """
 
     motion: m.MotionCommand | None = None
@@ -86,3 +90,6 @@ class Outputs:
     picture: PictureRequest | None = None
     control: ControlState | None = None
     stops: StopState | None = None
+    preview: PreviewState | None = None
+    preview_motion: PreviewMotion | None = None
+    preview_request: PreviewRequest | None = None

@@ -10,9 +10,10 @@ import msgspec
 from rolling_panda import intents
 from rolling_panda import messages as m
 
-#: What a row is about: a life of a point, an order of work, what somebody asked and how it was answered, a stop, a
+#: What a row is about: a life of a point, an order of work, whether previews are required, what
+#: somebody asked and how it was answered, a stop, a
 #: log line, a start.
-Kind = Literal["ticket", "order", "request", "stop", "event", "start"]
+Kind = Literal["ticket", "order", "preview", "request", "stop", "event", "start"]
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,13 @@ class OrderRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
     order: tuple[str, ...]
     revision: int
+    user: str = ""
+
+
+class PreviewRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Whether a cut needs its preview to be approved, and who said so."""
+
+    required: bool
     user: str = ""
 
 

@@ -1,14 +1,18 @@
 """What a start reads from the ledger and writes into it first."""
 
 import hashlib
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import msgspec
 
-from controller.journal import OrderRow, Record, TicketRow
+from controller.journal import OrderRow, PreviewRow, Record, TicketRow
 from controller.ledger import Ledger
 from rolling_panda.about import About, about
 from rolling_panda.errors import LedgerError
+
+Row = TypeVar("Row", bound=msgspec.Struct)
 
 
 class StartRow(msgspec.Struct, frozen=True, kw_only=True):
@@ -32,25 +36,38 @@ def start_record(config: Path, run_id: str) -> Record:
     return Record(0, "start", "controller", row)
 
 
-def restored(folder: Path) -> tuple[tuple[TicketRow, ...], OrderRow | None]:
-    """The newest row of each point in the ledger of a folder, and the order of work if people have put one.
+@dataclass(frozen=True)
+class Restored:
+    """What was recorded before: points, the order of work if people have put one, whether previews are required."""
+
+    tickets: tuple[TicketRow, ...] = ()
+    order: OrderRow | None = None
+    preview: PreviewRow | None = None
+
+
+def restored(folder: Path) -> Restored:
+    """The newest rows in the ledger of a folder.
 
     Raises:
         LedgerError: The ledger cannot be opened, or a row is not what this version writes.
     """
     with Ledger(folder) as ledger:
-        found: list[TicketRow] = []
-        order: OrderRow | None = None
-        told = [(kind, *row) for kind in ("ticket", "order") for row in ledger.newest(kind)]
-        for kind, name, body in told:
-            try:
-                if kind == "ticket":
-                    found.append(msgspec.json.decode(body, type=TicketRow))
-                else:
-                    order = msgspec.json.decode(body, type=OrderRow)
-            except msgspec.MsgspecError as error:
-                raise LedgerError(
-                    f"the ledger {ledger.path} tells of {kind} {name} what this version does not understand: {error}; "
-                    f"keep the folder, and give another one with --state"
-                ) from error
-        return tuple(found), order
+        orders, previews = _newest(ledger, "order", OrderRow), _newest(ledger, "preview", PreviewRow)
+        return Restored(
+            tuple(_newest(ledger, "ticket", TicketRow)),
+            orders[-1] if orders else None,
+            previews[-1] if previews else None,
+        )
+
+
+def _newest(ledger: Ledger, kind: str, row: type[Row]) -> list[Row]:
+    found = []
+    for name, body in ledger.newest(kind):
+        try:
+            found.append(msgspec.json.decode(body, type=row))
+        except msgspec.MsgspecError as error:
+            raise LedgerError(
+                f"the ledger {ledger.path} tells of {kind} {name} what this version does not understand: {error}; "
+                f"keep the folder, and give another one with --state"
+            ) from error
+    return found

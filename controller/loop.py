@@ -34,6 +34,8 @@ from rolling_panda.topics import (
     PLAN,
     POINTS,
     PRESENCE,
+    PREVIEW,
+    PREVIEW_MOTION,
     RELEASE,
     STOP,
     STOPS,
@@ -107,6 +109,8 @@ class Loop:
         self._motion, self._cut = transport.publisher(MOTION), transport.publisher(CUT)
         self._state, self._event = transport.publisher(CONTROLLER), transport.publisher(EVENT)
         self._plan, self._control = transport.publisher(PLAN), transport.publisher(CONTROL)
+        self._preview = transport.publisher(PREVIEW)
+        self._preview_motion = transport.publisher(PREVIEW_MOTION)
         self._latched, self._stop_file = transport.publisher(STOPS), stop_file or StopFile()
         self._ticks: deque[float] = deque(maxlen=min(round(rate_hz), _TIMED))
         self._tick_s = 0.0
@@ -129,6 +133,7 @@ class Loop:
             stops=tuple(stop.message for stop in self._stops.drain()),
             wall_time=time.time(),
             plan=None if self._planner is None else self._planner.newest,
+            preview=None if self._planner is None else self._planner.newest_preview,
             ledger=self._ledger.state,
             look=self._look.sample(),
             tick_s=self._tick_s,
@@ -158,8 +163,14 @@ class Loop:
             self._control.put(outputs.control)
         if outputs.request is not None and self._planner is not None:
             self._planner.ask(outputs.request)
+        if outputs.preview_request is not None and self._planner is not None:
+            self._planner.ask(outputs.preview_request)
         if outputs.plan is not None:
             self._plan.put(outputs.plan)
+        if outputs.preview is not None:
+            self._preview.put(outputs.preview)
+        if outputs.preview_motion is not None:
+            self._preview_motion.put(outputs.preview_motion)
         for event in outputs.events:
             self._event.put(event)
 

@@ -12,7 +12,7 @@ from controller.lease import Token
 from controller.lines import Lines
 from controller.modes import Event
 from controller.motion import Measured, Tracking
-from controller.next_cut import Known
+from controller.next_cut import Known, Permit
 from controller.queue import PointQueue
 from controller.reach import PostureSearch
 from controller.setpoints import BRAKED
@@ -53,6 +53,7 @@ class Movement:
         run_id: str,
         known: Known,
         method: Method | None = None,
+        permit: Permit = lambda _: "",
     ) -> None:
         """Build the robot's model and all that moves it.
 
@@ -64,6 +65,7 @@ class Movement:
             run_id: Makes this start's cut ids unlike any other's.
             known: What a plan says of a point.
             method: Whole-body method in place of the configured one.
+            permit: Why a point may not be gone to; empty when it may.
 
         Raises:
             ConfigError: There is no such method.
@@ -74,7 +76,7 @@ class Movement:
         self._saturation, self._setpoints = body.saturation, body.setpoints
         self._clearance = CutClearance(RobotModel(robot_config), config)
         search = PostureSearch(RobotModel(robot_config), config, self._clearance.admits)
-        self.sequence = CutSequence(config, search, body.follower, body.saturation, queue, run_id, known)
+        self.sequence = CutSequence(config, search, body.follower, body.saturation, queue, run_id, known, permit)
         self.teleoperation = Teleoperation(config, body.follower, body.robot.drive)
         self._homing: Homing | None = None
         #: Of the motion that the last step followed; None while nothing was followed.

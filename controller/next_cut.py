@@ -9,14 +9,21 @@ from controller.reach import CutPlan, PostureSearch, Unreachable
 from rolling_panda.differential_drive import Array
 from rolling_panda.messages import PruningPoint
 
-Known = Callable[[Ticket], CutPlan | Unreachable | None]
+Found = CutPlan | Unreachable | None
+Known = Callable[[Ticket], Found]
+Permit = Callable[[Ticket], str]
 
 
 class NextCut:
     """The search for one point's plan. `look` for the next point, `step` each period, read `found`."""
 
     def __init__(
-        self, search: PostureSearch, queue: PointQueue, iterations: int, known: Known = lambda _: None
+        self,
+        search: PostureSearch,
+        queue: PointQueue,
+        iterations: int,
+        known: Known = lambda _: None,
+        permit: Permit = lambda _: "",
     ) -> None:
         """Look at nothing yet.
 
@@ -25,8 +32,12 @@ class NextCut:
             queue: Says which point is next.
             iterations: Of the search in one period.
             known: What a plan says of a ticket's point, which is then not searched for.
+            permit: Why a ticket's point may not be gone to; empty when it may.
         """
         self._search, self._queue, self._iterations, self._known = search, queue, iterations, known
+        self.permit = permit
+        #: Why the next point may not be gone to; empty when it may, and where there is none.
+        self.refused = ""
         self.forget()
 
     def forget(self) -> None:
@@ -49,10 +60,11 @@ class NextCut:
         """Begin with the next accepted point, from configuration q (12), unless it is looked at already.
 
         Returns:
-            False when no point is accepted.
+            False when no point is accepted, or the next one may not be gone to.
         """
         ticket = self._queue.next()
-        if ticket is None or ticket.accepted is None:
+        self.refused = "" if ticket is None else self.permit(ticket)
+        if ticket is None or ticket.accepted is None or self.refused:
             self.forget()
             return False
         if not self.stands:

@@ -55,6 +55,12 @@ class Operator:
             return f"moved {intent.point_id} {f'before {intent.before}' if intent.before else 'to the end'}"
         if isinstance(intent, intents.PlannersOrder):
             return "gave the order of work back to the plan"
+        if isinstance(intent, intents.AskPreview):
+            return f"asked for a preview of {intent.point_id or 'the work'}"
+        if isinstance(intent, intents.ApprovePreview):
+            return f"approved the preview {intent.preview_hash[:8]}"
+        if isinstance(intent, intents.RequirePreview):
+            return "requires a preview before each cut" if intent.required else "requires no previews any more"
         return "home" if isinstance(intent, intents.Home) else ""
 
     def _accept_all(self, intent: intents.AcceptAll) -> str:

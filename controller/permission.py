@@ -28,6 +28,9 @@ _PROBES: dict[type[intents.Intent], intents.Intent | None] = {
     intents.AcceptAll: None,
     intents.MoveInQueue: None,
     intents.PlannersOrder: None,
+    intents.AskPreview: None,
+    intents.ApprovePreview: None,
+    intents.RequirePreview: None,
     intents.Start: intents.Start(user=""),
     intents.Survey: intents.Survey(user=""),
     intents.Pause: intents.Pause(user=""),
@@ -51,6 +54,7 @@ class Situation:
         work: Whether a point is accepted.
         rights: What who asks counts as.
         not_theirs: Why who asks may not move the robot, in words; empty when they may.
+        approval: Why work may not begin for want of an approved preview; empty when it may.
         unwatched: Why automatic work may not begin for want of somebody who sees the robot; empty when it may.
     """
 
@@ -63,6 +67,7 @@ class Situation:
     rights: modes.Rights = modes.ANYBODY
     not_theirs: str = ""
     unwatched: str = ""
+    approval: str = ""
 
 
 def refusal(intent: intents.Intent, now: float, situation: Situation) -> str:
@@ -96,6 +101,8 @@ def refusal(intent: intents.Intent, now: float, situation: Situation) -> str:
     if isinstance(intent, intents.Start):
         if not situation.work and not isinstance(intent, intents.Survey):
             return "no point is accepted"
+        if situation.approval and not isinstance(intent, intents.Survey):
+            return situation.approval
         return safety.perception(health, config) or situation.unwatched
     if isinstance(intent, intents.Home) and mode != "READY":
         return f"the arm is brought home in READY; the mode is {mode}"

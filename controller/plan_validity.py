@@ -54,7 +54,12 @@ def points_changed(plan: WorkPlan, tickets: Iterable[Ticket], order: tuple[str, 
 
 def place_changed(plan: WorkPlan, q: Array) -> str:
     """How far a robot at rest at q (12) is from where the plan begins; empty within the tolerances."""
-    away = q - plan.request.q
+    return away_from(plan.request.q, q)
+
+
+def away_from(start: Array, q: Array) -> str:
+    """How far a robot at rest at q (12) is from another configuration (12); empty within the tolerances."""
+    away = q - start
     moved, turned = float(np.hypot(*away[:2])), abs(float(away[2]))
     arm = float(np.abs(away[ARM_Q]).max())
     if moved > PLACE_TOLERANCE:
@@ -69,14 +74,25 @@ def place_changed(plan: WorkPlan, q: Array) -> str:
 class ObstacleWatch:
     """Looks out for what a plan has not reckoned with. Made once a plan; a look takes about a millisecond."""
 
-    def __init__(self, plan: WorkPlan) -> None:
-        """Remember what stood around, and where the base will be."""
-        self._before = plan.request.obstacles
+    def __init__(self, before: tuple[Capsule, ...], track: Array, lines: Sequence[tuple[Array, Array]]) -> None:
+        """Remember what stood around, and where robot and tool will be.
+
+        Args:
+            before: What stood around.
+            track: Places of the base (n×2, m).
+            lines: Of the tool into each cut: from, to (3 each, m).
+        """
+        self._before, self._track = before, track
         self._axes = Axes(tuple(obstacles_of(self._before)))
-        ways = [cut.way.q[:, :2] for cut in plan.cuts]
-        self._track = np.vstack([*(way[::_LOOK] for way in ways), *(way[-1:] for way in ways), np.empty((0, 2))])
-        lines = [(cut.cut.poses.clear.translation, cut.cut.poses.cut.translation) for cut in plan.cuts]
         self._lines = Axes(tuple(Obstacle("", "line", _point(a), _point(b), _BESIDE_TOOL) for a, b in lines))
+
+    @classmethod
+    def of(cls, plan: WorkPlan) -> "ObstacleWatch":
+        """For the session's plan."""
+        ways = [cut.way.q[:, :2] for cut in plan.cuts]
+        track = np.vstack([*(way[::_LOOK] for way in ways), *(way[-1:] for way in ways), np.empty((0, 2))])
+        lines = [(cut.cut.poses.clear.translation, cut.cut.poses.cut.translation) for cut in plan.cuts]
+        return cls(plan.request.obstacles, track, lines)
 
     def changed(self, now: Sequence[Capsule]) -> str:
         """What stands in the plan's way where nothing stood; empty where nothing does.

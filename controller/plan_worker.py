@@ -1,4 +1,4 @@
-"""Plans in a process of its own, behind everything that keeps time: the control loop asks and never waits."""
+"""Plans and previews in a process of its own, behind all that keeps time: the control loop asks, and never waits."""
 
 import multiprocessing
 import os
@@ -7,6 +7,7 @@ import threading
 from multiprocessing.connection import Connection
 
 from controller.config import ControllerConfig
+from controller.preview_plan import Preview, PreviewRequest
 from controller.work_plan import PlanRequest, WorkPlan
 from rolling_panda.config import RobotConfig
 from rolling_panda.errors import RollingPandaError
@@ -17,7 +18,10 @@ _END_S = 2.0
 
 
 class PlanWorker:
-    """The newest request is worked on, one at a time; `newest` is the last answer. Close it when done."""
+    """The newest request of each kind is worked on, one at a time, previews first. Close it when done.
+
+    `newest` is the last plan, `newest_preview` the last preview.
+    """
 
     def __init__(self, config: ControllerConfig, robot_config: RobotConfig) -> None:
         """Start the process; it is ready some seconds later.
@@ -28,10 +32,12 @@ class PlanWorker:
         """
         self._configs = config, robot_config
         self._waiting = threading.Condition()
-        self._request: PlanRequest | None = None
+        self._plan: PlanRequest | None = None
+        self._preview: PreviewRequest | None = None
         self._process: multiprocessing.process.BaseProcess | None = None
         self._closing = False
         self.newest: WorkPlan | None = None
+        self.newest_preview: Preview | None = None
         self._thread = threading.Thread(target=self._run, name="planner", daemon=True)
         self._thread.start()
 
@@ -41,10 +47,13 @@ class PlanWorker:
         process = self._process
         return None if process is None else process.pid
 
-    def ask(self, request: PlanRequest) -> None:
-        """Plan this next."""
+    def ask(self, request: PlanRequest | PreviewRequest) -> None:
+        """Do this next."""
         with self._waiting:
-            self._request = request
+            if isinstance(request, PreviewRequest):
+                self._preview = request
+            else:
+                self._plan = request
             self._waiting.notify()
 
     def close(self) -> None:
@@ -63,9 +72,9 @@ class PlanWorker:
         while (request := self._next()) is not None and connection is not None:
             try:
                 connection.send(request)
-                self.newest = connection.recv()
+                self._keep(connection.recv())
             except (EOFError, OSError):
-                self.newest = WorkPlan(request, failure="the planning process ended; it is being started again")
+                self._keep(_failed(request, "the planning process ended; it is being started again"))
                 connection.close()
                 connection = self._start()
         if connection is not None:
@@ -73,13 +82,24 @@ class PlanWorker:
         if self._process is not None:
             self._process.join(_END_S)
 
-    def _next(self) -> PlanRequest | None:
+    def _keep(self, made: WorkPlan | Preview) -> None:
+        if isinstance(made, Preview):
+            self.newest_preview = made
+        else:
+            self.newest = made
+
+    def _next(self) -> PlanRequest | PreviewRequest | None:
         """Waits for a request; None when closing."""
         with self._waiting:
-            while self._request is None and not self._closing:
+            while self._plan is None and self._preview is None and not self._closing:
                 self._waiting.wait()
-            request, self._request = self._request, None
-            return None if self._closing else request
+            if self._closing:
+                return None
+            if self._preview is not None:
+                preview, self._preview = self._preview, None
+                return preview
+            plan, self._plan = self._plan, None
+            return plan
 
     def _start(self) -> Connection | None:
         """A new process; None when closing."""
@@ -101,18 +121,25 @@ def _plan(connection: Connection, config: ControllerConfig, robot_config: RobotC
     threading.Thread(target=_end_with_parent, name="parent-watch", daemon=True).start()
     # What only planning needs is loaded here alone.
     from controller.planning.cuts import CutPlanner
+    from controller.rollout import Rollout
 
-    planner = CutPlanner(config, robot_config)
+    planner, rollout = CutPlanner(config, robot_config), Rollout(config, robot_config)
     while True:
         try:
             request = connection.recv()
         except EOFError:
             return
         try:
-            made = planner.plan(request)
+            made = rollout.roll(request) if isinstance(request, PreviewRequest) else planner.plan(request)
         except RollingPandaError as error:
-            made = WorkPlan(request, failure=str(error))
+            made = _failed(request, str(error))
         connection.send(made)
+
+
+def _failed(request: PlanRequest | PreviewRequest, why: str) -> WorkPlan | Preview:
+    if isinstance(request, PreviewRequest):
+        return Preview(request, failure=why)
+    return WorkPlan(request, failure=why)
 
 
 def _end_with_parent() -> None:

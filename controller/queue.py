@@ -188,6 +188,10 @@ class PointQueue:
         found = (ticket.accepted for ticket in self._tickets.values() if ticket.state == "ACCEPTED" and ticket.seen)
         return tuple(sorted((point for point in found if point is not None), key=lambda point: point.point_id))
 
+    def in_order(self) -> list[Ticket]:
+        """Every ticket in the order of work."""
+        return [self._tickets[point_id] for point_id in self._order]
+
     def tickets(self) -> tuple[Ticket, ...]:
         """Every ticket."""
         return tuple(self._tickets.values())

@@ -39,7 +39,7 @@ class Session:
         self._wanted: tuple[object, ...] = ()
         self._fresh = True
         self._said_at = -np.inf
-        self._watch = ObstacleWatch(WorkPlan(PlanRequest(0, np.zeros(0), ())))
+        self._watch = ObstacleWatch((), np.empty((0, 2)), ())
         self._compared: object = None
         self._in_the_way = ""
         self._moved = False
@@ -87,6 +87,13 @@ class Session:
         self._judge(why, True)
         return self._asked
 
+    @property
+    def cuts(self) -> dict[str, CutPlan] | None:
+        """What the plan says of each point that it works on; None while one is being made."""
+        if self._state == "planning" or (self._state in ("none", "void") and self._queue.next() is not None):
+            return None
+        return {name: cut.cut for name, cut in self._cuts.items()} if self.valid else {}
+
     def known(self, ticket: Ticket) -> CutPlan | Unreachable | None:
         """What the plan says of a point as it was accepted; None where it says nothing that holds."""
         plan, point_id = self._plan, ticket.point.point_id
@@ -108,7 +115,7 @@ class Session:
     def _take(self, made: WorkPlan) -> None:
         self._asked, self._plan = None, made
         self._cuts = {cut.point.point_id: cut for cut in made.cuts}
-        self._watch, self._compared, self._moved = ObstacleWatch(made), None, False
+        self._watch, self._compared, self._moved = ObstacleWatch.of(made), None, False
         self._fresh = True
 
     def _why_void(self, q: Array | None, obstacles: Sequence[Capsule], at_rest: bool, working: bool) -> str:

@@ -106,11 +106,12 @@ class Supervisor:
         """What has to end before a motion may begin; empty when nothing."""
         return self._movement.busy(self.bridge)
 
-    def situation(self, work: bool, now: float, intent: intents.Intent | None = None) -> Situation:
+    def situation(self, work: bool, approval: str, now: float, intent: intents.Intent | None = None) -> Situation:
         """What a permission depends on.
 
         Args:
             work: Whether a point is accepted.
+            approval: Why work may not begin for want of an approved preview; empty when it may.
             now: Monotonic time (s).
             intent: What is asked; None for whoever may operate.
         """
@@ -125,6 +126,7 @@ class Supervisor:
             homing=self._movement.homing,
             busy=self.busy(),
             work=work,
+            approval=approval,
         )
 
     def _pause(self, reason: str, now: float) -> None:

@@ -71,6 +71,24 @@ class PlannersOrder(Intent, frozen=True, kw_only=True):
     revision: Count
 
 
+class AskPreview(Intent, frozen=True, kw_only=True):
+    """Show what the robot would do: all accepted points in their order, or one of them alone."""
+
+    point_id: Annotated[str, Meta(max_length=64)] = ""
+
+
+class ApprovePreview(Intent, frozen=True, kw_only=True):
+    """The preview with this hash is what shall be done; work begins with `Start`."""
+
+    preview_hash: Digest
+
+
+class RequirePreview(Intent, frozen=True, kw_only=True):
+    """From now on no cut begins without its preview approved, or cuts begin without."""
+
+    required: bool
+
+
 class Start(Intent, frozen=True, kw_only=True):
     """READY → AUTO on the accepted points."""
 
@@ -139,6 +157,9 @@ AnyIntent = (
     | AcceptAll
     | MoveInQueue
     | PlannersOrder
+    | AskPreview
+    | ApprovePreview
+    | RequirePreview
     | Start
     | Survey
     | Pause

@@ -7,6 +7,7 @@ from msgspec import Meta, Struct
 from rolling_panda import messages as m
 from rolling_panda.control_messages import ClientKey, ControlState, StopState
 from rolling_panda.plan_messages import PlanState, PointPlan
+from rolling_panda.preview_messages import PreviewState
 from rolling_panda.replay_messages import ReplayState
 from rolling_panda.teleop_messages import ArmVelocities, BaseVelocity, SpeedShare
 
@@ -109,6 +110,12 @@ class PagePoints(PageMessage, frozen=True, kw_only=True):
     rule: m.PruningRule | None = None
 
 
+class PagePreview(PageMessage, frozen=True, kw_only=True):
+    """Sent when the controller has said it: the preview, and whether it is approved."""
+
+    preview: PreviewState
+
+
 class PageEvent(Struct, frozen=True, forbid_unknown_fields=True):
     """A line of the log: `number` grows; `wall_time` is the server's clock (s since 1970), for people."""
 
@@ -196,11 +203,17 @@ class PlaceByHand(PageMessage, frozen=True, kw_only=True):
     active: bool
 
 
+class ShowPreview(PageMessage, frozen=True, kw_only=True):
+    """Show this moment of the preview in the 3-D view (s from its start); None = nothing of it."""
+
+    time: m.NonNegative | None
+
+
 class Select(PageMessage, frozen=True, kw_only=True):
     """Highlight a point in the 3-D view; empty = none."""
 
     point_id: Annotated[str, Meta(max_length=64)]
 
 
-FromServer = PageState | PagePoints | PageEvents | Selected | Sightline | HoldEnded | Pong
-FromPage = Ping | Hold | ShowGizmo | PlaceByHand | Select
+FromServer = PageState | PagePoints | PagePreview | PageEvents | Selected | Sightline | HoldEnded | Pong
+FromPage = Ping | Hold | ShowGizmo | PlaceByHand | ShowPreview | Select

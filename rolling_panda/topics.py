@@ -16,6 +16,7 @@ from rolling_panda import (
     look_messages,
     plan_messages,
     plant_requests,
+    preview_messages,
     replay_messages,
     row_messages,
     teleop_messages,
@@ -138,6 +139,14 @@ PLAN = Topic(
     "controller/plan", plan_messages.SessionPlan, "controller", 0.2, "DATA_LOW", "DROP",
     "the session's plan, at once when it changes", latched=True,
 )
+PREVIEW = Topic(
+    "controller/preview", preview_messages.PreviewState, "controller", 2, "DATA_LOW", "DROP",
+    "whether there is a preview of the work, and who has approved it, at once when it changes", latched=True,
+)
+PREVIEW_MOTION = Topic(
+    "controller/preview-motion", preview_messages.PreviewMotion, "controller", 0.2, "DATA_LOW", "DROP",
+    "the motion of the preview, at once when it is made", latched=True,
+)
 HEARTBEAT = Topic(
     "heartbeat", m.Heartbeat, "any", 20, "INTERACTIVE_HIGH", "DROP",
     "a process's loop is turning",
@@ -177,7 +186,8 @@ REPLAY = Topic(
 
 TOPICS: tuple[Topic[Any], ...] = (
     MOTION, CUT, PICTURE, STOP, TELEOP, JOINTS, ODOMETRY, BRIDGE, CONTROLLER, PLAN, HEARTBEAT, EVENT, CAMERA,
-    POINTS, CROPS, LOOK, OBSTACLES, SCENERY, PRESENCE, CONTROL, STOPS, HARDWARE_STOP, REPLAY,
+    PREVIEW, PREVIEW_MOTION, POINTS, CROPS, LOOK, OBSTACLES, SCENERY, PRESENCE, CONTROL, STOPS, HARDWARE_STOP,
+    REPLAY,
 )
 
 
@@ -185,7 +195,8 @@ INTENT: Service[intents.Intent] = Service(
     "service/intent",
     (
         intents.Arm, intents.AcceptPoint, intents.RejectPoint, intents.ReconsiderPoint, intents.ResolvePoint,
-        intents.AcceptAll, intents.MoveInQueue, intents.PlannersOrder, intents.Start, intents.Survey,
+        intents.AcceptAll, intents.MoveInQueue, intents.PlannersOrder,
+        intents.AskPreview, intents.ApprovePreview, intents.RequirePreview, intents.Start, intents.Survey,
         intents.Pause, intents.Resume, intents.Home, intents.Acknowledge, intents.Reset, intents.TakeControl,
         intents.RequestControl, intents.GrantControl, intents.ReturnControl,
     ),

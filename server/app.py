@@ -22,6 +22,7 @@ from server.order_api import order_router
 from server.page_files import PageFiles
 from server.pages import pages_router
 from server.plant_api import plant_router
+from server.preview_api import preview_router
 from server.replay_api import replay_router
 from server.robot_api import robot_router
 from server.sessions import Session
@@ -75,6 +76,7 @@ def create_app(desk: Desk, origins: frozenset[str]) -> ASGIApp:
     app.include_router(operator_router(desk))
     app.include_router(plant_router(desk))
     app.include_router(order_router(desk))
+    app.include_router(preview_router(desk))
     app.include_router(control_router(desk))
     app.include_router(robot_router(desk))
     app.include_router(replay_router(desk))

@@ -87,6 +87,9 @@ class Loop:
         received = desk.link.points.peek()
         if received is not None:
             desk.scene.show_canes(received.message.canes)
+        preview = desk.link.preview_motion.peek()
+        if preview is not None:
+            desk.scene.ghost.take(preview.message)
         scenery = desk.link.scenery.peek()
         if scenery is not None and scenery.at != self._scenery_at:
             self._scenery_at = scenery.at

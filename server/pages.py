@@ -17,6 +17,7 @@ from rolling_panda.page_messages import (
     PageEvents,
     PageMessage,
     PagePoints,
+    PagePreview,
     PageState,
     Ping,
     PlaceByHand,
@@ -24,8 +25,10 @@ from rolling_panda.page_messages import (
     Select,
     Selected,
     ShowGizmo,
+    ShowPreview,
     Sightline,
 )
+from rolling_panda.preview_messages import PreviewState
 from server.desk import Desk
 from server.frame_rate import FRAMES_HZ, Frames
 from server.page_view import addressed
@@ -54,6 +57,7 @@ class OpenPage:
         self.placing = False
         self._state: PageState | None = None
         self._points: PagePoints | None = None
+        self._preview: PreviewState | None = None
         self._event_number = 0
         self._hold_sequence = -1
         self._holding = False
@@ -78,6 +82,8 @@ class OpenPage:
             await asyncio.wait(legs, return_when=asyncio.FIRST_COMPLETED)
         finally:
             desk.page_closed(self, self._holding)
+            if not any(other.session is self.session for other in desk.pages):
+                desk.scene.show_ghost(self.session.session_id, None)
             for leg in legs:
                 leg.cancel()
             await asyncio.gather(*legs, return_exceptions=True)
@@ -134,6 +140,10 @@ class OpenPage:
         if desk.points is not None and desk.points is not self._points:
             self._points = desk.points
             return desk.points
+        preview = desk.link.preview.peek()
+        if preview is not None and preview.message is not self._preview:
+            self._preview = preview.message
+            return PagePreview(preview=preview.message)
         if desk.log.number > self._event_number:
             events = desk.log.after(self._event_number, _EVENTS_AT_ONCE)
             self._event_number = desk.log.number
@@ -181,6 +191,8 @@ class OpenPage:
                 self._desk.show_gizmo(self.session, visible, axes)
             case PlaceByHand(active=active):
                 self._desk.place_by_hand(self, active)
+            case ShowPreview(time=moment):
+                self._desk.scene.show_ghost(self.session.session_id, moment)
             case Select(point_id=point_id):
                 self._desk.scene.select(self.session.session_id, point_id)
 

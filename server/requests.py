@@ -96,6 +96,24 @@ class Place(_Body):
     spur: Annotated[int, Field(ge=0, le=100000)]
 
 
+class AskPreview(_Body):
+    """Of which point alone; empty for all accepted ones in their order."""
+
+    point_id: Annotated[str, Field(max_length=64)] = ""
+
+
+class ApprovePreview(_Body):
+    """The hash of the preview that was looked at."""
+
+    preview_hash: Annotated[str, Field(max_length=64, pattern=r"^[0-9a-f]*$")]
+
+
+class RequirePreview(_Body):
+    """Whether a cut begins only with its preview approved."""
+
+    required: bool
+
+
 class AcceptAll(_Body):
     """Least confidence, 0…1."""
 

@@ -56,6 +56,8 @@ class RobotLink:
         transport.subscribe(topics.CAMERA, self._on_frame)
         self.points = transport.slot(topics.POINTS)
         self.plan = transport.slot(topics.PLAN)
+        self.preview = transport.slot(topics.PREVIEW)
+        self.preview_motion = transport.slot(topics.PREVIEW_MOTION)
         self.scenery = transport.slot(topics.SCENERY)
         self.crops: dict[str, PointCrop] = {}
         """The newest picture of each point, by its id."""

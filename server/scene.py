@@ -16,6 +16,7 @@ from rolling_panda.row_messages import Capsule, Scenery
 from server.robot_meshes import Part
 from server.scene_clicks import SceneClicks
 from server.scene_door import SceneDoor
+from server.scene_ghost import SceneGhost
 from server.scene_gizmo import SceneGizmos
 from server.scene_markers import STATE_COLORS, cut_marker, quat_wxyz_of_axis, selection_ring
 from server.scene_robot import SceneRobot
@@ -70,6 +71,7 @@ class Scene:
         self._selected: dict[str, str] = {}
         self._draw_surroundings()
         self.robot = SceneRobot(self._server, model, parts)
+        self.ghost = SceneGhost(model, parts)
         self._server.on_client_connect(self._on_client)
         self._server.on_client_disconnect(self._on_client_gone)
 
@@ -128,6 +130,10 @@ class Scene:
     def show_gizmo(self, owner: str, tool: m.Pose, axes: GizmoAxes = "tool") -> None:
         """Show the gizmo of `owner` at the tool (pose in odom), along these axes."""
         self.gizmos.show(owner, tool, self._clients(owner), axes)
+
+    def show_ghost(self, owner: str, time: float | None) -> None:
+        """Show a moment of the preview (s) on the views of `owner`; None = nothing of it."""
+        self.ghost.show(owner, time, self._clients(owner))
 
     def take_clicks(self, owner: str, taken: bool) -> None:
         """Take the clicks of `owner` anywhere into the view for lines of sight, or no more."""
@@ -210,10 +216,12 @@ class Scene:
             self.gizmos.attach(owner, client)
             self._clicks.attach(owner, client)
             self._draw_selection(owner)
+            self.ghost.attach(owner, client)
 
     async def _on_client_gone(self, client: viser.ClientHandle) -> None:
         self.gizmos.detach(client.client_id)
         self._clicks.detach(client.client_id)
+        self.ghost.detach(client.client_id)
 
     def _draw_surroundings(self) -> None:
         server, scene = self._server, self._server.scene

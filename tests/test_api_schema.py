@@ -10,7 +10,7 @@ from rolling_panda import topics
 
 #: What the server answers without a session.
 PUBLIC = {"/api/health", "/version", "/api/sign-in", "/api/sign-out"}
-OPERATIONS = 44
+OPERATIONS = 56
 
 
 @pytest.fixture(scope="module")

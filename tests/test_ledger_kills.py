@@ -74,7 +74,7 @@ class Desk:
         return Outputs(state=state, records=self.journal.take())
 
 folder = Path(sys.argv[1])
-desk = Desk(restored(folder)[0])
+desk = Desk(restored(folder).tickets)
 with Transport(TransportConfig(connect=(sys.argv[2],)), "controller", "rp1") as transport:
     Loop(desk, transport, 100.0, LedgerWriter(lambda: Ledger(folder))).run(threading.Event())
 """
@@ -129,7 +129,7 @@ class Operator:
 
 def lost(folder, operator):
     """What was acknowledged and is not in the ledger as that or as something later."""
-    states = {row.point.point_id: row.state for row in restored(folder)[0]}
+    states = {row.point.point_id: row.state for row in restored(folder).tickets}
     gone = {name for name in operator.accepted if states.get(name) not in ("ACCEPTED", "INTENT", "DONE", "UNKNOWN")}
     return gone | {name for name in operator.done if states.get(name) != "DONE"}
 

@@ -52,7 +52,7 @@ def test_a_robot_that_was_moved_voids_it() -> None:
 
 
 def obstacles_changed(plan, now):
-    return ObstacleWatch(plan).changed(now)
+    return ObstacleWatch.of(plan).changed(now)
 
 
 def planned(*obstacles):

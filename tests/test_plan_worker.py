@@ -12,6 +12,8 @@ import pytest
 from test_cut_planner import CONFIG, PLANNER, POST, point, request
 
 from controller.plan_worker import PlanWorker
+from controller.preview_plan import PreviewRequest
+from controller.rollout import Rollout
 from rolling_panda.config import RobotConfig
 from rolling_panda.generate.__main__ import ROOT
 
@@ -83,3 +85,13 @@ def test_it_ends_with_a_parent_that_is_killed() -> None:
         child = int(parent.stdout.readline())
         parent.kill()
     eventually(lambda: not psutil.pid_exists(child))
+
+
+def test_a_preview_is_answered_as_the_rollout_in_this_process_does_before_a_plan_that_waits(worker) -> None:
+    asked = request(point("a", 0.3), number=7)
+    wanted = PreviewRequest(1, asked.q, asked.points)
+    worker.ask(asked)
+    worker.ask(wanted)
+    eventually(lambda: worker.newest_preview is not None)
+    assert worker.newest_preview.digest == Rollout(CONFIG, RobotConfig()).roll(wanted).digest
+    eventually(lambda: worker.newest is not None and worker.newest.request.number == 7)

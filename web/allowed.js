@@ -1,6 +1,7 @@
 // What the operator may ask for now, and why not.
 
 import { INTENTS } from "./messages.js";
+import { whyNoStart } from "./preview-state.js";
 import { isLive, link, pageState, points, staleWords } from "./state.js";
 import { MODE_WORDS } from "./words.js";
 
@@ -16,6 +17,9 @@ const NEEDS = Object.freeze({
   Reset: "There is no stop to reset",
   AcceptPoint: "Points cannot be accepted",
   AcceptAll: "Points cannot be accepted",
+  AskPreview: "There can be no preview",
+  ApprovePreview: "Nothing can be approved",
+  RequirePreview: "It cannot be changed",
   MoveInQueue: "The order cannot be changed",
   PlannersOrder: "The order cannot be changed",
   RejectPoint: "Points cannot be rejected",
@@ -47,6 +51,7 @@ export function whyNot(intent) {
   if (controller.allowed.includes(intent)) return "";
   if (!INTENTS.includes(/** @type {any} */ (intent))) return `There is no ${intent}`;
   if (intent === "Start" && controller.mode === "READY" && countOf("ACCEPTED") === 0) return "Accept a point first";
+  if (intent === "Start" && controller.mode === "READY" && whyNoStart()) return whyNoStart();
   return `${NEEDS[intent]}; the mode is ${MODE_WORDS[controller.mode]}`;
 }
 

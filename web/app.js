@@ -11,6 +11,7 @@ import "./components/rp-log.js";
 import "./components/rp-mode.js";
 import "./components/rp-order.js";
 import "./components/rp-placing.js";
+import "./components/rp-preview.js";
 import "./components/rp-queue.js";
 import "./components/rp-replay.js";
 import "./components/rp-rule.js";

@@ -59,6 +59,8 @@ export type GizmoAxes = "tool"|"base"|"world";
 
 export type Finding = "seen"|"changed"|"severed"|"unseen";
 
+export type PreviewPhase = "none"|"waiting"|"rolling"|"ready"|"approved"|"expired";
+
 /** Is a process connected, and how old is its last word (s; None before the first). */
 export interface ProcessPresence {
   process: Process;
@@ -426,6 +428,63 @@ export interface PagePoints {
   rule: PruningRule|null;
 }
 
+/** One point of a preview, with the way to it and the way out again. */
+export interface PreviewedCut {
+  /** Of the point. */
+  point_id: string;
+  /** That is accepted, and that is previewed. */
+  revision: number;
+  /** When the way to it begins (s from the start). */
+  begins_s: number;
+  /** When the blades close (s from the start); None where they do not. */
+  cut_s: number|null;
+  /** When the way to the next point begins, or the work ends (s from the start). */
+  ends_s: number;
+  /** How it ends, in words: cut, or why not. */
+  result: string;
+  /** Least distance meanwhile between the robot's parts, and from them to ground and obstacles (m). */
+  clearance: number;
+  /** Between what that is. */
+  between: [string, string];
+  /** Least ω of the arm meanwhile. */
+  manipulability: number;
+  /** Least distance of an arm joint to its limit meanwhile (rad). */
+  joint_margin: number;
+}
+
+/** Controller → all: whether there is a preview, whether it still describes what would happen, and who approved it. */
+export interface PreviewState {
+  type: "PreviewState";
+  /** `frame_id` is odom. */
+  header: Header;
+  /** True while no cut begins that nobody has approved the preview of. */
+  required: boolean;
+  /** `waiting` for the robot to rest and the plan to be made, `rolling` while it is computed; `ready` to be approved; `expired` once something has changed. */
+  phase: PreviewPhase;
+  /** What has changed, or what is waited for. */
+  reason: string;
+  /** SHA-256 of all that it was made from and of all that is in it; empty when there is none. */
+  preview_hash: string;
+  /** Who has approved it; empty when nobody has. */
+  approved_by: string;
+  /** Where the base begins. */
+  start: PlanarPose|null;
+  /** Actuated coordinates at the start (rad). */
+  position: Actuated|null;
+  /** Of all of it (s). */
+  duration_s: number;
+  /** Points in their order. */
+  cuts: PreviewedCut[];
+  /** Accepted points that come after those, and are not in it. */
+  left: number;
+}
+
+/** Sent when the controller has said it: the preview, and whether it is approved. */
+export interface PagePreview {
+  type: "PagePreview";
+  preview: PreviewState;
+}
+
 /** A line of the log: `number` grows; `wall_time` is the server's clock (s since 1970), for people. */
 export interface PageEvent {
   number: number;
@@ -507,12 +566,18 @@ export interface PlaceByHand {
   active: boolean;
 }
 
+/** Show this moment of the preview in the 3-D view (s from its start); None = nothing of it. */
+export interface ShowPreview {
+  type: "ShowPreview";
+  time: number|null;
+}
+
 /** Highlight a point in the 3-D view; empty = none. */
 export interface Select {
   type: "Select";
   point_id: string;
 }
 
-export type FromServer = PageState|PagePoints|PageEvents|Selected|Sightline|HoldEnded|Pong;
+export type FromServer = PageState|PagePoints|PagePreview|PageEvents|Selected|Sightline|HoldEnded|Pong;
 
-export type FromPage = Ping|Hold|ShowGizmo|PlaceByHand|Select;
+export type FromPage = Ping|Hold|ShowGizmo|PlaceByHand|ShowPreview|Select;

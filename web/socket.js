@@ -1,6 +1,7 @@
 // The page's own link: state in, intents out, a ping ten times a second, and a new try whenever it breaks.
 
 import { isSignedIn } from "./api.js";
+import { preview } from "./preview-state.js";
 import { link, points, roundTrip, say, selected, takeEvents, takeState } from "./state.js";
 
 /** @typedef {import("./messages.js").FromServer} FromServer */
@@ -117,6 +118,9 @@ export class Link {
       }
       case "PagePoints":
         points.set(message);
+        break;
+      case "PagePreview":
+        preview.set(message.preview);
         break;
       case "PageEvents":
         takeEvents(message.events, this.firstEvents);

@@ -29,7 +29,7 @@ from rolling_panda.robot_model import RobotModel
 from rolling_panda.row_messages import Obstacles
 
 #: From the blades' command to its outcome (s); an estimate, for the session's length alone.
-_CLOSING_S = 0.5
+CLOSING_S = 0.5
 #: Rows of a way between two looks at the arm's manipulability.
 _LOOK = 10
 
@@ -113,7 +113,7 @@ class CutPlanner:
 
     def _target(self, name: str, cut: CutPlan) -> Target:
         config = self._config
-        hold_s = 2.0 * config.clearance / config.advance_speed + config.slow_zone / config.cut_speed + _CLOSING_S
+        hold_s = 2.0 * config.clearance / config.advance_speed + config.slow_zone / config.cut_speed + CLOSING_S
         least = self._collision.least(cut.q_clear).distance
         stand = Stand(cut.q_clear, 0.0, cut.joint_margin, cut.manipulability, least)
         return Target(name, cut.poses.clear, hold_s=hold_s, stand=stand)

@@ -17,6 +17,7 @@ from rolling_panda import (
     messages,
     page_messages,
     plan_messages,
+    preview_messages,
     row_messages,
     teleop_messages,
 )
@@ -103,6 +104,7 @@ def aliases() -> dict[str, Any]:
         crop_messages,
         look_messages,
         plan_messages,
+        preview_messages,
         row_messages,
         teleop_messages,
     ):
