@@ -25,6 +25,7 @@ from bridge.real import mp500
 from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.config import TransportConfig
+from rolling_panda.priority import take_priority
 from rolling_panda.robot_model import RobotModel
 from rolling_panda.transport import Transport
 
@@ -238,6 +239,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parser.parse_args(argv)
     seconds = 60.0 * arguments.minutes
     with RealSite(arguments.address) as site:
+        # As the controller, for which this stands.
+        take_priority("control")
         found = measure(site, seconds, arguments.seed)
     figures = summary(found, seconds)
     print(one_row_a_line(figures))

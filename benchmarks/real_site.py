@@ -20,7 +20,7 @@ from rolling_panda.resources import resource
 from rolling_panda.transport import Router
 
 _TOKEN = "for-this-measurement-only-0123456789abcdefghij"
-_START_S = 90.0
+_START_S = 180.0
 
 
 class RealSite:

@@ -14,10 +14,11 @@ _LOST_S = 1.5
 
 @dataclass
 class _Asked:
-    """A look under way: what it should show, the request that counts now, and how many more may follow."""
+    """A look under way: what it should show, the newest request and the first that counts, how many more may follow."""
 
     expected: Finding
     number: int
+    first: int
     more: int
     begun: float
     since: float
@@ -45,7 +46,7 @@ class Eye:
     def ask(self, point_id: str, expected: Finding, now: float) -> None:
         """Look at a point from now on; what is not as expected is looked at once more before it is believed."""
         self._number += 1
-        self._asked[point_id] = _Asked(expected, self._number, self._pictures - 1, now, now)
+        self._asked[point_id] = _Asked(expected, self._number, self._number, self._pictures - 1, now, now)
 
     def forget(self, point_id: str) -> None:
         """What a look at this point shows is not wanted any more."""
@@ -54,11 +55,13 @@ class Eye:
     def take(self, look: CloseLook, now: float) -> None:
         """What a picture shows; one that nobody waits for changes nothing."""
         asked = self._asked.get(look.point_id)
-        if asked is None or asked.number != look.number or asked.answer is not None:
+        # One that was taken for lost may be late: on a slow machine each of them is.
+        if asked is None or not asked.first <= look.number <= asked.number or asked.answer is not None:
             return
         if look.finding != asked.expected and asked.more > 0:
             asked.more -= 1
             self._again(asked, now)
+            asked.first = asked.number
         else:
             asked.answer, self.took_s = look, now - asked.since
 

@@ -82,6 +82,7 @@ def test_the_check_moves_nothing_and_names_what_is_missing(site: Site) -> None:
     )
     rows = {line[4:].split("  ")[0]: line[:2] for line in done.stdout.splitlines()}
     assert rows["base: wheel speeds"] == rows["base: free to move"] == rows["arm: ready to move"] == "ok"
+    assert rows["base: own odometry"] == rows["base: battery"] == "ok"
     assert rows["camera"] == rows["cutter"] == "NO"
     assert done.returncode == 1
     assert "nothing was moved" in done.stderr

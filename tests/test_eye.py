@@ -66,3 +66,19 @@ def test_what_is_not_as_expected_is_believed_after_a_second_picture_only() -> No
     eye.take(look(2, "severed"), 0.2)
     answer = eye.answer("a", 0.2)
     assert answer is not None and answer.finding == "severed"
+
+
+def test_a_picture_that_was_taken_for_lost_still_counts_when_it_comes_late() -> None:
+    eye = Eye(8.0, 2)
+    eye.ask("a", "seen", 0.0)
+    sent = [request[0] for tick in range(400) if (request := eye.due(0.01 * tick)) is not None]
+    assert sent[-1] > sent[0] == 1
+    eye.take(look(1, "unseen"), 4.0)
+    assert eye.answer("a", 4.0) is None, "not as expected: one more, taken from now on"
+    eye.take(look(2), 4.1)
+    assert eye.answer("a", 4.1) is None, "taken before that"
+    request = eye.due(4.2)
+    assert request is not None
+    eye.take(look(request[0]), 5.0)
+    answer = eye.answer("a", 5.0)
+    assert answer is not None and answer.finding == "seen"

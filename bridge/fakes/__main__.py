@@ -21,13 +21,14 @@ from bridge.fakes.control_box import ControlBox
 from bridge.fakes.cutter import FakeCutter
 from bridge.fakes.mp500 import FakeMp500
 from bridge.real.config import RealConfig
+from rolling_panda import topics
 from rolling_panda.config import RobotConfig, TransportConfig, load_section
 from rolling_panda.errors import InputError, RollingPandaError
 from rolling_panda.priority import take_priority
-from rolling_panda.process import stop_on_signals
+from rolling_panda.process import ROBOT_ID, stop_on_signals
 from rolling_panda.resources import resource
 from rolling_panda.robot_model import RobotModel
-from rolling_panda.transport import ForeignWire
+from rolling_panda.transport import ForeignWire, Onlooker
 
 
 class Device(Protocol):
@@ -85,11 +86,10 @@ def _bodies(arguments: argparse.Namespace, picture_hz: float, stack: ExitStack) 
     from bridge.fakes.vineyard_plant import VineyardPlant
     from bridge.sim.build import simulated_robot
 
-    take_priority("control")
     wire = ForeignWire(TransportConfig(connect=(arguments.connect,)))
     stack.callback(wire.close)
     send = wire.publisher(KEY)
-    robot = simulated_robot(arguments.config, arguments.seed, arguments.trace, "process")
+    robot = simulated_robot(arguments.config, arguments.seed, arguments.trace, "device")
     plant = VineyardPlant(robot, picture_hz, lambda picture, at: send(pack(picture, at)))
     stack.callback(plant.close)
     return _Bodies(plant, plant, plant)
@@ -97,6 +97,8 @@ def _bodies(arguments: argparse.Namespace, picture_hz: float, stack: ExitStack) 
 
 def _run(arguments: argparse.Namespace) -> None:
     ended = stop_on_signals()
+    # Devices have computers of their own.
+    take_priority("control")
     # The control box must not wait long for the other threads.
     sys.setswitchinterval(0.0005)
     if arguments.seed is not None and arguments.connect is None:
@@ -117,6 +119,9 @@ def _run(arguments: argparse.Namespace) -> None:
             stack.callback(base.close)
             cutter = devices["cutter"] = FakeCutter(ForeignWire(wire), real.cutter.service, bodies.blades)
             stack.callback(cutter.close)
+            buttons = Onlooker(wire, ROBOT_ID)
+            stack.callback(buttons.close)
+            buttons.subscribe(topics.HARDWARE_STOP, lambda said, _: base.tell(["press" if said.pressed else "free"]))
             turning = threading.Thread(target=base.run, args=(ended,), name="mp500")
             turning.start()
             stack.callback(turning.join)

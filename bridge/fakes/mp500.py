@@ -43,6 +43,7 @@ class FakeMp500:
         self._breaches: list[str] = []
         self._fastest = self._steepest = 0.0
         self._still_at: float | None = None
+        self._pose, self._turned = (0.0, 0.0, 0.0), wheels.turned
         wire.subscribe(mp500.COMMAND, self._on_command)
         wire.serve(mp500.SOFT_STOP, lambda request: self._on_soft(request, True))
         wire.serve(mp500.SOFT_RELEASE, lambda request: self._on_soft(request, False))
@@ -154,7 +155,38 @@ class FakeMp500:
             software_stop=soft,
             emergency_state=state,
         )
-        return {mp500.WHEELS: wheels, mp500.EMERGENCY: stop, mp500.BATTERY: battery(header, _CHARGE)}
+        return {
+            mp500.WHEELS: wheels,
+            mp500.ODOMETRY: self._odometry(header),
+            mp500.EMERGENCY: stop,
+            mp500.BATTERY: battery(header, _CHARGE),
+        }
+
+    def _odometry(self, header: object) -> object:
+        turned, speed = self._wheels.turned, self._wheels.speed
+        self._pose = self._drive.rolled(self._pose, *(turned - self._turned).tolist())
+        self._turned = turned
+        x, y, phi = self._pose
+        v, omega = self._drive.twist(*speed.tolist())
+        place, turn = "geometry_msgs/msg/Point", "geometry_msgs/msg/Quaternion"
+        pose = ros.make(
+            "geometry_msgs/msg/Pose",
+            position=ros.make(place, x=x, y=y, z=0.0),
+            orientation=ros.make(turn, x=0.0, y=0.0, z=math.sin(phi / 2), w=math.cos(phi / 2)),
+        )
+        twist = ros.make("geometry_msgs/msg/Twist", linear=_vector(v, 0.0), angular=_vector(0.0, omega))
+        unknown = np.zeros(36)
+        return ros.make(
+            ros.ODOMETRY,
+            header=header,
+            child_frame_id="base_link",
+            pose=ros.make("geometry_msgs/msg/PoseWithCovariance", pose=pose, covariance=unknown),
+            twist=ros.make("geometry_msgs/msg/TwistWithCovariance", twist=twist, covariance=unknown),
+        )
+
+
+def _vector(x: float, z: float) -> object:
+    return ros.make("geometry_msgs/msg/Vector3", x=x, y=0.0, z=z)
 
 
 def battery(header: object, share: float) -> object:

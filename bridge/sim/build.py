@@ -53,9 +53,12 @@ def simulated_bridge(
 
 
 def simulated_robot(
-    config_path: Path, seed: int, trace: Path | None, camera: Literal["inline", "process"]
+    config_path: Path, seed: int, trace: Path | None, camera: Literal["inline", "process", "device"]
 ) -> SimulatedRobot:
     """The simulated robot beside a row grown from `seed`; arguments as of `simulated_bridge`.
+
+    The camera as a `device` renders in a process too, which does not step back: a camera exposes however busy the
+    computer is.
 
     Raises:
         ConfigError: A section is wrong, or the trace cannot be written.
@@ -65,7 +68,9 @@ def simulated_robot(
     lens = load_section(config_path, "camera", CameraConfig)
     writer = None if trace is None else TraceWriter(trace)
     photographer: Photographer = (
-        InlinePhotographer(lens, seed) if camera == "inline" else ProcessPhotographer(lens, seed)
+        InlinePhotographer(lens, seed)
+        if camera == "inline"
+        else ProcessPhotographer(lens, seed, "interface" if camera == "device" else "background")
     )
     return SimulatedRobot(config, row, photographer, writer)
 

@@ -12,7 +12,7 @@ from bridge.sim.camera import Camera
 from bridge.sim.camera_config import CameraConfig
 from bridge.sim.row import Row
 from rolling_panda.differential_drive import Array
-from rolling_panda.priority import take_priority
+from rolling_panda.priority import Role, take_priority
 
 
 class Photographer(Protocol):
@@ -59,9 +59,15 @@ class ProcessPhotographer:
     A thread waits for that process, so that the physics never does. A renderer that dies is started again.
     """
 
-    def __init__(self, config: CameraConfig, seed: int) -> None:
-        """Start the process. It ends when this side of the pipe closes, however that happens."""
-        self._config, self._seed = config, seed
+    def __init__(self, config: CameraConfig, seed: int, role: Role = "background") -> None:
+        """Start the process. It ends when this side of the pipe closes, however that happens.
+
+        Args:
+            config: Lens and errors.
+            seed: Of the noise.
+            role: Scheduling of the process: whoever keeps time comes first.
+        """
+        self._config, self._seed, self._role = config, seed, role
         self._known: Row | None = None
         self._process, self._pipe = self._start()
         self._closing = False
@@ -99,7 +105,10 @@ class ProcessPhotographer:
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
         process = context.Process(
-            target=_render_until_closed, args=(theirs, self._config, self._seed), name="camera-renderer", daemon=True
+            target=_render_until_closed,
+            args=(theirs, self._config, self._seed, self._role),
+            name="camera-renderer",
+            daemon=True,
         )
         process.start()
         theirs.close()
@@ -125,9 +134,8 @@ class ProcessPhotographer:
         return None
 
 
-def _render_until_closed(pipe: Connection, config: CameraConfig, seed: int) -> None:
-    # Whoever keeps time comes first.
-    take_priority("background")
+def _render_until_closed(pipe: Connection, config: CameraConfig, seed: int, role: Role) -> None:
+    take_priority(role)
     photographer, row = InlinePhotographer(config, seed), Row(())
     try:
         while True:
