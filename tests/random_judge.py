@@ -43,6 +43,8 @@ class Judge:
     pressed_for: int = 0
     may_at: float = -1.0
     kills_in_intent: int = 0
+    #: What the ledger has of each point.
+    disk: dict = field(default_factory=dict)
     #: Points that this controller has been shown.
     shown_points: set = field(default_factory=set)
 
@@ -68,6 +70,10 @@ class Judge:
         assert point_id in self.accepted and point_id not in self.revoked, f"{point_id} is cut unaccepted"
         assert not self.bitten.get(point_id), f"{point_id} is cut twice"
         assert not self.at_bridge, "a cut under a latched stop"
+        written = self.disk.get(point_id)
+        # An order that is on its way when its controller is killed may come after a start has found the intent.
+        assert written is not None and written.cut_id == cut_id, "a cut before its intent"
+        assert written.state in ("INTENT", "UNKNOWN"), f"a cut of what is {written.state}"
         assert np.abs(self.last_xi).max() <= 0.04 + 1e-9, "a cut in motion"
         del self.accepted[point_id]
         self.bitten[point_id] = True

@@ -33,10 +33,10 @@ DT = 0.01
 
 @dataclass
 class Somebody:
-    """Somebody with a page."""
+    """Somebody with a page, which is not heard or shows nothing new until so many steps have been made."""
 
-    heard: bool = True
-    watching: bool = True
+    unheard_until: int = 0
+    blind_until: int = 0
     holding: bool = False
 
 
@@ -50,7 +50,7 @@ class World:
         self.now, self.steps, self.starts, self.number = 0.0, 0, 0, 0
         self.people = {name: Somebody() for name in PEOPLE}
         self.names, self.offsets, self.revision = ["p0", "p1", "p2"], [0.0] * 3, 1
-        self.disk, self.rows, self.durable, self.kept_stops = {}, [], 0, ()
+        self.disk, self.rows, self.durable, self.kept_stops = self.judge.disk, [], 0, ()
         self.ledger_failure, self.ledger_stuck = "", 0
         self.deaf = self.mute = 0
         self.orders, self.motions, self.stop_ids = [], [], []
@@ -108,9 +108,10 @@ class World:
         changes["obstacles"] = Sample(obstacles, self.now)
         self.number += 1
         if self.steps % 10 == 0:
-            heard = [name for name, person in self.people.items() if person.heard]
+            heard = [name for name, person in self.people.items() if self.steps >= person.unheard_until]
             people = tuple(
-                Person(name, name, PEOPLE[name], 0.0 if self.people[name].watching else 1e6) for name in heard
+                Person(name, name, PEOPLE[name], 0.0 if self.steps >= self.people[name].blind_until else 1e6)
+                for name in heard
             )
             changes["presence"] = Sample(Presence(sequence=self.number, people=people), self.now)
             self.judge.heard(heard, self.now)
@@ -155,7 +156,7 @@ class World:
     # --- what happens --------------------------------------------------------------------------------------------
 
     def happen(self):
-        likely = [self.ask] * 12 + [self.hold] * 6 + [self.look_away, *[self.perceive] * 3] + [self.help_on] * 70
+        likely = [self.ask] * 12 + [self.hold] * 6 + [self.look_away] * 3 + [self.perceive] * 3 + [self.help_on] * 70
         faults = [
             self.stop,
             self.press,
@@ -165,12 +166,10 @@ class World:
             self.kill_bridge,
             self.kill_controller,
         ]
-        self.chance.choice(likely + faults)()
+        self.chance.choice(likely + 2 * faults)()
 
     def help_on(self):
         """Somebody does what brings the robot to work, so that much of the time it is at work."""
-        for person in self.people.values():
-            person.heard = person.watching = True
         self.ledger_failure, self.robot.now = "", replace(self.robot.now, emergency=False)
         mode, user = self.controller.mode, self.chance.choice(("ada", "ada", "ada", "bob"))
         steps = {
@@ -182,7 +181,7 @@ class World:
         elif mode in steps:
             if mode == "READY":
                 self.prepare(user)
-            if not self.answer(steps[mode](user=user)):
+            if not self.answer(steps[mode](user=user)) and self.chance.random() < 0.2:
                 self.answer(intents.TakeControl(user=user, confirmed=True))
 
     def prepare(self, user):
@@ -200,6 +199,8 @@ class World:
         self.answer(intents.AcceptAll(user=user))
 
     def answer(self, intent):
+        if self.steps < self.people[intent.user].unheard_until:
+            return False
         intent = msgspec.structs.replace(intent, role=PEOPLE[intent.user])
         holder = self.controller._supervisor.authority._lease.holder
         before = self.controller.mode
@@ -236,7 +237,11 @@ class World:
 
     def look_away(self):
         person = self.people[self.chance.choice(tuple(PEOPLE))]
-        person.heard, person.watching = self.chance.random() < 0.6, self.chance.random() < 0.6
+        until = self.steps + self.chance.choice((30, 150, 400))
+        if self.chance.random() < 0.5:
+            person.unheard_until, person.holding = until, False
+        else:
+            person.blind_until = until
 
     def perceive(self):
         self.offsets[self.chance.randrange(3)] = self.chance.choice(
@@ -269,6 +274,8 @@ class World:
             self.judge.stop_at_bridge(stop_id)
         if where != "bridge":
             self.inputs = replace(self.inputs, stops=(*self.inputs.stops, request))
+        if self.chance.random() < 0.2:
+            self.chance.choice((self.kill_bridge, self.kill_controller))()
 
     def press(self):
         self.robot.now = replace(self.robot.now, emergency=self.chance.random() < 0.5)

@@ -78,6 +78,13 @@ def test_what_nobody_may_do_does_not_fill_the_log(server):
     assert 20 < lines(server) - before < 60
 
 
+def test_a_viewer_neither_holds_nor_lets_go(server):
+    with server.client("viewer", "eve") as eve:
+        for hold in (True, False):
+            answer = eve.post("/api/teleop", json={"hold": hold, "base": {"linear": 0.1, "angular": 0.0}})
+            assert answer.status_code == 403
+
+
 def test_a_forwarded_address_is_not_believed(server):
     answers = []
     with server.visitor() as visitor:
