@@ -11,6 +11,7 @@ import msgspec
 
 from controller.journal import Kind, LedgerState, Record
 from controller.ledger import Entry
+from controller.session_report import SessionAccount
 from rolling_panda import messages as m
 from rolling_panda.errors import LedgerError
 from rolling_panda.priority import take_priority
@@ -54,6 +55,9 @@ class LedgerWriter:
         self._some = threading.Condition()
         self._closing = False
         self._state = LedgerState()
+        self._account = SessionAccount()
+        #: Of what is durable; made anew on the writer's thread when something in it changes.
+        self.report = self._account.report()
         self._tokens, self._filled_at, self._left_out = _LINES_AT_ONCE, clock(), 0
         self._thread = threading.Thread(target=self._run, name="ledger", daemon=True)
         self._thread.start()
@@ -114,6 +118,8 @@ class LedgerWriter:
             with self._some:
                 for _ in batch:
                     self._waiting.popleft()
+            if any([self._account.take(at, record.body) for at, record in batch]):
+                self.report = self._account.report()
             self._state = LedgerState(max([self._state.durable, *(record.number for _, record in batch)]))
         if store is not None:
             store.close()

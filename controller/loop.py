@@ -37,6 +37,7 @@ from rolling_panda.topics import (
     PREVIEW,
     PREVIEW_MOTION,
     RELEASE,
+    REPORT,
     STOP,
     STOPS,
     TELEOP,
@@ -112,6 +113,7 @@ class Loop:
         self._preview = transport.publisher(PREVIEW)
         self._preview_motion = transport.publisher(PREVIEW_MOTION)
         self._latched, self._stop_file = transport.publisher(STOPS), stop_file or StopFile()
+        self._report, self._report_due = transport.publisher(REPORT), 0.0
         self._ticks: deque[float] = deque(maxlen=min(round(rate_hz), _TIMED))
         self._tick_s = 0.0
         self._count = self._late = 0
@@ -173,6 +175,9 @@ class Loop:
             self._preview_motion.put(outputs.preview_motion)
         for event in outputs.events:
             self._event.put(event)
+        if now >= self._report_due:
+            self._report_due = now + 1.0 / REPORT.rate_hz
+            self._report.put(self._ledger.report)
 
     def run(self, stopping: threading.Event) -> None:
         """Keep time until told to stop; a period that lasts too long is counted, and none is made up for."""

@@ -18,6 +18,7 @@ from rolling_panda import (
     plant_requests,
     preview_messages,
     replay_messages,
+    report_messages,
     row_messages,
     teleop_messages,
 )
@@ -147,6 +148,10 @@ PREVIEW_MOTION = Topic(
     "controller/preview-motion", preview_messages.PreviewMotion, "controller", 0.2, "DATA_LOW", "DROP",
     "the motion of the preview, at once when it is made", latched=True,
 )
+REPORT = Topic(
+    "controller/report", report_messages.SessionReport, "controller", 0.2, "BACKGROUND", "DROP",
+    "what was cut, refused and who held control since the controller started", latched=True,
+)
 HEARTBEAT = Topic(
     "heartbeat", m.Heartbeat, "any", 20, "INTERACTIVE_HIGH", "DROP",
     "a process's loop is turning",
@@ -185,7 +190,7 @@ REPLAY = Topic(
 )
 
 TOPICS: tuple[Topic[Any], ...] = (
-    MOTION, CUT, PICTURE, STOP, TELEOP, JOINTS, ODOMETRY, BRIDGE, CONTROLLER, PLAN, HEARTBEAT, EVENT, CAMERA,
+    MOTION, CUT, PICTURE, STOP, TELEOP, JOINTS, ODOMETRY, BRIDGE, CONTROLLER, PLAN, REPORT, HEARTBEAT, EVENT, CAMERA,
     PREVIEW, PREVIEW_MOTION, POINTS, CROPS, LOOK, OBSTACLES, SCENERY, PRESENCE, CONTROL, STOPS, HARDWARE_STOP,
     REPLAY,
 )

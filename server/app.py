@@ -24,6 +24,7 @@ from server.pages import pages_router
 from server.plant_api import plant_router
 from server.preview_api import preview_router
 from server.replay_api import replay_router
+from server.report_api import report_router
 from server.robot_api import robot_router
 from server.sessions import Session
 from server.site import site_router
@@ -80,6 +81,7 @@ def create_app(desk: Desk, origins: frozenset[str]) -> ASGIApp:
     app.include_router(control_router(desk))
     app.include_router(robot_router(desk))
     app.include_router(replay_router(desk))
+    app.include_router(report_router(desk))
     app.include_router(pages_router(desk))
     app.include_router(viser_router(desk.scene, desk.may_move, dropped))
     app.router.routes.append(_PageFiles("/", PageFiles(web), name="web"))

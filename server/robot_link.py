@@ -58,6 +58,7 @@ class RobotLink:
         self.plan = transport.slot(topics.PLAN)
         self.preview = transport.slot(topics.PREVIEW)
         self.preview_motion = transport.slot(topics.PREVIEW_MOTION)
+        self.report = transport.slot(topics.REPORT)
         self.scenery = transport.slot(topics.SCENERY)
         self.crops: dict[str, PointCrop] = {}
         """The newest picture of each point, by its id."""

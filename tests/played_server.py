@@ -14,6 +14,7 @@ from rolling_panda import messages as m
 from rolling_panda import page_messages as p
 from rolling_panda.control_messages import ControlState, StopState
 from rolling_panda.replay_messages import ReplayState
+from rolling_panda.report_messages import SessionReport
 from rolling_panda.resources import resource
 
 ORIGIN = "http://panda.test"
@@ -123,6 +124,7 @@ class PlayedServer:
     sockets: list[WebSocketRoute] = field(default_factory=list)
     crops_fetched: list[str] = field(default_factory=list)
     frames_fetched: list[int] = field(default_factory=list)
+    report: SessionReport = field(default_factory=lambda: SessionReport(began_at=0.0, written_at=0.0))
     rule: m.PruningRule | None = field(default_factory=m.PruningRule)
     crop: bytes = field(default_factory=lambda: camera_image((240, 180)))
     number: int = 0
@@ -148,6 +150,8 @@ class PlayedServer:
             route.fulfill(json={"arm_limits": [(-2.9, 2.9)] * 7})
         elif path == "/api/sign-in":
             route.fulfill(json={"password": False})
+        elif path == "/api/report":
+            route.fulfill(body=msgspec.json.encode(self.report), content_type="application/json")
         elif path == "/viser/":
             route.fulfill(body=VIEW, content_type="text/html")
         elif path.startswith("/api/points/") and path.endswith("/crop"):

@@ -59,6 +59,11 @@ def _charts(page: Page, server: PlayedServer) -> None:
     expect(page.locator("rp-charts")).to_be_visible()
 
 
+def _report(page: Page, server: PlayedServer) -> None:
+    page.locator('[data-opens="report"]').click()
+    expect(page.locator("rp-report")).to_contain_text("Nothing has been cut yet.")
+
+
 STATES: dict[str, Callable[[Page, PlayedServer], None]] = {
     "empty": _empty,
     "a point chosen": _chosen,
@@ -67,6 +72,7 @@ STATES: dict[str, Callable[[Page, PlayedServer], None]] = {
     "link lost": _link_lost,
     "rule": _rule,
     "charts": _charts,
+    "report": _report,
 }
 
 

@@ -32,7 +32,7 @@ const words = "// not a comment"; // beside code
 export function twice(x) {
 
 const two = 2;
-/** @type {any} */ (globalThis).seen = `a
+(globalThis).seen = `a
 *b`;
 
 return two * x;

@@ -7,6 +7,7 @@ from played_server import PlayedServer, bridge, controller, point
 from playwright.sync_api import Page, expect
 
 from rolling_panda.control_messages import StopState
+from rolling_panda.report_messages import CutReport, RefusalReport, SessionReport, VineReport
 
 pytestmark = pytest.mark.browser
 
@@ -91,6 +92,28 @@ def test_without_a_link_that_is_the_one_alarm_until_it_is_back(page: Page, serve
     server.online, server.gone = True, {}
     expect(page.locator("#alarms .empty")).to_be_visible(timeout=10_000)
     expect(page.locator("rp-telemetry .stale-note")).to_be_hidden()
+
+
+def test_the_report_tells_cuts_by_outcome_and_vine_and_what_was_refused(page: Page, server: PlayedServer) -> None:
+    page.locator('[data-opens="report"]').click()
+    expect(page.locator("rp-report")).to_contain_text("Nothing has been cut yet.")
+    cuts = [CutReport(cut_id="c1", point_id="p1", vine=1, spur=1, outcome="DONE", ended_at=2e9, seconds=3.0)]
+    cuts.append(CutReport(cut_id="c2", point_id="p2", vine=1, spur=2, outcome="UNKNOWN", ended_at=2e9, seconds=5.0))
+    server.report = SessionReport(
+        began_at=1.9e9,
+        written_at=2e9,
+        cuts=tuple(cuts),
+        cut_count=2,
+        vines=(VineReport(vine=1, done=1, unknown=1, seconds=8.0),),
+        refusals=(RefusalReport(at=2e9, user="Bob", asked="Start", reason="Ada holds control"),),
+        refusal_count=1,
+    )
+    page.keyboard.press("Escape")
+    page.locator('[data-opens="report"]').click()
+    expect(page.locator(".sums dd")).to_have_text(["1", "0", "1", "4.0", "1", "1"])
+    expect(page.locator("rp-report tbody tr")).to_have_count(4)
+    expect(page.locator("rp-report")).to_contain_text("Ada holds control")
+    expect(page.locator('a[download="cuts.csv"]')).to_have_attribute("href", "/api/report.csv")
 
 
 def test_the_robots_own_button_and_a_joint_at_its_limit_are_alarms(page: Page, server: PlayedServer) -> None:

@@ -10,6 +10,7 @@ from rolling_panda import (
     plant_requests,
     preview_messages,
     replay_messages,
+    report_messages,
     row_messages,
     teleop_messages,
 )
@@ -40,6 +41,7 @@ def test_every_message_is_on_the_wire_once() -> None:
         intents,
         plant_requests,
         replay_messages,
+        report_messages,
     )
     defined = [value for module in modules for value in vars(module).values()]
     known = {

@@ -578,6 +578,73 @@ export interface Select {
   point_id: string;
 }
 
+/** One cut and how it ended. */
+export interface CutReport {
+  /** Of the cut. */
+  cut_id: string;
+  /** Point that was cut. */
+  point_id: string;
+  /** Its vine. */
+  vine: number;
+  /** Its spur on that vine. */
+  spur: number;
+  /** As it is known now; empty while it goes on. */
+  outcome: Outcome;
+  /** In words. */
+  reason: string;
+  /** Who accepted it, or said how it ended. */
+  user: string;
+  /** When; 0 while it goes on. */
+  ended_at: number;
+  /** From the end of the cut before, or the start of work if that was later, to the end of this one. */
+  seconds: number;
+}
+
+/** The cuts of one vine by outcome, and the time they took together (s). */
+export interface VineReport {
+  vine: number;
+  done: number;
+  not_cut: number;
+  unknown: number;
+  seconds: number;
+}
+
+/** What somebody asked for and did not get: when, who, what, and why. */
+export interface RefusalReport {
+  at: number;
+  user: string;
+  asked: string;
+  reason: string;
+}
+
+/** Somebody took, granted or returned control: when, who, and what. */
+export interface ControlReport {
+  at: number;
+  user: string;
+  what: string;
+}
+
+/** Controller → all: what has happened since it started, as far as it is on disk. */
+export interface SessionReport {
+  type: "SessionReport";
+  /** When the controller started. */
+  began_at: number;
+  /** When the newest row of the ledger was written that is in here. */
+  written_at: number;
+  /** The newest cuts, oldest first. */
+  cuts: CutReport[];
+  /** All cuts, those left out of `cuts` too. */
+  cut_count: number;
+  /** Each vine with a cut, by its number; all cuts count. */
+  vines: VineReport[];
+  /** The newest refusals. */
+  refusals: RefusalReport[];
+  /** All of them. */
+  refusal_count: number;
+  /** The newest changes of control. */
+  control: ControlReport[];
+}
+
 export type FromServer = PageState|PagePoints|PagePreview|PageEvents|Selected|Sightline|HoldEnded|Pong;
 
 export type FromPage = Ping|Hold|ShowGizmo|PlaceByHand|ShowPreview|Select;

@@ -18,6 +18,7 @@ from rolling_panda.generate.description import (
     reachable,
     union_members,
 )
+from rolling_panda.report_messages import SessionReport
 
 #: Named literals whose values the page lists, and the name of the list.
 CONSTANTS = {
@@ -50,7 +51,9 @@ def messages_module() -> str:
 
 def messages_types() -> str:
     """Text of `web/messages.d.ts`: what the type checker needs."""
-    structs = reachable((*union_members(page_messages.FromServer), *union_members(page_messages.FromPage)))
+    structs = reachable(
+        (*union_members(page_messages.FromServer), *union_members(page_messages.FromPage), SessionReport)
+    )
     parts = [_HEADER]
     parts.extend(f"export const {list_name}: readonly {name}[];\n" for name, list_name in CONSTANTS.items())
     parts.append("export const INTENTS: readonly string[];\n")

@@ -2,20 +2,34 @@
 
 import { drawer } from "../drawer.js";
 import { element, setText } from "../element.js";
-import { drawOn } from "../store.js";
-import { RpCharts } from "./rp-charts.js";
 
+/** @typedef {HTMLElement & { tools: Node[], open: (open: boolean) => void }} Sheet */
+
+/** What few need at once is fetched when it is first opened. @type {Readonly<Record<string, () => Promise<Sheet>>>} */
+const SHEETS = Object.freeze({
+  charts: async () => new (await import("./rp-charts.js")).RpCharts(),
+  report: async () => new (await import("./rp-report.js")).RpReport(),
+});
 /** @type {Readonly<Record<string, string>>} */
-const TITLES = Object.freeze({ charts: "The last five minutes" });
+const TITLES = Object.freeze({ charts: "The last five minutes", report: "Report" });
 
 class RpDrawer extends HTMLElement {
+  constructor() {
+    super();
+    this.heading = element("h2", { id: "drawer-title" });
+    this.tools = element("div", { class: "drawer-tools" });
+    this.waiting = element("p", { class: "empty", attributes: { role: "status" } });
+    /** @type {Map<string, Sheet>} */
+    this.sheets = new Map();
+    /** Where the focus goes back to. @type {Element|null} */
+    this.opener = null;
+  }
+
   connectedCallback() {
     this.id = "drawer";
     this.tabIndex = -1;
     this.setAttribute("role", "region");
-    const title = element("h2", { id: "drawer-title" });
     this.setAttribute("aria-labelledby", "drawer-title");
-    const tools = element("div", { class: "drawer-tools" });
     const close = element("button", {
       id: "close-drawer",
       class: "quiet",
@@ -23,28 +37,44 @@ class RpDrawer extends HTMLElement {
       attributes: { type: "button" },
       onclick: () => drawer.set(""),
     });
-    this.append(element("div", { class: "panel-head" }, title, tools, close));
-    /** @type {Record<string, HTMLElement & { tools: Node[], open: (open: boolean) => void }>} */
-    const sheets = { charts: new RpCharts() };
-    this.append(...Object.values(sheets));
-    let opener = /** @type {Element|null} */ (null);
-    drawOn([drawer], () => {
-      const name = drawer.get();
-      const wasHidden = this.hidden;
-      if (wasHidden && name) opener = document.activeElement;
-      this.hidden = name === "";
-      for (const [each, sheet] of Object.entries(sheets)) {
-        sheet.hidden = each !== name;
-        sheet.open(each === name);
-      }
-      setText(title, TITLES[name] ?? "");
-      tools.replaceChildren(...(sheets[name]?.tools ?? []));
-      if (wasHidden && name) this.focus();
-      if (!wasHidden && !name && opener instanceof HTMLElement) opener.focus();
-    });
+    this.append(element("div", { class: "panel-head" }, this.heading, this.tools, close), this.waiting);
     this.addEventListener("keydown", (event) => {
       if (event.key === "Escape") drawer.set("");
     });
+    drawer.subscribe((name) => void this.show(name));
+  }
+
+  /** @param {string} name */
+  async show(name) {
+    const wasHidden = this.hidden;
+    if (wasHidden && name) this.opener = document.activeElement;
+    this.hidden = name === "";
+    this.lay("");
+    setText(this.heading, TITLES[name] ?? "");
+    if (wasHidden && name) this.focus();
+    if (!wasHidden && !name && this.opener instanceof HTMLElement) this.opener.focus();
+    const load = SHEETS[name];
+    if (!load) return;
+    setText(this.waiting, "Loading…");
+    try {
+      const sheet = this.sheets.get(name) ?? (await load());
+      if (!this.sheets.has(name)) this.append(sheet);
+      this.sheets.set(name, sheet);
+    } catch {
+      setText(this.waiting, "This could not be loaded. Close it, and open it again when the server is there.");
+    }
+    // Something else may have been opened meanwhile.
+    if (drawer.get() === name) this.lay(name);
+  }
+
+  /** Show one sheet and no other. @param {string} name */
+  lay(name) {
+    this.tools.replaceChildren(...(this.sheets.get(name)?.tools ?? []));
+    for (const [each, sheet] of this.sheets) {
+      sheet.hidden = each !== name;
+      sheet.open(each === name);
+    }
+    this.waiting.hidden = this.sheets.has(name);
   }
 }
 customElements.define("rp-drawer", RpDrawer);

@@ -1,5 +1,6 @@
 // What happened, and why something was refused; by severity, by process, and by words.
 
+import { drawerButton } from "../drawer.js";
 import { element, setText } from "../element.js";
 import { icon } from "../icons.js";
 import { PROCESSES } from "../messages.js";
@@ -29,7 +30,7 @@ class RpLog extends HTMLElement {
     const live = element("div", { class: "live", attributes: { role: "log", "aria-live": "polite" } }, list);
     const empty = element("p", { class: "empty" });
     this.id = "log";
-    const tools = element("div", { class: "log-tools" }, words, from, least);
+    const tools = element("div", { class: "log-tools" }, words, from, least, drawerButton("report", "Report"));
     this.append(element("div", { class: "panel-head" }, element("h2", { text: "Log" }), tools), live, empty);
 
     // Follow the newest line until somebody scrolls away from it; turning the screen is no such wish.

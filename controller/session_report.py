@@ -1,0 +1,95 @@
+"""The session's report, made from the rows of the ledger as they become durable. No clock: rows say when."""
+
+from collections import deque
+from datetime import datetime
+
+import msgspec
+from msgspec.structs import replace
+
+from controller.journal import RequestRow, TicketRow
+from rolling_panda import intents
+from rolling_panda.report_messages import ControlReport, CutReport, RefusalReport, SessionReport, VineReport
+
+#: What goes over the wire of each; the ledger has all.
+_MOST_CUTS, _MOST_REFUSALS, _MOST_CHANGES = 500, 100, 100
+_ENDED = ("DONE", "FAILED_NOT_CUT", "UNKNOWN")
+_CONTROL: dict[type[intents.Intent], str] = {
+    intents.TakeControl: "took control",
+    intents.GrantControl: "gave control to who had asked",
+    intents.ReturnControl: "returned control",
+}
+
+
+class SessionAccount:
+    """Takes rows in their order; `report` is what they come to."""
+
+    def __init__(self) -> None:
+        """Nothing has happened."""
+        self._began = self._written = self._ready_since = 0.0
+        self._cuts: dict[str, CutReport] = {}
+        self._refusals: deque[RefusalReport] = deque(maxlen=_MOST_REFUSALS)
+        self._control: deque[ControlReport] = deque(maxlen=_MOST_CHANGES)
+        self._refused = 0
+
+    def take(self, at: str, body: msgspec.Struct) -> bool:
+        """A row was written at a time (ISO 8601). Returns whether it is one that the report tells of."""
+        when = datetime.fromisoformat(at).timestamp()
+        first = self._began == 0.0
+        self._began, self._written = self._began or when, when
+        match body:
+            case TicketRow() if body.cut_id:
+                self._ticket(body, when)
+            case RequestRow() if not body.ok:
+                self._refused += 1
+                asked = type(body.asked).__name__
+                self._refusals.append(RefusalReport(at=when, user=body.asked.user, asked=asked, reason=body.reason))
+            case RequestRow() if isinstance(body.asked, intents.Start):
+                self._ready_since = when
+            case RequestRow() if type(body.asked) in _CONTROL:
+                what = _CONTROL[type(body.asked)]
+                self._control.append(ControlReport(at=when, user=body.asked.user, what=what))
+            case _:
+                return first
+        return True
+
+    def report(self) -> SessionReport:
+        """Everything up to now."""
+        cuts = list(self._cuts.values())
+        return SessionReport(
+            began_at=self._began,
+            written_at=self._written,
+            cuts=tuple(cuts[-_MOST_CUTS:]),
+            cut_count=len(cuts),
+            vines=_by_vine(cuts),
+            refusals=tuple(self._refusals),
+            refusal_count=self._refused,
+            control=tuple(self._control),
+        )
+
+    def _ticket(self, row: TicketRow, when: float) -> None:
+        known = self._cuts.get(row.cut_id)
+        if row.state == "INTENT":
+            point = row.point
+            cut = CutReport(cut_id=row.cut_id, point_id=point.point_id, vine=point.vine, spur=point.spur, user=row.user)
+            self._cuts[row.cut_id] = cut
+        elif known is not None and row.state in _ENDED:
+            told = replace(known, outcome=row.state, reason=row.reason[:500], user=row.user or known.user)
+            if not known.outcome:
+                # Somebody may say later how it ended, which takes the robot no time.
+                told = replace(told, ended_at=when, seconds=max(when - self._ready_since, 0.0))
+                self._ready_since = when
+            self._cuts[row.cut_id] = told
+
+
+def _by_vine(cuts: list[CutReport]) -> tuple[VineReport, ...]:
+    vines: dict[int, VineReport] = {}
+    for cut in cuts:
+        vine = vines.get(cut.vine, VineReport(vine=cut.vine))
+        vines[cut.vine] = replace(
+            vine,
+            done=vine.done + (cut.outcome == "DONE"),
+            not_cut=vine.not_cut + (cut.outcome == "FAILED_NOT_CUT"),
+            unknown=vine.unknown + (cut.outcome == "UNKNOWN"),
+            seconds=vine.seconds + cut.seconds,
+        )
+    return tuple(vines[number] for number in sorted(vines))

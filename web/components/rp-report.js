@@ -1,0 +1,141 @@
+// The session's report: cuts by outcome, the time they took, by vine, what was refused, and who held control.
+
+import { element, setText } from "../element.js";
+import { POINT_WORDS, clockWords, inWords } from "../words.js";
+
+/** @typedef {import("../messages.js").SessionReport} SessionReport */
+
+/** While it is open the report is asked for again after so long (ms); the controller says it every 5 s. */
+const AGAIN_MS = 5000;
+
+export class RpReport extends HTMLElement {
+  constructor() {
+    super();
+    this.timer = 0;
+    this.words = element("p", { class: "hint", attributes: { role: "status" } });
+    this.sums = element("dl", { class: "sums number" });
+    this.vines = table("By vine", ["Vine", "Done", "Not cut", "Unknown", "Minutes"]);
+    this.cuts = table("Cuts, the newest first", ["Ended", "Point", "Vine", "Outcome", "Seconds", "Accepted by"]);
+    this.refusals = table("Refused, the newest first", ["When", "Who", "Asked for", "Why"]);
+    this.control = table("Control", ["When", "Who", "What"]);
+    /** @type {Node[]} */
+    this.tools = [download("/api/report", "report.json", "JSON"), download("/api/report.csv", "cuts.csv", "CSV")];
+  }
+
+  connectedCallback() {
+    if (this.childElementCount > 0) return;
+    this.tabIndex = 0;
+    this.setAttribute("role", "group");
+    this.setAttribute("aria-label", "Report");
+    const tables = [this.vines, this.cuts, this.refusals, this.control];
+    this.append(this.words, this.sums, ...tables.map((each) => each.box));
+  }
+
+  /** @param {boolean} open */
+  open(open) {
+    window.clearInterval(this.timer);
+    if (!open) return;
+    void this.fetch();
+    this.timer = window.setInterval(() => void this.fetch(), AGAIN_MS);
+  }
+
+  async fetch() {
+    try {
+      const response = await fetch("/api/report", { credentials: "same-origin", signal: AbortSignal.timeout(4000) });
+      const body = await response.json();
+      if (response.ok) this.show(body);
+      else setText(this.words, `${body.reason} What is below stays as it was.`);
+    } catch {
+      setText(this.words, "The server cannot be reached; what is below is the last that was heard.");
+    }
+  }
+
+  /** @param {SessionReport} report */
+  show(report) {
+    const ended = report.cuts.filter((cut) => cut.ended_at > 0);
+    const seconds = ended.reduce((sum, cut) => sum + cut.seconds, 0);
+    const since = report.began_at > 0 ? `since ${clockWords(report.began_at)}` : "nothing recorded yet";
+    const left = report.cut_count - report.cuts.length;
+    setText(this.words, `From the ledger, ${since}${left > 0 ? `; ${left} older cuts are in the ledger alone` : ""}.`);
+    const count = (/** @type {"done"|"not_cut"|"unknown"} */ name) => report.vines.reduce((sum, vine) => sum + vine[name], 0);
+    sums(this.sums, [
+      ["Done", count("done")],
+      ["Not cut", count("not_cut")],
+      ["Unknown", count("unknown")],
+      ["Seconds a cut", ended.length > 0 ? (seconds / ended.length).toFixed(1) : "–"],
+      ["Vines", report.vines.length],
+      ["Refused", report.refusal_count],
+    ]);
+    this.vines.show(
+      report.vines.map((vine) => [vine.vine, vine.done, vine.not_cut, vine.unknown, (vine.seconds / 60).toFixed(1)]),
+      "No vine has been worked on yet.",
+    );
+    this.cuts.show(
+      [...report.cuts].reverse().map((cut) => [
+        cut.ended_at > 0 ? clockWords(cut.ended_at) : "now",
+        cut.point_id,
+        cut.vine,
+        [cut.outcome ? POINT_WORDS[cut.outcome] : "Cutting", inWords(cut.reason)].filter(Boolean).join(": "),
+        cut.ended_at > 0 ? cut.seconds.toFixed(1) : "–",
+        cut.user,
+      ]),
+      "Nothing has been cut yet.",
+    );
+    this.refusals.show(
+      [...report.refusals].reverse().map((each) => [clockWords(each.at), each.user, each.asked, inWords(each.reason)]),
+      "Nothing was refused.",
+    );
+    this.control.show(
+      [...report.control].reverse().map((each) => [clockWords(each.at), each.user, each.what]),
+      "Control has not changed hands.",
+    );
+  }
+}
+
+/**
+ * @param {string} title
+ * @param {readonly string[]} columns
+ */
+function table(title, columns) {
+  const body = element("tbody");
+  const head = element("tr", {}, ...columns.map((text) => element("th", { text, attributes: { scope: "col" } })));
+  const empty = element("p", { class: "hint" });
+  const grid = element("table", {}, element("thead", {}, head), body);
+  const box = element("section", {}, element("h3", { text: title }), grid, empty);
+  return {
+    box,
+    /**
+     * @param {readonly (readonly (string|number)[])[]} rows
+     * @param {string} nothing What is said when there are none.
+     */
+    show(rows, nothing) {
+      grid.hidden = rows.length === 0;
+      setText(empty, rows.length === 0 ? nothing : "");
+      body.replaceChildren(
+        ...rows.map((row) => element("tr", {}, ...row.map((cell) => element("td", { text: String(cell) })))),
+      );
+    },
+  };
+}
+
+/**
+ * @param {HTMLElement} list
+ * @param {readonly (readonly [string, string|number])[]} pairs
+ */
+function sums(list, pairs) {
+  list.replaceChildren(
+    ...pairs.map(([word, value]) =>
+      element("div", {}, element("dt", { text: word }), element("dd", { text: String(value) })),
+    ),
+  );
+}
+
+/**
+ * @param {string} path
+ * @param {string} name
+ * @param {string} words
+ */
+function download(path, name, words) {
+  return element("a", { class: "button", text: words, attributes: { href: path, download: name, title: `Save ${name}` } });
+}
+customElements.define("rp-report", RpReport);
