@@ -19,6 +19,7 @@ from typing import get_args
 import msgspec
 import numpy as np
 
+from benchmarks.guyot_judge import GuyotJudge
 from benchmarks.intervals import Figure, quantile, share
 from benchmarks.perception_gallery import save_failure
 from benchmarks.perception_growth import grow_long, table
@@ -29,7 +30,7 @@ from bridge.sim.camera import Camera
 from bridge.sim.camera_config import CameraConfig
 from bridge.sim.vineyard import grow
 from bridge.sim.vineyard_config import VineyardConfig
-from perception.config import PerceptionConfig
+from perception.config import PerceptionConfig, RuleConfig
 from perception.frame import decode_frame
 from perception.pipeline import Perception
 from perception.segmenter_choice import SEGMENTERS, choose_segmenter
@@ -39,6 +40,8 @@ from rolling_panda.robot_model import RobotModel, configuration
 
 #: Vines of a row, and the way between two frames (m).
 ROW_VINES, STEP = 3, 0.15
+#: Nodes that stay, by the kind of cut.
+KEPT = {"spur cut": 2, "cane cut": 8}
 #: The camera stands so far ahead of the base in the survey posture (m), and begins before the first trunk.
 _CAMERA_AHEAD = 0.5
 
@@ -82,10 +85,11 @@ def survey_row(
         gallery: Folder for pictures of wrong points.
         looks: Takes what a second look at each point comes to; None leaves it at the survey.
     """
-    config = VineyardConfig(vines=vines)
+    guyot = perception.config.rule.system == "guyot"
+    config = VineyardConfig(vines=vines, training="guyot" if guyot else "cordon")
     row = grow(config, seed)
     camera = Camera(camera_config, seed)
-    opinion = RowJudge(row, seed)
+    opinion = GuyotJudge(row, seed) if guyot else RowJudge(row, seed)
     position = msgspec.convert((0.0, 0.0, *survey_arm()), m.Actuated)
     first = config.first_vine_x - config.vine_spacing / 2
     last = first + vines * config.vine_spacing
@@ -116,12 +120,13 @@ def survey_row(
     into.points += judged
     into.abstained += left_open
     for vine, spur in opinion.spurs():
-        own = [p for p in judged if (p.vine, p.spur, p.kind) == (vine, spur, "spur cut")]
+        own = [p for p in judged if (p.vine, p.spur, p.kind) == (vine, spur, opinion.kind(spur))]
         into.spurs.append(
             {
                 "seed": seed,
                 "vine": vine,
                 "spur": spur,
+                "kind": opinion.kind(spur),
                 "visibility": opinion.visibility(vine, spur),
                 "point": bool(own),
                 "right": any(p.right for p in own),
@@ -132,7 +137,7 @@ def survey_row(
 def summarise(survey: Survey, visibility: str | None = None) -> dict[str, Figure]:
     """The figures, for all spurs or for those of one class of visibility."""
     chosen = [p for p in survey.points if visibility in (None, p.visibility)]
-    cuts = [p for p in chosen if p.kind == "spur cut"]
+    cuts = [p for p in chosen if p.kind in KEPT]
     renewals = [p for p in chosen if p.kind == "renewal cut"]
     on_cane = [p for p in cuts if p.right_cane]
     along = [abs(p.along_error) for p in on_cane if p.along_error is not None]
@@ -143,14 +148,23 @@ def summarise(survey: Survey, visibility: str | None = None) -> dict[str, Figure
         "right_cane": share(len(on_cane), len(cuts)),
         "along_error_median_m": quantile(along, 0.5),
         "along_error_p95_m": quantile(along, 0.95),
-        "node_count_right": share(sum(p.nodes_left == 2 for p in on_cane), len(on_cane)),
+        "node_count_right": share(sum(p.nodes_left == KEPT[p.kind] for p in on_cane), len(on_cane)),
         "plane_within_15_deg": share(sum((p.plane_error or 0.0) <= 15.0 for p in on_cane), len(on_cane)),
         "right": share(sum(p.right for p in cuts), len(cuts)),
         "renewal_right": share(sum(p.right for p in renewals), len(renewals)),
         "abstained": share(sum(not s["point"] for s in visible), len(visible)),
         "recall": share(sum(bool(s["right"]) for s in visible), len(visible)),
         "frame_ms_median": quantile(survey.frame_ms, 0.5),
-    }
+    } | _by_kind(spurs)
+
+
+def _by_kind(spurs: list[dict[str, int | bool | str]]) -> dict[str, Figure]:
+    """Where vines have cuts of several kinds: of all of each, out of view too, those with a right point."""
+    kinds = [kind for kind in KEPT if any(spur["kind"] == kind for spur in spurs)]
+    if len(kinds) < 2:
+        return {}
+    own = {kind: [bool(spur["right"]) for spur in spurs if spur["kind"] == kind] for kind in kinds}
+    return {f"right_of_all_{kind.replace(' ', '_')}s": share(sum(right), len(right)) for kind, right in own.items()}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -162,6 +176,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         "--segmenter", choices=SEGMENTERS, default="network", help="what tells classes (default: %(default)s)"
     )
     parser.add_argument("--weights", type=Path, help="ONNX file for the network (default: the one that is shipped)")
+    parser.add_argument(
+        "--training-system", choices=("spur", "guyot"), default="spur", help="how the vines are (default: %(default)s)"
+    )
     parser.add_argument("--fuse", action="store_true", help="apply the rule to what all frames have shown of a spur")
     parser.add_argument(
         "--looks", choices=("one", "two"), default="one", help="look at each point again from near, and after its cut"
@@ -183,7 +200,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         for number, done in enumerate(range(0, words.vines, ROW_VINES)):
             segmenter = choose_segmenter(words.segmenter, words.weights)
-            perception = Perception(PerceptionConfig(fuse=words.fuse), segmenter, model)
+            rule = RuleConfig(system=words.training_system)
+            perception = Perception(PerceptionConfig(fuse=words.fuse, rule=rule), segmenter, model)
             seed, vines = words.seed + number, min(ROW_VINES, words.vines - done)
             before = len(survey.points)
             survey_row(seed, vines, perception, model, CameraConfig(), survey, words.gallery, looks)
@@ -204,6 +222,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             "vines": words.vines,
             "segmenter": words.segmenter,
             "fuse": words.fuse,
+            "training_system": words.training_system,
             "looks": words.looks,
             "voided": [] if looks is None else [*looks.right_voided, *looks.wrong_voided],
             "summary": {name: asdict(figure) for name, figure in summary.items()},

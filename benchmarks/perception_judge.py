@@ -7,7 +7,7 @@ import numpy as np
 
 from bridge.sim.camera import RgbdImage
 from bridge.sim.row import Array, Rod, Row
-from bridge.sim.vineyard_truth import RightCut, SpurTruth, judge
+from bridge.sim.vineyard_truth import RightCut, judge
 from rolling_panda import messages as m
 from rolling_panda.camera_messages import Intrinsics
 
@@ -60,8 +60,9 @@ class JudgedPoint:
 
 
 @dataclass
-class _Sight:
-    truth: SpurTruth
+class Sight:
+    """What one has to see of a place: places on its wood (N×3, m), the rod of each, and the best share seen at once."""
+
     places: Array
     rods: "np.ndarray[tuple[int], np.dtype[np.int64]]"
     best: float = 0.0
@@ -73,7 +74,7 @@ class RowJudge:
 
     row: Row
     seed: int
-    _sights: dict[tuple[int, int], _Sight] = field(default_factory=dict)
+    _sights: dict[tuple[int, int], Sight] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Collect where one has to look on each spur."""
@@ -86,11 +87,7 @@ class RowJudge:
                 if (rod.vine, rod.spur) == (truth.vine, truth.spur)
                 and (rod.kind == "spur" or (rod.cane == truth.keeper and index <= truth.cut.rod))
             ]
-            places = np.concatenate([rod.start + _PLACES[:, None] * (rod.end - rod.start) for _, rod in rods])
-            numbers = np.repeat([index for index, _ in rods], len(_PLACES))
-            # What lies inside the cordon's bark cannot be seen.
-            inside = np.array([_buried(self.row, rod, share) for _, rod in rods for share in _PLACES])
-            self._sights[truth.vine, truth.spur] = _Sight(truth, places[~inside], numbers[~inside])
+            self._sights[truth.vine, truth.spur] = Sight(*sight_places(self.row, rods))
 
     def look(self, image: RgbdImage, k: Intrinsics, T_world_camera: Array) -> None:
         """Take note of what one frame shows."""
@@ -117,13 +114,14 @@ class RowJudge:
         """Vine and number of each spur that has a right cut and was in view."""
         return tuple(place for place, sight in self._sights.items() if sight.best > 0.0)
 
+    def kind(self, spur: int) -> str:
+        """Kind of the cut that belongs to a place."""
+        return "spur cut"
+
     def point(self, point: m.PruningPoint) -> JudgedPoint:
         """Judge one point."""
         position, tangent = np.array(point.position), np.array(point.tangent)
-        off_axis, index, rod = min(
-            ((_distance(rod, position), index, rod) for index, rod in self.row.standing() if rod.spur >= 0),
-            key=lambda found: found[:2],
-        )
+        off_axis, rod = nearest_rod(self.row, position)
         truth = next(t for t in judge(self.row) if (t.vine, t.spur) == (rod.vine, rod.spur))
         renewal = point.reason.startswith("Renewal")
         cut: RightCut | None = truth.renewal if renewal else truth.cut
@@ -150,6 +148,23 @@ class RowJudge:
             confidence=point.confidence,
             reason=point.reason,
         )
+
+
+def nearest_rod(row: Row, position: Array) -> tuple[float, Rod]:
+    """Distance (m) and rod of the spurs' and canes' wood whose axis is nearest to a place (3, m)."""
+    distance, _, rod = min(
+        ((_distance(rod, position), index, rod) for index, rod in row.standing() if rod.spur >= 0),
+        key=lambda found: found[:2],
+    )
+    return distance, rod
+
+
+def sight_places(row: Row, rods: list[tuple[int, Rod]]) -> tuple[Array, "np.ndarray[tuple[int], np.dtype[np.int64]]"]:
+    """Places on rods (N×3, m) that one has to see, and the rod of each; none inside the bark of what carries them."""
+    places = np.concatenate([rod.start + _PLACES[:, None] * (rod.end - rod.start) for _, rod in rods])
+    numbers = np.repeat([index for index, _ in rods], len(_PLACES))
+    inside = np.array([_buried(row, rod, share) for _, rod in rods for share in _PLACES])
+    return places[~inside], numbers[~inside]
 
 
 def _buried(row: Row, rod: Rod, share: float) -> bool:

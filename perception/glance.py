@@ -17,6 +17,8 @@ _SAME_DEPTH = 0.025
 _NEAREST = 0.25
 #: How far to the side of where it should be it is looked for (m): odometry and a close view are off by millimetres.
 _AROUND = 0.008
+#: Wood of this row is not so much farther away than a place on it (m).
+_OTHER_ROW = 0.8
 
 Glance = Literal["standing", "gone", "unseen"]
 
@@ -48,7 +50,7 @@ def _at(view: View, labels: NDArray[np.uint8], u: float, v: float, z: float) -> 
     wood = (kind == CANE) | (kind == NODE) | (kind == _SPUR)
     if (wood & (np.abs(depth - z) < _SAME_DEPTH)).any():
         return "standing"
-    # Nearer things hide the place, and wood without depth is too near to place.
-    if (wood & (depth == 0.0)).any() or ((depth > 0.0) & (depth < z - _SAME_DEPTH)).any():
+    # Nearer things hide the place, and wood without depth, or with that of another row, is nowhere.
+    if (wood & ((depth == 0.0) | (depth > z + _OTHER_ROW))).any() or ((depth > 0.0) & (depth < z - _SAME_DEPTH)).any():
         return "unseen"
     return "gone"

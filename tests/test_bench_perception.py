@@ -85,10 +85,10 @@ def test_what_hangs_behind_a_board_is_hidden_and_what_is_before_it_is_clear():
 
 def test_the_summary_has_a_figure_an_interval_and_a_number_for_each_measure():
     survey = Survey(
-        spurs=[{"visibility": "clear", "point": True, "right": True}] * 9
+        spurs=[{"kind": "spur cut", "visibility": "clear", "point": True, "right": True}] * 9
         + [
-            {"visibility": "clear", "point": False, "right": False},
-            {"visibility": "hidden", "point": False, "right": False},
+            {"kind": "spur cut", "visibility": "clear", "point": False, "right": False},
+            {"kind": "spur cut", "visibility": "hidden", "point": False, "right": False},
         ]
     )
     survey.points = [RowJudge(ROW, 11).point(point(t.cut.best, t.cut.tangent)) for t in TRUTHS[:4]]

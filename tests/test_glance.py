@@ -31,6 +31,7 @@ def view(behind=3.0, cane_depth=0.8, cols=slice(78, 83)):
         (view(cane_depth=0.9), AT, "gone"),
         (view(behind=0.5), AT + [0.05, 0.0, 0.0], "unseen"),
         (view(cane_depth=0.0), AT, "unseen"),
+        (view(cane_depth=6.5535), AT, "unseen"),
         (view(), AT + [0.5, 0.0, 0.0], "unseen"),
         (view(), np.array([0.0, 0.0, 0.2]), "unseen"),
         (view(), -AT, "unseen"),

@@ -13,7 +13,7 @@ from bridge.sim.camera import Camera
 from bridge.sim.camera_config import CameraConfig
 from bridge.sim.vineyard import grow
 from bridge.sim.vineyard_config import VineyardConfig
-from perception.config import PerceptionConfig
+from perception.config import LookConfig, PerceptionConfig
 from perception.pipeline import Perception
 from perception.segmenter_choice import choose_segmenter
 from rolling_panda import messages as m
@@ -110,3 +110,37 @@ def test_what_shows_nothing_makes_no_point_and_says_why(
         told = seen.process(bad(good, what))
     assert told.points == ()
     assert told.abstained and all(each.reason for each in told.abstained)
+
+
+@pytest.fixture(scope="module")
+def shown(model: RobotModel, good: CameraFrame) -> Perception:
+    """Perception that shows points of the good frame, and looks closely from as far away as that was taken."""
+    config = PerceptionConfig(look=LookConfig(farthest=1.2))
+    seen = Perception(config, choose_segmenter("labels", threads=1), model)
+    for _ in range(AGAIN):
+        seen.process(good)
+    return seen
+
+
+def test_a_closer_look_at_the_good_frame_sees_points(shown: Perception, good: CameraFrame) -> None:
+    looks = [
+        shown.look_closely(msgspec.structs.replace(good, point_id=point.point_id)) for point in shown.points().points
+    ]
+    assert [look.finding for look in looks].count("seen") >= 2
+
+
+@pytest.mark.parametrize("what", (*REFUSED, *WRONG_DEPTH))
+def test_a_closer_look_at_what_shows_nothing_neither_places_a_point_nor_calls_it_cut(
+    shown: Perception, good: CameraFrame, what: str
+) -> None:
+    points = shown.points().points
+    assert points
+    for point in points:
+        frame = msgspec.structs.replace(bad(good, what), point_id=point.point_id)
+        if what in REFUSED:
+            with pytest.raises(MessageError, match="image|depth_unit"):
+                shown.look_closely(frame)
+            continue
+        look = shown.look_closely(frame)
+        assert look.finding in ("unseen", "changed") and look.reason and look.position is None
+    assert shown.points().points == points
