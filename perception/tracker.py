@@ -339,7 +339,9 @@ class Tracker:
         moved = float(np.linalg.norm(np.subtract(new.position, old.position)))
         turned = float(np.arccos(np.clip(np.dot(new.tangent, old.tangent), -1.0, 1.0)))
         counts = (new.kind, new.nodes_kept, new.vine, new.spur) == (old.kind, old.nodes_kept, old.vine, old.spur)
-        return counts and moved <= self._config.moved and turned <= self._config.turned
+        # What it says of its place along the cane holds for where it is.
+        slid = abs((new.offset or 0.0) - (old.offset or 0.0))
+        return counts and moved <= self._config.moved and turned <= self._config.turned and slid < _SAME_OFFSET
 
 
 def _vector(values: Array) -> tuple[float, float, float]:

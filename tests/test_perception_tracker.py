@@ -62,6 +62,21 @@ def test_where_most_looks_cut_an_internode_is_taken_whole_not_half_way_to_where_
     assert point.position[1] == pytest.approx(0.0895, abs=1e-3)
 
 
+def test_a_point_is_where_it_says_it_is_also_after_a_small_step_along_its_internode():
+    def look(offset):
+        one = proposal(y=0.1 - offset)
+        return replace(one, cut=replace(one.cut, offset=offset))
+
+    tracker = Tracker(CONFIG)
+    for _ in range(3):
+        feed(tracker, view(), look(0.02))
+    for _ in range(6):
+        # Less than what a point may move by before it is called another one.
+        (point,) = feed(tracker, view(), look(0.0165)).points
+    assert point.offset == 0.0165 and point.revision == 2
+    assert point.position[1] == pytest.approx(0.1 - 0.0165, abs=1e-4)
+
+
 def test_after_many_looks_two_that_agree_are_enough_where_none_disagrees():
     def survey(*others):
         tracker, number = Tracker(CONFIG), SpurNumber(1, 1)
