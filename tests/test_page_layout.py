@@ -94,8 +94,8 @@ def test_on_a_telephone_the_stop_lies_over_nothing(page: Page, server: PlayedSer
     stop = page.locator("#stop").bounding_box()
     assert stop is not None
     assert page.evaluate("document.body.getBoundingClientRect().bottom") <= stop["y"]
-    page.locator("rp-teleoperation .hint").scroll_into_view_if_needed()
-    hint = page.locator("rp-teleoperation .hint").bounding_box()
+    page.locator("rp-teleoperation > .hint").scroll_into_view_if_needed()
+    hint = page.locator("rp-teleoperation > .hint").bounding_box()
     assert hint is not None and hint["y"] + hint["height"] <= stop["y"]
 
 
