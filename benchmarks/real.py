@@ -71,6 +71,7 @@ class Found:
     worst_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
     worst_base: tuple[float, float] = (0.0, 0.0)
     trials: list[Trial] = field(default_factory=list)
+    at_rest: int = 0
 
 
 def _tells(line: str) -> Callable[[RealSite], None]:
@@ -151,12 +152,25 @@ def _moves(site: RealSite, commander: Commander) -> bool:
     return all(report[device]["still_s"] < 0.0 for device in ("arm", "base"))
 
 
-def trial(site: RealSite, commander: Commander, fault: Fault) -> Trial:
-    """Inject one fault into the motion, watch what comes of it, and end it."""
+def _go_on(commander: Commander) -> None:
+    """A person has looked, and lets the robot go on."""
+    commander.silent = commander.at_work = False
+    end = time.monotonic() + 10.0
+    while not commander.follows() and time.monotonic() < end:
+        commander.run(0.5, moving=False)
+        commander.release()
+
+
+def trial(site: RealSite, commander: Commander, fault: Fault) -> Trial | None:
+    """Inject one fault into the motion, watch what comes of it, and end it; None where nothing moved before."""
     before = len(site.told_on_the_page())
     commander.at_work = True
     commander.run(1.5, moving=True)
-    site.wait(lambda: _moves(site, commander), 20.0, "motion to inject a fault into")
+    end = time.monotonic() + 20.0
+    while not _moves(site, commander):
+        if time.monotonic() > end:
+            _go_on(commander)
+            return None
     at, ticks = time.monotonic(), site.tell()["arm"]["ticks"]
     fault.begin(site)
     commander.silent = fault is FAULTS[0]
@@ -167,11 +181,7 @@ def trial(site: RealSite, commander: Commander, fault: Fault) -> Trial:
     arm = 1e-3 * (after["arm"]["moved_tick"] - ticks)
     still = after["arm"]["still_s"] >= 0.0
     fault.end(site)
-    commander.silent = commander.at_work = False
-    end = time.monotonic() + 10.0
-    while not commander.follows() and time.monotonic() < end:
-        commander.run(0.5, moving=False)
-        commander.release()
+    _go_on(commander)
     return Trial(fault.name, max(0.0, base), max(0.0, arm) if still else float("inf"), told)
 
 
@@ -188,7 +198,11 @@ def measure(site: RealSite, seconds: float, seed: int) -> Found:
             # Some lost packets are part of every day.
             site.tell(f"arm drop {rng.randrange(1, 19)}")
             commander.run(0.3, moving=True)
-            found.trials.append(trial(site, commander, FAULTS[number % len(FAULTS)]))
+            judged = trial(site, commander, FAULTS[number % len(FAULTS)])
+            if judged is None:
+                found.at_rest += 1
+            else:
+                found.trials.append(judged)
             number += 1
     finally:
         commander.transport.close()
@@ -223,6 +237,7 @@ def summary(found: Found, seconds: float) -> dict[str, Any]:
         "arm_commands": found.arm_commands,
         "base_commands": found.base_commands,
         "breaches": len(found.breaches),
+        "trials_without_motion": found.at_rest,
         "worst_arm": dict(zip(("velocity", "acceleration", "jerk"), found.worst_arm, strict=True)),
         "worst_base": dict(zip(("velocity", "acceleration"), found.worst_base, strict=True)),
         "faults": rows,
