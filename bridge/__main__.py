@@ -12,6 +12,7 @@ from bridge.loop import BridgeLoop
 from bridge.memory import Memory, open_memory
 from rolling_panda.process import ProcessContext, run_process
 from rolling_panda.resources import resource
+from rolling_panda.state_folder import alone
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -50,6 +51,11 @@ def _run(context: ProcessContext) -> None:
 
         check(context.config_path, context.wire, arguments.fakes)
         return
+    with alone(context.state_folder, "bridge"):
+        _work(context)
+
+
+def _work(context: ProcessContext) -> None:
     cuts, memory = CutFile(context.state_folder), open_memory(context.state_folder)
     try:
         core = _core(context, cuts, memory)

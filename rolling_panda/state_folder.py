@@ -1,6 +1,9 @@
 """Where a process keeps what must survive a restart, and how a small file there is replaced whole or not at all."""
 
+import fcntl
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
@@ -32,6 +35,32 @@ def open_state_folder(folder: Path) -> Path:
             f"cannot keep state in {folder}: {error.strerror}; give another folder with --state"
         ) from error
     return folder
+
+
+@contextmanager
+def alone(folder: Path, process: str) -> Iterator[None]:
+    """Be the only process of its kind that works with a folder; however it ends, the next one may.
+
+    Raises:
+        InputError: Another one is at work.
+    """
+    path = folder / f"{process}.lock"
+    try:
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
+    except OSError as error:
+        raise InputError(
+            f"cannot keep state in {folder}: {error.strerror}; give another folder with --state"
+        ) from error
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise InputError(
+                f"another {process} works with {folder}: two would cut the same point; end it, or give another --state"
+            ) from error
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def read_kept(path: Path, kind: type[Kept], nothing: Kept, what: str) -> Kept:

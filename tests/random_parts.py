@@ -38,8 +38,8 @@ class Saturation:
 class Sequence:
     """Drives for some periods, stands, cuts, and goes on, with the product's own blades."""
 
-    def __init__(self, config, queue, run_id, chance):
-        self._queue, self._chance = queue, chance
+    def __init__(self, config, queue, run_id, chance, permit):
+        self._queue, self._chance, self._permit, self.look_s = queue, chance, permit, 0.0
         self.blades = Blades(config, queue, run_id)
         self.phase, self.places, self.ending = "", (), ""
         self.abort()
@@ -82,7 +82,7 @@ class Sequence:
             return Moved(WHEELS, None, None if self._survey else (Event.FINISHED, "surveyed"))
         ticket = self._queue.get(self.active)
         if ticket is None or ticket.state != "ACCEPTED" or ticket.accepted is not self._accepted:
-            ticket = self._queue.next()
+            ticket = self._queue.next(lambda name: bool(self._permit(self._queue.get(name))))
             if ticket is None:
                 return Moved(rest, None, (Event.FINISHED, "no point"))
             self.active, self._accepted = ticket.point.point_id, ticket.accepted
@@ -101,12 +101,12 @@ class Movement:
 
     chance = random.Random(0)
 
-    def __init__(self, config, robot_config, queue, lines, run_id, known, method=None):
+    def __init__(self, config, robot_config, queue, lines, run_id, known, method=None, permit=lambda _: ""):
         saturation = Saturation()
         self._setpoints, self._saturation = Setpoints(saturation), saturation
         nothing = SimpleNamespace(astray="", model=SimpleNamespace(nearest=None))
         self.body = SimpleNamespace(robot=MODEL, measured=None, following=nothing, surroundings=nothing)
-        self.sequence = Sequence(config, queue, run_id, self.chance)
+        self.sequence = Sequence(config, queue, run_id, self.chance, permit)
         follower = SimpleNamespace(jog=lambda xi, robot: SimpleNamespace(xi=np.clip(xi, -0.03, 0.03)))
         self.teleoperation = Teleoperation(config, follower, MODEL.drive)
         self.tracking, self._home = None, 0

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from rolling_panda.errors import InputError
-from rolling_panda.state_folder import open_state_folder, replace_durably, usual_state_folder
+from rolling_panda.state_folder import alone, open_state_folder, replace_durably, usual_state_folder
 
 
 def test_each_robot_has_its_own_folder_for_this_user_alone(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -43,3 +43,13 @@ def test_an_interrupted_replacement_leaves_the_old_file(tmp_path: Path, monkeypa
     with pytest.raises(OSError, match="no space"):
         replace_durably(path, b"3")
     assert path.read_bytes() == b"2" and list(tmp_path.iterdir()) == [path]
+
+
+def test_a_second_bridge_does_not_start_beside_the_first_and_a_later_one_does(tmp_path: Path) -> None:
+    with alone(tmp_path, "bridge"):
+        with pytest.raises(InputError, match="another bridge works with"), alone(tmp_path, "bridge"):
+            pass
+        with alone(tmp_path, "controller"):
+            pass
+    with alone(tmp_path, "bridge"):
+        pass
