@@ -28,6 +28,8 @@ class RuleConfig(Struct, frozen=True, forbid_unknown_fields=True):
             more looks the less, by the root of their number (m).
         steadiest: So many looks count for that at most: what they have in common does not average out.
         crowded: Nodes nearer to each other than this past the basal bud may belong to two canes (m).
+        shortest_internode: The same for two that both stay (m).
+        longest_internode: Between nodes farther apart than this one was missed, or seen as something else (m).
         height_doubt: Canes whose bases differ in height by less than this cannot be told apart by it (m).
         stub_room: Least free stub between the keeper and the next cane for one cut that removes the rest (m).
         shears_room: Wood that must stay keeps at least this distance from the cut (m).
@@ -47,7 +49,7 @@ class RuleConfig(Struct, frozen=True, forbid_unknown_fields=True):
     fruiting_nodes: Annotated[int, Meta(ge=3, le=20)] = 8
     keeper_diameter: Positive = 0.006
     offset: Positive = 0.020
-    shift: Positive = 0.0095
+    shift: Positive = 0.0085
     short_internode: Positive = 0.040
     basal_reach: Positive = 0.055
     clear_beyond: Positive = 0.030
@@ -56,6 +58,8 @@ class RuleConfig(Struct, frozen=True, forbid_unknown_fields=True):
     diameter_doubt: Positive = 0.00035
     steadiest: Annotated[int, Meta(ge=1, le=100)] = 9
     crowded: Positive = 0.03
+    shortest_internode: Positive = 0.05
+    longest_internode: Positive = 0.125
     height_doubt: Positive = 0.004
     stub_room: Positive = 0.016
     shears_room: Positive = 0.022
@@ -220,7 +224,7 @@ class PerceptionConfig(Struct, frozen=True, forbid_unknown_fields=True):
     hang_s: Positive = 3.0
     survey_nearest: Positive = 0.55
     survey_farthest: Positive = 1.1
-    segmenter: Literal["network", "labels"] = "labels"
+    segmenter: Literal["network", "labels"] = "network"
     weights: str = ""
     threads: Annotated[int, Meta(ge=1, le=64)] = 2
     fuse: bool = False

@@ -153,9 +153,8 @@ def cut_arc(cane: Cane, config: RuleConfig) -> float | str:
         return f"the cane ends {1000 * beyond:.0f} mm past node {kept}: it is pruned already"
     if following is None and beyond < config.clear_beyond:
         return MoreToSee(f"what lies beyond node {kept} is not in view")
-    places = [node.arc for node in nodes[: kept + 1]]
-    if any(second - first < config.crowded for first, second in zip(places, places[1:], strict=False)):
-        return "two nodes seem to sit side by side, so one may belong to another cane"
+    if doubt := _doubtful_count(cane, nodes, config):
+        return doubt
     short = following is not None and following < config.short_internode
     arc = last.arc + (float(following) / 2 if short and following is not None else config.offset)
     seen = [0.0, *(node.arc for node in cane.nodes)]
@@ -167,6 +166,22 @@ def cut_arc(cane: Cane, config: RuleConfig) -> float | str:
         if second > first and _far_from(first, second, seen) > config.node_room:
             return MoreToSee("a stretch of the cane to keep is hidden where another node may be")
     return arc
+
+
+def _doubtful_count(cane: Cane, nodes: tuple[Node, ...], config: RuleConfig) -> str:
+    """Why the nodes up to the cut may not be what was counted; empty where nothing speaks for that."""
+    places = [node.arc for node in nodes[: config.nodes_kept + 1]]
+    gaps = [second - first for first, second in zip(places, places[1:], strict=False)]
+    if any(gap < config.crowded for gap in gaps) or any(
+        gap < config.shortest_internode for gap in gaps[: config.nodes_kept - 1]
+    ):
+        return "two nodes seem to sit side by side, so one may belong to another cane"
+    # The basal bud may be out of sight; from the base to the first node is no farther than past a basal bud at its end.
+    below = [node.arc for node in cane.nodes if node.arc <= config.basal_reach]
+    first = places[0] - (below[-1] if below else config.basal_reach)
+    if any(gap > config.longest_internode for gap in (first, *gaps[: config.nodes_kept - 1])):
+        return MoreToSee("two nodes are so far apart that one between them may not have been seen")
+    return ""
 
 
 def _far_from(start: float, end: float, taken: list[float]) -> float:

@@ -135,7 +135,10 @@ class Tracker:
             looks: At each spur so far.
         """
         supported = self._associate(proposals)
-        contradicted = {(track.number, track.cut.kind) for track in supported}
+        contradicted: dict[tuple[SpurNumber, CutKind], int] = {}
+        for track in supported:
+            place = track.number, track.cut.kind
+            contradicted[place] = max(contradicted.get(place, 0), track.hits)
         withdrawn: list[str] = []
         keep = []
         known = {id(track) for track in supported}
@@ -268,9 +271,12 @@ class Tracker:
         return supported
 
     def _doubt(
-        self, track: _Track, view: View, labels: NDArray[np.uint8], contradicted: set[tuple[SpurNumber, CutKind]]
+        self, track: _Track, view: View, labels: NDArray[np.uint8], contradicted: dict[tuple[SpurNumber, CutKind], int]
     ) -> str | None:
-        """Why a point that this frame did not propose is withdrawn; None to keep it, empty to drop it in silence."""
+        """Why a point that this frame did not propose is withdrawn; None to keep it, empty to drop it in silence.
+
+        `contradicted` says how many frames have proposed what this one proposes, by spur and kind.
+        """
         # Whether the wood just beyond the cut is still there.
         look = glance(view, labels, track.position + self._config.probe * track.tangent)
         if look == "unseen":
@@ -278,9 +284,11 @@ class Tracker:
         track.gone = track.gone + 1 if look == "gone" else 0
         if track.gone >= self._config.gone:
             return f"withdrawn: the wood beyond it was gone in {track.gone} frames, so it has been cut"
-        if track.shown is None or (track.number, track.cut.kind) in contradicted:
+        against = contradicted.get((track.number, track.cut.kind), 0)
+        if track.shown is None or against:
             track.misses += 1
-            if track.misses >= (_PATIENCE if track.shown is not None else _MEMORY_OF_UNSHOWN):
+            outvoted = track.shown is not None and against > max(track.hits, self._config.hits - 1)
+            if outvoted or track.misses >= (_PATIENCE if track.shown is not None else _MEMORY_OF_UNSHOWN):
                 return "withdrawn: closer looks put the cut elsewhere on this spur" if track.shown is not None else ""
         return None
 

@@ -47,13 +47,23 @@ def test_it_abstains_where_it_has_not_seen_enough():
     assert "only 1 of 2" in str(cut_arc(cane(nodes=(0.02, 0.1)), RULE))
     assert "not in view" in str(cut_arc(cane(nodes=(0.02, 0.1, 0.18), length=0.19), RULE))
     assert "pruned already" in str(cut_arc(cane(nodes=(0.02, 0.1, 0.18), length=0.2, end="free"), RULE))
-    assert "another node may be" in str(cut_arc(cane(nodes=(0.02, 0.1, 0.26), hidden=(Span(0.17, 0.19),)), RULE))
+    assert "another node may be" in str(cut_arc(cane(nodes=(0.02, 0.1, 0.22), hidden=(Span(0.15, 0.17),)), RULE))
     assert "cut is hidden" in str(cut_arc(cane(hidden=(Span(0.195, 0.205),)), RULE))
     assert "side by side" in str(cut_arc(cane(nodes=(0.02, 0.1, 0.12, 0.2)), RULE))
     assert "base" in str(cut_arc(cane(base_gap=0.03), RULE))
     assert decide(spur(), RULE).abstained and not decide(spur(), RULE).cuts
     assert decide(replace(spur(cane()), doubt="edge"), RULE).abstained == ("edge",)
     assert "thick" in decide(spur(cane(radius=0.009)), RULE).abstained[0]
+
+
+def test_nodes_too_near_or_too_far_apart_are_not_counted():
+    """One of them may be another cane's where they cross; or one between them was taken for something else."""
+    assert "side by side" in str(cut_arc(cane(nodes=(0.02, 0.1, 0.145, 0.2)), RULE))
+    assert "far apart" in str(cut_arc(cane(nodes=(0.02, 0.1, 0.26)), RULE))
+    assert "far apart" in str(cut_arc(cane(nodes=(0.02, 0.18, 0.26)), RULE))
+    assert "far apart" in str(cut_arc(cane(nodes=(0.19, 0.26)), RULE))
+    near_the_cut = cut_arc(cane(nodes=(0.02, 0.1, 0.18, 0.225)), RULE)
+    assert near_the_cut == cut_arc(cane(nodes=(0.02, 0.1, 0.18, 0.32)), RULE) == pytest.approx(0.2)
 
 
 def test_a_hidden_stretch_too_short_for_a_node_is_no_reason():
@@ -98,11 +108,11 @@ def test_a_cut_gives_way_to_a_cane_or_a_wire_that_crosses_a_little_off_and_stays
         assert 0.0 < (1.2 - cut.position[2]) * side <= RULE.shift + 1e-9
         assert np.linalg.norm(crossing - cut.position, axis=1).min() >= RULE.crossing
     (cut,) = decide(spur(cane()), RULE, None, wire_from(1.196, 1.214)).cuts
-    assert cut.position[2] == pytest.approx(1.2 - RULE.shift / 2) and "15 mm past node 2" in cut.reason
+    assert cut.position[2] == pytest.approx(1.2 - RULE.shift / 2) and "16 mm past node 2" in cut.reason
     assert decide(spur(cane()), RULE, None, wire_from(0.0, 9.0)).abstained == ("a wire is there",)
 
 
-@pytest.mark.parametrize(("tight", "best"), [((1.19, 1.203), 1.20475), ((1.197, 1.21), 1.19525), ((1.1, 1.3), 1.2)])
+@pytest.mark.parametrize(("tight", "best"), [((1.19, 1.203), 1.20425), ((1.197, 1.21), 1.19575), ((1.1, 1.3), 1.2)])
 def test_where_the_blades_only_just_have_room_a_better_place_nearby_is_taken(tight, best):
     beside = KeepOut(lambda place: "", lambda place, tangent: not tight[0] < place[2] < tight[1])
     (cut,) = decide(spur(cane()), RULE, None, beside).cuts

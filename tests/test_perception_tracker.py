@@ -180,6 +180,18 @@ def test_a_spur_has_one_cut_of_a_kind_and_the_better_supported_one_wins():
     assert len(withdrawn) == 1 and "elsewhere" in withdrawn[0]
 
 
+def test_a_point_gives_way_as_soon_as_more_looks_put_the_cut_elsewhere():
+    tracker = Tracker(CONFIG)
+    for _ in range(CONFIG.hits):
+        shown = feed(tracker, view(), proposal(y=0.06)).points
+    (first,) = shown
+    elsewhere = [feed(tracker, view(), proposal()) for _ in range(CONFIG.hits + 1)]
+    assert [told.points[0].point_id for told in elsewhere[:-1]] == [first.point_id] * CONFIG.hits
+    (second,) = elsewhere[-1].points
+    assert second.point_id != first.point_id
+    assert "elsewhere on this spur" in elsewhere[-1].withdrawn[0]
+
+
 def test_spurs_keep_their_numbers_while_the_robot_drives_on():
     along = np.array([1.0, 0.0, 0.0])
     rng = np.random.default_rng(1)

@@ -43,8 +43,10 @@ def test_the_bridge_keeps_the_same_deadlines_and_the_devices_are_no_slower() -> 
     assert devices.arm.realtime == "enforce"
 
 
-def test_perception_does_not_wait_for_labels_that_no_camera_has() -> None:
-    assert load_section(REAL, "perception", PerceptionConfig).segmenter == "network"
+@pytest.mark.parametrize("path", [REAL, SIM])
+def test_perception_does_not_wait_for_labels_that_no_real_camera_has(path: Path) -> None:
+    assert load_section(path, "perception", PerceptionConfig).segmenter == "network"
+    assert PerceptionConfig().segmenter == "network"
 
 
 def test_the_real_robot_has_its_own_configuration_unless_another_is_given() -> None:

@@ -31,20 +31,32 @@ def losses(trainer: Trainer, scenes: Scenes, until: int) -> list[float]:
 
 
 def test_the_same_seed_trains_the_same_network_also_in_two_goes(scenes):
-    whole = losses(Trainer(3, 4), scenes, 4)
-    first, second = Trainer(3, 4), Trainer(3, 4)
+    whole = losses(Trainer(3, 4, 1), scenes, 4)
+    first, second = Trainer(3, 4, 1), Trainer(3, 4, 1)
     begun = losses(first, scenes, 2)
     second.restore(first.state())
     assert begun + losses(second, scenes, 4) == pytest.approx(whole, rel=1e-3)
-    assert losses(Trainer(4, 4), scenes, 1)[0] != pytest.approx(whole[0], rel=1e-3)
+    assert losses(Trainer(4, 4, 1), scenes, 1)[0] != pytest.approx(whole[0], rel=1e-3)
+
+
+def test_a_training_goes_on_from_another_one_and_the_card_tells_both(scenes, tmp_path):
+    first = Trainer(1, 16, 2)
+    begun = losses(first, scenes, 6)
+    second = Trainer(2, 2, 3, first.state())
+    assert np.mean(losses(second, scenes, 2)) < np.mean(begun[:2])
+    score = confusion(Labeller(second.network, WEIGHTS), scenes)
+    write_network(tmp_path / "net.onnx", second, score, score, 0.0)
+    card = (tmp_path / "net.md").read_text(encoding="utf-8")
+    assert "8 steps of" in card and "--seed 1 --rows 2 --steps 16 --until 6 --out net.onnx" in card
+    assert "--seed 2 --rows 3 --steps 2 --start build/training/state_1_16.pt --out net.onnx" in card
 
 
 def test_what_was_learned_survives_the_export(scenes, tmp_path):
-    trainer = Trainer(1, 16)
+    trainer = Trainer(1, 16, 2)
     told = losses(trainer, scenes, 16)
     assert np.mean(told[-4:]) < 0.7 * np.mean(told[:4])
     score = confusion(Labeller(trainer.network, WEIGHTS), scenes)
-    write_network(tmp_path / "net.onnx", trainer, 1, score, score, 0.25)
+    write_network(tmp_path / "net.onnx", trainer, score, score, 0.25)
     said = NetworkSegmenter(tmp_path / "net.onnx").classify(scenes.color[0], scenes.depth[0].astype(np.float32))
     image = network_input(scenes.color[0], scenes.depth[0].astype(np.float32))
     with torch.inference_mode():
@@ -52,7 +64,7 @@ def test_what_was_learned_survives_the_export(scenes, tmp_path):
     assert len(np.unique(meant)) > 1 and np.mean(said == meant) > 0.999
     assert NetworkSegmenter(tmp_path / "net.onnx").widening == 0.25
     card = (tmp_path / "net.md").read_text(encoding="utf-8")
-    assert f"| cane | {score.overlap()['cane']:.3f} |" in card and "--seed 1 --rows 1 --steps 16" in card
+    assert f"| cane | {score.overlap()['cane']:.3f} |" in card and "--seed 1 --rows 2 --steps 16" in card
 
 
 def test_overlap_is_intersection_over_union():

@@ -1,7 +1,8 @@
 """Train the segmentation network: `python -m perception.training --out FILE.onnx`.
 
 Renders its own pictures, trains on one thread with a fixed seed, scores the result on other rows and writes the network
-with its card. A run that was interrupted, or told to stop with --until, goes on where it stopped.
+with its card. A run that was interrupted, or told to stop with --until, goes on where it stopped; with --start another
+run goes on from there.
 """
 
 import argparse
@@ -19,7 +20,7 @@ from perception.training.network import Labeller
 from perception.training.scenes import TRAINING_SEED, VALIDATION_SEED, Scenes, render_scenes
 from perception.training.score import confusion, widening
 
-_TELL_EVERY = 50
+_TELL_EVERY, _KEEP_EVERY = 50, 250
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -31,11 +32,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--rows", type=int, default=90, help="rows to render for training")
     parser.add_argument("--steps", type=int, default=2400, help="steps of training in all")
     parser.add_argument("--until", type=int, help="stop after this step of them and keep the state")
+    parser.add_argument("--start", type=Path, metavar="STATE", help="train what another run has kept in this file")
     words = parser.parse_args(argv)
     torch.set_num_threads(1)
     words.work.mkdir(parents=True, exist_ok=True)
     scenes = _scenes(words.work / f"training_{words.rows}.npz", TRAINING_SEED, words.rows)
-    trainer = Trainer(words.seed, words.steps)
+    start = None if words.start is None else torch.load(words.start, weights_only=True)
+    trainer = Trainer(words.seed, words.steps, words.rows, start)
     kept = words.work / f"state_{words.seed}_{words.steps}.pt"
     if kept.exists():
         trainer.restore(torch.load(kept, weights_only=True))
@@ -46,13 +49,15 @@ def main(argv: Sequence[str] | None = None) -> int:
             each = (time.process_time() - begin) / len(losses)
             mean = np.mean(losses[-_TELL_EVERY:])
             print(f"step {progress.step:>5}  loss {mean:.4f}  {each:.2f} s a step", flush=True)
+        if progress.step % _KEEP_EVERY == 0:
+            torch.save(trainer.state(), kept)
     torch.save(trainer.state(), kept)
     if trainer.step < trainer.steps:
         return 0
     held_out = _scenes(words.work / "validation.npz", VALIDATION_SEED, 6)
     labeller = Labeller(trainer.network, WEIGHTS)
     scores = {depth: confusion(labeller, held_out, depth) for depth in (True, False)}
-    write_network(words.out, trainer, words.rows, scores[True], scores[False], widening(labeller, held_out))
+    write_network(words.out, trainer, scores[True], scores[False], widening(labeller, held_out))
     print(words.out.with_suffix(".md").read_text(encoding="utf-8"))
     return 0
 

@@ -18,15 +18,12 @@ from rolling_panda.messages import WOOD_CLASSES
 _OPSET = 17
 
 
-def write_network(
-    path: Path, trainer: Trainer, rows: int, with_depth: Confusion, without: Confusion, wider: float
-) -> None:
+def write_network(path: Path, trainer: Trainer, with_depth: Confusion, without: Confusion, wider: float) -> None:
     """Write the network and its card.
 
     Args:
         path: ONNX file; the card is the same name with .md.
         trainer: Trained.
-        rows: That were rendered for it.
         with_depth: How it did on the rows held out.
         without: The same with the depth taken away.
         wider: By how much it draws canes too wide (px).
@@ -51,15 +48,23 @@ def write_network(
     onnx.helper.set_model_props(model, {"classes": json.dumps(list(WOOD_CLASSES)), "widening": f"{wider:.2f}"})
     onnx.checker.check_model(model)
     onnx.save(model, str(path))
-    path.with_suffix(".md").write_text(_card(path, trainer, rows, with_depth, without, wider), encoding="utf-8")
+    path.with_suffix(".md").write_text(_card(path, trainer, with_depth, without, wider), encoding="utf-8")
 
 
-def _card(path: Path, trainer: Trainer, rows: int, with_depth: Confusion, without: Confusion, wider: float) -> str:
+def _card(path: Path, trainer: Trainer, with_depth: Confusion, without: Confusion, wider: float) -> str:
     parameters = sum(weight.numel() for weight in trainer.network.parameters())
     overlap, found, blind = with_depth.overlap(), with_depth.found(), without.overlap()
     table = "\n".join(f"| {name} | {overlap[name]:.3f} | {found[name]:.3f} | {blind[name]:.3f} |" for name in overlap)
+    rows = max(run.rows for run in trainer.runs)
     seeds = f"seeds {TRAINING_SEED} to {TRAINING_SEED + rows - 1}"
-    options = f"--seed {trainer.seed} --rows {rows} --steps {trainer.steps}"
+    told, start = [], ""
+    for run in trainer.runs:
+        until = f" --until {run.until}" if run.until < run.steps else ""
+        options = f"--seed {run.seed} --rows {run.rows} --steps {run.steps}{until}{start}"
+        told.append(f"`python -m perception.training {options} --out {path.name}`")
+        start = f" --start build/training/state_{run.seed}_{run.steps}.pt"
+    commands = ", then\n  ".join(told)
+    steps = sum(run.until for run in trainer.runs)
     return f"""# {path.name}
 
 Tells the class of every pixel of a picture of a vine in winter, for `perception`.
@@ -70,8 +75,8 @@ Tells the class of every pixel of a picture of a vine in winter, for `perception
   {", ".join(WOOD_CLASSES)}.
 - Size: {parameters:,} parameters, {path.stat().st_size / 1024:.0f} KiB.
 - Data: {rows * VIEWS} pictures of {rows} rendered rows ({seeds}); no photograph.
-- Training: {trainer.steps} steps of {BATCH} crops of {CROP}×{CROP} pixels, one thread.
-- Command: `python -m perception.training {options} --out {path.name}`.
+- Training: {steps} steps of {BATCH} crops of {CROP}×{CROP} pixels, one thread.
+- Command: {commands}.
 
 Scores on {VIEWS * 6} pictures of 6 other rows (seeds from {VALIDATION_SEED}). Overlap is intersection over
 union, found is the share of the class's pixels that were given it.

@@ -1,7 +1,8 @@
 """Fits the network: crops of the pictures, varied once more, in a fixed order for a given seed."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -15,7 +16,8 @@ from rolling_panda.messages import WOOD_CLASSES, WoodClass
 
 #: Side of a crop and crops a step.
 CROP, BATCH = 256, 8
-_PEAK_RATE = 3e-3
+#: Highest rate of learning of fresh weights, and of weights that were trained before.
+_PEAK_RATE, _AGAIN_RATE = 3e-3, 2e-3
 #: Small things count for more than their pixels.
 _HEAVIER: dict[WoodClass, float] = {
     "background": 0.4,
@@ -38,23 +40,50 @@ class Progress:
     loss: float
 
 
+class Run(NamedTuple):
+    """One training: its seed, the rows rendered for it, the steps that it was planned for and those that it took."""
+
+    seed: int
+    rows: int
+    steps: int
+    until: int
+
+
+Runs = tuple[Run, ...]
+
+
 class Trainer:
     """Weights, optimiser and random state; can be put away and taken up again with the same result."""
 
-    def __init__(self, seed: int, steps: int) -> None:
-        """Fresh weights.
+    def __init__(self, seed: int, steps: int, rows: int, start: Mapping[str, object] | None = None) -> None:
+        """Fresh weights, or those of an earlier training.
 
         Args:
             seed: Of weights, crops and variations.
             steps: How many there will be: the rate of learning falls to nothing over them.
+            rows: That are rendered for it.
+            start: What another trainer's `state` was.
         """
         torch.manual_seed(seed)
         self.network = Network(CHANNELS, len(WOOD_CLASSES)).to(memory_format=torch.channels_last)
-        self._optimiser = torch.optim.AdamW(self.network.parameters(), _PEAK_RATE, weight_decay=1e-4)
-        self._schedule = torch.optim.lr_scheduler.OneCycleLR(self._optimiser, _PEAK_RATE, total_steps=steps)
+        self._before: Runs = ()
+        rate = _PEAK_RATE
+        if start is not None:
+            rate = _AGAIN_RATE
+            self.network.load_state_dict(start["network"])
+            runs = start["runs"]
+            assert isinstance(runs, list)
+            self._before = tuple(Run(*run) for run in runs)
+        self._optimiser = torch.optim.AdamW(self.network.parameters(), rate, weight_decay=1e-4)
+        self._schedule = torch.optim.lr_scheduler.OneCycleLR(self._optimiser, rate, total_steps=steps)
         self._loss = nn.CrossEntropyLoss(torch.tensor(WEIGHTS))
-        self.seed = seed
+        self.seed, self.rows = seed, rows
         self.steps, self.step = steps, 0
+
+    @property
+    def runs(self) -> Runs:
+        """Every training that these weights have seen, this one last."""
+        return (*self._before, Run(self.seed, self.rows, self.steps, self.step))
 
     def run(self, scenes: Scenes, until: int) -> Iterator[Progress]:
         """Train up to a step."""
@@ -75,6 +104,7 @@ class Trainer:
         """Everything that `restore` needs."""
         return {
             "step": self.step,
+            "runs": [tuple(run) for run in self.runs],
             "network": self.network.state_dict(),
             "optimiser": self._optimiser.state_dict(),
             "schedule": self._schedule.state_dict(),
