@@ -15,6 +15,10 @@ Role = m.Role
 Age = Annotated[float, Meta(ge=0.0, le=1e9)]
 #: Whose axes the gizmo's arrows lie along.
 GizmoAxes = Literal["tool", "base", "world"]
+CameraPreset = Literal["follow", "row", "tool", "top"]
+#: What the 3-D view can show: vines as perceived, pruning points, the tool's trail, the camera on the hand and what it
+#: sees, the points of its depth, and the simulated row as it really is.
+Layer = Literal["plant", "points", "trail", "camera", "cloud", "simulated"]
 
 
 class PageMessage(Struct, frozen=True, kw_only=True, tag=True, forbid_unknown_fields=True):
@@ -145,6 +149,13 @@ class Sightline(PageMessage, frozen=True, kw_only=True):
     direction: m.UnitVector3
 
 
+class Measured(PageMessage, frozen=True, kw_only=True):
+    """Of two places that were clicked while this session measures: second less first (m, odom), what is there."""
+
+    offset: m.Vector3
+    between: tuple[str, str]
+
+
 class HoldEnded(PageMessage, frozen=True, kw_only=True):
     """The server has ended or refused what this page holds, and takes no more of it before the page lets go."""
 
@@ -209,11 +220,29 @@ class ShowPreview(PageMessage, frozen=True, kw_only=True):
     time: m.NonNegative | None
 
 
+class PlaceCamera(PageMessage, frozen=True, kw_only=True):
+    """Put the camera of this session's 3-D views here; `follow` goes along with the base from then on."""
+
+    preset: CameraPreset
+
+
+class ShowLayers(PageMessage, frozen=True, kw_only=True):
+    """Show these layers on this session's 3-D views, and no others."""
+
+    layers: Annotated[tuple[Layer, ...], Meta(max_length=20)]
+
+
+class Measure(PageMessage, frozen=True, kw_only=True):
+    """From now on clicks into the 3-D view measure, each second one answered with `Measured`; or no more."""
+
+    active: bool
+
+
 class Select(PageMessage, frozen=True, kw_only=True):
     """Highlight a point in the 3-D view; empty = none."""
 
     point_id: Annotated[str, Meta(max_length=64)]
 
 
-FromServer = PageState | PagePoints | PagePreview | PageEvents | Selected | Sightline | HoldEnded | Pong
-FromPage = Ping | Hold | ShowGizmo | PlaceByHand | ShowPreview | Select
+FromServer = PageState | PagePoints | PagePreview | PageEvents | Selected | Sightline | Measured | HoldEnded | Pong
+FromPage = Ping | Hold | ShowGizmo | PlaceByHand | PlaceCamera | ShowLayers | Measure | ShowPreview | Select

@@ -12,10 +12,11 @@ import msgspec
 from rolling_panda import intents
 from rolling_panda import messages as m
 from rolling_panda.errors import InputError, ServiceError
-from rolling_panda.page_messages import GizmoAxes, PagePoints, PageState, Sightline
+from rolling_panda.page_messages import GizmoAxes, Measured, PagePoints, PageState, Sightline
 from rolling_panda.plant_requests import PlantRequest
 from server.config import ServerConfig
 from server.event_log import EventLog
+from server.looking import Looking
 from server.motion_rate import MotionRate
 from server.page_view import PageView
 from server.passwords import Passwords
@@ -48,6 +49,10 @@ class Listener(Protocol):
         """There may be something new to send."""
 
     placing: bool
+    measuring: bool
+
+    def measured(self, told: Measured) -> None:
+        """This page's session has clicked the second of two places to measure."""
 
     def sighted(self, line: Sightline) -> None:
         """This page's session has clicked into the 3-D view, to place a point there."""
@@ -82,6 +87,11 @@ class Desk:
     _seen_at: deque[tuple[int, float]] = field(default_factory=lambda: deque(maxlen=100))
     _users_trouble: str = ""
     _refused_holds: dict[str, str] = field(default_factory=dict)
+    looking: Looking = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Begin to draw what the link says."""
+        self.looking = Looking(self.link, self.view, self.scene)
 
     def note(self, severity: m.Severity, text: str, by: str = "") -> None:
         """Write a line of the server's own into the log, here and on the wire; `by` whom, who must not fill it."""
@@ -275,8 +285,14 @@ class Desk:
         page.placing = placing and page.session.may_operate
         self._take_clicks(page.session)
 
+    def measure(self, page: Listener, measuring: bool) -> None:
+        """A page takes its session's next clicks into the 3-D view for a measure, or no more."""
+        page.measuring = measuring and page.session.may_operate
+        self.scene.begin_measure(page.session.session_id, page.measuring)
+        self._take_clicks(page.session)
+
     def _take_clicks(self, session: Session) -> None:
-        taken = any(page.placing for page in self.pages if page.session is session)
+        taken = any(page.placing or page.measuring for page in self.pages if page.session is session)
         self.scene.take_clicks(session.session_id, taken)
 
     def sighted(self, owner: str, origin: m.Vector3, direction: m.Vector3) -> None:
@@ -285,6 +301,10 @@ class Desk:
             if page.placing and page.session.session_id == owner:
                 page.sighted(Sightline(origin=origin, direction=direction))
                 return
+        told = self.looking.measured(owner, origin, direction)
+        for page in self.pages:
+            if told is not None and page.measuring and page.session.session_id == owner:
+                page.measured(told)
 
     def page_closed(self, page: Listener, holding: bool) -> None:
         """A page has gone; with the last one of its session goes the gizmo, and with a holding one the hold."""
@@ -292,6 +312,8 @@ class Desk:
         self.teleop.unseen(page.view)
         if holding:
             self.let_go(page.session)
+        if page.measuring:
+            self.measure(page, False)
         if page.placing:
             self._take_clicks(page.session)
         if not any(other.session is page.session for other in self.pages):

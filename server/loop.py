@@ -34,7 +34,7 @@ class Loop:
 
     def jobs(self) -> list[Coroutine[Any, Any, None]]:
         """Endless coroutines; cancel them to end."""
-        config = self._desk.config
+        config, looking = self._desk.config, self._desk.looking
         return [
             _every(1 / HEARTBEAT.rate_hz, self._beat),
             _every(1 / PRESENCE.rate_hz, self._presence),
@@ -42,6 +42,7 @@ class Loop:
             _every(1 / config.scene_rate_hz, self._scene),
             _every(1 / config.teleop_rate_hz, self._teleop),
             _every(1 / _POINTS_RATE_HZ, self._points),
+            _every(1 / _POINTS_RATE_HZ, looking.draw),
             _every(1 / _LOG_RATE_HZ, self._log),
             _every(_ACCOUNTS_S, self._accounts),
         ]

@@ -71,6 +71,10 @@ class PageView:
             return None
         return pose_message(self._model.pose(configuration(posture.base, posture.position), self._model.tool_id))
 
+    def camera(self, frame: CameraFrame) -> m.Pose:
+        """T_odom_camera when a frame was taken."""
+        return pose_message(self._model.pose(configuration(frame.base, frame.position), self._model.camera_id))
+
     def points(self, now: float) -> PagePoints:
         """Every point in the order of work; those that perception no longer sees stay while the queue has them.
 

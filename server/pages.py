@@ -14,6 +14,8 @@ from rolling_panda.page_messages import (
     FromPage,
     Hold,
     HoldEnded,
+    Measure,
+    Measured,
     PageEvents,
     PageMessage,
     PagePoints,
@@ -21,10 +23,12 @@ from rolling_panda.page_messages import (
     PageState,
     Ping,
     PlaceByHand,
+    PlaceCamera,
     Pong,
     Select,
     Selected,
     ShowGizmo,
+    ShowLayers,
     ShowPreview,
     Sightline,
 )
@@ -54,7 +58,9 @@ class OpenPage:
         self._selected: str | None = None
         self._hold_ended: HoldEnded | None = None
         self._sightline: Sightline | None = None
+        self._measured: Measured | None = None
         self.placing = False
+        self.measuring = False
         self._state: PageState | None = None
         self._points: PagePoints | None = None
         self._preview: PreviewState | None = None
@@ -100,6 +106,11 @@ class OpenPage:
         self._sightline = line
         self.wake()
 
+    def measured(self, told: Measured) -> None:
+        """The second of two places was clicked."""
+        self._measured = told
+        self.wake()
+
     def hold_ended(self, reason: str) -> None:
         """This session's hold is over; the page that held must let go and press again."""
         if self._holding:
@@ -134,6 +145,9 @@ class OpenPage:
         if self._sightline is not None:
             line, self._sightline = self._sightline, None
             return line
+        if self._measured is not None:
+            told, self._measured = self._measured, None
+            return told
         if self._selected is not None:
             point_id, self._selected = self._selected, None
             return Selected(point_id=point_id)
@@ -193,6 +207,12 @@ class OpenPage:
                 self._desk.place_by_hand(self, active)
             case ShowPreview(time=moment):
                 self._desk.scene.show_ghost(self.session.session_id, moment)
+            case PlaceCamera(preset=preset):
+                self._desk.looking.place_camera(self.session, preset)
+            case ShowLayers(layers=layers):
+                self._desk.looking.show_layers(self.session, layers)
+            case Measure(active=active):
+                self._desk.measure(self, active)
             case Select(point_id=point_id):
                 self._desk.scene.select(self.session.session_id, point_id)
 

@@ -60,6 +60,7 @@ class RobotLink:
         self.preview_motion = transport.slot(topics.PREVIEW_MOTION)
         self.report = transport.slot(topics.REPORT)
         self.scenery = transport.slot(topics.SCENERY)
+        self.obstacles = transport.slot(topics.OBSTACLES)
         self.crops: dict[str, PointCrop] = {}
         """The newest picture of each point, by its id."""
         transport.subscribe(topics.CROPS, self._on_crop)

@@ -11,21 +11,30 @@ import viser
 
 from rolling_panda import messages as m
 from rolling_panda.differential_drive import Array
-from rolling_panda.page_messages import GizmoAxes, PagePoint
-from rolling_panda.row_messages import Capsule, Scenery
+from rolling_panda.page_messages import CameraPreset, GizmoAxes, Layer, PagePoint
+from rolling_panda.row_messages import Capsule, Obstacles, Scenery
 from server.robot_meshes import Part
+from server.scene_cameras import SceneCameras
 from server.scene_clicks import SceneClicks
 from server.scene_door import SceneDoor
 from server.scene_ghost import SceneGhost
 from server.scene_gizmo import SceneGizmos
+from server.scene_layers import SceneLayers
 from server.scene_markers import STATE_COLORS, cut_marker, quat_wxyz_of_axis, selection_ring
+from server.scene_measure import End, SceneMeasure
+from server.scene_pick import Ray, hit_ground, hit_rods, hit_triangles, nearest
 from server.scene_robot import SceneRobot
 from server.scene_row import color_of, drawn_kinds, rods_mesh
+from server.scene_sight import Sight, draw_cloud, draw_frustum
+from server.scene_sight import remove as remove_sight
+from server.scene_trail import SceneTrail
 
 VIEW_VERSION = viser.__version__
 _SKY_TOP, _SKY_BOTTOM = np.array([22.0, 27.0, 34.0]), np.array([58.0, 66.0, 76.0])
-_CANE_LINES = "/canes"
+_CANE_LINES = "/plant/canes"
 _SELECTION = "/selection"
+#: What is perceived is drawn so much thicker (m) than the simulated row, so that it is seen where both are.
+_ABOVE = 0.002
 #: Lines of canes are drawn beside them, on the robot's side (m): inside the wood they could not be seen.
 _BESIDE_CANE = np.array([0.0, -0.008, 0.0], dtype=np.float32)
 
@@ -69,30 +78,53 @@ class Scene:
         self._canes: tuple[tuple[m.Vector3, ...], ...] = ()
         self._rods: dict[str, list[Capsule]] = {}
         self._selected: dict[str, str] = {}
+        self._plant: dict[str, list[Capsule]] = {}
         self._draw_surroundings()
+        self.layers = SceneLayers(self._server)
+        self.cameras = SceneCameras()
+        self.trail = SceneTrail(self._server)
+        self._measure = SceneMeasure()
         self.robot = SceneRobot(self._server, model, parts)
         self.ghost = SceneGhost(model, parts)
         self._server.on_client_connect(self._on_client)
         self._server.on_client_disconnect(self._on_client_gone)
 
     def show_row(self, scenery: Scenery) -> None:
-        """Draw the row; kinds of rods that did not change are not sent again."""
+        """Draw the simulated row; kinds of rods that did not change are not sent again."""
+        self._show_rods("/row", scenery.capsules, self._rods, dim=True)
+
+    def show_plant(self, seen: Obstacles) -> None:
+        """Draw posts, trunks, cordons, wires and canes as perceived; likewise."""
+        self._show_rods("/plant", seen.capsules, self._plant, grow=_ABOVE)
+
+    def _show_rods(
+        self,
+        root: str,
+        capsules: tuple[Capsule, ...],
+        before: dict[str, list[Capsule]],
+        dim: bool = False,
+        grow: float = 0.0,
+    ) -> None:
         rods: dict[str, list[Capsule]] = {kind: [] for kind in drawn_kinds()}
-        for capsule in scenery.capsules:
+        for capsule in capsules:
             if capsule.kind in rods:
                 rods[capsule.kind].append(capsule)
         for kind in drawn_kinds():
-            capsules = rods[kind]
-            if capsules == self._rods.get(kind):
+            if rods[kind] == before.get(kind, []):
                 continue
-            self._rods[kind] = capsules
-            if capsules:
-                vertices, faces = rods_mesh(kind, capsules)
+            before[kind] = rods[kind]
+            if rods[kind]:
+                vertices, faces = rods_mesh(kind, rods[kind], grow)
                 self._server.scene.add_mesh_simple(
-                    f"/row/{kind}", vertices, faces, color=color_of(kind), flat_shading=True, receive_shadow=False
+                    f"{root}/{kind}",
+                    vertices,
+                    faces,
+                    color=color_of(kind, dim),
+                    flat_shading=True,
+                    receive_shadow=False,
                 )
             else:
-                self._server.scene.remove_by_name(f"/row/{kind}")
+                self._server.scene.remove_by_name(f"{root}/{kind}")
 
     def show_points(self, points: tuple[PagePoint, ...]) -> None:
         """Draw the pruning points, coloured by state; only what changed is sent."""
@@ -142,8 +174,54 @@ class Scene:
         else:
             self._clicks.end(owner)
 
+    def place_camera(self, owner: str, preset: CameraPreset, q: Array, tool: Array) -> None:
+        """Put the cameras of the views of `owner` where a preset has them; robot at q (12), tool at a place (3)."""
+        self.cameras.take(preset, self._clients(owner), q, tool)
+
+    def show_layers(self, owner: str, layers: tuple[Layer, ...]) -> None:
+        """Show `owner` these layers and no others."""
+        clients = self._clients(owner)
+        self.layers.choose(owner, layers, clients)
+        for client in clients:
+            remove_sight(client, cloud="cloud" not in layers, frustum="camera" not in layers)
+
+    @property
+    def sight_wanted(self) -> bool:
+        """Whether any view shows what the camera on the hand sees."""
+        owners = {self.door.owner(client_id) for client_id in self._server.get_clients()}
+        return any(self.layers.of(owner) & {"camera", "cloud"} for owner in owners if owner is not None)
+
+    def show_sight(self, sight: Sight, wxyz: Array, position: Array) -> None:
+        """Draw what the camera on the hand saw from a pose in odom, for those who want it."""
+        for client_id, client in self._server.get_clients().items():
+            owner = self.door.owner(client_id)
+            layers = frozenset[Layer]() if owner is None else self.layers.of(owner)
+            if "camera" in layers:
+                draw_frustum(client, sight, wxyz, position)
+            if "cloud" in layers:
+                draw_cloud(client, sight, wxyz, position)
+
+    def begin_measure(self, owner: str, begun: bool) -> None:
+        """`owner` measures from now on, or no more."""
+        if begun:
+            self._measure.begin(owner)
+        else:
+            self._measure.end(owner, self._clients(owner))
+
+    def measure(self, owner: str, origin: Array, direction: Array) -> tuple[End, End] | None:
+        """`owner` clicked along a line (odom); both ends after every second click."""
+        ray, layers = Ray(origin, direction), self.layers.of(owner)
+        rods = [rod for rows in self._plant.values() for rod in rows if "plant" in layers]
+        rods += [rod for rows in self._rods.values() for rod in rows if "simulated" in layers]
+        hit = nearest((hit_rods(ray, rods), hit_triangles(ray, self.robot.corners(), "robot"), hit_ground(ray)))
+        if hit is None:
+            return None
+        return self._measure.take(owner, End(ray.at(hit.distance), hit.what), self._clients(owner))
+
     def forget(self, owner: str) -> None:
         """`owner` has signed out."""
+        self.layers.forget(owner)
+        self._measure.end(owner, [])
         self._selected.pop(owner, None)
         self.gizmos.hide(owner)
         self._clicks.end(owner)
@@ -151,6 +229,7 @@ class Scene:
     def move(self, q: Array) -> bool:
         """Show the robot at q (12); True when something was sent."""
         self.gizmos.heading = float(q[2])
+        self.cameras.follow(q)
         return self.robot.move(q)
 
     def close(self) -> None:
@@ -215,6 +294,7 @@ class Scene:
         if owner is not None:
             self.gizmos.attach(owner, client)
             self._clicks.attach(owner, client)
+            self.layers.attach(owner, client)
             self._draw_selection(owner)
             self.ghost.attach(owner, client)
 
@@ -222,6 +302,7 @@ class Scene:
         self.gizmos.detach(client.client_id)
         self._clicks.detach(client.client_id)
         self.ghost.detach(client.client_id)
+        self.cameras.forget(client.client_id)
 
     def _draw_surroundings(self) -> None:
         server, scene = self._server, self._server.scene

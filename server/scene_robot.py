@@ -30,6 +30,7 @@ class SceneRobot:
             if joint != self._base:
                 names[joint] = f"{names[model.parents[joint]]}/{model.names[joint]}"
             self._frames[joint] = server.scene.add_frame(names[joint], show_axes=False)
+        self._parts = [part for part in parts if len(part.faces)]
         self._meshes: list[tuple[viser.MeshHandle, Color]] = []
         for number, part in enumerate(parts):
             handle = server.scene.add_mesh_simple(
@@ -57,6 +58,16 @@ class SceneRobot:
                 self._frames[joint].position = pose[:3]
                 self._frames[joint].wxyz = pose[3:]
         return True
+
+    def corners(self) -> Array:
+        """Every triangle of the robot where it is drawn now (n×3×3, m, odom)."""
+        placed = []
+        for part in self._parts:
+            where = self._data.oMi[part.joint]
+            vertices = part.vertices @ where.rotation.T + where.translation
+            placed.append(vertices[part.faces])
+        corners: Array = np.concatenate(placed)
+        return corners
 
     def set_grey(self, grey: bool) -> None:
         """Grey the robot while what is shown is only its last known state."""

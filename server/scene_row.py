@@ -28,21 +28,29 @@ def drawn_kinds() -> tuple[m.WoodClass, ...]:
     return tuple(_LOOKS)
 
 
-def color_of(kind: m.WoodClass) -> Color:
-    """Colour of a kind, sRGB 0…255."""
-    return _LOOKS[kind][0]
+def color_of(kind: m.WoodClass, dim: bool = False) -> Color:
+    """Colour of a kind, sRGB 0…255; dim where it is there but nobody has seen it yet."""
+    r, g, b = _LOOKS[kind][0]
+    return (r, g, b) if not dim else (_dimmed(r), _dimmed(g), _dimmed(b))
 
 
-def rods_mesh(kind: m.WoodClass, capsules: list[Capsule]) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
+def _dimmed(part: int) -> int:
+    return round(50 + 0.45 * part)
+
+
+def rods_mesh(
+    kind: m.WoodClass, capsules: list[Capsule], grow: float = 0.0
+) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
     """Vertices (V, 3) in odom (m) and faces (F, 3) of rods with flat ends.
 
     Args:
         kind: Decides how many sides a rod has.
         capsules: At least one.
+        grow: Drawn thicker by this (m).
     """
     sides = _LOOKS[kind][1]
     start, end = (np.array([getattr(c, name) for c in capsules]) for name in ("start", "end"))
-    radii = np.array([(c.start_radius, c.end_radius) for c in capsules])
+    radii = np.array([(c.start_radius, c.end_radius) for c in capsules]) + grow
     axis = end - start
     length = np.linalg.norm(axis, axis=1, keepdims=True)
     axis = np.where(length > 1e-9, axis / np.maximum(length, 1e-9), [[0.0, 0.0, 1.0]])

@@ -3,7 +3,7 @@ import pytest
 import trimesh
 
 from rolling_panda.row_messages import Capsule
-from server.scene_row import drawn_kinds, rods_mesh
+from server.scene_row import color_of, drawn_kinds, rods_mesh
 
 
 def rod(kind, start, end, radii=(0.01, 0.01)):
@@ -35,3 +35,10 @@ def test_a_rod_without_length_does_not_break_the_mesh():
 def test_every_kind_has_a_look(kind):
     vertices, faces = rods_mesh(kind, [rod(kind, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))])
     assert faces.max() == len(vertices) - 1
+
+
+def test_what_nobody_has_seen_is_dimmer_and_what_is_seen_drawn_around_it():
+    assert all(sum(color_of(kind, dim=True)) < sum(color_of(kind)) for kind in ("cane", "post", "wire"))
+    rods = [rod("wire", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.001, 0.001))]
+    thin, thick = (np.ptp(rods_mesh("wire", rods, grow)[0][:, 2]) for grow in (0.0, 0.002))
+    assert thick - thin > 0.003

@@ -57,6 +57,10 @@ export type ArmVelocities = [number, number, number, number, number, number, num
 
 export type GizmoAxes = "tool"|"base"|"world";
 
+export type CameraPreset = "follow"|"row"|"tool"|"top";
+
+export type Layer = "plant"|"points"|"trail"|"camera"|"cloud"|"simulated";
+
 export type Finding = "seen"|"changed"|"severed"|"unseen";
 
 export type PreviewPhase = "none"|"waiting"|"rolling"|"ready"|"approved"|"expired";
@@ -513,6 +517,13 @@ export interface Sightline {
   direction: UnitVector3;
 }
 
+/** Of two places that were clicked while this session measures: second less first (m, odom), what is there. */
+export interface Measured {
+  type: "Measured";
+  offset: Vector3;
+  between: [string, string];
+}
+
 /** The server has ended or refused what this page holds, and takes no more of it before the page lets go. */
 export interface HoldEnded {
   type: "HoldEnded";
@@ -563,6 +574,24 @@ export interface ShowGizmo {
 /** From now on clicks into the 3-D view are meant for new points, each answered with a `Sightline`; or no more. */
 export interface PlaceByHand {
   type: "PlaceByHand";
+  active: boolean;
+}
+
+/** Put the camera of this session's 3-D views here; `follow` goes along with the base from then on. */
+export interface PlaceCamera {
+  type: "PlaceCamera";
+  preset: CameraPreset;
+}
+
+/** Show these layers on this session's 3-D views, and no others. */
+export interface ShowLayers {
+  type: "ShowLayers";
+  layers: Layer[];
+}
+
+/** From now on clicks into the 3-D view measure, each second one answered with `Measured`; or no more. */
+export interface Measure {
+  type: "Measure";
   active: boolean;
 }
 
@@ -645,6 +674,6 @@ export interface SessionReport {
   control: ControlReport[];
 }
 
-export type FromServer = PageState|PagePoints|PagePreview|PageEvents|Selected|Sightline|HoldEnded|Pong;
+export type FromServer = PageState|PagePoints|PagePreview|PageEvents|Selected|Sightline|Measured|HoldEnded|Pong;
 
-export type FromPage = Ping|Hold|ShowGizmo|PlaceByHand|ShowPreview|Select;
+export type FromPage = Ping|Hold|ShowGizmo|PlaceByHand|PlaceCamera|ShowLayers|Measure|ShowPreview|Select;

@@ -28,6 +28,8 @@ export class Link {
     this.onholdended = () => {};
     /** Called when this session has clicked into the 3-D view to place a point. @type {(line: Sightline) => void} */
     this.onsightline = () => {};
+    /** Called with the distance of two places that were clicked. @type {(told: import("./messages.js").Measured) => void} */
+    this.onmeasured = () => {};
     this.attempts = 0;
     this.silentTurns = 0;
     this.number = 0;
@@ -131,6 +133,9 @@ export class Link {
         break;
       case "Sightline":
         this.onsightline(message);
+        break;
+      case "Measured":
+        this.onmeasured(message);
         break;
       case "HoldEnded":
         this.onholdended(message.reason);

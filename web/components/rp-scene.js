@@ -2,6 +2,7 @@
 
 import { listenForDriveKeys } from "../driving.js";
 import { element } from "../element.js";
+import { listenForViewKeys } from "../looking.js";
 import { link } from "../state.js";
 import { listenForSpace } from "../stop.js";
 import { listenForDrag, listenForHoldKey } from "../teleoperation.js";
@@ -37,6 +38,7 @@ class RpScene extends HTMLElement {
       listenForSpace(view);
       listenForHoldKey(view);
       listenForDriveKeys(view);
+      listenForViewKeys(view);
       listenForDrag(view);
       frame.classList.add("loaded");
       waiting.hidden = true;

@@ -1,0 +1,83 @@
+// Over the 3-D view: where its camera stands, what it shows, and a measure.
+
+import { placing } from "../by-hand.js";
+import { element, setEnabled, setText } from "../element.js";
+import { LAYERS, PRESETS, layers, measured, measuring, placeCamera, setMeasuring, showLayer } from "../looking.js";
+import { link, now, pageState } from "../state.js";
+import { drawOn } from "../store.js";
+
+class RpViewTools extends HTMLElement {
+  connectedCallback() {
+    const presets = PRESETS.map(([preset, word, hint], index) => {
+      const key = String(index + 1);
+      const traits = { text: word, data: { preset }, attributes: { type: "button", "aria-keyshortcuts": key } };
+      const button = element("button", traits);
+      button.addEventListener("click", () => placeCamera(preset));
+      drawOn([link, pageState], () => setEnabled(button, whyNoLooking(), `${hint} (key ${key})`));
+      return button;
+    });
+    const measure = element("button", {
+      id: "measure",
+      text: "Measure",
+      attributes: { type: "button", "aria-keyshortcuts": "M" },
+    });
+    measure.addEventListener("click", () => setMeasuring(!measuring.get()));
+
+    const list = element("div", { id: "layers", class: "layers" });
+    list.hidden = true;
+    const open = element("button", {
+      id: "show-layers",
+      text: "Layers",
+      attributes: { type: "button", "aria-expanded": "false", "aria-controls": "layers", title: "What the view shows" },
+    });
+    const show = (/** @type {boolean} */ shown) => {
+      list.hidden = !shown;
+      open.setAttribute("aria-expanded", String(shown));
+    };
+    open.addEventListener("click", () => show(list.hidden === true));
+    this.addEventListener("keydown", (event) => event.key === "Escape" && show(false));
+    for (const [layer, word] of LAYERS) {
+      const box = element("input", { data: { layer }, attributes: { type: "checkbox" } });
+      box.addEventListener("change", () => showLayer(layer, box.checked));
+      list.append(element("label", {}, box, word));
+      drawOn([layers], () => {
+        box.checked = layers.get().has(layer);
+      });
+    }
+    const words = element("p", { class: "measured", attributes: { role: "status" } });
+    this.append(element("div", { class: "tools", attributes: { role: "toolbar", "aria-label": "3-D view" } }, ...presets, measure, open), list, words);
+
+    drawOn([measuring, measured, placing, link, pageState, now], () => {
+      const on = measuring.get();
+      this.hidden = placing.get();
+      setEnabled(measure, whyNoMeasuring(), on ? "Measure no more" : "Click two places for their distance (key M)");
+      measure.setAttribute("aria-pressed", String(on));
+      words.hidden = !on;
+      setText(words, distanceWords());
+    });
+  }
+}
+
+function whyNoLooking() {
+  if (link.get().status !== "open") return "There is no link to the server";
+  return pageState.get()?.base ? "" : "It is not known yet where the robot is";
+}
+
+function whyNoMeasuring() {
+  return whyNoLooking() || (pageState.get()?.role === "viewer" ? "You are signed in as a viewer" : "");
+}
+
+function distanceWords() {
+  const told = measured.get();
+  if (told === null) return "Click two places in the view.";
+  const [along, across, up] = told.offset;
+  const far = Math.hypot(along, across, up);
+  const parts = `${metres(along)} along, ${metres(across)} across, ${metres(up)} up`;
+  return `${metres(far)} m from ${told.between[0]} to ${told.between[1]}: ${parts}`;
+}
+
+/** @param {number} value */
+function metres(value) {
+  return value.toFixed(3).replace("-", "−");
+}
+customElements.define("rp-view-tools", RpViewTools);
