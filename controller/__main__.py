@@ -31,7 +31,7 @@ def _run(context: ProcessContext) -> None:
     controller = Controller(config, robot_config, run_id, starts=count_start(folder))
     stop_file = open_stop_file(folder)
     before = restored(folder)
-    controller.restore(before.tickets, stop_file.stops, before.order, before.preview)
+    controller.restore(before.tickets, stop_file.stops, before.order, before.preview, before.approaches)
     ledger = LedgerWriter(lambda: Ledger(folder))
     ledger.write([start_record(context.config_path, run_id)])
     planner = PlanWorker(config, robot_config)

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from controller.authority import ABOUT_CONTROL, MOTION, client_of
 from controller.config import ControllerConfig
 from controller.interface import Inputs, Outputs
-from controller.journal import Journal, OrderRow, PreviewRow, RequestRow, TicketRow
+from controller.journal import ApproachRow, Journal, OrderRow, PreviewRow, RequestRow, TicketRow
 from controller.lines import Lines
 from controller.modes import Event
 from controller.motion import Tracking
@@ -98,12 +98,14 @@ class Controller:
         stops: tuple[StopRecord, ...] = (),
         order: OrderRow | None = None,
         preview: PreviewRow | None = None,
+        approaches: tuple[tuple[str, ApproachRow], ...] = (),
     ) -> None:
         """Take up the queue, its order and the latched stops of an earlier start; nothing resumes by itself."""
         if order is not None:
             self._queue.order.restore(order)
         if preview is not None:
             self._previews.restore(preview)
+        self._queue.approaches.restore(approaches)
         self._queue.restore(rows)
         self._supervisor.restore(stops)
 
@@ -249,6 +251,8 @@ class Controller:
             movement.go_home()
             supervisor.remark("the arm is being brought home")
             return ""
+        if isinstance(intent, intents.TurnApproach) and intent.point_id == movement.sequence.active:
+            return f"{intent.point_id} is being worked on: pause first"
         if isinstance(intent, ABOUT_PREVIEWS):
             return self._previews.do(intent, now)
         return self._operator.points(intent)

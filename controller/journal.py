@@ -13,7 +13,7 @@ from rolling_panda import messages as m
 #: What a row is about: a life of a point, an order of work, whether previews are required, what
 #: somebody asked and how it was answered, a stop, a
 #: log line, a start.
-Kind = Literal["ticket", "order", "preview", "request", "stop", "event", "start"]
+Kind = Literal["ticket", "order", "approach", "preview", "request", "stop", "event", "start"]
 
 
 @dataclass(frozen=True)
@@ -51,6 +51,13 @@ class OrderRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
     order: tuple[str, ...]
     revision: int
+    user: str = ""
+
+
+class ApproachRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """By how much `user` wants the approach to a point turned about its cane (rad); None leaves it to the search."""
+
+    azimuth: float | None
     user: str = ""
 
 

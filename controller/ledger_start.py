@@ -7,7 +7,7 @@ from typing import TypeVar
 
 import msgspec
 
-from controller.journal import OrderRow, PreviewRow, Record, TicketRow
+from controller.journal import ApproachRow, OrderRow, PreviewRow, Record, TicketRow
 from controller.ledger import Ledger
 from rolling_panda.about import About, about
 from rolling_panda.errors import LedgerError
@@ -38,11 +38,12 @@ def start_record(config: Path, run_id: str) -> Record:
 
 @dataclass(frozen=True)
 class Restored:
-    """What was recorded before: points, the order of work if people have put one, whether previews are required."""
+    """What was recorded before: points, and what people want: order of work, previews, approaches."""
 
     tickets: tuple[TicketRow, ...] = ()
     order: OrderRow | None = None
     preview: PreviewRow | None = None
+    approaches: tuple[tuple[str, ApproachRow], ...] = ()
 
 
 def restored(folder: Path) -> Restored:
@@ -53,10 +54,12 @@ def restored(folder: Path) -> Restored:
     """
     with Ledger(folder) as ledger:
         orders, previews = _newest(ledger, "order", OrderRow), _newest(ledger, "preview", PreviewRow)
+        approaches = [name for name, _ in ledger.newest("approach")]
         return Restored(
             tuple(_newest(ledger, "ticket", TicketRow)),
             orders[-1] if orders else None,
             previews[-1] if previews else None,
+            tuple(zip(approaches, _newest(ledger, "approach", ApproachRow), strict=True)),
         )
 
 

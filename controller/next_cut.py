@@ -71,7 +71,9 @@ class NextCut:
             self._ticket, self.found, self._finding = ticket, self._known(ticket), None
             if self.found is not None:
                 return True
-            self._finding = self._search.find(np.array(ticket.accepted.position), np.array(ticket.accepted.tangent), q)
+            at, along = np.array(ticket.accepted.position), np.array(ticket.accepted.tangent)
+            azimuth = self._queue.approaches.of(ticket.point.point_id)
+            self._finding = self._search.find(at, along, q, azimuth)
         return True
 
     @property

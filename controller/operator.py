@@ -1,5 +1,7 @@
 """What operators ask of the queue, and how the log tells it."""
 
+import math
+
 from controller.queue import PointQueue
 from controller.survey import open_place
 from rolling_panda import intents
@@ -27,6 +29,8 @@ class Operator:
             return self._accept_all(intent)
         if isinstance(intent, intents.MoveInQueue):
             return self._queue.move(intent.point_id, intent.before, intent.revision, intent.user)
+        if isinstance(intent, intents.TurnApproach):
+            return self._queue.turn(intent.point_id, intent.azimuth, intent.user)
         if isinstance(intent, intents.PlannersOrder):
             return self._queue.order.give_back(intent.revision) or self._queue.sort()
         return f"{type(intent).__name__} is not something this controller does"
@@ -53,6 +57,9 @@ class Operator:
             return f"accepted {points} of confidence {intent.confidence:.2f} and more"
         if isinstance(intent, intents.MoveInQueue):
             return f"moved {intent.point_id} {f'before {intent.before}' if intent.before else 'to the end'}"
+        if isinstance(intent, intents.TurnApproach):
+            how = "as is found" if intent.azimuth is None else f"turned by {math.degrees(intent.azimuth):.0f}°"
+            return f"wants {intent.point_id} approached {how}"
         if isinstance(intent, intents.PlannersOrder):
             return "gave the order of work back to the plan"
         if isinstance(intent, intents.AskPreview):

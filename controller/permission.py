@@ -28,6 +28,7 @@ _PROBES: dict[type[intents.Intent], intents.Intent | None] = {
     intents.AcceptAll: None,
     intents.MoveInQueue: None,
     intents.PlannersOrder: None,
+    intents.TurnApproach: None,
     intents.AskPreview: None,
     intents.ApprovePreview: None,
     intents.RequirePreview: None,

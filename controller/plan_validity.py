@@ -52,6 +52,13 @@ def points_changed(plan: WorkPlan, tickets: Iterable[Ticket], order: tuple[str, 
     return "" if plan.request.order == order else "the order of work was changed after it was made"
 
 
+def approaches_changed(before: tuple[tuple[str, float], ...], now: tuple[tuple[str, float], ...]) -> str:
+    """To which point somebody wants another approach than before; empty where to none."""
+    for point_id, _ in sorted(set(before) ^ set(now)):
+        return f"the approach to {point_id} was turned after it was made"
+    return ""
+
+
 def place_changed(plan: WorkPlan, q: Array) -> str:
     """How far a robot at rest at q (12) is from where the plan begins; empty within the tolerances."""
     return away_from(plan.request.q, q)

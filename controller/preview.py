@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from controller.journal import Journal, PreviewRow
-from controller.plan_validity import ObstacleWatch, away_from
+from controller.plan_validity import ObstacleWatch, approaches_changed, away_from
 from controller.preview_plan import Preview, PreviewRequest
 from controller.preview_report import motion_message, state_message
 from controller.queue import PointQueue, Ticket
@@ -157,7 +157,8 @@ class Previews:
             self._say("none", "no point is accepted")
             return None
         self._number += 1
-        self._asked = PreviewRequest(self._number, q.copy(), points, tuple(obstacles), dict(cuts or {}), look_s)
+        turned = self._queue.approaches.turned
+        self._asked = PreviewRequest(self._number, q.copy(), points, tuple(obstacles), dict(cuts or {}), look_s, turned)
         self._say("rolling", "")
         return self._asked
 
@@ -223,6 +224,8 @@ class Previews:
         if not working and at_rest and (why := away_from(preview.request.q, q)):
             return why
         if why := self._points_changed(preview, working):
+            return why
+        if why := approaches_changed(preview.request.turned, self._queue.approaches.turned):
             return why
         if self._compared is not obstacles:
             self._compared = obstacles

@@ -19,6 +19,7 @@ class PreviewRequest:
         points: Accepted points, each as it was accepted, in the order of work.
         obstacles: What stands in the way.
         cuts: What the session's plan says of points, by id; the others are searched for as in work.
+        turned: Points of which somebody has said the turn of the approach about the cane, and that (rad).
         look_s: From asking for a picture to knowing what it shows (s).
     """
 
@@ -28,6 +29,7 @@ class PreviewRequest:
     obstacles: tuple[Capsule, ...] = ()
     cuts: dict[str, CutPlan] = field(default_factory=dict)
     look_s: float = 0.5
+    turned: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,7 @@ from typing import Literal
 import msgspec
 import numpy as np
 
+from controller.approaches import Approaches
 from controller.config import ControllerConfig
 from controller.journal import Journal, TicketRow
 from controller.work_order import WorkOrder
@@ -64,6 +65,8 @@ class PointQueue:
         self._tickets: dict[str, Ticket] = {}
         self._order: list[str] = []
         self._entries: tuple[QueueEntry, ...] | None = None
+        self.approaches = Approaches(self._journal)
+        """From where cuts are to be made."""
         self.order = WorkOrder(self._journal)
         """How the accepted points are ordered; `sort` after it has changed."""
         self._notes: dict[str, str] = {}
@@ -259,7 +262,9 @@ class PointQueue:
     def entries(self) -> tuple[QueueEntry, ...]:
         """Every point in the order of work, for the wire."""
         if self._entries is None:
-            self._entries = tuple(_entry(self._tickets[i], self._notes.get(i, "")) for i in self._order)
+            self._entries = tuple(
+                _entry(self._tickets[i], self._notes.get(i, ""), self.approaches.of(i)) for i in self._order
+            )
         return self._entries
 
     def _changed(self, ticket: Ticket) -> str:
@@ -289,6 +294,16 @@ class PointQueue:
         """
         accepted = [name for name in self._order if self._tickets[name].state == "ACCEPTED"]
         return self.order.move(point_id, before, revision, user, accepted) or self.sort()
+
+    def turn(self, point_id: str, azimuth: float | None, user: str) -> str:
+        """Approach a point with this turn about its cane (rad), None as the search finds; why not, empty when done."""
+        ticket = self._tickets.get(point_id)
+        if ticket is None:
+            return f"there is no point {point_id!r}"
+        if ticket.state in ("INTENT", "DONE", "UNKNOWN"):
+            return f"{point_id} is {ticket.state}"
+        self._entries = None
+        return self.approaches.turn(point_id, azimuth, user)
 
     def sort(self) -> str:
         """Put everything where it belongs; nothing keeps that from being done."""
@@ -341,7 +356,7 @@ def _recorded(ticket: Ticket) -> tuple[object, ...]:
     return ticket.state, ticket.user, ticket.accepted, ticket.cut_id, ticket.point.revision
 
 
-def _entry(ticket: Ticket, note: str) -> QueueEntry:
+def _entry(ticket: Ticket, note: str, azimuth: float | None) -> QueueEntry:
     return QueueEntry(
         point_id=ticket.point.point_id,
         state=ticket.state,
@@ -350,5 +365,6 @@ def _entry(ticket: Ticket, note: str) -> QueueEntry:
         cut_id=ticket.cut_id,
         accepted_position=None if ticket.accepted is None else ticket.accepted.position,
         digest="" if ticket.accepted is None else ticket.accepted.digest,
+        azimuth=azimuth,
         recorded=ticket.point if not ticket.seen and ticket.state in _ASKED else None,
     )

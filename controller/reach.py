@@ -32,6 +32,8 @@ APPROACHES = (
     (0.7, 0.0),
     (-0.7, 0.0),
 )
+#: Tilts where somebody has said the turn about the cane (rad), in order of preference.
+TILTS = (0.0, 0.2, 0.26, -0.26)
 #: From the arm's shoulder to its wrist at most, over elbow and wrist offsets (m, Panda's dimensions), and from the
 #: wrist to the flange (m).
 _ARM_LENGTH, _WRIST_TO_FLANGE = 0.3266 + 0.3928 + 0.088, 0.107
@@ -103,13 +105,16 @@ class PostureSearch:
         self._lower = robot.limits.lower[ARM_Q] + margin
         self._upper = robot.limits.upper[ARM_Q] - margin
 
-    def find(self, position: Array, tangent: Array, q: Array) -> Generator[None, None, CutPlan | Unreachable]:
+    def find(
+        self, position: Array, tangent: Array, q: Array, azimuth: float | None = None
+    ) -> Generator[None, None, CutPlan | Unreachable]:
         """Search, yielding once an iteration.
 
         Args:
             position: Of the cut (3, m, odom).
             tangent: Along the cane (3, odom).
             q: Configuration (12) now: the base keeps its distance to the row.
+            azimuth: Turn of the approach about the cane (rad) that somebody wants; None leaves it to the search.
         """
         best: CutPlan | None = None
         self._passed_over = False
@@ -117,9 +122,10 @@ class PostureSearch:
         base = np.array([q[0], q[1], 0.0])
         lateral = float(base @ self._left)
         config = self._config
-        for azimuth, tilt in APPROACHES:
+        approaches = APPROACHES if azimuth is None else tuple((azimuth, tilt) for tilt in TILTS)
+        for turn, tilt in approaches:
             try:
-                poses = cut_poses(position, tangent, self._left, config.stand_off, config.clearance, azimuth, tilt)
+                poses = cut_poses(position, tangent, self._left, config.stand_off, config.clearance, turn, tilt)
             except InputError as error:
                 return Unreachable(str(error))
             for offset in OFFSETS:

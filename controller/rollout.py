@@ -66,6 +66,8 @@ class _Run:
         self._queue.update(m.PruningPoints(header=m.Header(), segmenter="", frames=0, points=request.points))
         for point in request.points:
             self._queue.accept(point.point_id, point.revision, "preview")
+        for point_id, azimuth in request.turned:
+            self._queue.approaches.turn(point_id, azimuth, "preview")
         self._queue.arrange(tuple(point.point_id for point in request.points))
         self._movement = Movement(config, robot_config, self._queue, Lines(self._journal), "preview", self._known)
         robot = self._movement.body.robot
@@ -186,7 +188,7 @@ class _Run:
     def _digest(self) -> str:
         encode = msgspec.msgpack.Encoder(order="deterministic").encode
         request, out = self._request, self._hash
-        for part in (*self._configs, request.points, request.obstacles, request.look_s):
+        for part in (*self._configs, request.points, request.obstacles, request.turned, request.look_s):
             out.update(encode(part))
         out.update(np.ascontiguousarray(request.q, dtype="<f8").tobytes())
         return out.hexdigest()

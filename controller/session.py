@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from controller import plan_report
-from controller.plan_validity import ObstacleWatch, place_changed, points_changed
+from controller.plan_validity import ObstacleWatch, approaches_changed, place_changed, points_changed
 from controller.queue import PointQueue, Ticket
 from controller.reach import CutPlan, Unreachable
 from controller.work_plan import PlannedCut, PlanRequest, WorkPlan
@@ -73,9 +73,9 @@ class Session:
         """
         if made is not None and self._asked is not None and made.request.number == self._asked.number:
             self._take(made)
-        accepted, order = self._queue.accepted(), self._queue.order.by_hand
-        if (accepted, order) != self._wanted:
-            self._wanted, self._quiet_since = (accepted, order), now
+        accepted, order, turned = self._queue.accepted(), self._queue.order.by_hand, self._queue.approaches.turned
+        if (accepted, order, turned) != self._wanted:
+            self._wanted, self._quiet_since = (accepted, order, turned), now
         why = self._why_void(q, obstacles, at_rest, working)
         self._judge(why, bool(accepted))
         pause = _AGAIN_S if self._plan is not None and self._plan.failure else _PAUSE_S
@@ -83,7 +83,8 @@ class Session:
         if self.valid or not due or not accepted or q is None or not (at_rest or working):
             return None
         self._number += 1
-        self._asked, self._asked_at = PlanRequest(self._number, q.copy(), accepted, tuple(obstacles), order), now
+        self._asked_at = now
+        self._asked = PlanRequest(self._number, q.copy(), accepted, tuple(obstacles), order, turned)
         self._judge(why, True)
         return self._asked
 
@@ -98,6 +99,8 @@ class Session:
         """What the plan says of a point as it was accepted; None where it says nothing that holds."""
         plan, point_id = self._plan, ticket.point.point_id
         if plan is None or ticket.accepted not in plan.request.points:
+            return None
+        if plan.request.turned != self._queue.approaches.turned:
             return None
         cut, refusal = self._cuts.get(point_id), plan.refused.get(point_id)
         if cut is not None:
@@ -125,6 +128,7 @@ class Session:
         if plan.failure:
             return f"planning failed: {plan.failure}"
         why = points_changed(plan, self._queue.tickets(), self._queue.order.by_hand)
+        why = why or approaches_changed(plan.request.turned, self._queue.approaches.turned)
         if not why:
             if self._compared is not obstacles:
                 self._compared = obstacles

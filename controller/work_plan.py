@@ -19,6 +19,7 @@ class PlanRequest:
         q: Configuration (12) at the start.
         points: Accepted points, each as it was accepted.
         obstacles: What stands in the way.
+        turned: Points of which somebody has said the turn of the approach about the cane, and that (rad).
         order: Points in the order that people want them in; of none the plan chooses it.
     """
 
@@ -27,6 +28,7 @@ class PlanRequest:
     points: tuple[PruningPoint, ...]
     obstacles: tuple[Capsule, ...] = ()
     order: tuple[str, ...] = ()
+    turned: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -65,6 +65,13 @@ class MoveInQueue(Intent, frozen=True, kw_only=True):
     revision: Count
 
 
+class TurnApproach(Intent, frozen=True, kw_only=True):
+    """Approach a point with this turn about its cane (rad); 0 is straight from the robot's side, None as is found."""
+
+    point_id: Name
+    azimuth: Annotated[float, Meta(ge=-3.2, le=3.2)] | None = None
+
+
 class PlannersOrder(Intent, frozen=True, kw_only=True):
     """Work in the plan's order again; `revision` is that of the order the operator saw."""
 
@@ -157,6 +164,7 @@ AnyIntent = (
     | AcceptAll
     | MoveInQueue
     | PlannersOrder
+    | TurnApproach
     | AskPreview
     | ApprovePreview
     | RequirePreview

@@ -193,6 +193,7 @@ class QueueEntry(Struct, frozen=True, forbid_unknown_fields=True):
     """A pruning point in the controller's queue: its life, why it is where it is, the `digest` that was accepted.
 
     `recorded` is the point as the ledger has it, where perception does not show it and somebody has to decide.
+    `azimuth` is the turn of the approach about the cane (rad) that somebody wants, None where the search chooses it.
     """
 
     point_id: Name
@@ -203,6 +204,7 @@ class QueueEntry(Struct, frozen=True, forbid_unknown_fields=True):
     accepted_position: Vector3 | None = None
     digest: Digest = ""
     recorded: "PruningPoint | None" = None
+    azimuth: Angle | None = None
 
 
 class Nearness(Struct, frozen=True, forbid_unknown_fields=True):

@@ -200,7 +200,7 @@ INTENT: Service[intents.Intent] = Service(
     "service/intent",
     (
         intents.Arm, intents.AcceptPoint, intents.RejectPoint, intents.ReconsiderPoint, intents.ResolvePoint,
-        intents.AcceptAll, intents.MoveInQueue, intents.PlannersOrder,
+        intents.AcceptAll, intents.MoveInQueue, intents.PlannersOrder, intents.TurnApproach,
         intents.AskPreview, intents.ApprovePreview, intents.RequirePreview, intents.Start, intents.Survey,
         intents.Pause, intents.Resume, intents.Home, intents.Acknowledge, intents.Reset, intents.TakeControl,
         intents.RequestControl, intents.GrantControl, intents.ReturnControl,

@@ -1,4 +1,4 @@
-"""REST for the order in which accepted points are worked off."""
+"""REST for how accepted points are worked off: in which order, and approached from where."""
 
 from fastapi import APIRouter, Response
 
@@ -16,6 +16,12 @@ def order_router(desk: Desk) -> APIRouter:
     async def work_before(session: Caller, point_id: PointId, request: body.MoveInQueue) -> Response:
         """Work on an accepted point before another one, or last."""
         wanted = intents.MoveInQueue(user=session.user, point_id=point_id, **request.model_dump())
+        return answer(await desk.ask(session, wanted))
+
+    @router.post("/points/{point_id}/approach")
+    async def approach(session: Caller, point_id: PointId, request: body.TurnApproach) -> Response:
+        """Turn the approach to a point about its cane; an accepted one is planned anew, which says what comes of it."""
+        wanted = intents.TurnApproach(user=session.user, point_id=point_id, azimuth=request.azimuth)
         return answer(await desk.ask(session, wanted))
 
     @router.post("/order/planners")

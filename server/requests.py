@@ -83,6 +83,12 @@ class MoveInQueue(_Body):
     revision: Annotated[int, Field(ge=0, le=2**62)]
 
 
+class TurnApproach(_Body):
+    """Turn of the approach about the cane (rad); null leaves it to the search."""
+
+    azimuth: Annotated[float, Field(ge=-3.2, le=3.2)] | None = None
+
+
 class PlannersOrder(_Body):
     """The revision of the order that was seen."""
 

@@ -13,7 +13,7 @@ class Searches:
     def __init__(self) -> None:
         self.begun = 0
 
-    def find(self, position, tangent, q):
+    def find(self, position, tangent, q, azimuth=None):
         self.begun += 1
         return self.look()
 

@@ -9,7 +9,7 @@ from playwright.sync_api import Page, expect
 from rolling_panda import messages as m
 
 pytestmark = pytest.mark.browser
-ALLOWED = ("MoveInQueue", "PlannersOrder")
+ALLOWED = ("MoveInQueue", "PlannersOrder", "TurnApproach")
 
 
 @pytest.fixture
@@ -102,3 +102,19 @@ def test_of_many_points_only_those_in_view_are_there(page: Page, server: PlayedS
     page.keyboard.press("End")
     expect(page.locator('.order-row[data-point-id="p299"]')).to_be_visible()
     assert page.locator(".order-row").count() < 30
+
+
+def test_the_approach_is_turned_and_left_to_the_search_again(page: Page, server: PlayedServer) -> None:
+    page.locator('rp-point[data-point-id="p2"]').click()
+    page.get_by_label("Turn of the approach").fill("30")
+    until(page, lambda: bool(server.posted))
+    path, body = server.posted[0]
+    assert path == "/api/points/p2/approach" and body["azimuth"] == pytest.approx(0.5236, abs=1e-3)
+    expect(page.get_by_role("button", name="As found")).to_have_attribute("aria-disabled", "true")
+    entry = msgspec.structs.replace(server.points[1].entry, azimuth=0.5236)
+    turned = msgspec.structs.replace(server.points[1], entry=entry)
+    server.points = (server.points[0], turned, *server.points[2:])
+    server.tell(server.page_points())
+    expect(page.locator(".approach .number")).to_have_text("30°")
+    page.get_by_role("button", name="As found").click()
+    until(page, lambda: ("/api/points/p2/approach", {"azimuth": None}) in server.posted)

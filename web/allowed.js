@@ -20,6 +20,7 @@ const NEEDS = Object.freeze({
   AskPreview: "There can be no preview",
   ApprovePreview: "Nothing can be approved",
   RequirePreview: "It cannot be changed",
+  TurnApproach: "The approach cannot be turned",
   MoveInQueue: "The order cannot be changed",
   PlannersOrder: "The order cannot be changed",
   RejectPoint: "Points cannot be rejected",

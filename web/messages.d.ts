@@ -126,7 +126,7 @@ export interface PruningPoint {
   digest: string;
 }
 
-/** A pruning point in the controller's queue: its life, why it is where it is, the `digest` that was accepted. `recorded` is the point as the ledger has it, where perception does not show it and somebody has to decide. */
+/** A pruning point in the controller's queue: its life, why it is where it is, the `digest` that was accepted. `recorded` is the point as the ledger has it, where perception does not show it and somebody has to decide. `azimuth` is the turn of the approach about the cane (rad) that somebody wants, None where the search chooses it. */
 export interface QueueEntry {
   point_id: string;
   state: PointState;
@@ -136,6 +136,7 @@ export interface QueueEntry {
   accepted_position: Vector3|null;
   digest: string;
   recorded: PruningPoint|null;
+  azimuth: number|null;
 }
 
 /** The least distance (m) between two things that must not touch, and which; negative where they overlap. */

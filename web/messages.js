@@ -13,6 +13,6 @@ export const SEVERITIES = Object.freeze(["info", "warning", "error"]);
 export const ROLES = Object.freeze(["viewer", "operator", "supervisor"]);
 
 /** What `ControllerState.allowed` may contain. */
-export const INTENTS = Object.freeze(["Arm", "AcceptPoint", "RejectPoint", "ReconsiderPoint", "ResolvePoint", "AcceptAll", "MoveInQueue", "PlannersOrder", "AskPreview", "ApprovePreview", "RequirePreview", "Start", "Survey", "Pause", "Resume", "Home", "Acknowledge", "Reset", "TakeControl", "RequestControl", "GrantControl", "ReturnControl"]);
+export const INTENTS = Object.freeze(["Arm", "AcceptPoint", "RejectPoint", "ReconsiderPoint", "ResolvePoint", "AcceptAll", "MoveInQueue", "PlannersOrder", "TurnApproach", "AskPreview", "ApprovePreview", "RequirePreview", "Start", "Survey", "Pause", "Resume", "Home", "Acknowledge", "Reset", "TakeControl", "RequestControl", "GrantControl", "ReturnControl"]);
 
 export const TEXT_MAX_LENGTH = 500;

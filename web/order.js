@@ -60,3 +60,22 @@ export async function plannersOrder() {
   const revision = pageState.get()?.controller?.order.revision ?? 0;
   return ask("The plan's order", "/api/order/planners", { revision });
 }
+
+/**
+ * Why the approach to a point cannot be turned; empty when it can.
+ *
+ * @param {PagePoint} row
+ */
+export function whyNotTurn(row) {
+  if (["INTENT", "DONE", "UNKNOWN"].includes(row.entry.state)) return "It is cut, or may be";
+  return whyNot("TurnApproach");
+}
+
+/**
+ * @param {PagePoint} row
+ * @param {number|null} azimuth About the cane (rad); null leaves it to the search.
+ */
+export function turnApproach(row, azimuth) {
+  const name = row.point.point_id;
+  return ask(`Turning the approach to ${name}`, `/api/points/${encodeURIComponent(name)}/approach`, { azimuth });
+}

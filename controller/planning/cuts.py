@@ -73,8 +73,9 @@ class CutPlanner:
         refused: dict[str, str] = {}
         cuts: dict[str, CutPlan] = {}
         targets = []
+        turned = dict(request.turned)
         for point in request.points:
-            found = self._posture(point, request.q)
+            found = self._posture(point, request.q, turned.get(point.point_id))
             if isinstance(found, str):
                 refused[point.point_id] = found
                 continue
@@ -94,10 +95,10 @@ class CutPlanner:
         digest = self._digest(request, planned, refused)
         return WorkPlan(request, tuple(planned), refused, said, schedule.duration, digest)
 
-    def _posture(self, point: PruningPoint, q: Array) -> CutPlan | str:
+    def _posture(self, point: PruningPoint, q: Array, azimuth: float | None) -> CutPlan | str:
         """A posture to make the cut from, or why there is none."""
         self._clearance.forget()
-        finding = self._search.find(np.array(point.position), np.array(point.tangent), q)
+        finding = self._search.find(np.array(point.position), np.array(point.tangent), q, azimuth)
         try:
             while True:
                 next(finding)
@@ -148,7 +149,15 @@ class CutPlanner:
     def _digest(self, request: PlanRequest, cuts: list[PlannedCut], refused: dict[str, str]) -> str:
         encode = msgspec.msgpack.Encoder(order="deterministic").encode
         out = hashlib.sha256()
-        for part in (self._config, self._robot_config, request.points, request.obstacles, request.order, refused):
+        for part in (
+            self._config,
+            self._robot_config,
+            request.points,
+            request.obstacles,
+            request.order,
+            request.turned,
+            refused,
+        ):
             out.update(encode(part))
         out.update(np.ascontiguousarray(request.q, dtype="<f8").tobytes())
         for cut in cuts:

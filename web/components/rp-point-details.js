@@ -2,6 +2,7 @@
 
 import { move, whyNotMove } from "../decisions.js";
 import { element, setEnabled, setText } from "../element.js";
+import { turnApproach, whyNotTurn } from "../order.js";
 import { newtons, uncertainty } from "../words.js";
 
 /** @typedef {import("../messages.js").PagePoint} PagePoint */
@@ -10,6 +11,8 @@ import { newtons, uncertainty } from "../words.js";
 /** A picture that has not come yet is asked for again after so long (ms), so many times. */
 const AGAIN_MS = 1500;
 const TRIES = 20;
+/** A dragged slider asks when it has rested for so long (ms). */
+const SETTLE_MS = 150;
 /** How far a press moves the cut along its cane (mm). */
 const STEPS = Object.freeze([-5, -1, 1, 5]);
 
@@ -70,6 +73,12 @@ export class RpPointDetails extends HTMLElement {
       return element("button", { class: "quiet", text: words, attributes: { type: "button" }, onclick: () => this.move(step) });
     });
     this.moves.append(element("span", { text: "Move, mm" }), ...this.buttons);
+    this.turn = element("input", { attributes: { type: "range", min: "-75", max: "75", step: "5", "aria-label": "Turn of the approach about the cane" } });
+    this.turned = element("span", { class: "number" });
+    this.free = element("button", { class: "quiet", text: "As found", attributes: { type: "button" }, onclick: () => this.row && void turnApproach(this.row, null) });
+    this.turning = 0;
+    this.turn.addEventListener("input", () => this.turnTo(Number(this.turn.value)));
+    this.approach = element("div", { class: "approach" }, element("span", { text: "Approach" }), this.turn, this.turned, this.free);
     this.shown = "";
     this.tries = 0;
     this.timer = 0;
@@ -86,7 +95,7 @@ export class RpPointDetails extends HTMLElement {
       if (this.tries++ >= TRIES) return;
       this.timer = window.setTimeout(() => this.fetch(), AGAIN_MS);
     });
-    this.append(this.frame, this.facts, this.moves);
+    this.append(this.frame, this.facts, this.moves, this.approach);
   }
 
   /** @param {number} step */
@@ -94,9 +103,34 @@ export class RpPointDetails extends HTMLElement {
     if (this.row) void move(this.row, step);
   }
 
+  /** While the slider is dragged, no more than a few requests a second. @param {number} degrees */
+  turnTo(degrees) {
+    setText(this.turned, `${degrees}°`);
+    window.clearTimeout(this.turning);
+    const row = this.row;
+    this.turning = window.setTimeout(() => {
+      this.turning = 0;
+      if (row) void turnApproach(row, (degrees * Math.PI) / 180);
+    }, SETTLE_MS);
+  }
+
+  /** @param {PagePoint} row */
+  showApproach(row) {
+    const { azimuth } = row.entry;
+    const why = whyNotTurn(row);
+    this.turn.disabled = why !== "";
+    this.turn.title = why || "From where the blades come, turned about the cane; an accepted cut is planned anew";
+    setEnabled(this.free, why || (azimuth === null ? "It is chosen by what is found already" : ""), "Leave the approach to the search");
+    if (this.turning) return;
+    const degrees = azimuth === null ? 0 : Math.round((180 * azimuth) / Math.PI);
+    this.turn.value = String(degrees);
+    setText(this.turned, azimuth === null ? "found" : `${degrees}°`);
+  }
+
   /** @param {PagePoint} row */
   show(row) {
     this.row = row;
+    this.showApproach(row);
     const { point } = row;
     const why = whyNotMove(row);
     this.buttons.forEach((button, at) => {
