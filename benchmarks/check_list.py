@@ -210,7 +210,8 @@ SERVER = (
           "if not may_move and isinstance(message, GizmoUpdate | GizmoDragStart):", "if False:",
           "test_viser_filter.py"),
     Check("the account of who is signed in", "server/sessions.py",
-          "if each.account and accounts.get(each.user) != each.account", "if False", "test_sessions.py"),
+          "if each.account and accounts.get(each.user) != each.account", "if False",
+          "test_sign_in.py::test_who_is_removed_is_out_within_a_second"),
 )
 
 WIRE = (
