@@ -92,14 +92,11 @@ function ofModes({ controller, bridge, stops }) {
  * @param {PageState} state
  * @returns {Alarm[]}
  */
-function ofWork({ controller, bridge, control }) {
+function ofWork({ controller, bridge }) {
   const found = [];
   const unknown = points.get()?.points.filter((row) => row.entry.state === "UNKNOWN").length ?? 0;
   if (unknown > 0) {
     found.push(alarm("unknown", "warning", `${counted(unknown, "cut")} ended unknown`, "Look at the plant, and say on the row whether it is cut."));
-  }
-  if (control?.requested_by) {
-    found.push(alarm("asked", "warning", `${control.requested_by} asks for control`, "Whoever holds it gives it, or goes on."));
   }
   if (bridge && isLive("bridge") && bridge.real_time_factor < 0.9 && bridge.kind === "sim") {
     found.push(alarm("slow", "warning", "The simulation is slower than real time", "Close other programs on this computer."));
