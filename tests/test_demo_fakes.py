@@ -33,7 +33,10 @@ def test_an_accepted_point_is_cut_where_it_was_accepted_by_libfranka_ros_and_lib
     config, record = tmp_path / "fakes.toml", tmp_path / "trace"
     text = resource("assets/config/fakes.toml").read_text().replace("127.0.0.41", ADDRESS)
     # Two cores that other tests use too may take seconds for a picture, which is nothing against the drivers.
-    patient = "[controller]\nobstacles_max_age_s = 30.0\nlook_timeout_s = 30.0\n\n[perception]"
+    patient = (
+        "[controller]\nobstacles_max_age_s = 30.0\nlook_timeout_s = 30.0\nperception_max_age_s = 20.0\n\n"
+        "[perception]\nhang_s = 20.0"
+    )
     small = "[vineyard]\nvines = 1\nrows_behind = 0\n\n"
     config.write_text(text.replace("[perception]", small + patient))
     demo = Demo(free_port(), 0, config, "--bridge", "real", "--fakes", "--trace", str(record))
