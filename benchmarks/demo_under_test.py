@@ -115,3 +115,5 @@ class Demo:
         self.client.close()
         self._popen.terminate()
         self._popen.wait(15)
+        assert self._popen.stdout is not None
+        self._popen.stdout.close()
