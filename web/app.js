@@ -9,9 +9,7 @@ import "./components/rp-invite.js";
 import "./components/rp-link-banner.js";
 import "./components/rp-log.js";
 import "./components/rp-mode.js";
-import "./components/rp-order.js";
 import "./components/rp-placing.js";
-import "./components/rp-preview.js";
 import "./components/rp-queue.js";
 import "./components/rp-replay.js";
 import "./components/rp-rule.js";
@@ -28,7 +26,7 @@ import { listenForDriveKeys, watchGamepad } from "./driving.js";
 import { explainGreyed } from "./greyed.js";
 import { keepHistory } from "./history.js";
 import { guardLooking } from "./looking.js";
-import { now } from "./state.js";
+import { now, points } from "./state.js";
 import { listenForSpace } from "./stop.js";
 import { guardHold, socket } from "./teleoperation.js";
 
@@ -42,3 +40,10 @@ keepHistory();
 guardLooking();
 window.setInterval(() => now.set(performance.now()), 250);
 socket.open();
+// What is about accepted points comes with the first of them.
+const wait = points.subscribe((page) => {
+  if (!page?.points.some((row) => row.entry.state === "ACCEPTED")) return;
+  wait();
+  void import("./components/rp-order.js");
+  void import("./components/rp-preview.js");
+});

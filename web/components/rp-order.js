@@ -54,6 +54,7 @@ class RpOrder extends HTMLElement {
       setText(words, orderWords());
       setEnabled(back, whyNoPlannersOrder(), "Work in the order that the plan finds the quickest");
       this.order = workOrder();
+      this.hidden = this.order.length < 2;
       this.draw();
     });
   }
