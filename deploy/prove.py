@@ -73,7 +73,7 @@ class Operator:
 
     def get(self, path: str) -> Any:
         """The answer in JSON."""
-        with self._opener.open(PAGE + path, timeout=5) as answer:
+        with self._opener.open(PAGE + path, timeout=20) as answer:
             return json.load(answer)
 
     def post(self, path: str, body: object) -> None:
@@ -81,26 +81,35 @@ class Operator:
         headers = {"Origin": PAGE, "Content-Type": "application/json"}
         request = urllib.request.Request(PAGE + path, json.dumps(body).encode(), headers)
         try:
-            self._opener.open(request, timeout=5).close()
+            self._opener.open(request, timeout=20).close()
         except urllib.error.HTTPError as error:
             raise RuntimeError(f"{path}: {error.read().decode(errors='replace')[:300]}") from error
 
     def prune(self, limit_s: float) -> str:
-        """Accept what is proposed, start, look on until the first cane is cut; returns how it ended."""
-        self.post("/api/arm", {})
-        until, started = time.monotonic() + limit_s, False
+        """Arm, accept what is proposed, start, look on until the first cane is cut; returns how it ended."""
+        until, trouble = time.monotonic() + limit_s, "no point was proposed"
         while time.monotonic() < until:
-            # Work goes on only while somebody looks.
-            self.get("/api/state")
-            states = [row["state"] for row in self.get("/api/points")["points"]]
+            # Work goes on only while somebody looks; where this script was late, it takes the work up again.
+            mode = (self.get("/api/state")["controller"] or {}).get("mode", "")
+            states = [row["entry"]["state"] for row in self.get("/api/points")["points"]]
             if "DONE" in states:
                 return "DONE"
-            if not started and "PROPOSED" in states:
-                self.post("/api/points/accept-all", {"confidence": 0.8})
-                self.post("/api/start", {})
-                started = True
+            try:
+                self._go_on(mode, states)
+            except RuntimeError as error:
+                trouble = str(error)
             time.sleep(0.2)
-        return f"nothing was cut in {limit_s:.0f} s"
+        return f"nothing was cut in {limit_s:.0f} s; {trouble}"
+
+    def _go_on(self, mode: str, states: list[str]) -> None:
+        if mode == "IDLE":
+            self.post("/api/arm", {})
+        elif mode == "PAUSED":
+            self.post("/api/resume", {})
+        elif mode == "READY" and "ACCEPTED" in states:
+            self.post("/api/start", {})
+        elif mode == "READY" and "PROPOSED" in states:
+            self.post("/api/points/accept-all", {"confidence": 0.8})
 
 
 def main() -> int:
@@ -184,7 +193,7 @@ def look(proof: Proof, services: dict[str, Any], engine: Any, password: str) -> 
     proof.that(
         "only the page is published, on the loopback address", published == ["127.0.0.1:8000->8000/tcp"], published
     )
-    version = json.load(urllib.request.urlopen(f"{PAGE}/version", timeout=5))
+    version = json.load(urllib.request.urlopen(f"{PAGE}/version", timeout=20))
     proof.that(f"the page is there: version {version['version']}", bool(version["packages_sha256"]))
     ended = Operator(password).prune(180.0)
     proof.that("a cane is cut, from acceptance to DONE", ended == "DONE", ended)
