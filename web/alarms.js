@@ -79,11 +79,11 @@ function ofModes({ controller, bridge, stops }) {
       break;
   }
   if (bridge?.cutter === "jammed") {
-    found.push(alarm("jammed", "error", "The cutter is jammed", "Stop, press the robot's emergency stop, and free the blades by hand."));
+    found.push(alarm("jammed", "error", "The cutter is jammed", "Press the robot's emergency stop, then free the blades by hand."));
   }
   const atWork = controller?.mode === "AUTO" || controller?.mode === "TELEOP";
   if (bridge?.watchdog && atWork && isLive("controller")) {
-    found.push(alarm("watchdog", "error", "The bridge gets no commands in time and holds the robot", "See the load of the computer; work goes on when you start it again."));
+    found.push(alarm("watchdog", "error", "The bridge gets no commands in time and holds the robot", "See the load of its computer, then start again."));
   }
   return found;
 }
@@ -99,7 +99,7 @@ function ofWork({ controller, bridge }) {
     found.push(alarm("unknown", "warning", `${counted(unknown, "cut")} ended unknown`, "Look at the plant, and say on the row whether it is cut."));
   }
   if (bridge && isLive("bridge") && bridge.real_time_factor < 0.9 && bridge.kind === "sim") {
-    found.push(alarm("slow", "warning", "The simulation is slower than real time", "Close other programs on this computer."));
+    found.push(alarm("slow", "warning", "The simulation is slower than real time", "Close other programs."));
   }
   if (controller && isLive("controller")) {
     if (lateShare() > LATE_SHARE) {
@@ -113,7 +113,7 @@ function ofWork({ controller, bridge }) {
     }
   }
   if ((roundTrip.get() ?? 0) > SLOW_MS) {
-    found.push(alarm("trip", "warning", "The link between this page and the server is slow", "Come nearer to the network; leading the tool may end by itself."));
+    found.push(alarm("trip", "warning", "The link between this page and the server is slow", "Leading the tool may end by itself."));
   }
   return found;
 }

@@ -38,10 +38,15 @@ class RpLog extends HTMLElement {
     const toEnd = () => {
       list.scrollTop = list.scrollHeight;
     };
+    let width = 0;
     list.addEventListener("scroll", () => {
-      following = list.scrollHeight - list.scrollTop - list.clientHeight < 24;
+      // A list that was just made narrower scrolls by itself.
+      if (width === list.clientWidth) following = list.scrollHeight - list.scrollTop - list.clientHeight < 24;
     });
-    new ResizeObserver(() => following && toEnd()).observe(list);
+    new ResizeObserver(() => {
+      width = list.clientWidth;
+      if (following) toEnd();
+    }).observe(list);
 
     /** @param {PageEvent} line */
     const isWanted = (line) =>
