@@ -74,7 +74,9 @@ def kinds(schema: dict[str, Any]) -> set[str]:
     return {schema["type"]}.union(*(kinds(one) for one in inner))
 
 
-@pytest.mark.parametrize("kind", {topic.message for topic in topics.TOPICS}, ids=lambda kind: str(kind.__name__))
+@pytest.mark.parametrize(
+    "kind", dict.fromkeys(topic.message for topic in topics.TOPICS), ids=lambda kind: str(kind.__name__)
+)
 def test_every_schema_is_one_that_a_viewer_reads(kind: type[m.Message]) -> None:
     """Foxglove takes an object of plain fields, arrays of one type, and no references."""
     schema = schema_of(kind)
