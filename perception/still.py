@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
@@ -20,6 +21,8 @@ _COMMON_DIAMETER = 0.008
 #: Canes thinner than this are too thin to follow (px).
 _THINNEST = 2.0
 _LEAST_PIXELS = 40
+#: A common cane is between 5 and 13 mm thick, so that without depth every length is known to this factor only.
+_SCALE_DOUBT = 1.6
 
 
 @dataclass(frozen=True)
@@ -71,6 +74,7 @@ def read_still(photograph: Photograph, labels: NDArray[np.uint8], config: Percep
         if isinstance(assumed, str):
             return Still((), (assumed,), 0, 0, "none")
         depth = np.full(labels.shape, assumed, np.float32)
+        config = _of_unknown_scale(config)
         scale = f"no depth: the median cane is taken to be {1000 * _COMMON_DIAMETER:.0f} mm thick"
     else:
         depth, scale = photograph.depth, "depth image"
@@ -91,6 +95,17 @@ def read_still(photograph: Photograph, labels: NDArray[np.uint8], config: Percep
     if not plant.spurs:
         abstained.append("no spur was recognised: the cordon with its spurs must be in the picture")
     return Still(tuple(points), tuple(abstained), len(plant.spurs), sum(len(s.canes) for s in plant.spurs), scale)
+
+
+def _of_unknown_scale(config: PerceptionConfig) -> PerceptionConfig:
+    """What tells a wrong count by the distance of nodes must not take the scale for the vine."""
+    rule = msgspec.structs.replace(
+        config.rule,
+        crowded=config.rule.crowded / _SCALE_DOUBT,
+        shortest_internode=config.rule.shortest_internode / _SCALE_DOUBT,
+        longest_internode=config.rule.longest_internode * _SCALE_DOUBT,
+    )
+    return msgspec.structs.replace(config, rule=rule)
 
 
 def _assumed_depth(photograph: Photograph, labels: NDArray[np.uint8]) -> float | str:

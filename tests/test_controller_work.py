@@ -204,7 +204,10 @@ def test_refusals_say_why_and_allowed_agrees_with_them():
     r = robot()
     r.run(0.1)
     assert "arm the robot first" in r.ask(intents.Start(user="ada")).reason
-    assert set(r.state.allowed) == {"Arm", "AcceptPoint", "RejectPoint", "ReconsiderPoint", "ResolvePoint", "AcceptAll"}
+    decisions = {"AcceptPoint", "RejectPoint", "ReconsiderPoint", "ResolvePoint", "AcceptAll", "TurnApproach"}
+    orders = {"MoveInQueue", "PlannersOrder"}
+    previews = {"AskPreview", "ApprovePreview", "RequirePreview"}
+    assert set(r.state.allowed) == {"Arm"} | decisions | orders | previews
     assert r.ask(intents.Arm(user="ada")).ok
     assert r.ask(intents.Start(user="ada")).reason == "no point is accepted"
     assert r.ask(intents.Resume(user="ada")).reason == "resume is not possible in READY"

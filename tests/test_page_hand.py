@@ -49,7 +49,7 @@ def test_what_moves_and_along_which_axes_is_chosen(page: Page, server: PlayedSer
     page.get_by_role("button", name="Base", exact=True).click()
     until(page, lambda: p.ShowGizmo(visible=False, axes="world") in server.said)
     expect(page.locator("#hold")).to_be_hidden()
-    page.get_by_role("button", name="Tool", exact=True).click()
+    page.get_by_role("group", name="What moves").get_by_role("button", name="Tool", exact=True).click()
     expect(page.get_by_role("button", name="world", exact=True)).to_have_attribute("aria-pressed", "true")
     until(page, lambda: server.said.count(p.ShowGizmo(visible=True, axes="world")) == 2)
 

@@ -54,8 +54,8 @@ def moved(row: p.PagePoint, digest: str) -> p.PagePoint:
 
 
 def test_another_rule_is_tried_at_once_and_says_what_it_changes(page: Page, server: PlayedServer) -> None:
-    expect(page.locator(".rule summary")).to_have_text("Spur · 2 nodes · ≥ 6 mm · 20 mm past")
-    page.locator(".rule summary").click()
+    expect(page.locator("rp-rule summary")).to_have_text("Spur · 2 nodes · ≥ 6 mm · 20 mm past")
+    page.locator("rp-rule summary").click()
     expect(page.locator("#rule-fruiting_nodes")).to_be_hidden()
     page.locator("#rule-offset").focus()
     for _ in range(5):
@@ -80,14 +80,14 @@ def test_another_rule_is_tried_at_once_and_says_what_it_changes(page: Page, serv
     server.tell(server.page_points())
     expect(page.locator(".rule-outcome")).to_have_text("4 points: 2 moved, 1 new, 1 acceptance void")
     expect(page.locator('[data-point-id="p2"] .reason')).to_contain_text("acceptance void: it moved by 5 mm")
-    expect(page.locator(".rule summary")).to_contain_text("25 mm past")
+    expect(page.locator("rp-rule summary")).to_contain_text("25 mm past")
     page.locator("#rule-back").click()
     until(page, lambda: len(server.posted) == 2)
     assert server.posted[-1][1]["offset"] == 0.02
 
 
 def test_guyot_asks_for_the_nodes_of_the_fruiting_cane(page: Page, server: PlayedServer) -> None:
-    page.locator(".rule summary").click()
+    page.locator("rp-rule summary").click()
     page.locator("#system-guyot").check(force=True)
     until(page, lambda: bool(server.posted))
     assert server.posted[-1][1]["system"] == "guyot"
@@ -98,7 +98,7 @@ def test_guyot_asks_for_the_nodes_of_the_fruiting_cane(page: Page, server: Playe
 
 def test_a_rule_that_is_refused_goes_back_and_says_why(page: Page, server: PlayedServer) -> None:
     server.answers["/api/rule"] = (409, {"ok": False, "reason": "perception is busy with a frame"})
-    page.locator(".rule summary").click()
+    page.locator("rp-rule summary").click()
     page.locator("#rule-nodes_kept").press("ArrowRight")
     expect(page.locator(".rule-outcome")).to_have_text("Not done: perception is busy with a frame")
     expect(page.locator("#rule-nodes_kept")).to_have_value("2")

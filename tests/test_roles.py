@@ -1,11 +1,13 @@
 """Every request that the server describes, by every role: what a role may not do is refused before anybody is asked."""
 
+import re
+
 import pytest
 from fake_wire import FakeWire
 from running_server import running_server
 
 #: What everybody who is signed in may do, and what everybody may do.
-ANYBODY_SIGNED_IN = {"/api/stop"}
+ANYBODY_SIGNED_IN = {"/api/stop", "/api/replay"}
 PUBLIC = {"/api/sign-in", "/api/sign-out"}
 SUPERVISOR = {"/api/reset", "/api/invite"}
 
@@ -34,9 +36,12 @@ def example(schema, document):
             parts = schema.get("prefixItems")
             return [0.5] * 4 if parts is None else [example(part, document) for part in parts]
         case "string":
-            return "p1" * max(1, -(-schema.get("minLength", 1) // 2))
+            name = "p1" * max(1, -(-schema.get("minLength", 1) // 2))
+            return next(word for word in (name, "0" * 64) if re.match(schema.get("pattern", ""), word))
         case "boolean":
             return True
+        case "integer":
+            return int(min(max(schema.get("minimum", 1), 1), schema.get("maximum", 1)))
         case _:
             return min(max(schema.get("minimum", 1), 1), schema.get("maximum", 1))
 

@@ -134,6 +134,11 @@ def enables_clicks(message):
     return message["type"] == "ScenePointerEnableMessage" and message["event_type"] == "click"
 
 
+def hear_clicks(view):
+    """With which keys held down the view takes clicks from now on; empty where it takes none."""
+    return [message for message in hear(view, enables_clicks) if enables_clicks(message)][-1]["modifiers"]
+
+
 def test_clicks_into_the_view_are_lines_of_sight_while_a_page_places_points(server):
     with (
         server.client() as client,
@@ -143,16 +148,16 @@ def test_clicks_into_the_view_are_lines_of_sight_while_a_page_places_points(serv
         hear(view, replayed)
         say(view, CAMERA)
         page.send(json.dumps({"type": "PlaceByHand", "active": True}))
-        assert hear(view, enables_clicks)[-1]["modifiers"]
+        assert hear_clicks(view)
         say(view, POINTER)
         line = hear_kind(page, "Sightline")
         assert (line["origin"], line["direction"]) == ([0.0, 0.0, 1.5], [0.0, 1.0, 0.0])
         page.send(json.dumps({"type": "PlaceByHand", "active": False}))
-        assert not hear(view, enables_clicks)[-1]["modifiers"]
+        assert not hear_clicks(view)
         page.send(json.dumps({"type": "PlaceByHand", "active": True}))
-        hear(view, enables_clicks)
+        assert hear_clicks(view)
         page.close()
-        assert not hear(view, enables_clicks)[-1]["modifiers"], "nobody is left who places"
+        assert not hear_clicks(view), "nobody is left who places"
 
 
 def test_a_viewer_takes_no_clicks(server):
