@@ -15,6 +15,8 @@ from rolling_panda.messages import Role
 ABOUT_CONTROL: Final = (intents.TakeControl, intents.RequestControl, intents.GrantControl, intents.ReturnControl)
 #: Intents that move the robot or lead to it: for who holds control.
 MOTION: Final = (intents.Arm, intents.Start, intents.Resume, intents.Home, intents.Acknowledge)
+#: A view older than this (s) is none: a robot is not worked with for so long in one go.
+_NEVER_S = 1e5
 
 
 class Authority:
@@ -72,7 +74,7 @@ class Authority:
         age = now - self._seen
         if age <= self._supervision_s:
             return ""
-        since = "yet" if age == math.inf else f"for {age:.1f} s"
+        since = "yet" if age > _NEVER_S else f"for {age:.1f} s"
         return f"nobody who may operate has seen the robot {since}, allowed are {self._supervision_s} s"
 
     def rights(self, client: Client, role: Role) -> Rights:

@@ -113,7 +113,7 @@ class Desk:
         for known, seen_at in reversed(self._seen_at):
             if known == number:
                 self.teleop.drew(view, seen_at, now)
-                self.people.saw(session, seen_at)
+                self._saw(session, seen_at, now)
                 return
 
     def fetched(self, session: Session, now: float) -> None:
@@ -121,7 +121,12 @@ class Desk:
         if self._seen_at:
             seen_at = self._seen_at[-1][1]
             self.teleop.drew(session.session_id, seen_at, now)
-            self.people.saw(session, seen_at)
+            self._saw(session, seen_at, now)
+
+    def _saw(self, session: Session, seen_at: float, now: float) -> None:
+        if self.people.saw(session, seen_at):
+            # Who looks and then asks at once must be known to have looked.
+            self.link.presence_of(self.people.message(now))
 
     async def ask(self, session: Session, intent: intents.Intent) -> Result:
         """Ask the controller, which logs what it does or why it refuses."""

@@ -30,10 +30,16 @@ class PresentPeople:
         """A page or a script of this session has said something."""
         self._of(session).heard_at = now
 
-    def saw(self, session: Session, seen_at: float) -> None:
-        """Something of this session has drawn or fetched the robot as it was at this time (s)."""
+    def saw(self, session: Session, seen_at: float) -> bool:
+        """Something of this session has drawn or fetched the robot as it was at this time (s).
+
+        Returns:
+            Whether that is news that should not wait: nobody of this session has seen the robot for a while.
+        """
         client = self._of(session)
+        news = seen_at - client.seen_at > HEARD_S
         client.seen_at = max(client.seen_at, seen_at)
+        return news
 
     def forget(self, session: Session) -> None:
         """The last of this session has gone."""

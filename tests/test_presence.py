@@ -41,3 +41,12 @@ def test_two_of_the_same_name_are_told_apart_and_the_cookie_is_not_told():
     people.heard(two, 1.0)
     keys = {person.key for person in people.message(1.0).people}
     assert len(keys) == 2 and not any("cookie" in key for key in keys)
+
+
+def test_the_first_look_in_a_while_is_news_and_the_next_ones_are_not():
+    people, ann = PresentPeople(), session()
+    people.heard(ann, 1.0)
+    assert people.saw(ann, 0.9)
+    assert not people.saw(ann, 1.4)
+    assert people.saw(ann, 9.0)
+    assert not people.saw(ann, 8.0)
