@@ -25,7 +25,7 @@ test: check browser
 ifdef ARGS
 	$(BIN)/pytest $(ARGS)
 else
-	$(BIN)/pytest -n auto --dist loadfile -m "not alone and not slow"
+	$(BIN)/pytest -n auto -m "not alone and not slow"
 	$(BIN)/pytest -m "alone and not slow"
 endif
 
