@@ -19,7 +19,9 @@ class ServerConfig(Struct, frozen=True, forbid_unknown_fields=True):
             only a new press starts a hold.
         view_timeout_s: A page that has not drawn a state younger than this may not move the robot.
         stop_confirm_s: How long a stop waits for bridge and controller to say that they have latched it.
-        session_idle_s: A session unused for this long has ended.
+        unread_s: A page or a 3-D view that does not read what it is sent for this long is dropped; it may come again.
+        unread_s: Positive = 10.0
+    session_idle_s: A session unused for this long has ended.
         invite_s: Life of a sign-in link that a supervisor makes for somebody else.
         log_lines: Log lines kept in memory.
         max_body_bytes: Longest request body, and longest WebSocket frame from a client.
@@ -33,6 +35,7 @@ class ServerConfig(Struct, frozen=True, forbid_unknown_fields=True):
     hold_resume_s: Positive = 1.0
     view_timeout_s: Positive = 0.5
     stop_confirm_s: Positive = 0.5
+    unread_s: Positive = 10.0
     session_idle_s: Positive = 12 * 3600.0
     invite_s: Positive = 600.0
     log_lines: Annotated[int, Meta(ge=200, le=100_000)] = 1000

@@ -28,6 +28,8 @@ from server.sessions import Session, Sessions
 from server.teleop import TeleopHold
 
 _CONFIRM_POLL_S = 0.01
+#: A view says where its gizmo is twenty times a second at most; one that says more often waits for the loop's turn (s).
+_AIM_GAP_S = 0.02
 
 
 @dataclass(frozen=True)
@@ -86,6 +88,7 @@ class Desk:
     points: PagePoints | None = None
     _seen_at: deque[tuple[int, float]] = field(default_factory=lambda: deque(maxlen=100))
     _users_trouble: str = ""
+    _aimed_at: float = float("-inf")
     _refused_holds: dict[str, str] = field(default_factory=dict)
     looking: Looking = field(init=False)
 
@@ -198,6 +201,17 @@ class Desk:
         if not was_holding:
             self.note("info", f"{session.user} holds the tool", session.client)
         return Result(200, True, "holding")
+
+    def aimed(self, owner: str, target: m.Pose) -> None:
+        """`owner` has dragged their gizmo. While they hold, the robot hears of it at once, not with the loop's turn."""
+        self.teleop.aim(owner, target)
+        now = time.monotonic()
+        self.end_lapsed_hold(now)
+        if self.teleop.holder == owner and self.teleop.leads_gizmo and now - self._aimed_at >= _AIM_GAP_S:
+            held = self.teleop.due(now)
+            if held is not None:
+                self._aimed_at = now
+                self.link.teleop(held)
 
     def let_go(self, session: Session) -> None:
         """End this session's hold at once; its gizmo goes back to the tool."""

@@ -36,6 +36,7 @@ from rolling_panda.preview_messages import PreviewState
 from server.desk import Desk
 from server.frame_rate import FRAMES_HZ, Frames
 from server.page_view import addressed
+from server.reading_socket import was_unread
 from server.sessions import Session
 from server.teleop import Aim
 
@@ -95,6 +96,8 @@ class OpenPage:
             await asyncio.gather(*legs, return_exceptions=True)
         if self.session.ended.is_set():
             await self._close("signed out")
+        elif was_unread(self._websocket.scope):
+            self._closed_for("it did not read what it was sent")
 
     def selected(self, point_id: str) -> None:
         """A point was clicked in the 3-D view of this session."""

@@ -25,6 +25,7 @@ from server.loop import Loop
 from server.page_view import PageView
 from server.passwords import Passwords
 from server.presence import PresentPeople
+from server.reading_socket import ReadingSocket
 from server.robot_link import RobotLink
 from server.robot_meshes import robot_parts
 from server.scene import Scene
@@ -94,7 +95,7 @@ async def serve(
         robot_parts(model.model),
         # Called on viser's thread, and not before a page is served.
         on_select=lambda owner, point_id: soon(desk.clicked, owner, point_id),
-        on_aim=lambda owner, target: soon(desk.teleop.aim, owner, target),
+        on_aim=lambda owner, target: soon(desk.aimed, owner, target),
         on_sightline=lambda owner, origin, direction: soon(desk.sighted, owner, origin, direction),
         on_stranger=lambda: soon(desk.note, "warning", "refused a connection to the 3-D view from outside the page"),
     )
@@ -157,6 +158,9 @@ async def _site(
             proxy_headers=False,
             ws_max_size=config.max_body_bytes,
             ws_per_message_deflate=False,
+            ws=ReadingSocket,
+            ws_ping_interval=config.unread_s / 2,
+            ws_ping_timeout=config.unread_s,
             timeout_graceful_shutdown=1,
             ssl_certfile=None if tls is None else str(tls.certificate),
             ssl_keyfile=None if tls is None else str(tls.key),
