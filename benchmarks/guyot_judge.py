@@ -40,6 +40,7 @@ class GuyotJudge(RowJudge):
                 middles = [rod.at(0.5)[0] for _, rod in own if rod.kind == "node" and rod.cane == cane][1:]
                 wanted = _Wanted(kind, cane, cut, np.array(middles).reshape(-1, 3))
                 self._wanted[truth.vine, kind] = wanted
+                self._cuts[truth.vine, kind] = cut
                 seen = [(k, rod) for k, rod in own if rod.kind == "spur" or (rod.cane == cane and k <= cut.rod)]
                 self._sights[truth.vine, kind] = Sight(*sight_places(self.row, seen))
 

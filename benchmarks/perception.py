@@ -52,7 +52,8 @@ class Survey:
 
     Attributes:
         points: Every point shown at the end.
-        spurs: Spurs in view: seed, vine, spur, how visible, and whether they got a point, and a right one.
+        spurs: Spurs in view: seed, vine, spur, how visible, what is in the blades' way wherever the right cut may be
+            made (empty for nothing), and whether they got a point, and a right one.
         frame_ms: Time of each frame through segmentation, plant model and rule, on a wall clock.
         abstained: What every row left open at the end.
     """
@@ -128,6 +129,7 @@ def survey_row(
                 "spur": spur,
                 "kind": opinion.kind(spur),
                 "visibility": opinion.visibility(vine, spur),
+                "blocked": opinion.blocked(vine, spur),
                 "point": bool(own),
                 "right": any(p.right for p in own),
             }
@@ -144,6 +146,7 @@ def summarise(survey: Survey, visibility: str | None = None) -> dict[str, Figure
     spurs = [s for s in survey.spurs if visibility in (None, s["visibility"])]
     # A spur that was hidden all along is no spur that one could have found.
     visible = [s for s in spurs if s["visibility"] == (visibility or "clear")]
+    free = [s for s in visible if not s["blocked"]]
     return {
         "right_cane": share(len(on_cane), len(cuts)),
         "along_error_median_m": quantile(along, 0.5),
@@ -154,6 +157,9 @@ def summarise(survey: Survey, visibility: str | None = None) -> dict[str, Figure
         "renewal_right": share(sum(p.right for p in renewals), len(renewals)),
         "abstained": share(sum(not s["point"] for s in visible), len(visible)),
         "recall": share(sum(bool(s["right"]) for s in visible), len(visible)),
+        "blocked": share(len(visible) - len(free), len(visible)),
+        "abstained_unblocked": share(sum(not s["point"] for s in free), len(free)),
+        "recall_unblocked": share(sum(bool(s["right"]) for s in free), len(free)),
         "frame_ms_median": quantile(survey.frame_ms, 0.5),
     } | _by_kind(spurs)
 

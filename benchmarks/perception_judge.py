@@ -5,6 +5,7 @@ from typing import Literal
 
 import numpy as np
 
+from benchmarks.perception_blocked import Blocker, blocked_by
 from bridge.sim.camera import RgbdImage
 from bridge.sim.row import Array, Rod, Row
 from bridge.sim.vineyard_truth import RightCut, judge
@@ -75,6 +76,7 @@ class RowJudge:
     row: Row
     seed: int
     _sights: dict[tuple[int, int], Sight] = field(default_factory=dict)
+    _cuts: dict[tuple[int, int], RightCut] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Collect where one has to look on each spur."""
@@ -87,6 +89,7 @@ class RowJudge:
                 if (rod.vine, rod.spur) == (truth.vine, truth.spur)
                 and (rod.kind == "spur" or (rod.cane == truth.keeper and index <= truth.cut.rod))
             ]
+            self._cuts[truth.vine, truth.spur] = truth.cut
             self._sights[truth.vine, truth.spur] = Sight(*sight_places(self.row, rods))
 
     def look(self, image: RgbdImage, k: Intrinsics, T_world_camera: Array) -> None:
@@ -117,6 +120,10 @@ class RowJudge:
     def kind(self, spur: int) -> str:
         """Kind of the cut that belongs to a place."""
         return "spur cut"
+
+    def blocked(self, vine: int, spur: int) -> Blocker:
+        """What is in the blades' way wherever the right cut may be made; empty for nothing."""
+        return blocked_by(self.row, self._cuts[vine, spur])
 
     def point(self, point: m.PruningPoint) -> JudgedPoint:
         """Judge one point."""

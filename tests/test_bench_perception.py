@@ -85,16 +85,18 @@ def test_what_hangs_behind_a_board_is_hidden_and_what_is_before_it_is_clear():
 
 def test_the_summary_has_a_figure_an_interval_and_a_number_for_each_measure():
     survey = Survey(
-        spurs=[{"kind": "spur cut", "visibility": "clear", "point": True, "right": True}] * 9
+        spurs=[{"kind": "spur cut", "visibility": "clear", "blocked": "", "point": True, "right": True}] * 9
         + [
-            {"kind": "spur cut", "visibility": "clear", "point": False, "right": False},
-            {"kind": "spur cut", "visibility": "hidden", "point": False, "right": False},
+            {"kind": "spur cut", "visibility": "clear", "blocked": "cane", "point": False, "right": False},
+            {"kind": "spur cut", "visibility": "hidden", "blocked": "", "point": False, "right": False},
         ]
     )
     survey.points = [RowJudge(ROW, 11).point(point(t.cut.best, t.cut.tangent)) for t in TRUTHS[:4]]
     summary = summarise(survey)
     assert summary["recall"].value == 0.9 and summary["recall"].n == 10
     assert summary["abstained"].value == pytest.approx(0.1)
+    assert summary["blocked"].value == pytest.approx(0.1) and summary["recall_unblocked"].value == 1.0
+    assert summary["recall_unblocked"].n == 9 and summary["abstained_unblocked"].value == 0.0
     assert summary["right_cane"].value == 1.0 and summary["right_cane"].low < 0.6 and summary["right_cane"].n == 4
 
 
