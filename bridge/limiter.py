@@ -3,7 +3,7 @@
 import numpy as np
 
 from rolling_panda.differential_drive import Array
-from rolling_panda.jerk_limit import largest_rise
+from rolling_panda.jerk_limit import largest_repeated_rise, largest_rise
 from rolling_panda.robot_model import ARM_Q, ARM_XI, Limits
 
 # Share of the acceleration that braking ahead of a joint's limit counts on: the servos lag.
@@ -13,7 +13,9 @@ _BRAKING = 0.5
 class Limiter:
     """Follows a desired ξ̇ within the limits, from what was sent before. Starts at rest."""
 
-    def __init__(self, limits: Limits, wheel_acceleration: float, joint_margin: float, dt: float) -> None:
+    def __init__(
+        self, limits: Limits, wheel_acceleration: float, joint_margin: float, dt: float, repeats: float = 0.0
+    ) -> None:
         """Prepare.
 
         Args:
@@ -21,7 +23,10 @@ class Limiter:
             wheel_acceleration: Tighter bound for the wheels (rad/s²).
             joint_margin: Distance to an arm joint's limit at which motion towards it has ended (rad).
             dt: Period of `step` (s).
+            repeats: Periods in which the arm may go on with its last acceleration against our will, as it does where
+                packets are lost: so much room is left up to its joints' velocities.
         """
+        self._repeats = repeats
         self._velocity, self._dt = limits.velocity, dt
         acceleration = limits.acceleration.copy()
         acceleration[:2] = np.minimum(acceleration[:2], wheel_acceleration)
@@ -71,6 +76,10 @@ class Limiter:
         change = np.minimum(np.maximum(missing, -self._change), self._change)
         arm_missing, jerk, last = missing[ARM_XI], self._jerk, self._last
         wanted = np.copysign(largest_rise(np.abs(arm_missing), jerk), arm_missing)
+        if self._repeats > 0.0:
+            sent, most = self.sent[ARM_XI], self._velocity[ARM_XI]
+            up = largest_repeated_rise(most - sent, jerk, self._repeats)
+            wanted = np.minimum(np.maximum(wanted, -largest_repeated_rise(most + sent, jerk, self._repeats)), up)
         wanted = np.minimum(np.maximum(wanted, last - jerk), last + jerk)
         self._last = np.minimum(np.maximum(wanted, -self._arm_change), self._arm_change)
         change[ARM_XI] = self._last

@@ -23,3 +23,17 @@ def largest_rise(room: Array, step: Array) -> Array:
     """
     rise: Array = np.maximum(np.sqrt(2.0 * step * np.maximum(room, 0.0)) - 0.5 * step, np.minimum(room, step))
     return rise
+
+
+def largest_repeated_rise(room: Array, step: Array, repeats: float) -> Array:
+    """The same where a rise may be repeated against our will before it can fall: n β + β + (β − step) + … ≤ room.
+
+    Args:
+        room: What is left up to the limit (n); where it is exceeded, the answer leads back slowly.
+        step: By how much the rise may change from one period to the next (n), positive.
+        repeats: How often at most (n above).
+    """
+    share = step * (repeats + 0.5)
+    inside = np.maximum(share * share - 0.25 * step * step + 2.0 * step * room, 0.0)
+    rise: Array = np.maximum(np.sqrt(inside) - share, np.minimum(room / (1.0 + repeats), step))
+    return rise

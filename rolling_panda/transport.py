@@ -281,10 +281,16 @@ class ForeignWire:
         """
         self._session = _open(config, "bridge")
 
-    def publisher(self, name: str) -> Callable[[bytes], None]:
-        """What sends bytes under this key, at once and newest first."""
+    def publisher(self, name: str, lossless: bool = False) -> Callable[[bytes], None]:
+        """What sends bytes under this key, at once and newest first.
+
+        Args:
+            name: The key.
+            lossless: Wait where the way is full, for some seconds at most, in place of leaving samples out.
+        """
+        full = zenoh.CongestionControl.BLOCK if lossless else zenoh.CongestionControl.DROP
         publisher = self._session.declare_publisher(
-            name, priority=zenoh.Priority.REAL_TIME, congestion_control=zenoh.CongestionControl.DROP, express=True
+            name, priority=zenoh.Priority.REAL_TIME, congestion_control=full, express=True
         )
         return publisher.put
 

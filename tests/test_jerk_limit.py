@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rolling_panda.jerk_limit import largest_rise
+from rolling_panda.jerk_limit import largest_repeated_rise, largest_rise
 
 rooms, steps = st.floats(0.0, 10.0), st.floats(1e-4, 1.0)
 
@@ -33,3 +33,22 @@ def test_it_is_the_greatest():
     room, step = 1.0, 0.01
     rise = float(largest_rise(np.array([room]), np.array([step]))[0]) * 1.05
     assert sum(max(rise - i * step, 0.0) for i in range(1000)) > room
+
+
+@given(rooms, steps, st.integers(0, 40), st.integers(0, 5))
+def test_a_rise_that_is_repeated_against_our_will_keeps_the_limit(room, step, repeats, before):
+    total = 0.0
+    for _ in range(before + 1):
+        rise = float(largest_repeated_rise(np.array([room - total]), np.array([step]), repeats)[0])
+        total += rise
+    total += repeats * rise
+    while rise > 0.0:
+        rise -= step
+        total += max(rise, 0.0)
+    assert total <= room + 1e-9
+
+
+@given(rooms, steps)
+def test_what_is_never_repeated_is_bound_as_before(room, step):
+    args = np.array([room]), np.array([step])
+    assert largest_repeated_rise(*args, 0.0) == pytest.approx(largest_rise(*args), abs=1e-12)

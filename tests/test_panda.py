@@ -88,6 +88,18 @@ def test_random_targets_break_no_limit(arm: Panda, box: DeviceProcess) -> None:
     assert arm.read().fault == ""
 
 
+def test_packets_lost_at_the_highest_speeds_break_no_limit(arm: Panda, box: DeviceProcess) -> None:
+    """There libfranka's own limits would break the jerk: what the arm went on with by itself is beyond them."""
+    for sign in (1.0, -1.0, 1.0, -1.0, 1.0, -1.0):
+        for _ in range(9):
+            turn(arm, np.full(7, 3.0 * sign), 0.04)
+            box.tell("drop 15")
+    report = box.tell()
+    assert report["breaches"] == []
+    assert report["lost"] >= 500
+    assert report["worst"][0] > 0.97, "the highest speed was never reached"
+
+
 def test_a_reflex_stops_it_until_a_person_releases_it(arm: Panda, box: DeviceProcess) -> None:
     turn(arm, TURN, 0.3)
     box.tell("collide")

@@ -17,7 +17,7 @@ from rolling_panda.camera_messages import CameraFrame, Intrinsics
 from rolling_panda.config import TransportConfig
 from rolling_panda.errors import ServiceError, TransportError
 from rolling_panda.topics import CAMERA, HEARTBEAT, INTENT, MOTION, Service, Topic
-from rolling_panda.transport import Feed, Onlooker, Rejections, Router, Slot, Transport
+from rolling_panda.transport import Feed, ForeignWire, Onlooker, Rejections, Router, Slot, Transport
 
 pytestmark = pytest.mark.alone
 
@@ -242,3 +242,24 @@ def test_closing_twice_is_no_mistake(endpoint: str) -> None:
     transport = Transport(TransportConfig(connect=(endpoint,)), "server", "rp1")
     transport.close()
     transport.close()
+
+
+def test_what_must_not_get_lost_waits_where_the_way_is_full(endpoint: str) -> None:
+    sent, came = 200, 0
+
+    def slowly(data: bytes, at: float) -> None:
+        nonlocal came
+        came += 1
+        time.sleep(0.3 if came == 2 else 0.0)
+
+    listener = ForeignWire(TransportConfig(connect=(endpoint,)))
+    listener.subscribe("full/way", slowly)
+    speaker = ForeignWire(TransportConfig(connect=(endpoint,)))
+    put = speaker.publisher("full/way", lossless=True)
+    put(b"")
+    until(lambda: came > 0)
+    for _ in range(sent):
+        put(bytes(200_000))
+    until(lambda: came == 1 + sent, 10.0)
+    speaker.close()
+    listener.close()

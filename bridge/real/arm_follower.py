@@ -1,4 +1,12 @@
-"""What the arm is told each millisecond: the newest target, interpolated, within velocity, acceleration and jerk."""
+"""What the arm is told each millisecond: the newest target, interpolated, within velocity, acceleration and jerk.
+
+The limits hold from one period of the arm's to the next, from what the arm itself took: how late the callback is by the
+clock plays no part in them. A packet that comes too late or is lost is one more period with the last acceleration; 19
+of them in a row the control box puts up with. Before them, and again between two such rows, the acceleration may be
+as high as it can: so each rise of a velocity leaves room for as many more of it as that takes.
+"""
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,6 +18,13 @@ from rolling_panda.robot_model import ARM_XI, Limits
 TICK_S = 0.001
 # Targets that come in farther apart than this (s) are followed as if they had come so: the delay must stay small.
 _LONGEST_SPAN = 0.02
+# In a row; the next one stops the arm.
+_LOST = 19
+# Every joint's acceleration dies away in two periods, at half of it in the first: two rows of lost packets with one
+# command in between are the worst there can be.
+_REPEATS = 1.5 * _LOST
+# Of the arm's limits: nobody knows how its control box rounds.
+_SHARE = 0.999
 
 
 class ArmFollower:
@@ -28,7 +43,13 @@ class ArmFollower:
             fade_s: Silence after which the last target begins to fade.
             deadline_s: Silence after which the target is zero.
         """
-        self._limiter = Limiter(limits, float(limits.acceleration[0]), joint_margin, TICK_S)
+        inside = replace(
+            limits,
+            velocity=_SHARE * limits.velocity,
+            acceleration=_SHARE * limits.acceleration,
+            jerk=_SHARE * limits.jerk,
+        )
+        self._limiter = Limiter(inside, float(limits.acceleration[0]), joint_margin, TICK_S, _REPEATS)
         self._watchdog = Watchdog(fade_s, deadline_s)
         self._start = self._target = np.zeros(7)
         self._began, self._span = float("-inf"), TICK_S

@@ -17,8 +17,8 @@ class BaseConfig(Struct, frozen=True, forbid_unknown_fields=True):
         connect: Where that bridge is reached; empty = the router of this program.
         namespace: Of the ROS nodes, put before every key.
         command_hz: Velocity commands a second.
-        fade_s: Silence of this program after which the last command begins to fade.
-        deadline_s: Silence after which zeros are sent.
+        fade_s: Silence of this program, or of the wheels, after which the last command begins to fade.
+        deadline_s: Silence after which zeros are the goal.
         stale_s: Wheel speeds older than this are a fault.
         unmonitored_s: An emergency-stop state older than this is a fault.
         runaway_s: Wheels that still turn this long after zeros were commanded are stopped by the relay board.

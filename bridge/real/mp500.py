@@ -1,7 +1,8 @@
 """The Neobotix MP-500 base: ROS 2 messages through Zenoh, with a deadline of our own.
 
 The maker's own watchdog lets the base run on for 1 s, 1.5 m at full speed. So a thread here sends commands at a fixed
-rate whatever the bridge does: a target that is not renewed fades to zero within `deadline_s`.
+rate whatever the bridge does: a target that is not renewed fades to zero within `deadline_s`, and so does any target
+while the wheels do not tell how they turn. No command may be lost on the way, since each is one step of a ramp.
 
 The relay board tells the right motor's velocity negated, as it is mounted mirrored, and raw encoder counts in place of
 angles; the wheels' angles are the integral of their speeds.
@@ -74,6 +75,7 @@ class Mp500:
         self._wire, self._drive, self._config = wire, drive, config
         self._step = acceleration / config.command_hz
         self._watchdog = Watchdog(config.fade_s, config.deadline_s)
+        self._wheels = Watchdog(config.fade_s, config.deadline_s)
         self._lock = threading.Lock()
         self._target = self._sent = np.zeros(2)
         self._position = self._velocity = np.zeros(2)
@@ -94,7 +96,7 @@ class Mp500:
         self._closing = threading.Event()
         self._thread: threading.Thread | None = None
         if moving:
-            self._send = wire.publisher(prefix + COMMAND)
+            self._send = wire.publisher(prefix + COMMAND, lossless=True)
             self._thread = threading.Thread(target=self._command, name="mp500", daemon=True)
             self._thread.start()
 
@@ -152,7 +154,8 @@ class Mp500:
             # The motors have no power: what follows begins at zero, by a ramp.
             self._sent = np.zeros(2)
         else:
-            goal = 0.0 * self._target if fault else self._watchdog.trust(now) * self._target
+            trust = 0.0 if fault else min(self._watchdog.trust(now), self._wheels.trust(now))
+            goal = trust * self._target
             self._sent = self._sent + np.minimum(np.maximum(goal - self._sent, -self._step), self._step)
         if np.any(self._sent != 0.0):
             self._rest_since = None
@@ -163,6 +166,9 @@ class Mp500:
     def _is_runaway(self, now: float) -> bool:
         """Whether wheels turn that were told to rest; True once."""
         if self._runaway or self._rest_since is None or now - self._rest_since < self._config.runaway_s:
+            return False
+        # Old speeds are no sign of anything.
+        if now - self._wheels_at > self._config.stale_s:
             return False
         # By hand, with the motors off, it may be pushed about.
         if self._emergency != FREE or float(np.abs(self._velocity).max()) <= _REST:
@@ -201,6 +207,7 @@ class Mp500:
                 gap = min(max(0.0, at - self._wheels_at), _LONGEST_GAP)
             self._position = self._position + 0.5 * (velocity + self._velocity) * gap
             self._velocity, self._stamp, self._wheels_at = velocity, stamp, at
+            self._wheels.feed(at)
 
     def _on_emergency(self, data: bytes, at: float) -> None:
         self.heard[EMERGENCY] += 1

@@ -14,8 +14,8 @@ from rolling_panda.differential_drive import Array
 from rolling_panda.errors import InputError
 from rolling_panda.robot_model import Limits
 
-# A state older than this (s) is a fault: the control box tells a thousand a second.
-_STALE_S = 0.15
+# A state older than this (s) is a fault: the control box tells a thousand a second, and stops an arm that lost 20.
+_STALE_S = 0.08
 _CLOSE_S = 2.0
 
 
