@@ -30,7 +30,7 @@ def apart(work: Callable[[], Result]) -> Result:
             with os.fdopen(writable, "wb") as pipe:
                 pickle.dump(work(), pipe)
             code = 0
-        except BaseException:
+        except Exception:
             traceback.print_exc()
         finally:
             # Nothing of the parent's is to be closed or written a second time.

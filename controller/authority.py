@@ -8,15 +8,13 @@ from controller.interface import Sample
 from controller.lease import Client, Lease, Token, first_epoch
 from controller.modes import Rights, Who
 from rolling_panda import intents
-from rolling_panda.control_messages import ControlState, Person, Presence
+from rolling_panda.control_messages import NEVER_SEEN_S, ControlState, Person, Presence
 from rolling_panda.messages import Role
 
 #: Intents about control itself.
 ABOUT_CONTROL: Final = (intents.TakeControl, intents.RequestControl, intents.GrantControl, intents.ReturnControl)
 #: Intents that move the robot or lead to it: for who holds control.
 MOTION: Final = (intents.Arm, intents.Start, intents.Resume, intents.Home, intents.Acknowledge)
-#: A view older than this (s) is none: a robot is not worked with for so long in one go.
-_NEVER_S = 1e5
 
 
 class Authority:
@@ -74,7 +72,7 @@ class Authority:
         age = now - self._seen
         if age <= self._supervision_s:
             return ""
-        since = "yet" if age > _NEVER_S else f"for {age:.1f} s"
+        since = "yet" if age == math.inf else f"for {age:.1f} s"
         return f"nobody who may operate has seen the robot {since}, allowed are {self._supervision_s} s"
 
     def rights(self, client: Client, role: Role) -> Rights:
@@ -128,8 +126,9 @@ class Authority:
 
     def _watched(self, presence: Sample[Presence]) -> None:
         views = [person.view_age_s for person in presence.message.people if _may_operate(person)]
-        if views:
-            self._seen = max(self._seen, presence.at - min(views))
+        youngest = min(views, default=NEVER_SEEN_S)
+        if youngest < NEVER_SEEN_S:
+            self._seen = max(self._seen, presence.at - youngest)
 
 
 def client_of(intent: intents.Intent) -> Client:

@@ -14,6 +14,10 @@ Nonce = Annotated[str, Meta(max_length=32, pattern=r"^[0-9a-f]*(?!\n)$")]
 WallTime = Annotated[float, Meta(ge=0.0, le=1e11)]
 
 
+#: A view that has shown nothing yet counts as this old (s).
+NEVER_SEEN_S = 1e6
+
+
 class Person(Struct, frozen=True, forbid_unknown_fields=True):
     """Somebody whose page or script is heard from now.
 

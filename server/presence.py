@@ -2,13 +2,11 @@
 
 from dataclasses import dataclass
 
-from rolling_panda.control_messages import Person, Presence
+from rolling_panda.control_messages import NEVER_SEEN_S, Person, Presence
 from server.sessions import Session
 
 #: Who has been silent for so long (s) is not there any more.
 HEARD_S = 1.0
-#: A view that nobody knows the age of counts as this old (s).
-_NEVER_S = 1e6
 
 
 @dataclass
@@ -52,7 +50,7 @@ class PresentPeople:
         return Presence(
             sequence=self._sequence,
             people=tuple(
-                Person(key, client.session.user, client.session.role, min(max(0.0, now - client.seen_at), _NEVER_S))
+                Person(key, client.session.user, client.session.role, min(max(0.0, now - client.seen_at), NEVER_SEEN_S))
                 for key, client in self._clients.items()
             ),
         )

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 import pytest
 from operator_page import FLAGS
 from played_server import ORIGIN, PlayedServer, point
-from playwright.sync_api import Browser, Page, expect, sync_playwright
+from playwright.sync_api import Browser, FloatRect, Locator, Page, expect, sync_playwright
 
 from rolling_panda import messages as m
 
@@ -58,3 +58,11 @@ def until(page: Page, condition: Callable[[], bool], seconds: float = 5.0) -> No
     while not condition():
         assert time.monotonic() < deadline, "it did not happen in time"
         page.wait_for_timeout(20)
+
+
+def box_of(part: Locator) -> FloatRect:
+    """Where a part of the page is (px), once it is to be seen: what a click brings up is drawn a frame later."""
+    expect(part).to_be_visible()
+    box = part.bounding_box()
+    assert box is not None
+    return box

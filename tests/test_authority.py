@@ -2,7 +2,7 @@ from controller.authority import Authority
 from controller.interface import Sample
 from controller.lease import Client
 from rolling_panda import intents
-from rolling_panda.control_messages import Person, Presence
+from rolling_panda.control_messages import NEVER_SEEN_S, Person, Presence
 
 ADA, BOB = Client("a", "Ada"), Client("b", "Bob")
 
@@ -89,3 +89,9 @@ def test_the_old_holder_is_told_before_and_after_control_goes_over():
     assert (after.holder, after.user, after.coming) == ("b", "Bob", "")
     assert after.told_number > before.told_number and "Bob" in after.told
     assert after.epoch > before.epoch
+
+
+def test_somebody_who_has_seen_nothing_yet_is_told_so():
+    it = authority()
+    it.review(presence(1, 5.0, ada(age=NEVER_SEEN_S)), True, 5.0)
+    assert "yet" in it.unwatched(5.2)

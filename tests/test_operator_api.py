@@ -378,3 +378,13 @@ def test_the_plan_is_given_whole_and_its_absence_said(server, client):
     assert msgspec.json.decode(given.content, type=SessionPlan) == plan
     schemas = client.get("/api/openapi.json").json()["components"]["schemas"]
     assert "plan_hash" in schemas["PointPlan"]["properties"] and "SessionPlan" in schemas
+
+
+def test_who_fetches_the_state_is_known_to_have_seen_it_before_the_answer_is_there(running):
+    with telling(running.wire), running.client(user="new") as client:
+        eventually(lambda: client.get("/api/state").json()["joints"] is not None)
+    with telling(running.wire), running.client(user="newer") as client:
+        client.get("/api/state")
+        told = running.wire.sent[topics.PRESENCE.name][-1]
+        (newer,) = [person for person in told.people if person.user == "newer"]
+        assert newer.view_age_s < 1.0
