@@ -5,18 +5,23 @@ from contextlib import contextmanager
 
 from playwright.sync_api import Page, Request, sync_playwright
 
-FLAGS = (
+#: A page without the 3-D view.
+FLAT_FLAGS = (
     "--no-sandbox",
-    # The 3-D view needs WebGL, and a machine without a GPU draws it in software.
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--ignore-gpu-blocklist",
+    "--disable-gpu",
     "--disable-quic",
     "--no-first-run",
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
+)
+#: The 3-D view needs WebGL, and a machine without a GPU draws it in software.
+FLAGS = (
+    *(flag for flag in FLAT_FLAGS if flag != "--disable-gpu"),
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--ignore-gpu-blocklist",
 )
 
 

@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable, Iterator
 
 import pytest
-from operator_page import FLAGS
+from operator_page import FLAT_FLAGS
 from played_server import ORIGIN, PlayedServer, point
 from playwright.sync_api import Browser, FloatRect, Locator, Page, expect, sync_playwright
 
@@ -14,7 +14,7 @@ from rolling_panda import messages as m
 @pytest.fixture(scope="module")
 def browser(chromium_path: str) -> Iterator[Browser]:
     with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=chromium_path, args=list(FLAGS))
+        chromium = playwright.chromium.launch(executable_path=chromium_path, args=list(FLAT_FLAGS))
         yield chromium
         chromium.close()
 

@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from played_page import until
+from played_page import box_of, until
 from played_server import ORIGIN, PlayedServer, bridge, controller, point
 from playwright.sync_api import Browser, Page, expect
 
@@ -234,8 +234,7 @@ def test_a_hold_that_the_server_ended_goes_on_only_when_pressed_again(page: Page
 
 
 def test_dragging_in_the_view_counts_as_holding(page: Page, server: PlayedServer) -> None:
-    box = page.locator("rp-scene iframe").bounding_box()
-    assert box is not None
+    box = box_of(page.locator("rp-scene iframe"))
     page.mouse.move(box["x"] + 100, box["y"] + 100)
     page.mouse.down()
     page.mouse.up()

@@ -5,6 +5,7 @@ from typing import get_args
 
 import pytest
 from axe import axe, grave
+from played_page import box_of
 from played_server import ORIGIN, PlayedServer, bridge, controller, point
 from playwright.sync_api import Browser, Page, expect
 
@@ -119,8 +120,7 @@ def test_a_fingertip_hits_everything_that_can_be_pressed(
     for pressed in page.locator("button:visible, select:visible, summary:visible, input:visible, a:visible").all():
         # A tick is pressed by its words too.
         ticked = pressed.get_attribute("type") == "checkbox"
-        box = (pressed.locator("xpath=ancestor::label") if ticked else pressed).bounding_box()
-        assert box is not None
+        box = box_of(pressed.locator("xpath=ancestor::label") if ticked else pressed)
         if min(box["width"], box["height"]) < 43.5:
             small[pressed.evaluate("each => each.outerHTML.slice(0, 90)")] = (box["width"], box["height"])
     assert not small

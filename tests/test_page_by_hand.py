@@ -2,7 +2,7 @@
 
 import msgspec
 import pytest
-from played_page import until
+from played_page import box_of, until
 from played_server import PlayedServer, point
 from playwright.sync_api import Page, expect
 
@@ -13,8 +13,7 @@ PLACED = (200, {"ok": True, "reason": "p9"})
 
 
 def click_image(page: Page, u: float, v: float) -> None:
-    box = page.locator("rp-camera .picture svg").bounding_box()
-    assert box is not None
+    box = box_of(page.locator("rp-camera .picture svg"))
     page.mouse.click(box["x"] + u * box["width"], box["y"] + v * box["height"])
 
 

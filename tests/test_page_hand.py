@@ -2,7 +2,7 @@
 
 import msgspec
 import pytest
-from played_page import until
+from played_page import box_of, until
 from played_server import PlayedServer, controller
 from playwright.sync_api import Page, expect
 
@@ -36,8 +36,7 @@ def begin(page: Page, part: str) -> None:
 
 
 def middle(page: Page, selector: str) -> tuple[float, float]:
-    box = page.locator(selector).bounding_box()
-    assert box is not None
+    box = box_of(page.locator(selector))
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
 
@@ -156,8 +155,8 @@ def test_a_joint_turns_while_its_button_is_held_and_its_range_is_drawn(page: Pag
     page.mouse.up()
     until(page, lambda: not held(server))
     for button in page.locator("rp-joints button").all():
-        box = button.bounding_box()
-        assert box is not None and min(box["width"], box["height"]) >= 44
+        box = box_of(button)
+        assert min(box["width"], box["height"]) >= 44
 
 
 def test_two_at_once_stop_and_say_so(page: Page, server: PlayedServer) -> None:

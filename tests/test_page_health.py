@@ -2,7 +2,7 @@
 
 import msgspec
 import pytest
-from played_page import until
+from played_page import box_of, until
 from played_server import PlayedServer, bridge, controller, point
 from playwright.sync_api import Page, expect
 
@@ -40,8 +40,7 @@ def test_charts_show_what_was_and_stand_still_when_told_to(page: Page, server: P
     page.locator("#pause-charts").click()
     until(page, lambda: shown(page, "position-error") == "3.1 mm")
     # A moment in the past, by keys and by pointing; outside of what was seen there is nothing.
-    box = canvas.bounding_box()
-    assert box is not None
+    box = box_of(canvas)
     page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 10)
     until(page, lambda: shown(page, "position-error") == "–")
     expect(page.locator(".drawer-tools .hint")).to_have_text("2 min ago")

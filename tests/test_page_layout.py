@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 import pytest
-from played_page import until
+from played_page import box_of, until
 from played_server import PlayedServer, bridge, controller, point
 from playwright.sync_api import Page, expect
 
@@ -22,25 +22,21 @@ def test_fits_the_screen_with_the_stop_on_top(page: Page, server: PlayedServer, 
     server.bridge = bridge(stop_id="s1", stopped_by="Ada: stop button")
     server.controller = controller("ESTOP_LATCHED")
     expect(page.locator("rp-stop-banner")).to_be_visible()
-    leave, stop = page.locator("#sign-out").bounding_box(), page.locator("#stop").bounding_box()
-    assert leave is not None and stop is not None
+    leave, stop = box_of(page.locator("#sign-out")), box_of(page.locator("#stop"))
     assert leave["x"] + leave["width"] <= stop["x"]
     overflow = page.evaluate("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]")
     assert overflow[0] <= size[0]
     assert overflow[1] <= size[1]
-    view = page.locator("rp-scene").bounding_box()
-    assert view is not None
+    view = box_of(page.locator("rp-scene"))
     assert min(view["width"], view["height"]) >= 300, "there is room to see the robot"
-    banner = page.locator("rp-stop-banner").bounding_box()
-    assert banner is not None
+    banner = box_of(page.locator("rp-stop-banner"))
     assert banner["y"] >= view["y"] + view["height"] / 2, "the tool stays in view"
     assert banner["y"] + banner["height"] <= view["y"] + view["height"]
     assert page.locator(".product").evaluate("each => each.scrollWidth <= each.clientWidth"), "its name is cut off"
     for button in page.locator("button:visible").all():
         assert button.evaluate("each => each.scrollWidth <= each.clientWidth"), f"{button} is cut off"
     for selector in ("#stop", "#arm", "#start", "#pause", "#resume", "#home", "#acknowledge", "#teleop", "#hold"):
-        box = page.locator(selector).bounding_box()
-        assert box is not None
+        box = box_of(page.locator(selector))
         assert box["height"] >= 44
         assert box["x"] >= 0
         assert box["x"] + box["width"] <= size[0]
@@ -52,8 +48,7 @@ def test_fits_the_screen_with_the_stop_on_top(page: Page, server: PlayedServer, 
 def test_the_queue_has_room_for_five_points_on_a_small_screen(page: Page, server: PlayedServer) -> None:
     server.points = tuple(point(number, "PROPOSED", spur=number) for number in range(1, 12))
     server.tell(server.page_points())
-    fifth, list_ = page.locator("rp-point").nth(4).bounding_box(), page.locator(".groups").bounding_box()
-    assert fifth is not None and list_ is not None
+    fifth, list_ = box_of(page.locator("rp-point").nth(4)), box_of(page.locator(".groups"))
     assert fifth["y"] + fifth["height"] <= list_["y"] + list_["height"]
 
 
@@ -62,10 +57,10 @@ def test_a_telephone_scrolls_one_column_and_keeps_the_stop(page: Page, server: P
     server.bridge = bridge(stop_id="s1", stopped_by="Ada: stop button")
     for part in ("#start", "#reset", "#hold", "#accept-all", "rp-gauge >> nth=0", "#log-filter"):
         page.locator(part).scroll_into_view_if_needed()
-        box = page.locator(part).bounding_box()
-        assert box is not None and box["x"] >= 0 and box["x"] + box["width"] <= 390, part
-        stop = page.locator("#stop").bounding_box()
-        assert stop is not None and stop["y"] >= 0 and stop["y"] + stop["height"] <= 844
+        box = box_of(page.locator(part))
+        assert box["x"] >= 0 and box["x"] + box["width"] <= 390, part
+        stop = box_of(page.locator("#stop"))
+        assert stop["y"] >= 0 and stop["y"] + stop["height"] <= 844
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
     page.locator("#stop").click()
     until(page, lambda: len(server.stops()) == 1)
@@ -81,9 +76,8 @@ def test_on_small_screens_neither_banner_hides_the_view(
     server.online = False
     server.sockets[-1].close()
     expect(page.locator("rp-link-banner")).to_contain_text("No link to the server")
-    view, lost = page.locator("rp-scene").bounding_box(), page.locator("rp-link-banner").bounding_box()
-    stopped = page.locator("rp-stop-banner").bounding_box()
-    assert view is not None and lost is not None and stopped is not None
+    view, lost = box_of(page.locator("rp-scene")), box_of(page.locator("rp-link-banner"))
+    stopped = box_of(page.locator("rp-stop-banner"))
     assert lost["y"] + lost["height"] <= view["y"]
     assert stopped["height"] <= 0.3 * view["height"]
     assert view["height"] >= 300
@@ -91,12 +85,11 @@ def test_on_small_screens_neither_banner_hides_the_view(
 
 def test_on_a_telephone_the_stop_lies_over_nothing(page: Page, server: PlayedServer) -> None:
     page.set_viewport_size({"width": 390, "height": 844})
-    stop = page.locator("#stop").bounding_box()
-    assert stop is not None
+    stop = box_of(page.locator("#stop"))
     assert page.evaluate("document.body.getBoundingClientRect().bottom") <= stop["y"]
     page.locator("rp-teleoperation > .hint").scroll_into_view_if_needed()
-    hint = page.locator("rp-teleoperation > .hint").bounding_box()
-    assert hint is not None and hint["y"] + hint["height"] <= stop["y"]
+    hint = box_of(page.locator("rp-teleoperation > .hint"))
+    assert hint["y"] + hint["height"] <= stop["y"]
 
 
 def test_without_a_link_nothing_is_pushed_off_a_tablet(page: Page, server: PlayedServer) -> None:
@@ -107,8 +100,7 @@ def test_without_a_link_nothing_is_pushed_off_a_tablet(page: Page, server: Playe
     server.online = False
     server.sockets[-1].close()
     expect(page.locator("rp-link-banner")).to_contain_text("No link to the server")
-    leave, stop = page.locator("#sign-out").bounding_box(), page.locator("#stop").bounding_box()
-    assert leave is not None and stop is not None
+    leave, stop = box_of(page.locator("#sign-out")), box_of(page.locator("#stop"))
     assert leave["x"] + leave["width"] <= stop["x"]
     for useless in ("#reset", "#invite"):
         expect(page.locator(useless)).to_be_hidden()

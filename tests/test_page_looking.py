@@ -1,7 +1,7 @@
 """Cameras, layers and measure of the 3-D view, by the page's buttons and keys."""
 
 import pytest
-from played_page import until
+from played_page import box_of, until
 from played_server import PlayedServer
 from playwright.sync_api import Page, expect
 
@@ -74,5 +74,5 @@ def test_a_viewer_looks_around_and_is_told_why_measuring_is_not_for_them(page: P
     expect(measure).to_have_attribute("title", "You are signed in as a viewer")
     expect(page.get_by_role("button", name="Row", exact=True)).to_have_attribute("aria-disabled", "false")
     for button in page.locator("rp-view-tools .tools button").all():
-        box = button.bounding_box()
-        assert box is not None and min(box["width"], box["height"]) >= 44
+        box = box_of(button)
+        assert min(box["width"], box["height"]) >= 44

@@ -2,7 +2,7 @@
 
 import msgspec
 import pytest
-from played_page import until
+from played_page import box_of, until
 from played_server import PlayedServer, controller, point
 from playwright.sync_api import Page, expect
 
@@ -45,9 +45,8 @@ def test_the_list_is_in_the_order_of_work_and_says_whose_it_is(page: Page, serve
 
 def test_a_row_is_dragged_to_another_place(page: Page, server: PlayedServer) -> None:
     opened(page)
-    grip = page.locator('.order-row[data-point-id="p4"] .order-grip').bounding_box()
-    goal = page.locator('.order-row[data-point-id="p2"]').bounding_box()
-    assert grip and goal
+    grip = box_of(page.locator('.order-row[data-point-id="p4"] .order-grip'))
+    goal = box_of(page.locator('.order-row[data-point-id="p2"]'))
     page.mouse.move(grip["x"] + 10, grip["y"] + 20)
     page.mouse.down()
     page.mouse.move(goal["x"] + 10, goal["y"] + 8, steps=4)
@@ -58,8 +57,7 @@ def test_a_row_is_dragged_to_another_place(page: Page, server: PlayedServer) -> 
 
 def test_a_drag_that_ends_where_it_began_asks_for_nothing(page: Page, server: PlayedServer) -> None:
     opened(page)
-    grip = page.locator('.order-row[data-point-id="p3"] .order-grip').bounding_box()
-    assert grip
+    grip = box_of(page.locator('.order-row[data-point-id="p3"] .order-grip'))
     page.mouse.move(grip["x"] + 10, grip["y"] + 20)
     page.mouse.down()
     page.mouse.move(grip["x"] + 10, grip["y"] + 24, steps=2)
