@@ -13,6 +13,7 @@ BENCHMARKS = {
     "arm": ("benchmarks.arm", "the arm alone between random poses, beside published figures"),
     "load": ("benchmarks.load", "processor, memory and traffic of the demo"),
     "ledger": ("benchmarks.ledger", "what recording costs the control step, on a slow disk too"),
+    "record": ("benchmarks.record", "what a recorder beside the demo costs the control"),
     "live": ("benchmarks.live", "the running demo: control periods on time, round trip, tool error"),
     "perception": ("benchmarks.perception", "surveys of unseen rows, every pruning point judged"),
     "real": ("benchmarks.real", "random commands and faults, the real bridge on fakes with monitors"),

@@ -56,6 +56,10 @@ class Demo:
                 break
         else:
             raise InputError(f"the demo did not come up:\n{said}")
+        wire = re.search(r"--connect (\S+)", said)
+        assert wire is not None, said
+        #: Where the robot's wire is.
+        self.endpoint = wire[1]
         self.client.post("/api/sign-in", json={"token": token[1]}).raise_for_status()
         self.wait(lambda: len(self.client.get("/api/points").json()["points"]) >= 2, 60.0)
 

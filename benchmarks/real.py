@@ -21,6 +21,7 @@ import psutil
 
 from benchmarks.documents import one_row_a_line
 from benchmarks.real_site import RealSite
+from bridge.core import actuated
 from bridge.real import mp500
 from rolling_panda import messages as m
 from rolling_panda import topics
@@ -29,7 +30,7 @@ from rolling_panda.priority import take_priority
 from rolling_panda.robot_model import RobotModel
 from rolling_panda.transport import Transport
 
-_REST = (0.0,) * 9
+_REST: m.Actuated = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 # Between two faults (s), and how long one is watched.
 _CALM_S, _WATCHED_S = 7.0, 1.5
 # Work goes on at these shares of what wheels (0.3 m/s) and joints can do; the rest of the time anything is commanded.
@@ -104,7 +105,7 @@ class Commander:
         self._joints, self._motion = self.transport.slot(topics.JOINTS), self.transport.publisher(topics.MOTION)
         self._rng, self._limits = rng, RobotModel().limits
         self._sequence, self._until = 0, 0.0
-        self._xi: tuple[float, ...] = _REST
+        self._xi = _REST
         self.silent = self.at_work = False
 
     def run(self, seconds: float, moving: bool) -> None:
@@ -116,8 +117,7 @@ class Commander:
                 # After any silence, of a device too, the robot waits for a command at rest.
                 xi = self._random(time.monotonic()) if moving and self.follows() else _REST
                 echo = got.message.sequence
-                command = m.MotionCommand(epoch=1, sequence=self._sequence, echo=echo, xi=xi)  # type: ignore[arg-type]
-                self._motion.put(command)
+                self._motion.put(m.MotionCommand(epoch=1, sequence=self._sequence, echo=echo, xi=xi))
             time.sleep(0.002)
 
     @property
@@ -137,11 +137,11 @@ class Commander:
         state = self.state.peek()
         return state is not None and not state.message.watchdog and not state.message.stop_id
 
-    def _random(self, now: float) -> tuple[float, ...]:
+    def _random(self, now: float) -> m.Actuated:
         if now >= self._until:
             share = self._rng.choice([0.1, 0.5, 1.0])
             most = self._limits.velocity * (_WORK if self.at_work else share)
-            self._xi = tuple(self._rng.uniform(-v, v) for v in most.tolist())
+            self._xi = actuated(np.array([self._rng.uniform(-v, v) for v in most.tolist()]))
             self._until = now + self._rng.choice([0.01, 0.05, 0.2, 0.5])
         return self._xi
 

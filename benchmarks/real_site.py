@@ -7,6 +7,7 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Self
 
@@ -54,7 +55,8 @@ class RealSite:
         self._log = (folder / "log").open("w+", encoding="utf-8")
         url = f"http://127.0.0.1:{port}"
         self._page = httpx.Client(base_url=url, headers={"Origin": url}, timeout=10.0)
-        try:
+        with ExitStack() as begun:
+            begun.callback(self.close)
             self._devices = self._start("bridge.fakes", [*shared, "--arm", address])
             self._line()
             self.bridge = psutil.Process(self._start("bridge", ["real", "--fakes", *shared, *kept]).pid)
@@ -62,9 +64,7 @@ class RealSite:
             self.wait(self._answers, _START_S, "the page")
             # Once: the token is used up by the first.
             self._page.post("/api/sign-in", json={"token": _TOKEN}, timeout=60.0).raise_for_status()
-        except BaseException:
-            self.close()
-            raise
+            begun.pop_all()
 
     def __enter__(self) -> Self:
         """Return itself."""

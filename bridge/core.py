@@ -319,8 +319,8 @@ class BridgeCore:
         return m.JointState(
             header=m.Header(now),
             sequence=self._ticks // self._joint_ticks,
-            position=_actuated(self._measured.position),
-            velocity=_actuated(self._measured.velocity),
+            position=actuated(self._measured.position),
+            velocity=actuated(self._measured.velocity),
         )
 
     def _state(self, now: float) -> m.BridgeState:
@@ -347,7 +347,7 @@ class BridgeCore:
         measured: Measurement = self._measured
         if bool(np.abs(measured.velocity).max() > _MOVING):
             self._shutter.wake(self._ticks)
-        posture = Posture(self._clock, m.Header(now, "camera"), self._odometer.pose, _actuated(measured.position))
+        posture = Posture(self._clock, m.Header(now, "camera"), self._odometer.pose, actuated(measured.position))
         self._shutter.follow(posture)
         expose = self._shutter.due(self._ticks)
         if expose:
@@ -367,6 +367,7 @@ class BridgeCore:
         return Scenery(header=m.Header(now, "odom"), revision=self._scenery_revision, capsules=capsules)
 
 
-def _actuated(values: Array) -> m.Actuated:
+def actuated(values: Array) -> m.Actuated:
+    """Values over ξ (9) as the wire has them."""
     a, b, c, d, e, f, g, h, i = (float(value) for value in values)
     return a, b, c, d, e, f, g, h, i

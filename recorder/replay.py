@@ -83,7 +83,10 @@ class Stage:
         self._put: dict[str, Any] = {}
         for topic in TOPICS:
             if played(topic):
-                self._put[topic.name] = self._wires.get(topic.sender, self._wires["bridge"]).publisher(topic)  # type: ignore[call-overload]
+                wire = next(
+                    (self._wires[process] for process in _ABSENT if process == topic.sender), self._wires["bridge"]
+                )
+                self._put[topic.name] = wire.publisher(topic)
         own = self._wires["controller"]
         self._state = own.publisher(topics.REPLAY)
         own.serve(topics.SEEK, self._seek)

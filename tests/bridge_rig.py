@@ -45,21 +45,55 @@ class Parts:
     close: Callable[[], None]
 
 
-class Rig:
+class Commander:
+    """What commands a bridge and keeps all that it says; whoever has one steps it."""
+
+    core: BridgeCore
+
+    def __init__(self, token: str = "") -> None:
+        self.epoch, self.sequence, self.echo, self.token = 1, 0, 0, token
+        self.now = 0.0
+        self.outputs: list[BridgeOutputs] = []
+
+    def message(self, xi: tuple[float, ...]) -> m.MotionCommand:
+        self.sequence += 1
+        return m.MotionCommand(
+            epoch=self.epoch,
+            sequence=self.sequence,
+            echo=self.echo,
+            xi=xi,  # type: ignore[arg-type]
+            token=self.token,
+        )
+
+    def command(self, xi: tuple[float, ...]) -> None:
+        self.core.on_motion(self.message(xi), self.now)
+
+    def hear(self, out: BridgeOutputs, xi: tuple[float, ...] | None) -> None:
+        """Keep what a tick gave; with `xi`, answer its joint state."""
+        self.outputs.append(out)
+        if out.joints is not None:
+            self.echo = out.joints.sequence
+            if xi is not None:
+                self.command(xi)
+
+    @property
+    def state(self) -> m.BridgeState:
+        return next(out.state for out in reversed(self.outputs) if out.state is not None)
+
+
+class Rig(Commander):
     """Steps the bridge and answers each of its joint states, for as long as there is something to say."""
 
     def __init__(self, parts: Parts) -> None:
+        super().__init__("a1")
         self.parts, self.plant = parts, parts.plant
-        self.epoch, self.sequence, self.token = 1, 0, "a1"
-        self.now = 0.0
         self.start()
 
     def start(self) -> None:
         """(Re)start the bridge; the plant stays as it is."""
         self.core = self.parts.start()
         self.time = self.parts.time()
-        self.echo = 0
-        self.outputs: list[BridgeOutputs] = []
+        self.echo, self.outputs = 0, []
 
     def run(self, seconds: float, xi: tuple[float, ...] | None) -> None:
         """Let robot time pass; with `xi`, command it after each joint state."""
@@ -69,12 +103,7 @@ class Rig:
             due = self.time.due(time.monotonic())
             for _ in range(due):
                 self.now = self.time.tick()
-                out = self.core.step(self.now, time.monotonic())
-                self.outputs.append(out)
-                if out.joints is not None:
-                    self.echo = out.joints.sequence
-                    if xi is not None:
-                        self.command(xi)
+                self.hear(self.core.step(self.now, time.monotonic()), xi)
             if self.parts.real:
                 time.sleep(0.004)
 
@@ -91,19 +120,6 @@ class Rig:
         self.run(1.0, FORWARD)
         np.testing.assert_allclose(self.plant.velocity(), FORWARD, atol=0.06)
 
-    def message(self, xi: tuple[float, ...]) -> m.MotionCommand:
-        self.sequence += 1
-        return m.MotionCommand(
-            epoch=self.epoch,
-            sequence=self.sequence,
-            echo=self.echo,
-            xi=xi,  # type: ignore[arg-type]
-            token=self.token,
-        )
-
-    def command(self, xi: tuple[float, ...]) -> None:
-        self.core.on_motion(self.message(xi), self.now)
-
     def cut(self, cut_id: str, epoch: int | None = None) -> None:
         self.core.on_cut(
             m.CutCommand(
@@ -118,10 +134,6 @@ class Rig:
 
     def at_rest(self) -> bool:
         return float(np.abs(self.plant.velocity()).max()) < 0.02
-
-    @property
-    def state(self) -> m.BridgeState:
-        return next(out.state for out in reversed(self.outputs) if out.state is not None)
 
     @property
     def refusals(self) -> str:

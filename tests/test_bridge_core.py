@@ -2,25 +2,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from bridge_rig import MODEL, PICTURE, REST, Commander
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridge.config import BridgeConfig, OdometryConfig
-from bridge.core import TICK_S, BridgeCore, BridgeOutputs
+from bridge.core import TICK_S, BridgeCore
 from bridge.interface import Measurement, Setpoint
 from bridge.memory import Memory
 from bridge.odometer import Odometer
 from bridge.picture import Picture
 from rolling_panda import messages as m
-from rolling_panda.camera_messages import Intrinsics
 from rolling_panda.look_messages import PictureRequest
-from rolling_panda.robot_model import RobotModel
 
-MODEL = RobotModel()
 MIDDLE = (MODEL.limits.lower[5:] + MODEL.limits.upper[5:]) / 2
-REST = (0.0,) * 9
 FORWARD = (*MODEL.drive.wheels(0.3, 0.0), 0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.2)
-PICTURE = Picture(Intrinsics(4, 4, 1.0, 1.0, 2.0, 2.0), b"c", b"d", b"l")
 
 
 class IdealRobot:
@@ -57,43 +53,23 @@ def odometer() -> Odometer:
     return Odometer(MODEL.drive, OdometryConfig(), TICK_S)
 
 
-class Bench:
+class Bench(Commander):
     """A core on an ideal robot, with a controller that repeats one velocity at 100 Hz for as long as it lives."""
 
     def __init__(self) -> None:
+        super().__init__()
         self.robot = IdealRobot()
         self.core = BridgeCore(self.robot, BridgeConfig(), MODEL.limits, odometer(), "sim")
-        self.now = 0.0
-        self.echo = self.sequence = 0
-        self.epoch = 1
-        self.xi: tuple[float, ...] | None = None
-        self.outputs: list[BridgeOutputs] = []
 
     def run(self, seconds: float, xi: tuple[float, ...] | None) -> None:
         for _ in range(round(seconds * 1000)):
             self.now += 1e-3
-            out = self.core.step(self.now)
-            self.outputs.append(out)
-            if out.joints is not None:
-                self.echo = out.joints.sequence
-                if xi is not None:
-                    self.command(xi)
-
-    def command(self, xi: tuple[float, ...]) -> None:
-        self.sequence += 1
-        self.core.on_motion(
-            m.MotionCommand(epoch=self.epoch, sequence=self.sequence, echo=self.echo, xi=xi),  # type: ignore[arg-type]
-            self.now,
-        )
+            self.hear(self.core.step(self.now), xi)
 
     def drive_on(self) -> None:
         self.run(0.1, REST)
         self.run(0.5, FORWARD)
         assert self.robot.sent[-1].xi == pytest.approx(FORWARD)
-
-    @property
-    def state(self) -> m.BridgeState:
-        return next(out.state for out in reversed(self.outputs) if out.state is not None)
 
     @property
     def log(self) -> list[str]:
