@@ -18,6 +18,7 @@ BENCHMARKS = {
     "perception": ("benchmarks.perception", "surveys of unseen rows, every pruning point judged"),
     "real": ("benchmarks.real", "random commands and faults, the real bridge on fakes with monitors"),
     "faults": ("benchmarks.faults", "random faults in motion, judged by what the actuators were sent"),
+    "clean": ("benchmarks.clean", "an hour of automatic work without a fault: nothing stops by itself"),
     "checks": ("benchmarks.checks", "each check of safety taken away on a copy: its test has to fail"),
     "plots": ("benchmarks.plots", "pictures of what the others wrote with --json"),
 }

@@ -2,13 +2,17 @@
 
 import argparse
 import asyncio
-import contextlib
+import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import AsyncExitStack, contextmanager, suppress
 
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 from websockets.typing import Origin
+
+from rolling_panda.errors import RollingPandaError
+from rolling_panda.launch import child_environment, python_command
 
 _OPEN_S = 30.0
 
@@ -23,7 +27,7 @@ async def look_on(url: str, cookie: str, pages: int, slow: int) -> None:
         slow: How many of them never read.
     """
     socket_url = url.replace("http", "ws", 1) + "/ws"
-    async with contextlib.AsyncExitStack() as stack, asyncio.TaskGroup() as group:
+    async with AsyncExitStack() as stack, asyncio.TaskGroup() as group:
         readers = []
         for number in range(pages):
             opening = connect(
@@ -40,9 +44,33 @@ async def look_on(url: str, cookie: str, pages: int, slow: int) -> None:
 
 
 async def _read(page: ClientConnection) -> None:
-    with contextlib.suppress(ConnectionClosed):
+    with suppress(ConnectionClosed):
         async for _ in page:
             pass
+
+
+@contextmanager
+def looked_at(url: str, cookie: str, pages: int, slow: int) -> Iterator[None]:
+    """So many pages look on meanwhile, from a process of their own; `slow` of them never read.
+
+    Raises:
+        RollingPandaError: They were not let in, or not all of those that read did so to the end.
+    """
+    words = [url, cookie, "--pages", str(pages), "--slow", str(slow)]
+    with subprocess.Popen(
+        python_command("benchmarks.crowd", words),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        env=child_environment(),
+    ) as crowd:
+        assert crowd.stdout is not None
+        if crowd.stdout.readline() != "open\n":
+            raise RollingPandaError("the pages that look on were not let in")
+        yield
+        reading, _ = crowd.communicate(timeout=20)
+    if int(reading) != pages - slow:
+        raise RollingPandaError(f"{reading.strip()} of {pages - slow} pages still read at the end")
 
 
 def main(argv: Sequence[str] | None = None) -> int:

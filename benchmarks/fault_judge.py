@@ -29,7 +29,7 @@ class Trial:
         requirement: That it tests.
         seed: Of the trial.
         limit_s: Allowed; infinite where the robot must go on, NaN where it may.
-        note: For people, and not judged: the controller's mode at the end, or the hop.
+        note: For people, and not judged: the hop, and the controller's mode at the end.
         braking_s: From the fault until the wheels are slower than they were, for good; infinite if never.
         quiet_s: From the fault until nothing but zero is sent; infinite if never.
         replayed: Rows with an older token or number than a row before.

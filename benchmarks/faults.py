@@ -120,18 +120,20 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--pages", type=int, default=0, help="with --live: that look on, a fifth never reading, at 10 pictures a second"
     )
-    parser.add_argument("--only", metavar="TEXT", default="", help="faults whose name or requirement has this in it")
+    parser.add_argument(
+        "--only", metavar="TEXT", nargs="+", default=[""], help="requirements, or parts of the names of faults"
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write there what was found")
     arguments = parser.parse_args(argv)
 
     def wanted(fault: Fault | LiveFault) -> bool:
-        return arguments.only in (fault.requirement, "") or arguments.only in fault.name
+        return any(text in (fault.requirement, "") or text in fault.name for text in arguments.only)
 
     live = [fault for fault in LIVE_FAULTS if wanted(fault)]
     chosen = [fault for fault in FAULTS if wanted(fault)]
     if not (chosen if arguments.live is None else live):
         known = ", ".join(sorted({fault.requirement for fault in FAULTS}))
-        parser.error(f"--only {arguments.only!r} is in no fault's name; requirements are {known}")
+        parser.error(f"--only {' '.join(arguments.only)!r} is in no fault's name; requirements are {known}")
     if arguments.live is None:
         trials = _in_one_process(chosen, arguments.seed, arguments.trials)
     else:

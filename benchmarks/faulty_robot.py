@@ -5,13 +5,13 @@ import signal
 import subprocess
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any, Self
 
 import httpx
 
+from benchmarks.crowd import looked_at
 from benchmarks.live_robot import PROCESSES, LiveRobot, free_port
 from benchmarks.wall_clock import WallClock
 from rolling_panda.errors import RollingPandaError
@@ -96,33 +96,10 @@ class FaultyRobot(LiveRobot):
         self.processes[name].send_signal(signal.SIGCONT)
         return at
 
-    @contextmanager
-    def looked_at(self, pages: int) -> Iterator[None]:
-        """So many pages look on meanwhile, a fifth of which never read.
-
-        Raises:
-            RollingPandaError: Not all of those that read did so to the end.
-        """
-        if pages == 0:
-            yield
-            return
+    def looked_at(self, pages: int) -> AbstractContextManager[None]:
+        """So many pages look on meanwhile, a fifth of which never read."""
         cookie = "; ".join(f"{name}={value}" for name, value in self.client.cookies.items())
-        slow = pages // 5
-        words = [self.url, cookie, "--pages", str(pages), "--slow", str(slow)]
-        with subprocess.Popen(
-            python_command("benchmarks.crowd", words),
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            env=child_environment(),
-        ) as crowd:
-            assert crowd.stdout is not None
-            if crowd.stdout.readline() != "open\n":
-                raise RollingPandaError("the pages that look on were not let in")
-            yield
-            reading, _ = crowd.communicate(timeout=20)
-        if int(reading) != pages - slow:
-            raise RollingPandaError(f"{reading.strip()} of {pages - slow} pages still read at the end")
+        return looked_at(self.url, cookie, pages, pages // 5) if pages else nullcontext()
 
     def make_ready(self) -> None:
         """Undo every fault of the ways and the clock, and lead the robot back to READY, as a supervisor would.

@@ -7,16 +7,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import httpx
 import numpy as np
 
 from benchmarks.fault_judge import Rows, Trial, braking_after, judge, last_taken
+from benchmarks.fault_world import MODEL
 from benchmarks.faulty_robot import FaultyRobot, Hand
 from benchmarks.live_fault_kinds import LiveFault
 from bridge.sim import trace
+from controller.config import ControllerConfig
 from rolling_panda.errors import RollingPandaError
 
 #: A base driven by hand moves at least this fast (rad/s of a wheel) before a fault, and base or arm at work.
-_DRIVEN, _WORKING = 1.3, 0.3
+_DRIVEN = 0.95 * ControllerConfig().teleop_base_speed / MODEL.drive.wheel_radius
+_WORKING = 0.3
 _PATIENCE_S = 10.0
 #: How much of the trace before a fault belongs to a trial (s), and what the trace may lag behind (s).
 _BEFORE_S, _WRITTEN_S = 0.3, 0.3
@@ -24,12 +28,21 @@ _BEFORE_S, _WRITTEN_S = 0.3, 0.3
 
 @dataclass(frozen=True)
 class Happened:
-    """A fault that was made to happen: when (s, monotonic), and the trace that it is in."""
+    """A fault that was made to happen.
+
+    Attributes:
+        fault: Which.
+        at: When (s, monotonic).
+        trace: That it is in.
+        until: End of its part of the trace (s, monotonic).
+        mode: The controller's at the end, with its reason; empty where nobody could be asked.
+    """
 
     fault: LiveFault
     at: float
     trace: Path
     until: float
+    mode: str
 
 
 def run_live(
@@ -90,7 +103,7 @@ def _happen(robot: FaultyRobot, fault: LiveFault, later_s: float, way: float) ->
         left = at + fault.watched_s - time.monotonic()
         if left > 0.0:
             time.sleep(left)
-        out = Happened(fault, at, robot.trace, time.monotonic())
+        out = Happened(fault, at, robot.trace, time.monotonic(), _mode(robot))
     time.sleep(_WRITTEN_S)
     for name in fault.restart:
         if robot.processes[name].poll() is not None:
@@ -98,6 +111,14 @@ def _happen(robot: FaultyRobot, fault: LiveFault, later_s: float, way: float) ->
     if fault.restart:
         robot.wait(lambda: all(robot.gone(name) is None for name in fault.restart), 30, f"{fault.restart} to be back")
     return out
+
+
+def _mode(robot: FaultyRobot) -> str:
+    try:
+        controller = robot.state()["controller"]
+    except httpx.HTTPError:
+        return ""
+    return f"{controller['mode']}: {controller['reason']}" if controller else ""
 
 
 def _moves(robot: FaultyRobot, by_hand: bool) -> bool:
@@ -130,4 +151,6 @@ def _trial(one: Happened, rows: Rows, seed: int, number: int) -> Trial:
     since = one.at if fault.since == "fault" else last_taken(rows)
     found = judge(rows, (), since, fault.limit_s)
     braking = braking_after(rows, one.at)
-    return Trial(fault.name, fault.requirement, seed + number, fault.limit_s, fault.hop, braking, *found)
+    return Trial(
+        fault.name, fault.requirement, seed + number, fault.limit_s, f"{fault.hop}; {one.mode}", braking, *found
+    )

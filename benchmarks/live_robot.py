@@ -5,6 +5,7 @@ import socket
 import subprocess
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -50,13 +51,12 @@ class LiveRobot:
 
     def __enter__(self) -> Self:
         """Start everything and wait until the server answers."""
-        try:
+        with ExitStack() as undo:
+            undo.callback(self.close)
             for name in PROCESSES:
                 self.start(name)
             self.wait(self._healthy, 60, "the server to answer")
-        except BaseException:
-            self.close()
-            raise
+            undo.pop_all()
         return self
 
     def __exit__(

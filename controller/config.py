@@ -84,7 +84,7 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         teleop_speed: Limit of the tool in teleoperation (m/s).
         teleop_turn: The same for turning (rad/s).
         teleop_base_speed: Limit of each wheel on the ground where base or tool are led by hand (m/s): from it
-            `base_braking` has the base at rest within 0.15 s of letting go.
+            `base_braking` has the base at rest 0.1 s after it hears of letting go, which leaves the word 50 ms.
         teleop_base: What the base does in teleoperation: `free` keeps it parallel to the row, in `transit` the tool's
             sideways motion steers it.
         hierarchy: Of the method `hierarchy`.
@@ -155,7 +155,7 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
     hold_max_age_s: Positive = 0.15
     teleop_speed: Positive = 0.25
     teleop_turn: Positive = 0.6
-    teleop_base_speed: Positive = 0.18
+    teleop_base_speed: Positive = 0.15
     teleop_base: Literal["free", "transit"] = "free"
     hierarchy: HierarchyConfig = HierarchyConfig()
 

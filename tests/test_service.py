@@ -1,4 +1,5 @@
 import argparse
+import socket
 import threading
 
 import pytest
@@ -22,6 +23,13 @@ def test_a_port_in_use_is_one_clear_line():
 def test_a_port_that_is_no_port_is_one_clear_line():
     with pytest.raises(InputError, match="cannot listen"):
         listen("127.0.0.1", 70_000)
+
+
+def test_no_part_of_an_answer_waits_for_the_other_side():
+    with listen("127.0.0.1", 0) as door, socket.create_connection(door.getsockname()):
+        answering, _ = door.accept()
+        with answering:
+            assert answering.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
 
 
 def context(*argv):

@@ -1,31 +1,31 @@
 """Pages that look on, some of which never read, and a robot's configuration with a quick camera."""
 
-import subprocess
-
 import pytest
 from fake_wire import FakeWire
 from running_server import running_server
 
+from benchmarks.crowd import looked_at
 from benchmarks.faults import loaded
 from bridge.config import BridgeConfig
 from rolling_panda.config import load_section
-from rolling_panda.launch import child_environment, python_command
+from rolling_panda.errors import RollingPandaError
 
 
 @pytest.mark.alone
-def test_pages_look_on_until_they_are_told_to_end():
+def test_pages_look_on_until_they_are_told_to_end(capfd):
     with running_server(FakeWire()) as server, server.client(user="ann") as client:
-        words = [server.address, server.cookie(client), "--pages", "6", "--slow", "2"]
-        with subprocess.Popen(
-            python_command("benchmarks.crowd", words),
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            env=child_environment(),
-        ) as crowd:
-            assert crowd.stdout.readline() == "open\n"
-            assert crowd.communicate(timeout=10)[0] == "4\n"
-        assert crowd.returncode == 0
+        cookie = server.cookie(client)
+        with looked_at(server.address, cookie, pages=6, slow=2):
+            pass
+        # More of them read than are said to: some must have been thrown out.
+        with (
+            pytest.raises(RollingPandaError, match="3 of 5 pages still read"),
+            looked_at(server.address, cookie, 3, -2),
+        ):
+            pass
+        with pytest.raises(RollingPandaError, match="not let in"), looked_at(server.address, "a=b", 1, 0):
+            pass
+    assert "HTTP 40" in capfd.readouterr().err
 
 
 def test_a_loaded_robot_takes_ten_pictures_a_second(tmp_path):

@@ -1,0 +1,33 @@
+"""Work without a fault goes on, and a stop that there is would be seen; `rolling-panda bench clean` takes an hour."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from benchmarks.clean import EndlessRow, main, work
+
+
+def test_work_goes_on_without_a_stop_and_with_jitter_on_the_ways(tmp_path, monkeypatch, capsys):
+    # Calm and rough seconds in turns, so that a short run has both.
+    monkeypatch.setattr("benchmarks.clean._CALM_S", 2.0)
+    file = tmp_path / "clean.json"
+    assert main(["--seconds", "8", "--json", str(file)]) == 0
+    found = json.loads(file.read_text())
+    assert found["cuts"] >= 2 and found["stops"] == [] and found["longest_rest_s"] < 1.0
+    assert "0 stops" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("fault", "mode"),
+    [
+        (lambda world: setattr(world, "perception", False), "PAUSED"),
+        (lambda world: setattr(world.odometry, "loss", 1.0), "PROTECTIVE_STOP"),
+    ],
+)
+def test_a_stop_is_told_once_with_its_time(fault, mode):
+    world = EndlessRow(1)
+    fault(world)
+    found = replace(work(world, 3.0, 0.0), seconds=3.0)
+    ((at, was),) = found.stops
+    assert was == mode and 0.0 < at < 3.0 and found.longest_rest_s > 0.5
