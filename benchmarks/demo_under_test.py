@@ -20,7 +20,7 @@ _LOOK_S = 0.2
 
 
 class Demo:
-    """A demo under measurement, and a script signed in to it."""
+    """A demo under measurement, and a script signed in to it. With several robots it asks the same of each."""
 
     def __init__(self, port: int, seed: int, config: Path | None = None, *more: str) -> None:
         """Start it and wait until detections have come.
@@ -61,7 +61,10 @@ class Demo:
         #: Where the robot's wire is.
         self.endpoint = wire[1]
         self.client.post("/api/sign-in", json={"token": token[1]}).raise_for_status()
-        self.wait(lambda: len(self.client.get("/api/points").json()["points"]) >= 2, 60.0)
+        several = self.client.get("/api/robots")
+        #: Below which each robot's requests are.
+        self.paths = [row["path"].rstrip("/") for row in several.json()] if several.is_success else [""]
+        self.wait(lambda: all(len(self._points(path)) >= 2 for path in self.paths), 90.0)
 
     def wait(self, condition: Callable[[], Any], limit_s: float) -> None:
         """Poll until `condition()` holds.
@@ -76,23 +79,31 @@ class Demo:
             time.sleep(0.1)
 
     def post(self, path: str, **body: Any) -> dict[str, Any]:
-        """Ask for something that must be granted."""
-        answer = self.client.post(f"/api/{path}", json=body)
-        answer.raise_for_status()
+        """Ask for something that must be granted; the answer of the last robot."""
+        for robot in self.paths:
+            answer = self.client.post(f"{robot}/api/{path}", json=body)
+            answer.raise_for_status()
         return dict(answer.json())
 
     def state(self) -> dict[str, Any]:
-        """What the page would show now."""
-        return dict(self.client.get("/api/state").json())
+        """That of the first robot."""
+        return self.states()[0]
 
-    def mode(self) -> str:
-        """State of the supervision machine."""
-        return str(self.state()["controller"]["mode"])
+    def _points(self, path: str) -> list[Any]:
+        return list(self.client.get(f"{path}/api/points").json()["points"])
+
+    def states(self) -> list[dict[str, Any]]:
+        """What the page of each robot would show now."""
+        return [dict(self.client.get(f"{path}/api/state").json()) for path in self.paths]
+
+    def in_mode(self, mode: str) -> bool:
+        """Is the supervision machine of every robot there?"""
+        return all(state["controller"]["mode"] == mode for state in self.states())
 
     def begin_work(self) -> None:
         """Arm, accept all that was detected, start."""
         self.post("arm")
-        self.wait(lambda: self.mode() == "READY", 20.0)
+        self.wait(lambda: self.in_mode("READY"), 20.0)
         self.post("points/accept-all", confidence=0.0)
         self.post("start")
 
@@ -104,7 +115,8 @@ class Demo:
         def look() -> None:
             with httpx.Client(base_url=self.client.base_url, cookies=self.client.cookies, timeout=10) as client:
                 while not ended.wait(_LOOK_S):
-                    client.get("/api/state")
+                    for path in self.paths:
+                        client.get(f"{path}/api/state")
 
         thread = threading.Thread(target=look, name="somebody who looks on")
         thread.start()

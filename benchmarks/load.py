@@ -133,11 +133,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="rolling-panda bench load", description=__doc__)
     parser.add_argument("--seconds", type=float, default=20.0, help="how long each situation lasts (default: 20)")
     parser.add_argument("--seed", type=int, default=0, help="row to grow (default: 0)")
+    parser.add_argument("--robots", type=int, default=1, help="so many robots at once (default: 1)")
     parser.add_argument("--port", type=int, default=8765, help="port of the page (default: 8765)")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures here")
     arguments = parser.parse_args(argv)
     print("starting the demo", flush=True)
-    demo = Demo(arguments.port, arguments.seed)
+    demo = Demo(arguments.port, arguments.seed, None, "--robots", str(arguments.robots))
     try:
         time.sleep(10.0)
         print(f"idle, {arguments.seconds:.0f} s", flush=True)
@@ -153,8 +154,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             time.sleep(3.0)
             print(f"moving, {arguments.seconds:.0f} s", flush=True)
             moving = cost(demo.tree, arguments.seconds)
-            still_working = demo.mode() == "AUTO"
-            factor = demo.state()["bridge"]["real_time_factor"]
+            still_working = demo.in_mode("AUTO")
+            factor = min(state["bridge"]["real_time_factor"] for state in demo.states())
     finally:
         demo.close()
     _show(idle, moving, page, factor, still_working)
@@ -162,6 +163,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         document = {
             "machine": f"{platform.platform()}, {os.cpu_count()} cores",
             "seconds": arguments.seconds,
+            "robots": arguments.robots,
             "idle": asdict(idle),
             "moving": asdict(moving),
             "page": asdict(page) if page is not None else None,

@@ -1,6 +1,7 @@
 """`rolling-panda demo`: the whole program on this machine, in simulation, until Ctrl-C or until one process ends."""
 
 import argparse
+import contextlib
 import os
 import secrets
 import shutil
@@ -8,15 +9,17 @@ import socket
 import tempfile
 import threading
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from rolling_panda import __version__
 from rolling_panda.config import RobotConfig, TransportConfig, load_section
 from rolling_panda.demo_readiness import Readiness
+from rolling_panda.demo_robots import DemoRobot, check_count, commands, demo_robots
 from rolling_panda.demo_supervisor import Death, Supervisor
 from rolling_panda.errors import InputError
 from rolling_panda.launch import python_command
-from rolling_panda.process import ROBOT_ID, stop_on_signals
+from rolling_panda.process import stop_on_signals
 from rolling_panda.resources import resource
 from rolling_panda.router import DEFAULT_ENDPOINT
 
@@ -30,6 +33,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the demo."""
     parser.add_argument("--port", type=int, default=8000, help="port of the operator's page (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=0, help="which vineyard row to grow (default: %(default)s)")
+    parser.add_argument(
+        "--robots", type=int, default=1, metavar="N", help="so many robots, each in a row of its own (default: 1)"
+    )
     parser.add_argument("--trace", type=Path, metavar="FILE", help="record there what was really actuated, each step")
     parser.add_argument(
         "--state", type=Path, metavar="DIR", help="keep there what survives a restart (default: nothing is kept)"
@@ -57,13 +63,14 @@ def run(arguments: argparse.Namespace) -> int:
     check(arguments)
     stopping = stop_on_signals()
     folder = Path(tempfile.mkdtemp(prefix="rolling-panda-"))
+    robots = demo_robots(arguments, folder)
     supervisor = Supervisor(folder)
     what = "the real bridge on fakes of the devices" if arguments.fakes else "simulation"
     _say(f"Rolling Panda {__version__}: {what}, seed {arguments.seed}")
     _say(f"Logs of the processes are in {folder}, for as long as it runs and after a failure")
     token_file = folder / "sign-in-token"
     try:
-        death = _start_and_watch(arguments, supervisor, token_file, stopping)
+        death = _start_and_watch(arguments, robots, supervisor, token_file, stopping)
     finally:
         supervisor.end()
         token_file.unlink(missing_ok=True)
@@ -94,6 +101,7 @@ def check(arguments: argparse.Namespace) -> None:
             "the demo moves no real robot: `--bridge real --fakes` runs its drivers on fakes of the devices; for the "
             "robot itself start `rolling-panda bridge real` and the other processes one by one (docs/deployment.md)"
         )
+    check_count(arguments)
     load_section(arguments.config, "transport", TransportConfig)
     load_section(arguments.config, "robot", RobotConfig)
     if not 1 <= arguments.port <= 65535:
@@ -123,7 +131,11 @@ def _check_writable(path: Path) -> None:
 
 
 def _start_and_watch(
-    arguments: argparse.Namespace, supervisor: Supervisor, token_file: Path, stopping: threading.Event
+    arguments: argparse.Namespace,
+    robots: tuple[DemoRobot, ...],
+    supervisor: Supervisor,
+    token_file: Path,
+    stopping: threading.Event,
 ) -> Death | None:
     """What ended the run: a process, or a person (None)."""
     began = time.monotonic()
@@ -139,24 +151,26 @@ def _start_and_watch(
                 f"the router did not listen within {STARTUP_S:.0f} s; its log is {supervisor.log('router')}"
             )
     _progress("router", began)
-    _say(f"  The robot's wire is at {endpoint}: rolling-panda status --connect {endpoint}")
+    for robot in robots:
+        named = f" --robot-id {robot.name}" if robot.prefix else ""
+        whose = f"The wire of {robot.name}" if robot.prefix else "The robot's wire"
+        _say(f"  {whose} is at {endpoint}: rolling-panda status --connect {endpoint}{named}")
 
     if arguments.fakes:
         supervisor.start("fakes", python_command("bridge.fakes", _fakes_arguments(arguments, endpoint)))
     token = secrets.token_urlsafe(32)
     write_secret(token_file, token)
-    for name, own in _own_arguments(arguments, token_file).items():
-        shared = ["--config", str(arguments.config.resolve()), "--robot-id", ROBOT_ID, "--connect", endpoint]
-        # A row is grown anew for each run: what was done in another one says nothing about it.
-        shared += ["--state", str((arguments.state or token_file.parent / "state").resolve())]
-        supervisor.start(name, python_command(name, [*shared, "--exit-with-parent", *own]))
+    for name, command in commands(robots, arguments, endpoint, token_file).items():
+        supervisor.start(name, command)
 
-    with Readiness(endpoint, ROBOT_ID, page) as readiness:
-        missing = ["bridge", "controller", "perception", "server"]
+    with contextlib.ExitStack() as watched:
+        ready = [(robot, watched.enter_context(Readiness(endpoint, robot.name, page))) for robot in robots]
+        missing = [f"{robot.prefix}{name}" for robot in robots for name in ("bridge", "controller", "perception")]
+        missing.append("server")
         while missing:
             if supervisor.death() is not None or stopping.wait(_POLL_S):
                 return supervisor.death()
-            for name in sorted(readiness.up() & set(missing)):
+            for name in sorted(_up(ready) & set(missing)):
                 missing.remove(name)
                 _progress(name, began)
             if missing and time.monotonic() - began > STARTUP_S:
@@ -171,6 +185,13 @@ def _start_and_watch(
     return supervisor.death()
 
 
+def _up(watched: Sequence[tuple[DemoRobot, Readiness]]) -> set[str]:
+    """Names of the processes that are up; the server is once each robot hears of it."""
+    heard = [(robot.prefix, seen.up()) for robot, seen in watched]
+    own = {prefix + name for prefix, up in heard for name in up - {"server"}}
+    return own | ({"server"} if all("server" in up for _, up in heard) else set())
+
+
 def write_secret(path: Path, text: str) -> None:
     """Write a new file that only this user can read.
 
@@ -183,21 +204,7 @@ def write_secret(path: Path, text: str) -> None:
 
 def _fakes_arguments(arguments: argparse.Namespace, endpoint: str) -> list[str]:
     words = ["--config", str(arguments.config.resolve()), "--connect", endpoint, "--seed", str(arguments.seed)]
-    return words + _trace_arguments(arguments)
-
-
-def _trace_arguments(arguments: argparse.Namespace) -> list[str]:
-    return [] if arguments.trace is None else ["--trace", str(arguments.trace.resolve())]
-
-
-def _own_arguments(arguments: argparse.Namespace, token_file: Path) -> dict[str, list[str]]:
-    simulated = ["sim", "--seed", str(arguments.seed), *_trace_arguments(arguments)]
-    return {
-        "bridge": ["real", "--fakes"] if arguments.fakes else simulated,
-        "controller": [],
-        "perception": [],
-        "server": ["--port", str(arguments.port), "--sign-in-token-file", str(token_file)],
-    }
+    return words + ([] if arguments.trace is None else ["--trace", str(arguments.trace.resolve())])
 
 
 def _progress(name: str, began: float) -> None:

@@ -18,6 +18,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--host", default="127.0.0.1", help="address to listen on (default: %(default)s)")
     parser.add_argument("--port", type=int, default=8000, help="port of the page (default: %(default)s; 0 = any)")
     parser.add_argument(
+        "--also-robot-id",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="another robot at the same router, beside --robot-id; may be given several times",
+    )
+    parser.add_argument(
         "--sign-in-token-file",
         type=Path,
         metavar="FILE",

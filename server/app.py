@@ -1,9 +1,11 @@
 """The application: routes, error answers and the guard around them."""
 
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import msgspec
-from fastapi import FastAPI, Request
+from fastapi import APIRouter, FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
@@ -11,11 +13,14 @@ from starlette.routing import Match, Mount
 from starlette.types import ASGIApp, Scope
 
 from rolling_panda import __version__
+from rolling_panda.messages import Severity
 from rolling_panda.page_messages import PageEvents, PagePoints, PageState
 from rolling_panda.plan_messages import SessionPlan
 from rolling_panda.resources import resource
+from server.camera_api import camera_router
 from server.control_api import control_router
 from server.desk import Desk, Result
+from server.front import Front
 from server.guard import Guard, is_protected
 from server.operator_api import answer, operator_router
 from server.order_api import order_router
@@ -23,11 +28,13 @@ from server.page_files import PageFiles
 from server.pages import pages_router
 from server.plant_api import plant_router
 from server.preview_api import preview_router
+from server.reception import Reception
 from server.replay_api import replay_router
 from server.report_api import report_router
 from server.robot_api import robot_router
+from server.robots_api import path_of, robots_router
 from server.sessions import Session
-from server.site import site_router
+from server.site import page_router, site_router
 from server.viser_proxy import viser_router
 
 _ABOUT = (
@@ -57,9 +64,56 @@ class _PageFiles(Mount):
         return (Match.NONE, {}) if is_protected(scope["path"]) else super().matches(scope)
 
 
-def create_app(desk: Desk, origins: frozenset[str]) -> ASGIApp:
-    """The guarded application; `origins` are the exact origins that the page may have."""
-    web = resource("web")
+def create_app(reception: Reception, origins: frozenset[str]) -> ASGIApp:
+    """The guarded application; `origins` are the exact origins that the page may have.
+
+    One robot is at `/`. Several are at `/robots/NAME/` each, and `/` has what is about all of them.
+    """
+    if len(reception.desks) == 1:
+        (desk,) = reception.desks.values()
+        return robot_app(reception, desk, origins)
+    robots = {name: robot_app(reception, desk, origins) for name, desk in reception.desks.items()}
+    return Front(robots, _hall(reception, origins))
+
+
+def robot_app(reception: Reception, desk: Desk, origins: frozenset[str]) -> ASGIApp:
+    """Everything about one robot."""
+
+    def dropped(session: Session, kind: str) -> None:
+        desk.note("warning", f"a view of {session.user} sent {kind!r} to the 3-D view; dropped", session.client)
+
+    routers = (
+        page_router(web := resource("web")),
+        site_router(reception),
+        camera_router(desk),
+        operator_router(desk),
+        plant_router(desk),
+        order_router(desk),
+        preview_router(desk),
+        control_router(desk),
+        robot_router(desk),
+        replay_router(desk),
+        report_router(desk),
+        pages_router(desk),
+        viser_router(desk.scene, desk.may_move, dropped),
+    )
+    return _guarded(routers, web, reception, origins, desk.note)
+
+
+def _hall(reception: Reception, origins: frozenset[str]) -> ASGIApp:
+    """What several robots have in common."""
+    first = path_of(next(iter(reception.desks)))
+    routers = (page_router(web := resource("web"), first), site_router(reception), robots_router(reception))
+    return _guarded(routers, web, reception, origins, reception.note)
+
+
+def _guarded(
+    routers: Sequence[APIRouter],
+    web: Path,
+    reception: Reception,
+    origins: frozenset[str],
+    note: Callable[[Severity, str, str], None],
+) -> ASGIApp:
     app = _Application(
         title="Rolling Panda",
         version=__version__,
@@ -69,31 +123,18 @@ def create_app(desk: Desk, origins: frozenset[str]) -> ASGIApp:
         redoc_url=None,
         redirect_slashes=False,
     )
-
-    def dropped(session: Session, kind: str) -> None:
-        desk.note("warning", f"a view of {session.user} sent {kind!r} to the 3-D view; dropped", session.client)
-
-    app.include_router(site_router(desk, web))
-    app.include_router(operator_router(desk))
-    app.include_router(plant_router(desk))
-    app.include_router(order_router(desk))
-    app.include_router(preview_router(desk))
-    app.include_router(control_router(desk))
-    app.include_router(robot_router(desk))
-    app.include_router(replay_router(desk))
-    app.include_router(report_router(desk))
-    app.include_router(pages_router(desk))
-    app.include_router(viser_router(desk.scene, desk.may_move, dropped))
+    for router in routers:
+        app.include_router(router)
     app.router.routes.append(_PageFiles("/", PageFiles(web), name="web"))
     app.add_exception_handler(RequestValidationError, _invalid)
     app.add_exception_handler(HTTPException, _failed)
     return Guard(
         app,
-        desk.sessions,
+        reception.sessions,
         origins,
-        desk.cookie,
-        desk.config.max_body_bytes,
-        on_refusal=lambda text: desk.note("warning", text, "a foreign page"),
+        reception.cookie,
+        reception.max_body_bytes,
+        on_refusal=lambda text: note("warning", text, "a foreign page"),
     )
 
 

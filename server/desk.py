@@ -1,4 +1,4 @@
-"""The operator's desk: what REST and the pages share, and what happens when somebody asks for something."""
+"""The operator's desk of one robot: what REST and the pages share, and what comes of it when somebody asks."""
 
 import asyncio
 import time
@@ -19,12 +19,11 @@ from server.event_log import EventLog
 from server.looking import Looking
 from server.motion_rate import MotionRate
 from server.page_view import PageView
-from server.passwords import Passwords
 from server.presence import PresentPeople
 from server.quiet import Quiet
 from server.robot_link import RobotLink
 from server.scene import Scene
-from server.sessions import Session, Sessions
+from server.sessions import Session
 from server.teleop import TeleopHold
 
 _CONFIRM_POLL_S = 0.01
@@ -68,26 +67,25 @@ class Listener(Protocol):
 
 @dataclass(eq=False)
 class Desk:
-    """Shared state of the server; its event loop alone touches it."""
+    """Shared state of the server about one robot; its event loop alone touches it.
+
+    `held_elsewhere` names another robot that a session holds now; empty where it holds none.
+    """
 
     config: ServerConfig
     link: RobotLink
     scene: Scene
     view: PageView
-    sessions: Sessions
     log: EventLog
     teleop: TeleopHold
     people: PresentPeople
-    address: str
-    cookie: str
-    passwords: Passwords | None = None
+    held_elsewhere: Callable[[Session], str] = lambda session: ""
     motion: MotionRate = field(default_factory=MotionRate)
     quiet: Quiet = field(default_factory=Quiet)
     pages: set["Listener"] = field(default_factory=set)
     state: PageState | None = None
     points: PagePoints | None = None
     _seen_at: deque[tuple[int, float]] = field(default_factory=lambda: deque(maxlen=100))
-    _users_trouble: str = ""
     _aimed_at: float = float("-inf")
     _refused_holds: dict[str, str] = field(default_factory=dict)
     looking: Looking = field(init=False)
@@ -191,6 +189,10 @@ class Desk:
         if not self.may_move(session):
             # Whoever may not move the robot must not keep the tool from who may.
             return self._refuse_hold(session, "somebody else holds control of the robot; ask for it, or take it", 409)
+        other = self.held_elsewhere(session)
+        if other:
+            # With two windows side by side, one key or one gamepad must not lead both.
+            return self._refuse_hold(session, f"you hold {other}: let go of it first", 409)
         self.end_lapsed_hold(now)
         was_holding = self.teleop.holder == key
         try:
@@ -260,32 +262,13 @@ class Desk:
         self.scene.show_gizmo(session.session_id, tool, axes)
         self.teleop.aim(session.session_id, tool)
 
-    def end_void_sessions(self) -> None:
-        """Sign out whoever's account has been removed or changed."""
-        if self.passwords is None:
-            return
-        try:
-            accounts = {user.name: user.fingerprint for user in self.passwords.users.everyone()}
-        except InputError as error:
-            # Whoever is at work stays at work; nobody new comes in.
-            if str(error) != self._users_trouble:
-                self._users_trouble = str(error)
-                self.note("error", self._users_trouble)
-            return
-        self._users_trouble = ""
-        for session in self.sessions.void(accounts):
-            self.note("warning", f"the account of {session.user} was removed or changed")
-            self.sign_out(session)
-
-    def sign_out(self, session: Session) -> None:
-        """End a session everywhere."""
+    def leave(self, session: Session) -> None:
+        """A session ends: nothing of it stays with this robot."""
         self.let_go(session)
         self.teleop.forget(session.session_id)
         self.motion.forget(session.session_id)
         self.people.forget(session)
         self.scene.forget(session.session_id)
-        self.sessions.end(session)
-        self.note("info", f"{session.user} signed out")
 
     def wake_pages(self) -> None:
         """There is something new for the pages."""

@@ -1,6 +1,7 @@
 """The door of the server: origin, session and size of every request, and the headers of every answer.
 
-Default-deny: whatever lies under `/api/`, `/camera/`, `/viser` or a WebSocket needs a session, except the few listed.
+Default-deny: whatever lies under `/api/`, `/camera/`, `/viser`, `/robots` (of a robot that is not there) or a WebSocket
+needs a session, except the few listed.
 """
 
 import time
@@ -16,7 +17,7 @@ from server.sessions import Session, Sessions
 _PUBLIC = frozenset({"/api/sign-in", "/api/health", "/api/openapi.json"})
 #: Requests whose body only labels them: one that is too long is left out, and the request goes on.
 _LABELLED = frozenset({"/api/stop"})
-_PROTECTED = ("/api", "/camera", "/viser", "/ws")
+_PROTECTED = ("/api", "/camera", "/viser", "/ws", "/robots")
 _SAFE_METHODS = frozenset({"GET", "HEAD"})
 
 PAGE_POLICY = (

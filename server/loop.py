@@ -1,7 +1,7 @@
-"""What the server does all the time: heartbeat, states to the pages, the 3-D view, teleoperation, the log.
+"""What the server does all the time for each robot: heartbeat, states to the pages, 3-D view, teleoperation, log.
 
 One asyncio loop does all of it, and the heartbeat is sent from that same loop: when it hangs, the heartbeat stops and
-the controller stops the robot.
+the controller stops the robot; with several robots, each of them.
 """
 
 import asyncio
@@ -12,6 +12,7 @@ from typing import Any
 from rolling_panda.robot_model import configuration
 from rolling_panda.topics import HEARTBEAT, PRESENCE
 from server.desk import Desk
+from server.reception import Reception
 
 #: Posture older than this (s) is drawn grey: it is only the last known one.
 _STALE_S = 1.0
@@ -22,7 +23,7 @@ _ACCOUNTS_S = 0.5
 
 
 class Loop:
-    """The server's periodic work."""
+    """The server's periodic work for one robot."""
 
     def __init__(self, desk: Desk) -> None:
         """Nothing runs yet."""
@@ -44,15 +45,11 @@ class Loop:
             _every(1 / _POINTS_RATE_HZ, self._points),
             _every(1 / _POINTS_RATE_HZ, looking.draw),
             _every(1 / _LOG_RATE_HZ, self._log),
-            _every(_ACCOUNTS_S, self._accounts),
         ]
 
     async def _beat(self, now: float) -> None:
         self._turns += 1
         self._desk.link.beat(self._turns)
-
-    async def _accounts(self, now: float) -> None:
-        self._desk.end_void_sessions()
 
     async def _presence(self, now: float) -> None:
         self._desk.link.presence_of(self._desk.people.message(now))
@@ -115,6 +112,15 @@ class Loop:
                 desk.note("warning", f"refused a message on {topic}: {reason}")
         if desk.log.number != before:
             desk.wake_pages()
+
+
+def watch_accounts(reception: Reception) -> Coroutine[Any, Any, None]:
+    """Endless: whoever's account has been removed is out soon."""
+
+    async def look(now: float) -> None:
+        reception.end_void_sessions()
+
+    return _every(_ACCOUNTS_S, look)
 
 
 async def _every(period_s: float, job: Callable[[float], Awaitable[None]]) -> None:

@@ -198,23 +198,6 @@ def operator_router(desk: Desk) -> APIRouter:
         """Log lines after line number `after`, oldest first."""
         return _json(PageEvents(events=desk.log.after(after, desk.config.log_lines)))
 
-    @router.get("/me", tags=["state"])
-    async def me(session: Caller) -> body.Me:
-        """Who is signed in."""
-        return body.Me(user=session.user, role=session.role)
-
-    @router.post("/invite", tags=["sessions"])
-    async def invite(session: Caller, request: body.Invite) -> Response:
-        """A single-use sign-in link for somebody else or for a script. Supervisors only."""
-        if session.role != "supervisor":
-            return answer(Result(403, False, "only a supervisor may invite"))
-        if desk.passwords is not None:
-            return answer(Result(403, False, "here people sign in with a password: rolling-panda user add NAME"))
-        expires_at = time.monotonic() + desk.config.invite_s
-        token = desk.sessions.invite(request.user, request.role, expires_at)
-        desk.note("info", f"{session.user} made a sign-in link for {request.user} ({request.role})")
-        return JSONResponse({"ok": True, "reason": "", "link": f"{desk.address}/sign-in?token={token}"})
-
     return router
 
 

@@ -2,10 +2,11 @@
 
 import asyncio
 import contextlib
+import re
 import secrets
 import socket
 import threading
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 from pathlib import Path
 
 import uvicorn
@@ -21,13 +22,14 @@ from server.app import create_app
 from server.config import ServerConfig
 from server.desk import Desk
 from server.event_log import EventLog
-from server.loop import Loop
+from server.loop import Loop, watch_accounts
 from server.page_view import PageView
 from server.passwords import Passwords
 from server.presence import PresentPeople
 from server.reading_socket import ReadingSocket
+from server.reception import Reception
 from server.robot_link import RobotLink
-from server.robot_meshes import robot_parts
+from server.robot_meshes import Part, robot_parts
 from server.scene import Scene
 from server.sessions import Sessions
 from server.teleop import TeleopHold
@@ -43,6 +45,12 @@ def run(context: ProcessContext) -> None:
     """
     config = load_section(context.config_path, "server", ServerConfig)
     arguments = context.arguments
+    _check_names([arguments.robot_id, *arguments.also_robot_id])
+    if arguments.also_robot_id and context.wire.certificates:
+        raise InputError(
+            f"a server's certificate names one robot, so with --certificates the router would refuse it robot "
+            f"{arguments.also_robot_id[0]}: start a server for each robot, on a port of its own"
+        )
     allowed = access(arguments)
     with listen(arguments.host, arguments.port) as door:
         port = int(door.getsockname()[1])
@@ -55,7 +63,11 @@ def run(context: ProcessContext) -> None:
                 print(f"Sign in once with this link: {address}/sign-in?token={token}", flush=True)
         else:
             print(f"Sign in with name and password: {address}", flush=True)
-        asyncio.run(serve(config, context.transport, sessions, door, address, context.stopping, allowed))
+        with contextlib.ExitStack() as others:
+            wires = {arguments.robot_id: context.transport}
+            for name in arguments.also_robot_id:
+                wires[name] = others.enter_context(Transport(context.wire, "server", name))
+            asyncio.run(serve(config, wires, sessions, door, address, context.stopping, allowed))
 
 
 def listen(host: str, port: int) -> socket.socket:
@@ -82,46 +94,44 @@ def listen(host: str, port: int) -> socket.socket:
 
 async def serve(
     config: ServerConfig,
-    transport: Transport,
+    wires: Mapping[str, Transport],
     sessions: Sessions,
     door: socket.socket,
     address: str,
     stopping: threading.Event,
     allowed: Access | None = None,
 ) -> None:
-    """Serve the page on `door` until `stopping` is set; `address` is how the page is reached on this machine."""
+    """Serve the page on `door` until `stopping` is set.
+
+    Args:
+        config: Rates and limits.
+        wires: The wire of each robot, by its name.
+        sessions: Who may come in.
+        door: Listening.
+        address: How the page is reached on this machine.
+        stopping: Ends it.
+        allowed: How people come in.
+    """
     allowed = allowed or Access()
-    soon = asyncio.get_running_loop().call_soon_threadsafe
-    model = RobotModel()
-    scene = Scene(
-        model.model,
-        robot_parts(model.model),
-        # Called on viser's thread, and not before a page is served.
-        on_select=lambda owner, point_id: soon(desk.clicked, owner, point_id),
-        on_aim=lambda owner, target: soon(desk.aimed, owner, target),
-        on_sightline=lambda owner, origin, direction: soon(desk.sighted, owner, origin, direction),
-        on_stranger=lambda: soon(desk.note, "warning", "refused a connection to the 3-D view from outside the page"),
-    )
-    link = RobotLink(transport)
     port = int(door.getsockname()[1])
-    desk = Desk(
-        config,
-        link,
-        scene,
-        PageView(link, model),
+    reception = Reception(
         sessions,
-        EventLog(config.log_lines),
-        TeleopHold(config),
-        PresentPeople(),
         address,
         # Cookies do not know ports: two servers on one machine must not sign each other's people out.
         f"rolling_panda_{port}",
+        config.invite_s,
+        config.max_body_bytes,
         None if allowed.users is None else Passwords(allowed.users),
     )
+    model = RobotModel()
+    parts = robot_parts(model.model)
+    for name, wire in wires.items():
+        reception.desks[name] = _desk(config, wire, model, parts, reception)
     own = {f"{allowed.scheme}://{name}:{port}" for name in ("127.0.0.1", "localhost")}
     origins = frozenset({*own, *config.origins})
-    jobs = [asyncio.create_task(job) for job in Loop(desk).jobs()]
-    site = asyncio.create_task(_site(create_app(desk, origins), config, door, stopping, allowed.tls))
+    work = [watch_accounts(reception), *(job for desk in reception.desks.values() for job in Loop(desk).jobs())]
+    jobs = [asyncio.create_task(job) for job in work]
+    site = asyncio.create_task(_site(create_app(reception, origins), config, door, stopping, allowed.tls))
     try:
         # A job that fails ends the server: a page that shows half the truth is worse than none.
         await asyncio.wait([*jobs, site], return_when=asyncio.FIRST_COMPLETED)
@@ -129,14 +139,41 @@ async def serve(
             if job.done():
                 job.result()
     finally:
-        for session in desk.sessions.everyone():
+        for session in sessions.everyone():
             session.ended.set()
         for job in jobs:
             job.cancel()
         stopping.set()
         await asyncio.gather(*jobs, site, return_exceptions=True)
-        scene.close()
-        link.close()
+        for desk in reception.desks.values():
+            desk.scene.close()
+            desk.link.close()
+
+
+def _desk(config: ServerConfig, wire: Transport, model: RobotModel, parts: list[Part], reception: Reception) -> Desk:
+    """The desk of the robot on this wire, with a 3-D view of its own."""
+    soon = asyncio.get_running_loop().call_soon_threadsafe
+    scene = Scene(
+        model.model,
+        parts,
+        # Called on viser's thread, and not before a page is served.
+        on_select=lambda owner, point_id: soon(desk.clicked, owner, point_id),
+        on_aim=lambda owner, target: soon(desk.aimed, owner, target),
+        on_sightline=lambda owner, origin, direction: soon(desk.sighted, owner, origin, direction),
+        on_stranger=lambda: soon(desk.note, "warning", "refused a connection to the 3-D view from outside the page"),
+    )
+    link = RobotLink(wire)
+    desk = Desk(
+        config,
+        link,
+        scene,
+        PageView(link, model),
+        EventLog(config.log_lines),
+        TeleopHold(config),
+        PresentPeople(),
+        held_elsewhere=lambda session: reception.held_elsewhere(session, desk),
+    )
+    return desk
 
 
 class _Site(uvicorn.Server):
@@ -174,6 +211,16 @@ async def _site(
         await asyncio.sleep(_POLL_S)
     site.should_exit = True
     await serving
+
+
+def _check_names(robots: list[str]) -> None:
+    for name in robots:
+        if re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}", name) is None:
+            raise InputError(
+                f"a robot cannot be called {name!r}: give up to 32 letters, digits, - and _, since it is part of a path"
+            )
+        if robots.count(name) > 1:
+            raise InputError(f"robot {name} is given twice; give each of --robot-id and --also-robot-id once")
 
 
 def _first_token(file: Path | None) -> str:

@@ -1,17 +1,18 @@
-"""The page's files, signing in and out, and what is open to everybody."""
+"""Signing in and out, inviting others, and what is open to everybody: the same for every robot of the server."""
 
 import time
 from pathlib import Path
 from typing import Annotated
 
 import msgspec
-from fastapi import APIRouter, Depends, Header, Query, Request, Response
-from fastapi.responses import FileResponse, JSONResponse
+from fastapi import APIRouter, Depends, Header, Request, Response
+from fastapi.responses import FileResponse, JSONResponse, RedirectResponse
 
 from rolling_panda.about import about
 from server import requests as body
-from server.desk import Desk, Result
-from server.operator_api import answer
+from server.desk import Result
+from server.operator_api import ANSWERS, Caller, answer
+from server.reception import Reception
 from server.sessions import Session, SignInError
 
 
@@ -29,26 +30,35 @@ Origin = Annotated[str, Header(include_in_schema=False)]
 Address = Annotated[str, Depends(_address)]
 
 
-def site_router(desk: Desk, web: Path) -> APIRouter:
-    """Routes outside the session; `web` is the folder of the page."""
+def page_router(web: Path, onwards: str = "") -> APIRouter:
+    """The page and the way in, from the folder `web`; whoever is signed in is sent `onwards`, where that is given."""
+    router = APIRouter(include_in_schema=False)
+
+    @router.get("/")
+    def page(visitor: Visitor) -> Response:
+        if visitor is not None and onwards:
+            return RedirectResponse(onwards)
+        return FileResponse(web / ("sign-in.html" if visitor is None else "index.html"))
+
+    @router.get("/sign-in")
+    def sign_in_page() -> Response:
+        # Only shows a page: a browser that fetches links in advance must not use the token up.
+        return FileResponse(web / "sign-in.html")
+
+    return router
+
+
+def site_router(reception: Reception) -> APIRouter:
+    """Who is signed in, and what is open to everybody."""
     router = APIRouter()
 
     async def _signed_in(request: body.SignIn, address: str) -> Session:
         if request.token is not None:
-            return desk.sessions.sign_in(request.token, time.monotonic(), address)
-        if desk.passwords is None:
+            return reception.sessions.sign_in(request.token, time.monotonic(), address)
+        if reception.passwords is None:
             raise SignInError("this server has no users file: sign in with the link that it printed")
-        user = await desk.passwords.enter(request.user or "", request.password or "", address)
-        return desk.sessions.open(user.name, user.role, time.monotonic(), user.fingerprint)
-
-    @router.get("/", include_in_schema=False)
-    def page(visitor: Visitor) -> Response:
-        return FileResponse(web / ("sign-in.html" if visitor is None else "index.html"))
-
-    @router.get("/sign-in", include_in_schema=False)
-    def sign_in_page() -> Response:
-        # Only shows a page: a browser that fetches links in advance must not use the token up.
-        return FileResponse(web / "sign-in.html")
+        user = await reception.passwords.enter(request.user or "", request.password or "", address)
+        return reception.sessions.open(user.name, user.role, time.monotonic(), user.fingerprint)
 
     @router.post("/api/sign-in", tags=["sessions"], responses={401: {"model": body.Outcome}})
     async def sign_in(visitor: Visitor, request: body.SignIn, address: Address, origin: Origin) -> Response:
@@ -57,18 +67,18 @@ def site_router(desk: Desk, web: Path) -> APIRouter:
             session = await _signed_in(request, address)
         except SignInError as error:
             whose = f" as {request.user!r}" if request.user is not None else ""
-            desk.note("warning", f"sign-in{whose} from {address} refused: {error}", f"sign-in {address}")
+            reception.note("warning", f"sign-in{whose} from {address} refused: {error}", f"sign-in {address}")
             if error.wait_s > 0:
                 refused = answer(Result(429, False, str(error)))
                 refused.headers["Retry-After"] = str(max(1, round(error.wait_s)))
                 return refused
             return answer(Result(401, False, str(error)))
         if visitor is not None:
-            desk.sign_out(visitor)
-        desk.note("info", f"{session.user} signed in ({session.role})")
+            reception.sign_out(visitor)
+        reception.note("info", f"{session.user} signed in ({session.role})")
         signed_in = JSONResponse({"ok": True, "reason": ""})
         signed_in.set_cookie(
-            desk.cookie,
+            reception.cookie,
             session.session_id,
             httponly=True,
             samesite="strict",
@@ -81,15 +91,15 @@ def site_router(desk: Desk, web: Path) -> APIRouter:
     @router.get("/api/sign-in", tags=["sessions"])
     async def sign_in_way() -> body.SignInWay:
         """How to sign in."""
-        return body.SignInWay(password=desk.passwords is not None)
+        return body.SignInWay(password=reception.passwords is not None)
 
     @router.post("/api/sign-out", tags=["sessions"], responses={401: {"model": body.Outcome}})
     async def sign_out(visitor: Visitor) -> Response:
         """End this session; its pages close at once."""
         if visitor is not None:
-            desk.sign_out(visitor)
+            reception.sign_out(visitor)
         signed_out = JSONResponse({"ok": True, "reason": ""})
-        signed_out.delete_cookie(desk.cookie, path="/", httponly=True, samesite="strict")
+        signed_out.delete_cookie(reception.cookie, path="/", httponly=True, samesite="strict")
         return signed_out
 
     @router.get("/api/health", tags=["server"])
@@ -104,15 +114,15 @@ def site_router(desk: Desk, web: Path) -> APIRouter:
         """Which program runs here: version, revision of its source, Python, and a digest of the installed packages."""
         return dict(running)
 
-    @router.get("/camera/color.jpg", tags=["state"], response_class=Response)
-    async def camera(n: Annotated[int, Query(ge=0)] | None = None) -> Response:
-        """The newest image of the eye-in-hand camera, JPEG; with `n` that of frame `n`, one of the newest few."""
-        frame = desk.link.camera.peek()
-        if frame is None:
-            return answer(Result(404, False, "no camera image has come yet"))
-        image = frame.message.color_jpeg if n is None else desk.link.images.get(n)
-        if image is None:
-            return answer(Result(404, False, f"frame {n} is not among the newest ones; {frame.message.sequence} is"))
-        return Response(image, media_type="image/jpeg")
+    @router.get("/api/me", tags=["sessions"], responses=ANSWERS)
+    async def me(session: Caller) -> body.Me:
+        """Who is signed in."""
+        return body.Me(user=session.user, role=session.role)
+
+    @router.post("/api/invite", tags=["sessions"], responses=ANSWERS)
+    async def invite(session: Caller, request: body.Invite) -> Response:
+        """A single-use sign-in link for somebody else or for a script. Supervisors only."""
+        made = reception.invite(session, request.user, request.role)
+        return JSONResponse({"ok": True, "reason": "", "link": made.reason}) if made.ok else answer(made)
 
     return router

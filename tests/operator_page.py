@@ -1,5 +1,6 @@
 """Headless Chromium on the real page, as an operator would have it."""
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -52,7 +53,8 @@ def operator_page(
             page = context.new_page()
             page.on("request", look)
             page.goto(link)
-            page.wait_for_url(f"{origin}/", timeout=30_000)
+            # With several robots the way in leads on to the first one's page.
+            page.wait_for_url(re.compile(rf"^{re.escape(origin)}/(robots/[^/]+/)?$"), timeout=30_000)
             yield page
         finally:
             browser.close()

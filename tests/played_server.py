@@ -113,6 +113,8 @@ class PlayedServer:
     abstained: tuple[m.Abstention, ...] = ()
     gone: dict[str, float] = field(default_factory=dict)
     role: p.Role = "supervisor"
+    #: Path of its page, where there are several.
+    base: str = ""
     control: ControlState | None = None
     stopped: tuple[StopState, ...] = ()
     replay: ReplayState | None = None
@@ -132,11 +134,11 @@ class PlayedServer:
     image: bytes = field(default_factory=lambda: camera_image())
 
     def attach(self, page: Page) -> None:
-        page.route(f"{ORIGIN}/**", self.serve)
-        page.route_web_socket("**/ws", self.accept)
+        page.route(f"{ORIGIN}{self.base}/**", self.serve)
+        page.route_web_socket(f"**{self.base}/ws", self.accept)
 
     def serve(self, route: Route) -> None:
-        path = route.request.url.removeprefix(ORIGIN).split("?")[0]
+        path = route.request.url.removeprefix(ORIGIN + self.base).split("?")[0]
         if not self.online:
             route.abort()
         elif route.request.method == "POST":

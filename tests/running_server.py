@@ -27,10 +27,15 @@ def parts():
 
 
 class RunningServer:
-    def __init__(self, wire, address, sessions):
+    def __init__(self, wire, address, sessions, path=""):
         self.wire = wire
         self.address = address
         self.sessions = sessions
+        self._path = path
+
+    def robot(self, name, wire):
+        """The same server as the page of one of its robots sees it."""
+        return RunningServer(wire, self.address, self.sessions, f"/robots/{name}")
 
     @contextlib.contextmanager
     def client(self, role="supervisor", user="test"):
@@ -51,18 +56,19 @@ class RunningServer:
 
     @property
     def socket_address(self):
-        return self.address.replace("http", "ws", 1)
+        return self.address.replace("http", "ws", 1) + self._path
 
 
 @contextlib.contextmanager
-def running_server(wire, config=None, access=None):
+def running_server(wire, config=None, access=None, **others):
+    """`wire` is that of the robot `rp1`; further robots are given by their names."""
     parts()
     sessions = Sessions(3600.0)
     stopping = threading.Event()
     with listen("127.0.0.1", 0) as door, patch("server.service.robot_parts", lambda model: parts()):
         access = access or Access()
         address = f"{access.scheme}://127.0.0.1:{door.getsockname()[1]}"
-        work = serve(config or ServerConfig(), wire, sessions, door, address, stopping, access)
+        work = serve(config or ServerConfig(), {"rp1": wire, **others}, sessions, door, address, stopping, access)
         failure = []
 
         def run():

@@ -34,12 +34,12 @@ def free_port() -> int:
 class Demo:
     """A running demo under test; leaves nothing behind."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *more: str) -> None:
         self.port = free_port()
         self.trace = folder / "trace"
         self.words: list[str] = []
         self._popen = subprocess.Popen(
-            python_command("rolling_panda", ["demo", "--port", str(self.port), "--trace", str(self.trace)]),
+            python_command("rolling_panda", ["demo", "--port", str(self.port), "--trace", str(self.trace), *more]),
             # The demo's own temporary folder lies in this one, to be removed with it.
             env=child_environment() | {"TMPDIR": str(folder)},
             stdout=subprocess.PIPE,
@@ -59,7 +59,7 @@ class Demo:
         assert time.monotonic() - began < STARTUP_S, self.text()
         self.children = psutil.Process(self.pid).children(recursive=True)
         for name in CHILDREN:
-            assert self.child(name).is_running(), self.text()
+            assert all(child.is_running() for child in self.named(name)), self.text()
 
     def close(self) -> None:
         if self._popen.poll() is None:
@@ -73,8 +73,14 @@ class Demo:
         return "".join(self.words)
 
     def child(self, name: str) -> psutil.Process:
+        (found,) = self.named(name)
+        return found
+
+    def named(self, name: str) -> list[psutil.Process]:
+        """Its processes of this name: one, or one a robot."""
         module = ["rolling_panda", "router"] if name == "router" else [name]
-        (found,) = [child for child in self.children if child.cmdline()[3 : 3 + len(module)] == module]
+        found = [child for child in self.children if child.cmdline()[3 : 3 + len(module)] == module]
+        assert found, f"no {name}:\n{self.text()}"
         return found
 
     def ends(self, limit_s: float = 5.0) -> int:
@@ -89,8 +95,8 @@ class Demo:
 
 
 @contextlib.contextmanager
-def running_demo(folder: Path) -> Iterator[Demo]:
-    demo = Demo(folder)
+def running_demo(folder: Path, *more: str) -> Iterator[Demo]:
+    demo = Demo(folder, *more)
     try:
         demo.wait_until_up()
         yield demo

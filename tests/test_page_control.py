@@ -25,6 +25,8 @@ def test_alone_there_is_nothing_to_see_of_it(page: Page, server: PlayedServer) -
     expect(page.locator("#mode")).to_be_visible()
     until(page, lambda: server.number > 5)
     expect(page.locator("rp-control")).to_be_hidden()
+    expect(page.locator("rp-robots")).to_be_hidden()
+    expect(page.locator("#stop small")).to_have_text("space bar")
 
 
 def test_control_is_taken_from_somebody_only_by_a_second_press(page: Page, server: PlayedServer) -> None:

@@ -35,6 +35,7 @@ def test_no_part_of_an_answer_waits_for_the_other_side():
 def context(*argv):
     parser = argparse.ArgumentParser()
     add_arguments(parser)
+    parser.set_defaults(robot_id="rp1", config=resource("assets/config/sim.toml"), connect=None, certificates=None)
     return ProcessContext(parser.parse_args(argv), resource("assets/config/sim.toml"), FakeWire(), threading.Event())
 
 
@@ -43,8 +44,8 @@ def served(monkeypatch):
     """Instead of serving, hand over what would have been served."""
     seen = {}
 
-    async def serve(config, transport, sessions, door, address, stopping, allowed):
-        seen.update(sessions=sessions, address=address, allowed=allowed)
+    async def serve(config, wires, sessions, door, address, stopping, allowed):
+        seen.update(robots=list(wires), sessions=sessions, address=address, allowed=allowed)
 
     monkeypatch.setattr(service, "serve", serve)
     return seen
@@ -74,3 +75,36 @@ def test_a_weak_or_missing_token_is_refused(served, tmp_path):
     weak.write_text("1234")
     with pytest.raises(InputError, match="128 bits"):
         service.run(context("--port", "0", "--sign-in-token-file", str(weak)))
+
+
+@pytest.mark.parametrize("names", [["rp1"], ["a/b"], [""], ["two words"], ["*"], ["rp2", "rp2"]])
+def test_a_robots_name_is_part_of_a_path_and_there_once(served, names):
+    with pytest.raises(InputError, match="cannot be called|given twice"):
+        service.run(context("--port", "0", *(f"--also-robot-id={name}" for name in names)))
+
+
+def test_several_robots_are_on_wires_of_their_own(served, monkeypatch):
+    opened = []
+
+    class Wire(FakeWire):
+        def __init__(self, config, process, robot_id):
+            super().__init__()
+            opened.append((process, robot_id))
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_):
+            opened.append("closed")
+
+    monkeypatch.setattr(service, "Transport", Wire)
+    service.run(context("--port", "0", "--also-robot-id", "rp2"))
+    assert served["robots"] == ["rp1", "rp2"]
+    assert opened == [("server", "rp2"), "closed"]
+
+
+def test_a_certificate_is_for_one_robot(served):
+    given = context("--port", "0", "--also-robot-id", "rp2")
+    given.arguments.certificates = "folder"
+    with pytest.raises(InputError, match="certificate names one robot"):
+        service.run(given)

@@ -67,7 +67,7 @@ export async function fetchJson(path) {
 /** Is this browser signed in? Null when the server cannot be reached. */
 export async function isSignedIn() {
   try {
-    const response = await fetch("/api/me", { credentials: "same-origin", signal: AbortSignal.timeout(4000) });
+    const response = await fetch("api/me", { credentials: "same-origin", signal: AbortSignal.timeout(4000) });
     if (response.status === 401) return false;
     return response.ok ? true : null;
   } catch {

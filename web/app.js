@@ -27,7 +27,7 @@ import { explainGreyed } from "./greyed.js";
 import { keepHistory } from "./history.js";
 import { guardLooking } from "./looking.js";
 import { now, points } from "./state.js";
-import { listenForSpace } from "./stop.js";
+import { listenForSpace, several } from "./stop.js";
 import { guardHold, socket } from "./teleoperation.js";
 
 explainGreyed(document);
@@ -47,3 +47,8 @@ const wait = points.subscribe((page) => {
   void import("./components/rp-order.js");
   void import("./components/rp-preview.js");
 });
+if (several) {
+  // The room is there from the first picture on.
+  document.querySelector("rp-robots")?.removeAttribute("hidden");
+  void import("./components/rp-robots.js");
+}

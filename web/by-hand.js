@@ -44,7 +44,7 @@ export async function place(path, body) {
 /** Listen for clicks into the 3-D view, and stop placing when the link goes or nobody may place any more. */
 export function guardPlacing() {
   socket.onsightline = ({ origin, direction }) => {
-    if (placing.get()) void place("/api/points/by-hand", { origin, direction });
+    if (placing.get()) void place("api/points/by-hand", { origin, direction });
   };
   link.subscribe(({ status }) => {
     if (status !== "open") placing.set(false);

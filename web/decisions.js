@@ -67,7 +67,7 @@ export async function acceptAll(confidence) {
   const open = (points.get()?.points ?? []).filter(
     (row) => row.entry.state === "PROPOSED" && row.point.confidence >= confidence,
   );
-  const done = await ask("Accepting all", "/api/points/accept-all", { confidence });
+  const done = await ask("Accepting all", "api/points/accept-all", { confidence });
   if (done) {
     remember(`accepted ${counted(open.length, "point")}`, async () => {
       // Those that have been cut meanwhile, or were decided anew, stay as they are.
@@ -153,7 +153,7 @@ function resolve(row, outcome, reason) {
  */
 function send(row, what, action, body) {
   const name = row.point.point_id;
-  return ask(`${what} ${name}`, `/api/points/${encodeURIComponent(name)}/${action}`, body);
+  return ask(`${what} ${name}`, `api/points/${encodeURIComponent(name)}/${action}`, body);
 }
 
 /** @param {PagePoint} row */

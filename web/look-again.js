@@ -22,7 +22,7 @@ export function placeItem(place) {
   if (place.needs !== "another look" || place.position === null) return item;
   const button = element("button", { class: "quiet look-again", text: "Look again", attributes: { type: "button" } });
   const { vine, spur } = place;
-  button.addEventListener("click", () => void ask("Look again", "/api/look-again", { vine, spur }));
+  button.addEventListener("click", () => void ask("Look again", "api/look-again", { vine, spur }));
   setEnabled(button, whyNot("Survey"), HINT);
   item.append(" ", button);
   return item;

@@ -39,16 +39,16 @@ export function whyNoApproval() {
 /** @param {string} pointId Empty for all of the work. */
 export function askPreview(pointId) {
   hide();
-  return ask("Preview", "/api/preview", { point_id: pointId });
+  return ask("Preview", "api/preview", { point_id: pointId });
 }
 
 export function approve() {
-  return ask("Approving the preview", "/api/preview/approve", { preview_hash: preview.get()?.preview_hash ?? "" });
+  return ask("Approving the preview", "api/preview/approve", { preview_hash: preview.get()?.preview_hash ?? "" });
 }
 
 /** @param {boolean} required */
 export function require(required) {
-  return ask("Previews", "/api/preview/required", { required });
+  return ask("Previews", "api/preview/required", { required });
 }
 
 /** Show a moment in the 3-D view. @param {number} time */

@@ -13,7 +13,7 @@ const passwordField = /** @type {HTMLInputElement} */ (document.getElementById("
 /** @returns {Promise<boolean>} Do people sign in with a password here? */
 async function withPassword() {
   try {
-    const response = await fetch("/api/sign-in", { signal: AbortSignal.timeout(4000) });
+    const response = await fetch("api/sign-in", { signal: AbortSignal.timeout(4000) });
     return response.ok && (await response.json()).password === true;
   } catch {
     return false;
@@ -24,9 +24,9 @@ async function withPassword() {
 async function signIn(body) {
   progress.textContent = "Signing in…";
   progress.className = "";
-  const answer = await post("/api/sign-in", body);
+  const answer = await post("api/sign-in", body);
   if (answer.ok) {
-    location.replace("/");
+    location.replace(location.pathname.replace(/sign-in$/, ""));
     return;
   }
   const unsaid = answer.status === 401 && !answer.reason;

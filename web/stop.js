@@ -9,6 +9,8 @@ import { signal } from "./store.js";
 /** @type {import("./store.js").Signal<StopProgress>} */
 export const stopProgress = signal(/** @type {StopProgress} */ ("idle"));
 
+/** Does this server have several robots? Then each has its page under a path of its own. */
+export const several = location.pathname.startsWith("/robots/");
 const TRIES = 4;
 /** The server has sent the stop, but the bridge has not confirmed it. */
 const UNCONFIRMED = 503;
@@ -19,6 +21,7 @@ export async function stopRobot(reason) {
   let refusal = "";
   let unconfirmed = 0;
   for (let attempt = 0; attempt < TRIES; attempt++) {
+    // At the root: it stops every robot of this server, whichever this page shows.
     const answer = await post("/api/stop", { reason }, 1000);
     if (answer.ok) {
       stopProgress.set("sent");

@@ -7,8 +7,8 @@ import { pageState, selected, showToast } from "./state.js";
 import { signal } from "./store.js";
 import { isTyping } from "./stop.js";
 
-const scheme = location.protocol === "https:" ? "wss" : "ws";
-export const socket = new Link(`${scheme}://${location.host}/ws`);
+// Beside the page: with several robots each has a page and a socket of its own.
+export const socket = new Link(new URL("ws", location.href.replace(/^http/, "ws")).href);
 
 /** @typedef {"tool"|"base"|"joints"} Part */
 

@@ -109,7 +109,7 @@ class RpCamera extends HTMLElement {
       this.loading = false;
       if (this.image.hidden) setText(this.empty, "The image did not load; trying the next one.");
     });
-    next.src = `/camera/color.jpg?n=${frame}`;
+    next.src = `camera/color.jpg?n=${frame}`;
   }
 
   /** @param {MouseEvent} event */
@@ -120,7 +120,7 @@ class RpCamera extends HTMLElement {
     const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(toScreen.inverse());
     const [u, v] = [at.x / width, at.y / height];
     if (u < 0 || u > 1 || v < 0 || v > 1) return;
-    const name = await place("/api/points/by-hand-in-image", { sequence: this.shownFrame, u, v });
+    const name = await place("api/points/by-hand-in-image", { sequence: this.shownFrame, u, v });
     const held = this.held.get();
     // In an image that is held still the new point is where it was clicked.
     if (name && held !== null) this.held.set(new Map(held).set(name, [at.x, at.y]));

@@ -9,8 +9,8 @@ import { drawOn } from "../store.js";
 const CONFIRM_MS = 4000;
 
 class RpControl extends HTMLElement {
-  give = button("grant-control", () => void ask("Granting control", "/api/control/grant"));
-  request = button("request-control", () => void ask("Asking for control", "/api/control/request"));
+  give = button("grant-control", () => void ask("Granting control", "api/control/grant"));
+  request = button("request-control", () => void ask("Asking for control", "api/control/request"));
   take = button("take-control", () => this.taken());
   /** Until when the second press counts (ms). */
   armed = 0;
@@ -60,7 +60,7 @@ class RpControl extends HTMLElement {
       return;
     }
     this.armed = 0;
-    void ask("Taking control", "/api/control/take", { confirm: held });
+    void ask("Taking control", "api/control/take", { confirm: held });
   }
 
   /**

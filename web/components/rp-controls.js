@@ -29,7 +29,7 @@ class RpControls extends HTMLElement {
     for (const [id, intent, word, hint] of BUTTONS) {
       const button = element("button", { id, text: word, attributes: { type: "button" } });
       button.addEventListener("click", () => {
-        void ask(word, `/api/${id}`, intent === "Survey" ? { distance: Number(distance.value) } : {});
+        void ask(word, `api/${id}`, intent === "Survey" ? { distance: Number(distance.value) } : {});
       });
       this.append(button);
       if (intent === "Survey") this.append(distance);

@@ -64,7 +64,7 @@ class RpInvite extends HTMLElement {
     });
     form.addEventListener("submit", async (event) => {
       event.preventDefault();
-      const answer = await post("/api/invite", { user: user.value.trim(), role: role.value });
+      const answer = await post("api/invite", { user: user.value.trim(), role: role.value });
       if (!answer.ok || !answer.link) {
         setText(words, `No link was made: ${answer.reason}`);
         return;

@@ -17,7 +17,7 @@ const DEGREE = 180 / Math.PI;
 
 class RpJoints extends HTMLElement {
   connectedCallback() {
-    const limits = fetchJson("/api/robot").then((robot) => /** @type {[number, number][]} */ (robot?.arm_limits ?? []));
+    const limits = fetchJson("api/robot").then((robot) => /** @type {[number, number][]} */ (robot?.arm_limits ?? []));
     for (let joint = 0; joint < 7; joint++) {
       const turn = (/** @type {1|-1} */ way) => {
         const word = way > 0 ? "up" : "down";

@@ -143,7 +143,7 @@ export class RpPointDetails extends HTMLElement {
       if (node) setText(node, value(point));
     });
     // The hash tells points of the same name apart that perception has found before and after it was started anew.
-    const path = `/api/points/${encodeURIComponent(point.point_id)}/crop?revision=${point.revision}&of=${point.digest}`;
+    const path = `api/points/${encodeURIComponent(point.point_id)}/crop?revision=${point.revision}&of=${point.digest}`;
     if (path === this.shown) return;
     this.shown = path;
     this.tries = 0;

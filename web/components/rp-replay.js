@@ -41,7 +41,7 @@ class RpReplay extends HTMLElement {
 
   /** @param {{ playing: boolean, position_s?: number }} request */
   seek(request) {
-    void ask("Moving in the recording", "/api/replay", request);
+    void ask("Moving in the recording", "api/replay", request);
   }
 
   draw() {

@@ -19,7 +19,7 @@ export class RpReport extends HTMLElement {
     this.refusals = table("Refused, the newest first", ["When", "Who", "Asked for", "Why"]);
     this.control = table("Control", ["When", "Who", "What"]);
     /** @type {Node[]} */
-    this.tools = [download("/api/report", "report.json", "JSON"), download("/api/report.csv", "cuts.csv", "CSV")];
+    this.tools = [download("api/report", "report.json", "JSON"), download("api/report.csv", "cuts.csv", "CSV")];
   }
 
   connectedCallback() {
@@ -41,7 +41,7 @@ export class RpReport extends HTMLElement {
 
   async fetch() {
     try {
-      const response = await fetch("/api/report", { credentials: "same-origin", signal: AbortSignal.timeout(4000) });
+      const response = await fetch("api/report", { credentials: "same-origin", signal: AbortSignal.timeout(4000) });
       const body = await response.json();
       if (response.ok) this.show(body);
       else setText(this.words, `${body.reason} What is below stays as it was.`);

@@ -110,7 +110,7 @@ class RpRule extends HTMLElement {
     const asked = this.wanted;
     const before = points.get()?.points ?? [];
     setText(this.outcome, "Trying it…");
-    const answer = await post("/api/rule", asked);
+    const answer = await post("api/rule", asked);
     this.asking = false;
     if (this.wanted !== asked) {
       void this.ask();

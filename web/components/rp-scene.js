@@ -24,7 +24,7 @@ class RpScene extends HTMLElement {
       retry.hidden = true;
       waiting.hidden = false;
       frame.classList.remove("loaded");
-      frame.src = "/viser/";
+      frame.src = "viser/";
     };
     frame.addEventListener("load", () => {
       const view = frame.contentWindow;

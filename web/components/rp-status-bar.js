@@ -70,7 +70,7 @@ class RpStatusBar extends HTMLElement {
     const role = element("span", { class: "user-role" });
     const leave = element("button", { id: "sign-out", class: "quiet", text: "Sign out", attributes: { type: "button" } });
     leave.addEventListener("click", async () => {
-      const answer = await post("/api/sign-out");
+      const answer = await post("api/sign-out");
       if (answer.ok) location.replace("/");
       else say("error", `Sign-out refused: ${answer.reason}`);
     });

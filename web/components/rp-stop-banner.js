@@ -34,7 +34,7 @@ class RpStopBanner extends HTMLElement {
       event.preventDefault();
       // With the stop that is shown: one that was pressed since is not reset unseen.
       const body = { reason: reason.value.trim(), stop_id: pageState.get()?.bridge?.stop_id ?? "" };
-      if (await ask("Reset", "/api/reset", body)) reason.value = "";
+      if (await ask("Reset", "api/reset", body)) reason.value = "";
     });
     this.append(
       element("div", { class: "banner-head" }, icon("ESTOP_LATCHED"), element("h2", { text: "Software stop" }), who),

@@ -3,7 +3,7 @@
 import { element, setText } from "../element.js";
 import { icon } from "../icons.js";
 import { drawOn } from "../store.js";
-import { stopProgress, stopRobot } from "../stop.js";
+import { several, stopProgress, stopRobot } from "../stop.js";
 
 /** @type {Readonly<Record<import("../stop.js").StopProgress, string>>} */
 const WORDS = Object.freeze({
@@ -20,10 +20,14 @@ class RpStop extends HTMLElement {
       "button",
       {
         id: "stop",
-        attributes: { type: "button", "aria-keyshortcuts": "Space", title: "Stops base and arm. Space bar does the same." },
+        attributes: {
+          type: "button",
+          "aria-keyshortcuts": "Space",
+          title: `Stops base and arm${several ? " of every robot" : ""}. Space bar does the same.`,
+        },
       },
       icon("ESTOP_LATCHED"),
-      element("span", { class: "stop-words" }, label, element("small", { text: "space bar" })),
+      element("span", { class: "stop-words" }, label, element("small", { text: several ? "all robots · space bar" : "space bar" })),
     );
     // On pressing down, not on letting go: a finger that slides off has still stopped the robot.
     button.addEventListener("pointerdown", (event) => {

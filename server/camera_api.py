@@ -1,0 +1,26 @@
+"""REST for the image of the camera on the hand."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Response
+
+from server.desk import Desk, Result
+from server.operator_api import answer
+
+
+def camera_router(desk: Desk) -> APIRouter:
+    """`/camera/color.jpg`."""
+    router = APIRouter()
+
+    @router.get("/camera/color.jpg", tags=["state"], response_class=Response)
+    async def camera(n: Annotated[int, Query(ge=0)] | None = None) -> Response:
+        """The newest image of the eye-in-hand camera, JPEG; with `n` that of frame `n`, one of the newest few."""
+        frame = desk.link.camera.peek()
+        if frame is None:
+            return answer(Result(404, False, "no camera image has come yet"))
+        image = frame.message.color_jpeg if n is None else desk.link.images.get(n)
+        if image is None:
+            return answer(Result(404, False, f"frame {n} is not among the newest ones; {frame.message.sequence} is"))
+        return Response(image, media_type="image/jpeg")
+
+    return router

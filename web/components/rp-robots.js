@@ -1,0 +1,95 @@
+// Which robot this page shows, and how the others are. Another robot is another page, loaded whole: nothing of one robot
+// can stay on the page of another, and no press can reach the wrong one.
+
+import { fetchJson } from "../api.js";
+import { element, setText } from "../element.js";
+import { setIcon } from "../icons.js";
+import { keepHistoryOver } from "../kept-history.js";
+import { showToast } from "../state.js";
+import { hold } from "../teleoperation.js";
+import { MODE_WORDS, inWords } from "../words.js";
+
+/**
+ * A robot as `GET /api/robots` tells it.
+ *
+ * @typedef {object} Glance
+ * @property {string} name
+ * @property {string} path
+ * @property {import("../messages.js").Mode|null} mode
+ * @property {""|"warning"|"error"} severity
+ * @property {string} alarm
+ * @property {string} holder
+ * @property {boolean} yours
+ * @property {number} pages
+ */
+
+const PERIOD_MS = 1000;
+
+class RpRobots extends HTMLElement {
+  list = element("ul");
+  /** @type {Map<string, (robot: Glance) => void>} */
+  rows = new Map();
+  /** Alarms of the other robots that have been told. @type {Map<string, string>} */
+  told = new Map();
+
+  connectedCallback() {
+    this.setAttribute("role", "navigation");
+    this.setAttribute("aria-label", "Robots");
+    this.append(this.list);
+    keepHistoryOver();
+    void this.ask();
+  }
+
+  async ask() {
+    /** @type {Glance[]|null} */
+    const robots = await fetchJson("/api/robots");
+    this.classList.toggle("stale", robots === null);
+    for (const robot of robots ?? []) {
+      const draw = this.rows.get(robot.name) ?? this.newRow(robot);
+      draw(robot);
+      this.tell(robot);
+    }
+    window.setTimeout(() => void this.ask(), PERIOD_MS);
+  }
+
+  /** @param {Glance} robot */
+  newRow({ name, path }) {
+    const shape = element("span", { class: "shape" });
+    const mode = element("span", { class: "robot-mode" });
+    const alarm = element("span", { class: "robot-alarm" });
+    const holder = element("span", { class: "robot-holder" });
+    const link = element("a", { attributes: { href: path }, data: { robot: name } }, shape, element("strong", { text: name }), mode, alarm, holder);
+    const here = path === location.pathname;
+    if (here) {
+      link.setAttribute("aria-current", "page");
+      document.title = `${name} · Rolling Panda`;
+    }
+    // Leaving ends a hold in any case; here it ends before the page does.
+    link.addEventListener("click", () => hold.releaseAll());
+    this.list.append(element("li", {}, link));
+    const draw = (/** @type {Glance} */ robot) => {
+      link.dataset.severity = robot.severity;
+      setIcon(shape, robot.severity || robot.mode || "UNKNOWN");
+      setText(mode, robot.mode === null ? "No state yet" : MODE_WORDS[robot.mode]);
+      setText(alarm, inWords(robot.alarm));
+      setText(holder, robot.yours ? "You hold control" : robot.holder ? `${robot.holder} holds control` : "");
+      const working = robot.mode === "AUTO" || robot.mode === "TELEOP";
+      const leaving = here && working ? ". Work pauses when nobody looks at this robot" : "";
+      link.title = `${here ? "Shown on this page" : `Show ${name}`}${robot.alarm ? `. ${alarm.textContent}` : ""}${leaving}`;
+    };
+    this.rows.set(name, draw);
+    return draw;
+  }
+
+  /**
+   * What is wrong with a robot that this page does not show is told once.
+   *
+   * @param {Glance} robot
+   */
+  tell({ name, path, severity, alarm }) {
+    if (path === location.pathname || this.told.get(name) === alarm) return;
+    this.told.set(name, alarm);
+    if (severity) showToast(severity, `${name}: ${inWords(alarm)}`);
+  }
+}
+customElements.define("rp-robots", RpRobots);
