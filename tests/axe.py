@@ -11,7 +11,9 @@ from playwright.sync_api import Page
 PACKAGE = "axe-core@4.10.3"
 #: What keeps somebody from using the page; the lesser impacts are matters of taste.
 GRAVE = ("serious", "critical")
-_RUN = """async () => (await axe.run(document, {iframes: false, resultTypes: ["violations"]})).violations.map(
+_RUN = """async only => (await axe.run(document, {
+    iframes: false, resultTypes: ["violations"], ...(only.length && {runOnly: {type: "rule", values: only}})
+})).violations.map(
     found => [found.impact, found.id, found.nodes.map(node => node.html.slice(0, 120) + " " + node.failureSummary)])"""
 
 
@@ -32,7 +34,8 @@ def axe(tmp_path_factory: pytest.TempPathFactory) -> str:
     return Path(folder / "package" / "axe.min.js").read_text(encoding="utf-8")
 
 
-def grave(page: Page, source: str) -> list[str]:
-    """Serious and critical violations on the page as it is now."""
+def grave(page: Page, source: str, *rules: str) -> list[str]:
+    """Serious and critical violations on the page as it is now, of these rules alone where any are named."""
     page.evaluate(source)
-    return [f"{rule}: {' | '.join(nodes[:3])}" for impact, rule, nodes in page.evaluate(_RUN) if impact in GRAVE]
+    found = page.evaluate(_RUN, list(rules))
+    return [f"{rule}: {' | '.join(nodes[:3])}" for impact, rule, nodes in found if impact in GRAVE]

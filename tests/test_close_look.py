@@ -33,16 +33,21 @@ SEES = LabelImageSegmenter()
 
 @dataclass(frozen=True)
 class Scene:
-    """A row and its right cuts, as the simulator knows them."""
+    """A row and its right cuts, as the simulator knows them, and what the camera sees before each."""
 
     row: Row
     cuts: tuple[RightCut, ...]
+    views: tuple[View, ...]
+
+    def pairs(self) -> list[tuple[RightCut, View]]:
+        return list(zip(self.cuts, self.views, strict=True))
 
 
 @pytest.fixture(scope="module")
 def scene() -> Scene:
     row = grow(VineyardConfig(vines=1), SEED)
-    return Scene(row, tuple(truth.cut for truth in judge(row) if truth.cut is not None)[::3])
+    cuts = tuple(truth.cut for truth in judge(row) if truth.cut is not None)[::3]
+    return Scene(row, cuts, tuple(view_from_clear(row, cut) for cut in cuts))
 
 
 def point(cut: RightCut, aside: float = 0.0, along: float = 0.0) -> m.PruningPoint:
@@ -75,8 +80,8 @@ def view_from_clear(row: Row, cut: RightCut, clearance: float = 0.22) -> View:
     return replace(view, R=place[:3, :3], t=place[:3, 3])
 
 
-def look(row: Row, cut: RightCut, seen: m.PruningPoint, clearance: float = 0.22) -> CloseLook:
-    return look_closely(view_from_clear(row, cut, clearance), SEES, seen, 7, PerceptionConfig())
+def look(view: View, seen: m.PruningPoint) -> CloseLook:
+    return look_closely(view, SEES, seen, 7, PerceptionConfig())
 
 
 def without(row: Row, cut: RightCut) -> Row:
@@ -88,8 +93,8 @@ def without(row: Row, cut: RightCut) -> Row:
 
 
 def test_every_right_cut_is_confirmed_within_two_millimetres_though_the_survey_was_off_by_four(scene: Scene) -> None:
-    for cut in scene.cuts:
-        seen = look(scene.row, cut, point(cut, aside=0.004))
+    for cut, view in scene.pairs():
+        seen = look(view, point(cut, aside=0.004))
         assert seen.finding == "seen" and seen.number == 7, (cut.rod, seen)
         off = np.array(seen.position) - cut.best
         assert float(np.linalg.norm(off - cut.tangent * (off @ cut.tangent))) < 0.0025
@@ -97,8 +102,8 @@ def test_every_right_cut_is_confirmed_within_two_millimetres_though_the_survey_w
 
 def test_the_node_before_the_cut_says_where_along_the_cane_it_belongs(scene: Scene) -> None:
     shifts = []
-    for cut in scene.cuts:
-        here, there = (look(scene.row, cut, point(cut, along=along)) for along in (0.0, 0.005))
+    for cut, view in scene.pairs():
+        here, there = (look(view, point(cut, along=along)) for along in (0.0, 0.005))
         if here.reason or there.reason:
             continue
         shifts.append(float(np.subtract(there.position, here.position) @ cut.tangent))
@@ -107,15 +112,15 @@ def test_the_node_before_the_cut_says_where_along_the_cane_it_belongs(scene: Sce
 
 
 def test_after_the_cut_it_says_that_the_wood_beyond_is_off_and_before_never(scene: Scene) -> None:
-    findings = [look(without(scene.row, cut), cut, point(cut)).finding for cut in scene.cuts]
+    findings = [look(view_from_clear(without(scene.row, cut), cut), point(cut)).finding for cut in scene.cuts]
     assert findings.count("severed") >= 0.8 * len(findings)
     assert set(findings) <= {"severed", "unseen"}
-    assert all(look(scene.row, cut, point(cut)).finding == "seen" for cut in scene.cuts)
+    assert all(look(view, point(cut)).finding == "seen" for cut, view in scene.pairs())
 
 
 def test_from_too_far_or_out_of_the_picture_it_says_nothing_and_why(scene: Scene) -> None:
     cut = scene.cuts[0]
-    far = look(scene.row, cut, point(cut), clearance=0.6)
+    far = look(view_from_clear(scene.row, cut, clearance=0.6), point(cut))
     assert far.finding == "unseen" and "away" in far.reason and far.position is None
-    beside = look(scene.row, cut, point(cut, aside=0.6))
+    beside = look(scene.views[0], point(cut, aside=0.6))
     assert beside.finding == "unseen" and "picture" in beside.reason

@@ -29,27 +29,22 @@ def accept(loop: ClosedLoop, count: int) -> list[m.QueueEntry]:
     return list(loop.queue("ACCEPTED"))
 
 
-def test_an_accepted_cane_is_severed_where_it_was_accepted(tmp_path: Path) -> None:
+def test_nothing_moves_before_start_and_then_the_cane_is_severed_where_it_was_accepted(tmp_path: Path) -> None:
     loop = surveyed(3, tmp_path / "trace")
     (entry,) = accept(loop, 1)
+    loop.run(1.0)
+    started = loop.now
     assert loop.ask(intents.Start(user="test")).ok
     assert loop.run_until(lambda: any(loop.queue("DONE", "FAILED_NOT_CUT", "UNKNOWN")), 40.0)
     assert [done.point_id for done in loop.queue("DONE")] == [entry.point_id]
     loop.close()
-    (cut,) = trace.read(tmp_path / "trace").events
+    record = trace.read(tmp_path / "trace")
+    before = record.rows[record.rows["clock"] <= started]
+    assert len(before) > 100 and abs(before["setpoint"]).max() == 0.0
+    (cut,) = record.events
     assert cut["point_id"] == entry.point_id
     assert entry.accepted_position is not None
     assert min(math.dist(piece["point"], entry.accepted_position) for piece in cut["severed"]) < 0.010
-
-
-def test_nothing_moves_and_nothing_is_cut_before_start(tmp_path: Path) -> None:
-    loop = surveyed(1, tmp_path / "trace")
-    accept(loop, 2)
-    loop.run(3.0)
-    loop.close()
-    record = trace.read(tmp_path / "trace")
-    assert abs(record.rows["setpoint"]).max() == 0.0
-    assert record.events == ()
 
 
 def test_the_stop_halts_a_moving_robot_and_only_a_reset_with_a_start_moves_it_again(tmp_path: Path) -> None:

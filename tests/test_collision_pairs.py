@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 
@@ -62,3 +64,10 @@ def test_pairs_left_out_for_being_far_apart_do_not_meet_in_other_postures():
         pin.computeDistances(ROBOT.model, ROBOT.data, trial, data, q)
         least = min(least, *(result.min_distance for result in data.distanceResults))
     assert least > 0.02
+
+
+def test_a_robot_that_cannot_move_as_far_is_judged_for_itself():
+    stiff = RobotModel()
+    stiff.limits = replace(ROBOT.limits, upper=ROBOT.limits.lower)
+    assert self_pairs(stiff, SHAPES, GROUND) == [], "what does not move comes no nearer"
+    assert self_pairs(ROBOT, SHAPES, GROUND) == PAIRS

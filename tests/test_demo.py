@@ -142,6 +142,8 @@ def test_when_a_process_is_killed_it_says_which_and_ends_the_rest(tmp_path: Path
         assert (folder / "bridge.log").exists()
 
 
+# Children that watch their parent are tested in test_demo_supervisor.py, which takes less time.
+@pytest.mark.slow
 def test_when_the_demo_itself_is_killed_nothing_outlives_it(tmp_path: Path) -> None:
     with running_demo(tmp_path) as demo:
         os.kill(demo.pid, signal.SIGKILL)

@@ -134,7 +134,7 @@ def lost(folder, operator):
     return gone | {name for name in operator.done if states.get(name) != "DONE"}
 
 
-@pytest.mark.parametrize("kills", [8, pytest.param(500, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kills", [4, pytest.param(500, marks=pytest.mark.slow)])
 def test_no_acknowledged_decision_is_lost(tmp_path, kills):
     chance = random.Random(3)
     for begin in range(0, kills, ROUND):

@@ -24,24 +24,27 @@ def drive(robot: LiveRobot) -> None:
     robot.wait(robot.driving, 40, "the base to drive")
 
 
-@pytest.mark.parametrize("name", ["controller", "perception", "server", "router"])
+@pytest.mark.parametrize(
+    "name", ["router", *(pytest.param(each, marks=pytest.mark.slow) for each in ("perception", "server"))]
+)
 def test_base_and_arm_are_still_soon_after_a_process_is_killed(tmp_path: Path, name: str) -> None:
     with LiveRobot(tmp_path) as robot:
         drive(robot)
         killed = robot.kill(name)
-        if name in ("controller", "perception"):
-            row = robot.wait(lambda: robot.gone(name), 5, f"the server to say that {name} has gone")
-            # The last state stays, with its age, instead of vanishing.
-            assert row["age_s"] is not None
-            assert robot.state()["controller"] is not None
+        if name == "perception":
+            robot.wait(lambda: robot.gone(name), 5, "the server to say that perception has gone")
         robot.wait(lambda: robot.clock() > killed + 1.5, 5, "the robot to come to rest")
     assert trace.read(robot.trace).still_after(killed) < LIMIT_S
 
 
-def test_a_restarted_controller_moves_nothing_by_itself(tmp_path: Path) -> None:
+def test_a_killed_controller_is_missed_and_a_new_one_moves_nothing_by_itself(tmp_path: Path) -> None:
     with LiveRobot(tmp_path) as robot:
         drive(robot)
         killed = robot.kill("controller")
+        row = robot.wait(lambda: robot.gone("controller"), 5, "the server to say that the controller has gone")
+        # The last state stays, with its age, instead of vanishing.
+        assert row["age_s"] is not None
+        assert robot.state()["controller"] is not None
         robot.start("controller")
         robot.wait(lambda: robot.mode() in ("IDLE", "READY") and not robot.gone("controller"), 20, "the new controller")
         robot.wait(lambda: robot.clock() > killed + 6.0, 10, "time to pass")

@@ -9,7 +9,8 @@ import psutil
 import pytest
 from live_robot import LiveRobot
 
-pytestmark = pytest.mark.alone
+# What the planner answers is tested in test_plan_worker.py, what the page shows in test_page_plan.py.
+pytestmark = [pytest.mark.alone, pytest.mark.slow]
 
 
 def proposed(robot: LiveRobot) -> list[dict[str, Any]]:

@@ -194,7 +194,7 @@ class Operators(RuleBasedStateMachine):
         self.folder.cleanup()
 
 
-@pytest.mark.parametrize(("examples", "steps"), [(15, 30), pytest.param(300, 50, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("examples", "steps"), [(8, 30), pytest.param(300, 50, marks=pytest.mark.slow)])
 def test_whoever_decides_in_whatever_order(examples, steps):
     with running_server(FakeWire()) as server:
         clients = {}

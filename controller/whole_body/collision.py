@@ -91,7 +91,7 @@ class CollisionModel:
     """Of what the last `dampers` found; None where nothing was near."""
 
     def __init__(self, robot: RobotModel) -> None:
-        """Build the robot's shapes and decide by sampling which of its pairs to watch (about 0.2 s)."""
+        """Build the robot's shapes and decide by sampling which of its pairs to watch (about 0.2 s the first time)."""
         self._robot = robot
         # A view of Pinocchio's own memory.
         self._tool = robot.data.oMf[robot.tool_id]

@@ -22,6 +22,8 @@ _SAMPLES, _SEED, _NEVER_NEARER = 4096, 20240521, 0.05
 _CONSTANT = 1e-6
 _CARRIED = (BASE, CASTER, "link0")
 _NEIGHBOURS_OF_TOOL = ("link6", "link7")
+#: What was decided, by everything that it depends on: a program has several models of one robot.
+_decided: dict[tuple[object, ...], tuple[tuple[int, int], ...]] = {}
 
 
 def self_pairs(robot: RobotModel, geometry: Any, ground: int) -> list[tuple[int, int]]:
@@ -35,6 +37,14 @@ def self_pairs(robot: RobotModel, geometry: Any, ground: int) -> list[tuple[int,
         geometry: Pinocchio's geometry model, its ground added.
         ground: Index of the ground.
     """
+    bounds = robot.limits.lower[ARM_Q].tobytes(), robot.limits.upper[ARM_Q].tobytes()
+    known = (robot.model.saveToString(), geometry.saveToString(), *bounds, ground)
+    if known not in _decided:
+        _decided[known] = tuple(_decide(robot, geometry, ground))
+    return list(_decided[known])
+
+
+def _decide(robot: RobotModel, geometry: Any, ground: int) -> list[tuple[int, int]]:
     disabled = _disabled_links()
     parts = [part_of(item.name) for item in geometry.geometryObjects]
     joints = [item.parentJoint for item in geometry.geometryObjects]
