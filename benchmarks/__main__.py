@@ -11,6 +11,7 @@ BENCHMARKS = {
     "row": ("benchmarks.row", "cuts in simulated rows, end to end"),
     "reach": ("benchmarks.reach", "tool poses anywhere around the robot: reached, limits, manipulability"),
     "arm": ("benchmarks.arm", "the arm alone between random poses, beside published figures"),
+    "page": ("benchmarks.page", "the page in a real browser: hand to robot, robot to screen, with viewers"),
     "load": ("benchmarks.load", "processor, memory and traffic of the demo"),
     "ledger": ("benchmarks.ledger", "what recording costs the control step, on a slow disk too"),
     "record": ("benchmarks.record", "what a recorder beside the demo costs the control"),

@@ -2,22 +2,26 @@
 
 import argparse
 import asyncio
+import re
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import AsyncExitStack, contextmanager, suppress
 
+import httpx
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
-from websockets.typing import Origin
+from websockets.typing import Origin, Subprotocol
 
 from rolling_panda.errors import RollingPandaError
 from rolling_panda.launch import child_environment, python_command
+from server.scene import VIEW_VERSION
 
-_OPEN_S = 30.0
+_OPEN_S, _CLOSE_S = 30.0, 0.2
+_FRAME = re.compile(r'"camera_frame":(\d+)')
 
 
-async def look_on(url: str, cookie: str, pages: int, slow: int) -> None:
+async def look_on(url: str, cookie: str, pages: int, slow: int, whole: bool = False) -> None:
     """Open the pages, say `open`, and look on until standard input closes.
 
     Args:
@@ -25,38 +29,60 @@ async def look_on(url: str, cookie: str, pages: int, slow: int) -> None:
         cookie: Of a session.
         pages: How many in all.
         slow: How many of them never read.
+        whole: Whether each has the 3-D view and the camera's image too, as a page in a browser has.
     """
-    socket_url = url.replace("http", "ws", 1) + "/ws"
+    address, headers = url.replace("http", "ws", 1), {"Cookie": cookie}
     async with AsyncExitStack() as stack, asyncio.TaskGroup() as group:
-        readers = []
-        for number in range(pages):
+
+        async def opened(path: str, protocols: list[Subprotocol] | None = None) -> ClientConnection:
             opening = connect(
-                socket_url, origin=Origin(url), additional_headers={"Cookie": cookie}, open_timeout=_OPEN_S
+                address + path,
+                origin=Origin(url),
+                additional_headers=headers,
+                open_timeout=_OPEN_S,
+                # Who never reads never hears the other side say goodbye.
+                close_timeout=_CLOSE_S,
+                subprotocols=protocols,
+                max_size=None,
+                compression=None,
             )
-            page = await stack.enter_async_context(opening)
+            return await stack.enter_async_context(opening)
+
+        images = await stack.enter_async_context(httpx.AsyncClient(base_url=url, headers=headers, trust_env=False))
+        readers, views = [], []
+        for number in range(pages):
+            page = await opened("/ws")
+            view = await opened("/viser", [Subprotocol(f"viser-v{VIEW_VERSION}")]) if whole else None
             if number >= slow:
-                readers.append(group.create_task(_read(page)))
+                readers.append(group.create_task(_read(page, images if whole else None)))
+                if view is not None:
+                    views.append(group.create_task(_read(view)))
         print("open", flush=True)
         await asyncio.to_thread(sys.stdin.read)
         print(sum(not reader.done() for reader in readers), flush=True)
-        for reader in readers:
+        for reader in readers + views:
             reader.cancel()
 
 
-async def _read(page: ClientConnection) -> None:
+async def _read(socket: ClientConnection, images: httpx.AsyncClient | None = None) -> None:
+    shown = "0"
     with suppress(ConnectionClosed):
-        async for _ in page:
-            pass
+        async for said in socket:
+            frame = _FRAME.search(said) if images is not None and isinstance(said, str) else None
+            if images is not None and frame is not None and frame[1] != shown:
+                shown = frame[1]
+                with suppress(httpx.HTTPError):
+                    await images.get(f"/camera/color.jpg?n={shown}")
 
 
 @contextmanager
-def looked_at(url: str, cookie: str, pages: int, slow: int) -> Iterator[None]:
-    """So many pages look on meanwhile, from a process of their own; `slow` of them never read.
+def looked_at(url: str, cookie: str, pages: int, slow: int, whole: bool = False) -> Iterator[None]:
+    """So many pages look on meanwhile, from a process of their own; `slow` of them never read, `whole` as in `look_on`.
 
     Raises:
         RollingPandaError: They were not let in, or not all of those that read did so to the end.
     """
-    words = [url, cookie, "--pages", str(pages), "--slow", str(slow)]
+    words = [url, cookie, "--pages", str(pages), "--slow", str(slow), *(["--whole"] if whole else [])]
     with subprocess.Popen(
         python_command("benchmarks.crowd", words),
         stdin=subprocess.PIPE,
@@ -80,8 +106,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("cookie", help="NAME=VALUE of a session")
     parser.add_argument("--pages", type=int, default=50, help="how many in all (default: 50)")
     parser.add_argument("--slow", type=int, default=10, help="how many of them never read (default: 10)")
+    parser.add_argument("--whole", action="store_true", help="each with the 3-D view and the camera's image")
     arguments = parser.parse_args(argv)
-    asyncio.run(look_on(arguments.url, arguments.cookie, arguments.pages, arguments.slow))
+    asyncio.run(look_on(arguments.url, arguments.cookie, arguments.pages, arguments.slow, arguments.whole))
     return 0
 
 

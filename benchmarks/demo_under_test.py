@@ -45,8 +45,8 @@ class Demo:
             env=child_environment(),
         )
         self.tree = psutil.Process(self._popen.pid)
-        url = f"http://127.0.0.1:{port}"
-        self.client = httpx.Client(base_url=url, headers={"Origin": url}, timeout=10)
+        self.url = f"http://127.0.0.1:{port}"
+        self.client = httpx.Client(base_url=self.url, headers={"Origin": self.url}, timeout=10)
         said = ""
         assert self._popen.stdout is not None
         for line in self._popen.stdout:
@@ -99,6 +99,18 @@ class Demo:
     def in_mode(self, mode: str) -> bool:
         """Is the supervision machine of every robot there?"""
         return all(state["controller"]["mode"] == mode for state in self.states())
+
+    def guest(self, user: str, role: str) -> str:
+        """Somebody else signs in; their cookie."""
+        token = self.post("invite", user=user, role=role)["link"].split("token=")[1]
+        with httpx.Client(base_url=self.url, headers={"Origin": self.url}, trust_env=False) as client:
+            client.post("/api/sign-in", json={"token": token}).raise_for_status()
+            return "; ".join(f"{name}={value}" for name, value in client.cookies.items())
+
+    def log(self, lines: int) -> list[str]:
+        """The newest lines of the log."""
+        told = self.client.get("/api/events").json()["events"]
+        return [f"{line['process']}: {line['text']}" for line in told[-lines:]]
 
     def begin_work(self) -> None:
         """Arm, accept all that was detected, start."""

@@ -19,16 +19,8 @@ from typing import Any
 
 import psutil
 
+from benchmarks.browser import FLAGS
 from benchmarks.demo_under_test import Demo
-
-_FLAGS = [
-    "--no-sandbox",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--ignore-gpu-blocklist",
-    "--disable-background-networking",
-]
 
 
 @dataclass(frozen=True)
@@ -77,7 +69,7 @@ def page_cost(demo: Demo, chromium: str, seconds: float, without: Cost) -> PageC
     link = demo.post("invite", user="bench", role="viewer")["link"]
     received = 0
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=_FLAGS)
+        browser = playwright.chromium.launch(executable_path=chromium, args=list(FLAGS))
         page = browser.new_context(locale="en-US", viewport={"width": 1280, "height": 800}).new_page()
         wire = page.context.new_cdp_session(page)
 

@@ -6,29 +6,14 @@ from contextlib import contextmanager
 
 from playwright.sync_api import Page, Request, sync_playwright
 
-#: A page without the 3-D view.
-FLAT_FLAGS = (
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-)
-#: The 3-D view needs WebGL, and a machine without a GPU draws it in software.
-FLAGS = (
-    *(flag for flag in FLAT_FLAGS if flag != "--disable-gpu"),
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--ignore-gpu-blocklist",
-)
+from benchmarks.browser import FLAGS, FLAT_FLAGS
+
+__all__ = ["FLAGS", "FLAT_FLAGS", "operator_page"]
 
 
 @contextmanager
 def operator_page(
-    chromium_path: str, link: str, *, width: int = 1280, height: int = 800, scale: float = 0.25
+    chromium_path: str, link: str, *, width: int = 1280, height: int = 800, scale: float = 0.25, touch: bool = False
 ) -> Iterator[Page]:
     """A page signed in by a single-use link. Leaving it fails if the page asked any other origin for anything.
 
@@ -48,7 +33,10 @@ def operator_page(
         try:
             # The 3-D client reads the language and dies on an empty one.
             context = browser.new_context(
-                locale="en-US", viewport={"width": width, "height": height}, device_scale_factor=scale
+                locale="en-US",
+                viewport={"width": width, "height": height},
+                device_scale_factor=scale,
+                has_touch=touch,
             )
             page = context.new_page()
             page.on("request", look)

@@ -10,6 +10,7 @@ from live_robot import LiveRobot
 from operator_page import operator_page
 from playwright.sync_api import Page
 
+from benchmarks.gizmo_hand import FirstView
 from bridge.sim import trace
 from server.scene_gizmo import GIZMO_PX
 
@@ -62,32 +63,6 @@ def press(page: Page, robot: LiveRobot) -> None:
     raise AssertionError(f"the drag does not take the tool\n{robot.logs()}")
 
 
-class View:
-    """The 3-D view of a page while it has its first camera (`server/scene.py`)."""
-
-    EYE, LOOK_AT, FOV = np.array([-1.45, -1.95, 1.85]), np.array([0.3, 0.45, 0.8]), 0.82
-
-    def __init__(self, page: Page) -> None:
-        box = page.locator("iframe").bounding_box()
-        assert box is not None
-        self.centre = np.array([box["x"] + box["width"] / 2, box["y"] + box["height"] / 2])
-        self.focal = box["height"] / 2 / math.tan(self.FOV / 2)
-        self.forward = (self.LOOK_AT - self.EYE) / np.linalg.norm(self.LOOK_AT - self.EYE)
-        self.right = np.cross(self.forward, [0.0, 0.0, 1.0])
-        self.right /= np.linalg.norm(self.right)
-        self.down = np.cross(self.forward, self.right)
-
-    def pixel(self, point: np.ndarray) -> np.ndarray:
-        """Where a point in odom is on the page."""
-        offset = point - self.EYE
-        across = np.array([offset @ self.right, offset @ self.down])
-        return np.asarray(self.centre + self.focal * across / (offset @ self.forward))
-
-    def metres(self, pixels: float, point: np.ndarray) -> float:
-        """What this many pixels are at the depth of a point."""
-        return float(pixels * ((point - self.EYE) @ self.forward) / self.focal)
-
-
 # A hold ends when the view is older than 0.5 s, as it must. A view drawn in software is now and then, on a machine that
 # has other work as well: run this one on a quiet machine, with `-m slow`.
 @pytest.mark.slow
@@ -99,7 +74,7 @@ def test_the_tool_follows_the_dragged_gizmo_and_rests_when_it_is_let_go(tmp_path
             page.wait_for_selector('#teleop[aria-disabled="false"]', timeout=60_000)
             page.click("#teleop")
             page.wait_for_timeout(2_000)
-            origin, view = np.array(tool(robot)["position"]), View(page)
+            origin, view = np.array(tool(robot)["position"]), FirstView(page)
             # The tool's x axis lies along the row in the survey posture: there is the gizmo's first arrow.
             along = np.array([1.0, 0.0, 0.0])
             grip = origin + 0.8 * view.metres(GIZMO_PX, origin) * along
