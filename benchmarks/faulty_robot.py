@@ -150,11 +150,17 @@ class Hand:
         self._thread = threading.Thread(target=self._hold)
         #: When the last renewal was answered (s, monotonic).
         self.renewed_at = 0.0
+        self._looks = True
 
     def silence(self) -> float:
         """Say nothing more; returns when the last word was said (s, monotonic)."""
         self._ended.set()
         self._thread.join()
+        return self.renewed_at
+
+    def look_away(self) -> float:
+        """Be heard, but look at the robot no more; returns when it was last seen (s, monotonic)."""
+        self._looks = False
         return self.renewed_at
 
     def let_go(self) -> float:
@@ -186,7 +192,7 @@ class Hand:
         wanted = {"hold": True, "base": {"linear": self._linear, "angular": 0.0}}
         while not self._ended.wait(_RENEW_S):
             try:
-                self._client.get("/api/state")
+                self._client.get("/api/state" if self._looks else "/api/me")
                 if self._linear:
                     self._client.post("/api/teleop", json=wanted)
                 self.renewed_at = time.monotonic()

@@ -174,6 +174,15 @@ LIVE_FAULTS: tuple[LiveFault, ...] = (
         watched_s=3.0,
     ),
     LiveFault(
+        "who is there looks away",
+        "R16",
+        "browser–server",
+        2.5,
+        lambda robot, hand: hand.look_away(),
+        moving="work",
+        watched_s=4.0,
+    ),
+    LiveFault(
         "perception stands still for 3 s",
         "R20",
         "perception–controller",
