@@ -2,13 +2,16 @@
 
     .venv/bin/python deploy/prove.py                      # with docker compose
     .venv/bin/python deploy/prove.py --engine podman --compose podman-compose
+    .venv/bin/python deploy/prove.py --real               # compose.real.yaml on fakes of the devices: guided by hand
 
 Everything happens in a folder of its own and under a project name of its own; at the end all of it is taken down again.
 A line for each thing that was looked at; ends with 1 if one is not as docs/deployment.md says.
 """
 
 import argparse
+import contextlib
 import json
+import math
 import os
 import secrets
 import shlex
@@ -19,6 +22,7 @@ import tempfile
 import time
 import urllib.error
 import urllib.request
+from collections.abc import Callable
 from http.cookiejar import CookieJar
 from pathlib import Path
 from typing import Any
@@ -27,7 +31,10 @@ import yaml
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = "http://127.0.0.1:8000"
-IMAGE = "rolling-panda:0.1.0"
+IMAGE, REAL_IMAGE = "rolling-panda:0.1.0", "rolling-panda-real:0.1.0"
+# With --real: the network of arm and base, who is where on it, and whom the base's ROS 2 nodes are behind.
+FIELD, BRIDGE_AT, ARM_AT, NODES_AT = "192.168.147.0/24", "192.168.147.9", "192.168.147.2", "192.168.147.3"
+NODES = f"tcp/{NODES_AT}:7448"
 #: What a process finds out about itself in its container.
 _INSIDE = """
 import json, os, socket
@@ -101,6 +108,35 @@ class Operator:
             time.sleep(0.2)
         return f"nothing was cut in {limit_s:.0f} s; {trouble}"
 
+    def guide(self, limit_s: float, **hold: object) -> float:
+        """Hold the robot by hand until its tool is 20 mm away or the time is over; how far it is then (m)."""
+        self._until(lambda state: state["controller"]["mode"] in ("READY", "TELEOP"), limit_s)
+        before = self.get("/api/state")["controller"]["T_odom_tool"]["position"]
+        until, moved = time.monotonic() + limit_s, 0.0
+        while moved < 0.02 and time.monotonic() < until:
+            self.post("/api/teleop", {"hold": True, **hold})
+            moved = math.dist(before, self.get("/api/state")["controller"]["T_odom_tool"]["position"])
+            time.sleep(0.04)
+        self.post("/api/teleop", {"hold": False})
+        return moved
+
+    def arm(self, limit_s: float) -> None:
+        """Arm as soon as every process is there."""
+
+        def armed(state: Any) -> bool:
+            if state["controller"] is None or state["controller"]["mode"] != "IDLE":
+                return state["controller"] is not None
+            with contextlib.suppress(RuntimeError):
+                self.post("/api/arm", {})
+            return False
+
+        self._until(armed, limit_s)
+
+    def _until(self, condition: Callable[[Any], bool], limit_s: float) -> None:
+        until = time.monotonic() + limit_s
+        while not condition(self.get("/api/state")) and time.monotonic() < until:
+            time.sleep(0.2)
+
     def _go_on(self, mode: str, states: list[str]) -> None:
         if mode == "IDLE":
             self.post("/api/arm", {})
@@ -118,6 +154,7 @@ def main() -> int:
     parser.add_argument("--engine", default="docker", help="the engine's command")
     parser.add_argument("--compose", default="docker compose", help="the compose command")
     parser.add_argument("--no-build", action="store_true", help=f"the image {IMAGE} is there already")
+    parser.add_argument("--real", action="store_true", help=f"compose.real.yaml too, on fakes ({REAL_IMAGE})")
     arguments = parser.parse_args()
     services: dict[str, Any] = yaml.safe_load((ROOT / "compose.yaml").read_text())["services"]
     proof, password = Proof(), secrets.token_urlsafe(16)
@@ -132,9 +169,18 @@ def main() -> int:
         here = Path(folder)
         shutil.copy(ROOT / "compose.yaml", here)
         compose = [*shlex.split(arguments.compose), "-p", "rolling-panda-proof"]
+        if arguments.real:
+            compose += ["-f", "compose.yaml", "-f", "compose.real.yaml"]
+            os.environ.update(FIELD_ADDRESS=BRIDGE_AT, FIELD_SUBNET=FIELD, FIELD_INTERFACE="none")
+            real = yaml.safe_load((ROOT / "compose.real.yaml").read_text())
+            (here / "compose.real.yaml").write_text(yaml.safe_dump(on_fakes(real)))
+            (here / "my-robot.toml").write_text(robot((ROOT / "assets/config/real.toml").read_text()))
         if not arguments.no_build:
             base = [f"--build-arg=BASE_IMAGE={os.environ['BASE_IMAGE']}"] if "BASE_IMAGE" in os.environ else []
             subprocess.run([arguments.engine, "build", *base, "-t", IMAGE, str(ROOT)], check=True)
+            if arguments.real:
+                base.append("--build-arg=LOCK=requirements-real.lock")
+                subprocess.run([arguments.engine, "build", *base, "-t", REAL_IMAGE, str(ROOT)], check=True)
         (here / "users").mkdir(mode=0o700)
         words = "rolling-panda certificates --out /here/certificates"
         words += " && rolling-panda user add ada --role supervisor --file /here/users/users.json --password-stdin"
@@ -156,13 +202,66 @@ def main() -> int:
         )
         subprocess.run([*compose, "up", "--detach", "--no-build"], cwd=here, check=True)
         try:
-            look(proof, services, engine, password)
+            look(proof, services, engine)
+            operator = Operator(password)
+            if arguments.real:
+                guide(proof, operator)
+            else:
+                ended = operator.prune(180.0)
+                proof.that("a cane is cut, from acceptance to DONE", ended == "DONE", ended)
         finally:
             subprocess.run([*compose, "down", "--volumes"], cwd=here, check=False)
     return 0 if proof.held else 1
 
 
-def look(proof: Proof, services: dict[str, Any], engine: Any, password: str) -> None:
+def on_fakes(real: dict[str, Any]) -> dict[str, Any]:
+    """compose.real.yaml where there is neither a network card towards a robot nor a camera: fakes in two containers."""
+    for usb in ("devices", "device_cgroup_rules"):
+        del real["services"]["bridge"][usb]
+    network = {"driver": "bridge", "internal": True, "ipam": {"config": [{"subnet": FIELD}]}}
+    shared = {"image": REAL_IMAGE, "init": True, "stdin_open": True}
+    fakes = {
+        "nodes": {"command": ["router", "--listen", f"tcp/0.0.0.0:{NODES.rsplit(':', 1)[1]}"], "at": NODES_AT},
+        "devices": {
+            "entrypoint": ["python", "-m", "bridge.fakes"],
+            "command": ["--config", "/config/robot.toml", "--connect", NODES, "--arm", ARM_AT],
+            "volumes": ["./my-robot.toml:/config/robot.toml:ro"],
+            # The router may not listen yet.
+            "restart": "unless-stopped",
+            "at": ARM_AT,
+        },
+    }
+    for name, service in fakes.items():
+        at = service.pop("at")
+        real["services"][name] = {**shared, **service, "networks": {"field": {"ipv4_address": at}}}
+    return {**real, "networks": {"field": network}}
+
+
+def robot(text: str) -> str:
+    """The real robot's configuration with the fakes in it, on a kernel without PREEMPT_RT."""
+    text = text.replace('address = ""', f'address = "{ARM_AT}"').replace('"enforce"', '"ignore"')
+    text = text.replace('connect = ""', f'connect = "{NODES}"')
+    text = text.replace('service = ""', f'service = "cutter/close"\nconnect = "{NODES}"')
+    return text.replace("[real.camera]", "[real.camera]\nenabled = false")
+
+
+def guide(proof: Proof, operator: Operator) -> None:
+    """Look at what a person does by the page with the real robot's drivers."""
+    operator.arm(60.0)
+    state = operator.get("/api/state")
+    proof.that("the bridge is the real robot's", state["bridge"]["kind"] == "real", state["bridge"]["kind"])
+    moved = operator.guide(20.0, joints=[0.0, 0.0, 0.0, 0.0, 0.0, 0.2, 0.0])
+    proof.that("the arm is moved by hand, through libfranka", moved >= 0.02, moved)
+    moved = operator.guide(20.0, base={"linear": 0.05, "angular": 0.0})
+    proof.that("the base is moved by hand, through ROS 2 over Zenoh", moved >= 0.02, moved)
+    operator.post("/api/stop", {"reason": "proof"})
+    until = time.monotonic() + 5.0
+    while not (stop := operator.get("/api/state")["bridge"]["stop_id"]) and time.monotonic() < until:
+        time.sleep(0.1)
+    proof.that("the software stop is latched at the bridge", bool(stop))
+
+
+def look(proof: Proof, services: dict[str, Any], engine: Any) -> None:
     """Look at everything that docs/deployment.md promises of the running containers."""
     names = {name: f"rolling-panda-proof_{name}_1" for name in services}
     running = engine("ps", "--format", "{{.Names}}").split()
@@ -195,8 +294,6 @@ def look(proof: Proof, services: dict[str, Any], engine: Any, password: str) -> 
     )
     version = json.load(urllib.request.urlopen(f"{PAGE}/version", timeout=20))
     proof.that(f"the page is there: version {version['version']}", bool(version["packages_sha256"]))
-    ended = Operator(password).prune(180.0)
-    proof.that("a cane is cut, from acceptance to DONE", ended == "DONE", ended)
 
 
 if __name__ == "__main__":
