@@ -111,10 +111,12 @@ def test_after_an_emergency_stop_it_begins_at_zero_by_a_ramp(base: Mp500, fake: 
 def test_without_wheel_speeds_it_stops_and_says_which_topic_is_silent(base: Mp500, fake: DeviceProcess) -> None:
     drive(base, FORWARD, 0.5)
     fake.tell(f"mute {mp500.WHEELS}")
-    drive(base, FORWARD, 0.6)
+    drive(base, FORWARD, 0.15)
+    assert fake.tell()["command"][0] < 0.28, "it slows down before it calls the silence a fault"
+    drive(base, FORWARD, 1.6)
     state = base.read()
-    assert mp500.WHEELS in state.fault and not state.severe
-    assert fake.tell()["command"] == [0.0, 0.0]
+    assert mp500.WHEELS in state.fault and not state.severe, "the last speed heard of is no runaway"
+    assert fake.tell()["command"] == [0.0, 0.0] and not fake.tell()["soft"]
     fake.tell("free")
     until(lambda: base.read().fault == "")
 
