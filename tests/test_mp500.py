@@ -113,7 +113,9 @@ def test_without_wheel_speeds_it_stops_and_says_which_topic_is_silent(base: Mp50
     fake.tell(f"mute {mp500.WHEELS}")
     drive(base, FORWARD, 0.15)
     assert fake.tell()["command"][0] < 0.28, "it slows down before it calls the silence a fault"
-    drive(base, FORWARD, 1.6)
+    drive(base, FORWARD, 0.1)
+    assert mp500.WHEELS in base.read().fault, "within 0.25 s"
+    drive(base, FORWARD, 1.5)
     state = base.read()
     assert mp500.WHEELS in state.fault and not state.severe, "the last speed heard of is no runaway"
     assert fake.tell()["command"] == [0.0, 0.0] and not fake.tell()["soft"]

@@ -29,7 +29,7 @@ class BaseConfig(Struct, frozen=True, forbid_unknown_fields=True):
     command_hz: Annotated[float, Meta(ge=10.0, le=200.0)] = 50.0
     fade_s: Positive = 0.07
     deadline_s: Positive = 0.2
-    stale_s: Positive = 0.25
+    stale_s: Positive = 0.2
     unmonitored_s: Positive = 1.0
     runaway_s: Positive = 1.0
 
