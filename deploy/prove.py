@@ -22,7 +22,6 @@ import tempfile
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Callable
 from http.cookiejar import CookieJar
 from pathlib import Path
 from typing import Any
@@ -97,7 +96,7 @@ class Operator:
         until, trouble = time.monotonic() + limit_s, "no point was proposed"
         while time.monotonic() < until:
             # Work goes on only while somebody looks; where this script was late, it takes the work up again.
-            mode = (self.get("/api/state")["controller"] or {}).get("mode", "")
+            mode = self._mode()
             states = [row["entry"]["state"] for row in self.get("/api/points")["points"]]
             if "DONE" in states:
                 return "DONE"
@@ -108,34 +107,31 @@ class Operator:
             time.sleep(0.2)
         return f"nothing was cut in {limit_s:.0f} s; {trouble}"
 
+    def ready(self, limit_s: float) -> None:
+        """Arm as soon as every process is there; after a protective stop, as a busy machine brings them, too."""
+        until = time.monotonic() + limit_s
+        while (mode := self._mode()) not in ("READY", "TELEOP") and time.monotonic() < until:
+            with contextlib.suppress(RuntimeError):
+                self.post("/api/arm" if mode == "IDLE" else "/api/acknowledge", {})
+            time.sleep(0.2)
+
     def guide(self, limit_s: float, **hold: object) -> float:
         """Hold the robot by hand until its tool is 20 mm away or the time is over; how far it is then (m)."""
-        self._until(lambda state: state["controller"]["mode"] in ("READY", "TELEOP"), limit_s)
+        self.ready(limit_s)
         before = self.get("/api/state")["controller"]["T_odom_tool"]["position"]
         until, moved = time.monotonic() + limit_s, 0.0
         while moved < 0.02 and time.monotonic() < until:
-            self.post("/api/teleop", {"hold": True, **hold})
+            try:
+                self.post("/api/teleop", {"hold": True, **hold})
+            except RuntimeError:
+                self.ready(limit_s)
             moved = math.dist(before, self.get("/api/state")["controller"]["T_odom_tool"]["position"])
             time.sleep(0.04)
         self.post("/api/teleop", {"hold": False})
         return moved
 
-    def arm(self, limit_s: float) -> None:
-        """Arm as soon as every process is there."""
-
-        def armed(state: Any) -> bool:
-            if state["controller"] is None or state["controller"]["mode"] != "IDLE":
-                return state["controller"] is not None
-            with contextlib.suppress(RuntimeError):
-                self.post("/api/arm", {})
-            return False
-
-        self._until(armed, limit_s)
-
-    def _until(self, condition: Callable[[Any], bool], limit_s: float) -> None:
-        until = time.monotonic() + limit_s
-        while not condition(self.get("/api/state")) and time.monotonic() < until:
-            time.sleep(0.2)
+    def _mode(self) -> str:
+        return str((self.get("/api/state")["controller"] or {}).get("mode", ""))
 
     def _go_on(self, mode: str, states: list[str]) -> None:
         if mode == "IDLE":
@@ -247,7 +243,7 @@ def robot(text: str) -> str:
 
 def guide(proof: Proof, operator: Operator) -> None:
     """Look at what a person does by the page with the real robot's drivers."""
-    operator.arm(60.0)
+    operator.ready(60.0)
     state = operator.get("/api/state")
     proof.that("the bridge is the real robot's", state["bridge"]["kind"] == "real", state["bridge"]["kind"])
     moved = operator.guide(20.0, joints=[0.0, 0.0, 0.0, 0.0, 0.0, 0.2, 0.0])
