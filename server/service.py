@@ -48,7 +48,7 @@ def run(context: ProcessContext) -> None:
     _check_names([arguments.robot_id, *arguments.also_robot_id])
     if arguments.also_robot_id and context.wire.certificates:
         raise InputError(
-            f"a server's certificate names one robot, so with --certificates the router would refuse it robot "
+            f"a server's certificate names one robot, so with --certificates the router would refuse what is said to "
             f"{arguments.also_robot_id[0]}: start a server for each robot, on a port of its own"
         )
     allowed = access(arguments)

@@ -100,6 +100,7 @@ def test_the_other_robot_is_seen_and_chosen_and_nothing_reaches_the_wrong_one(pa
     two.controller = controller("ESTOP_LATCHED")
     hall.alarms["panda-2"] = ("error", "Stopped: by Bob")
     expect(second).to_contain_text("Stopped: by Bob")
+    expect(second.locator(".robot-mode")).to_have_text("")
     expect(page.locator("rp-toasts")).to_contain_text("panda-2: Stopped: by Bob")
     # A hold ends with the choice of another robot, and that other robot is told nothing of it.
     page.locator("#teleop").click()

@@ -70,7 +70,9 @@ class RpRobots extends HTMLElement {
     const draw = (/** @type {Glance} */ robot) => {
       link.dataset.severity = robot.severity;
       setIcon(shape, robot.severity || robot.mode || "UNKNOWN");
-      setText(mode, robot.mode === null ? "No state yet" : MODE_WORDS[robot.mode]);
+      const word = robot.mode === null ? "No state yet" : MODE_WORDS[robot.mode];
+      // An alarm that begins with the mode says it already.
+      setText(mode, inWords(robot.alarm).startsWith(word) ? "" : word);
       setText(alarm, inWords(robot.alarm));
       setText(holder, robot.yours ? "You hold control" : robot.holder ? `${robot.holder} holds control` : "");
       const working = robot.mode === "AUTO" || robot.mode === "TELEOP";
