@@ -9,6 +9,7 @@ import argparse
 import json
 import os
 import platform
+import resource
 import sys
 import time
 from collections.abc import Sequence
@@ -18,7 +19,9 @@ from typing import get_args
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
+from benchmarks.confusion import Confusion, no_counts, shares
 from benchmarks.guyot_judge import GuyotJudge
 from benchmarks.intervals import Figure, quantile, share
 from benchmarks.perception_gallery import save_failure
@@ -38,8 +41,8 @@ from rolling_panda import messages as m
 from rolling_panda.errors import RollingPandaError
 from rolling_panda.robot_model import RobotModel, configuration
 
-#: Vines of a row, and the way between two frames (m).
-ROW_VINES, STEP = 3, 0.15
+#: Vines of a row, and the way between two frames (m): the survey drives at 0.15 m/s, and the camera takes two a second.
+ROW_VINES, STEP = 3, 0.075
 #: Nodes that stay, by the kind of cut.
 KEPT = {"spur cut": 2, "cane cut": 8}
 #: The camera stands so far ahead of the base in the survey posture (m), and begins before the first trunk.
@@ -56,12 +59,14 @@ class Survey:
             made (empty for nothing), and whether they got a point, and a right one.
         frame_ms: Time of each frame through segmentation, plant model and rule, on a wall clock.
         abstained: What every row left open at the end.
+        confusion: Pixels by true class and by the class told.
     """
 
     points: list[JudgedPoint] = field(default_factory=list)
     spurs: list[dict[str, int | bool | str]] = field(default_factory=list)
     frame_ms: list[float] = field(default_factory=list)
     abstained: list[m.Abstention] = field(default_factory=list)
+    confusion: NDArray[np.int64] = field(default_factory=no_counts)
 
 
 def survey_row(
@@ -73,6 +78,7 @@ def survey_row(
     into: Survey,
     gallery: Path | None = None,
     looks: Looks | None = None,
+    step: float = STEP,
 ) -> None:
     """Drive along one row.
 
@@ -85,6 +91,7 @@ def survey_row(
         into: Takes the result.
         gallery: Folder for pictures of wrong points.
         looks: Takes what a second look at each point comes to; None leaves it at the survey.
+        step: Way between two frames (m).
     """
     guyot = perception.config.rule.system == "guyot"
     config = VineyardConfig(vines=vines, training="guyot" if guyot else "cordon")
@@ -96,7 +103,7 @@ def survey_row(
     last = first + vines * config.vine_spacing
     points: tuple[m.PruningPoint, ...] = ()
     left_open: tuple[m.Abstention, ...] = ()
-    for sequence, x in enumerate(np.arange(first, last + STEP, STEP) - _CAMERA_AHEAD):
+    for sequence, x in enumerate(np.arange(first, last + step, step) - _CAMERA_AHEAD):
         base = m.PlanarPose(float(x), 0.0, 0.0)
         place = model.pose(configuration(base, position), model.camera_id).homogeneous
         image = camera.render(row, place, sequence)
@@ -190,6 +197,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         "--looks", choices=("one", "two"), default="one", help="look at each point again from near, and after its cut"
     )
     parser.add_argument(
+        "--step", type=float, default=STEP, metavar="METRES", help="way between two frames (default: %(default)s)"
+    )
+    parser.add_argument(
         "--growth",
         action="store_true",
         help="survey one row of so many vines instead, and tell what each vine's frames cost",
@@ -199,18 +209,20 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = parser.parse_args(argv)
     if words.seed < 0 or words.vines < 1:
         parser.error(f"--seed {words.seed} --vines {words.vines}: give a seed of 0 or more and at least one vine")
+    if not words.step > 0.0:
+        parser.error(f"--step {words.step}: give a way of more than 0 m")
     model, survey = RobotModel(), Survey()
     if words.growth:
         return _growth(words)
     looks = Looks() if words.looks == "two" else None
     try:
         for number, done in enumerate(range(0, words.vines, ROW_VINES)):
-            segmenter = choose_segmenter(words.segmenter, words.weights)
+            segmenter = Confusion(choose_segmenter(words.segmenter, words.weights), survey.confusion)
             rule = RuleConfig(system=words.training_system)
             perception = Perception(PerceptionConfig(fuse=words.fuse, rule=rule), segmenter, model)
             seed, vines = words.seed + number, min(ROW_VINES, words.vines - done)
             before = len(survey.points)
-            survey_row(seed, vines, perception, model, CameraConfig(), survey, words.gallery, looks)
+            survey_row(seed, vines, perception, model, CameraConfig(), survey, words.gallery, looks, words.step)
             new = survey.points[before:]
             print(f"seed {seed}: {vines} vines, {len(new)} points, {sum(p.right for p in new)} right", flush=True)
     except RollingPandaError as error:
@@ -227,6 +239,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             "seed": words.seed,
             "vines": words.vines,
             "segmenter": words.segmenter,
+            "step_m": words.step,
             "fuse": words.fuse,
             "training_system": words.training_system,
             "looks": words.looks,
@@ -236,6 +249,8 @@ def main(argv: Sequence[str] | None = None) -> int:
                 kind: {name: asdict(figure) for name, figure in summarise(survey, kind).items()}
                 for kind in ("clear", "partly", "hidden")
             },
+            "memory_mib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024,
+            "confusion": shares(survey.confusion),
             "results": [asdict(point) for point in survey.points],
             "spurs": survey.spurs,
             "open": {need: sum(a.needs == need for a in survey.abstained) for need in get_args(m.Need)},
@@ -251,11 +266,15 @@ def _growth(words: argparse.Namespace) -> int:
     except RollingPandaError as error:
         print(f"rolling-panda bench perception: {error}", file=sys.stderr)
         return 1
-    stretches = grow_long(words.seed, words.vines, STEP, perception, RobotModel())
+    stretches = grow_long(words.seed, words.vines, words.step, perception, RobotModel())
     print(table(stretches))
     if words.json is not None:
         document = {"machine": f"{platform.platform()}, {os.cpu_count()} cores", "seed": words.seed}
-        document |= {"segmenter": words.segmenter, "stretches": [asdict(stretch) for stretch in stretches]}
+        document |= {
+            "segmenter": words.segmenter,
+            "step_m": words.step,
+            "stretches": [asdict(stretch) for stretch in stretches],
+        }
         words.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
     return 0
 

@@ -5,10 +5,10 @@ import json
 from benchmarks.perception import main
 
 
-def test_each_vine_passed_is_a_line_and_what_is_known_grows_with_them(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("benchmarks.perception.STEP", 0.4)
+def test_each_vine_passed_is_a_line_and_what_is_known_grows_with_them(tmp_path, capsys):
     out = tmp_path / "growth.json"
-    assert main(["--growth", "--seed", "3", "--vines", "2", "--segmenter", "labels", "--json", str(out)]) == 0
+    words = ["--growth", "--seed", "3", "--vines", "2", "--step", "0.4", "--segmenter", "labels", "--json", str(out)]
+    assert main(words) == 0
     first, second = json.loads(out.read_text())["stretches"]
     assert (first["vines"], second["vines"]) == (1, 2)
     assert first["frame_ms"] > 0.0 and second["spurs"] > first["spurs"] > 0

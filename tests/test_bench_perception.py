@@ -6,14 +6,18 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from benchmarks.perception import Survey, main, summarise
+from benchmarks.perception import STEP, Survey, main, summarise
 from benchmarks.perception_judge import RowJudge
+from bridge.config import BridgeConfig
 from bridge.sim.camera import Camera
 from bridge.sim.camera_config import CameraConfig
 from bridge.sim.vineyard import grow
 from bridge.sim.vineyard_config import VineyardConfig
 from bridge.sim.vineyard_truth import judge
+from controller.config import ControllerConfig
 from rolling_panda import messages as m
+from rolling_panda.config import load_section
+from rolling_panda.resources import resource
 
 ROW = grow(VineyardConfig(vines=1), 11)
 TRUTHS = [truth for truth in judge(ROW) if truth.cut is not None]
@@ -100,10 +104,24 @@ def test_the_summary_has_a_figure_an_interval_and_a_number_for_each_measure():
     assert summary["right_cane"].value == 1.0 and summary["right_cane"].low < 0.6 and summary["right_cane"].n == 4
 
 
+def test_the_bench_looks_as_often_as_a_survey_does():
+    camera = load_section(resource("assets/config/sim.toml"), "bridge", BridgeConfig)
+    assert pytest.approx(ControllerConfig().survey_speed / camera.camera_moving_hz) == STEP
+
+
+def test_a_step_that_leads_nowhere_is_refused(capsys):
+    with pytest.raises(SystemExit):
+        main(["--step", "0"])
+    assert "more than 0 m" in capsys.readouterr().err
+
+
 def test_the_command_writes_what_it_measured(tmp_path, capsys):
     path = tmp_path / "p.json"
-    assert main(["--seed", "100", "--vines", "1", "--segmenter", "labels", "--json", str(path)]) == 0
+    words = ["--seed", "100", "--vines", "1", "--segmenter", "labels"]
+    assert main([*words, "--step", "0.15", "--json", str(path)]) == 0
     document = json.loads(path.read_text(encoding="utf-8"))
+    assert document["step_m"] == 0.15
+    assert document["confusion"]["cane"]["cane"] == 1.0 and 50 < document["memory_mib"] < 2000
     assert {
         "right_cane",
         "along_error_median_m",
@@ -123,7 +141,7 @@ def test_the_command_writes_what_it_measured(tmp_path, capsys):
 @pytest.mark.slow
 def test_wrong_points_are_pictured(tmp_path, monkeypatch):
     monkeypatch.setattr("benchmarks.perception_judge.ON_AXIS", -1.0)
-    words = ["--seed", "100", "--vines", "1", "--segmenter", "labels", "--gallery", str(tmp_path)]
+    words = ["--seed", "100", "--vines", "1", "--step", "0.15", "--segmenter", "labels", "--gallery", str(tmp_path)]
     assert main(words) == 0
     pictures = [np.asarray(Image.open(path)) for path in sorted(tmp_path.glob("100_p*.png"))]
     assert len(pictures) >= 6
