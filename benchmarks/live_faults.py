@@ -95,7 +95,8 @@ def _happen(robot: FaultyRobot, fault: LiveFault, later_s: float, way: float) ->
     by_hand = fault.moving == "base"
     with Hand(robot, way if by_hand else 0.0) as hand:
         if not by_hand:
-            robot.post("points/accept-all", confidence=0.0)
+            # Refused when all of them are accepted already.
+            robot.client.post("/api/points/accept-all", json={"confidence": 0.0})
             robot.post("start")
         robot.wait(lambda: _moves(robot, by_hand), _PATIENCE_S, "the robot to move")
         time.sleep(later_s)
