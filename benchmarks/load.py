@@ -141,8 +141,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         else:
             print(f"one idle page, {arguments.seconds:.0f} s", flush=True)
             page = page_cost(demo, chromium, arguments.seconds, idle)
-        demo.begin_work()
         with demo.watched():
+            demo.begin_work()
             time.sleep(3.0)
             print(f"moving, {arguments.seconds:.0f} s", flush=True)
             moving = cost(demo.tree, arguments.seconds)

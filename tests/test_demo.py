@@ -49,14 +49,14 @@ class Demo:
         self.pid = self._popen.pid
         self.children: list[psutil.Process] = []
 
-    def wait_until_up(self) -> None:
+    def wait_until_up(self, limit_s: float = STARTUP_S) -> None:
         assert self._popen.stdout is not None
         began = time.monotonic()
         for line in self._popen.stdout:
             self.words.append(line)
             if "Ctrl-C ends everything" in line:
                 break
-        assert time.monotonic() - began < STARTUP_S, self.text()
+        assert time.monotonic() - began < limit_s, self.text()
         self.children = psutil.Process(self.pid).children(recursive=True)
         for name in CHILDREN:
             assert all(child.is_running() for child in self.named(name)), self.text()
@@ -95,10 +95,10 @@ class Demo:
 
 
 @contextlib.contextmanager
-def running_demo(folder: Path, *more: str) -> Iterator[Demo]:
+def running_demo(folder: Path, *more: str, limit_s: float = STARTUP_S) -> Iterator[Demo]:
     demo = Demo(folder, *more)
     try:
-        demo.wait_until_up()
+        demo.wait_until_up(limit_s)
         yield demo
     finally:
         demo.close()
