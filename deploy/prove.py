@@ -196,8 +196,8 @@ def main() -> int:
             words,
             feed=password,
         )
-        subprocess.run([*compose, "up", "--detach", "--no-build"], cwd=here, check=True)
         try:
+            subprocess.run([*compose, "up", "--detach", "--no-build"], cwd=here, check=True)
             look(proof, services, engine)
             operator = Operator(password)
             if arguments.real:

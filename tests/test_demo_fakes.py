@@ -26,7 +26,7 @@ def entries(demo: Demo) -> dict[str, dict[str, Any]]:
 
 def ended(demo: Demo) -> bool:
     """Whether one is cut, or the work has stopped."""
-    return demo.mode() != "AUTO" or "DONE" in {entry["state"] for entry in entries(demo).values()}
+    return not demo.in_mode("AUTO") or "DONE" in {entry["state"] for entry in entries(demo).values()}
 
 
 def test_an_accepted_point_is_cut_where_it_was_accepted_by_libfranka_ros_and_librealsense(tmp_path: Path) -> None:
@@ -43,12 +43,12 @@ def test_an_accepted_point_is_cut_where_it_was_accepted_by_libfranka_ros_and_lib
     try:
         assert demo.state()["bridge"]["kind"] == "fakes"
         demo.post("arm")
-        demo.wait(lambda: demo.mode() == "READY", 20.0)
+        demo.wait(lambda: demo.in_mode("READY"), 20.0)
         demo.post("points/accept-all", confidence=0.0)
         # The network takes its time on a busy machine, and nobody starts on an old picture.
         demo.wait(lambda: demo.client.post("/api/start", json={}).json()["ok"], 60.0)
         with demo.watched():
-            demo.wait(lambda: demo.mode() == "AUTO", 10.0)
+            demo.wait(lambda: demo.in_mode("AUTO"), 10.0)
             accepted = {name: entry["accepted_position"] for name, entry in entries(demo).items()}
             demo.wait(lambda: ended(demo), 200.0)
         assert "DONE" in {entry["state"] for entry in entries(demo).values()}, entries(demo)
