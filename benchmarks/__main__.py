@@ -21,6 +21,7 @@ BENCHMARKS = {
     "faults": ("benchmarks.faults", "random faults in motion, judged by what the actuators were sent"),
     "clean": ("benchmarks.clean", "an hour of automatic work without a fault: nothing stops by itself"),
     "checks": ("benchmarks.checks", "each check of safety taken away on a copy: its test has to fail"),
+    "pictures": ("benchmarks.pictures", "the operator's page in each of its states, for the documents"),
     "plots": ("benchmarks.plots", "pictures of what the others wrote with --json"),
 }
 

@@ -26,6 +26,10 @@ VIEW = (
     "<!doctype html><title>view</title><script src=/view.js></script>"
     "<div id=root>3-D view</div><button>in the view</button>"
 )
+STILL = (
+    "<!doctype html><title>view</title><style>body{margin:0}img{width:100vw;height:100vh;object-fit:cover}</style>"
+    "<img id=root src=/viser/still.jpg>"
+)
 ALLOWED = {
     "IDLE": ("Arm",),
     "READY": ("Start", "Home"),
@@ -129,6 +133,7 @@ class PlayedServer:
     report: SessionReport = field(default_factory=lambda: SessionReport(began_at=0.0, written_at=0.0))
     rule: m.PruningRule | None = field(default_factory=m.PruningRule)
     crop: bytes = field(default_factory=lambda: camera_image((240, 180)))
+    view: bytes = b""
     number: int = 0
     started: float = field(default_factory=time.time)
     image: bytes = field(default_factory=lambda: camera_image())
@@ -155,7 +160,9 @@ class PlayedServer:
         elif path == "/api/report":
             route.fulfill(body=msgspec.json.encode(self.report), content_type="application/json")
         elif path == "/viser/":
-            route.fulfill(body=VIEW, content_type="text/html")
+            route.fulfill(body=STILL if self.view else VIEW, content_type="text/html")
+        elif path == "/viser/still.jpg":
+            route.fulfill(body=self.view, content_type="image/jpeg")
         elif path.startswith("/api/points/") and path.endswith("/crop"):
             self.crops_fetched.append(route.request.url.removeprefix(ORIGIN))
             if self.crop:

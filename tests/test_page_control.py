@@ -1,23 +1,12 @@
 """On the page: who holds control, and how it changes hands."""
 
-import msgspec
 import pytest
+from page_parts import held
 from played_page import until
 from played_server import PlayedServer
 from playwright.sync_api import Page, expect
 
-from rolling_panda.control_messages import ControlState
-
 pytestmark = pytest.mark.browser
-
-FREE = ControlState(
-    holder="", user="", epoch=7, expires_s=0.0, requested_by="", requested_key="", coming="", told="", told_number=0,
-    supervised=True,
-)  # fmt: skip
-
-
-def held(holder: str, user: str, **changes: object) -> ControlState:
-    return msgspec.structs.replace(FREE, holder=holder, user=user, expires_s=0.8, **changes)
 
 
 def test_alone_there_is_nothing_to_see_of_it(page: Page, server: PlayedServer) -> None:

@@ -5,9 +5,10 @@ import re
 from pathlib import Path
 
 import pytest
+from page_parts import held
 from played_page import box_of, until
-from played_server import PlayedServer, bridge, controller, point
-from playwright.sync_api import Page, expect
+from played_server import ORIGIN, PlayedServer, bridge, controller, point
+from playwright.sync_api import Browser, Page, expect
 
 from rolling_panda import page_messages as p
 from rolling_panda.resources import resource
@@ -35,7 +36,7 @@ def test_fits_the_screen_with_the_stop_on_top(page: Page, server: PlayedServer, 
     assert page.locator(".product").evaluate("each => each.scrollWidth <= each.clientWidth"), "its name is cut off"
     for button in page.locator("button:visible").all():
         assert button.evaluate("each => each.scrollWidth <= each.clientWidth"), f"{button} is cut off"
-    for selector in ("#stop", "#arm", "#start", "#pause", "#resume", "#home", "#acknowledge", "#teleop", "#hold"):
+    for selector in ("#stop", "#arm", "#start", "#pause", "#resume", "#home", "#acknowledge", "#teleop"):
         box = box_of(page.locator(selector))
         assert box["height"] >= 44
         assert box["x"] >= 0
@@ -43,6 +44,44 @@ def test_fits_the_screen_with_the_stop_on_top(page: Page, server: PlayedServer, 
         middle = [box["x"] + box["width"] / 2, box["y"] + box["height"] / 2]
         top = page.evaluate("([x, y]) => document.elementFromPoint(x, y)?.closest('button')?.id", middle)
         assert f"#{top}" == selector, "nothing lies over it"
+
+
+def test_what_is_accepted_and_who_comes_moves_nothing_on_the_page(browser: Browser, server: PlayedServer) -> None:
+    """Neither a panel nor a button nor a row of the queue is elsewhere, so that no press meets another one."""
+    parts = (
+        "#stop",
+        "#mode",
+        "rp-controls button",
+        "main > *",
+        ".middle > .panel",
+        ".right > *",
+        ".bottom > *",
+        "rp-point",
+    )
+    boxes = f"""() => [...document.querySelectorAll({json.dumps(", ".join(parts))})].map(each => {{
+        const box = each.getBoundingClientRect();
+        const name = each.id || each.dataset.pointId || "";
+        return [each.localName, name, box.x, box.y, name === "mode" ? 0 : box.width];
+    }}).filter(([name]) => name !== "rp-link-banner")"""
+    server.points = tuple(point(number, "PROPOSED", spur=number) for number in range(1, 4))
+    context = browser.new_context(viewport={"width": 1280, "height": 800}, locale="en-US")
+    page = context.new_page()
+    server.attach(page)
+    page.goto(f"{ORIGIN}/")
+    expect(page.locator("#mode")).to_have_attribute("data-mode", "READY")
+    expect(page.locator("rp-point")).to_have_count(3)
+    expect(page.locator("rp-camera img")).to_be_visible()
+    before = page.evaluate(boxes)
+    assert len(before) > 15
+    server.points = (point(1, "ACCEPTED"), point(2, "ACCEPTED", spur=2), point(3, "REJECTED", spur=3))
+    server.tell(server.page_points())
+    expect(page.locator("#preview")).to_be_visible()
+    expect(page.locator("rp-order summary")).to_be_visible()
+    assert page.evaluate(boxes) == before
+    server.control = held("other", "Bob")
+    expect(page.locator("#take-control")).to_be_visible()
+    assert page.evaluate(boxes) == before
+    context.close()
 
 
 def test_the_queue_has_room_for_five_points_on_a_small_screen(page: Page, server: PlayedServer) -> None:
@@ -55,7 +94,7 @@ def test_the_queue_has_room_for_five_points_on_a_small_screen(page: Page, server
 def test_a_telephone_scrolls_one_column_and_keeps_the_stop(page: Page, server: PlayedServer) -> None:
     page.set_viewport_size({"width": 390, "height": 844})
     server.bridge = bridge(stop_id="s1", stopped_by="Ada: stop button")
-    for part in ("#start", "#reset", "#hold", "#accept-all", "rp-gauge >> nth=0", "#log-filter"):
+    for part in ("#start", "#reset", "#teleop", "#accept-all", "rp-gauge >> nth=0", "#log-filter"):
         page.locator(part).scroll_into_view_if_needed()
         box = box_of(page.locator(part))
         assert box["x"] >= 0 and box["x"] + box["width"] <= 390, part
@@ -87,9 +126,9 @@ def test_on_a_telephone_the_stop_lies_over_nothing(page: Page, server: PlayedSer
     page.set_viewport_size({"width": 390, "height": 844})
     stop = box_of(page.locator("#stop"))
     assert page.evaluate("document.body.getBoundingClientRect().bottom") <= stop["y"]
-    page.locator("rp-teleoperation > .hint").scroll_into_view_if_needed()
-    hint = box_of(page.locator("rp-teleoperation > .hint"))
-    assert hint["y"] + hint["height"] <= stop["y"]
+    page.locator("#teleop").scroll_into_view_if_needed()
+    last = box_of(page.locator("#teleop"))
+    assert last["y"] + last["height"] <= stop["y"]
 
 
 def test_without_a_link_nothing_is_pushed_off_a_tablet(page: Page, server: PlayedServer) -> None:

@@ -40,12 +40,17 @@ keepHistory();
 guardLooking();
 window.setInterval(() => now.set(performance.now()), 250);
 socket.open();
-// What is about accepted points comes with the first of them.
-const wait = points.subscribe((page) => {
-  if (!page?.points.some((row) => row.entry.state === "ACCEPTED")) return;
-  wait();
-  void import("./components/rp-order.js");
-  void import("./components/rp-preview.js");
+// What is about accepted points comes with the first of them, or later where the link was lost just then.
+let coming = false;
+const wait = points.subscribe(async (page) => {
+  if (coming || !page?.points.some((row) => row.entry.state === "ACCEPTED")) return;
+  coming = true;
+  try {
+    await Promise.all([import("./components/rp-order.js"), import("./components/rp-preview.js")]);
+    wait();
+  } catch {
+    coming = false;
+  }
 });
 if (several) {
   // The room is there from the first picture on.

@@ -56,10 +56,10 @@ export function setText(node, text) {
 }
 
 /**
- * Enable a button, or grey it and say why. Not the `disabled` attribute: a button that has it swallows the press, and a
- * finger would never learn the reason (`greyed.js`).
+ * Enable a control, or grey it and say why. Not the `disabled` attribute: a control that has it swallows the press and
+ * takes no focus, so that neither a finger nor a keyboard would learn the reason (`greyed.js`).
  *
- * @param {HTMLButtonElement} button
+ * @param {HTMLButtonElement|HTMLInputElement} button
  * @param {string} why Empty when it may be pressed.
  * @param {string} [hint] What it does, shown while it may be pressed.
  */

@@ -18,13 +18,13 @@ export function placeWords(place) {
  * @returns {HTMLElement}
  */
 export function placeItem(place) {
-  const item = element("li", {}, placeWords(place));
+  const item = element("li", {}, element("span", { text: placeWords(place) }));
   if (place.needs !== "another look" || place.position === null) return item;
   const button = element("button", { class: "quiet look-again", text: "Look again", attributes: { type: "button" } });
   const { vine, spur } = place;
   button.addEventListener("click", () => void ask("Look again", "api/look-again", { vine, spur }));
   setEnabled(button, whyNot("Survey"), HINT);
-  item.append(" ", button);
+  item.append(button);
   return item;
 }
 

@@ -1,7 +1,7 @@
 // Who holds control of the robot's motion, and how it changes hands. Out of the way while there is nobody else.
 
 import { ask } from "../api.js";
-import { element, setText } from "../element.js";
+import { element, setEnabled, setText } from "../element.js";
 import { pageState, showToast } from "../state.js";
 import { drawOn } from "../store.js";
 
@@ -39,11 +39,14 @@ class RpControl extends HTMLElement {
     this.hidden = control === null || !((held && !mine) || asked || coming || (state?.viewers ?? 0) > 1);
     const who = mine ? "You hold control" : held ? `${control?.user} holds control` : "Nobody holds control";
     setText(words, coming ? `Control goes to ${coming}` : mine && asked ? `${asked} asks for control` : who);
+    words.title = words.textContent ?? "";
     this.give.hidden = !(mine && asked !== "" && !coming);
     setText(this.give, `Give to ${asked}`);
+    this.give.title = `${asked} moves the robot then; it stops first`;
     this.request.hidden = !(operates && held && !mine && !coming);
     setText(this.request, mineAsked ? "Asked" : "Ask");
-    this.request.disabled = asked !== "";
+    const waits = mineAsked ? `You have asked: ${control?.user} can give it to you` : asked && `${asked} has asked already`;
+    setEnabled(this.request, waits, `Ask ${control?.user ?? ""} for control; nothing stops meanwhile`);
     this.take.hidden = !operates || mine || coming !== "";
     const sure = performance.now() < this.armed;
     setText(this.take, !held ? "Take control" : sure ? "Really take it?" : "Take");
@@ -82,7 +85,7 @@ class RpControl extends HTMLElement {
  * @param {() => void} press
  */
 function button(id, press) {
-  return element("button", { id, class: "quiet", attributes: { type: "button" }, onclick: press });
+  return element("button", { id, attributes: { type: "button" }, onclick: press });
 }
 
 customElements.define("rp-control", RpControl);

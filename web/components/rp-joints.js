@@ -34,7 +34,8 @@ class RpJoints extends HTMLElement {
       };
       const [up, down] = [turn(1), turn(-1)];
       const needle = element("span", { class: "needle" });
-      const scale = element("div", { class: "scale", attributes: { role: "img" } }, needle);
+      const unknown = `Joint ${joint + 1}: where it is between its limits is not known yet`;
+      const scale = element("div", { class: "scale", attributes: { role: "img", "aria-label": unknown } }, needle);
       const angle = element("span", { class: "number" });
       this.append(element("div", { class: "joint" }, up, scale, down, angle));
       /** @type {[number, number]|null} */

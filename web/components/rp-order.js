@@ -43,8 +43,8 @@ class RpOrder extends HTMLElement {
     this.mark.hidden = true;
     this.list = element("div", { class: "order-list", attributes: { role: "listbox", tabindex: "0", "aria-label": "Order of work", "aria-description": HINT, title: HINT } }, this.space, this.mark);
     this.said = element("p", { class: "order-said", attributes: { role: "status" } });
-    this.box = element("details", { class: "rule order" }, element("summary", {}, words), element("div", { class: "order-body" }, this.list, element("div", { class: "order-foot" }, element("span", { text: "Drag, or Alt + arrows" }), back)), this.said);
-    this.append(this.box);
+    this.box = element("details", { class: "rule order" }, element("summary", {}, words), element("div", { class: "order-body" }, this.list, element("div", { class: "order-foot" }, element("span", { text: "Drag a row, or Alt + arrows" }), back)), this.said);
+    this.replaceChildren(this.box);
     this.list.addEventListener("scroll", () => this.draw());
     this.list.addEventListener("keydown", (event) => this.key(event));
     this.list.addEventListener("click", (event) => this.choose(event));
@@ -54,7 +54,6 @@ class RpOrder extends HTMLElement {
       setText(words, orderWords());
       setEnabled(back, whyNoPlannersOrder(), "Work in the order that the plan finds the quickest");
       this.order = workOrder();
-      this.hidden = this.order.length < 2;
       this.draw();
     });
   }

@@ -118,8 +118,7 @@ export class RpPointDetails extends HTMLElement {
   showApproach(row) {
     const { azimuth } = row.entry;
     const why = whyNotTurn(row);
-    this.turn.disabled = why !== "";
-    this.turn.title = why || "From where the blades come, turned about the cane; an accepted cut is planned anew";
+    setEnabled(this.turn, why, "From where the blades come, turned about the cane; an accepted cut is planned anew");
     setEnabled(this.free, why || (azimuth === null ? "It is chosen by what is found already" : ""), "Leave the approach to the search");
     if (this.turning) return;
     const degrees = azimuth === null ? 0 : Math.round((180 * azimuth) / Math.PI);

@@ -28,7 +28,7 @@ class RpPreview extends HTMLElement {
     const required = element("input", { id: "require-preview", attributes: { type: "checkbox" } });
     const label = element("label", { class: "preview-required", attributes: { for: "require-preview" } }, required, "Before each cut");
     const player = element("div", { class: "preview-player" }, run, slider, time, close, yes);
-    this.append(element("div", { class: "preview-tools" }, all, one, label, words), player);
+    this.replaceChildren(element("div", { class: "preview-tools" }, all, one, label, words), player);
     slider.addEventListener("input", () => {
       playing.set(false);
       show(Number(slider.value));
@@ -53,8 +53,8 @@ class RpPreview extends HTMLElement {
       setText(run, playing.get() ? "Stop" : "Play");
       setEnabled(close, moment.get() === null ? "The ghost is not shown" : "", "Take the ghost out of the 3-D view");
       required.checked = state?.required ?? false;
-      required.disabled = whyNot("RequirePreview") !== "";
-      label.title = whyNot("RequirePreview") || "No cut begins before its preview has been approved";
+      setEnabled(required, whyNot("RequirePreview"), "No cut begins before its preview has been approved");
+      label.title = required.title;
       player.hidden = !isThere();
       this.dataset.phase = state?.phase ?? "none";
       const at = moment.get() ?? 0;
@@ -63,6 +63,7 @@ class RpPreview extends HTMLElement {
       slider.setAttribute("aria-valuetext", `${at.toFixed(1)} s`);
       setText(time, `${at.toFixed(1)} / ${(state?.duration_s ?? 0).toFixed(1)} s`);
       setText(words, wordsOf(state, moment.get()));
+      this.classList.toggle("wide", words.textContent !== "");
       words.title = words.textContent ?? "";
     });
   }
@@ -73,7 +74,7 @@ class RpPreview extends HTMLElement {
  * @param {number|null} at
  */
 function wordsOf(state, at) {
-  if (state === null || state.phase === "none") return state?.reason ? inWords(state.reason) : "See the motion before it is made.";
+  if (state === null || state.phase === "none") return inWords(state?.reason ?? "");
   if (state.phase === "waiting") return state.reason ? `Waiting: ${state.reason}…` : "Waiting…";
   if (state.phase === "rolling") return "Working it out…";
   if (state.phase === "expired") return `Expired: ${inWords(state.reason)}`;

@@ -46,7 +46,7 @@ class RpQueue extends HTMLElement {
     ];
     list.addEventListener("keydown", (event) => this.key(event));
     list.addEventListener("reject", (event) => this.askWhy(/** @type {RpPoint} */ (event.target)));
-    this.append(head, document.createElement("rp-rule"), document.createElement("rp-order"), element("div", { class: "queue-tools" }, summary, ...acceptEvery(), addByHand()), list, empty, element("div", { class: "open-places" }, ...open.map((each) => each.box)));
+    this.append(head, document.createElement("rp-rule"), orderOfWork(), element("div", { class: "queue-tools" }, summary, ...acceptEvery(), addByHand()), list, empty, element("div", { class: "open-places" }, ...open.map((each) => each.box)));
 
     /** @type {Map<string, HTMLElement>} */
     const groups = new Map();
@@ -184,6 +184,13 @@ class RpQueue extends HTMLElement {
   }
 }
 
+/** Until there is an order to be fetched its place is kept, so that the first acceptance moves no row. */
+function orderOfWork() {
+  const order = document.createElement("rp-order");
+  order.append(element("p", { class: "rule order-none", text: "Order of work: nothing accepted" }));
+  return order;
+}
+
 function undoButton() {
   const button = element("button", { id: "undo", class: "quiet", text: "Undo", attributes: { type: "button" } });
   button.addEventListener("click", () => void undo());
@@ -196,7 +203,7 @@ function undoButton() {
 function acceptEvery() {
   const least = element("select", { id: "least-confidence", attributes: { "aria-label": "Least confidence to accept" } });
   for (const value of THRESHOLDS) {
-    const words = value === 0 ? "any" : `≥ ${value * 100} %`;
+    const words = value === 0 ? "any %" : `≥ ${value * 100} %`;
     least.append(element("option", { text: words, attributes: { value: String(value) } }));
   }
   const button = element("button", { id: "accept-all", text: "Accept all", attributes: { type: "button" } });

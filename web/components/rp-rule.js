@@ -158,16 +158,14 @@ class RpRule extends HTMLElement {
     setText(this.summary, ruleWords(rule));
     for (const input of this.systems) {
       if (input.checked !== (input.value === rule.system)) input.checked = input.value === rule.system;
-      input.disabled = why !== "";
-      input.title = why;
+      setEnabled(input, why);
     }
     for (const { name, unit, scale } of QUANTITIES) {
       const slider = this.sliders.get(name);
       if (!slider) continue;
       const shown = String(Number((rule[name] * scale).toFixed(3)));
       if (slider.input.value !== shown) slider.input.value = shown;
-      slider.input.disabled = why !== "";
-      slider.input.title = why;
+      setEnabled(slider.input, why);
       setText(slider.value, `${shown}${unit}`);
       slider.row.hidden = name === "fruiting_nodes" && rule.system !== "guyot";
     }

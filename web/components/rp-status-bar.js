@@ -17,6 +17,7 @@ class RpStatusBar extends HTMLElement {
         element("img", { attributes: { src: "icon.svg", alt: "" } }),
         element("span", { class: "product-name", text: "Rolling Panda" }),
       ),
+      document.createElement("rp-control"),
       this.presence(),
       this.linkChip(),
       this.person(),
@@ -32,7 +33,7 @@ class RpStatusBar extends HTMLElement {
         "span",
         { class: "presence", data: { process, present: "false" } },
         shape,
-        element("span", { text: process }),
+        element("span", { class: "process-name", text: process }),
         age,
       );
       box.append(chip);

@@ -67,14 +67,15 @@ class RpTeleoperation extends HTMLElement {
       this.classList.toggle("on", on);
       what.hidden = pace.hidden = !on;
       frame.hidden = !on || part !== "tool";
-      button.hidden = on && part !== "tool";
+      button.hidden = !on || part !== "tool";
+      words.hidden = !on;
       pad.hidden = !on || part !== "base";
       joints.hidden = !on || part !== "joints";
       setText(holdWords, holding ? "Moving…" : "Hold to move");
       setText(percent, `${Math.round(100 * hold.share.get())} %`);
       const controller = pageState.get()?.controller ?? null;
       const held = (holding && controller?.held_by) || "";
-      setText(words, held ? `${held[0]?.toUpperCase()}${held.slice(1)}.` : explanation(on, why, holding, part, nearWords(controller)));
+      setText(words, held ? `${held[0]?.toUpperCase()}${held.slice(1)}.` : explanation(why, holding, part, nearWords(controller)));
       words.classList.toggle("warned", held !== "" || (controller?.near?.distance ?? 1) < NEAR);
     });
   }
@@ -100,15 +101,13 @@ function choice(label, chosen, choose, values) {
 }
 
 /**
- * @param {boolean} on
  * @param {string} why
  * @param {boolean} holding
  * @param {import("../teleoperation.js").Part} part
  * @param {string} near
  */
-function explanation(on, why, holding, part, near) {
+function explanation(why, holding, part, near) {
   if (why) return `${why}.`;
-  if (!on) return "Shows a gizmo at the tool, to drag where the tool should go.";
   if (holding) return near || (part === "tool" ? "The tool follows the gizmo. Let go to stop." : "Let go to stop.");
   if (part === "base") return "The base moves while you hold, and stops when you let go.";
   if (part === "joints") return "A joint turns while you hold + or −. The bar is its range.";
