@@ -113,6 +113,7 @@ def test_the_other_robot_is_seen_and_chosen_and_nothing_reaches_the_wrong_one(pa
     expect(page.locator('[data-point-id="p1"]')).to_have_count(0)
     until(page, lambda: one.holds()[-1:] == [False])
     assert two.holds() == []
+    until(page, lambda: len(samples(page)) > 0)
     assert min(samples(page)) >= 0, "the other robot's readings are no readings of this one"
     page.keyboard.up("KeyH")
     # What is pressed now is for the robot that is shown, except the stop.
