@@ -3,7 +3,7 @@
 import numpy as np
 
 from rolling_panda.differential_drive import Array
-from rolling_panda.jerk_limit import largest_repeated_rise, largest_rise
+from rolling_panda.jerk_limit import largest_rise
 from rolling_panda.robot_model import ARM_Q, ARM_XI, Limits
 
 # Share of the acceleration that braking ahead of a joint's limit counts on: the servos lag.
@@ -78,8 +78,8 @@ class Limiter:
         wanted = np.copysign(largest_rise(np.abs(arm_missing), jerk), arm_missing)
         if self._repeats > 0.0:
             sent, most = self.sent[ARM_XI], self._velocity[ARM_XI]
-            up = largest_repeated_rise(most - sent, jerk, self._repeats)
-            wanted = np.minimum(np.maximum(wanted, -largest_repeated_rise(most + sent, jerk, self._repeats)), up)
+            up = largest_rise(most - sent, jerk, self._repeats)
+            wanted = np.minimum(np.maximum(wanted, -largest_rise(most + sent, jerk, self._repeats)), up)
         wanted = np.minimum(np.maximum(wanted, last - jerk), last + jerk)
         self._last = np.minimum(np.maximum(wanted, -self._arm_change), self._arm_change)
         change[ARM_XI] = self._last

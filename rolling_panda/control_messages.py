@@ -12,8 +12,6 @@ ClientKey = Annotated[str, Meta(max_length=64)]
 Nonce = Annotated[str, Meta(max_length=32, pattern=r"^[0-9a-f]*(?!\n)$")]
 #: Seconds since 1970 on the clock of the process that says it, for people only.
 WallTime = Annotated[float, Meta(ge=0.0, le=1e11)]
-
-
 #: A view that has shown nothing yet counts as this old (s).
 NEVER_SEEN_S = 1e6
 

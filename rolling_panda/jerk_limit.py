@@ -14,22 +14,13 @@ import numpy as np
 from rolling_panda.differential_drive import Array
 
 
-def largest_rise(room: Array, step: Array) -> Array:
+def largest_rise(room: Array, step: Array, repeats: float = 0.0) -> Array:
     """The greatest rise in this period from which the limit is still kept.
 
-    Args:
-        room: What is left up to the limit (n); where it is negative, it is the answer or less: back inside at once.
-        step: By how much the rise may change from one period to the next (n), positive.
-    """
-    rise: Array = np.maximum(np.sqrt(2.0 * step * np.maximum(room, 0.0)) - 0.5 * step, np.minimum(room, step))
-    return rise
-
-
-def largest_repeated_rise(room: Array, step: Array, repeats: float) -> Array:
-    """The same where a rise may be repeated against our will before it can fall: n β + β + (β − step) + … ≤ room.
+    Where it may be repeated n times against our will before it can fall, n β + β + (β − step) + … stays in the room.
 
     Args:
-        room: What is left up to the limit (n); where it is exceeded, the answer leads back slowly.
+        room: What is left up to the limit (n); where it is negative, the answer leads back, without repeats at once.
         step: By how much the rise may change from one period to the next (n), positive.
         repeats: How often at most (n above).
     """

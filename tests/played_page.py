@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import pytest
 from operator_page import FLAT_FLAGS
@@ -34,9 +35,10 @@ def server() -> PlayedServer:
     )
 
 
-@pytest.fixture
-def page(browser: Browser, server: PlayedServer) -> Iterator[Page]:
-    context = browser.new_context(viewport={"width": 1280, "height": 800}, locale="en-US")
+@contextmanager
+def opened(browser: Browser, attach: Callable[[Page], None], path: str, width: int, height: int) -> Iterator[Page]:
+    """A page of what is attached to it, ready; leaving it fails if one of its scripts failed or broke the policy."""
+    context = browser.new_context(viewport={"width": width, "height": height}, locale="en-US")
     page = context.new_page()
     problems: list[str] = []
     page.on("pageerror", lambda error: problems.append(str(error)))
@@ -44,13 +46,19 @@ def page(browser: Browser, server: PlayedServer) -> Iterator[Page]:
         "console",
         lambda message: problems.append(message.text) if "Content Security Policy" in message.text else None,
     )
-    server.attach(page)
-    page.goto(f"{ORIGIN}/")
+    attach(page)
+    page.goto(f"{ORIGIN}{path}")
     expect(page.locator("#mode")).to_have_attribute("data-mode", "READY")
-    expect(page.locator("rp-scene iframe")).to_have_class("loaded")
     yield page
     context.close()
     assert problems == []
+
+
+@pytest.fixture
+def page(browser: Browser, server: PlayedServer) -> Iterator[Page]:
+    with opened(browser, server.attach, "/", 1280, 800) as page:
+        expect(page.locator("rp-scene iframe")).to_have_class("loaded")
+        yield page
 
 
 def until(page: Page, condition: Callable[[], bool], seconds: float = 5.0) -> None:

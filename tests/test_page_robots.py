@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 from axe import axe, grave
-from played_page import until
+from played_page import opened, until
 from played_server import ORIGIN, PlayedServer, controller, point
 from playwright.sync_api import Browser, Page, Route, expect
 
@@ -69,16 +69,8 @@ def hall() -> PlayedHall:
 
 @pytest.fixture
 def pages(browser: Browser, hall: PlayedHall) -> Iterator[Page]:
-    context = browser.new_context(viewport={"width": 1024, "height": 768}, locale="en-US")
-    page = context.new_page()
-    problems: list[str] = []
-    page.on("pageerror", lambda error: problems.append(str(error)))
-    hall.attach(page)
-    page.goto(f"{ORIGIN}/robots/panda-1/")
-    expect(page.locator("#mode")).to_have_attribute("data-mode", "READY")
-    yield page
-    context.close()
-    assert problems == []
+    with opened(browser, hall.attach, "/robots/panda-1/", 1024, 768) as page:
+        yield page
 
 
 def samples(page: Page) -> list[float]:
