@@ -120,7 +120,9 @@ def _ramp(left: float, right: float, step: float) -> tuple[float, float]:
 
 
 #: The same function for numbers.
-_largest_rise: Callable[[float, float], float] = compiled(NUMBER(NUMBER, NUMBER))(cast(Any, largest_rise))
+_largest_rise: Callable[[float, float, float], float] = compiled(NUMBER(NUMBER, NUMBER, NUMBER))(
+    cast(Any, largest_rise)
+)
 
 
 @compiled(NUMBER(NUMBER, NUMBER, NUMBER, NUMBER, NUMBER, NUMBER, NUMBER))
@@ -134,7 +136,7 @@ def _most(
         most = max(_RETURN * room, -_RETURN_SPEED)
     else:
         most = math.sqrt(brake * brake + acceleration * room) - brake
-    rise = min(_largest_rise(most - sent + brake, jerk) - brake, _largest_rise(speed - sent, jerk))
+    rise = min(_largest_rise(most - sent + brake, jerk, 0.0) - brake, _largest_rise(speed - sent, jerk, 0.0))
     # Every end is moved into what can be reached, which keeps their order.
     rise = min(rise, min(step, change + jerk))
     return sent + max(rise, max(-step, change - jerk))
