@@ -8,6 +8,7 @@ pytest.importorskip("onnx", reason="the extra `training` is not installed: pip i
 
 from perception.network_input import network_input  # noqa: E402
 from perception.network_segmenter import NetworkSegmenter  # noqa: E402
+from perception.training.compact import CompactLabeller  # noqa: E402
 from perception.training.export import write_network  # noqa: E402
 from perception.training.fit import WEIGHTS, Trainer  # noqa: E402
 from perception.training.network import Labeller  # noqa: E402
@@ -65,6 +66,17 @@ def test_what_was_learned_survives_the_export(scenes, tmp_path):
     assert NetworkSegmenter(tmp_path / "net.onnx").widening == 0.25
     card = (tmp_path / "net.md").read_text(encoding="utf-8")
     assert f"| cane | {score.overlap()['cane']:.3f} |" in card and "--seed 1 --rows 2 --steps 16" in card
+
+
+def test_the_form_that_is_exported_says_the_same_as_the_one_that_was_trained():
+    network = Trainer(5, 2, 1).network
+    with torch.inference_mode():
+        network.answer[0].weight.mul_(50.0)
+        labeller = Labeller(network, WEIGHTS).eval()
+        image = torch.rand((2, 4, 48, 80), generator=torch.Generator().manual_seed(0))
+        meant, said = labeller(image), CompactLabeller(labeller).eval()(image)
+    assert said.shape == meant.shape and said.dtype == torch.uint8
+    assert len(torch.unique(meant)) > 2 and (said == meant).float().mean() > 0.999
 
 
 def test_overlap_is_intersection_over_union():

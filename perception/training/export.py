@@ -9,6 +9,7 @@ import onnx
 import torch
 
 from perception.network_input import CHANNELS
+from perception.training.compact import CompactLabeller
 from perception.training.fit import BATCH, CROP, WEIGHTS, Trainer
 from perception.training.network import Labeller
 from perception.training.scenes import TRAINING_SEED, VALIDATION_SEED, VIEWS
@@ -30,7 +31,7 @@ def write_network(path: Path, trainer: Trainer, with_depth: Confusion, without: 
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     buffer = BytesIO()
-    labeller = Labeller(trainer.network.to(memory_format=torch.contiguous_format), WEIGHTS).eval()
+    labeller = CompactLabeller(Labeller(trainer.network, WEIGHTS)).eval()
     with warnings.catch_warnings():
         # The newer exporter needs one more package and gives the same graph.
         warnings.simplefilter("ignore", DeprecationWarning)

@@ -58,7 +58,7 @@ class Network(nn.Module):
 
 
 class Labeller(nn.Module):
-    """The network with what is exported: the index of the likeliest class."""
+    """The network with what it is for: the index of the likeliest class."""
 
     prior: Tensor
 
