@@ -114,6 +114,8 @@ CONTROLLER = (
     Check("repeated presence renews nothing", "controller/authority.py",
           "presence.message.sequence > last.message.sequence or presence.at - last.at > 1.0", "True",
           "test_authority.py"),
+    Check("a lease lives from the last word", "controller/authority.py",
+          "presence.at - person.heard_age_s for", "presence.at for", "test_authority.py"),
     Check("a viewer gets no control", "controller/authority.py",
           'if intent.role == "viewer":\n            return "a viewer may look and stop, not operate"',
           'if False:\n            return ""', "test_authority.py"),

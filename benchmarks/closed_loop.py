@@ -171,7 +171,7 @@ class ClosedLoop:
         self.close()
 
     def _present(self) -> Presence:
-        people = tuple(Person(name, name, "supervisor", 0.0) for name in self._people)
+        people = tuple(Person(name, name, "supervisor", 0.0, 0.0) for name in self._people)
         return Presence(sequence=self._ticks, people=people)
 
     def _receive(self, outputs: BridgeOutputs) -> None:

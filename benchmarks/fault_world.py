@@ -26,14 +26,17 @@ from controller.journal import LedgerState
 from rolling_panda import intents
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
-from rolling_panda.control_messages import Person, Presence
 from rolling_panda.robot_model import RobotModel, configuration, pose_message
 from rolling_panda.row_messages import Obstacles
 from rolling_panda.teleop_messages import BaseVelocity, TeleopTarget
+from server.presence import PresentPeople
+from server.sessions import Session
 
 MODEL = RobotModel()
 _USER = "ada"
 _CONTROL_TICKS = 10
+#: A page speaks, and the server tells who is there, each in so many periods of 1 ms.
+_PAGE_TICKS, _PRESENCE_TICKS = 50, 200
 
 
 class LaggedRobot:
@@ -133,6 +136,7 @@ class World:
         self.commanded: m.MotionCommand | None = None
         self.intruder: Callable[[World], None] = lambda world: None
         self._people: tuple[str, ...] = ()
+        self._there = PresentPeople()
 
     def new_bridge(self) -> BridgeCore:
         """A bridge that remembers what the last one did."""
@@ -240,14 +244,13 @@ class World:
             self.inputs = replace(self.inputs, odometry=sample)
 
     def _control(self) -> None:
-        people = tuple(
-            Person(name, name, "supervisor", 0.0 if self.watched else 1e6) for name in self._people if self.heard
-        )
         changes: dict[str, Any] = {}
         if self.server:
             changes["server_seen"] = self.now
-            if self.ticks % 200 == 0:
-                changes["presence"] = Sample(Presence(sequence=self.ticks, people=people), self.now)
+            if self.heard and self.ticks % _PAGE_TICKS == 0:
+                self._pages_speak()
+            if self.ticks % _PRESENCE_TICKS == 0:
+                changes["presence"] = Sample(self._there.message(self.now), self.now)
             if self.held is not None and self.heard:
                 base = self.held if isinstance(self.held, BaseVelocity) else None
                 pose = None if base is not None else cast(m.Pose, self.held)
@@ -261,6 +264,14 @@ class World:
         self._send(self.controller.step(self.inputs, self.now))
         self.inputs = replace(self.inputs, stops=(), ledger=LedgerState(self.controller.recorded))
         self.modes.append(self.controller.mode)
+
+    def _pages_speak(self) -> None:
+        """Each page says that it is there, and which state it has drawn."""
+        for name in self._people:
+            session = Session("", name, "supervisor", 0.0, client=name)
+            self._there.heard(session, self.now)
+            if self.watched:
+                self._there.saw(session, self.now)
 
     def _send(self, out: Outputs) -> None:
         if out.motion is not None:

@@ -163,7 +163,7 @@ class KinematicRobot:
             self.people.add(self.teleop.user)
         self._told_presence = bool(self.people)
         age = 0.0 if self.watching else 1e6
-        people = tuple(Person(name, name, "supervisor", age) for name in sorted(self.people))
+        people = tuple(Person(name, name, "supervisor", 0.0, age) for name in sorted(self.people))
         return Presence(sequence=self._sequence, people=people)
 
     def run(self, seconds: float) -> None:

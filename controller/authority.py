@@ -60,7 +60,8 @@ class Authority:
             # A number that does not grow is a repetition, unless the server was away for longer than a lease lives.
             if last is None or presence.message.sequence > last.message.sequence or presence.at - last.at > 1.0:
                 self._newest = presence
-                self._lease.renew(frozenset(person.key for person in presence.message.people), presence.at)
+                people = presence.message.people
+                self._lease.renew({person.key: presence.at - person.heard_age_s for person in people})
                 self._watched(presence)
         lost = self._lease.review(at_rest, now)
         if self._lease.coming is not None:

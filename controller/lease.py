@@ -2,13 +2,13 @@
 
 import math
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
 #: So many leases can be given between two starts of the controller.
 _LEASES_A_START: Final = 1 << 20
-#: A lease that is not renewed for so long has ended (s).
+#: A lease whose holder has said nothing for so long has ended (s).
 LIFE_S: Final = 1.0
 #: A request that nobody has answered for so long is forgotten (s).
 _REQUEST_S: Final = 30.0
@@ -114,10 +114,10 @@ class Lease:
         self._drop(self._lost)
         return ""
 
-    def renew(self, keys: frozenset[str], now: float) -> None:
-        """These clients are there: the holder's lease lives on."""
-        if self.holder is not None and self.holder.key in keys:
-            self._renewed = max(self._renewed, now)
+    def renew(self, heard: Mapping[str, float]) -> None:
+        """When (s) each client, by its key, said something last: the holder's lease lives from then on."""
+        if self.holder is not None:
+            self._renewed = max(self._renewed, heard.get(self.holder.key, -math.inf))
 
     def review(self, at_rest: bool, now: float) -> str:
         """Let time pass. Returns why who moved the robot no longer may; empty when nothing ended.
@@ -138,7 +138,7 @@ class Lease:
         return lost
 
     def left(self, now: float) -> float:
-        """How long the lease still lives without being renewed (s); 0 without a holder."""
+        """How long the lease still lives without a word of its holder (s); 0 without one."""
         return 0.0 if self.holder is None else max(0.0, self._renewed + LIFE_S - now)
 
     def _give(self, client: Client, now: float, told: str) -> None:

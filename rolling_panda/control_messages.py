@@ -23,17 +23,19 @@ class Person(Struct, frozen=True, forbid_unknown_fields=True):
         key: Who.
         user: Their name.
         role: What they may do.
+        heard_age_s: Since they last said something (s).
         view_age_s: Age of the newest state of the robot that they have drawn or fetched (s).
     """
 
     key: ClientKey
     user: Text
     role: Role
+    heard_age_s: NonNegative
     view_age_s: NonNegative
 
 
 class Presence(Message, frozen=True, kw_only=True):
-    """Server → controller: who is there. It renews the lease of the one who holds control.
+    """Server → controller: who is there. It renews the lease of the one who holds control, from their last word on.
 
     Attributes:
         sequence: Strictly increasing; one that is not above the last counts for nothing.
@@ -51,7 +53,7 @@ class ControlState(Message, frozen=True, kw_only=True):
         holder: Key of who holds control, empty when nobody.
         user: Their name.
         epoch: Of the token that motion commands and cut orders carry now.
-        expires_s: How long the lease still lives without being renewed (s).
+        expires_s: How long the lease still lives without a word of its holder (s).
         requested_by: Name of who asks for control, empty when nobody.
         requested_key: Their key.
         coming: Name of who gets control as soon as the robot is at rest, empty when nobody.

@@ -110,12 +110,17 @@ class Desk:
 
     def drew(self, session: Session, view: str, number: int, now: float) -> None:
         """A page of this session, its `view`, has drawn state `number`."""
-        self.people.heard(session, now)
+        self.heard(session, now)
         for known, seen_at in reversed(self._seen_at):
             if known == number:
                 self.teleop.drew(view, seen_at, now)
                 self._saw(session, seen_at, now)
                 return
+
+    def heard(self, session: Session, now: float) -> None:
+        """A page or a script of this session has said something."""
+        if self.people.heard(session, now):
+            self.link.presence_of(self.people.message(now))
 
     def fetched(self, session: Session, now: float) -> None:
         """A script has fetched the state that was made last."""

@@ -5,7 +5,7 @@ header with the server's own address on every POST. `POST /api/invite` makes the
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from typing import Annotated, Any
 
 import msgspec
@@ -47,13 +47,14 @@ ANSWERS: dict[int | str, dict[str, Any]] = {
 }
 
 
-def heard(desk: Desk) -> Callable[[Request], None]:
+def heard(desk: Desk) -> Callable[[Request], Awaitable[None]]:
     """What notes that somebody asks, which is how a script shows that it is there."""
 
-    def note(request: Request) -> None:
+    # Not a plain function, which would run on a thread of its own: who is there is for the server's loop alone.
+    async def note(request: Request) -> None:
         session: Session | None = request.state.session
         if session is not None:
-            desk.people.heard(session, time.monotonic())
+            desk.heard(session, time.monotonic())
 
     return note
 

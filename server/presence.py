@@ -7,6 +7,8 @@ from server.sessions import Session
 
 #: Who has been silent for so long (s) is not there any more.
 HEARD_S = 1.0
+#: The first word after so long a silence (s) is told at once: with the next turn it could come too late for the lease.
+_SILENT_S = 0.4
 
 
 @dataclass
@@ -24,9 +26,16 @@ class PresentPeople:
         self._clients: dict[str, _Client] = {}
         self._sequence = 0
 
-    def heard(self, session: Session, now: float) -> None:
-        """A page or a script of this session has said something."""
-        self._of(session).heard_at = now
+    def heard(self, session: Session, now: float) -> bool:
+        """A page or a script of this session has said something.
+
+        Returns:
+            Whether that is news that should not wait: somebody who may operate has been silent for a while.
+        """
+        client = self._of(session)
+        news = session.may_operate and now - client.heard_at > _SILENT_S
+        client.heard_at = now
+        return news
 
     def saw(self, session: Session, seen_at: float) -> bool:
         """Something of this session has drawn or fetched the robot as it was at this time (s).
@@ -50,7 +59,13 @@ class PresentPeople:
         return Presence(
             sequence=self._sequence,
             people=tuple(
-                Person(key, client.session.user, client.session.role, min(max(0.0, now - client.seen_at), NEVER_SEEN_S))
+                Person(
+                    key,
+                    client.session.user,
+                    client.session.role,
+                    max(0.0, now - client.heard_at),
+                    min(max(0.0, now - client.seen_at), NEVER_SEEN_S),
+                )
                 for key, client in self._clients.items()
             ),
         )

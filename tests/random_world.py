@@ -26,6 +26,7 @@ from rolling_panda.config import RobotConfig
 from rolling_panda.control_messages import Person, Presence
 from rolling_panda.row_messages import Obstacles
 from rolling_panda.teleop_messages import BaseVelocity, TeleopTarget
+from server.presence import HEARD_S
 
 PEOPLE = {"ada": "supervisor", "bob": "operator", "vic": "viewer"}
 DT = 0.01
@@ -38,6 +39,7 @@ class Somebody:
     unheard_until: int = 0
     blind_until: int = 0
     holding: bool = False
+    said_at: float = float("-inf")
 
 
 class World:
@@ -107,14 +109,12 @@ class World:
         obstacles = Obstacles(header=m.Header(self.now), capsules=())
         changes["obstacles"] = Sample(obstacles, self.now)
         self.number += 1
+        heard = [name for name, person in self.people.items() if self.steps >= person.unheard_until]
+        for name in heard:
+            self.people[name].said_at = self.now
+        self.judge.heard(heard, self.now)
         if self.steps % 10 == 0:
-            heard = [name for name, person in self.people.items() if self.steps >= person.unheard_until]
-            people = tuple(
-                Person(name, name, PEOPLE[name], 0.0 if self.steps >= self.people[name].blind_until else 1e6)
-                for name in heard
-            )
-            changes["presence"] = Sample(Presence(sequence=self.number, people=people), self.now)
-            self.judge.heard(heard, self.now)
+            changes["presence"] = Sample(Presence(sequence=self.number, people=self.there()), self.now)
         holder = next((name for name, person in self.people.items() if person.holding), None)
         # The server lets no viewer hold.
         if holder is not None and PEOPLE[holder] != "viewer" and self.steps % 3 == 0:
@@ -128,6 +128,14 @@ class World:
         self.inputs = replace(self.inputs, stops=())
         self.write(out.records)
         self.send(out)
+
+    def there(self):
+        """Whom the server lists: who has said something within a second, and how long ago."""
+        return tuple(
+            Person(name, name, PEOPLE[name], age, 0.0 if self.steps >= person.blind_until else 1e6)
+            for name, person in self.people.items()
+            if (age := self.now - person.said_at) <= HEARD_S
+        )
 
     def write(self, records):
         self.rows += [(r.number, r.name, r.body) for r in records if r.kind == "ticket"]

@@ -17,8 +17,8 @@ def presence(number, at, *people):
     return Sample(Presence(sequence=number, people=people), at)
 
 
-def ada(age=0.0, role="operator"):
-    return Person("a", "Ada", role, age)
+def ada(age=0.0, role="operator", heard=0.0):
+    return Person("a", "Ada", role, heard, age)
 
 
 def test_rights_follow_role_and_lease():
@@ -39,6 +39,19 @@ def test_the_servers_word_renews_the_lease_and_its_silence_ends_it():
     assert it.held
     assert "Ada" in it.review(None, False, 19 * 0.2 + 1.0)
     assert not it.held
+
+
+def test_a_server_that_still_lists_somebody_does_not_renew_control_without_a_word_of_theirs():
+    it = authority()
+    it.claim(ADA, 0.0)
+    lost = ""
+    for number in range(1, 9):
+        now = number * 0.2
+        # Ada said something last at 0.2 s, and the server lists her for a second more.
+        people = (ada(heard=now - 0.2),) if now <= 1.2 else ()
+        lost = lost or it.review(presence(number, now, *people), False, now)
+        assert bool(lost) == (now >= 1.2)
+    assert "nothing was heard" in lost
 
 
 def test_a_repeated_or_older_word_renews_nothing():

@@ -17,6 +17,17 @@ def test_who_says_something_is_there_for_a_second():
     assert people.message(2.1).people == ()
 
 
+def test_the_age_of_the_last_word_is_told_and_the_first_one_after_a_silence_is_news():
+    people, ann, vic = PresentPeople(), session(), session("vic", "viewer")
+    assert people.heard(ann, 1.0)
+    assert people.message(1.7).people[0].heard_age_s == pytest.approx(0.7)
+    assert people.heard(ann, 1.7)
+    assert not people.heard(ann, 1.75)
+    assert people.message(1.8).people[0].heard_age_s == pytest.approx(0.05)
+    # Nobody waits for a viewer, of whom there may be many.
+    assert not people.heard(vic, 1.8)
+
+
 def test_the_age_of_the_view_is_that_of_the_newest_state_drawn():
     people, ann = PresentPeople(), session()
     people.heard(ann, 5.0)

@@ -259,7 +259,7 @@ export interface ControlState {
   user: string;
   /** Of the token that motion commands and cut orders carry now. */
   epoch: number;
-  /** How long the lease still lives without being renewed (s). */
+  /** How long the lease still lives without a word of its holder (s). */
   expires_s: number;
   /** Name of who asks for control, empty when nobody. */
   requested_by: string;
