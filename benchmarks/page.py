@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import psutil
 
-from benchmarks.browser import chromium
+from benchmarks.browser import chromium, put_first
 from benchmarks.crowd import looked_at
 from benchmarks.demo_under_test import Demo
 from benchmarks.latencies import Spread, ages, spread
@@ -73,7 +73,8 @@ def measured(page: "Page", demo: Demo, record: Path, arguments: argparse.Namespa
     """Drag, watch, press."""
     trouble, drags = "", Drags()
     try:
-        drag(page, demo, record, arguments.drags, arguments.seed, drags)
+        if arguments.drags:
+            drag(page, demo, record, arguments.drags, arguments.seed, drags)
     except InputError as error:
         # What else is measured took minutes too.
         trouble = f"{error}; the last of the log: {' | '.join(demo.log(6))}"
@@ -121,8 +122,9 @@ def run(demo: Demo, record: Path, arguments: argparse.Namespace) -> dict[str, An
             paints, filled = first_paints(context, arguments.paints)
             found["first_paint"], found["first_state"] = _plain(spread(paints)), _plain(spread(filled))
         page = open_page(context)
+        found["browser_first"] = not arguments.last and put_first() > 0
         memory = Heap(page)
-        if arguments.drags and arguments.stops:
+        if arguments.drags or arguments.stops:
             print(f"{arguments.drags} drags, {arguments.stops} stops", flush=True)
             found["alone"] = asdict(measured(page, demo, record, arguments))
             memory.read()
@@ -171,6 +173,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--minutes", type=float, default=0.0, help="open for this long at least, its heap watched (default: 0)"
     )
+    parser.add_argument("--last", action="store_true", help="the browser's threads keep their usual priority")
     parser.add_argument("--scale", type=float, default=0.25, help="pixels drawn of each of the page's (default: 0.25)")
     parser.add_argument("--seed", type=int, default=0, help="row to grow (default: 0)")
     parser.add_argument("--port", type=int, default=8767, help="port of the page (default: 8767)")
