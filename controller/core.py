@@ -68,7 +68,7 @@ class Controller:
         self._lines = Lines(self._journal)
         self._queue = PointQueue(config, self._journal)
         self._session = Session(self._queue)
-        self._previews = Previews(self._queue, self._journal)
+        self._previews = Previews(self._queue, self._journal, config.hierarchy)
         permit = self._previews.permit
         self._movement = Movement(config, robot_config, self._queue, self._lines, run_id, self._known, method, permit)
         self._supervisor = Supervisor(config, self._movement, self._lines, starts)

@@ -17,6 +17,9 @@ class Operator:
 
     def points(self, intent: intents.Intent) -> str:
         """Decide; returns why not, empty when done."""
+        return self._decide(intent) or self._queue.sort()
+
+    def _decide(self, intent: intents.Intent) -> str:
         if isinstance(intent, intents.AcceptPoint):
             return self._queue.accept(intent.point_id, intent.revision, intent.user, intent.digest)
         if isinstance(intent, intents.RejectPoint):
@@ -32,7 +35,7 @@ class Operator:
         if isinstance(intent, intents.TurnApproach):
             return self._queue.turn(intent.point_id, intent.azimuth, intent.user)
         if isinstance(intent, intents.PlannersOrder):
-            return self._queue.order.give_back(intent.revision) or self._queue.sort()
+            return self._queue.order.give_back(intent.revision)
         return f"{type(intent).__name__} is not something this controller does"
 
     def unknown_place(self, intent: intents.Survey) -> str:

@@ -10,11 +10,13 @@ from typing import Final
 import numpy as np
 
 from controller.journal import Journal, PreviewRow
-from controller.plan_validity import ObstacleWatch, approaches_changed, away_from
+from controller.path_watch import PathWatch
+from controller.plan_validity import approaches_changed, away_from
 from controller.preview_plan import Preview, PreviewRequest
 from controller.preview_report import motion_message, state_message
 from controller.queue import PointQueue, Ticket
 from controller.reach import CutPlan
+from controller.whole_body.hierarchy_config import HierarchyConfig
 from rolling_panda import intents
 from rolling_panda.differential_drive import Array
 from rolling_panda.messages import PruningPoint
@@ -34,9 +36,15 @@ _PLAN_S = 15.0
 class Previews:
     """Keeps one preview. `review` it now and then; `permit` and `known` answer for single points in between."""
 
-    def __init__(self, queue: PointQueue, journal: Journal) -> None:
-        """Nothing is asked for, and nothing is required; what people decide is recorded in `journal`."""
-        self._queue, self._journal = queue, journal
+    def __init__(self, queue: PointQueue, journal: Journal, settings: HierarchyConfig) -> None:
+        """Nothing is asked for, and nothing is required.
+
+        Args:
+            queue: Of the points.
+            journal: Records what people decide.
+            settings: Say which distances are kept.
+        """
+        self._queue, self._journal, self._settings = queue, journal, settings
         self.required = False
         self._preview: Preview | None = None
         self._asked: PreviewRequest | None = None
@@ -46,7 +54,8 @@ class Previews:
         self._phase: PreviewPhase = "none"
         self._reason = self._approved_by = ""
         self._begun = False
-        self._watch: ObstacleWatch | None = None
+        self._order: tuple[str, ...] = ()
+        self._watch: PathWatch | None = None
         self._compared: object = None
         self._in_the_way = ""
         self._fresh = self._fresh_motion = True
@@ -157,6 +166,9 @@ class Previews:
             self._say("none", "no point is accepted")
             return None
         self._number += 1
+        following, names = self._queue.next(), tuple(point.point_id for point in points)
+        # Until it is of no use any more, only people change the order that it shows.
+        self._order = names if following is not None and following.point.point_id == names[0] else ()
         turned = self._queue.approaches.turned
         self._asked = PreviewRequest(self._number, q.copy(), points, tuple(obstacles), dict(cuts or {}), look_s, turned)
         self._say("rolling", "")
@@ -211,9 +223,8 @@ class Previews:
             self._say("none", f"the preview failed: {made.failure}")
             return
         self._preview, self._fresh_motion = made, True
-        track = np.array([(row.base.x, row.base.y) for row in made.rows]).reshape(-1, 2)
-        lines = [(plan.poses.clear.translation, plan.poses.cut.translation) for plan in made.plans.values()]
-        self._watch, self._compared, self._in_the_way = ObstacleWatch(made.request.obstacles, track, lines), None, ""
+        self._watch = None if made.swept is None else PathWatch(made, made.swept, self._settings)
+        self._compared, self._in_the_way = None, ""
         self._say("ready", "")
 
     def _changed(self, q: Array, obstacles: Sequence[Capsule], at_rest: bool, working: bool) -> str:
@@ -229,8 +240,16 @@ class Previews:
             return why
         if self._compared is not obstacles:
             self._compared = obstacles
-            self._in_the_way = watch.changed(obstacles)
+            self._in_the_way = watch.changed(obstacles, self._come_to(preview))
         return self._in_the_way
+
+    def _come_to(self, preview: Preview) -> str:
+        """The point that is worked on now, or next."""
+        for cut in preview.cuts:
+            ticket = self._queue.get(cut.point_id)
+            if ticket is not None and ticket.state in ("ACCEPTED", "INTENT"):
+                return cut.point_id
+        return preview.cuts[-1].point_id if preview.cuts else ""
 
     def _points_changed(self, preview: Preview, working: bool) -> str:
         for point in preview.request.points:
@@ -256,3 +275,4 @@ class Previews:
         if (phase, reason) == (self._phase, self._reason):
             return
         self._phase, self._reason, self._fresh = phase, reason, True
+        self._queue.hold(self._order if phase in ("rolling", "ready", "approved") else ())

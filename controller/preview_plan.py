@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from controller.reach import CutPlan
+from controller.swept import Swept
 from rolling_panda.differential_drive import Array
 from rolling_panda.messages import PruningPoint
 from rolling_panda.preview_messages import PreviewedCut, PreviewRow
@@ -44,6 +45,7 @@ class Preview:
         duration: Of all of it (s).
         digest: SHA-256 of the request, the configuration and the motion; empty when there is none.
         failure: Why there is none; empty when there is one.
+        swept: The room that the motion takes up; None when there is none.
     """
 
     request: PreviewRequest
@@ -53,3 +55,4 @@ class Preview:
     duration: float = 0.0
     digest: str = ""
     failure: str = ""
+    swept: Swept | None = None

@@ -210,6 +210,11 @@ class PointQueue:
         self._notes, self._entries = notes or {}, None
         self.sort()
 
+    def hold(self, order: tuple[str, ...]) -> None:
+        """Work on these accepted points first, in this order, until it is let go with none; people may change it."""
+        if self.order.hold(order):
+            self.sort()
+
     def intend(self, point_id: str, cut_id: str) -> int:
         """ACCEPTED → INTENT: the blades are about to move. Returns the number of its record."""
         self._put(point_id, replace(self._tickets[point_id], state="INTENT", cut_id=cut_id, reason="cutting"))

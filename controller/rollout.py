@@ -23,6 +23,7 @@ from controller.queue import PointQueue, Ticket
 from controller.reach import CutPlan, Unreachable
 from controller.rollout_cuts import CutLog
 from controller.servos import Servos
+from controller.swept import sweep
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
 from rolling_panda.differential_drive import Array
@@ -83,6 +84,8 @@ class _Run:
     def all(self) -> Preview:
         """Work until the work ends."""
         rows: list[PreviewRow] = []
+        times: list[float] = []
+        way: list[Array] = []
         every = max(1, round(ROW_S / self._dt))
         longest = math.ceil(_LONGEST_S * len(self._request.points) / self._dt)
         self._movement.sequence.begin()
@@ -93,13 +96,16 @@ class _Run:
             moved = self._period(number, now)
             if number % every == 0 or moved.event is not None:
                 rows.append(self._look_at(now))
-            self._hash.update(np.ascontiguousarray(self._servos.q, dtype="<f8").tobytes())
+            times.append(now)
+            way.append(self._servos.q.copy())
+            self._hash.update(np.ascontiguousarray(way[-1], dtype="<f8").tobytes())
             if moved.event is not None:
                 event, why = moved.event
                 why = "" if event is Event.FINISHED else why
                 break
         cuts = self._log.cuts(now, why)
-        return Preview(self._request, cuts, self._plans, tuple(rows), now, self._digest())
+        swept = sweep(self._movement.body.surroundings.model, times, way)
+        return Preview(self._request, cuts, self._plans, tuple(rows), now, self._digest(), swept=swept)
 
     def _period(self, number: int, now: float) -> Moved:
         """One control period, and what the robot does of it."""

@@ -27,6 +27,7 @@ class Surroundings:
         self._places: tuple[Array, ...] = ()
         self._canes: tuple[Capsule, ...] = ()
         self._names: tuple[str, ...] = ()
+        self._axes = Axes(())
 
     def take(self, obstacles: Sample[Obstacles] | None) -> None:
         """Take the newest message; one that was taken before costs nothing."""
@@ -55,18 +56,29 @@ class Surroundings:
         self._allow()
 
     def _allow(self) -> None:
-        allowed: set[str] = set()
-        if self._canes and self._places:
-            gaps = self._axes.gaps(np.array(self._places), np.zeros(len(self._places)))
-            for row in gaps:
-                nearest = int(np.argmin(row))
-                if row[nearest] >= _ON_SPUR:
-                    continue
-                spur = self._canes[nearest].vine, self._canes[nearest].spur
-                for cane, name, gap in zip(self._canes, self._names, row.tolist(), strict=True):
-                    if (cane.vine, cane.spur) == spur or cane.undecided and gap < _ON_SPUR:
-                        allowed.add(name)
-        self.model.allow(allowed)
+        self.model.allow({self._names[index] for index in touchable(self._canes, self._axes, self._places)})
+
+
+def touchable(canes: Sequence[Capsule], axes: Axes, places: Sequence[Array]) -> set[int]:
+    """Which canes the blades may touch when they cut at these places: the spurs there, and what may yet be cut off.
+
+    Args:
+        canes: That stay, or of which it is not decided.
+        axes: Of the same.
+        places: Of the cuts (3, m, odom).
+    """
+    allowed: set[int] = set()
+    if not canes or not len(places):
+        return allowed
+    for row in axes.gaps(np.array(places), np.zeros(len(places))):
+        nearest = int(np.argmin(row))
+        if row[nearest] >= _ON_SPUR:
+            continue
+        spur = canes[nearest].vine, canes[nearest].spur
+        for index, (cane, gap) in enumerate(zip(canes, row.tolist(), strict=True)):
+            if (cane.vine, cane.spur) == spur or cane.undecided and gap < _ON_SPUR:
+                allowed.add(index)
+    return allowed
 
 
 def obstacles_of(capsules: Sequence[Capsule]) -> list[Obstacle]:

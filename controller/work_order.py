@@ -14,6 +14,7 @@ class WorkOrder:
         self._journal = journal
         self._by_hand: tuple[str, ...] = ()
         self._planned: tuple[str, ...] = ()
+        self._held: tuple[str, ...] = ()
         self._state = QueueOrder()
 
     @property
@@ -33,6 +34,12 @@ class WorkOrder:
     def plan(self, order: tuple[str, ...]) -> None:
         """The plan works in this order; none, and it is that along the row."""
         self._planned = order
+
+    def hold(self, order: tuple[str, ...]) -> bool:
+        """Work on these first, whatever is planned; people may still change it. Returns whether that is new."""
+        changed = order != self._held
+        self._held = order
+        return changed
 
     def move(self, point_id: str, before: str, revision: int, user: str, accepted: Sequence[str]) -> str:
         """Put a point before another one, or at the end; returns why not, empty when done.
@@ -68,8 +75,8 @@ class WorkOrder:
     def arranged(self, along: Sequence[str], accepted: Callable[[str], bool]) -> list[str]:
         """All points in their order.
 
-        By hand, those that people have not seen in their order come after it. By plan, accepted points that it does
-        not name stay in their places along the row.
+        By hand or held, those that people have not seen in their order come after it. By plan, accepted points that it
+        does not name stay in their places along the row.
 
         Args:
             along: All points along the row.
@@ -78,11 +85,12 @@ class WorkOrder:
         places = [name for name in along if accepted(name)]
         known = set(places)
         wanted = [name for name in self._planned if name in known]
-        if self._by_hand:
+        lead = [*self._by_hand, *(name for name in self._held if name not in self._by_hand)]
+        if lead:
             among = set(wanted)
             following = iter(wanted)
             planned = [next(following) if name in among else name for name in places]
-            first = [name for name in self._by_hand if name in known]
+            first = [name for name in lead if name in known]
             begun = set(first)
             wanted = [*first, *(name for name in planned if name not in begun)]
         among = set(wanted)

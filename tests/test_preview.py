@@ -1,5 +1,7 @@
 """When a preview may be followed: what an approval holds for, and each way in which it expires."""
 
+from dataclasses import replace
+
 import pytest
 from controller_at_work import CONFIG, entry, point
 from previewed import ROLLOUT, Previewed
@@ -29,7 +31,7 @@ def rolled():
         key = tuple(each.point_id for each in request.points), request.obstacles, request.q.round(6).tobytes()
         before = made.get(key) or ROLLOUT.roll(request)
         made[key] = before
-        return type(before)(request, before.cuts, before.plans, before.rows, before.duration, before.digest)
+        return replace(before, request=request)
 
     return roll
 
@@ -108,16 +110,31 @@ def test_a_point_accepted_anew_or_not_any_more_ends_it(p):
     assert p.state.phase == "expired"
 
 
-def test_what_comes_into_the_way_ends_it_and_what_stands_elsewhere_does_not(p):
+def post_at(x, y):
+    return Capsule("post", (x, y, 0.0), (x, y, 2.0), 0.04, 0.04)
+
+
+def test_what_comes_into_the_way_ends_it_and_what_leaves_it_room_does_not(p):
     shown = p.previewed("a")
     assert p.ask(intents.ApprovePreview, preview_hash=shown.preview_hash) == ""
-    far = Capsule("post", (8.0, 0.75, 0.0), (8.0, 0.75, 2.0), 0.04, 0.04)
-    p.robot.obstacles = (far,)
+    beside = (post_at(8.0, 0.75), post_at(0.9, 0.75), Capsule("wire", (-2, 0.75, 1.75), (2, 0.75, 1.75), 0.004, 0.004))
+    p.robot.obstacles = beside
     p.robot.run(0.3)
     assert p.state.phase == "approved"
-    p.robot.obstacles = (far, Capsule("post", (0.8, 0.75, 0.0), (0.8, 0.75, 2.0), 0.04, 0.04))
+    halfway = p.motion.rows[len(p.motion.rows) // 3].tool
+    p.robot.obstacles = (*beside, post_at(*halfway[:2]))
     p.robot.run(0.3)
-    assert p.state.phase == "expired" and "a post is seen" in p.state.reason
+    assert p.state.phase == "expired" and "a post is seen" in p.state.reason and "to a" in p.state.reason
+
+
+def test_what_is_planned_or_accepted_meanwhile_leaves_the_order_that_was_shown(p):
+    p.robot.show((*POINTS, point("c", (0.1, 0.75, 1.0))))
+    shown = p.previewed("a", "b")
+    assert p.ask(intents.ApprovePreview, preview_hash=shown.preview_hash) == ""
+    p.robot.controller._queue.arrange(("b", "a"))
+    assert p.ask(intents.AcceptPoint, point_id="c", revision=1) == ""
+    p.worked()
+    assert [name for name, _ in p.robot.cuts][:2] == ["a", "b"]
 
 
 def test_another_order_ends_it(p):
@@ -134,7 +151,8 @@ def test_an_approval_that_expires_under_way_keeps_the_blades_from_closing(p):
     assert p.ask(intents.Start) == ""
     p.robot.run(1.5)
     assert p.robot.state.active_point_id == "a"
-    p.robot.obstacles = (Capsule("post", (0.9, 0.75, 0.0), (0.9, 0.75, 2.0), 0.04, 0.04),)
+    x, y, _ = next(row.tool for row in p.motion.rows if row.time > shown.cuts[0].cut_s)
+    p.robot.obstacles = (post_at(x, y),)
     p.robot.run(10.0)
     assert p.robot.cuts == []
     assert entry(p.robot, "a").state == "ACCEPTED"

@@ -32,6 +32,17 @@ def test_who_moves_a_point_orders_all_that_is_accepted_and_the_next_one_comes_la
     assert order.arranged(("0", *NAMES), set("0abc").__contains__) == ["a", "c", "b", "0", "d", "e", "f"]
 
 
+def test_what_is_held_comes_first_until_it_is_let_go_or_a_person_says_otherwise():
+    order = WorkOrder(Journal())
+    assert order.hold(("d", "b")) and not order.hold(("d", "b"))
+    order.plan(tuple("cbd"))
+    assert order.arranged(NAMES, set("abcd").__contains__) == list("dbacef")
+    assert order.move("a", "d", 0, "ada", tuple("dbac")) == ""
+    assert order.arranged(NAMES, set("abcd").__contains__) == list("adbcef")
+    assert order.give_back(1) == "" and order.hold(())
+    assert order.arranged(NAMES, set("abcd").__contains__) == list("acbdef")
+
+
 def test_of_two_people_who_move_at_once_the_second_is_told():
     order = WorkOrder(Journal())
     assert order.move("a", "", 0, "ada", NAMES) == ""

@@ -17,7 +17,15 @@ import pinocchio as pin
 from msgspec import Struct
 
 from controller.compiled import FLAG, MATRIX, NOTHING, NUMBER, VECTOR, compiled
-from controller.whole_body.collision_geometry import BLADES, add_ground, bounding_radius, part_of, robot_geometry
+from controller.whole_body.collision_geometry import (
+    BLADES,
+    Shapes,
+    add_ground,
+    bounding_radius,
+    part_of,
+    robot_geometry,
+    shapes_of,
+)
 from controller.whole_body.collision_pairs import self_pairs
 from controller.whole_body.obstacle import Axes, Obstacle
 from rolling_panda.differential_drive import NQ, NXI, Array
@@ -113,6 +121,17 @@ class CollisionModel:
     def self_pairs(self) -> tuple[Pair, ...]:
         """Watched pairs within the robot and with the ground; a part of several shapes comes up once for each."""
         return tuple(self._names)
+
+    @property
+    def shapes(self) -> Shapes:
+        """Of the robot, in the order of `placed`."""
+        return shapes_of(self._shapes.geometryObjects[: len(self._parts)])
+
+    def placed(self, q: Array) -> Array:
+        """Where each part is at q (12): its rotation, row by row, and its middle, both in odom (p×12)."""
+        self._place(q)
+        placements = self._data.oMg[: len(self._parts)]
+        return np.array([[*T.rotation.ravel(), *T.translation] for T in placements])
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:

@@ -7,11 +7,14 @@
   every position of the caster's wheel.
 """
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
+from rolling_panda.differential_drive import Array
 from rolling_panda.resources import resource
 from rolling_panda.robot_model import RobotModel, panda_urdf
 
@@ -30,6 +33,21 @@ _TOOL_CAPSULES = (
 #: The caster's wheel (radius 0.080, width 0.035, trail 0.060 m, vendor's mesh) in every direction it can turn to: its
 #: farthest point is (0.140, 0.0175, −0.02) m from the sphere's middle.
 _CASTER_RADIUS, _CASTER_HEIGHT = 0.145, 0.100
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """The robot's parts: each is a box, which may be a line or a point, and all that is near enough to it.
+
+    Attributes:
+        parts: Names (p); a part of several shapes comes up once for each.
+        half: Half sizes of the boxes (p×3, m).
+        around: How near (p, m): the radius of a capsule or a sphere.
+    """
+
+    parts: tuple[str, ...]
+    half: Array
+    around: Array
 
 
 def robot_geometry(robot: RobotModel) -> Any:
@@ -61,6 +79,23 @@ def bounding_radius(shape: Any) -> float:
     if isinstance(shape, pin.coal.Sphere):
         return float(shape.radius)
     return float(np.linalg.norm(shape.halfSide))
+
+
+def shapes_of(objects: Sequence[Any]) -> Shapes:
+    """Of capsules, spheres and boxes."""
+    cores = [_core(item.geometry) for item in objects]
+    half, around = np.array([half for half, _ in cores]), np.array([around for _, around in cores])
+    return Shapes(tuple(part_of(item.name) for item in objects), half, around)
+
+
+def _core(shape: Any) -> tuple[tuple[float, float, float], float]:
+    """Half sizes of the box (m) that a capsule, sphere or box is drawn around, and by how much it is larger (m)."""
+    if isinstance(shape, pin.coal.Capsule):
+        return (0.0, 0.0, float(shape.halfLength)), float(shape.radius)
+    if isinstance(shape, pin.coal.Sphere):
+        return (0.0, 0.0, 0.0), float(shape.radius)
+    x, y, z = shape.halfSide.tolist()
+    return (x, y, z), 0.0
 
 
 def _add(geometry: Any, robot: RobotModel, part: str, frame: str, shape: Any, T_frame_shape: Any) -> None:
