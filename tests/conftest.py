@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
-from played_page import browser, page, server
+from played_page import browser, page, server, tab
 from playwright.sync_api import sync_playwright
 
-__all__ = ["browser", "page", "server"]
+__all__ = ["browser", "page", "server", "tab"]
 
 # A time limit for each example would judge how busy the machine is, not the code. The same examples each time, so that
 # a change fails for what it changed; `HYPOTHESIS_PROFILE=explore make test` looks for new ones.

@@ -7,7 +7,7 @@ import pytest
 from axe import axe, grave
 from played_page import opened, until
 from played_server import ORIGIN, PlayedServer, controller, point
-from playwright.sync_api import Browser, Page, Route, expect
+from playwright.sync_api import Page, Route, expect
 
 from rolling_panda.resources import resource
 from server.robot_glance import Glance
@@ -68,8 +68,8 @@ def hall() -> PlayedHall:
 
 
 @pytest.fixture
-def pages(browser: Browser, hall: PlayedHall) -> Iterator[Page]:
-    with opened(browser, hall.attach, "/robots/panda-1/", 1024, 768) as page:
+def pages(tab: Page, hall: PlayedHall) -> Iterator[Page]:
+    with opened(tab, hall.attach, "/robots/panda-1/", 1024, 768) as page:
         yield page
 
 
