@@ -47,6 +47,7 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         position_tolerance: The tool is in place to cut (m).
         rotation_tolerance: The same for its direction (rad).
         settle_speed: Slower than this the tool counts as at rest there (m/s).
+        settle_joints: Slower than this each joint does (rad/s); at 0.1 the bridge closes no blades.
         reach_timeout_s: A motion that has not ended this long after its planned end has failed (s).
         cut_timeout_s: A cut without outcome for this long is UNKNOWN (s).
         largest_radius: Canes thicker than this are refused (m).
@@ -122,6 +123,7 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
     position_tolerance: Positive = 0.0015
     rotation_tolerance: Positive = 0.0175
     settle_speed: Positive = 0.005
+    settle_joints: Positive = 0.05
     reach_timeout_s: Positive = 6.0
     cut_timeout_s: Positive = 3.0
     largest_radius: Positive = 0.0075

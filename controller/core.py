@@ -15,6 +15,7 @@ from controller.lines import Lines
 from controller.modes import Event
 from controller.motion import Tracking
 from controller.movement import Moved, Movement
+from controller.newest import Newest
 from controller.next_cut import Found
 from controller.operator import Operator
 from controller.permission import EVENTS, Situation, allowed, refusal
@@ -73,7 +74,7 @@ class Controller:
         self._movement = Movement(config, robot_config, self._queue, self._lines, run_id, self._known, method, permit)
         self._supervisor = Supervisor(config, self._movement, self._lines, starts)
         self._operator = Operator(self._queue)
-        self._inputs = Inputs()
+        self._inputs, self._newest = Inputs(), Newest()
         self._points_seen: object = None
         self._state_due = self._stops_due = -math.inf
 
@@ -117,6 +118,7 @@ class Controller:
             now: Monotonic time (s), the clock of the inputs' arrival times.
         """
         self._lines.now = now
+        inputs = self._newest.of(inputs)
         self._take(inputs, now)
         supervisor = self._supervisor
         supervisor.review(now)

@@ -30,6 +30,7 @@ from rolling_panda import intents
 from rolling_panda import messages as m
 from rolling_panda.differential_drive import Array
 from rolling_panda.look_messages import CloseLook
+from rolling_panda.robot_model import ARM_XI
 
 #: A point that perception has refined by less than this is aimed at as it was (m).
 _REFINED = 0.0003
@@ -60,7 +61,6 @@ class CutSequence:
         """
         self._config, self._follower = config, follower
         self._saturation, self._queue = saturation, queue
-        self._blades = Blades(config, queue, run_id, self._ended)
         heading = config.row_heading
         self._left = np.array([-np.sin(heading), np.cos(heading), 0.0])
         self._events: list[str] = []
@@ -73,6 +73,7 @@ class CutSequence:
         self._ways = Ways(config, follower.flows)
         self._eye = Eye(config.look_timeout_s, _PICTURES)
         self._verification = Verification(queue, self._eye, config.verify)
+        self._blades = Blades(config, queue, run_id, self._verification.begin)
         self._coming = NextCut(search, queue, config.search_steps_each, known, permit)
         #: Where the blades closed last (m, odom), and on which point.
         self._cut_at: Array = np.zeros(3)
@@ -254,11 +255,15 @@ class CutSequence:
         return Work(tracking.xi, tracking)
 
     def _advance(self, robot: Measured, now: float) -> Work:
-        tracking = self._track(robot)
-        config = self._config
+        tracking, config = self._track(robot), self._config
         there = self._patience.over(tracking, now, config.position_tolerance, config.rotation_tolerance)
         # Where it comes to rest, not where it passes by.
-        if there and float(np.linalg.norm(robot.kinematics.J_xi[:3] @ tracking.xi)) < config.settle_speed:
+        rests = there and float(np.linalg.norm(robot.kinematics.J_xi[:3] @ tracking.xi)) < config.settle_speed
+        if rests and self._motion is not None and np.abs(tracking.xi[ARM_XI]).max() >= config.settle_joints:
+            # What the arm would still make good beside the tool's path can wait: the blades close at rest.
+            self._motion.settle(robot.q)
+            rests = False
+        if rests:
             self._blades.begin(self._point_id, now)
             self._stage = Stage.CUT
         elif self._patience.late(now):
@@ -272,8 +277,7 @@ class CutSequence:
         tracking = self._track(robot)
         if not self._blades.busy:
             self._retreat_from(robot)
-            return Work(tracking.xi, tracking)
-        if self._coming.look(robot.q):
+        elif self._coming.look(robot.q):
             self._coming.step()
         return Work(tracking.xi, tracking, cut=self._blades.command(now))
 
@@ -353,9 +357,6 @@ class CutSequence:
         """From a pose of the tool (pin.SE3) at q (12) to a cut; where a look comes first, to where it is taken."""
         there = self._ways.there(plan, T_odom_tool, q)
         return there if self._config.confirm else (*there, self._ways.into(plan))
-
-    def _ended(self, point_id: str, outcome: m.Outcome, word: str, now: float) -> None:
-        self._verification.begin(point_id, outcome, word, now)
 
     def _fail(self, robot: Measured, reason: str) -> Work:
         self._queue.resolve(self._point_id, "FAILED_NOT_CUT", reason)

@@ -109,6 +109,7 @@ class ToolMotion:
         self.duration = max(leg.end for leg in self._legs)
         self.time, self.scale = 0.0, 1.0
         self._corrections: list[Correction] = []
+        self._settled: Posture | None = None
 
     @property
     def done(self) -> bool:
@@ -155,6 +156,11 @@ class ToolMotion:
         self.goal = pin.SE3(self.goal.rotation, self.goal.translation + by)
         self.duration = max(self.duration, made.end)
 
+    def settle(self, q: Array) -> None:
+        """From now on keep the tool where it should be and the arm otherwise as it is at q (12), once."""
+        if self._settled is None:
+            self._settled = Posture(q.copy())
+
     def advance(self, scale: float, dt: float) -> None:
         """Let the clock run at the rate `scale` for one period of `dt` (s)."""
         self.scale = scale
@@ -177,6 +183,8 @@ class ToolMotion:
 
     def posture(self) -> Posture:
         """Base and arm as they should be now: the arm straight from leg to leg, heading as at the goal."""
+        if self._settled is not None:
+            return self._settled
         q, rate = self._q_start.copy(), np.zeros(len(self._q_start))
         for leg in self._legs:
             if self.time <= leg.begin:

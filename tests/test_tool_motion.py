@@ -187,3 +187,16 @@ def test_the_base_may_move_while_a_motion_waits_and_not_once_it_is_in_the_canes(
     assert path.base == "row"
     path.time = path.duration - 0.01
     assert path.base == "frozen"
+
+
+def test_an_arm_that_settles_stays_as_it_is_and_the_tool_where_it_should_be():
+    path = motion([pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), pose((0.3, 0.0, 0.0), (0.0, 0.2, 0.0))])
+    path.time = path.duration
+    before, q = path.desired(), np.arange(12.0)
+    path.settle(q)
+    q[5] = 99.0
+    # A second time changes nothing: what is measured meanwhile would lead it on.
+    path.settle(q)
+    np.testing.assert_array_equal(path.posture().q, np.arange(12.0))
+    assert not path.posture().rate.any() and path.posture().goal is None
+    np.testing.assert_array_equal(path.desired().T_odom_tool.homogeneous, before.T_odom_tool.homogeneous)

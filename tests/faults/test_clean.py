@@ -18,6 +18,18 @@ def test_work_goes_on_without_a_stop_and_with_jitter_on_the_ways(tmp_path, monke
     assert "0 stops" in capsys.readouterr().out
 
 
+def test_in_jitter_the_blades_are_asked_to_close_when_the_arm_rests():
+    world = EndlessRow(0)
+    world.motion.jitter = world.state.jitter = world.odometry.jitter = 0.1
+    for _ in range(8):
+        world.offer()
+        world.run(1.0)
+    assert world.controller.mode == "AUTO" and world.cut_ids
+    refused = {each.reason: each.count for each in world.bridge.refusals.counts()}
+    # An order is repeated twenty times a second until the blades close.
+    assert refused.get("the robot is not at rest", 0) <= 5
+
+
 @pytest.mark.parametrize(
     ("fault", "mode"),
     [
