@@ -12,6 +12,7 @@ class ServerConfig(Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         page_rate_hz: `PageState` messages a second to each page.
+        onlooker_rate_hz: The same to a page of somebody who may only look on; another mode or stop is told at once.
         scene_rate_hz: Most updates a second of the 3-D view; nothing is sent while nothing moves.
         teleop_rate_hz: `TeleopTarget` messages a second while the operator holds.
         hold_timeout_s: A hold that is not renewed for this long moves nothing any more.
@@ -20,8 +21,7 @@ class ServerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         view_timeout_s: A page that has not drawn a state younger than this may not move the robot.
         stop_confirm_s: How long a stop waits for bridge and controller to say that they have latched it.
         unread_s: A page or a 3-D view that does not read what it is sent for this long is dropped; it may come again.
-        unread_s: Positive = 10.0
-    session_idle_s: A session unused for this long has ended.
+        session_idle_s: A session unused for this long has ended.
         invite_s: Life of a sign-in link that a supervisor makes for somebody else.
         log_lines: Log lines kept in memory.
         max_body_bytes: Longest request body, and longest WebSocket frame from a client.
@@ -29,6 +29,7 @@ class ServerConfig(Struct, frozen=True, forbid_unknown_fields=True):
     """
 
     page_rate_hz: Positive = 10.0
+    onlooker_rate_hz: Positive = 5.0
     scene_rate_hz: Positive = 30.0
     teleop_rate_hz: Positive = 30.0
     hold_timeout_s: Positive = 0.15

@@ -276,8 +276,8 @@ class Desk:
         self.scene.forget(session.session_id)
 
     def wake_pages(self) -> None:
-        """There is something new for the pages."""
-        for page in self.pages:
+        """There is something new for the pages: whoever may operate hears it before all that look on."""
+        for page in sorted(self.pages, key=lambda page: not page.session.may_operate):
             page.wake()
 
     def clicked(self, owner: str, point_id: str) -> None:

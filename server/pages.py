@@ -20,7 +20,6 @@ from rolling_panda.page_messages import (
     PageMessage,
     PagePoints,
     PagePreview,
-    PageState,
     Ping,
     PlaceByHand,
     PlaceCamera,
@@ -35,6 +34,7 @@ from rolling_panda.page_messages import (
 from rolling_panda.preview_messages import PreviewState
 from server.desk import Desk
 from server.frame_rate import FRAMES_HZ, Frames
+from server.page_pace import PagePace
 from server.page_view import addressed
 from server.reading_socket import was_unread
 from server.sessions import Session
@@ -62,7 +62,7 @@ class OpenPage:
         self._measured: Measured | None = None
         self.placing = False
         self.measuring = False
-        self._state: PageState | None = None
+        self._pace = PagePace(desk.config.page_rate_hz, desk.config.onlooker_rate_hz)
         self._points: PagePoints | None = None
         self._preview: PreviewState | None = None
         self._event_number = 0
@@ -142,8 +142,7 @@ class OpenPage:
         if self._hold_ended is not None:
             ended, self._hold_ended = self._hold_ended, None
             return ended
-        if desk.state is not None and desk.state is not self._state:
-            self._state = desk.state
+        if desk.state is not None and self._pace.due(desk.state, self.session.may_operate):
             return addressed(desk.state, self.session)
         if self._sightline is not None:
             line, self._sightline = self._sightline, None

@@ -186,6 +186,11 @@ class Scene:
             remove_sight(client, cloud="cloud" not in layers, frustum="camera" not in layers)
 
     @property
+    def views(self) -> int:
+        """How many are open."""
+        return len(self._server.get_clients())
+
+    @property
     def sight_wanted(self) -> bool:
         """Whether any view shows what the camera on the hand sees."""
         owners = {self.door.owner(client_id) for client_id in self._server.get_clients()}

@@ -109,6 +109,12 @@ def test_a_page_gets_states_with_its_user_and_growing_numbers(page):
     assert {row["process"] for row in first["processes"]} == {"bridge", "controller", "perception", "server"}
 
 
+def test_a_page_that_may_only_look_on_is_told_half_as_often(server):
+    with server.client(user="vi", role="viewer") as client, Page(server, client) as page:
+        page.hear("PageState")
+        assert [page.hear("PageState")["number"] % 2 for _ in range(3)] == [0, 0, 0]
+
+
 def test_a_ping_is_answered_with_its_number(page):
     page.hear("PageState")
     page.say("Ping", number=77, rendered=0)
