@@ -1,7 +1,6 @@
 """The application: routes, error answers and the guard around them."""
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -82,8 +81,9 @@ def robot_app(reception: Reception, desk: Desk, origins: frozenset[str]) -> ASGI
     def dropped(session: Session, kind: str) -> None:
         desk.note("warning", f"a view of {session.user} sent {kind!r} to the 3-D view; dropped", session.client)
 
+    files = PageFiles(web := resource("web"))
     routers = (
-        page_router(web := resource("web")),
+        page_router(web, files),
         site_router(reception),
         camera_router(desk),
         operator_router(desk),
@@ -97,19 +97,20 @@ def robot_app(reception: Reception, desk: Desk, origins: frozenset[str]) -> ASGI
         pages_router(desk),
         viser_router(desk.scene, desk.may_move, dropped),
     )
-    return _guarded(routers, web, reception, origins, desk.note)
+    return _guarded(routers, files, reception, origins, desk.note)
 
 
 def _hall(reception: Reception, origins: frozenset[str]) -> ASGIApp:
     """What several robots have in common."""
     first = path_of(next(iter(reception.desks)))
-    routers = (page_router(web := resource("web"), first), site_router(reception), robots_router(reception))
-    return _guarded(routers, web, reception, origins, reception.note)
+    files = PageFiles(web := resource("web"))
+    routers = (page_router(web, files, first), site_router(reception), robots_router(reception))
+    return _guarded(routers, files, reception, origins, reception.note)
 
 
 def _guarded(
     routers: Sequence[APIRouter],
-    web: Path,
+    files: PageFiles,
     reception: Reception,
     origins: frozenset[str],
     note: Callable[[Severity, str, str], None],
@@ -125,11 +126,11 @@ def _guarded(
     )
     for router in routers:
         app.include_router(router)
-    app.router.routes.append(_PageFiles("/", PageFiles(web), name="web"))
+    app.router.routes.append(_PageFiles("/", files, name="web"))
     app.add_exception_handler(RequestValidationError, _invalid)
     app.add_exception_handler(HTTPException, _failed)
     return Guard(
-        app,
+        files.before(app),
         reception.sessions,
         origins,
         reception.cookie,

@@ -15,7 +15,7 @@ class PagePace:
         self._told: PageState | None = None
 
     def due(self, state: PageState, may_operate: bool) -> bool:
-        """Whether to send this state; if so it counts as sent. Another mode or stop, or a lost process, is due at once."""
+        """Whether to send this state, which then counts as sent. Another mode, stop or lost process is due at once."""
         before = self._told
         if state is before:
             return False

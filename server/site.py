@@ -12,6 +12,7 @@ from rolling_panda.about import about
 from server import requests as body
 from server.desk import Result
 from server.operator_api import ANSWERS, Caller, answer
+from server.page_files import PageFiles
 from server.reception import Reception
 from server.sessions import Session, SignInError
 
@@ -30,15 +31,18 @@ Origin = Annotated[str, Header(include_in_schema=False)]
 Address = Annotated[str, Depends(_address)]
 
 
-def page_router(web: Path, onwards: str = "") -> APIRouter:
-    """The page and the way in, from the folder `web`; whoever is signed in is sent `onwards`, where that is given."""
+def page_router(web: Path, files: PageFiles, onwards: str = "") -> APIRouter:
+    """The page and the way in, from the folder `web` and what of it is kept.
+
+    Whoever is signed in is sent `onwards`, where that is given.
+    """
     router = APIRouter(include_in_schema=False)
 
     @router.get("/")
-    def page(visitor: Visitor) -> Response:
-        if visitor is not None and onwards:
-            return RedirectResponse(onwards)
-        return FileResponse(web / ("sign-in.html" if visitor is None else "index.html"))
+    async def page(request: Request, visitor: Visitor) -> Response:
+        if visitor is None:
+            return FileResponse(web / "sign-in.html")
+        return RedirectResponse(onwards) if onwards else files.kept("index.html", request.scope)
 
     @router.get("/sign-in")
     def sign_in_page() -> Response:
