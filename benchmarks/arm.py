@@ -13,7 +13,6 @@ baseline that can be compared with directly.
 import argparse
 import json
 import os
-import platform
 import sys
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -24,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.documents import machine
 from benchmarks.reach_judge import Quality, judge
 from benchmarks.reach_run import BASE, MethodName, Runner
 from controller.planning.arm_ik import ArmIk
@@ -137,7 +137,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     for row in [row for row in rows if not row.quality.reached][:10]:
         print(f"  pair {row.pair}: {row.reason or 'ended away from the goal'}")
     if arguments.json is not None:
-        document = {"machine": platform.platform(), "summary": summary, "results": [asdict(row) for row in rows]}
+        document = {"machine": machine(), "summary": summary, "results": [asdict(row) for row in rows]}
         arguments.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
     return 0
 

@@ -1,7 +1,14 @@
 """How benchmarks write what they found: JSON that people can read and compare line by line."""
 
 import json
+import os
+import platform
 from typing import Any
+
+
+def machine() -> str:
+    """Where figures come from: the system, how many cores it has, and how many programs wanted them in this minute."""
+    return f"{platform.platform()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}"
 
 
 def one_row_a_line(document: dict[str, Any]) -> str:

@@ -2,7 +2,6 @@
 
 import argparse
 import gc
-import platform
 import sys
 import tempfile
 import time
@@ -12,7 +11,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from benchmarks.documents import one_row_a_line
+from benchmarks.documents import machine, one_row_a_line
 from benchmarks.tick import working
 from benchmarks.tick_parts import Times
 from controller.journal import LedgerState, Record
@@ -133,7 +132,7 @@ def main(argv: Sequence[str] | None = None) -> int:
                 durations[name] += those
                 if name != "no disk":
                     _check(place / name)
-    figures: dict[str, Any] = {"machine": platform.platform(), "slow_flush_s": _SLOW_S}
+    figures: dict[str, Any] = {"machine": machine(), "slow_flush_s": _SLOW_S}
     for name, each in durations.items():
         times = Times.of(each)
         figures[name] = {**asdict(times), "steps": len(each)}

@@ -8,8 +8,6 @@ counters and, for the tool, from the simulator's trace.
 import argparse
 import json
 import math
-import os
-import platform
 import re
 import statistics
 import sys
@@ -21,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.demo_under_test import Demo
+from benchmarks.documents import machine
 from benchmarks.load import cores_between, processor_times
 from rolling_panda.resources import resource
 
@@ -163,7 +162,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     for name, value in asdict(found).items():
         print(f"{name:<22} {value}")
     if arguments.json is not None:
-        document = {"machine": f"{platform.platform()}, {os.cpu_count()} cores", **asdict(found)}
+        document = {"machine": machine(), **asdict(found)}
         arguments.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
     return 0
 

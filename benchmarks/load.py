@@ -8,7 +8,6 @@ import argparse
 import base64
 import json
 import os
-import platform
 import shutil
 import sys
 import time
@@ -21,6 +20,7 @@ import psutil
 
 from benchmarks.browser import FLAGS
 from benchmarks.demo_under_test import Demo
+from benchmarks.documents import machine
 
 
 @dataclass(frozen=True)
@@ -153,7 +153,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     _show(idle, moving, page, factor, still_working)
     if arguments.json is not None:
         document = {
-            "machine": f"{platform.platform()}, {os.cpu_count()} cores",
+            "machine": machine(),
             "seconds": arguments.seconds,
             "robots": arguments.robots,
             "idle": asdict(idle),

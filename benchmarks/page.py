@@ -7,8 +7,6 @@ followed from the robot to the screen. With `--viewers` the same is done while o
 
 import argparse
 import json
-import os
-import platform
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -21,6 +19,7 @@ import psutil
 from benchmarks.browser import chromium, put_first
 from benchmarks.crowd import looked_at
 from benchmarks.demo_under_test import Demo
+from benchmarks.documents import machine
 from benchmarks.latencies import Spread, ages, spread
 from benchmarks.page_hands import Drags, Heap, drag, first_paints, open_page, press_stop, signed_in, watch_screen
 from rolling_panda.errors import InputError, RollingPandaError
@@ -190,7 +189,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     show("", found)
     if arguments.json is not None:
         document = {
-            "machine": f"{platform.platform()}, {os.cpu_count()} cores",
+            "machine": machine(),
             "viewport": [1280, 800],
             "scale": arguments.scale,
             **found,

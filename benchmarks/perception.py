@@ -7,8 +7,6 @@ apart.
 
 import argparse
 import json
-import os
-import platform
 import resource
 import sys
 import time
@@ -22,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.confusion import Confusion, no_counts, shares
+from benchmarks.documents import machine
 from benchmarks.guyot_judge import GuyotJudge
 from benchmarks.intervals import Figure, quantile, share
 from benchmarks.perception_gallery import save_failure
@@ -235,7 +234,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"{f'open for {need}':24} {sum(each.needs == need for each in survey.abstained):8}")
     if words.json is not None:
         document = {
-            "machine": f"{platform.platform()}, {os.cpu_count()} cores",
+            "machine": machine(),
             "seed": words.seed,
             "vines": words.vines,
             "segmenter": words.segmenter,
@@ -269,7 +268,7 @@ def _growth(words: argparse.Namespace) -> int:
     stretches = grow_long(words.seed, words.vines, words.step, perception, RobotModel())
     print(table(stretches))
     if words.json is not None:
-        document = {"machine": f"{platform.platform()}, {os.cpu_count()} cores", "seed": words.seed}
+        document = {"machine": machine(), "seed": words.seed}
         document |= {
             "segmenter": words.segmenter,
             "step_m": words.step,

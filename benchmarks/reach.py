@@ -3,7 +3,6 @@
 import argparse
 import math
 import os
-import platform
 import re
 import sys
 import time
@@ -18,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks import reach_targets
-from benchmarks.documents import one_row_a_line
+from benchmarks.documents import machine, one_row_a_line
 from benchmarks.intervals import share
 from benchmarks.reach_judge import Quality, Trajectory, judge
 from benchmarks.reach_run import BASE, METHODS, MethodName, Runner
@@ -152,7 +151,7 @@ def _run(arguments: argparse.Namespace) -> int:
     _print(arguments.method, rows, summary, time.perf_counter() - began)
     if arguments.json is not None:
         document = {
-            "machine": platform.platform(),
+            "machine": machine(),
             "method": arguments.method,
             "targets": str(arguments.targets or f"drawn: seed {arguments.seed}, free axis {arguments.free_axis}"),
             "summary": summary,

@@ -6,8 +6,6 @@ presses a stop; measured is when base and arm are at rest, and whether the page 
 """
 
 import argparse
-import os
-import platform
 import random
 import sys
 import time
@@ -17,9 +15,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import psutil
 
-from benchmarks.documents import one_row_a_line
+from benchmarks.documents import machine, one_row_a_line
 from benchmarks.real_site import RealSite
 from bridge.core import actuated
 from bridge.real import mp500
@@ -262,8 +259,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     for line in found.breaches[:10]:
         print(f"breach: {line}")
     if arguments.json is not None:
-        machine = f"{platform.platform()}, {os.cpu_count()} cores, load {psutil.getloadavg()[1]:.1f}"
-        document = {"machine": machine, "seed": arguments.seed, **figures}
+        document = {"machine": machine(), "seed": arguments.seed, **figures}
         arguments.json.write_text(one_row_a_line(document), encoding="utf-8")
     good = all(row["within"] and row["told"] == row["n"] for row in figures["faults"])
     return 0 if good and not found.breaches else 1

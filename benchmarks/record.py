@@ -8,8 +8,6 @@ does meets both alike.
 import argparse
 import json
 import math
-import os
-import platform
 import signal
 import subprocess
 import sys
@@ -23,6 +21,7 @@ from typing import Any
 import psutil
 
 from benchmarks.demo_under_test import Demo
+from benchmarks.documents import machine
 from benchmarks.live import configured, watch
 from rolling_panda import messages as m
 from rolling_panda.config import TransportConfig
@@ -158,9 +157,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             figures = measure(demo, arguments.pairs, arguments.seconds, Path(folder))
         finally:
             demo.close()
-    load = f"load {psutil.getloadavg()[1]:.1f}"
     document = {
-        "machine": f"{platform.platform()}, {os.cpu_count()} cores, {load}",
+        "machine": machine(),
         "rate_hz": arguments.rate,
         **figures,
     }

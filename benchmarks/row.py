@@ -5,8 +5,6 @@ Several methods work on the same accepted points: a seed's row looks the same to
 
 import argparse
 import math
-import os
-import platform
 import re
 import sys
 import tempfile
@@ -22,7 +20,7 @@ from msgspec.structs import replace
 from benchmarks.cane_touches import Cane, CaneTouches, staying_rods
 from benchmarks.closed_loop import ClosedLoop
 from benchmarks.cut_truth import true_cut
-from benchmarks.documents import one_row_a_line
+from benchmarks.documents import machine, one_row_a_line
 from benchmarks.row_report import Cut, RowRun, mean_stages, summarise, tell, tell_stages
 from benchmarks.row_stages import StageClock
 from benchmarks.row_walk import walk
@@ -269,7 +267,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             "pictures_hz": arguments.pictures,
             "looks": not arguments.no_looks,
             "segmenter": arguments.segmenter,
-            "machine": f"{platform.platform()}, {os.cpu_count()} cores",
+            "machine": machine(),
             "summary": summary,
             "results": [asdict(run) for run in runs],
         }

@@ -2,7 +2,6 @@
 
 import argparse
 import gc
-import platform
 import sys
 import time
 from collections.abc import Sequence
@@ -10,7 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from benchmarks.documents import one_row_a_line
+from benchmarks.documents import machine, one_row_a_line
 from benchmarks.kinematic_robot import KinematicRobot
 from benchmarks.peers.run import run_peers
 from benchmarks.tick_parts import Recorder, Times, measure_parts, obstacles
@@ -85,7 +84,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         parser.error("--steps must be at least 1")
     durations, demands = measure(arguments.steps)
     whole, parts = Times.of(durations), measure_parts(demands)
-    figures: dict[str, Any] = {**asdict(whole), "steps": len(durations), "machine": platform.platform()}
+    figures: dict[str, Any] = {**asdict(whole), "steps": len(durations), "machine": machine()}
     figures["parts"] = {name: asdict(times) for name, times in parts.items()}
     print(
         f"one control step: median {whole.median_us} us, p99 {whole.p99_us} us, max {whole.max_us} us, "
