@@ -6,7 +6,7 @@ cut flows into the way to the next.
 """
 
 import math
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from controller.tool_motion import Leg, ToolMotion
 from controller.verification import Verification
 from controller.ways import Ways, at_base
 from controller.whole_body.saturation import Saturation
+from controller.withdrawal import Withdrawal
 from rolling_panda import intents
 from rolling_panda import messages as m
 from rolling_panda.differential_drive import Array
@@ -61,12 +62,12 @@ class CutSequence:
         """
         self._config, self._follower = config, follower
         self._saturation, self._queue = saturation, queue
-        heading = config.row_heading
-        self._left = np.array([-np.sin(heading), np.cos(heading), 0.0])
+        self._left = np.array([-np.sin(config.row_heading), np.cos(config.row_heading), 0.0])
         self._events: list[str] = []
         self._motion: ToolMotion | None = None
         self._patience = Patience(config.reach_timeout_s, 1.0 / config.rate_hz)
         self._plan: CutPlan | None = None
+        self._withdrawal: Withdrawal | None = None
         self._accepted: m.PruningPoint | None = None
         self._survey = Survey(config, follower, saturation, queue)
         self._places: tuple[Array, ...] = ()
@@ -77,10 +78,9 @@ class CutSequence:
         self._coming = NextCut(search, queue, config.search_steps_each, known, permit)
         #: Where the blades closed last (m, odom), and on which point.
         self._cut_at: Array = np.zeros(3)
-        self._cut_point = ""
         #: Where perception had the point when it was looked at closely, which shows it better.
         self._looked_at: m.Vector3 | None = None
-        self._ending = ""
+        self._ending = self._cut_point = ""
         self._forget()
 
     @property
@@ -214,7 +214,7 @@ class CutSequence:
             return Work(xi)
         self._plan = coming.found
         self._stage = Stage.TRAVEL
-        self._go(robot, *self._way_to(self._plan, robot.kinematics.T_odom_tool, robot.q), to_cut=True)
+        self._go(robot, *self._ways.to(self._plan, robot.kinematics.T_odom_tool, robot.q), to_cut=True)
         return Work(xi)
 
     def _travel(self, robot: Measured, now: float) -> Work:
@@ -282,27 +282,33 @@ class CutSequence:
         return Work(tracking.xi, tracking, cut=self._blades.command(now))
 
     def _retreat(self, robot: Measured, now: float) -> Work:
+        if self._withdrawal is not None:
+            return self._withdraw(self._withdrawal, robot, now)
         tracking = self._track(robot)
-        assert self._motion is not None
+        assert self._motion is not None and self._plan is not None
         plan = self._coming.found
         if self._motion.leg > 0 and isinstance(plan, CutPlan):
             # Out of the canes, and the way to the next one has begun.
             self._plan, self._stage = plan, Stage.TRAVEL
             self._point_id, self._accepted = self._coming.point_id, self._coming.accepted
             return Work(tracking.xi, tracking)
-        if not self._patience.over(tracking, now, _NEAR):
-            if not self._patience.late(now):
-                return Work(tracking.xi, tracking)
+        if self._patience.over(tracking, now, _NEAR):
+            return self._out(robot, tracking)
+        if self._patience.late(now):
+            self._events.append(f"{self._point_id}: {missed('the way back', tracking)}; now by joints")
+            self._withdrawal = Withdrawal(self._config, self._follower, robot.q, self._plan.q_clear)
+        return Work(tracking.xi, tracking)
+
+    def _withdraw(self, withdrawal: Withdrawal, robot: Measured, now: float) -> Work:
+        tracking = withdrawal.step(robot, now)
+        if withdrawal.late:
             return Work(self._saturation.ramp(robot.sent), pause=missed("the way back", tracking))
+        return self._out(robot, tracking) if withdrawal.done else Work(tracking.xi, tracking)
+
+    def _out(self, robot: Measured, tracking: Tracking) -> Work:
         ticket = self._queue.get(self._point_id)
         if ticket is not None and ticket.state == "UNKNOWN":
             return Work(tracking.xi, tracking, pause=f"{self._point_id} is UNKNOWN: {ticket.reason}")
-        return self._next(robot)
-
-    def _surveying(self, robot: Measured, now: float) -> Work:
-        return self._survey.step(robot, now)
-
-    def _rest(self, robot: Measured, now: float) -> Work:
         return self._next(robot)
 
     # --- parts -------------------------------------------------------------------------------------------------------
@@ -312,7 +318,7 @@ class CutSequence:
         self._point_id = ""
         self._accepted = None
         self._looked_at = None
-        self._motion = self._plan = None
+        self._motion = self._plan = self._withdrawal = None
         self._patience.again()
 
     def _check_acceptance(self, robot: Measured) -> None:
@@ -342,21 +348,16 @@ class CutSequence:
 
     def _retreat_from(self, robot: Measured) -> None:
         assert self._plan is not None
-        self._stage = Stage.RETREAT
+        self._stage, self._withdrawal = Stage.RETREAT, None
         self._cut_at, self._cut_point = robot.kinematics.T_odom_tool.translation.copy(), self._point_id
         back = self._ways.out(self._plan, robot.q)
         ticket, plan = self._queue.get(self._point_id), self._coming.found
         unsure = ticket is not None and ticket.state == "UNKNOWN"
         stands = isinstance(plan, CutPlan) and self._coming.stands and not unsure and not self._ending
-        onwards = self._way_to(plan, back.goal, back.q_goal) if stands and isinstance(plan, CutPlan) else ()
+        onwards = self._ways.to(plan, back.goal, back.q_goal) if stands and isinstance(plan, CutPlan) else ()
         if not onwards:
             self._coming.forget()
         self._go(robot, back, *onwards, to_cut=bool(onwards))
-
-    def _way_to(self, plan: CutPlan, T_odom_tool: Any, q: Array) -> tuple[Leg, ...]:
-        """From a pose of the tool (pin.SE3) at q (12) to a cut; where a look comes first, to where it is taken."""
-        there = self._ways.there(plan, T_odom_tool, q)
-        return there if self._config.confirm else (*there, self._ways.into(plan))
 
     def _fail(self, robot: Measured, reason: str) -> Work:
         self._queue.resolve(self._point_id, "FAILED_NOT_CUT", reason)
@@ -386,8 +387,8 @@ class CutSequence:
         return tracking
 
 
-_STEPS = {
-    Stage.REST: CutSequence._rest,
+_STEPS: dict[Stage, Callable[[CutSequence, Measured, float], Work]] = {
+    Stage.REST: lambda sequence, robot, now: sequence._next(robot),
     Stage.ESCAPE: CutSequence._escape,
     Stage.SEARCH: CutSequence._find,
     Stage.TRAVEL: CutSequence._travel,
@@ -395,5 +396,5 @@ _STEPS = {
     Stage.ADVANCE: CutSequence._advance,
     Stage.CUT: CutSequence._cutting,
     Stage.RETREAT: CutSequence._retreat,
-    Stage.SURVEY: CutSequence._surveying,
+    Stage.SURVEY: lambda sequence, robot, now: sequence._survey.step(robot, now),
 }
