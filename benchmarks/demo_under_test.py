@@ -20,7 +20,10 @@ _LOOK_S = 0.2
 
 
 class Demo:
-    """A demo under measurement, and a script signed in to it. With several robots it asks the same of each."""
+    """A demo under measurement, and a script signed in to it; with several robots, one script for each.
+
+    A session holds one robot at a time.
+    """
 
     def __init__(self, port: int, seed: int, config: Path | None = None, *more: str) -> None:
         """Start it and wait until detections have come.
@@ -64,6 +67,13 @@ class Demo:
         several = self.client.get("/api/robots")
         #: Below which each robot's requests are.
         self.paths = [row["path"].rstrip("/") for row in several.json()] if several.is_success else [""]
+        #: Who holds each robot.
+        self.scripts = [self.client]
+        for number in range(1, len(self.paths)):
+            cookie = self.guest(f"script-{number + 1}", "supervisor")
+            self.scripts.append(
+                httpx.Client(base_url=self.url, headers={"Origin": self.url, "Cookie": cookie}, timeout=10)
+            )
         self.wait(lambda: all(len(self._points(path)) >= 2 for path in self.paths), 90.0)
 
     def wait(self, condition: Callable[[], Any], limit_s: float) -> None:
@@ -79,10 +89,15 @@ class Demo:
             time.sleep(0.1)
 
     def post(self, path: str, **body: Any) -> dict[str, Any]:
-        """Ask for something that must be granted; the answer of the last robot."""
-        for robot in self.paths:
-            answer = self.client.post(f"{robot}/api/{path}", json=body)
-            answer.raise_for_status()
+        """Ask for something that must be granted; the answer of the last robot.
+
+        Raises:
+            InputError: It was not.
+        """
+        for script, robot in zip(self.scripts, self.paths, strict=True):
+            answer = script.post(f"{robot}/api/{path}", json=body)
+            if not answer.is_success:
+                raise InputError(f"{robot}/api/{path} was refused: {answer.text}")
         return dict(answer.json())
 
     def state(self) -> dict[str, Any]:
@@ -102,7 +117,8 @@ class Demo:
 
     def guest(self, user: str, role: str) -> str:
         """Somebody else signs in; their cookie."""
-        token = self.post("invite", user=user, role=role)["link"].split("token=")[1]
+        answer = self.client.post(f"{self.paths[0]}/api/invite", json={"user": user, "role": role})
+        token = answer.raise_for_status().json()["link"].split("token=")[1]
         with httpx.Client(base_url=self.url, headers={"Origin": self.url}, trust_env=False) as client:
             client.post("/api/sign-in", json={"token": token}).raise_for_status()
             return "; ".join(f"{name}={value}" for name, value in client.cookies.items())
@@ -117,6 +133,8 @@ class Demo:
         self.post("arm")
         self.wait(lambda: self.in_mode("READY"), 20.0)
         self.post("points/accept-all", confidence=0.0)
+        # Not before a picture of what stands around has come, which takes a while on a busy machine.
+        self.wait(lambda: all("Start" in state["controller"]["allowed"] for state in self.states()), 30.0)
         self.post("start")
 
     @contextmanager
@@ -125,10 +143,9 @@ class Demo:
         ended = threading.Event()
 
         def look() -> None:
-            with httpx.Client(base_url=self.client.base_url, cookies=self.client.cookies, timeout=10) as client:
-                while not ended.wait(_LOOK_S):
-                    for path in self.paths:
-                        client.get(f"{path}/api/state")
+            while not ended.wait(_LOOK_S):
+                for script, path in zip(self.scripts, self.paths, strict=True):
+                    script.get(f"{path}/api/state")
 
         thread = threading.Thread(target=look, name="somebody who looks on")
         thread.start()
@@ -140,7 +157,8 @@ class Demo:
 
     def close(self) -> None:
         """End it as Ctrl-C does."""
-        self.client.close()
+        for script in self.scripts:
+            script.close()
         self._popen.terminate()
         self._popen.wait(15)
         assert self._popen.stdout is not None

@@ -67,6 +67,7 @@ def _preview(page: Any, album: Keeps) -> None:
         page.locator('rp-point[data-state="PROPOSED"] .accept').first.click()
         _rest(page, 0.5)
     page.locator("rp-point .reason", has_text="no. 1,").wait_for()
+    page.evaluate("document.querySelector('rp-queue .groups').scrollTop = 0")
     _press(page, "#preview")
     page.locator('#approve-preview[aria-disabled="false"]').wait_for()
     slider = page.locator("#preview-time")
@@ -98,6 +99,8 @@ def _charts_and_report(page: Any, album: Keeps) -> None:
 def _by_hand(page: Any, album: Keeps) -> None:
     _press(page, "#teleop")
     _rest(page)
+    # A browser that draws in software may be silent for so long that its control has ended.
+    page.wait_for_function("!document.querySelector('rp-toasts .toast')")
     album.take(page, "live-teleoperate")
     page.locator("#teleop").click()
 

@@ -104,6 +104,9 @@ class Previews:
         points = {point.point_id: point for point in preview.request.points}
         if name not in names or points[name] != ticket.accepted:
             return f"{name} is not in the approved preview as it is accepted now"
+        shown = preview.cuts[names.index(name)]
+        if shown.cut_s is None:
+            return f"the approved preview shows {name} as {shown.result}"[:300]
         for before in names[: names.index(name)]:
             earlier = self._queue.get(before)
             if earlier is None or earlier.state not in ("INTENT", "DONE"):

@@ -6,6 +6,7 @@ camera answer as they should. Nothing is planned a second time, so that what is 
 
 import hashlib
 import math
+from collections import deque
 
 import msgspec
 import numpy as np
@@ -75,7 +76,9 @@ class _Run:
         self._servos = Servos(robot.drive, request.q, config.base_lag_s, config.arm_lag_s, self._dt)
         self._log = CutLog(robot.limits, self._movement.body.surroundings.model, self._queue)
         self._obstacles = Sample(Obstacles(header=m.Header(0.0, "odom"), capsules=request.obstacles), 0.0)
-        self._look: tuple[float, Sample[CloseLook]] | None = None
+        self._asked: set[int] = set()
+        self._coming: deque[tuple[float, CloseLook]] = deque()
+        self._look: Sample[CloseLook] | None = None
         self._closing: tuple[str, str, float] | None = None
         self._cut: set[str] = set()
         self._plans: dict[str, CutPlan] = {}
@@ -123,8 +126,10 @@ class _Run:
             self._closing = (*moved.cut, now)
             self._log.closed(moved.cut[1], now)
         due = sequence.picture(now)
-        if due is not None and (self._look is None or self._look[1].message.number != due[0]):
-            self._look = now + self._request.look_s, Sample(self._shown(*due), now)
+        if due is not None and due[0] not in self._asked:
+            # Of two points at the same time, too: of the cut before, and of the next one.
+            self._asked.add(due[0])
+            self._coming.append((now + self._request.look_s, self._shown(*due)))
         if command is not None:
             self._servos.step(np.array(command.xi))
         return moved
@@ -140,9 +145,10 @@ class _Run:
         )
         base = _planar(self._servos.q)
         odometry = m.Odometry(header=header, sequence=number, pose=base, linear=linear, angular=angular)
-        look = None if self._look is None or now < self._look[0] else self._look[1]
+        if self._coming and now >= self._coming[0][0]:
+            self._look = Sample(self._coming.popleft()[1], now)
         bridge = Sample(self._bridge(now), now)
-        return Inputs(Sample(joints, now), Sample(odometry, now), bridge, obstacles=self._obstacles, look=look)
+        return Inputs(Sample(joints, now), Sample(odometry, now), bridge, obstacles=self._obstacles, look=self._look)
 
     def _bridge(self, now: float) -> m.BridgeState:
         cut_id, point_id, since = self._closing or ("", "", now)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 from controller_at_work import CONFIG, entry, point
+from msgspec import structs
 from previewed import ROLLOUT, Previewed
 
 from controller import preview as preview_module
@@ -85,6 +86,23 @@ def test_what_comes_later_is_not_approved_before_what_comes_first(p):
     assert "a comes before b" in p.ask(intents.ApprovePreview, preview_hash=shown.preview_hash)
     assert p.ask(intents.MoveInQueue, point_id="b", before="a", revision=0) == ""
     assert p.ask(intents.ApprovePreview, preview_hash=shown.preview_hash) == ""
+
+
+def test_what_the_preview_does_not_cut_is_not_cut_under_its_approval(rolled):
+    def not_b(request):
+        made = rolled(request)
+        cuts = tuple(
+            cut if cut.point_id == "a" else structs.replace(cut, cut_s=None, result="not cut: a wire is too near")
+            for cut in made.cuts
+        )
+        return replace(made, cuts=cuts)
+
+    p = required(Previewed(POINTS, roll=not_b))
+    shown = p.previewed()
+    assert p.ask(intents.ApprovePreview, preview_hash=shown.preview_hash) == ""
+    p.worked()
+    assert [name for name, _ in p.robot.cuts] == ["a"]
+    assert "the approved preview shows b as not cut: a wire is too near" in p.robot.state.reason
 
 
 def test_a_base_that_was_moved_ends_the_approval_and_is_told(p):

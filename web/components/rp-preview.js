@@ -39,12 +39,17 @@ class RpPreview extends HTMLElement {
       if (!whyNot("RequirePreview")) void require(wanted);
     });
     let hash = "";
+    let working = false;
     drawOn([preview, moment, playing, points, pageState, link, now, selected], () => {
       const state = preview.get();
       if ((state?.preview_hash ?? "") !== hash) {
         hash = state?.preview_hash ?? "";
         hide();
       }
+      // What the robot does now is the robot's to show, not the ghost's.
+      const works = pageState.get()?.controller?.mode === "AUTO";
+      if (works && !working) hide();
+      working = works;
       const accepted = workOrder();
       const chosen = accepted.some((row) => row.point.point_id === selected.get());
       setEnabled(all, whyNoPreview(accepted.length), "Show what the robot would do with the accepted points");
