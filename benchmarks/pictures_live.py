@@ -19,7 +19,7 @@ class Keeps(Protocol):
 
 
 def walk_through(page: Any, album: Keeps, port: int, seed: int) -> None:
-    """From signing in to the stop, on a demo of its own."""
+    """From signing in to leading the tool by hand, on a demo of its own."""
     demo = Demo(port, seed)
     try:
         page.goto(f"http://127.0.0.1:{port}/")
@@ -28,7 +28,7 @@ def walk_through(page: Any, album: Keeps, port: int, seed: int) -> None:
         # Drawn in software the view is slow, and work is paused while nobody looks on.
         with demo.watched():
             page.goto(demo.post("invite", user="Ada", role="supervisor")["link"])
-            for step in (_find, _preview, _work, _charts_and_report, _by_hand, _stop):
+            for step in (_find, _preview, _work, _charts_and_report, _by_hand):
                 step(page, album)
     finally:
         demo.close()
@@ -53,7 +53,6 @@ def _find(page: Any, album: Keeps) -> None:
     page.locator("rp-camera img").wait_for()
     _rest(page, 8.0)
     album.keep_still(page)
-    album.take(page, "live-idle")
     _press(page, "#arm")
     _mode(page, "READY")
     page.locator("rp-point").first.click(position={"x": 60, "y": 12})
@@ -103,16 +102,3 @@ def _by_hand(page: Any, album: Keeps) -> None:
     page.wait_for_function("!document.querySelector('rp-toasts .toast')")
     album.take(page, "live-teleoperate")
     page.locator("#teleop").click()
-
-
-def _stop(page: Any, album: Keeps) -> None:
-    page.locator("#stop").click()
-    _mode(page, "ESTOP_LATCHED")
-    page.locator('.acknowledgements [data-acknowledged="true"]').nth(1).wait_for()
-    page.locator("#reset-reason").fill("the row is clear, nobody is near")
-    _rest(page)
-    album.take(page, "live-stopped")
-    page.emulate_media(color_scheme="dark")
-    page.set_viewport_size({"width": 1024, "height": 768})
-    _rest(page)
-    album.take(page, "live-tablet-dark")
