@@ -91,7 +91,29 @@ def test_who_may_not_change_it_changes_nothing(page: Page, server: PlayedServer)
     assert server.posted == []
 
 
-def test_of_many_points_only_those_in_view_are_there(page: Page, server: PlayedServer) -> None:
+WATCH = """() => {
+  window.touched = [];
+  new MutationObserver((records) => {
+    for (const { target } of records) {
+      const part = target instanceof Element ? target : target.parentElement;
+      const row = part?.closest("rp-point, .order-row");
+      if (row && !part.closest("rp-point-details")) window.touched.push(row.dataset.pointId);
+    }
+  }).observe(document.querySelector("rp-queue"), {
+    subtree: true, childList: true, attributes: true, characterData: true,
+  });
+}"""
+
+
+def touched(page: Page) -> set[str]:
+    """Points of which anything was drawn anew since the last time; two pictures later nothing is outstanding."""
+    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    return set(page.evaluate("() => window.touched.splice(0)"))
+
+
+def test_of_many_points_only_those_in_view_are_there_and_only_what_changed_is_drawn_anew(
+    page: Page, server: PlayedServer
+) -> None:
     opened(page)
     server.points = tuple(point(number, "ACCEPTED", spur=number) for number in range(300))
     server.tell(server.page_points())
@@ -100,6 +122,22 @@ def test_of_many_points_only_those_in_view_are_there(page: Page, server: PlayedS
     page.keyboard.press("End")
     expect(page.locator('.order-row[data-point-id="p299"]')).to_be_visible()
     assert page.locator(".order-row").count() < 30
+    page.evaluate(WATCH)
+    touched(page)
+    for _ in range(3):
+        server.tell(server.state())
+        server.tell(server.page_points())
+    assert touched(page) == set(), "states and points that are as they were"
+    page.keyboard.press("ArrowUp")
+    expect(page.locator('.order-row[data-point-id="p298"]')).to_have_attribute("aria-selected", "true")
+    # Of the queue the first row takes the Tab key while no row is chosen.
+    assert touched(page) <= {"p298", "p299", "p0"}
+    entry = msgspec.structs.replace(server.points[297].entry, reason="a wire is near")
+    changed = msgspec.structs.replace(server.points[297], entry=entry)
+    server.points = (*server.points[:297], changed, *server.points[298:])
+    server.tell(server.page_points())
+    expect(page.locator('rp-point[data-point-id="p297"] .reason')).to_contain_text("a wire is near")
+    assert touched(page) == {"p297"}
 
 
 def test_the_approach_is_turned_and_left_to_the_search_again(page: Page, server: PlayedServer) -> None:

@@ -77,7 +77,7 @@ export function setEnabled(button, why, hint = "") {
  * @param {string} name
  * @param {string} value Empty removes it.
  */
-function setAttribute(node, name, value) {
+export function setAttribute(node, name, value) {
   if ((node.getAttribute(name) ?? "") === value) return;
   if (value) node.setAttribute(name, value);
   else node.removeAttribute(name);

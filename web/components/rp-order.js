@@ -1,6 +1,6 @@
 // The order of work, to be changed by dragging or by keys. Only rows in view are there, so that thousands cost nothing.
 
-import { element, setEnabled, setText } from "../element.js";
+import { element, setAttribute, setEnabled, setText } from "../element.js";
 import { moveTo, orderWords, plannersOrder, whyNoMove, whyNoPlannersOrder, workOrder } from "../order.js";
 import { link, now, pageState, points, selected } from "../state.js";
 import { drawOn } from "../store.js";
@@ -72,7 +72,7 @@ class RpOrder extends HTMLElement {
     }
     for (let at = first; at <= last; at += 1) this.show(at);
     const chosen = this.place(selected.get());
-    list.setAttribute("aria-activedescendant", this.rows.has(chosen) ? `order-${chosen}` : "");
+    setAttribute(list, "aria-activedescendant", this.rows.has(chosen) ? `order-${chosen}` : "");
   }
 
   /** @param {number} at */
@@ -92,11 +92,11 @@ class RpOrder extends HTMLElement {
     if (number) setText(number, `${at + 1}`);
     if (name) setText(name, `${point.point.point_id} · vine ${point.point.vine}, spur ${point.point.spur}`);
     if (way) setText(way, refused ? "refused" : point.plan ? `${point.plan.duration_s.toFixed(1)} s` : "");
-    row.dataset.pointId = point.point.point_id;
-    row.title = why || point.point.reason;
+    setAttribute(row, "data-point-id", point.point.point_id);
+    setAttribute(row, "title", why || point.point.reason);
     row.classList.toggle("refused", why !== "");
     row.classList.toggle("dragged", point.point.point_id === this.dragged);
-    row.setAttribute("aria-selected", String(point.point.point_id === selected.get()));
+    setAttribute(row, "aria-selected", String(point.point.point_id === selected.get()));
   }
 
   /** @param {string} pointId */

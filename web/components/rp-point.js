@@ -3,7 +3,6 @@
 import { accept, isUnknown, reject, whyNotAccept, whyNotReject } from "../decisions.js";
 import { element, setEnabled, setText } from "../element.js";
 import { icon, setIcon } from "../icons.js";
-import { pageState } from "../state.js";
 import { select } from "../teleoperation.js";
 import { POINT_WORDS, counted, inWords } from "../words.js";
 
@@ -69,13 +68,28 @@ export class RpPoint extends HTMLElement {
     if (this.row) select(this.row.point.point_id);
   }
 
-  /** @param {PagePoint} row */
-  show(row) {
+  /** What is shown, in one string. */
+  drawn = "";
+
+  /** @param {boolean} active Is the robot at it now? */
+  mark(active) {
+    this.classList.toggle("active", active);
+  }
+
+  /**
+   * Nothing is done where nothing has changed: of thousands of points that come anew, one has.
+   *
+   * @param {PagePoint} row
+   * @param {string} may What may be done with points now.
+   */
+  show(row, may) {
     this.row = row;
+    const drawn = `${JSON.stringify(row)}\n${may}`;
+    if (drawn === this.drawn) return;
+    this.drawn = drawn;
     const { point, entry } = row;
     this.dataset.pointId = point.point_id;
     this.dataset.state = entry.state;
-    this.classList.toggle("active", pageState.get()?.controller?.active_point_id === point.point_id);
     setIcon(this.shape, entry.state);
     setText(this.word, POINT_WORDS[entry.state]);
     setText(this.place, point.point_id);

@@ -3,7 +3,7 @@
 import { countOf, whyNot } from "../allowed.js";
 import { placing, setPlacing, whyNoPlacing } from "../by-hand.js";
 import { accept, acceptAll, decisions, undo, whyNoUndo, whyNotAccept, whyNotReject } from "../decisions.js";
-import { element, panelHead, setEnabled, setText } from "../element.js";
+import { element, panelHead, setAttribute, setEnabled, setText } from "../element.js";
 import { icon } from "../icons.js";
 import { guardLookAgain, placeItem, placeWords } from "../look-again.js";
 import { link, now, pageState, points, selected, staleWords } from "../state.js";
@@ -61,7 +61,8 @@ class RpQueue extends HTMLElement {
       setText(source, page?.segmenter ?? "");
       setText(empty, emptyWords());
       // States come ten times a second; the rows change with the points, and with what may be done with them.
-      const may = MAY.map(whyNot).concat(pageState.get()?.controller?.active_point_id ?? "").join("\n").replace(AGE, "");
+      this.follow(pageState.get()?.controller?.active_point_id ?? "");
+      const may = MAY.map(whyNot).join("\n").replace(AGE, "");
       if (page === drawnPage && may === drawn) return;
       drawnPage = page;
       drawn = may;
@@ -69,7 +70,8 @@ class RpQueue extends HTMLElement {
       setText(summary, summaryWords(this.order));
       empty.hidden = this.order.length > 0;
       for (const each of open) each.show(page?.abstained ?? []);
-      this.place(list, groups);
+      this.place(list, groups, may);
+      this.rows.get(this.active)?.mark(true);
       this.choose();
     });
     drawOn([selected], () => this.choose());
@@ -81,7 +83,17 @@ class RpQueue extends HTMLElement {
   order = [];
   /** The row that is marked as chosen. */
   chosen = "";
+  /** The point that the robot is at. */
+  active = "";
   reason = new RpReason();
+
+  /** @param {string} pointId */
+  follow(pointId) {
+    if (pointId === this.active) return;
+    this.rows.get(this.active)?.mark(false);
+    this.rows.get(pointId)?.mark(true);
+    this.active = pointId;
+  }
 
   /** Mark the chosen row alone, and let the Tab key come to it, or else to the first. */
   choose() {
@@ -89,8 +101,9 @@ class RpQueue extends HTMLElement {
     const reachable = this.rows.has(pointId) ? pointId : (this.order[0]?.point.point_id ?? "");
     for (const name of [this.chosen, this.reachable, pointId, reachable]) {
       const item = this.rows.get(name);
-      item?.setAttribute("aria-current", String(name === pointId));
-      if (item) item.tabIndex = name === reachable ? 0 : -1;
+      if (!item) continue;
+      setAttribute(item, "aria-current", String(name === pointId));
+      setAttribute(item, "tabindex", name === reachable ? "0" : "-1");
     }
     this.chosen = pointId;
     this.reachable = reachable;
@@ -124,8 +137,9 @@ class RpQueue extends HTMLElement {
    *
    * @param {HTMLElement} list
    * @param {Map<string, HTMLElement>} groups
+   * @param {string} may What may be done with points now.
    */
-  place(list, groups) {
+  place(list, groups, may) {
     const rows = this.order;
     const wantedRows = new Set(rows.map((row) => row.point.point_id));
     const wantedGroups = new Set(rows.map(groupOf));
@@ -154,7 +168,7 @@ class RpQueue extends HTMLElement {
       }
       putAfter(group, item, lastRow);
       lastRow = item;
-      item.show(row);
+      item.show(row, may);
     }
   }
 
