@@ -28,6 +28,7 @@ from server.scene_row import color_of, drawn_kinds, rods_mesh
 from server.scene_sight import Sight, draw_cloud, draw_frustum
 from server.scene_sight import remove as remove_sight
 from server.scene_trail import SceneTrail
+from server.scene_wake import wake_on_own_thread
 
 VIEW_VERSION = viser.__version__
 _SKY_TOP, _SKY_BOTTOM = np.array([22.0, 27.0, 34.0]), np.array([58.0, 66.0, 76.0])
@@ -66,6 +67,7 @@ class Scene:
             on_sightline: Called with (owner, origin, direction) when `owner`, who places points, clicked into the view.
             on_stranger: Called when a connection that did not come through the proxy was refused.
         """
+        wake_on_own_thread()
         with contextlib.redirect_stdout(io.StringIO()):
             self._server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         self.port = int(self._server.get_port())
