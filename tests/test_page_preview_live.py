@@ -15,8 +15,10 @@ from bridge.sim import trace
 
 pytestmark = [pytest.mark.browser, pytest.mark.alone, pytest.mark.slow]
 
-#: Of the tool that was driven from the line that was shown (m), and of the time it took from the time shown.
-BOUND, LONGER = 0.03, 0.2
+#: Of the tool that was driven from the line that was shown (m).
+BOUND = 0.01
+#: How much longer it may take than was shown, as a share: pictures on a machine that draws the page too come late.
+LONGER = 0.6
 
 
 def preview(robot: LiveRobot) -> dict[str, Any]:
@@ -86,4 +88,4 @@ def test_what_was_previewed_and_approved_is_what_is_done(tmp_path: Path, chromiu
     print(f"apart: median {np.median(apart):.4f} m, 95 % {within:.4f} m, most {most:.4f} m")
     print(f"{took:.1f} s for {expected:.1f} s")
     assert within < BOUND
-    assert took == pytest.approx(expected, rel=LONGER, abs=1.0)
+    assert took < (1.0 + LONGER) * expected
