@@ -3,6 +3,7 @@
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 from page_parts import held
@@ -10,6 +11,7 @@ from played_page import box_of, until
 from played_server import ORIGIN, PlayedServer, bridge, controller, point
 from playwright.sync_api import Browser, Page, expect
 
+from rolling_panda import messages as m
 from rolling_panda import page_messages as p
 from rolling_panda.resources import resource
 from server.page_files import as_sent
@@ -46,7 +48,47 @@ def test_fits_the_screen_with_the_stop_on_top(page: Page, server: PlayedServer, 
         assert f"#{top}" == selector, "nothing lies over it"
 
 
-def test_what_is_accepted_and_who_comes_moves_nothing_on_the_page(browser: Browser, server: PlayedServer) -> None:
+#: What moved on the page since it was ready, other than by a press: its share of the screen and of what.
+SHIFTS = """() => { window.shifts = []; new PerformanceObserver((list) => {
+  for (const { value, sources } of list.getEntries())
+    window.shifts.push([value, ...sources.map(({ node }) => `${node?.nodeName} ${node?.className}`)]);
+}).observe({ type: "layout-shift" }); }"""
+
+
+def a_whole_job(page: Page, server: PlayedServer) -> None:
+    """Every point is worked off but one, which is refused; a pause and a stop come in between."""
+    states: list[m.PointState] = ["ACCEPTED"] * 3
+    told = 10
+
+    def tell(mode: m.Mode, reason: str, **more: Any) -> None:
+        nonlocal told
+        told += 1
+        server.controller = controller(mode, reason=reason, **more)
+        server.points = tuple(point(k + 1, state, spur=k + 1) for k, state in enumerate(states))
+        server.tell(p.PageEvents(events=(server.event(told, "warning", f"{mode}: {reason}"),)))
+        server.tell(server.page_points())
+        expect(page.locator("#mode")).to_have_attribute("data-mode", mode)
+
+    ends: tuple[tuple[int, m.PointState], ...] = ((1, "DONE"), (2, "FAILED_NOT_CUT"), (3, "UNKNOWN"))
+    for number, end in ends:
+        name = f"p{number}"
+        for phase in ("APPROACH", "ADVANCE", "CUT", "RETREAT"):
+            states[number - 1] = "INTENT" if phase == "CUT" else "ACCEPTED"
+            tell("AUTO", f"{phase.lower()} of {name}, vine 1, spur {number}", phase=phase, active_point_id=name)
+        states[number - 1] = end
+        tell("PAUSED", f"{name} is {end}; a person has to look at it before the work goes on")
+    server.bridge = bridge(stop_id="s1", stopped_by="Ada: stop button")
+    tell("ESTOP_LATCHED", "stopped by Ada: stop button")
+    expect(page.locator("rp-stop-banner")).to_be_visible()
+    server.bridge = bridge()
+    tell("IDLE", "the stop was released by Ada: all clear")
+    expect(page.locator("rp-stop-banner")).to_be_hidden()
+    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
+def test_what_is_accepted_who_comes_and_a_whole_job_move_nothing_on_the_page(
+    browser: Browser, server: PlayedServer
+) -> None:
     """Neither a panel nor a button nor a row of the queue is elsewhere, so that no press meets another one."""
     parts = (
         "#stop",
@@ -72,6 +114,7 @@ def test_what_is_accepted_and_who_comes_moves_nothing_on_the_page(browser: Brows
     expect(page.locator("rp-point")).to_have_count(3)
     expect(page.locator("rp-camera img")).to_be_visible()
     before = page.evaluate(boxes)
+    page.evaluate(SHIFTS)
     assert len(before) > 15
     server.points = (point(1, "ACCEPTED"), point(2, "ACCEPTED", spur=2), point(3, "REJECTED", spur=3))
     server.tell(server.page_points())
@@ -81,6 +124,9 @@ def test_what_is_accepted_and_who_comes_moves_nothing_on_the_page(browser: Brows
     server.control = held("other", "Bob")
     expect(page.locator("#take-control")).to_be_visible()
     assert page.evaluate(boxes) == before
+    a_whole_job(page, server)
+    shifts = page.evaluate("window.shifts")
+    assert sum(share for share, *_ in shifts) < 0.02, "words beside one that has changed, a line of the alarms, no more"
     context.close()
 
 
