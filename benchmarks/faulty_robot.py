@@ -192,7 +192,7 @@ class Hand:
         wanted = {"hold": True, "base": {"linear": self._linear, "angular": 0.0}}
         while not self._ended.wait(_RENEW_S):
             try:
-                self._client.get("/api/state" if self._looks else "/api/me")
+                self._client.get("/api/state" if self._looks else "/api/events")
                 if self._linear:
                     self._client.post("/api/teleop", json=wanted)
                 self.renewed_at = time.monotonic()

@@ -7,6 +7,9 @@ from controller.whole_body.saturation import Saturation
 from rolling_panda import messages as m
 from rolling_panda.differential_drive import NXI, Array
 
+#: So many periods of rest come first under a new token: the bridge takes no other beginning, and one may be lost.
+_AT_REST_FIRST = 3
+
 BRAKED = "a velocity outside the limits was not sent; the robot brakes"
 
 
@@ -17,6 +20,8 @@ class Setpoints:
         """At rest."""
         self._saturation = saturation
         self._number = 0
+        self._token: Token | None = None
+        self._rest = 0
         self.sent: Array = np.zeros(NXI)
         self.before: Array = self.sent
 
@@ -37,6 +42,11 @@ class Setpoints:
 
     def command(self, xi: Array, token: Token, echo: int) -> m.MotionCommand:
         """The message for ξ̇ (9), which counts as sent; `echo` is the joint state that it was computed from."""
+        if token != self._token:
+            # Control changes hands at rest.
+            self._token, self._rest = token, _AT_REST_FIRST if self.at_rest else 0
+        if self._rest > 0:
+            self._rest, xi = self._rest - 1, np.zeros(NXI)
         self.sent, self.before = xi, self.sent
         self._number += 1
         a, b, c, d, e, f, g, h, i = xi.tolist()

@@ -9,7 +9,9 @@ import pytest
 
 from benchmarks.apart import apart
 from benchmarks.fault_kinds import FAULTS
+from benchmarks.fault_world import World
 from benchmarks.faults import deal, main, run_trial, start
+from rolling_panda.teleop_messages import BaseVelocity
 
 NAMED = {fault.name: fault for fault in FAULTS}
 SHORT = ("software stop", "controller killed, base at full speed", "an older controller's commands")
@@ -19,6 +21,18 @@ SHORT = ("software stop", "controller killed, base at full speed", "an older con
 def test_the_most_important_ones_hold(name):
     trial = run_trial(NAMED[name], start(NAMED[name]), seed=5)
     assert trial.held, trial
+
+
+def test_who_was_silent_and_has_lost_control_moves_the_robot_by_holding_anew():
+    world = World(0)
+    world._armed()
+    world.heard = False
+    world.run(1.5)
+    assert world.controller._supervisor.authority.held is False
+    world.heard, world.held = True, BaseVelocity(0.1, 0.0)
+    world.modes.clear()
+    world._until_it_moves(0.5)
+    assert set(world.modes) == {"TELEOP"}
 
 
 def test_trials_are_dealt_out_to_the_faults_of_a_requirement_each_with_a_seed_of_its_own():
