@@ -79,6 +79,9 @@ def test_alarms_come_worst_first_with_what_to_do_and_go(page: Page, server: Play
     server.tell(server.page_points())
     expect(page.locator("#alarms .empty")).to_be_visible(timeout=5000)
     expect(page.locator("#alarms li")).to_have_count(0)
+    server.controller = controller("PAUSED", reason="nothing was heard from them for 1 s")
+    expect(rows).to_have_text(["Paused: nothing was heard from them for 1 s"])
+    expect(page.locator("#alarms li .act")).to_contain_text("press Resume, then Start")
 
 
 def test_without_a_link_that_is_the_one_alarm_until_it_is_back(page: Page, server: PlayedServer) -> None:

@@ -74,6 +74,9 @@ function ofModes({ controller, bridge, stops }) {
     case "PROTECTIVE_STOP":
       found.push(alarm("protective", "error", `Protective stop${reason}`, "Mend the cause, then press Acknowledge."));
       break;
+    case "PAUSED":
+      found.push(alarm("paused", "warning", `Paused${reason}`, "When that is seen to, press Resume, then Start."));
+      break;
     case "FAULT":
       found.push(alarm("fault", "error", `Fault${reason}`, "Mend the cause; a supervisor presses Acknowledge."));
       break;
