@@ -22,6 +22,13 @@ def control_router(desk: Desk) -> APIRouter:
         told = msgspec.to_builtins(received.message) | {"client": session.client}
         return Response(msgspec.json.encode(told), media_type="application/json")
 
+    @router.post("/here")
+    async def here(session: Caller) -> Response:
+        """Say that the caller is there, which keeps control: a page does so while the 3-D view keeps it busy."""
+        if not session.may_operate:
+            return answer(Result(403, False, f"a {session.role} may look and stop, not operate"))
+        return answer(Result(200, True, ""))
+
     @router.post("/take")
     async def take(session: Caller, request: body.TakeControl) -> Response:
         """Hold control. From somebody else only with `confirm`; the robot stops first, and they are told."""

@@ -135,6 +135,7 @@ class PlayedServer:
     crop: bytes = field(default_factory=lambda: camera_image((240, 180)))
     view: bytes = b""
     number: int = 0
+    heres: int = 0
     started: float = field(default_factory=time.time)
     image: bytes = field(default_factory=lambda: camera_image())
 
@@ -146,6 +147,9 @@ class PlayedServer:
         path = route.request.url.removeprefix(ORIGIN + self.base).split("?")[0]
         if not self.online:
             route.abort()
+        elif path == "/api/control/here":
+            self.heres += 1
+            route.fulfill(json={"ok": True, "reason": ""})
         elif route.request.method == "POST":
             self.posted.append((path, route.request.post_data_json))
             status, body = self.answers.get(path, (200, {"ok": True, "reason": ""}))

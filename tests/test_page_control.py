@@ -1,10 +1,14 @@
 """On the page: who holds control, and how it changes hands."""
 
+import time
+
 import pytest
 from page_parts import held
 from played_page import until
 from played_server import PlayedServer
 from playwright.sync_api import Page, expect
+
+from rolling_panda.page_messages import Ping
 
 pytestmark = pytest.mark.browser
 
@@ -37,3 +41,28 @@ def test_a_request_is_shown_and_granted_and_who_gave_is_told(page: Page, server:
     server.control = held("other", "Bob", told="Bob holds control, before Ada", told_number=3)
     expect(page.locator("rp-toasts")).to_contain_text("You no longer hold control")
     expect(page.locator("#request-control")).to_be_visible()
+
+
+def test_who_holds_control_is_there_while_the_page_is_busy_but_not_when_it_hangs(
+    page: Page, server: PlayedServer
+) -> None:
+    def pings() -> int:
+        return sum(isinstance(message, Ping) for message in server.said)
+
+    server.control = held("other", "Bob")
+    expect(page.locator("rp-control")).to_contain_text("Bob holds control")
+    assert server.heres == 0
+    server.control = held("me", "Ada")
+    until(page, lambda: server.heres > 0)
+    # The thread that draws stands still, for good as far as this test goes.
+    page.evaluate("setTimeout(() => { const until = performance.now() + 4500; while (performance.now() < until); }, 0)")
+    began = time.monotonic()
+    before, spoken = server.heres, pings()
+    told: list[float] = []
+    while time.monotonic() < began + 4.0:
+        page.wait_for_timeout(20)
+        if server.heres > before:
+            before = server.heres
+            told.append(time.monotonic() - began)
+    assert 1.2 < told[-1] < 2.8, told
+    assert pings() <= spoken + 2

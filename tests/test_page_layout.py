@@ -222,7 +222,7 @@ def test_the_page_is_small_and_keeps_to_its_own_files() -> None:
             waiting += [(script.parent / name).resolve() for name in imported]
     assert sum(len(sent[script].encode()) for script in first) < 150_000, "what the page fetches before it is used"
     later = {"rp-charts.js", "charts.js", "rp-report.js", "rp-order.js", "rp-preview.js", "preview.js"}
-    later |= {"rp-robots.js", "kept-history.js"}
+    later |= {"rp-robots.js", "kept-history.js", "here-worker.js"}
     assert {script.name for script in set(scripts) - first} - {"sign-in.js", "view.js"} == later, (
         "what it fetches when opened"
     )
