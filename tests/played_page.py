@@ -71,15 +71,14 @@ def opened(tab: Page, attach: Callable[[Page], None], path: str, width: int, hei
         tab.mouse.up()
         for key in _PRESSED:
             tab.keyboard.up(key)
-        tab.unroute_all(behavior="ignoreErrors")
-        tab.route(f"{ORIGIN}/**", lambda route: route.fulfill(body="", content_type="text/html"))
+        tab.route(f"{ORIGIN}/nothing", lambda route: route.fulfill(body="", content_type="text/html"))
         tab.goto(f"{ORIGIN}/nothing")
         tab.evaluate("localStorage.clear(); sessionStorage.clear()")
-        tab.unroute_all()
+        tab.unroute_all(behavior="ignoreErrors")
         tab.emulate_media(color_scheme="null", reduced_motion="null")
         tab.remove_listener("pageerror", failed)
         tab.remove_listener("console", said)
-    assert problems == []
+    assert problems == [], problems
 
 
 @pytest.fixture

@@ -23,6 +23,9 @@ def server() -> Iterator[tuple[Stage, Transport]]:
     router = Router(TransportConfig(mode="router", connect=(), listen=(endpoint,)))
     server = Transport(TransportConfig(connect=(endpoint,)), "server", "rp1")
     stage = Stage(endpoint, Player(tape(event(0.35, "it begins")), "a.mcap", time.monotonic()))
+    end = time.monotonic() + 5.0
+    while not {"bridge", "controller", "perception"} <= server.present() and time.monotonic() < end:
+        time.sleep(0.02)
     yield stage, server
     stage.__exit__()
     server.close()
