@@ -130,6 +130,8 @@ def sign_in(page: str, token: str) -> int:
     ).status_code
 
 
+# One more start of everything; what it is made of is tested in `test_demo_supervisor.py`.
+@pytest.mark.slow
 def test_when_a_process_is_killed_it_says_which_and_ends_the_rest(tmp_path: Path) -> None:
     with running_demo(tmp_path) as demo:
         # The bridge has a process of its own for pictures, which must not be left either.

@@ -24,9 +24,9 @@ def drive(robot: LiveRobot) -> None:
     robot.wait(robot.driving, 40, "the base to drive")
 
 
-@pytest.mark.parametrize(
-    "name", ["router", *(pytest.param(each, marks=pytest.mark.slow) for each in ("perception", "server"))]
-)
+# Each a start of everything; the one after which most could go wrong, the controller's, is below and not slow.
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["router", "perception", "server"])
 def test_base_and_arm_are_still_soon_after_a_process_is_killed(tmp_path: Path, name: str) -> None:
     with LiveRobot(tmp_path) as robot:
         drive(robot)

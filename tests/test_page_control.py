@@ -29,6 +29,9 @@ def test_control_is_taken_from_somebody_only_by_a_second_press(page: Page, serve
     page.locator("#take-control").click()
     expect(page.locator("#take-control")).to_have_text("Really take it?")
     assert not any(path == "/api/control/take" for path, _ in server.posted)
+    for name in ("#home", "#teleop"):
+        expect(page.locator(name)).to_have_attribute("aria-disabled", "true")
+        expect(page.locator(name)).to_have_attribute("title", "Bob holds control: ask for it, or take it")
     page.locator("#take-control").click()
     until(page, lambda: ("/api/control/take", {"confirm": True}) in server.posted)
 

@@ -27,6 +27,8 @@ const NEEDS = Object.freeze({
   ReconsiderPoint: "Decisions cannot be taken back",
   ResolvePoint: "How a cut ended cannot be said",
 });
+/** What moves the robot, or gets it ready to, is for who holds control. */
+const OF_HOLDER = new Set(["Arm", "Start", "Survey", "Resume", "Home"]);
 
 /** Why this page can ask for nothing now; empty when it can. */
 export function whyNothing() {
@@ -49,11 +51,19 @@ export function whyNot(intent) {
   if (nothing) return nothing;
   const controller = pageState.get()?.controller ?? null;
   if (controller === null || !isLive("controller")) return staleWords("controller") || "The controller is not there";
-  if (controller.allowed.includes(intent)) return "";
+  if (controller.allowed.includes(intent)) return OF_HOLDER.has(intent) ? whyNotHolder() : "";
   if (!INTENTS.includes(/** @type {any} */ (intent))) return `There is no ${intent}`;
   if (intent === "Start" && controller.mode === "READY" && countOf("ACCEPTED") === 0) return "Accept a point first";
   if (intent === "Start" && controller.mode === "READY" && whyNoStart()) return whyNoStart();
   return `${NEEDS[intent]}; the mode is ${MODE_WORDS[controller.mode]}`;
+}
+
+/** Whose robot it is while somebody else moves it; empty for who holds control, and where nobody does. */
+function whyNotHolder() {
+  const state = pageState.get();
+  const control = state?.control ?? null;
+  if (control === null || control.holder === "" || control.holder === state?.client) return "";
+  return `${control.user} holds control: ask for it, or take it`;
 }
 
 /** Why the tool cannot be moved by hand now; empty when it can. */
@@ -63,7 +73,7 @@ export function whyNoTeleoperation() {
   const controller = pageState.get()?.controller ?? null;
   if (controller === null || !isLive("controller")) return staleWords("controller") || "The controller is not there";
   if (!isLive("bridge")) return staleWords("bridge") || "The bridge is not there";
-  if (controller.mode === "READY" || controller.mode === "TELEOP") return "";
+  if (controller.mode === "READY" || controller.mode === "TELEOP") return whyNotHolder();
   return `Teleoperation needs Ready; the mode is ${MODE_WORDS[controller.mode]}`;
 }
 

@@ -11,6 +11,8 @@ from rolling_panda.config import load_section
 from rolling_panda.errors import RollingPandaError
 
 
+# Pages are other programs, which take their time to begin.
+@pytest.mark.slow
 @pytest.mark.alone
 def test_pages_look_on_until_they_are_told_to_end(capfd):
     with running_server(FakeWire()) as server, server.client(user="ann") as client:
