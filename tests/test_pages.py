@@ -115,6 +115,13 @@ def test_a_page_that_may_only_look_on_is_told_half_as_often(server):
         assert [page.hear("PageState")["number"] % 2 for _ in range(3)] == [0, 0, 0]
 
 
+def test_a_page_that_may_only_look_on_holds_nothing_and_is_told_for_its_role(server):
+    with server.client(user="vi", role="viewer") as client, Page(server, client) as page:
+        page.hear("PageState")
+        page.hold(True)
+        assert "a viewer may look and stop, not operate" in page.hear("HoldEnded")["reason"]
+
+
 def test_a_ping_is_answered_with_its_number(page):
     page.hear("PageState")
     page.say("Ping", number=77, rendered=0)
