@@ -2,9 +2,11 @@
 
 import argparse
 import asyncio
+import json
 import re
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import AsyncExitStack, contextmanager, suppress
 
@@ -43,36 +45,49 @@ async def look_on(url: str, cookie: str, pages: int, slow: int, whole: bool = Fa
                 # Who never reads never hears the other side say goodbye.
                 close_timeout=_CLOSE_S,
                 subprotocols=protocols,
+                # A browser asks for no sign of life.
+                ping_interval=None,
                 max_size=None,
                 compression=None,
             )
             return await stack.enter_async_context(opening)
 
         images = await stack.enter_async_context(httpx.AsyncClient(base_url=url, headers=headers, trust_env=False))
-        readers, views = [], []
+        readers = []
         for number in range(pages):
             page = await opened("/ws")
             view = await opened("/viser", [Subprotocol(f"viser-v{VIEW_VERSION}")]) if whole else None
             if number >= slow:
                 readers.append(group.create_task(_read(page, images if whole else None)))
                 if view is not None:
-                    views.append(group.create_task(_read(view)))
+                    readers.append(group.create_task(_read(view)))
         print("open", flush=True)
         await asyncio.to_thread(sys.stdin.read)
-        print(sum(not reader.done() for reader in readers), flush=True)
-        for reader in readers + views:
+        print(json.dumps([reader.result() for reader in readers if reader.done()]), flush=True)
+        for reader in readers:
             reader.cancel()
 
 
-async def _read(socket: ClientConnection, images: httpx.AsyncClient | None = None) -> None:
-    shown = "0"
-    with suppress(ConnectionClosed):
+async def _read(socket: ClientConnection, images: httpx.AsyncClient | None = None) -> str:
+    """Read until the other side ends it; how it ended."""
+    shown, image = "0", asyncio.create_task(asyncio.sleep(0.0))
+    try:
         async for said in socket:
             frame = _FRAME.search(said) if images is not None and isinstance(said, str) else None
-            if images is not None and frame is not None and frame[1] != shown:
+            # As the page does: the newest image, beside what else is read, and one at a time.
+            if images is not None and frame is not None and frame[1] != shown and image.done():
                 shown = frame[1]
-                with suppress(httpx.HTTPError):
-                    await images.get(f"/camera/color.jpg?n={shown}")
+                image = asyncio.create_task(_load(images, f"/camera/color.jpg?n={shown}"))
+    except ConnectionClosed:
+        pass
+    finally:
+        image.cancel()
+    return f"{socket.close_code} {socket.close_reason}".strip()
+
+
+async def _load(images: httpx.AsyncClient, path: str) -> None:
+    with suppress(httpx.HTTPError):
+        await images.get(path)
 
 
 @contextmanager
@@ -94,13 +109,14 @@ def looked_at(url: str, cookie: str, pages: int, slow: int, whole: bool = False)
         if crowd.stdout.readline() != "open\n":
             raise RollingPandaError("the pages that look on were not let in")
         yield
-        reading, _ = crowd.communicate(timeout=20)
-    if int(reading) != pages - slow:
-        raise RollingPandaError(f"{reading.strip()} of {pages - slow} pages still read at the end")
+        told, _ = crowd.communicate(timeout=20)
+    if ended := json.loads(told):
+        how = ", ".join(f"{count} x {reason}" for reason, count in Counter(ended).most_common())
+        raise RollingPandaError(f"{len(ended)} of the pages and views that read were ended: {how}")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Look on until standard input closes, then say how many still read. Returns the exit code."""
+    """Look on until standard input closes, then say which that read were ended. Returns the exit code."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("url", help="of the server, http://HOST:PORT")
     parser.add_argument("cookie", help="NAME=VALUE of a session")

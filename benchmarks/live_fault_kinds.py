@@ -177,8 +177,7 @@ LIVE_FAULTS: tuple[LiveFault, ...] = (
         "who is there looks away",
         "R16",
         "browser–server",
-        # Out of the canes first.
-        3.5,
+        2.5,
         lambda robot, hand: hand.look_away(),
         moving="work",
         watched_s=4.0,

@@ -80,7 +80,7 @@ def run_live(
                     happened.append(_happen(robot, fault, draw.uniform(0.0, 0.4), way))
                 except (RollingPandaError, AssertionError) as error:
                     lines = str(error).splitlines()
-                    told(f"no trial of {fault.name}: {lines[0]}; {' | '.join(lines[-4:])}")
+                    told(f"no trial of {fault.name}: {lines[0]}; {_why_not(robot)}; {' | '.join(lines[-4:])}")
                     break
     told(f"{len(happened)} faults in {starts} starts of the processes")
     return _judged(happened, seed)
@@ -110,7 +110,7 @@ def _happen(robot: FaultyRobot, fault: LiveFault, later_s: float, way: float) ->
         if robot.processes[name].poll() is not None:
             robot.start(name)
     if fault.restart:
-        robot.wait(lambda: all(robot.gone(name) is None for name in fault.restart), 30, f"{fault.restart} to be back")
+        robot.wait(lambda: robot.back(fault.restart), 30, f"{fault.restart} to be back")
     return out
 
 
@@ -120,6 +120,18 @@ def _mode(robot: FaultyRobot) -> str:
     except httpx.HTTPError:
         return ""
     return f"{controller['mode']}: {controller['reason']}" if controller else ""
+
+
+def _why_not(robot: FaultyRobot) -> str:
+    """What the robot says it is doing, and what keeps it from that."""
+    try:
+        controller = robot.state()["controller"]
+    except httpx.HTTPError as error:
+        return str(error)
+    if not controller:
+        return "no controller"
+    near = controller["near"] and f"near {controller['near']}"
+    return ", ".join(filter(None, (controller["mode"], controller["reason"], controller["held_by"], near)))
 
 
 def _moves(robot: FaultyRobot, by_hand: bool) -> bool:

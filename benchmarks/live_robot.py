@@ -4,7 +4,7 @@ import signal
 import socket
 import subprocess
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
@@ -76,6 +76,8 @@ class LiveRobot:
             "server": ["--port", str(self.port), "--sign-in-token-file", str(token)],
         }[name]
         if name == "server":
+            # Sessions end with the server that knew them.
+            self._sign_out()
             token.touch(0o600)
             token.write_text(TOKEN)
         if name != "router":
@@ -108,8 +110,7 @@ class LiveRobot:
 
     def close(self) -> None:
         """End everything, politely first."""
-        if self._client is not None:
-            self._client.close()
+        self._sign_out()
         for process in reversed(self.processes.values()):
             if process.poll() is None:
                 process.terminate()
@@ -152,6 +153,15 @@ class LiveRobot:
         rows = {row["process"]: row for row in self.state()["processes"]}
         return None if rows[name]["present"] else dict(rows[name])
 
+    def back(self, names: Sequence[str]) -> bool:
+        """Whether these processes, started again, are connected."""
+        return self._healthy() and all(self.gone(name) is None for name in names)
+
+    def refused(self) -> list[str]:
+        """What a process said of messages that it did not take: none where all speak the same language."""
+        told = self.client.get("/api/events").json()["events"]
+        return [line["text"] for line in told if line["text"].startswith(("refused a message", "refused on"))]
+
     def driving(self) -> bool:
         """Whether the base moves at a good part of its speed, in automatic work."""
         state = self.state()
@@ -189,6 +199,11 @@ class LiveRobot:
             told = self._client.get("/api/events").json()["events"][-25:]
             parts.append("--- log\n" + "\n".join(f"{line['process']}: {line['text']}" for line in told))
         return "\n".join(parts)
+
+    def _sign_out(self) -> None:
+        if self._client is not None:
+            self._client.close()
+        self._client = None
 
     def _healthy(self) -> bool:
         ended = [name for name, process in self.processes.items() if process.poll() is not None]

@@ -13,8 +13,6 @@ from rolling_panda.messages import Role
 
 #: Intents about control itself.
 ABOUT_CONTROL: Final = (intents.TakeControl, intents.RequestControl, intents.GrantControl, intents.ReturnControl)
-#: Intents that move the robot or lead to it: for who holds control.
-MOTION: Final = (intents.Arm, intents.Start, intents.Resume, intents.Home, intents.Acknowledge)
 
 
 class Authority:
@@ -46,6 +44,10 @@ class Authority:
     def begin(self, seen: int) -> None:
         """Count tokens from above the newest epoch that the bridge has accepted, and above all of earlier starts."""
         self._lease.begin(first_epoch(self._starts, seen))
+
+    def begin_anew(self) -> None:
+        """Go on under a newer token; who holds control keeps it."""
+        self._lease.begin_anew()
 
     def review(self, presence: Sample[Presence] | None, at_rest: bool, now: float) -> str:
         """Take in who is there. Returns why the robot must stop; empty when nobody lost control.

@@ -7,7 +7,7 @@ queue what is cut; here one period and one request pass through them in their or
 import math
 from collections.abc import Iterable
 
-from controller.authority import ABOUT_CONTROL, MOTION, client_of
+from controller.authority import ABOUT_CONTROL, client_of
 from controller.config import ControllerConfig
 from controller.interface import Inputs, Outputs
 from controller.journal import ApproachRow, Journal, OrderRow, PreviewRow, RequestRow, TicketRow
@@ -240,7 +240,7 @@ class Controller:
         if isinstance(intent, intents.Survey) and (unknown := self._operator.unknown_place(intent)):
             return unknown
         client, event = client_of(intent), EVENTS.get(type(intent))
-        if isinstance(intent, MOTION):
+        if isinstance(intent, intents.OF_HOLDER):
             supervisor.authority.claim(client, now)
         if event is not None:
             rights = supervisor.authority.rights(client, intent.role)

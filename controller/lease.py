@@ -27,7 +27,7 @@ class Token:
     """What every motion command and cut order carries: an older one actuates nothing.
 
     Attributes:
-        epoch: Grows with each lease given and each start of the controller, durably.
+        epoch: Grows with each lease given, each new beginning and each start of the controller, durably.
         nonce: Random: two controllers that count alike are still told apart.
     """
 
@@ -56,6 +56,11 @@ class Lease:
     def begin(self, epoch: int) -> None:
         """Count tokens from here; what the robot does before somebody holds control is to stand still."""
         self.token = Token(epoch, self._draw())
+
+    def begin_anew(self) -> None:
+        """A newer token for whoever holds control."""
+        if self.token is not None:
+            self.begin(self.token.epoch + 1)
 
     def held_by(self, client: Client) -> bool:
         """Whether this client holds control and nobody is about to take it."""
@@ -145,8 +150,7 @@ class Lease:
         self.holder, self.coming, self._renewed = client, None, now
         if self.requested is not None and self.requested.key == client.key:
             self.requested = None
-        if self.token is not None:
-            self.token = Token(self.token.epoch + 1, self._draw())
+        self.begin_anew()
         self._tell(told)
 
     def _drop(self, told: str) -> None:

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 from controller import modes, safety
-from controller.authority import MOTION
 from controller.config import ControllerConfig
 from controller.modes import Event
 from rolling_panda import intents
@@ -82,7 +81,7 @@ def refusal(intent: intents.Intent, now: float, situation: Situation) -> str:
     config, health, mode = situation.config, situation.health, situation.state.mode
     if "operator" not in situation.rights:
         return situation.not_theirs or "only who may operate may ask for this"
-    if isinstance(intent, MOTION) and mode != "FAULT" and situation.not_theirs:
+    if isinstance(intent, intents.OF_HOLDER) and mode != "FAULT" and situation.not_theirs:
         return situation.not_theirs
     event = EVENTS.get(type(intent))
     if event is not None and not (event is Event.PAUSE and situation.homing):

@@ -27,6 +27,9 @@ class SessionAccount:
         """Nothing has happened."""
         self._began = self._written = self._ready_since = 0.0
         self._cuts: dict[str, CutReport] = {}
+        #: Points that were accepted and no cut was begun for yet; points that were given up so.
+        self._accepted: set[str] = set()
+        self._given_up: set[str] = set()
         self._refusals: deque[RefusalReport] = deque(maxlen=_MOST_REFUSALS)
         self._control: deque[ControlReport] = deque(maxlen=_MOST_CHANGES)
         self._refused = 0
@@ -37,8 +40,8 @@ class SessionAccount:
         first = self._began == 0.0
         self._began, self._written = self._began or when, when
         match body:
-            case TicketRow() if body.cut_id:
-                self._ticket(body, when)
+            case TicketRow():
+                return self._ticket(body, when) or first
             case RequestRow() if not body.ok:
                 self._refused += 1
                 asked = type(body.asked).__name__
@@ -66,7 +69,26 @@ class SessionAccount:
             control=tuple(self._control),
         )
 
-    def _ticket(self, row: TicketRow, when: float) -> None:
+    def _ticket(self, row: TicketRow, when: float) -> bool:
+        """Returns whether the report tells of it. A point keeps the id of its last cut when it is accepted anew."""
+        point_id = row.point.point_id
+        if row.state == "FAILED_NOT_CUT":
+            if point_id in self._given_up:
+                return False
+            if point_id in self._accepted or not row.cut_id:
+                self._give_up(row, when)
+                return True
+        self._given_up.discard(point_id)
+        if row.state == "ACCEPTED":
+            self._accepted.add(point_id)
+        else:
+            self._accepted.discard(point_id)
+        if not row.cut_id:
+            return False
+        self._cut(row, when)
+        return True
+
+    def _cut(self, row: TicketRow, when: float) -> None:
         known = self._cuts.get(row.cut_id)
         if row.state == "INTENT":
             point = row.point
@@ -79,6 +101,22 @@ class SessionAccount:
                 told = replace(told, ended_at=when, seconds=max(when - self._ready_since, 0.0))
                 self._ready_since = when
             self._cuts[row.cut_id] = told
+
+    def _give_up(self, row: TicketRow, when: float) -> None:
+        point = row.point
+        self._given_up.add(point.point_id)
+        self._accepted.discard(point.point_id)
+        self._cuts[f"{point.point_id} given up at {when}"] = CutReport(
+            point_id=point.point_id,
+            vine=point.vine,
+            spur=point.spur,
+            outcome="FAILED_NOT_CUT",
+            reason=row.reason[:500],
+            user=row.user,
+            ended_at=when,
+            seconds=max(when - self._ready_since, 0.0),
+        )
+        self._ready_since = when
 
 
 def _by_vine(cuts: list[CutReport]) -> tuple[VineReport, ...]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import Final
 
 from controller import modes, safety
 from controller.authority import Authority, client_of
@@ -16,6 +17,9 @@ from controller.stop_latch import StopLatch
 from rolling_panda import intents
 from rolling_panda import messages as m
 from rolling_panda.control_messages import StopRecord
+
+#: A bridge whose watchdog has held the robot for so long (s) is offered another token.
+_ANEW_S: Final = 2.0
 
 
 class Supervisor:
@@ -35,6 +39,7 @@ class Supervisor:
         self.authority = Authority(draw_nonce, config.supervision_s, starts)
         self.state = modes.boot()
         self._inputs = Inputs()
+        self._obeyed = 0.0
         self.health = safety.health(self._inputs, None, 0.0)
 
     @property
@@ -63,11 +68,13 @@ class Supervisor:
         self._inputs = inputs
         if self.bridge is not None and self.authority.token is None:
             self.authority.begin(self.bridge.epoch)
+            self._obeyed = now
         token, astray = self.authority.token, self._movement.body.following.astray
         self.health = safety.health(inputs, None if token is None else token.epoch, now, trouble, astray)
 
     def review(self, now: float) -> None:
         """End what must not go on, and begin what an operator's hand holds."""
+        self._review_token(now)
         inputs, bridge = self._inputs, self.bridge
         latched = self.stops.take(inputs.stops, bridge, inputs.wall_time)
         if latched:
@@ -128,6 +135,14 @@ class Supervisor:
             work=work,
             approval=approval,
         )
+
+    def _review_token(self, now: float) -> None:
+        """One command with a spoilt number far ahead, once accepted, would have all others refused for good."""
+        if not self.health.watchdog or self.health.overruled:
+            self._obeyed = now
+        elif now - self._obeyed > _ANEW_S and self._movement.at_rest:
+            self.authority.begin_anew()
+            self._obeyed = now
 
     def _pause(self, reason: str, now: float) -> None:
         """What moves comes to rest, and nothing resumes by itself."""

@@ -1,6 +1,6 @@
 """What an operator may ask of the controller: the requests of the intent service, each answered with an `Answer`."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 from msgspec import Meta, Struct
 
@@ -180,3 +180,6 @@ AnyIntent = (
     | GrantControl
     | ReturnControl
 )
+
+#: What moves the robot or leads to it: for who holds control, but for the end of a fault.
+OF_HOLDER: Final = (Arm, Start, Survey, Resume, Home, Acknowledge)

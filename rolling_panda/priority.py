@@ -8,17 +8,18 @@ import contextlib
 import os
 from typing import Literal
 
-Role = Literal["control", "interface", "background"]
+Role = Literal["control", "interface", "sight", "background"]
 #: Low among real-time priorities: above every ordinary program, below the kernel's own threads.
 _REAL_TIME = 10
-_NICE = {"interface": -5, "background": 5}
+_NICE = {"interface": -10, "sight": -5, "background": 5}
 
 
 def take_priority(role: Role) -> None:
     """Set this process's scheduling; threads and children that it starts later inherit it.
 
     Args:
-        role: `control` keeps a period (real-time round robin), `interface` answers people, `background` may wait.
+        role: `control` keeps a period (real-time round robin), `interface` answers people at once, `sight` follows the
+            camera, `background` may wait.
     """
     if role == "control":
         with contextlib.suppress(PermissionError, OSError):

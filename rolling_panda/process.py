@@ -15,6 +15,7 @@ from rolling_panda import __version__
 from rolling_panda import messages as m
 from rolling_panda.config import TransportConfig, load_section
 from rolling_panda.errors import RollingPandaError
+from rolling_panda.garbage import keep_what_is_there
 from rolling_panda.priority import Role, take_priority
 from rolling_panda.resources import resource
 from rolling_panda.state_folder import open_state_folder, usual_state_folder
@@ -25,7 +26,7 @@ _PRIORITY: dict[m.Process, Role] = {
     "bridge": "control",
     "controller": "control",
     "server": "interface",
-    "perception": "interface",
+    "perception": "sight",
 }
 
 
@@ -86,6 +87,7 @@ def run_process(
         end_with_parent(stopping)
     try:
         take_priority(_PRIORITY[process])
+        keep_what_is_there()
         with Transport(wire_config(arguments), process, arguments.robot_id) as transport:
             run(ProcessContext(arguments, arguments.config, transport, stopping))
     except RollingPandaError as error:

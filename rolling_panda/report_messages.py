@@ -4,18 +4,18 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from rolling_panda.control_messages import WallTime
+from rolling_panda.control_messages import ClientKey, WallTime
 from rolling_panda.messages import Count, Message, Name, NonNegative, Outcome, Text
 
 _Number = Annotated[int, Meta(ge=0, le=100000)]
 
 
 class CutReport(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """One cut and how it ended.
+    """One cut and how it ended, or a point that was given up before the blades were asked to close.
 
     Attributes:
-        cut_id: Of the cut.
-        point_id: Point that was cut.
+        cut_id: Of the cut; empty where the point was given up before there was one.
+        point_id: Point that was to be cut.
         vine: Its vine.
         spur: Its spur on that vine.
         outcome: As it is known now; empty while it goes on.
@@ -25,7 +25,7 @@ class CutReport(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
         seconds: From the end of the cut before, or the start of work if that was later, to the end of this one.
     """
 
-    cut_id: Name
+    cut_id: ClientKey = ""
     point_id: Name
     vine: _Number
     spur: _Number

@@ -95,7 +95,7 @@ def robot_app(reception: Reception, desk: Desk, origins: frozenset[str]) -> ASGI
         replay_router(desk),
         report_router(desk),
         pages_router(desk),
-        viser_router(desk.scene, desk.may_move, dropped),
+        viser_router(desk.scene, desk.may_move, desk.dragged, dropped),
     )
     return _guarded(routers, files, reception, origins, desk.note)
 

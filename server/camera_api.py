@@ -18,7 +18,9 @@ def camera_router(desk: Desk) -> APIRouter:
         frame = desk.link.camera.peek()
         if frame is None:
             return answer(Result(404, False, "no camera image has come yet"))
-        image = frame.message.color_jpeg if n is None else desk.link.images.get(n)
+        # The newest is told to the pages before it is among the kept ones, which are heard on a thread of their own.
+        images = {**desk.link.images, frame.message.sequence: frame.message.color_jpeg}
+        image = images.get(frame.message.sequence if n is None else n)
         if image is None:
             return answer(Result(404, False, f"frame {n} is not among the newest ones; {frame.message.sequence} is"))
         return Response(image, media_type="image/jpeg")

@@ -16,8 +16,8 @@ class ServerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         scene_rate_hz: Most updates a second of the 3-D view; nothing is sent while nothing moves.
         teleop_rate_hz: `TeleopTarget` messages a second while the operator holds.
         hold_timeout_s: A hold that is not renewed for this long moves nothing any more.
-        hold_resume_s: A page that paused for no longer than this, with the button still pressed, holds on; after that
-            only a new press starts a hold.
+        hold_resume_s: A page that paused for no longer than this, with the button still pressed, holds on, and so does
+            a script; after that only a new press starts a hold.
         view_timeout_s: A page that has not drawn a state younger than this may not move the robot.
         stop_confirm_s: How long a stop waits for bridge and controller to say that they have latched it.
         unread_s: A page or a 3-D view that does not read what it is sent for this long is dropped; it may come again.

@@ -25,6 +25,7 @@ from server.robot_link import RobotLink
 from server.scene import Scene
 from server.sessions import Session
 from server.teleop import TeleopHold
+from server.viser_filter import GizmoUpdate
 
 _CONFIRM_POLL_S = 0.01
 #: A view says where its gizmo is twenty times a second at most; one that says more often waits for the loop's turn (s).
@@ -206,11 +207,15 @@ class Desk:
             return self._refuse_hold(session, str(error), 409)
         self._refused_holds.pop(key, None)
         if not was_holding:
-            self.note("info", f"{session.user} holds the tool", session.client)
+            self.note("info", f"{session.user} holds the robot", session.client)
         return Result(200, True, "holding")
 
-    def aimed(self, owner: str, target: m.Pose) -> None:
-        """`owner` has dragged their gizmo. While they hold, the robot hears of it at once, not with the loop's turn."""
+    def dragged(self, session: Session, gizmo: GizmoUpdate) -> None:
+        """A gizmo was dragged. While its owner holds, the robot hears of it at once, not with the loop's turn."""
+        owner = session.session_id
+        target = self.scene.gizmos.drag(owner, gizmo.position, gizmo.wxyz)
+        if target is None:
+            return
         self.teleop.aim(owner, target)
         now = time.monotonic()
         self.end_lapsed_hold(now)
@@ -226,7 +231,7 @@ class Desk:
         if self.teleop.release(session.session_id):
             self._say_release()
             self._held_out(session.session_id, "The hold was ended from elsewhere. Press again to go on.")
-            self.note("info", f"{session.user} let go of the tool", session.client)
+            self.note("info", f"{session.user} let go of the robot", session.client)
 
     def _say_release(self) -> None:
         """At once: the robot brakes from when it hears of it, and the next turn of the loop repeats it."""

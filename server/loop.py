@@ -12,7 +12,6 @@ from typing import Any
 from rolling_panda.robot_model import configuration
 from rolling_panda.topics import HEARTBEAT, PRESENCE
 from server.desk import Desk
-from server.page_pace import turn_is_drawn
 from server.reception import Reception
 
 #: Posture older than this (s) is drawn grey: it is only the last known one.
@@ -31,7 +30,6 @@ class Loop:
         self._desk = desk
         self._turns = 0
         self._number = 0
-        self._drawn = 0
         self._scenery_at = 0.0
         self._warned: set[tuple[str, str]] = set()
 
@@ -65,11 +63,9 @@ class Loop:
     async def _scene(self, now: float) -> None:
         desk = self._desk
         posture = desk.link.posture(now)
-        self._drawn += 1
-        if posture is None or not turn_is_drawn(self._drawn, desk.scene.views):
-            return
-        desk.scene.move(configuration(posture.base, posture.position))
-        desk.scene.robot.set_grey(posture.age_s > _STALE_S)
+        if posture is not None:
+            desk.scene.move(configuration(posture.base, posture.position))
+            desk.scene.robot.set_grey(posture.age_s > _STALE_S)
 
     async def _teleop(self, now: float) -> None:
         desk = self._desk

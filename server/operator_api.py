@@ -151,7 +151,7 @@ def operator_router(desk: Desk) -> APIRouter:
     async def teleop(session: Caller, request: body.Teleop) -> Response:
         """Hold the robot to a tool target (T_odom_tool), a base velocity or joint velocities for the next 150 ms.
 
-        Repeat to keep holding.
+        Repeat to keep holding. A hold that lapsed more than a second ago has to be let go of (`hold: false`) first.
 
         Only while the caller also fetches `GET /api/state` at least twice a second: who does not look may not move.
         """

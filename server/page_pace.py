@@ -1,9 +1,6 @@
-"""How often pages and 3-D views are told where the robot is. Whoever may only look on does not need every state."""
+"""How often pages are told where the robot is. Whoever may only look on does not need every state."""
 
 from rolling_panda.page_messages import PageState
-
-#: With more 3-D views than this, what moves is drawn every second turn: each view is packed and sent its own.
-_FEW_VIEWS = 8
 
 
 class PagePace:
@@ -35,8 +32,3 @@ def _same(before: PageState, state: PageState) -> bool:
 
 def _mode(state: PageState) -> str:
     return "" if state.controller is None else state.controller.mode
-
-
-def turn_is_drawn(turn: int, views: int) -> bool:
-    """Whether the 3-D views are told where the robot is at this turn."""
-    return views <= _FEW_VIEWS or turn % 2 == 0

@@ -68,7 +68,6 @@ class OpenPage:
         self._event_number = 0
         self._hold_sequence = -1
         self._holding = False
-        self._held_at = 0.0
         #: The button is still pressed, but its hold is over: only a new press starts another.
         self._spent = False
         self._frames = Frames()
@@ -230,9 +229,8 @@ class OpenPage:
         if self._spent:
             return
         # A moment's pause of a slow browser goes on by itself; after a longer one it takes a new press.
-        long_ago = now - self._held_at > self._desk.config.hold_resume_s
-        if self._holding and long_ago:
-            self._desk.end_lapsed_hold(now)
+        self._desk.end_lapsed_hold(now)
+        if self._holding and self._desk.teleop.must_let_go(self.session.session_id, now):
             self._spend("The hold ended: the page or its link was too slow. Press again to go on.")
             return
         aim = aim_of(message, self._desk.scene.gizmos.pose(self.session.session_id))
@@ -240,7 +238,7 @@ class OpenPage:
             self._desk.teleop.want(self.session.session_id, aim)
         held = self._desk.hold(self.session, now, self.view, message.share)
         if held.ok:
-            self._holding, self._held_at = True, now
+            self._holding = True
         elif not self._holding:
             self._spend(held.reason)
 

@@ -22,6 +22,7 @@ from server.scene_gizmo import SceneGizmos
 from server.scene_layers import SceneLayers
 from server.scene_markers import STATE_COLORS, cut_marker, quat_wxyz_of_axis, selection_ring
 from server.scene_measure import End, SceneMeasure
+from server.scene_pace import pace_views, pause_s
 from server.scene_pick import Ray, hit_ground, hit_rods, hit_triangles, nearest
 from server.scene_robot import SceneRobot
 from server.scene_row import color_of, drawn_kinds, rods_mesh
@@ -53,7 +54,6 @@ class Scene:
         model: Any,
         parts: list[Part],
         on_select: Callable[[str, str], object],
-        on_aim: Callable[[str, m.Pose], object],
         on_sightline: Callable[[str, m.Vector3, m.Vector3], object],
         on_stranger: Callable[[], object],
     ) -> None:
@@ -63,7 +63,6 @@ class Scene:
             model: Pinocchio model of the robot.
             parts: Its looks.
             on_select: Called with (owner, point_id) when `owner` clicked a point.
-            on_aim: Called with (owner, target) when `owner` dragged their gizmo.
             on_sightline: Called with (owner, origin, direction) when `owner`, who places points, clicked into the view.
             on_stranger: Called when a connection that did not come through the proxy was refused.
         """
@@ -72,7 +71,8 @@ class Scene:
             self._server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         self.port = int(self._server.get_port())
         self.door = SceneDoor(self._server, on_stranger)
-        self.gizmos = SceneGizmos(on_aim)
+        pace_views(self._server, lambda client_id: pause_s(self.views, self.door.looks_on(client_id)))
+        self.gizmos = SceneGizmos()
         self._clicks = SceneClicks(on_sightline)
         self._on_select = on_select
         self._marker = cut_marker()

@@ -18,16 +18,16 @@ class SceneDoor:
         """Guard `server`; `on_stranger` is called on viser's thread when a connection was refused."""
         self._server = server._websock_server
         self._on_stranger = on_stranger
-        self._expected: dict[int, str] = {}
-        self._owners: dict[int, str] = {}
+        self._expected: dict[int, tuple[str, bool]] = {}
+        self._owners: dict[int, tuple[str, bool]] = {}
         # A request of this type would publish the view through a public tunnel.
         for kind in (viser_messages.ShareUrlRequest, viser_messages.ShareUrlDisconnect):
             self._server.unregister_handler(kind)
         self._server.on_client_connect(self._check)
 
-    def expect(self, port: int, owner: str) -> None:
+    def expect(self, port: int, owner: str, may_operate: bool) -> None:
         """The connection from this local port, about to be made, belongs to `owner`."""
-        self._expected[port] = owner
+        self._expected[port] = owner, may_operate
 
     def forget(self, port: int) -> None:
         """That connection has ended."""
@@ -35,7 +35,11 @@ class SceneDoor:
 
     def owner(self, client_id: int) -> str | None:
         """Whose connection a viser client is; None for strangers."""
-        return self._owners.get(client_id)
+        return self._owners.get(client_id, (None, False))[0]
+
+    def looks_on(self, client_id: int) -> bool:
+        """Whether who has this connection may not operate."""
+        return not self._owners.get(client_id, ("", False))[1]
 
     async def _check(self, connection: WebsockClientConnection) -> None:
         client_id = int(connection.client_id)

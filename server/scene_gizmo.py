@@ -1,7 +1,6 @@
 """The gizmos of the 3-D view: one a session, shown on that session's views alone."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -33,11 +32,10 @@ class _Gizmo:
 
 
 class SceneGizmos:
-    """Shows gizmos and reports where they were dragged. Used from the server's loop and from viser's thread."""
+    """Shows gizmos and works out where they were dragged. Used from the server's loop; views come on viser's thread."""
 
-    def __init__(self, on_aim: Callable[[str, m.Pose], object]) -> None:
-        """`on_aim(owner, target)` is called on viser's thread when `owner` has dragged their gizmo."""
-        self._on_aim = on_aim
+    def __init__(self) -> None:
+        """No gizmo is shown."""
         self._gizmos: dict[str, _Gizmo] = {}
         self.heading = 0.0
         """Of the base in odom (rad), for gizmos along its axes."""
@@ -71,18 +69,15 @@ class SceneGizmos:
         )
         gizmo.handles[client.client_id] = handle
 
-        async def dragged(event: viser.TransformControlsEvent) -> None:
-            x, y, z = (float(value) for value in event.target.position)
-            drawn = pin.Quaternion(*(float(value) for value in event.target.wxyz))
-            if drawn.norm() < 1e-9:
-                return
-            drawn.normalize()
-            qx, qy, qz, qw = ((drawn * gizmo.offset).coeffs()).tolist()
-            gizmo.pose = m.Pose((x, y, z), (qx, qy, qz, qw))
-            gizmo.dragged = True
-            self._on_aim(owner, gizmo.pose)
-
-        handle.on_update(dragged)
+    def drag(self, owner: str, position: m.Vector3, wxyz: tuple[float, float, float, float]) -> m.Pose | None:
+        """`owner` has dragged the arrows to here in odom; where the tool shall go, None when that is nowhere."""
+        gizmo, drawn = self._gizmos.get(owner), pin.Quaternion(*wxyz)
+        if gizmo is None or drawn.norm() < 1e-9:
+            return None
+        drawn.normalize()
+        qx, qy, qz, qw = ((drawn * gizmo.offset).coeffs()).tolist()
+        gizmo.pose, gizmo.dragged = m.Pose(position, (qx, qy, qz, qw)), True
+        return gizmo.pose
 
     def detach(self, client_id: int) -> None:
         """A view has closed."""

@@ -12,6 +12,8 @@ from server.robot_meshes import Color, Part
 _BASE_JOINT = "base_phi"
 #: Smaller movements (m, and quaternion parts) are not sent: they cannot be seen, and noise would never let it rest.
 _STILL = 2e-5
+#: Likewise of the base, where odometry wanders by a third of a millimetre, and of a milliradian, while it stands still.
+_BASE_STILL = 1e-3
 
 
 class SceneRobot:
@@ -48,7 +50,8 @@ class SceneRobot:
             x, y, z, w = pin.Quaternion(placement.rotation).coeffs()
             pose = np.array([*placement.translation, w, x, y, z])
             sent = self._sent.get(joint)
-            if sent is None or float(np.abs(pose - sent).max()) > _STILL:
+            still = _BASE_STILL if joint == self._base else _STILL
+            if sent is None or float(np.abs(pose - sent).max()) > still:
                 moved.append((joint, pose))
         if not moved:
             return False

@@ -6,7 +6,7 @@ import re
 import secrets
 import socket
 import threading
-from collections.abc import Generator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from pathlib import Path
 
 import uvicorn
@@ -14,6 +14,7 @@ from starlette.types import ASGIApp
 
 from rolling_panda.config import load_section
 from rolling_panda.errors import InputError
+from rolling_panda.garbage import keep_what_is_there
 from rolling_panda.process import ProcessContext
 from rolling_panda.robot_model import RobotModel
 from rolling_panda.transport import Transport
@@ -67,7 +68,7 @@ def run(context: ProcessContext) -> None:
             wires = {arguments.robot_id: context.transport}
             for name in arguments.also_robot_id:
                 wires[name] = others.enter_context(Transport(context.wire, "server", name))
-            asyncio.run(serve(config, wires, sessions, door, address, context.stopping, allowed))
+            asyncio.run(serve(config, wires, sessions, door, address, context.stopping, allowed, keep_what_is_there))
 
 
 def listen(host: str, port: int) -> socket.socket:
@@ -100,6 +101,7 @@ async def serve(
     address: str,
     stopping: threading.Event,
     allowed: Access | None = None,
+    built: Callable[[], None] = lambda: None,
 ) -> None:
     """Serve the page on `door` until `stopping` is set.
 
@@ -111,6 +113,7 @@ async def serve(
         address: How the page is reached on this machine.
         stopping: Ends it.
         allowed: How people come in.
+        built: Called when everything is there, before anybody is served.
     """
     allowed = allowed or Access()
     port = int(door.getsockname()[1])
@@ -129,9 +132,11 @@ async def serve(
         reception.desks[name] = _desk(config, wire, model, parts, reception)
     own = {f"{allowed.scheme}://{name}:{port}" for name in ("127.0.0.1", "localhost")}
     origins = frozenset({*own, *config.origins})
+    app = create_app(reception, origins)
+    built()
     work = [watch_accounts(reception), *(job for desk in reception.desks.values() for job in Loop(desk).jobs())]
     jobs = [asyncio.create_task(job) for job in work]
-    site = asyncio.create_task(_site(create_app(reception, origins), config, door, stopping, allowed.tls))
+    site = asyncio.create_task(_site(app, config, door, stopping, allowed.tls))
     try:
         # A job that fails ends the server: a page that shows half the truth is worse than none.
         await asyncio.wait([*jobs, site], return_when=asyncio.FIRST_COMPLETED)
@@ -158,7 +163,6 @@ def _desk(config: ServerConfig, wire: Transport, model: RobotModel, parts: list[
         parts,
         # Called on viser's thread, and not before a page is served.
         on_select=lambda owner, point_id: soon(desk.clicked, owner, point_id),
-        on_aim=lambda owner, target: soon(desk.aimed, owner, target),
         on_sightline=lambda owner, origin, direction: soon(desk.sighted, owner, origin, direction),
         on_stranger=lambda: soon(desk.note, "warning", "refused a connection to the 3-D view from outside the page"),
     )

@@ -35,7 +35,8 @@ class TeleopHold:
     """One holder at a time; the first wins.
 
     A hold lives while it is renewed within `hold_timeout_s` and the holder has lately drawn a state of the robot that
-    is not older than `view_timeout_s`.
+    is not older than `view_timeout_s`. One that has lapsed goes on with the next word within `hold_resume_s`; later its
+    holder lets go first: who slept, or was not heard while this process did, moves nothing on waking.
     """
 
     def __init__(self, config: ServerConfig) -> None:
@@ -43,6 +44,8 @@ class TeleopHold:
         self._config = config
         self._hold: _Hold | None = None
         self._ended: _Hold | None = None
+        #: When each holder whose hold has lapsed, and who has not let go since, renewed it last.
+        self._lapsed: dict[str, float] = {}
         self._releases = 0
         self._sequence = 0
         self._aims: dict[str, Aim] = {}
@@ -96,11 +99,17 @@ class TeleopHold:
             share: Of the usual speed, 0…1.
 
         Raises:
-            InputError: Somebody else holds, the holder's view is old, or there is no target.
+            InputError: Somebody else holds, the holder's view is old, there is no target, or their last hold lapsed
+                long ago and they have not let go since.
         """
         self.expire(now)
         if self._hold is not None and self._hold.holder != holder:
             raise InputError(f"{self._hold.user} is holding the robot; wait until they let go")
+        if self.must_let_go(holder, now):
+            raise InputError(
+                f"your hold ended, as nothing was heard of it in time, and more than {self._config.hold_resume_s} s "
+                "have passed: let go, then hold again"
+            )
         view = view or holder
         age = now - self._drawn_at.get(view, float("-inf"))
         if age > self._config.view_timeout_s:
@@ -110,9 +119,15 @@ class TeleopHold:
         if self._hold is None:
             self._hold = _Hold(holder, user, view, client, now, self._aims[holder])
         self._hold.renewed_at, self._hold.view, self._hold.share = now, view, share
+        self._lapsed.pop(holder, None)
+
+    def must_let_go(self, holder: str, now: float) -> bool:
+        """Whether this holder's hold lapsed so long ago that the next one begins only after they have let go."""
+        return now - self._lapsed.get(holder, now) > self._config.hold_resume_s
 
     def release(self, holder: str) -> bool:
         """End this holder's hold at once; True when they were holding."""
+        self._lapsed.pop(holder, None)
         if self._hold is None or self._hold.holder != holder:
             return False
         self._ended, self._hold = self._hold, None
@@ -140,6 +155,7 @@ class TeleopHold:
         if now - hold.renewed_at <= self._config.hold_timeout_s and now - seen_at <= self._config.view_timeout_s:
             return None
         self.release(hold.holder)
+        self._lapsed[hold.holder] = hold.renewed_at
         return hold.holder
 
     def due(self, now: float) -> TeleopTarget | None:

@@ -4,6 +4,7 @@ Viser trusts its client: it clicks disabled buttons, sets sliders beyond their e
 and opens public tunnels when told to. So each frame is decoded strictly, and what passes is encoded anew.
 """
 
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import msgspec
@@ -82,13 +83,26 @@ class GizmoDragEnd(_ClientMessage, frozen=True, tag="TransformControlsDragEndMes
     owner: _Owner = ""
 
 
-_Admitted = ViewerCamera | SceneNodeClick | ScenePointer | GizmoUpdate | GizmoDragStart | GizmoDragEnd
-_DECODER: msgspec.msgpack.Decoder[_Admitted] = msgspec.msgpack.Decoder(_Admitted, strict=True)
+_Message = ViewerCamera | SceneNodeClick | ScenePointer | GizmoUpdate | GizmoDragStart | GizmoDragEnd
+_DECODER: msgspec.msgpack.Decoder[_Message] = msgspec.msgpack.Decoder(_Message, strict=True)
 _ENCODER = msgspec.msgpack.Encoder()
 
 
-def admit(frame: bytes, may_operate: bool, may_move: bool = True) -> bytes | None:
-    """The frame to pass on to viser; None to drop it as forged, empty to leave it out.
+@dataclass(frozen=True)
+class Admitted:
+    """A frame that was read and found right.
+
+    Attributes:
+        frame: To pass on to viser; empty to leave it out.
+        gizmo: Where it says that the gizmo was dragged, if it does and may.
+    """
+
+    frame: bytes
+    gizmo: GizmoUpdate | None = None
+
+
+def admit(frame: bytes, may_operate: bool, may_move: bool = True) -> Admitted | None:
+    """What to pass on to viser; None to drop the frame as forged.
 
     Args:
         frame: One binary WebSocket frame from a browser.
@@ -102,9 +116,9 @@ def admit(frame: bytes, may_operate: bool, may_move: bool = True) -> bytes | Non
     if not may_operate and not isinstance(message, ViewerCamera):
         return None
     if not may_move and isinstance(message, GizmoUpdate | GizmoDragStart):
-        return b""
+        return Admitted(b"")
     # Encoded anew, so that viser reads what was checked here and nothing else.
-    return _ENCODER.encode(message)
+    return Admitted(_ENCODER.encode(message), message if isinstance(message, GizmoUpdate) else None)
 
 
 def kind(frame: bytes) -> str:

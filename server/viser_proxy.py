@@ -3,7 +3,8 @@
 import asyncio
 import gzip
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
+from typing import Any
 
 import websockets
 from fastapi import APIRouter, Request, Response
@@ -13,22 +14,26 @@ from websockets.typing import Subprotocol
 
 from server.scene import VIEW_VERSION, Scene, view_page
 from server.sessions import Session
-from server.viser_filter import admit, kind
+from server.viser_filter import GizmoUpdate, admit, kind
 
 #: Viser's own panel and notices have nothing to say here, and would cover the view.
 _STYLE = b"<style>[data-floating-window],.mantine-Notifications-root{display:none!important}</style>"
 #: The page's own file on how the view is drawn; it has to run before the client's scripts.
-_SCRIPT = b'<script src="/view.js"></script>'
+_SCRIPT = b'<script type="module" src="/view.js"></script>'
 
 
 def viser_router(
-    scene: Scene, may_move: Callable[[Session], bool], on_drop: Callable[[Session, str], None]
+    scene: Scene,
+    may_move: Callable[[Session], bool],
+    on_drag: Callable[[Session, GizmoUpdate], object],
+    on_drop: Callable[[Session, str], None],
 ) -> APIRouter:
     """Routes `/viser/` and the WebSocket `/viser`.
 
     Args:
         scene: What is shown.
         may_move: Whether this session may lead the tool now.
+        on_drag: Hears at once where a session that may has dragged its gizmo; viser would tell it two threads later.
         on_drop: Hears of refused frames: whose, and what they said they were.
     """
     router = APIRouter(include_in_schema=False)
@@ -48,12 +53,23 @@ def viser_router(
     @router.websocket("/viser")
     async def link(websocket: WebSocket) -> None:
         session: Session = websocket.state.session
+
+        def heard(frame: bytes) -> bytes:
+            """What of a frame to pass on; empty where nothing."""
+            admitted = admit(frame, session.may_operate, may_move(session))
+            if admitted is None:
+                on_drop(session, kind(frame))
+                return b""
+            if admitted.gizmo is not None:
+                on_drag(session, admitted.gizmo)
+            return admitted.frame
+
         offered = [Subprotocol(name) for name in websocket.scope.get("subprotocols", ())]
         with socket.socket() as near:
             near.setblocking(False)
             near.bind(("127.0.0.1", 0))
             port = int(near.getsockname()[1])
-            scene.door.expect(port, session.session_id)
+            scene.door.expect(port, session.session_id, session.may_operate)
             try:
                 await asyncio.get_running_loop().sock_connect(near, ("127.0.0.1", scene.port))
                 async with connect(
@@ -66,7 +82,7 @@ def viser_router(
                     proxy=None,
                 ) as upstream:
                     await websocket.accept(subprotocol=upstream.subprotocol)
-                    await _relay(websocket, upstream, session, may_move, on_drop)
+                    await _relay(websocket, upstream, session, _to_viser(websocket, upstream, heard))
             except (OSError, websockets.InvalidHandshake):
                 await websocket.close(1013, "the 3-D view is not running")
             finally:
@@ -79,12 +95,11 @@ async def _relay(
     websocket: WebSocket,
     upstream: ClientConnection,
     session: Session,
-    may_move: Callable[[Session], bool],
-    on_drop: Callable[[Session, str], None],
+    to_viser: Coroutine[Any, Any, None],
 ) -> None:
     """Carry frames both ways until either side closes or the session ends."""
     legs = [
-        asyncio.create_task(_to_viser(websocket, upstream, session, may_move, on_drop)),
+        asyncio.create_task(to_viser),
         asyncio.create_task(_to_browser(websocket, upstream)),
         asyncio.create_task(session.ended.wait()),
     ]
@@ -101,21 +116,11 @@ async def _relay(
         await _close(websocket, upstream.close_code, upstream.close_reason or "")
 
 
-async def _to_viser(
-    websocket: WebSocket,
-    upstream: ClientConnection,
-    session: Session,
-    may_move: Callable[[Session], bool],
-    on_drop: Callable[[Session, str], None],
-) -> None:
+async def _to_viser(websocket: WebSocket, upstream: ClientConnection, heard: Callable[[bytes], bytes]) -> None:
     try:
         while True:
-            frame = await websocket.receive_bytes()
-            admitted = admit(frame, session.may_operate, may_move(session))
-            if admitted is None:
-                on_drop(session, kind(frame))
-            elif admitted:
-                await upstream.send(admitted)
+            if frame := heard(await websocket.receive_bytes()):
+                await upstream.send(frame)
     except (WebSocketDisconnect, KeyError, websockets.ConnectionClosed):
         # KeyError: a text frame, which viser's client never sends.
         return

@@ -4,18 +4,31 @@ import threading
 import time
 from collections import defaultdict
 from contextlib import contextmanager
+from functools import cache
 
 from rolling_panda import messages as m
 from rolling_panda import topics
+from rolling_panda.codec import StrictDecoder, encode
 from rolling_panda.transport import Feed, Slot
 
 
+@cache
+def decoder(kind):
+    return StrictDecoder(kind)
+
+
+def as_received(message):
+    """A message as it comes to the others: what they would refuse fails here."""
+    return decoder(type(message)).decode(encode(message))
+
+
 class FakePublisher:
-    def __init__(self, sent):
-        self._sent = sent
+    def __init__(self, topic, sent):
+        self._kind, self._sent = topic.message, sent
 
     def put(self, message):
-        self._sent.append(message)
+        assert isinstance(message, self._kind)
+        self._sent.append(as_received(message))
 
 
 class FakeWire:
@@ -30,7 +43,7 @@ class FakeWire:
         self._stores = defaultdict(list)
 
     def publisher(self, topic):
-        return FakePublisher(self.sent[topic.name])
+        return FakePublisher(topic, self.sent[topic.name])
 
     def subscribe(self, topic, store):
         self._stores[topic.name].append(store)

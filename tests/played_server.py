@@ -23,11 +23,12 @@ POLICY = (
     "frame-src 'self'; base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
 )
 VIEW = (
-    "<!doctype html><title>view</title><script src=/view.js></script>"
+    "<!doctype html><html data-view=drawn><title>view</title><script type=module src=/view.js></script>"
     "<div id=root>3-D view</div><button>in the view</button>"
 )
 STILL = (
-    "<!doctype html><title>view</title><style>body{margin:0}img{width:100vw;height:100vh;object-fit:cover}</style>"
+    "<!doctype html><html data-view=drawn><title>view</title>"
+    "<style>body{margin:0}img{width:100vw;height:100vh;object-fit:cover}</style>"
     "<img id=root src=/viser/still.jpg>"
 )
 ALLOWED = {

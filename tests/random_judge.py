@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from controller.authority import MOTION
 from rolling_panda import intents
 
 #: A lease lives so long, a hold so long (s); and a period more.
@@ -188,7 +187,7 @@ class Judge:
         if ok:
             self.heard_at[intent.user] = world.now
             assert intent.role != "viewer", f"a viewer may {intent}"
-            if isinstance(intent, MOTION) and before != "FAULT":
+            if isinstance(intent, intents.OF_HOLDER) and before != "FAULT":
                 assert holder is None or holder.user == intent.user, f"{intent} while {holder} holds control"
             if isinstance(intent, intents.Acknowledge) and before == "FAULT":
                 assert intent.role == "supervisor"

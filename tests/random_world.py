@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import msgspec
 import numpy as np
+from fake_wire import as_received
 from random_judge import Judge
 from random_parts import MODEL, CutDisk, Movement, Robot
 
@@ -97,6 +98,8 @@ class World:
         if self.kill_in_intent and chance.random() < 0.1 and self.controller._movement.sequence.in_canes:
             self.start_controller()
         out = self.bridge.step(self.now)
+        for message in (out.joints, out.state, out.odometry, out.stops, *out.events):
+            assert message is None or as_received(message) == message
         self.mute = max(0, self.mute - 1)
         if not self.mute:
             for name, message in (("joints", out.joints), ("bridge", out.state), ("odometry", out.odometry)):
@@ -124,6 +127,8 @@ class World:
         self.inputs = replace(self.inputs, **changes)
         self.judge.delivered(self.inputs)
         out = self.controller.step(self.inputs, self.now)
+        for message in (out.motion, out.cut, out.state, out.control, out.stops, out.preview, *out.events):
+            assert message is None or as_received(message) == message
         self.judge.stepped(self, out)
         self.inputs = replace(self.inputs, stops=())
         self.write(out.records)

@@ -209,6 +209,7 @@ def test_bark_and_light_differ_from_seed_to_seed_unless_switched_off():
         assert (np.std(tone, axis=0).max() > 0.004) == differs
 
 
+@pytest.mark.alone
 def test_a_small_frame_takes_less_than_a_tenth_of_a_second():
     config = CameraConfig(width=424, height=240)
     row, camera = grow(VineyardConfig(), 0), Camera(config, 0)

@@ -99,6 +99,7 @@ def test_every_part_of_the_page_does_its_work(page: Page, robot: LiveRobot) -> N
     charts_and_log(page)
     people(page, robot)
     report(page)
+    assert robot.refused() == []
     stop_and_reset(page, robot)
 
 

@@ -126,6 +126,7 @@ def test_accepted_points_are_cut_where_they_were_accepted_and_the_page_stops_the
             done = [point_id for point_id in chosen if entries[point_id]["state"] == "DONE"]
             for point_id in done:
                 page.wait_for_selector(f'[data-point-id="{point_id}"][data-state="DONE"]', timeout=40_000)
+            assert robot.refused() == []
     assert sorted(took)[(len(took) - 1) // 2] < 0.5, took
     assert max(took) < 1.0, took
     assert len(done) >= 2, [entries[point_id] for point_id in chosen]

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from rolling_panda.control_messages import StopState
 from rolling_panda.page_messages import PageState, ProcessPresence
-from server.page_pace import PagePace, turn_is_drawn
+from server.page_pace import PagePace
 
 
 def state(number: int, **more: object) -> PageState:
@@ -50,8 +50,3 @@ def test_an_onlooker_hears_of_a_stop_a_mode_and_a_lost_process_at_once() -> None
     assert pace.due(state(14, **other), False)
     assert pace.due(state(15, **other, processes=(ProcessPresence("bridge", False, 3.0),)), False)
     assert not pace.due(state(16, **other, processes=(ProcessPresence("bridge", False, 3.1),)), False)
-
-
-def test_with_many_views_every_second_turn_is_drawn() -> None:
-    assert all(turn_is_drawn(turn, 1) for turn in range(10))
-    assert sum(turn_is_drawn(turn, 50) for turn in range(30)) == 15

@@ -40,8 +40,8 @@ class PlayedHall:
         elif path == "/api/stop":
             self.stops.append(route.request.post_data_json)
             route.fulfill(json={"ok": True, "reason": ""})
-        elif path == "/view.js":
-            route.fulfill(body=resource("web/view.js").read_bytes(), content_type="text/javascript")
+        elif path in ("/view.js", "/view-behind.js"):
+            route.fulfill(body=resource(f"web{path}").read_bytes(), content_type="text/javascript")
         else:
             route.abort()
 

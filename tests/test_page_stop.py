@@ -2,10 +2,11 @@
 
 import msgspec
 import pytest
-from played_page import until
+from played_page import box_of, until
 from played_server import PlayedServer, bridge, controller
 from playwright.sync_api import Page, expect
 
+from rolling_panda import page_messages as p
 from rolling_panda.control_messages import StopRecord, StopState
 
 pytestmark = pytest.mark.browser
@@ -53,3 +54,17 @@ def test_a_pressed_button_on_the_robot_comes_before_the_reset(page: Page, server
     expect(page.locator("#reset")).to_be_enabled()
     page.locator("#reset").click()
     until(page, lambda: ("/api/reset", {"reason": "row is clear", "stop_id": "s1"}) in server.posted)
+
+
+@pytest.mark.parametrize("size", [(1280, 800), (1024, 768)])
+def test_no_notice_lies_over_the_field_for_the_reason(page: Page, server: PlayedServer, size: tuple[int, int]) -> None:
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    page.locator("#teleop").click()
+    page.keyboard.down("h")
+    until(page, lambda: server.holds()[-1:] == [True])
+    server.tell(p.HoldEnded(reason="The robot was stopped."))
+    server.bridge = bridge(stop_id="s1", stopped_by="Ada: stop button")
+    server.controller = controller("ESTOP_LATCHED", reason="stopped by Ada")
+    field = box_of(page.locator("rp-stop-banner input"))
+    notice = box_of(page.locator(".toast").first)
+    assert notice["y"] + notice["height"] <= field["y"]

@@ -200,7 +200,7 @@ def late_page():
             page.look()
             page.say("ShowGizmo", visible=True)
             page.hold(True)
-            page.hear_event("ann holds the tool")
+            page.hear_event("ann holds the robot")
             page.sent = wire.sent[topics.TELEOP.name]
             page.told = lambda: [event["text"] for event in client.get("/api/events").json()["events"]]
             yield page
@@ -215,7 +215,7 @@ def test_a_hold_that_paused_for_a_moment_begins_anew_from_the_tool(late_page):
     time.sleep(0.3)
     late_page.look()
     late_page.hold(True)
-    late_page.hear_event("ann holds the tool")
+    late_page.hear_event("ann holds the robot")
     assert not any("refused" in text for text in late_page.told()), late_page.told()
     assert sum("not renewed" in text for text in late_page.told()) == 1
 
@@ -229,11 +229,11 @@ def test_a_hold_that_paused_for_long_is_over_until_it_is_pressed_anew(late_page)
         late_page.look()
         late_page.hold(True)
     late_page.look()
-    assert sum("holds the tool" in text for text in late_page.told()) == 1
+    assert sum("holds the robot" in text for text in late_page.told()) == 1
     late_page.hold(False)
     late_page.look()
     late_page.hold(True)
-    late_page.hear_event("ann holds the tool")
+    late_page.hear_event("ann holds the robot")
     assert sum("not renewed" in text for text in late_page.told()) == 1
 
 
@@ -255,7 +255,7 @@ def test_letting_go_is_said_at_once(server, page):
     page.hold_until_sent(sent)
     page.hold(False)
     eventually(lambda: not sent[-1].hold)
-    page.hear_event("ann let go of the tool")
+    page.hear_event("ann let go of the robot")
 
 
 def test_a_page_that_closes_ends_its_hold(server, open_page):

@@ -40,7 +40,7 @@ def test_control_is_real_time_where_that_is_permitted() -> None:
     assert scheduling("control")[0] == (os.SCHED_RR if permitted else os.SCHED_OTHER)
 
 
-@pytest.mark.parametrize("role", ["control", "interface", "background"])
+@pytest.mark.parametrize("role", ["control", "interface", "sight", "background"])
 def test_no_role_fails_without_permission(role: str) -> None:
     limited = "import resource; resource.setrlimit(resource.RLIMIT_NICE, (0, 0));" + SHOW
     done = subprocess.run([sys.executable, "-c", limited, role], capture_output=True, text=True, check=False)

@@ -1,6 +1,5 @@
 """Where the tool shall go, from what was dragged, along whichever axes the arrows lie."""
 
-import asyncio
 from types import SimpleNamespace
 
 import numpy as np
@@ -19,14 +18,12 @@ class Handle:
     def __init__(self, **drawn):
         self.position, self.wxyz = np.array(drawn["position"]), np.array(drawn["wxyz"])
 
-    def on_update(self, callback):
-        self.callback = callback
-
 
 class View:
     def __init__(self, client_id=1):
         self.client_id = client_id
         self.scene = SimpleNamespace(add_transform_controls=self._add)
+        self.gizmos = SceneGizmos()
 
     def _add(self, name, **options):
         self.handle = Handle(**options)
@@ -38,59 +35,60 @@ class View:
         turned = pin.Quaternion(*handle.wxyz) * pin.Quaternion(pin.exp3(np.array(turn)))
         handle.wxyz = np.array([turned.w, turned.x, turned.y, turned.z])
         handle.position = handle.position + np.array(by)
-        asyncio.run(handle.callback(SimpleNamespace(target=handle)))
+        return self.gizmos.drag("ada", tuple(handle.position), tuple(handle.wxyz))
 
 
-@pytest.fixture
-def aims():
-    return []
-
-
-def shown(aims, axes):
-    gizmos = SceneGizmos(lambda owner, target: aims.append(target))
-    gizmos.heading = HEADING
+def shown(axes):
     view = View()
-    gizmos.show("ada", pose_message(TOOL), [view], axes)
-    return gizmos, view
+    view.gizmos.heading = HEADING
+    view.gizmos.show("ada", pose_message(TOOL), [view], axes)
+    return view.gizmos, view
 
 
 AXES = {"tool": TOOL.rotation, "base": pin.exp3(np.array([0.0, 0.0, HEADING])), "world": np.eye(3)}
 
 
 @pytest.mark.parametrize("axes", AXES)
-def test_the_arrows_lie_along_the_axes_that_were_chosen(aims, axes):
-    gizmos, view = shown(aims, axes)
+def test_the_arrows_lie_along_the_axes_that_were_chosen(axes):
+    gizmos, view = shown(axes)
     assert pin.Quaternion(*view.handle.wxyz).toRotationMatrix() == pytest.approx(AXES[axes], abs=1e-6)
     assert placement(gizmos.pose("ada")).isApprox(TOOL, 1e-6), "showing it asks for nothing"
 
 
 @pytest.mark.parametrize("axes", AXES)
 @pytest.mark.parametrize("turn", [(0.3, 0.0, 0.0), (0.0, -0.5, 0.0), (0.0, 0.0, 1.2)])
-def test_turning_an_arc_turns_the_tool_about_that_axis(aims, axes, turn):
-    _, view = shown(aims, axes)
-    view.drag(turn, (0.01, 0.02, 0.03))
+def test_turning_an_arc_turns_the_tool_about_that_axis(axes, turn):
+    gizmos, view = shown(axes)
+    aim = view.drag(turn, (0.01, 0.02, 0.03))
     about = AXES[axes] @ np.array(turn)
     wanted = pin.SE3(pin.exp3(about) @ TOOL.rotation, TOOL.translation + [0.01, 0.02, 0.03])
-    assert placement(aims[-1]).isApprox(wanted, 1e-6)
+    assert placement(aim).isApprox(wanted, 1e-6)
+    assert gizmos.pose("ada") == aim
 
 
-def test_letting_go_brings_the_arrows_back_to_the_tool_and_their_axes(aims):
-    gizmos, view = shown(aims, "world")
+def test_letting_go_brings_the_arrows_back_to_the_tool_and_their_axes():
+    gizmos, view = shown("world")
     view.drag((0.0, 0.0, 0.4))
     gizmos.reset("ada", pose_message(TOOL))
     assert pin.Quaternion(*view.handle.wxyz).toRotationMatrix() == pytest.approx(np.eye(3), abs=1e-6)
     assert placement(gizmos.pose("ada")).isApprox(TOOL, 1e-6)
 
 
-def test_arrows_that_are_no_rotation_aim_nowhere(aims):
-    _, view = shown(aims, "tool")
-    view.handle.wxyz = np.zeros(4)
-    asyncio.run(view.handle.callback(SimpleNamespace(target=view.handle)))
-    assert aims == []
+def test_arrows_that_are_no_rotation_aim_nowhere():
+    gizmos, _ = shown("tool")
+    before = gizmos.pose("ada")
+    assert gizmos.drag("ada", (0.1, 0.2, 0.3), (0.0, 0.0, 0.0, 0.0)) is None
+    assert gizmos.pose("ada") == before
 
 
-def test_what_nobody_dragged_follows_the_tool(aims):
-    gizmos, view = shown(aims, "base")
+def test_a_gizmo_that_is_not_shown_aims_nowhere():
+    gizmos, _ = shown("tool")
+    assert gizmos.drag("bob", (0.1, 0.2, 0.3), (1.0, 0.0, 0.0, 0.0)) is None
+    assert gizmos.pose("bob") is None
+
+
+def test_what_nobody_dragged_follows_the_tool():
+    gizmos, view = shown("base")
     moved = m.Pose((1.0, 0.5, 0.9), pose_message(TOOL).quat_xyzw)
     assert gizmos.follow(moved, holder=None) == ["ada"]
     assert view.handle.position == pytest.approx((1.0, 0.5, 0.9))

@@ -44,7 +44,7 @@ def served(monkeypatch):
     """Instead of serving, hand over what would have been served."""
     seen = {}
 
-    async def serve(config, wires, sessions, door, address, stopping, allowed):
+    async def serve(config, wires, sessions, door, address, stopping, allowed, built):
         seen.update(robots=list(wires), sessions=sessions, address=address, allowed=allowed)
 
     monkeypatch.setattr(service, "serve", serve)

@@ -8,7 +8,9 @@ from msgspec.structs import replace
 from controller.journal import RequestRow, TicketRow
 from controller.session_report import SessionAccount
 from rolling_panda import intents
+from rolling_panda.codec import StrictDecoder, encode
 from rolling_panda.messages import Answer
+from rolling_panda.report_messages import SessionReport
 
 BEGAN = datetime(2026, 1, 31, 9, 0, tzinfo=UTC).timestamp()
 
@@ -29,7 +31,8 @@ def report(*rows):
     account = SessionAccount()
     for seconds, row in rows:
         account.take(at(seconds), row)
-    return account.report()
+    # As it comes to the server.
+    return StrictDecoder(SessionReport).decode(encode(account.report()))
 
 
 def test_a_cut_takes_from_the_one_before_or_from_the_start_of_work():
@@ -53,6 +56,45 @@ def test_a_cut_takes_from_the_one_before_or_from_the_start_of_work():
     assert [(vine.vine, vine.done, vine.not_cut, round(vine.seconds, 3)) for vine in told.vines] == [
         (1, 1, 0, 4.0),
         (2, 0, 1, 3.5),
+    ]
+
+
+def test_a_point_that_is_given_up_before_the_blades_close_is_told_each_time_it_was_tried():
+    given_up = replace(ticket("a", "FAILED_NOT_CUT", user="ada", reason="not reached in time"), cut_id="")
+    accepted = replace(ticket("a", "ACCEPTED", user="ada"), cut_id="")
+    told = report(
+        (0.0, accepted),
+        (1.0, asked(intents.Start(user="ada"))),
+        (6.0, given_up),
+        # Seen anew it is recorded again, and was tried once all the same.
+        (7.0, given_up),
+        (20.0, accepted),
+        (21.0, asked(intents.Start(user="ada"))),
+        (24.0, given_up),
+    )
+    assert [(cut.cut_id, cut.point_id, cut.outcome, cut.reason, cut.user, cut.seconds) for cut in told.cuts] == [
+        ("", "a", "FAILED_NOT_CUT", "not reached in time", "ada", 5.0),
+        ("", "a", "FAILED_NOT_CUT", "not reached in time", "ada", 3.0),
+    ]
+    assert told.vines[0].not_cut == 2
+
+
+def test_a_point_that_is_given_up_at_its_second_try_leaves_the_first_cut_as_it_was():
+    failed = ticket("a", "FAILED_NOT_CUT", user="ada", reason="the wood stands")
+    missed = ticket("a", "FAILED_NOT_CUT", user="ada", reason="not reached in time")
+    told = report(
+        (0.0, ticket("a", "ACCEPTED", user="ada")),
+        (1.0, asked(intents.Start(user="ada"))),
+        (2.0, ticket("a", "INTENT", user="ada")),
+        (3.0, failed),
+        (10.0, ticket("a", "ACCEPTED", user="ada")),
+        (11.0, asked(intents.Start(user="ada"))),
+        (15.0, missed),
+        (16.0, missed),
+    )
+    assert [(cut.cut_id, cut.reason, cut.seconds) for cut in told.cuts] == [
+        ("c-a", "the wood stands", 2.0),
+        ("", "not reached in time", 4.0),
     ]
 
 

@@ -179,3 +179,37 @@ def test_the_share_of_the_speed_goes_out_and_is_that_of_the_newest_renewal():
     teleop.hold("a", "ann", 10.01, share=0.25)
     teleop.aim("a", THERE)
     assert teleop.due(10.02).share == 0.25
+
+
+def test_after_a_short_silence_the_next_word_goes_on():
+    teleop = holding()
+    assert teleop.due(10.5).hold is False
+    teleop.drew("a", 10.9, 10.9)
+    teleop.aim("a", HERE)
+    teleop.hold("a", "ann", 10.9)
+    assert teleop.due(10.9).hold
+
+
+def test_after_a_long_silence_only_a_new_hold_moves_anything():
+    teleop = holding()
+    assert teleop.due(10.5).hold is False
+    teleop.drew("a", 11.1, 11.1)
+    teleop.aim("a", HERE)
+    # The first may have waited in a server that stood still.
+    for word in (11.1, 11.13):
+        with pytest.raises(InputError, match="more than 1.0 s have passed: let go, then hold again"):
+            teleop.hold("a", "ann", word)
+        assert teleop.holder is None
+    teleop.release("a")
+    teleop.aim("a", HERE)
+    teleop.hold("a", "ann", 11.15)
+    assert teleop.due(11.15).hold
+
+
+def test_a_hold_that_lapsed_is_not_another_holders():
+    teleop = holding()
+    teleop.expire(12.0)
+    teleop.drew("b", 12.0, 12.0)
+    teleop.aim("b", THERE)
+    teleop.hold("b", "bea", 12.0)
+    assert teleop.due(12.0).user == "bea"

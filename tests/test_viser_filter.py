@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from viser import _messages
 from viser.infra._messages import wire_field_names
 
-from server.viser_filter import admit, kind
+from server.viser_filter import Admitted, admit, kind
 
 CAMERA = {
     "type": "ViewerCameraMessage", "wxyz": [1, 0, 0, 0], "position": [0, 0, 1.5], "fov": 1.0, "near": 0.01,
@@ -35,8 +35,9 @@ def frame(message):
 @pytest.mark.parametrize("message", [CAMERA, CLICK, POINTER, DRAG, GRAB, LET_GO])
 def test_what_an_operator_may_say_reaches_viser_unchanged(message):
     admitted = admit(frame(message), may_operate=True)
-    assert msgspec.msgpack.decode(admitted) == message
-    assert type(_messages.Message.deserialize(admitted)).__name__ == message["type"]
+    assert msgspec.msgpack.decode(admitted.frame) == message
+    assert (admitted.gizmo is not None) == (message is DRAG)
+    assert type(_messages.Message.deserialize(admitted.frame)).__name__ == message["type"]
 
 
 @pytest.mark.parametrize("message", [CLICK, POINTER, DRAG, GRAB, LET_GO])
@@ -47,9 +48,9 @@ def test_a_viewer_may_only_look(message):
 
 def test_the_gizmo_is_led_by_who_holds_control_alone():
     for message in (DRAG, GRAB):
-        assert admit(frame(message), may_operate=True, may_move=False) == b""
+        assert admit(frame(message), may_operate=True, may_move=False) == Admitted(b"")
     for message in (CAMERA, CLICK, POINTER, LET_GO):
-        assert admit(frame(message), may_operate=True, may_move=False)
+        assert admit(frame(message), may_operate=True, may_move=False).frame
 
 
 @pytest.mark.parametrize("name", sorted(each.__name__ for each in _messages.Message.get_subclasses()))
@@ -88,7 +89,7 @@ def test_what_is_not_exactly_right_is_dropped(message):
 def test_a_second_value_for_a_key_cannot_hide_behind_the_first():
     sneaky = b"\x83" + frame("type") + frame("GuiUpdateMessage") + frame(GRAB)[1:]
     admitted = admit(sneaky, may_operate=True)
-    assert admitted is None or msgspec.msgpack.decode(admitted)["type"] != "GuiUpdateMessage"
+    assert admitted is None or msgspec.msgpack.decode(admitted.frame)["type"] != "GuiUpdateMessage"
 
 
 @settings(max_examples=200)

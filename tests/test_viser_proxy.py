@@ -313,7 +313,7 @@ def test_the_client_page_is_compressed_and_kept_by_the_browser(server):
         first = client.get("/viser/")
         assert first.headers["content-encoding"] == "gzip"
         # Compared as places: on a failure nobody wants to read the client.
-        own, clients = (first.text.index(start) for start in ('<script src="/view.js">', "<script data-"))
+        own, clients = (first.text.index(start) for start in ('<script type="module" src="/view.js">', "<script data-"))
         assert own < clients, "it has to run before the client"
         again = client.get("/viser/", headers={"if-none-match": first.headers["etag"]})
         assert again.status_code == 304

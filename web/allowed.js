@@ -1,6 +1,7 @@
 // What the operator may ask for now, and why not.
 
-import { INTENTS } from "./messages.js";
+import { holder } from "./holder.js";
+import { INTENTS, OF_HOLDER } from "./messages.js";
 import { whyNoStart } from "./preview-state.js";
 import { isLive, link, pageState, points, staleWords } from "./state.js";
 import { MODE_WORDS } from "./words.js";
@@ -27,8 +28,6 @@ const NEEDS = Object.freeze({
   ReconsiderPoint: "Decisions cannot be taken back",
   ResolvePoint: "How a cut ended cannot be said",
 });
-/** What moves the robot, or gets it ready to, is for who holds control. */
-const OF_HOLDER = new Set(["Arm", "Start", "Survey", "Resume", "Home"]);
 
 /** Why this page can ask for nothing now; empty when it can. */
 export function whyNothing() {
@@ -51,7 +50,9 @@ export function whyNot(intent) {
   if (nothing) return nothing;
   const controller = pageState.get()?.controller ?? null;
   if (controller === null || !isLive("controller")) return staleWords("controller") || "The controller is not there";
-  if (controller.allowed.includes(intent)) return OF_HOLDER.has(intent) ? whyNotHolder() : "";
+  // After a fault nobody moves anything by acknowledging it.
+  const ofHolder = OF_HOLDER.includes(intent) && controller.mode !== "FAULT";
+  if (controller.allowed.includes(intent)) return ofHolder ? whyNotHolder() : "";
   if (!INTENTS.includes(/** @type {any} */ (intent))) return `There is no ${intent}`;
   if (intent === "Start" && controller.mode === "READY" && countOf("ACCEPTED") === 0) return "Accept a point first";
   if (intent === "Start" && controller.mode === "READY" && whyNoStart()) return whyNoStart();
@@ -60,10 +61,8 @@ export function whyNot(intent) {
 
 /** Whose robot it is while somebody else moves it; empty for who holds control, and where nobody does. */
 function whyNotHolder() {
-  const state = pageState.get();
-  const control = state?.control ?? null;
-  if (control === null || control.holder === "" || control.holder === state?.client) return "";
-  return `${control.user} holds control: ask for it, or take it`;
+  const { held, mine, user } = holder();
+  return held && !mine ? `${user} holds control: ask for it, or take it` : "";
 }
 
 /** Why the tool cannot be moved by hand now; empty when it can. */

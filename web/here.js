@@ -1,6 +1,7 @@
 // Keeps control while this page lives: the 3-D view can keep its thread busy for a second or two, and that is no absence.
 
-import { link, pageState } from "./state.js";
+import { holder } from "./holder.js";
+import { link } from "./state.js";
 
 const EVERY_MS = 250;
 
@@ -8,8 +9,6 @@ const EVERY_MS = 250;
 export function keepControl() {
   const worker = new Worker("here-worker.js");
   window.setInterval(() => {
-    const state = pageState.get();
-    const holder = link.get().status === "open" ? state?.control?.holder : "";
-    worker.postMessage(Boolean(holder) && holder === state?.client);
+    worker.postMessage(link.get().status === "open" && holder().mine);
   }, EVERY_MS);
 }

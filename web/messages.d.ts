@@ -12,6 +12,7 @@ export const SEVERITIES: readonly Severity[];
 export const ROLES: readonly Role[];
 
 export const INTENTS: readonly string[];
+export const OF_HOLDER: readonly string[];
 
 export const TEXT_MAX_LENGTH: number;
 
@@ -608,11 +609,11 @@ export interface Select {
   point_id: string;
 }
 
-/** One cut and how it ended. */
+/** One cut and how it ended, or a point that was given up before the blades were asked to close. */
 export interface CutReport {
-  /** Of the cut. */
+  /** Of the cut; empty where the point was given up before there was one. */
   cut_id: string;
-  /** Point that was cut. */
+  /** Point that was to be cut. */
   point_id: string;
   /** Its vine. */
   vine: number;

@@ -15,4 +15,7 @@ export const ROLES = Object.freeze(["viewer", "operator", "supervisor"]);
 /** What `ControllerState.allowed` may contain. */
 export const INTENTS = Object.freeze(["Arm", "AcceptPoint", "RejectPoint", "ReconsiderPoint", "ResolvePoint", "AcceptAll", "MoveInQueue", "PlannersOrder", "TurnApproach", "AskPreview", "ApprovePreview", "RequirePreview", "Start", "Survey", "Pause", "Resume", "Home", "Acknowledge", "Reset", "TakeControl", "RequestControl", "GrantControl", "ReturnControl"]);
 
+/** Of these, what is for who holds control, but for the end of a fault. */
+export const OF_HOLDER = Object.freeze(["Arm", "Start", "Survey", "Resume", "Home", "Acknowledge"]);
+
 export const TEXT_MAX_LENGTH = 500;

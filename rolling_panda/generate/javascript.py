@@ -45,6 +45,11 @@ def messages_module() -> str:
     parts.append(
         f"/** What `ControllerState.allowed` may contain. */\nexport const INTENTS = Object.freeze([{allowed}]);\n"
     )
+    holders = ", ".join(f'"{intent.__name__}"' for intent in intents.OF_HOLDER)
+    parts.append(
+        f"/** Of these, what is for who holds control, but for the end of a fault. */\n"
+        f"export const OF_HOLDER = Object.freeze([{holders}]);\n"
+    )
     parts.append(f"export const TEXT_MAX_LENGTH = {_text_length()};\n")
     return "\n".join(parts)
 
@@ -56,7 +61,7 @@ def messages_types() -> str:
     )
     parts = [_HEADER]
     parts.extend(f"export const {list_name}: readonly {name}[];\n" for name, list_name in CONSTANTS.items())
-    parts.append("export const INTENTS: readonly string[];\n")
+    parts.append("export const INTENTS: readonly string[];\nexport const OF_HOLDER: readonly string[];\n")
     parts.append("export const TEXT_MAX_LENGTH: number;\n")
     parts.extend(_type(name, _spelled_out(hint)) for name, hint in aliases().items() if _is_worth_a_name(hint))
     said = union_members(page_messages.FromPage)

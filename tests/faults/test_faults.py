@@ -6,11 +6,13 @@ from dataclasses import replace
 from functools import partial
 
 import pytest
+from msgspec.structs import replace as replace_field
 
 from benchmarks.apart import apart
 from benchmarks.fault_kinds import FAULTS
 from benchmarks.fault_world import World
 from benchmarks.faults import deal, main, run_trial, start
+from rolling_panda import intents
 from rolling_panda.teleop_messages import BaseVelocity
 
 NAMED = {fault.name: fault for fault in FAULTS}
@@ -33,6 +35,38 @@ def test_who_was_silent_and_has_lost_control_moves_the_robot_by_holding_anew():
     world.modes.clear()
     world._until_it_moves(0.5)
     assert set(world.modes) == {"TELEOP"}
+
+
+def test_a_spoiled_number_that_was_accepted_does_not_keep_the_robot_still_for_good():
+    world = World(0)
+    world.drive()
+    # A flipped bit far up in the number; all else is in order, so that the bridge believes it.
+    world.bridge.on_motion(replace_field(world.commanded, sequence=world.commanded.sequence + 2**40), world.now)
+    world.run(1.0)
+    assert world.controller.mode == "PROTECTIVE_STOP" and abs(world.robot.now.velocity).max() < 1e-3
+    world.held = None
+    world.run(3.0)
+    world.ask(intents.Acknowledge(user="ada"))
+    world.ask(intents.Resume(user="ada"))
+    world.run(0.5)
+    assert abs(world.robot.now.velocity).max() < 1e-3, "nothing wakes by itself"
+    world.held = BaseVelocity(0.1, 0.0)
+    world._until_it_moves(0.5)
+
+
+def test_who_was_overruled_by_another_controller_does_not_come_back_when_that_one_has_ended():
+    world = World(0)
+    world.drive()
+    world.held = None
+    world.run(1.0)
+    newer = world.commanded.epoch + 1
+    # It sends one command, at rest, and is gone.
+    other = replace_field(world.commanded, epoch=newer, token="other", sequence=1, xi=(0.0,) * 9)
+    assert not any(world.commanded.xi)
+    world.bridge.on_motion(other, world.now)
+    world.run(10.0)
+    assert world.controller.mode == "FAULT" and world.inputs.bridge.message.epoch == newer
+    assert world.inputs.bridge.message.watchdog
 
 
 def test_trials_are_dealt_out_to_the_faults_of_a_requirement_each_with_a_seed_of_its_own():

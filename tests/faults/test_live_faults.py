@@ -27,3 +27,10 @@ def test_drawn_faults_between_real_processes_hold(tmp_path):
     assert all(row["replayed"] == 0 and row["beyond"] == 0 for row in document["results"])
     timed = [row for row in document["results"] if row["quiet_s"] is not None and row["limit_s"] is not None]
     assert timed and all(math.isfinite(row["quiet_s"]) for row in timed)
+
+
+def test_after_each_process_that_is_killed_the_next_trial_has_one_again(tmp_path):
+    file = tmp_path / "live.json"
+    assert main(["--live", "60", "--seed", "1", "--only", "killed", "--json", str(file)]) == 0
+    happened = [row["fault"] for row in json.loads(file.read_text())["results"]]
+    assert len(happened) >= 3 and "server killed" in happened

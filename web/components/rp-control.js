@@ -2,6 +2,7 @@
 
 import { ask } from "../api.js";
 import { element, setEnabled, setText } from "../element.js";
+import { holder } from "../holder.js";
 import { pageState, showToast } from "../state.js";
 import { drawOn } from "../store.js";
 
@@ -31,13 +32,12 @@ class RpControl extends HTMLElement {
     const state = pageState.get();
     const control = state?.control ?? null;
     const operates = state !== null && state.role !== "viewer";
-    const held = control !== null && control.holder !== "";
-    const mine = held && control?.holder === state?.client;
+    const { held, mine, user } = holder();
     const asked = control?.requested_by ?? "";
     const mineAsked = asked !== "" && control?.requested_key === state?.client;
     const coming = control?.coming ?? "";
     this.hidden = control === null || !((held && !mine) || asked || coming || (state?.viewers ?? 0) > 1);
-    const who = mine ? "You hold control" : held ? `${control?.user} holds control` : "Nobody holds control";
+    const who = mine ? "You hold control" : held ? `${user} holds control` : "Nobody holds control";
     setText(words, coming ? `Control goes to ${coming}` : mine && asked ? `${asked} asks for control` : who);
     words.title = words.textContent ?? "";
     this.give.hidden = !(mine && asked !== "" && !coming);
@@ -45,18 +45,18 @@ class RpControl extends HTMLElement {
     this.give.title = `${asked} moves the robot then; it stops first`;
     this.request.hidden = !(operates && held && !mine && !coming);
     setText(this.request, mineAsked ? "Asked" : "Ask");
-    const waits = mineAsked ? `You have asked: ${control?.user} can give it to you` : asked && `${asked} has asked already`;
-    setEnabled(this.request, waits, `Ask ${control?.user ?? ""} for control; nothing stops meanwhile`);
+    const waits = mineAsked ? `You have asked: ${user} can give it to you` : asked && `${asked} has asked already`;
+    setEnabled(this.request, waits, `Ask ${user} for control; nothing stops meanwhile`);
     this.take.hidden = !operates || mine || coming !== "";
     const sure = performance.now() < this.armed;
     setText(this.take, !held ? "Take control" : sure ? "Really take it?" : "Take");
-    this.take.title = held ? `Takes control from ${control?.user}: the robot stops first, and they are told` : "";
+    this.take.title = held ? `Takes control from ${user}: the robot stops first, and they are told` : "";
     this.tell(mine, control?.told_number ?? 0, control?.told ?? "");
   }
 
   /** The first press on somebody else's control asks whether it is meant. */
   taken() {
-    const held = (pageState.get()?.control?.holder ?? "") !== "";
+    const { held } = holder();
     if (held && performance.now() >= this.armed) {
       this.armed = performance.now() + CONFIRM_MS;
       setText(this.take, "Really take it?");

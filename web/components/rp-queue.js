@@ -282,7 +282,9 @@ function groupOf(row) {
 /** @param {readonly PagePoint[]} rows */
 function summaryWords(rows) {
   if (rows.length === 0) return "";
-  return `${rows.length} found · ${countOf("ACCEPTED")} accepted · ${countOf("DONE")} done`;
+  const notCut = countOf("FAILED_NOT_CUT");
+  const more = notCut > 0 ? ` · ${notCut} not cut` : "";
+  return `${rows.length} found · ${countOf("ACCEPTED")} accepted · ${countOf("DONE")} done${more}`;
 }
 
 function emptyWords() {

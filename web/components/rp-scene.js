@@ -9,6 +9,8 @@ import { listenForDrag, listenForHoldKey } from "../teleoperation.js";
 
 /** Below this width (px) the 3-D client lays its own panel over the view, as on a telephone. */
 const LEAST_WIDTH = 600;
+/** Whoever has seen nothing for so long (ms) is told what may be the matter. */
+const LONG_MS = 20_000;
 
 class RpScene extends HTMLElement {
   connectedCallback() {
@@ -19,10 +21,21 @@ class RpScene extends HTMLElement {
     const waiting = element("div", { class: "empty", attributes: { role: "status" } }, words, retry);
     this.append(waiting, frame);
 
+    let patience = 0;
+    /** @param {string} text */
+    const fail = (text) => {
+      words.textContent = text;
+      retry.hidden = false;
+    };
     const load = () => {
       words.textContent = "Loading the 3-D view…";
       retry.hidden = true;
       waiting.hidden = false;
+      window.clearTimeout(patience);
+      patience = window.setTimeout(
+        () => fail("The 3-D view shows nothing yet; this browser may lack WebGL. Everything else works without it."),
+        LONG_MS,
+      );
       frame.classList.remove("loaded");
       frame.src = "viser/";
     };
@@ -31,8 +44,8 @@ class RpScene extends HTMLElement {
       if (!view || !frame.getAttribute("src")) return;
       const there = frame.contentDocument?.querySelector("#root, canvas") ?? null;
       if (there === null) {
-        words.textContent = "The 3-D view did not load. Everything else works without it.";
-        retry.hidden = false;
+        window.clearTimeout(patience);
+        fail("The 3-D view did not load. Everything else works without it.");
         return;
       }
       listenForSpace(view);
@@ -41,7 +54,14 @@ class RpScene extends HTMLElement {
       listenForViewKeys(view);
       listenForDrag(view);
       frame.classList.add("loaded");
-      waiting.hidden = true;
+      const root = view.document.documentElement;
+      const look = () => {
+        if (root.dataset.view !== "drawn") return;
+        window.clearTimeout(patience);
+        waiting.hidden = true;
+      };
+      new MutationObserver(look).observe(root, { attributeFilter: ["data-view"] });
+      look();
     });
     retry.addEventListener("click", load);
     // In a narrow place the view is laid out at that width and shown smaller.

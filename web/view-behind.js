@@ -1,0 +1,119 @@
+// Where the processor draws the 3-D view: its pictures are drawn behind the canvas, and shown when they are done.
+//
+// A browser without a graphics card copies what was drawn into a canvas at the end of the same frame, and the page's
+// thread waits for it: for all of the drawing, a tenth of a second and more, in which no button is heard. So the client
+// draws into a picture of its own, and only a finished one is copied into the canvas.
+
+/** How often it is asked whether a picture is done (ms). */
+const ASK_MS = 4;
+/** A picture that says for so long that it is not done is shown all the same (ms). */
+const LONGEST_MS = 1000;
+
+export class Behind {
+  /** Is something drawn that is not shown yet? */
+  busy = false;
+  drawn = false;
+  width = 0;
+  height = 0;
+
+  /** @param {WebGL2RenderingContext} gl From now on what is drawn "into the canvas" is drawn behind it. */
+  constructor(gl) {
+    this.gl = gl;
+    this.picture = gl.createFramebuffer();
+    this.color = gl.createRenderbuffer();
+    this.depth = gl.createRenderbuffer();
+    this.bind = gl.bindFramebuffer.bind(gl);
+    /** What the client has bound; null is what it believes to be the canvas. @type {WebGLFramebuffer | null} */
+    this.forDrawing = null;
+    /** @type {WebGLFramebuffer | null} */
+    this.forReading = null;
+    this.bind(gl.FRAMEBUFFER, this.picture);
+    this.fit();
+    gl.framebufferRenderbuffer(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.RENDERBUFFER, this.color);
+    gl.framebufferRenderbuffer(gl.FRAMEBUFFER, gl.DEPTH_STENCIL_ATTACHMENT, gl.RENDERBUFFER, this.depth);
+    this.stepIn();
+  }
+
+  /** Take the place of what the client asks of the canvas. */
+  stepIn() {
+    const { gl } = this;
+    gl.bindFramebuffer = (target, framebuffer) => {
+      if (target !== gl.READ_FRAMEBUFFER) this.forDrawing = framebuffer;
+      if (target !== gl.DRAW_FRAMEBUFFER) this.forReading = framebuffer;
+      this.bind(target, framebuffer ?? this.picture);
+    };
+    const drawBuffers = gl.drawBuffers.bind(gl);
+    gl.drawBuffers = (buffers) => drawBuffers(this.forDrawing === null ? [gl.COLOR_ATTACHMENT0] : buffers);
+    const readBuffer = gl.readBuffer.bind(gl);
+    gl.readBuffer = (buffer) => readBuffer(this.forReading === null ? gl.COLOR_ATTACHMENT0 : buffer);
+    const viewport = gl.viewport.bind(gl);
+    gl.viewport = (x, y, width, height) => {
+      // The client sets it anew whenever it has changed the canvas's size.
+      this.fit();
+      viewport(x, y, width, height);
+    };
+    const clear = gl.clear.bind(gl);
+    gl.clear = (mask) => {
+      if (this.forDrawing === null) this.drawn = true;
+      clear(mask);
+    };
+  }
+
+  /** As large as the canvas. */
+  fit() {
+    const { gl } = this;
+    const { drawingBufferWidth: width, drawingBufferHeight: height } = gl;
+    if (width === this.width && height === this.height) return;
+    [this.width, this.height] = [width, height];
+    const before = gl.getParameter(gl.RENDERBUFFER_BINDING);
+    gl.bindRenderbuffer(gl.RENDERBUFFER, this.color);
+    gl.renderbufferStorage(gl.RENDERBUFFER, gl.RGBA8, width, height);
+    gl.bindRenderbuffer(gl.RENDERBUFFER, this.depth);
+    gl.renderbufferStorage(gl.RENDERBUFFER, gl.DEPTH24_STENCIL8, width, height);
+    gl.bindRenderbuffer(gl.RENDERBUFFER, before);
+  }
+
+  /**
+   * After the client's turn: show what it has drawn as soon as that is done.
+   *
+   * @param {(shown: () => void) => void} nextFrame Calls at the browser's next frame.
+   * @param {() => void} shown
+   */
+  finish(nextFrame, shown) {
+    if (!this.drawn || this.busy) return;
+    const { gl } = this;
+    this.drawn = false;
+    const done = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    if (done === null) return;
+    this.busy = true;
+    gl.flush();
+    const began = performance.now();
+    const ask = () => {
+      const late = performance.now() - began > LONGEST_MS;
+      if (!late && !gl.isContextLost() && gl.getSyncParameter(done, gl.SYNC_STATUS) !== gl.SIGNALED) {
+        window.setTimeout(ask, ASK_MS);
+        return;
+      }
+      gl.deleteSync(done);
+      nextFrame(() => {
+        this.show();
+        this.busy = false;
+        shown();
+      });
+    };
+    window.setTimeout(ask, ASK_MS);
+  }
+
+  /** Copy the picture into the canvas. */
+  show() {
+    const { gl, width, height } = this;
+    const cut = gl.isEnabled(gl.SCISSOR_TEST);
+    if (cut) gl.disable(gl.SCISSOR_TEST);
+    this.bind(gl.READ_FRAMEBUFFER, this.picture);
+    this.bind(gl.DRAW_FRAMEBUFFER, null);
+    gl.blitFramebuffer(0, 0, width, height, 0, 0, width, height, gl.COLOR_BUFFER_BIT, gl.NEAREST);
+    if (cut) gl.enable(gl.SCISSOR_TEST);
+    this.bind(gl.READ_FRAMEBUFFER, this.forReading ?? this.picture);
+    this.bind(gl.DRAW_FRAMEBUFFER, this.forDrawing ?? this.picture);
+  }
+}
