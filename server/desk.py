@@ -252,8 +252,8 @@ class Desk:
             if reason and page.session.session_id == owner:
                 page.hold_ended(reason)
         tool = self.view.tool(time.monotonic())
+        self.scene.gizmos.reset(owner, tool)
         if tool is not None and self.scene.gizmos.shown(owner):
-            self.scene.gizmos.reset(owner, tool)
             self.teleop.aim(owner, tool)
 
     def show_gizmo(self, session: Session, visible: bool, axes: GizmoAxes = "tool") -> None:

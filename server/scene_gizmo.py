@@ -74,6 +74,9 @@ class SceneGizmos:
         gizmo, drawn = self._gizmos.get(owner), pin.Quaternion(*wxyz)
         if gizmo is None or drawn.norm() < 1e-9:
             return None
+        for handle in list(gizmo.handles.values()):
+            # Viser sends what differs from what it believes to be drawn, so it has to know that the browser moved it.
+            handle.position[:], handle.wxyz[:] = position, wxyz
         drawn.normalize()
         qx, qy, qz, qw = ((drawn * gizmo.offset).coeffs()).tolist()
         gizmo.pose, gizmo.dragged = m.Pose(position, (qx, qy, qz, qw)), True
@@ -100,11 +103,13 @@ class SceneGizmos:
                 moved.append(owner)
         return moved
 
-    def reset(self, owner: str, tool: m.Pose) -> None:
-        """Bring a gizmo back to the tool."""
+    def reset(self, owner: str, tool: m.Pose | None) -> None:
+        """Bring a gizmo back to the tool; where that is not known now, it follows as soon as it is."""
         gizmo = self._gizmos.get(owner)
         if gizmo is not None:
-            self._place(gizmo, tool)
+            gizmo.dragged = False
+            if tool is not None:
+                self._place(gizmo, tool)
 
     def pose(self, owner: str) -> m.Pose | None:
         """Where the gizmo of `owner` is in odom, or None without one."""

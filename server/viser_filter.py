@@ -93,7 +93,8 @@ class Admitted:
     """A frame that was read and found right.
 
     Attributes:
-        frame: To pass on to viser; empty to leave it out.
+        frame: To pass on to viser; empty to leave it out, as all that is said of the gizmo: viser would take where it
+            was dragged for where it is drawn some time later, and after that not draw it back where it had been.
         gizmo: Where it says that the gizmo was dragged, if it does and may.
     """
 
@@ -107,7 +108,7 @@ def admit(frame: bytes, may_operate: bool, may_move: bool = True) -> Admitted | 
     Args:
         frame: One binary WebSocket frame from a browser.
         may_operate: May this session point at things and drag the gizmo?
-        may_move: May it now, or does somebody else hold control? To let go is always heard.
+        may_move: May it drag the gizmo now, or does somebody else hold control?
     """
     try:
         message = _DECODER.decode(frame)
@@ -115,10 +116,12 @@ def admit(frame: bytes, may_operate: bool, may_move: bool = True) -> Admitted | 
         return None
     if not may_operate and not isinstance(message, ViewerCamera):
         return None
-    if not may_move and isinstance(message, GizmoUpdate | GizmoDragStart):
+    if isinstance(message, GizmoUpdate):
+        return Admitted(b"", message if may_move else None)
+    if isinstance(message, GizmoDragStart | GizmoDragEnd):
         return Admitted(b"")
     # Encoded anew, so that viser reads what was checked here and nothing else.
-    return Admitted(_ENCODER.encode(message), message if isinstance(message, GizmoUpdate) else None)
+    return Admitted(_ENCODER.encode(message))
 
 
 def kind(frame: bytes) -> str:

@@ -14,9 +14,29 @@ TOOL = pin.SE3(pin.rpy.rpyToMatrix(0.4, -0.9, 2.0), np.array([0.3, 0.5, 0.9]))
 HEADING = 0.7
 
 
+class Placed:
+    """One part of where viser draws a node: like viser, it sends nothing where it believes that nothing changes."""
+
+    def __set_name__(self, owner, name):
+        self._name = name
+
+    def __get__(self, handle, owner=None):
+        return handle.believed[self._name]
+
+    def __set__(self, handle, value):
+        if not np.allclose(value, handle.believed[self._name]):
+            handle.believed[self._name][:] = value
+            handle.seen[self._name] = np.array(value)
+
+
 class Handle:
+    """A gizmo as viser believes it to be drawn, and as it is `seen` in the browser."""
+
+    position, wxyz = Placed(), Placed()
+
     def __init__(self, **drawn):
-        self.position, self.wxyz = np.array(drawn["position"]), np.array(drawn["wxyz"])
+        self.believed = {name: np.array(drawn[name], float) for name in ("position", "wxyz")}
+        self.seen = {name: value.copy() for name, value in self.believed.items()}
 
 
 class View:
@@ -32,10 +52,10 @@ class View:
     def drag(self, turn, by=(0.0, 0.0, 0.0)):
         """Turn the arrows about their own axes, and move them."""
         handle = self.handle
-        turned = pin.Quaternion(*handle.wxyz) * pin.Quaternion(pin.exp3(np.array(turn)))
-        handle.wxyz = np.array([turned.w, turned.x, turned.y, turned.z])
-        handle.position = handle.position + np.array(by)
-        return self.gizmos.drag("ada", tuple(handle.position), tuple(handle.wxyz))
+        turned = pin.Quaternion(*handle.seen["wxyz"]) * pin.Quaternion(pin.exp3(np.array(turn)))
+        handle.seen["wxyz"] = np.array([turned.w, turned.x, turned.y, turned.z])
+        handle.seen["position"] = handle.seen["position"] + np.array(by)
+        return self.gizmos.drag("ada", tuple(handle.seen["position"]), tuple(handle.seen["wxyz"]))
 
 
 def shown(axes):
@@ -51,7 +71,7 @@ AXES = {"tool": TOOL.rotation, "base": pin.exp3(np.array([0.0, 0.0, HEADING])), 
 @pytest.mark.parametrize("axes", AXES)
 def test_the_arrows_lie_along_the_axes_that_were_chosen(axes):
     gizmos, view = shown(axes)
-    assert pin.Quaternion(*view.handle.wxyz).toRotationMatrix() == pytest.approx(AXES[axes], abs=1e-6)
+    assert pin.Quaternion(*view.handle.seen["wxyz"]).toRotationMatrix() == pytest.approx(AXES[axes], abs=1e-6)
     assert placement(gizmos.pose("ada")).isApprox(TOOL, 1e-6), "showing it asks for nothing"
 
 
@@ -68,10 +88,20 @@ def test_turning_an_arc_turns_the_tool_about_that_axis(axes, turn):
 
 def test_letting_go_brings_the_arrows_back_to_the_tool_and_their_axes():
     gizmos, view = shown("world")
-    view.drag((0.0, 0.0, 0.4))
+    view.drag((0.0, 0.0, 0.4), (0.1, 0.0, 0.0))
     gizmos.reset("ada", pose_message(TOOL))
-    assert pin.Quaternion(*view.handle.wxyz).toRotationMatrix() == pytest.approx(np.eye(3), abs=1e-6)
+    assert pin.Quaternion(*view.handle.seen["wxyz"]).toRotationMatrix() == pytest.approx(np.eye(3), abs=1e-6)
+    assert view.handle.seen["position"] == pytest.approx(TOOL.translation)
     assert placement(gizmos.pose("ada")).isApprox(TOOL, 1e-6)
+
+
+def test_let_go_where_the_tool_is_not_known_the_arrows_are_back_as_soon_as_it_is():
+    gizmos, view = shown("tool")
+    view.drag((0.0, 0.0, 0.4), (0.1, 0.0, 0.0))
+    assert gizmos.follow(pose_message(TOOL), holder=None) == []
+    gizmos.reset("ada", None)
+    assert gizmos.follow(pose_message(TOOL), holder=None) == ["ada"]
+    assert view.handle.seen["position"] == pytest.approx(TOOL.translation)
 
 
 def test_arrows_that_are_no_rotation_aim_nowhere():
@@ -91,5 +121,5 @@ def test_what_nobody_dragged_follows_the_tool():
     gizmos, view = shown("base")
     moved = m.Pose((1.0, 0.5, 0.9), pose_message(TOOL).quat_xyzw)
     assert gizmos.follow(moved, holder=None) == ["ada"]
-    assert view.handle.position == pytest.approx((1.0, 0.5, 0.9))
+    assert view.handle.seen["position"] == pytest.approx((1.0, 0.5, 0.9))
     assert gizmos.follow(pose_message(TOOL), holder="ada") == []
