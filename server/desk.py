@@ -25,7 +25,7 @@ from server.robot_link import RobotLink
 from server.scene import Scene
 from server.sessions import Session
 from server.teleop import TeleopHold
-from server.viser_filter import GizmoUpdate
+from server.viser_filter import GizmoDragEnd, GizmoUpdate
 
 _CONFIRM_POLL_S = 0.01
 #: A view says where its gizmo is twenty times a second at most; one that says more often waits for the loop's turn (s).
@@ -210,9 +210,17 @@ class Desk:
             self.note("info", f"{session.user} holds the robot", session.client)
         return Result(200, True, "holding")
 
-    def dragged(self, session: Session, gizmo: GizmoUpdate) -> None:
-        """A gizmo was dragged. While its owner holds, the robot hears of it at once, not with the loop's turn."""
+    def dragged(self, session: Session, gizmo: GizmoUpdate | GizmoDragEnd) -> None:
+        """A gizmo was dragged, or let go of. While its owner holds, the robot hears at once, not with the loop's turn.
+
+        The 3-D client tells the last place of a drag when it ends, after the page has said that the hold has: the next
+        hold may not lead there.
+        """
         owner = session.session_id
+        if isinstance(gizmo, GizmoDragEnd):
+            if self.teleop.holder != owner:
+                self._held_out(owner)
+            return
         target = self.scene.gizmos.drag(owner, gizmo.position, gizmo.wxyz)
         if target is None:
             return

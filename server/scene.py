@@ -4,7 +4,7 @@ import contextlib
 import io
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import viser
@@ -46,13 +46,21 @@ def view_page() -> bytes:
     return (Path(viser.__file__).parent / "client" / "build" / "index.html").read_bytes()
 
 
+class Soon(Protocol):
+    """Has the server's loop call `function(*arguments)` soon; from any thread."""
+
+    def __call__(self, function: Callable[..., object], *arguments: object) -> object:
+        """Ask for it."""
+
+
 class Scene:
-    """Everything that is drawn. Its methods are called from the server's loop; callbacks come on viser's thread."""
+    """Everything that is drawn. It belongs to the server's loop: what viser's thread tells is handed over to it."""
 
     def __init__(
         self,
         model: Any,
         parts: list[Part],
+        soon: Soon,
         on_select: Callable[[str, str], object],
         on_sightline: Callable[[str, m.Vector3, m.Vector3], object],
         on_stranger: Callable[[], object],
@@ -62,6 +70,7 @@ class Scene:
         Args:
             model: Pinocchio model of the robot.
             parts: Its looks.
+            soon: Hands over to the loop from which the scene is used, and on which all that follow are called.
             on_select: Called with (owner, point_id) when `owner` clicked a point.
             on_sightline: Called with (owner, origin, direction) when `owner`, who places points, clicked into the view.
             on_stranger: Called when a connection that did not come through the proxy was refused.
@@ -70,10 +79,11 @@ class Scene:
         with contextlib.redirect_stdout(io.StringIO()):
             self._server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         self.port = int(self._server.get_port())
-        self.door = SceneDoor(self._server, on_stranger)
+        self._soon = soon
+        self.door = SceneDoor(self._server, lambda: soon(on_stranger))
         pace_views(self._server, lambda client_id: pause_s(self.views, self.door.looks_on(client_id)))
         self.gizmos = SceneGizmos()
-        self._clicks = SceneClicks(on_sightline)
+        self._clicks = SceneClicks(lambda *line: soon(on_sightline, *line))
         self._on_select = on_select
         self._marker = cut_marker()
         self._points: dict[str, tuple[PagePoint, viser.MeshHandle]] = {}
@@ -263,7 +273,7 @@ class Scene:
             async def clicked(event: viser.SceneNodePointerEvent[Any]) -> None:
                 owner = self.door.owner(event.client_id)
                 if owner is not None:
-                    self._on_select(owner, point_id)
+                    self._soon(self._on_select, owner, point_id)
 
             handle.on_click(clicked)
         else:
@@ -297,6 +307,12 @@ class Scene:
         return [client for client_id, client in clients.items() if self.door.owner(client_id) == owner]
 
     async def _on_client(self, client: viser.ClientHandle) -> None:
+        self._soon(self._attach, client)
+
+    async def _on_client_gone(self, client: viser.ClientHandle) -> None:
+        self._soon(self._detach, client.client_id)
+
+    def _attach(self, client: viser.ClientHandle) -> None:
         owner = self.door.owner(client.client_id)
         if owner is not None:
             self.gizmos.attach(owner, client)
@@ -305,11 +321,11 @@ class Scene:
             self._draw_selection(owner)
             self.ghost.attach(owner, client)
 
-    async def _on_client_gone(self, client: viser.ClientHandle) -> None:
-        self.gizmos.detach(client.client_id)
-        self._clicks.detach(client.client_id)
-        self.ghost.detach(client.client_id)
-        self.cameras.forget(client.client_id)
+    def _detach(self, client_id: int) -> None:
+        self.gizmos.detach(client_id)
+        self._clicks.detach(client_id)
+        self.ghost.detach(client_id)
+        self.cameras.forget(client_id)
 
     def _draw_surroundings(self) -> None:
         server, scene = self._server, self._server.scene

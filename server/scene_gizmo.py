@@ -32,7 +32,7 @@ class _Gizmo:
 
 
 class SceneGizmos:
-    """Shows gizmos and works out where they were dragged. Used from the server's loop; views come on viser's thread."""
+    """Shows gizmos and works out where they were dragged. Used from the server's loop alone."""
 
     def __init__(self) -> None:
         """No gizmo is shown."""
@@ -74,30 +74,31 @@ class SceneGizmos:
         gizmo, drawn = self._gizmos.get(owner), pin.Quaternion(*wxyz)
         if gizmo is None or drawn.norm() < 1e-9:
             return None
-        for handle in list(gizmo.handles.values()):
+        for handle in gizmo.handles.values():
             # Viser sends what differs from what it believes to be drawn, so it has to know that the browser moved it.
             handle.position[:], handle.wxyz[:] = position, wxyz
         drawn.normalize()
+        gizmo.drawn = drawn
         qx, qy, qz, qw = ((drawn * gizmo.offset).coeffs()).tolist()
         gizmo.pose, gizmo.dragged = m.Pose(position, (qx, qy, qz, qw)), True
         return gizmo.pose
 
     def detach(self, client_id: int) -> None:
         """A view has closed."""
-        for gizmo in list(self._gizmos.values()):
+        for gizmo in self._gizmos.values():
             gizmo.handles.pop(client_id, None)
 
     def hide(self, owner: str) -> None:
         """Remove the gizmo of `owner`."""
         gizmo = self._gizmos.pop(owner, None)
         if gizmo is not None:
-            for handle in list(gizmo.handles.values()):
+            for handle in gizmo.handles.values():
                 handle.remove()
 
     def follow(self, tool: m.Pose, holder: str | None) -> list[str]:
         """Keep every gizmo that nobody has dragged at the tool, except that of `holder`; whose gizmos moved."""
         moved = []
-        for owner, gizmo in list(self._gizmos.items()):
+        for owner, gizmo in self._gizmos.items():
             if owner != holder and not gizmo.dragged and _apart(gizmo.pose, tool) > _FOLLOW:
                 self._place(gizmo, tool)
                 moved.append(owner)
@@ -123,7 +124,7 @@ class SceneGizmos:
         base = pin.Quaternion(math.cos(heading), 0.0, 0.0, math.sin(heading))
         gizmo.drawn = {"tool": tool, "base": base, "world": pin.Quaternion.Identity()}[gizmo.axes]
         gizmo.offset = gizmo.drawn.inverse() * tool
-        for handle in list(gizmo.handles.values()):
+        for handle in gizmo.handles.values():
             handle.position = pose.position
             handle.wxyz = _wxyz(gizmo.drawn)
 

@@ -157,14 +157,21 @@ async def serve(
 
 def _desk(config: ServerConfig, wire: Transport, model: RobotModel, parts: list[Part], reception: Reception) -> Desk:
     """The desk of the robot on this wire, with a 3-D view of its own."""
-    soon = asyncio.get_running_loop().call_soon_threadsafe
+    loop = asyncio.get_running_loop()
+
+    def soon(function: Callable[..., object], *arguments: object) -> None:
+        # Once the loop is closed, viser's thread has nobody left to tell.
+        with contextlib.suppress(RuntimeError):
+            loop.call_soon_threadsafe(function, *arguments)
+
     scene = Scene(
         model.model,
         parts,
-        # Called on viser's thread, and not before a page is served.
-        on_select=lambda owner, point_id: soon(desk.clicked, owner, point_id),
-        on_sightline=lambda owner, origin, direction: soon(desk.sighted, owner, origin, direction),
-        on_stranger=lambda: soon(desk.note, "warning", "refused a connection to the 3-D view from outside the page"),
+        soon,
+        # None is called before a page is served.
+        on_select=lambda owner, point_id: desk.clicked(owner, point_id),
+        on_sightline=lambda owner, origin, direction: desk.sighted(owner, origin, direction),
+        on_stranger=lambda: desk.note("warning", "refused a connection to the 3-D view from outside the page"),
     )
     link = RobotLink(wire)
     desk = Desk(

@@ -95,11 +95,11 @@ class Admitted:
     Attributes:
         frame: To pass on to viser; empty to leave it out, as all that is said of the gizmo: viser would take where it
             was dragged for where it is drawn some time later, and after that not draw it back where it had been.
-        gizmo: Where it says that the gizmo was dragged, if it does and may.
+        gizmo: What it says of the gizmo, where that matters: dragged to a place, if it may be, or let go of.
     """
 
     frame: bytes
-    gizmo: GizmoUpdate | None = None
+    gizmo: GizmoUpdate | GizmoDragEnd | None = None
 
 
 def admit(frame: bytes, may_operate: bool, may_move: bool = True) -> Admitted | None:
@@ -108,7 +108,7 @@ def admit(frame: bytes, may_operate: bool, may_move: bool = True) -> Admitted | 
     Args:
         frame: One binary WebSocket frame from a browser.
         may_operate: May this session point at things and drag the gizmo?
-        may_move: May it drag the gizmo now, or does somebody else hold control?
+        may_move: May it drag the gizmo now, or does somebody else hold control? To let go is always heard.
     """
     try:
         message = _DECODER.decode(frame)
@@ -118,7 +118,9 @@ def admit(frame: bytes, may_operate: bool, may_move: bool = True) -> Admitted | 
         return None
     if isinstance(message, GizmoUpdate):
         return Admitted(b"", message if may_move else None)
-    if isinstance(message, GizmoDragStart | GizmoDragEnd):
+    if isinstance(message, GizmoDragEnd):
+        return Admitted(b"", message)
+    if isinstance(message, GizmoDragStart):
         return Admitted(b"")
     # Encoded anew, so that viser reads what was checked here and nothing else.
     return Admitted(_ENCODER.encode(message))

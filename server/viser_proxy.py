@@ -14,7 +14,7 @@ from websockets.typing import Subprotocol
 
 from server.scene import VIEW_VERSION, Scene, view_page
 from server.sessions import Session
-from server.viser_filter import GizmoUpdate, admit, kind
+from server.viser_filter import GizmoDragEnd, GizmoUpdate, admit, kind
 
 #: Viser's own panel and notices have nothing to say here, and would cover the view.
 _STYLE = b"<style>[data-floating-window],.mantine-Notifications-root{display:none!important}</style>"
@@ -25,7 +25,7 @@ _SCRIPT = b'<script type="module" src="/view.js"></script>'
 def viser_router(
     scene: Scene,
     may_move: Callable[[Session], bool],
-    on_drag: Callable[[Session, GizmoUpdate], object],
+    on_gizmo: Callable[[Session, GizmoUpdate | GizmoDragEnd], object],
     on_drop: Callable[[Session, str], None],
 ) -> APIRouter:
     """Routes `/viser/` and the WebSocket `/viser`.
@@ -33,7 +33,8 @@ def viser_router(
     Args:
         scene: What is shown.
         may_move: Whether this session may lead the tool now.
-        on_drag: Hears at once where a session that may has dragged its gizmo; viser would tell it two threads later.
+        on_gizmo: Hears at once where a session that may has dragged its gizmo, and when anybody has let go of theirs;
+            viser would tell it two threads later.
         on_drop: Hears of refused frames: whose, and what they said they were.
     """
     router = APIRouter(include_in_schema=False)
@@ -61,7 +62,7 @@ def viser_router(
                 on_drop(session, kind(frame))
                 return b""
             if admitted.gizmo is not None:
-                on_drag(session, admitted.gizmo)
+                on_gizmo(session, admitted.gizmo)
             return admitted.frame
 
         offered = [Subprotocol(name) for name in websocket.scope.get("subprotocols", ())]

@@ -117,6 +117,17 @@ def test_a_gizmo_that_is_not_shown_aims_nowhere():
     assert gizmos.pose("bob") is None
 
 
+def test_a_view_that_opens_later_draws_the_arrows_where_they_were_dragged():
+    gizmos, view = shown("base")
+    view.drag((0.0, 0.0, 0.4), (0.1, 0.0, 0.0))
+    aim = gizmos.pose("ada")
+    later = View(client_id=2)
+    gizmos.attach("ada", later)
+    for name, value in view.handle.seen.items():
+        assert later.handle.seen[name] == pytest.approx(value)
+    assert gizmos.drag("ada", tuple(later.handle.position), tuple(later.handle.wxyz)) == aim
+
+
 def test_what_nobody_dragged_follows_the_tool():
     gizmos, view = shown("base")
     moved = m.Pose((1.0, 0.5, 0.9), pose_message(TOOL).quat_xyzw)

@@ -49,6 +49,7 @@ def test_a_viewer_may_only_look(message):
 def test_the_gizmo_is_led_by_who_holds_control_alone_and_viser_hears_nothing_of_it():
     assert admit(frame(DRAG), may_operate=True).gizmo.position == (0.1, 0.2, 0.3)
     assert admit(frame(DRAG), may_operate=True, may_move=False) == Admitted(b"")
+    assert admit(frame(LET_GO), may_operate=True, may_move=False).gizmo is not None, "to let go is always heard"
     for message in (DRAG, GRAB, LET_GO):
         assert not admit(frame(message), may_operate=True).frame
     for message in (CAMERA, CLICK, POINTER):
