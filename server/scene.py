@@ -93,7 +93,7 @@ class Scene:
         self._plant: dict[str, list[Capsule]] = {}
         self._draw_surroundings()
         self.layers = SceneLayers(self._server)
-        self.cameras = SceneCameras()
+        self.cameras = SceneCameras(self._server)
         self.trail = SceneTrail(self._server)
         self._measure = SceneMeasure()
         self.robot = SceneRobot(self._server, model, parts)
@@ -331,9 +331,6 @@ class Scene:
         server, scene = self._server, self._server.scene
         server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
         server.gui.main_panel.minimize()
-        server.initial_camera.position = (-1.45, -1.95, 1.85)
-        server.initial_camera.look_at = (0.3, 0.45, 0.8)
-        server.initial_camera.fov = 0.82
         scene.world_axes.visible = False
         sky = _SKY_TOP + np.linspace(0.0, 1.0, 64)[:, None, None] * (_SKY_BOTTOM - _SKY_TOP)
         scene.set_background_image(np.repeat(sky, 4, axis=1).astype(np.uint8), format="png")

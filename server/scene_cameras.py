@@ -12,6 +12,8 @@ from rolling_panda.page_messages import CameraPreset
 
 #: A camera that goes along is moved when the base has gone so far (m).
 _STEP = 0.004
+#: Where a new view begins is told anew when the base has gone so far (m) or turned so far (rad).
+_BEGIN_STEP = 0.3
 #: A view reports its camera late. Farther than this (m) from each place where it was put, somebody has moved it.
 _ECHO = 0.03
 
@@ -56,11 +58,15 @@ class _Along:
 
 
 class SceneCameras:
-    """Moves the cameras of views. Called from the server's loop."""
+    """Moves the cameras of views, and says where new ones begin: near the robot. Called from the server's loop."""
 
-    def __init__(self) -> None:
+    def __init__(self, server: viser.ViserServer) -> None:
         """Every camera stands where its owner leaves it."""
         self._along: dict[int, _Along] = {}
+        self._begin = server.initial_camera
+        self._begin.fov = 0.82
+        self._begun = np.full(3, np.inf)
+        self._begin_near(np.zeros(3))
 
     def take(self, preset: CameraPreset, clients: list[viser.ClientHandle], q: Array, tool: Array) -> None:
         """Put the cameras of these views where `preset` has them."""
@@ -77,6 +83,7 @@ class SceneCameras:
 
     def follow(self, q: Array) -> None:
         """Take along the cameras that follow the base; whoever turns or moves theirs keeps it so, going along."""
+        self._begin_near(q[:3])
         base = np.array([q[0], q[1], 0.0])
         for along in list(self._along.values()):
             camera = along.client.camera
@@ -89,6 +96,13 @@ class SceneCameras:
             along.base = base
             along.put.append(base + along.offset)
             _put(along.client, base + along.offset, base + along.gaze)
+
+    def _begin_near(self, base: Array) -> None:
+        if float(np.abs(base - self._begun).max()) < _BEGIN_STEP:
+            return
+        self._begun = base.copy()
+        begin = shot("follow", base, base)
+        self._begin.position, self._begin.look_at = begin.position, begin.look_at
 
     def forget(self, client_id: int) -> None:
         """A view has closed."""

@@ -12,6 +12,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
+from rolling_panda.errors import RollingPandaError
 from server.scene import VIEW_VERSION, Scene, view_page
 from server.sessions import Session
 from server.viser_filter import GizmoDragEnd, GizmoUpdate, admit, kind
@@ -20,6 +21,8 @@ from server.viser_filter import GizmoDragEnd, GizmoUpdate, admit, kind
 _STYLE = b"<style>[data-floating-window],.mantine-Notifications-root{display:none!important}</style>"
 #: The page's own file on how the view is drawn; it has to run before the client's scripts.
 _SCRIPT = b'<script type="module" src="/view.js"></script>'
+#: The client unpacks itself, and would run whether that file has come or not; without it, it does all the same.
+_UNPACKS, _WAITS = b"await init();", b'await Promise.all([init(),import("/view.js").catch(()=>{})]);'
 
 
 def viser_router(
@@ -38,7 +41,7 @@ def viser_router(
         on_drop: Hears of refused frames: whose, and what they said they were.
     """
     router = APIRouter(include_in_schema=False)
-    page = view_page().replace(b"<head>", b"<head>" + _SCRIPT + _STYLE, 1)
+    page = _view_page()
     compressed = gzip.compress(page, 6)
 
     @router.get("/viser/")
@@ -90,6 +93,14 @@ def viser_router(
                 scene.door.forget(port)
 
     return router
+
+
+def _view_page() -> bytes:
+    """The client's page with what is the page's own."""
+    page = view_page()
+    if page.count(_UNPACKS) != 1:
+        raise RollingPandaError(f"viser {VIEW_VERSION} has another client than the one that is known")
+    return page.replace(_UNPACKS, _WAITS).replace(b"<head>", b"<head>" + _SCRIPT + _STYLE, 1)
 
 
 async def _relay(

@@ -40,7 +40,7 @@ class PlayedHall:
         elif path == "/api/stop":
             self.stops.append(route.request.post_data_json)
             route.fulfill(json={"ok": True, "reason": ""})
-        elif path in ("/view.js", "/view-behind.js"):
+        elif path in ("/view.js", "/view-behind.js", "/view-drawn.js"):
             route.fulfill(body=resource(f"web{path}").read_bytes(), content_type="text/javascript")
         else:
             route.abort()

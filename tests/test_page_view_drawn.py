@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 import pytest
+from played_page import box_of, until
 from played_server import ORIGIN, VIEW, PlayedServer
 from playwright.sync_api import Browser, Page, expect
 
@@ -66,6 +67,21 @@ def test_words_stand_in_its_place_until_the_robot_is_drawn(page: Page) -> None:
     expect(words).to_be_hidden()
     page.clock.fast_forward(30_000)
     expect(words).to_be_hidden()
+
+
+def test_a_press_on_the_words_moves_nothing(page: Page, server: PlayedServer) -> None:
+    box = box_of(page.locator("rp-scene iframe"))
+    page.locator("#teleop").click()
+    page.mouse.move(box["x"] + 100, box["y"] + 100)
+    page.mouse.down()
+    page.wait_for_timeout(300)
+    assert server.holds() == []
+    page.mouse.up()
+    page.frames[1].evaluate(CLIENT, 20000)
+    expect(page.locator("rp-scene .empty")).to_be_hidden()
+    page.mouse.down()
+    until(page, lambda: server.holds()[-1:] == [True])
+    page.mouse.up()
 
 
 def test_who_waits_for_long_is_told_what_may_be_the_matter_and_may_load_it_again(page: Page) -> None:

@@ -9,6 +9,7 @@ from rolling_panda.page_messages import CameraPreset
 from server.scene_cameras import SceneCameras, shot
 
 TOOL = np.array([0.6, 0.5, 1.0])
+SERVER = SimpleNamespace(initial_camera=SimpleNamespace())
 
 
 def at(x=0.0, y=0.0, heading=0.0):
@@ -40,8 +41,19 @@ def test_the_preset_of_the_tool_looks_at_it():
     assert shot("tool", at(), TOOL).look_at == pytest.approx(TOOL)
 
 
+def test_a_view_that_opens_later_begins_near_the_robot():
+    begin = SimpleNamespace()
+    cameras = SceneCameras(SimpleNamespace(initial_camera=begin))
+    before = begin.position.copy()
+    cameras.follow(at(0.1))
+    assert begin.position == pytest.approx(before), "views are not told of every centimetre"
+    cameras.follow(at(12.0, 0.5))
+    assert begin.position - before == pytest.approx([12.0, 0.5, 0.0])
+    assert begin.look_at == pytest.approx(shot("follow", at(12.0, 0.5), TOOL).look_at)
+
+
 def test_only_the_view_that_follows_goes_along_and_only_once_the_base_has_moved():
-    cameras, mine, other = SceneCameras(), view(1), view(2)
+    cameras, mine, other = SceneCameras(SERVER), view(1), view(2)
     cameras.take("follow", [mine], at(), TOOL)
     cameras.take("row", [other], at(), TOOL)
     before, stays = mine.camera.position.copy(), other.camera.position.copy()
@@ -53,7 +65,7 @@ def test_only_the_view_that_follows_goes_along_and_only_once_the_base_has_moved(
 
 
 def test_a_late_report_of_where_it_was_put_is_not_taken_for_a_hand():
-    cameras, mine = SceneCameras(), view()
+    cameras, mine = SceneCameras(SERVER), view()
     cameras.take("follow", [mine], at(), TOOL)
     start = mine.camera.position.copy()
     late = start.copy()
@@ -67,7 +79,7 @@ def test_a_late_report_of_where_it_was_put_is_not_taken_for_a_hand():
 
 
 def test_who_moves_the_camera_keeps_it_so_and_it_goes_along():
-    cameras, mine = SceneCameras(), view()
+    cameras, mine = SceneCameras(SERVER), view()
     cameras.take("follow", [mine], at(), TOOL)
     mine.camera.position, mine.camera.look_at = np.array([2.0, 2.0, 2.0]), np.array([0.0, 1.0, 1.0])
     cameras.follow(at(0.3))
@@ -76,7 +88,7 @@ def test_who_moves_the_camera_keeps_it_so_and_it_goes_along():
 
 
 def test_a_closed_view_and_one_that_chose_another_preset_follow_no_more():
-    cameras, mine, closed = SceneCameras(), view(1), view(2)
+    cameras, mine, closed = SceneCameras(SERVER), view(1), view(2)
     cameras.take("follow", [mine, closed], at(), TOOL)
     cameras.take("top", [mine], at(), TOOL)
     cameras.forget(2)

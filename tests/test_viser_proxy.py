@@ -335,11 +335,35 @@ def test_the_client_page_is_compressed_and_kept_by_the_browser(server):
     with server.client() as client:
         first = client.get("/viser/")
         assert first.headers["content-encoding"] == "gzip"
-        # Compared as places: on a failure nobody wants to read the client.
-        own, clients = (first.text.index(start) for start in ('<script type="module" src="/view.js">', "<script data-"))
-        assert own < clients, "it has to run before the client"
         again = client.get("/viser/", headers={"if-none-match": first.headers["etag"]})
         assert again.status_code == 304
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("comes", [True, False])
+def test_the_client_waits_for_the_pages_own_file_and_does_without_it_where_it_does_not_come(server, browser, comes):
+    with server.client() as client:
+        context = browser.new_context(base_url=server.address)
+        context.add_cookies([{"name": n, "value": v, "url": server.address} for n, v in client.cookies.items()])
+    page = context.new_page()
+
+    def late(route):
+        time.sleep(1.0)
+        if comes:
+            route.continue_()
+        else:
+            route.abort()
+
+    page.route("**/view-behind.js", late)
+    page.add_init_script("""new MutationObserver((_, looking) => {
+      if (!document.querySelector("#root > *")) return;
+      window.beganWith = location.search;
+      looking.disconnect();
+    }).observe(document, { childList: true, subtree: true });""")
+    page.goto("/viser/")
+    page.wait_for_function("window.beganWith !== undefined", timeout=1000 * PATIENCE_S)
+    assert page.evaluate("beganWith").startswith("?fixedDpr=") == comes
+    context.close()
 
 
 @pytest.fixture

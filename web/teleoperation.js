@@ -104,7 +104,7 @@ export function listenForHoldKey(target) {
 }
 
 /**
- * Dragging in the 3-D view counts as holding for as long as the pointer is down there.
+ * Dragging in the 3-D view counts as holding for as long as the pointer is down there, once there is something to see.
  *
  * @param {Window} view
  */
@@ -114,7 +114,8 @@ export function listenForDrag(view) {
   view.addEventListener(
     "pointerdown",
     (event) => {
-      if (teleoperating.get() && moving.get() === "tool" && event.isPrimary && event.button === 0) hold.press("gizmo");
+      if (view.document.documentElement.dataset.view === "loading" || !event.isPrimary || event.button !== 0) return;
+      if (teleoperating.get() && moving.get() === "tool") hold.press("gizmo");
     },
     options,
   );

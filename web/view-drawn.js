@@ -4,12 +4,13 @@
 const FEWEST_TRIANGLES = 4000;
 
 /**
- * Marks the document `data-view="drawn"` once the robot is on the screen.
+ * Marks the document `data-view="loading"`, and `data-view="drawn"` once the robot is on the screen.
  *
  * @param {(callback: () => void) => void} nextFrame Calls at the browser's next frame.
  * @param {() => boolean} shown Has all that was drawn come to the screen?
  */
 export const tellWhenDrawn = (nextFrame, shown) => {
+  document.documentElement.dataset.view ??= "loading";
   const { prototype } = WebGL2RenderingContext;
   const { drawElements } = prototype;
   let triangles = 0;

@@ -55,8 +55,10 @@ class RpScene extends HTMLElement {
       listenForDrag(view);
       frame.classList.add("loaded");
       const root = view.document.documentElement;
+      // Where the view's own file has not come, nobody tells.
+      if (!root.dataset.view) root.dataset.view = "untold";
       const look = () => {
-        if (root.dataset.view !== "drawn") return;
+        if (root.dataset.view === "loading") return;
         window.clearTimeout(patience);
         waiting.hidden = true;
       };
