@@ -6,7 +6,8 @@ from typing import Literal
 
 from controller.config import ControllerConfig
 from controller.interface import Inputs
-from rolling_panda.messages import Mode
+from rolling_panda import topics
+from rolling_panda.messages import BridgeState, Mode
 
 Action = Literal["none", "pause", "protect", "fault"]
 
@@ -24,6 +25,7 @@ class Health:
         present: Processes connected now.
         watchdog: The bridge says that its watchdog holds the robot.
         overruled: The bridge has accepted a newer controller than this one.
+        refused: How many motion commands the bridge has refused since its start.
         ledger: Why what is done cannot be recorded; empty when it can.
         astray: Why the robot does not do what it is told; empty when it does.
         obstacles: Age of the picture behind what is known to stand around.
@@ -37,6 +39,7 @@ class Health:
     present: frozenset[str]
     watchdog: bool
     overruled: bool
+    refused: int = 0
     ledger: str = ""
     astray: str = ""
     obstacles: float = 0.0
@@ -66,10 +69,15 @@ def health(inputs: Inputs, epoch: int | None, now: float, ledger: str = "", astr
         present=inputs.present,
         watchdog=bridge is not None and bridge.message.watchdog,
         overruled=bridge is not None and epoch is not None and bridge.message.epoch > epoch,
+        refused=0 if bridge is None else _refused(bridge.message),
         ledger=ledger,
         astray=astray,
         obstacles=_picture_age(inputs, now),
     )
+
+
+def _refused(bridge: BridgeState) -> int:
+    return sum(each.count for each in bridge.rejections if each.topic == topics.MOTION.name)
 
 
 def _picture_age(inputs: Inputs, now: float) -> float:

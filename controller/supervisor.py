@@ -39,7 +39,8 @@ class Supervisor:
         self.authority = Authority(draw_nonce, config.supervision_s, starts)
         self.state = modes.boot()
         self._inputs = Inputs()
-        self._obeyed = 0.0
+        #: When the bridge last did as it was told, and how many commands it had refused by then.
+        self._obeyed, self._refused = 0.0, 0
         self.health = safety.health(self._inputs, None, 0.0)
 
     @property
@@ -138,11 +139,14 @@ class Supervisor:
 
     def _review_token(self, now: float) -> None:
         """One command with a spoilt number far ahead, once accepted, would have all others refused for good."""
-        if not self.health.watchdog or self.health.overruled:
-            self._obeyed = now
-        elif now - self._obeyed > _ANEW_S and self._movement.at_rest:
-            self.authority.begin_anew()
-            self._obeyed = now
+        health = self.health
+        if health.watchdog and not health.overruled:
+            if now - self._obeyed < _ANEW_S or not self._movement.at_rest:
+                return
+            if health.refused > self._refused:
+                self.authority.begin_anew()
+                self._lines.say("warning", f"the bridge refused every command for {_ANEW_S:.0f} s: a new token begins")
+        self._obeyed, self._refused = now, health.refused
 
     def _pause(self, reason: str, now: float) -> None:
         """What moves comes to rest, and nothing resumes by itself."""

@@ -37,6 +37,22 @@ def test_who_was_silent_and_has_lost_control_moves_the_robot_by_holding_anew():
     assert set(world.modes) == {"TELEOP"}
 
 
+@pytest.mark.parametrize("held_by", ["a stop", "a fault of the robot"])
+def test_a_robot_that_something_else_keeps_still_stays_under_its_token(held_by):
+    world = World(0)
+    world._armed()
+    if held_by == "a stop":
+        world.stop()
+    else:
+        plain = world.robot.read
+        world.robot.read = lambda: replace(plain(), fault="the wheels say nothing")
+    world.run(0.5)
+    token = world.controller._supervisor.authority.token
+    assert world.bridge._state(world.now).watchdog
+    world.run(5.0)
+    assert world.controller._supervisor.authority.token == token
+
+
 def test_a_spoiled_number_that_was_accepted_does_not_keep_the_robot_still_for_good():
     world = World(0)
     world.drive()
