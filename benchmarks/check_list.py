@@ -112,7 +112,9 @@ CONTROLLER = (
     Check("a new token for each lease", "controller/lease.py",
           "        self.begin_anew()", "        pass", "test_lease.py"),
     Check("who was overruled takes no new token", "controller/supervisor.py",
-          " or self.health.overruled:", ":", "faults/test_faults.py"),
+          " and not health.overruled:", ":", "faults/test_faults.py"),
+    Check("what a stop or a fault keeps still keeps its token", "controller/supervisor.py",
+          "if health.refused > self._refused:", "if True:", "faults/test_faults.py"),
     Check("a spoilt number is got over", "controller/supervisor.py",
           "self.authority.begin_anew()", "pass", "faults/test_faults.py"),
     Check("repeated presence renews nothing", "controller/authority.py",
@@ -219,7 +221,7 @@ SERVER = (
           "test_viser_filter.py"),
     Check("the account of who is signed in", "server/sessions.py",
           "if each.account and accounts.get(each.user) != each.account", "if False",
-          "test_sign_in.py::test_who_is_removed_is_out_within_a_second"),
+          "test_sign_in.py::test_who_is_removed_is_out_at_once"),
 )
 
 WIRE = (

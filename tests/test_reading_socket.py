@@ -12,7 +12,7 @@ from server.config import ServerConfig
 
 def test_a_page_that_does_not_read_is_dropped_and_one_that_reads_stays():
     wire = FakeWire()
-    config = ServerConfig(unread_s=0.4, page_rate_hz=100.0)
+    config = ServerConfig(unread_s=2.0, page_rate_hz=100.0)
     with running_server(wire, config) as server, telling(wire), server.client(user="ann") as client:
 
         def opened():
