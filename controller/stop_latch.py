@@ -67,13 +67,15 @@ class StopLatch:
 
     def ask_release(self, intent: intents.Reset, bridge: m.BridgeState | None, now: float) -> str:
         """A supervisor resets; returns why not. The release goes to the bridge, and only its state ends the latch."""
-        newest = bridge.stop_id if bridge is not None and bridge.stop_id else next(reversed(self._pending), "")
+        if bridge is None:
+            return "the bridge has not said yet what it holds: reset again in a moment"
+        newest = bridge.stop_id or next(reversed(self._pending), "")
         if intent.stop_id and intent.stop_id != newest:
             return "another stop was pressed meanwhile: look who pressed it and why, then reset again"
         if self._asked is not None and now - self._asked_at < _RELEASE_S:
             return "the reset is under way"
         self._asked, self._asked_at = intent, now
-        if bridge is not None and bridge.stop_id:
+        if bridge.stop_id:
             self._due = m.ReleaseStop(stop_id=bridge.stop_id, user=intent.user, reason=intent.reason)
         return ""
 

@@ -53,10 +53,15 @@ def test_clicks_on_canes_in_the_view_and_in_the_image_place_points(tmp_path: Pat
         answers = [click_and_hear(page, *places[k]) for k in chosen]
         placed = [(line, answer["reason"]) for line, answer in answers if answer["ok"]]
         assert len(placed) >= CLICKS - 2, answers
-        shown = {row["point"]["point_id"]: row["point"] for row in robot.points()}
+
+        def shown() -> dict[str, dict]:
+            return {row["point"]["point_id"]: row["point"] for row in robot.points()}
+
+        robot.wait(lambda: {name for _, name in placed} <= set(shown()), 10, "the placed points to be shown")
+        points = shown()
         for line, name in placed:
-            assert shown[name]["kind"] == "by hand"
-            assert beside_line(shown[name]["position"], line) < 0.04
+            assert points[name]["kind"] == "by hand"
+            assert beside_line(points[name]["position"], line) < 0.04
         for _, answer in answers:
             assert answer["ok"] or "click" in answer["reason"] or "is there already" in answer["reason"]
 

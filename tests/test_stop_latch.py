@@ -91,11 +91,13 @@ def test_a_reset_of_a_stop_that_is_not_the_newest_any_more_is_refused():
     assert latch.message().released_by == "ada: looked at it"
 
 
-def test_without_a_bridge_nothing_is_released():
+def test_before_the_bridge_has_said_what_it_holds_a_reset_is_refused_and_later_it_is_not_lost():
     latch = StopLatch()
     latch.take((stop("a"),), None)
-    latch.ask_release(RESET, None, 1.0)
-    assert not latch.released(None)
+    assert "the bridge has not said" in latch.ask_release(RESET, None, 1.0)
+    assert not latch.released(None) and not latch.released(BRIDGE)
+    assert latch.ask_release(RESET, bridge("a"), 1.1) == ""
+    assert latch.release_due().stop_id == "a"
 
 
 def test_of_two_stops_the_one_that_the_bridge_holds_is_released():

@@ -19,7 +19,14 @@ pytestmark = [pytest.mark.alone, pytest.mark.slow]
 PEOPLE = {"ada": "supervisor", "bob": "operator", "vic": "viewer"}
 ANYBODY = st.sampled_from(["ada", "bob", "ada", "bob", "vic"])
 #: Of a busy machine, not of the program: what a person would try again.
-_AGAIN = ("watchdog", "old, allowed are", "silent for", "under way", "wait until the robot is at rest")
+_AGAIN = (
+    "watchdog",
+    "old, allowed are",
+    "silent for",
+    "under way",
+    "wait until the robot is at rest",
+    "has not said yet",
+)
 PATIENCE_S = 15.0
 
 
