@@ -172,6 +172,8 @@ class ObstacleConfig(Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         nearest: Pixels nearer than this are not used (m).
+        thick_nearest: The same of posts, trunks and cordons: from near by, a network takes one for another, and wire or
+            canes for any of them, and what is as thick has been seen from farther away before (m).
         farthest: The same for farther ones (m).
         cell: Size of the cells in which points are gathered (m).
         hits: Frames that must have shown a cell.
@@ -181,11 +183,13 @@ class ObstacleConfig(Struct, frozen=True, forbid_unknown_fields=True):
         apart: Posts and trunks farther apart than this along the row are two (m).
         wire_apart: Wires farther apart than this in height are two (m).
         piece: A cordon is cut into pieces of this length (m).
+        piece_apart: What is farther than this above, below or behind the rest of a piece is no part of it (m).
         most: Rods kept at most; of canes the nearest.
         canes: Whether what stays of the canes is among them.
     """
 
     nearest: Positive = 0.2
+    thick_nearest: Positive = 0.5
     farthest: Positive = 2.0
     cell: Positive = 0.02
     hits: Hits = 3
@@ -195,6 +199,7 @@ class ObstacleConfig(Struct, frozen=True, forbid_unknown_fields=True):
     apart: Positive = 0.15
     wire_apart: Positive = 0.06
     piece: Positive = 0.15
+    piece_apart: Positive = 0.06
     most: Annotated[int, Meta(ge=1, le=500)] = 200
     canes: bool = True
 
@@ -208,6 +213,8 @@ class PerceptionConfig(Struct, frozen=True, forbid_unknown_fields=True):
         survey_nearest: A frame with the cordon nearer than this is no survey: it shows parts of spurs only, so that it
             may confirm that wood has gone and propose nothing (m).
         survey_farthest: The same for a cordon farther away, where canes are too thin in the image (m).
+        upright: Least cosine of the angle between the image's upward direction and the vertical. A camera turned farther,
+            as by a hand that jogs a joint, sees what no network was trained on: such a frame changes nothing.
         segmenter: Says which pixel shows what: `network`, or `labels`, the simulated camera's own, for comparison.
         weights: ONNX file for the network; empty takes the one that is shipped.
         threads: Of the network. With fewer than the machine has cores a frame takes longer; the loop that drives the
@@ -224,6 +231,7 @@ class PerceptionConfig(Struct, frozen=True, forbid_unknown_fields=True):
     hang_s: Positive = 3.0
     survey_nearest: Positive = 0.55
     survey_farthest: Positive = 1.1
+    upright: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.8
     segmenter: Literal["network", "labels"] = "network"
     weights: str = ""
     threads: Annotated[int, Meta(ge=1, le=64)] = 2

@@ -58,7 +58,8 @@ class ObstacleMap:
         for kind, cells in self._seen.items():
             rows, cols = pixels_of(labels, (WOOD_CLASSES.index(kind),))
             depth = view.depth[rows, cols]
-            used = np.flatnonzero((depth > config.nearest) & (depth < config.farthest))
+            nearest = config.nearest if _SHAPES[kind] == "along" else config.thick_nearest
+            used = np.flatnonzero((depth > nearest) & (depth < config.farthest))
             used = used[:: max(1, len(used) // config.points)]
             grown |= cells.add(view.points(rows[used], cols[used], depth[used]))
         if grown:
@@ -81,7 +82,7 @@ class ObstacleMap:
         elif shape == "along":
             groups = _groups(points, 2, config.wire_apart)
         else:
-            groups = _pieces(points, config.piece)
+            groups = _pieces(points, config.piece, config.piece_apart)
         rods = self._fits(kind, [group for group in groups if len(group) >= config.least], away)
         return [
             Capsule(kind, _vector(rod.start), _vector(rod.end), rod.radius, rod.radius)
@@ -147,13 +148,14 @@ def _groups(points: Array, axis: int, apart: float) -> list[Array]:
     return np.split(points, np.nonzero(np.diff(points[:, axis]) > apart)[0] + 1)
 
 
-def _pieces(points: Array, piece: float) -> list[Array]:
-    """Points in groups by the stretch of the row, `piece` long, that they are in."""
+def _pieces(points: Array, piece: float, apart: float) -> list[Array]:
+    """Points in groups by the stretch of the row, `piece` long, that they are in, without gaps of `apart` across it."""
     if len(points) == 0:
         return []
     number = np.floor(points[:, 0] / piece)
     order = np.argsort(number, kind="stable")
-    return np.split(points[order], np.nonzero(np.diff(number[order]))[0] + 1)
+    pieces = np.split(points[order], np.nonzero(np.diff(number[order]))[0] + 1)
+    return [body for each in pieces for level in _groups(each, 2, apart) for body in _groups(level, 1, apart)]
 
 
 def _fit(points: Array, away: Array, thin: bool) -> _Rod:

@@ -94,6 +94,8 @@ class Perception:
         self._stamp = view.stamp
         self.sightings.note(frame)
         self.withdrawn = ()
+        if -view.R[2, 1] < self._config.upright:
+            return self._message(view, self._tracker.points(), self._told, self._canes)
         try:
             labels = self.segmenter.segment(view)
         except InputError as error:

@@ -159,6 +159,20 @@ def test_a_joint_turns_while_its_button_is_held_and_its_range_is_drawn(page: Pag
         assert min(box["width"], box["height"]) >= 44
 
 
+def test_the_next_joint_turns_for_as_long_as_its_button_is_held_too(page: Page, server: PlayedServer) -> None:
+    begin(page, "Joints")
+    for name, joint in (("Joint 1 up", 1), ("Joint 4 up", 4)):
+        page.mouse.move(*middle(page, f'[aria-label="{name}"]'))
+        page.mouse.down()
+        until(page, lambda: held(server))
+        page.wait_for_timeout(300)
+        hold = newest(server)
+        assert hold is not None and hold.hold and hold.joints is not None, name
+        assert hold.joints[joint - 1] > 0.0
+        page.mouse.up()
+        until(page, lambda: not held(server))
+
+
 def test_two_at_once_stop_and_say_so(page: Page, server: PlayedServer) -> None:
     begin(page, "Joints")
     expect(page.locator('[aria-label="Joint 1 up"]')).to_be_visible()

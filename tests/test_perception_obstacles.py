@@ -8,10 +8,12 @@ from bridge.sim.camera import Camera
 from bridge.sim.camera_config import CameraConfig
 from bridge.sim.vineyard import grow
 from bridge.sim.vineyard_config import VineyardConfig
-from perception.config import ObstacleConfig
+from perception.config import ObstacleConfig, PerceptionConfig
 from perception.frame import decode_frame
 from perception.obstacles import ObstacleMap
+from perception.pipeline import Perception
 from perception.segmenter import LabelImageSegmenter
+from perception.segmenter_choice import choose_segmenter
 from rolling_panda import messages as m
 from rolling_panda.robot_model import RobotModel, configuration
 from rolling_panda.row_messages import Capsule
@@ -60,6 +62,35 @@ def test_the_wires_before_the_robot_are_all_there(seen):
     height = config.cordon_height + config.wires[0]
     near = [wire for wire in wires if abs(wire.start[2] - height) < 0.03]
     assert sum(math.dist(wire.start, wire.end) for wire in near) > 1.0
+
+
+def elbow(angle):
+    """The arm beside a cut, its fourth joint at this angle (7, rad)."""
+    return (-0.046, -1.034, 0.504, angle, 1.96, 1.944, 0.392)
+
+
+# As it comes to rest after the cut; and jogged up from there, near the post, rolled, and turned over.
+@pytest.mark.parametrize("after", [elbow(-2.213), elbow(-1.471), elbow(-1.021), elbow(-0.098)])
+def test_what_the_network_takes_for_wood_near_by_or_turned_over_is_nothing_in_the_way(after):
+    model, row, camera = RobotModel(), grow(VineyardConfig(), 0), Camera(CameraConfig(), 0)
+    seen, number = Perception(PerceptionConfig(), choose_segmenter("network", threads=1), model), 0
+    for base, arm, frames in ((m.PlanarPose(), survey_arm(), 5), (m.PlanarPose(0.0615), after, 8)):
+        position = (0.0, 0.0, *arm)
+        place = model.pose(configuration(base, position), model.camera_id).homogeneous
+        for _ in range(frames):
+            seen.process(camera_frame(camera.render(row, place, number), camera, base, position, number))
+            number += 1
+        if frames == 5:
+            points = {point.point_id for point in seen.points().points}
+    # What is behind the row is in nobody's way.
+    thick = [each for each in seen.obstacles if each.kind in ("post", "trunk", "cordon") and each.start[1] < 1.2]
+    assert thick and points
+    for capsule in thick:
+        same = [rod for _, rod in row.standing() if rod.kind == capsule.kind]
+        for end in (capsule.start, capsule.end):
+            assert min(distance(np.array(end), rod.start, rod.end) for rod in same) < 0.05, capsule
+        assert capsule.start_radius < 0.06, capsule
+    assert points <= {point.point_id for point in seen.points().points}, "nothing was cut"
 
 
 def test_nothing_seen_is_nothing_known():
