@@ -213,7 +213,7 @@ class PerceptionConfig(Struct, frozen=True, forbid_unknown_fields=True):
         survey_nearest: A frame with the cordon nearer than this is no survey: it shows parts of spurs only, so that it
             may confirm that wood has gone and propose nothing (m).
         survey_farthest: The same for a cordon farther away, where canes are too thin in the image (m).
-        upright: Least cosine of the angle between the image's upward direction and the vertical. A camera turned farther,
+        upright: Least cosine of the angle between the image's upward direction and the vertical. A camera turned over,
             as by a hand that jogs a joint, sees what no network was trained on: such a frame changes nothing.
         segmenter: Says which pixel shows what: `network`, or `labels`, the simulated camera's own, for comparison.
         weights: ONNX file for the network; empty takes the one that is shipped.

@@ -125,6 +125,8 @@ class PlayedServer:
     replay: ReplayState | None = None
     online: bool = True
     silent: bool = False
+    #: How long ago it heard each process, where none is gone (s).
+    heard_s: float = 0.03
     answers: dict[str, tuple[int, Any]] = field(default_factory=dict)
     posted: list[tuple[str, Any]] = field(default_factory=list)
     said: list[p.FromPage] = field(default_factory=list)
@@ -208,7 +210,7 @@ class PlayedServer:
 
     def state(self) -> p.PageState:
         self.number += 1
-        ages = {name: self.gone.get(name, 0.03) for name in m.PROCESSES}
+        ages = {name: self.gone.get(name, self.heard_s) for name in m.PROCESSES}
         rows = tuple(p.ProcessPresence(name, name not in self.gone, ages[name]) for name in m.PROCESSES)
         return p.PageState(
             number=self.number,

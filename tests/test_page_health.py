@@ -96,6 +96,22 @@ def test_without_a_link_that_is_the_one_alarm_until_it_is_back(page: Page, serve
     expect(page.locator("rp-telemetry .stale-note")).to_be_hidden()
 
 
+def test_what_the_page_itself_has_not_heard_is_no_alarm_of_a_process(page: Page, server: PlayedServer) -> None:
+    server.heard_s = 0.8
+    page.wait_for_timeout(300)
+    page.evaluate("""() => {
+      const list = document.querySelector("#alarms");
+      window.alarmed = "";
+      const looking = new MutationObserver(() => (window.alarmed += list.textContent));
+      looking.observe(list, { childList: true, subtree: true });
+    }""")
+    server.silent = True
+    expect(page.locator("#alarms strong").first).to_have_text("The server is silent", timeout=6000)
+    assert "gone" not in page.evaluate("alarmed")
+    server.silent, server.heard_s = False, 0.03
+    expect(page.locator("#alarms .empty")).to_be_visible(timeout=10_000)
+
+
 def test_the_report_tells_cuts_by_outcome_and_vine_and_what_was_refused(page: Page, server: PlayedServer) -> None:
     page.locator('[data-opens="report"]').click()
     expect(page.locator("rp-report")).to_contain_text("Nothing has been cut yet.")

@@ -93,6 +93,19 @@ def test_what_the_network_takes_for_wood_near_by_or_turned_over_is_nothing_in_th
     assert points <= {point.point_id for point in seen.points().points}, "nothing was cut"
 
 
+def test_while_a_joint_is_jogged_nothing_is_taken_for_cut_or_left_open():
+    model, row, camera = RobotModel(), grow(VineyardConfig(), 5), Camera(CameraConfig(), 5)
+    seen = Perception(PerceptionConfig(), choose_segmenter("network", threads=1), model)
+    told = []
+    for number, turned in enumerate([0.0] * 6 + [0.9, 1.0, 1.1, 1.2, 1.2, 1.2, 1.2, 1.2]):
+        arm = np.array(survey_arm()) + [0.0, 0.0, 0.0, turned, 0.0, 0.0, 0.0]
+        base, position = m.PlanarPose(0.2), (0.0, 0.0, *arm.tolist())
+        place = model.pose(configuration(base, position), model.camera_id).homogeneous
+        points = seen.process(camera_frame(camera.render(row, place, number), camera, base, position, number))
+        told.append(({point.point_id for point in points.points}, len(points.abstained)))
+    assert told[5][0] and all(each == told[5] for each in told[6:])
+
+
 def test_nothing_seen_is_nothing_known():
     assert ObstacleMap(ObstacleConfig()).update(blank_view(), np.zeros((48, 64), dtype=np.uint8)) == ()
 

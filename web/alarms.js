@@ -1,7 +1,7 @@
 // What needs somebody now: how bad it is, what it is, and what to do about it.
 
 import { history } from "./history.js";
-import { isLive, link, pageState, points, roundTrip, staleWords } from "./state.js";
+import { isGone, isLive, link, pageState, points, roundTrip, staleWords } from "./state.js";
 import { counted, inWords } from "./words.js";
 
 /** @typedef {import("./messages.js").PageState} PageState */
@@ -53,7 +53,7 @@ function alarm(id, severity, text, act) {
 function ofProcesses() {
   if (!isLive("server")) return [alarm("server", "error", "The server is silent", "Wait, or start it again; the robot stops without it.")];
   return /** @type {const} */ (["bridge", "controller", "perception"])
-    .filter((process) => !isLive(process))
+    .filter(isGone)
     .map((process) => alarm(process, process === "perception" ? "warning" : "error", staleWords(process), GONE[process] ?? ""));
 }
 

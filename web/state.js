@@ -97,14 +97,35 @@ export function stateAge() {
  * @returns {number|null}
  */
 export function processAge(process) {
-  const state = pageState.get();
   const passed = stateAge();
-  if (state === null || passed === null) return null;
-  if (process === "server") return passed;
+  if (process === "server" || passed === null) return passed;
+  const age = toldAge(process);
+  return age === null ? null : age + passed;
+}
+
+/**
+ * Age of the last word of a process (s) as the server measured it.
+ *
+ * @param {Process} process
+ * @returns {number|null}
+ */
+function toldAge(process) {
+  const state = pageState.get();
+  if (state === null) return null;
   let age = state.processes.find((row) => row.process === process)?.age_s ?? null;
   if (process === "bridge" && state.bridge_age_s !== null) age = state.bridge_age_s;
   if (process === "controller" && state.controller_age_s !== null) age = state.controller_age_s;
-  return age === null ? null : age + passed;
+  return age;
+}
+
+/**
+ * Has the server said that a process is gone? What this page has not heard in time says nothing of it.
+ *
+ * @param {Process} process
+ */
+export function isGone(process) {
+  const row = pageState.get()?.processes.find((each) => each.process === process);
+  return !row?.present || (toldAge(process) ?? Infinity) >= OLD_AFTER_S[process];
 }
 
 /**
@@ -137,7 +158,8 @@ export function staleWords(...processes) {
   for (const process of processes) {
     if (isLive(process)) continue;
     const age = processAge(process);
-    return age === null ? `${process} not seen yet` : `${process} gone — last state ${ageWords(age)} old`;
+    if (age === null) return `${process} not seen yet`;
+    return `${process} ${isGone(process) ? "gone" : "not heard in time"} — last state ${ageWords(age)} old`;
   }
   return "";
 }
