@@ -221,7 +221,7 @@ SERVER = (
           "test_viser_filter.py"),
     Check("the account of who is signed in", "server/sessions.py",
           "if each.account and accounts.get(each.user) != each.account", "if False",
-          "test_sign_in.py::test_who_is_removed_is_out_at_once"),
+          "test_sign_in.py::test_who_is_removed_is_out_within_a_second"),
 )
 
 WIRE = (

@@ -58,7 +58,7 @@ class ObstacleMap:
         for kind, cells in self._seen.items():
             rows, cols = pixels_of(labels, (WOOD_CLASSES.index(kind),))
             depth = view.depth[rows, cols]
-            nearest = config.nearest if _SHAPES[kind] == "along" else config.thick_nearest
+            nearest = config.nearest if kind == "wire" else config.thick_nearest
             used = np.flatnonzero((depth > nearest) & (depth < config.farthest))
             used = used[:: max(1, len(used) // config.points)]
             grown |= cells.add(view.points(rows[used], cols[used], depth[used]))

@@ -71,7 +71,7 @@ def test_a_disk_that_hangs_keeps_nobody_waiting_but_the_blades(tmp_path: Path, m
     orders = CutOrders(memory)
     began = time.monotonic()
     verdicts = {orders.judge(order("a"), None, True, "")[0] for _ in range(1000)}
-    assert verdicts == {"wait"} and time.monotonic() - began < 10.0
+    assert verdicts == {"wait"} and time.monotonic() - began < 1.0
     go.set()
     assert judged(orders, "a") == ("cut", "")
     memory.close()

@@ -279,7 +279,7 @@ def test_the_view_costs_what_the_browser_can_draw(
         "  cancelAnimationFrame(requestAnimationFrame(() => { done(Infinity); })); })"
     )
     assert (pause < 60.0) is smooth, f"{pause:.0f} ms between two pictures"
-    assert pause < 1000.0
+    assert pause < 300.0
     context.close()
 
 

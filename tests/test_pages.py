@@ -221,7 +221,7 @@ def late_page():
 
 def test_letting_go_is_said_at_once_not_with_the_next_turn(late_page):
     late_page.hold(False)
-    eventually(lambda: late_page.sent and not late_page.sent[-1].hold)
+    eventually(lambda: late_page.sent and not late_page.sent[-1].hold, 1.0)
 
 
 def test_a_hold_that_paused_for_a_moment_begins_anew_from_the_tool(late_page):

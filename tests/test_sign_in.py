@@ -96,7 +96,7 @@ def test_who_guesses_waits_and_who_is_in_can_stop_meanwhile(server, users):
         assert sign_in(eve, "bob").status_code == 200
 
 
-def test_who_is_removed_is_out_at_once(server, users):
+def test_who_is_removed_is_out_within_a_second(server, users):
     users.add("carl", "operator", PASSWORD)
     with server.visitor() as carl:
         carl.headers["origin"] = server.address
@@ -114,8 +114,7 @@ def test_who_is_removed_is_out_at_once(server, users):
             users.remove("carl")
             removed = time.monotonic()
             with pytest.raises(ConnectionClosed):
-                while time.monotonic() < removed + 10.0:
-                    page.recv(timeout=10)
-            # Half a second, and what a busy machine adds.
-            assert time.monotonic() - removed < 5.0
+                while time.monotonic() < removed + 5.0:
+                    page.recv(timeout=5)
+            assert time.monotonic() - removed < 1.5
         assert carl.get("/api/me").status_code == 401

@@ -68,7 +68,7 @@ def test_signing_out_closes_the_page_at_once(server, visitor):
         assert visitor.post("/api/sign-out").json()["ok"]
         with pytest.raises(ConnectionClosed):
             for _ in range(100):
-                page.recv(timeout=10)
+                page.recv(timeout=1)
     assert visitor.get("/api/me", headers={"cookie": cookie}).status_code == 401
 
 

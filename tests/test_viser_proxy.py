@@ -319,7 +319,7 @@ def test_signing_out_closes_the_view(server):
         hear(view, replayed)
         client.post("/api/sign-out")
         with pytest.raises(ConnectionClosed):
-            hear(view, lambda message: False)
+            hear(view, lambda message: False, patience_s=1.0)
 
 
 def test_who_goes_around_the_proxy_is_thrown_out(server, view_port):

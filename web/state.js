@@ -137,7 +137,7 @@ export function isLive(process) {
   const state = pageState.get();
   const age = processAge(process);
   if (state === null || link.get().status !== "open") return false;
-  if (process !== "server" && !state.processes.find((row) => row.process === process)?.present) return false;
+  if (process !== "server" && isGone(process)) return false;
   return age !== null && age < OLD_AFTER_S[process];
 }
 
