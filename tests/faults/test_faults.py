@@ -79,8 +79,12 @@ def test_who_was_overruled_by_another_controller_does_not_come_back_when_that_on
     # It sends one command, at rest, and is gone.
     other = replace_field(world.commanded, epoch=newer, token="other", sequence=1, xi=(0.0,) * 9)
     assert not any(world.commanded.xi)
+    late = world.commanded
     world.bridge.on_motion(other, world.now)
-    world.run(10.0)
+    for _ in range(20):
+        # What was on its way still comes, and is refused.
+        world.bridge.on_motion(late, world.now)
+        world.run(0.5)
     assert world.controller.mode == "FAULT" and world.inputs.bridge.message.epoch == newer
     assert world.inputs.bridge.message.watchdog
 
