@@ -58,7 +58,9 @@ COPY --from=materials /materials.cdx.json /usr/share/rolling-panda/materials.cdx
 ENV NUMBA_CACHE_DIR=/var/cache/rolling-panda
 # What survives a restart is in a folder of its own: a volume that is mounted here belongs to this user too.
 RUN install --directory --owner 10001 --group 10001 $NUMBA_CACHE_DIR \
-    && install --directory --owner 10001 --group 10001 --mode 700 /var/lib/rolling-panda
+    && install --directory --owner 10001 --group 10001 --mode 700 /var/lib/rolling-panda \
+    && for name in router bridge controller perception server recorder; do \
+        install --directory --owner 10001 --group 10001 --mode 700 "/certificates/$name"; done
 # MuJoCo computes here and draws nothing, so it needs no OpenGL. One thread of linear algebra a process: see launch.py.
 ENV PATH=/app/bin:$PATH \
     PYTHONUNBUFFERED=1 \

@@ -7,22 +7,23 @@ from collections.abc import Sequence
 
 #: Benchmarks: name, module with `main(argv) -> int`, and one line for people.
 BENCHMARKS = {
-    "tick": ("benchmarks.tick", "time of one control step"),
-    "row": ("benchmarks.row", "cuts in simulated rows, end to end"),
-    "reach": ("benchmarks.reach", "tool poses anywhere around the robot: reached, limits, manipulability"),
-    "arm": ("benchmarks.arm", "the arm alone between random poses, beside published figures"),
-    "page": ("benchmarks.page", "the page in a real browser: hand to robot, robot to screen, with viewers"),
-    "load": ("benchmarks.load", "processor, memory and traffic of the demo"),
-    "ledger": ("benchmarks.ledger", "what recording costs the control step, on a slow disk too"),
-    "record": ("benchmarks.record", "what a recorder beside the demo costs the control"),
-    "live": ("benchmarks.live", "the running demo: control periods on time, round trip, tool error"),
-    "perception": ("benchmarks.perception", "surveys of unseen rows, every pruning point judged"),
-    "real": ("benchmarks.real", "random commands and faults, the real bridge on fakes with monitors"),
-    "faults": ("benchmarks.faults", "random faults in motion, judged by what the actuators were sent"),
-    "clean": ("benchmarks.clean", "an hour of automatic work without a fault: nothing stops by itself"),
+    "tick": ("benchmarks.control.tick", "time of one control step"),
+    "row": ("benchmarks.control.row", "cuts in simulated rows, end to end"),
+    "reach": ("benchmarks.control.reach", "tool poses anywhere around the robot: reached, limits, manipulability"),
+    "arm": ("benchmarks.control.arm", "the arm alone between random poses, beside published figures"),
+    "page": ("benchmarks.page.latency", "the page in a real browser: hand to robot, robot to screen, with viewers"),
+    "load": ("benchmarks.page.load", "processor, memory and traffic of the demo"),
+    "ledger": ("benchmarks.control.ledger", "what recording costs the control step, on a slow disk too"),
+    "record": ("benchmarks.control.record", "what a recorder beside the demo costs the control"),
+    "live": ("benchmarks.control.live", "the running demo: control periods on time, round trip, tool error"),
+    "perception": ("benchmarks.perception.survey", "surveys of unseen rows, every pruning point judged"),
+    "obstacles": ("benchmarks.perception.obstacles", "what stands in the way after ten minutes, against the truth"),
+    "real": ("benchmarks.faults.real", "random commands and faults, the real bridge on fakes with monitors"),
+    "faults": ("benchmarks.faults.run", "random faults in motion, judged by what the actuators were sent"),
+    "clean": ("benchmarks.faults.clean", "an hour of automatic work without a fault: nothing stops by itself"),
     "checks": ("benchmarks.checks", "each check of safety taken away on a copy: its test has to fail"),
-    "pictures": ("benchmarks.pictures", "the operator's page in each of its states, for the documents"),
-    "plots": ("benchmarks.plots", "pictures of what the others wrote with --json"),
+    "pictures": ("benchmarks.page.pictures", "the operator's page in each of its states, for the documents"),
+    "plots": ("benchmarks.common.plots", "pictures of what the others wrote with --json"),
 }
 
 

@@ -6,19 +6,25 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from bridge.core import BridgeCore
-from bridge.cut_memory import CutFile
+from bridge.config import BridgeConfig
+from bridge.core.bridge import BridgeCore
+from bridge.core.cut_memory import CutFile
+from bridge.core.state_memory import Memory, open_memory
 from bridge.loop import BridgeLoop
-from bridge.memory import Memory, open_memory
-from rolling_panda.process import ProcessContext, run_process
+from bridge.real.config import RealConfig
+from bridge.sim.camera.config import CameraConfig
+from bridge.sim.vineyard.config import VineyardConfig
+from rolling_panda.config import RobotConfig, load_section
 from rolling_panda.resources import resource
-from rolling_panda.state_folder import alone
+from rolling_panda.runtime.process import ProcessContext, run_process
+from rolling_panda.runtime.state_folder import alone
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the bridge; returns the exit code."""
     about = "The robot, with its own watchdog, limits and latched stop."
-    return run_process("bridge", about, _run, _arguments, with_usual_config(sys.argv[1:] if argv is None else argv))
+    words = with_usual_config(sys.argv[1:] if argv is None else argv)
+    return run_process("bridge", about, _run, _arguments, words, _check)
 
 
 def with_usual_config(argv: Sequence[str]) -> list[str]:
@@ -42,6 +48,16 @@ def _seed(text: str) -> int:
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(f"{text!r} is no seed; give a whole number from 0")
     return int(text)
+
+
+def _check(arguments: argparse.Namespace) -> None:
+    load_section(arguments.config, "bridge", BridgeConfig)
+    load_section(arguments.config, "robot", RobotConfig)
+    if arguments.kind == "real":
+        load_section(arguments.config, "real", RealConfig)
+    else:
+        load_section(arguments.config, "vineyard", VineyardConfig)
+        load_section(arguments.config, "camera", CameraConfig)
 
 
 def _run(context: ProcessContext) -> None:

@@ -3,11 +3,11 @@
 import threading
 import time
 
-from bridge.core import TICK_S, BridgeCore, BridgeOutputs
-from bridge.robot_time import RealTime, RobotTime, SteppedTime
+from bridge.core.bridge import TICK_S, BridgeCore, BridgeOutputs
+from bridge.core.robot_time import RealTime, RobotTime, SteppedTime
 from rolling_panda import messages as m
 from rolling_panda import topics
-from rolling_panda.transport import Slot, Transport
+from rolling_panda.transport.zenoh import Slot, Transport
 
 # Waking twice as often as joint states go out costs a fifth of waking every millisecond. A command wakes it at once.
 _WAKES = 2

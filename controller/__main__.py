@@ -1,5 +1,6 @@
 """`python -m controller`: the control process."""
 
+import argparse
 import gc
 import sys
 import uuid
@@ -7,20 +8,24 @@ from collections.abc import Sequence
 
 from controller.config import ControllerConfig
 from controller.core import Controller
-from controller.ledger import Ledger
-from controller.ledger_start import restored, start_record
-from controller.ledger_writer import LedgerWriter
+from controller.ledger.start import count_start, restored, start_record
+from controller.ledger.store import Ledger
+from controller.ledger.writer import LedgerWriter
 from controller.loop import Loop
-from controller.plan_worker import PlanWorker
-from controller.starts import count_start
+from controller.planner_process import PlannerProcess
 from controller.stop_file import open_stop_file
 from rolling_panda.config import RobotConfig, load_section
-from rolling_panda.process import ProcessContext, run_process
+from rolling_panda.runtime.process import ProcessContext, run_process
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the controller until it is told to stop. Returns the exit code."""
-    return run_process("controller", "Whole-body control and supervision of the robot.", _run, argv=argv)
+    return run_process("controller", "Whole-body control and supervision of the robot.", _run, argv=argv, check=_check)
+
+
+def _check(arguments: argparse.Namespace) -> None:
+    load_section(arguments.config, "controller", ControllerConfig)
+    load_section(arguments.config, "robot", RobotConfig)
 
 
 def _run(context: ProcessContext) -> None:
@@ -34,7 +39,7 @@ def _run(context: ProcessContext) -> None:
     controller.restore(before.tickets, stop_file.stops, before.order, before.preview, before.approaches)
     ledger = LedgerWriter(lambda: Ledger(folder))
     ledger.write([start_record(context.config_path, run_id)])
-    planner = PlanWorker(config, robot_config)
+    planner = PlannerProcess(config, robot_config)
     loop = Loop(controller, context.transport, config.rate_hz, ledger, planner, stop_file)
     # What lives now lives until the end: the collector need not look at it in the middle of a control period.
     gc.collect()

@@ -4,12 +4,77 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
-from controller.whole_body.hierarchy_config import HierarchyConfig
-from rolling_panda.config import Positive
+from rolling_panda.bounds import always_on, at_least, at_most, usually_on, within
+from rolling_panda.config import ArmPosture, Positive
 
 NotNegative = Annotated[float, Meta(ge=0.0, le=0.2)]
 Gain = Annotated[float, Meta(ge=0.0, le=100.0)]
-ArmPosture = tuple[float, float, float, float, float, float, float]
+Weight = Annotated[float, Meta(ge=0.0, le=1e4)]
+
+
+class HierarchyConfig(Struct, frozen=True, forbid_unknown_fields=True):
+    """Weights among the tasks of the null space (each against a velocity in shares of its limit), and damping.
+
+    Attributes:
+        base_heading: Weight of the base's heading.
+        base_place: Weight of the base's place along its heading.
+        arm_posture: Weight of the arm's posture.
+        manipulability: Weight of the climb to more manipulability.
+        joint_centre: Weight, at the limit, of the way back to the middle of a joint; 0 outside `limit_zone`.
+        smoothness: Weight against changes of velocity.
+        good_manipulability: ω of the arm from which on it is not raised.
+        damping: λ² where the smallest singular value of the scaled Jacobian is 0.
+        damping_from: Singular value below which damping begins.
+        clock_rise: Largest rise of the rate of a motion's clock (1/s).
+        axle_ahead: Least distance of the tool ahead of the axle in transit (m).
+        axle_rate: Rate at which that distance may be used up (1/s).
+        collisions: Whether distances to itself, the ground and obstacles are kept.
+        collision_distance: d_s, kept between any two parts that are watched (m).
+        blade_distance: The same for the blades (m), which work near wires that nothing else may come near to.
+        cutter_distance: The same for the cutter's body (m), whose capsule is 9 mm larger than it.
+        cane_distance: The same of the robot's other parts to canes that stay (m).
+        cane_speed: ξ for canes (m/s): wider than for what does not give, and in step with the way into a cut.
+        cane_braking: Deceleration that an approach to a cane reckons with (m/s²), that of the way into a cut.
+        collision_influence: d_i, nearer than which they approach more slowly (m).
+        collision_speed: ξ, fastest approach at d_i (m/s), and fastest parting below d_s.
+        collision_braking: Deceleration that an approach reckons with (m/s²).
+        tipping: Whether the wheels and the caster are kept on the ground.
+    """
+
+    base_heading: Weight = 4.0
+    base_place: Weight = 4.0
+    arm_posture: Weight = 1.0
+    manipulability: Weight = 1.0
+    joint_centre: Weight = 10.0
+    smoothness: Weight = 0.2
+    good_manipulability: Positive = 0.08
+    damping: Weight = 0.01
+    damping_from: Positive = 0.2
+    clock_rise: Positive = 4.0
+    axle_ahead: Annotated[float, at_least(0.15, 1.0)] = 0.25
+    axle_rate: Positive = 2.0
+    collisions: Annotated[bool, always_on()] = True
+    collision_distance: Annotated[float, at_least(0.01, 0.1)] = 0.015
+    blade_distance: Annotated[float, at_least(0.003, 0.05)] = 0.004
+    cutter_distance: Annotated[float, at_least(0.005, 0.05)] = 0.008
+    cane_distance: Annotated[float, at_least(0.005, 0.05)] = 0.010
+    cane_speed: Annotated[float, at_most(1.0)] = 0.7
+    cane_braking: Annotated[float, at_most(2.0)] = 1.2
+    collision_influence: Annotated[float, at_least(0.04, 0.5)] = 0.08
+    collision_speed: Annotated[float, at_most(0.4)] = 0.25
+    collision_braking: Annotated[float, at_most(1.0)] = 0.5
+    tipping: Annotated[bool, always_on()] = True
+
+    def kept(self, pair: tuple[str, str]) -> float:
+        """d_s of a pair of parts, by their names (m): of the tool's parts the smaller one of the two."""
+        own = {"blades": self.blade_distance, "cutter": self.cutter_distance}
+        usual = self.cane_distance if is_cane(pair) else self.collision_distance
+        return min(own.get(part, usual) for part in pair)
+
+
+def is_cane(pair: tuple[str, str]) -> bool:
+    """Whether the second of a pair, by its name, is a cane."""
+    return pair[1].startswith("cane ")
 
 
 class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
@@ -94,70 +159,70 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
     home: ArmPosture = (-0.2784, -0.1128, -0.0354, -2.0055, 1.6759, 1.2124, -0.269)
     reach: ArmPosture = (-0.3, -1.2, 1.1, -1.7, 2.25, 2.4, 0.55)
     method: Literal["hierarchy", "nullspace", "decoupled"] = "hierarchy"
-    rate_hz: Positive = 100.0
-    base_rate_hz: Positive = 100.0
+    rate_hz: Annotated[float, at_least(50.0, 1000.0)] = 100.0
+    base_rate_hz: Annotated[float, at_least(50.0, 1000.0)] = 100.0
     row_heading: float = 0.0
-    row_distance: Positive = 0.75
-    base_speed: Positive = 0.3
-    base_yaw_rate: Positive = 0.2
-    base_acceleration: Positive = 0.8
-    base_yaw_acceleration: Positive = 3.0
-    base_braking: Positive = 1.5
-    arm_share: Annotated[float, Meta(gt=0.0, le=1.0)] = 0.6
-    arm_acceleration_share: Annotated[float, Meta(gt=0.0, le=1.0)] = 0.5
-    arm_jerk_share: Annotated[float, Meta(gt=0.0, le=1.0)] = 0.5
-    tool_speed: Positive = 0.7
-    tool_turn: Positive = 1.5
-    tool_acceleration: Positive = 3.0
-    tool_jerk: Positive = 50.0
-    cut_speed: Positive = 0.03
-    slow_zone: Positive = 0.025
-    slow_braking: Positive = 1.2
+    row_distance: Annotated[float, within(0.5, 3.0)] = 0.75
+    base_speed: Annotated[float, at_most(0.3)] = 0.3
+    base_yaw_rate: Annotated[float, at_most(0.5)] = 0.2
+    base_acceleration: Annotated[float, at_most(1.5)] = 0.8
+    base_yaw_acceleration: Annotated[float, at_most(6.0)] = 3.0
+    base_braking: Annotated[float, within(1.5, 1.8)] = 1.5
+    arm_share: Annotated[float, at_most(1.0)] = 0.6
+    arm_acceleration_share: Annotated[float, at_most(1.0, 0.2)] = 0.5
+    arm_jerk_share: Annotated[float, at_most(1.0, 0.05)] = 0.5
+    tool_speed: Annotated[float, at_most(1.0)] = 0.7
+    tool_turn: Annotated[float, at_most(2.5)] = 1.5
+    tool_acceleration: Annotated[float, at_most(10.0)] = 3.0
+    tool_jerk: Annotated[float, at_most(500.0)] = 50.0
+    cut_speed: Annotated[float, at_most(0.1)] = 0.03
+    slow_zone: Annotated[float, at_least(0.01, 0.2)] = 0.025
+    slow_braking: Annotated[float, at_most(3.0)] = 1.2
     blend: Annotated[float, Meta(ge=0.0, le=0.5)] = 0.4
-    advance_speed: Positive = 0.7
-    stand_off: Positive = 0.15
-    arm_only: Positive = 0.05
+    advance_speed: Annotated[float, at_most(1.0)] = 0.7
+    stand_off: Annotated[float, at_least(0.08, 0.4)] = 0.15
+    arm_only: Annotated[float, at_least(0.03, 0.3)] = 0.05
     base_lag_s: NotNegative = 0.05
     arm_lag_s: NotNegative = 0.02
-    clearance: Positive = 0.22
-    position_tolerance: Positive = 0.0015
-    rotation_tolerance: Positive = 0.0175
-    settle_speed: Positive = 0.005
-    settle_joints: Positive = 0.05
-    reach_timeout_s: Positive = 6.0
-    cut_timeout_s: Positive = 3.0
-    largest_radius: Positive = 0.0075
-    survey_speed: Positive = 0.15
-    confirm: bool = True
-    verify: bool = True
-    look_within: Positive = 0.08
-    look_speed: Positive = 0.25
-    look_from: Positive = 0.15
-    look_timeout_s: Positive = 8.0
-    moved_tolerance: Positive = 0.005
+    clearance: Annotated[float, at_least(0.1, 0.5)] = 0.22
+    position_tolerance: Annotated[float, at_most(0.005)] = 0.0015
+    rotation_tolerance: Annotated[float, at_most(0.09)] = 0.0175
+    settle_speed: Annotated[float, at_most(0.02)] = 0.005
+    settle_joints: Annotated[float, at_most(0.1)] = 0.05
+    reach_timeout_s: Annotated[float, at_most(15.0)] = 6.0
+    cut_timeout_s: Annotated[float, at_most(5.0)] = 3.0
+    largest_radius: Annotated[float, at_most(0.0125)] = 0.0075
+    survey_speed: Annotated[float, at_most(0.3)] = 0.15
+    confirm: Annotated[bool, usually_on()] = True
+    verify: Annotated[bool, usually_on()] = True
+    look_within: Annotated[float, at_most(0.2)] = 0.08
+    look_speed: Annotated[float, at_most(0.5)] = 0.25
+    look_from: Annotated[float, at_most(0.5)] = 0.15
+    look_timeout_s: Annotated[float, at_most(20.0)] = 8.0
+    moved_tolerance: Annotated[float, at_most(0.005)] = 0.005
     gain_position: Gain = 5.0
     gain_rotation: Gain = 5.0
     gain_posture: Gain = 1.0
     gain_heading: Gain = 0.8
     gain_manipulability: Gain = 0.2
     gain_limits: Gain = 2.0
-    limit_zone: Positive = 0.25
+    limit_zone: Annotated[float, at_least(0.1, 1.0)] = 0.25
     damping: Positive = 0.01
-    joint_margin: Annotated[float, Meta(ge=0.0, le=0.5)] = 0.03
+    joint_margin: Annotated[float, at_least(0.01, 0.5)] = 0.03
     search_steps: Annotated[int, Meta(ge=1, le=200)] = 10
-    joints_max_age_s: Positive = 0.2
-    odometry_max_age_s: Positive = 0.25
-    bridge_max_age_s: Positive = 0.5
-    server_max_age_s: Positive = 2.0
-    supervision_s: Positive = 2.0
-    hold_link_max_age_s: Positive = 0.3
-    perception_max_age_s: Positive = 1.0
-    ledger_max_age_s: Positive = 0.6
-    obstacles_max_age_s: Positive = 6.0
-    hold_max_age_s: Positive = 0.15
-    teleop_speed: Positive = 0.25
-    teleop_turn: Positive = 0.6
-    teleop_base_speed: Positive = 0.15
+    joints_max_age_s: Annotated[float, at_most(0.25)] = 0.2
+    odometry_max_age_s: Annotated[float, at_most(0.3)] = 0.25
+    bridge_max_age_s: Annotated[float, at_most(0.5)] = 0.5
+    server_max_age_s: Annotated[float, at_most(2.0)] = 2.0
+    supervision_s: Annotated[float, at_most(2.0)] = 2.0
+    hold_link_max_age_s: Annotated[float, at_most(0.3)] = 0.3
+    perception_max_age_s: Annotated[float, at_most(2.0)] = 1.0
+    ledger_max_age_s: Annotated[float, at_most(0.8)] = 0.6
+    obstacles_max_age_s: Annotated[float, at_most(10.0)] = 6.0
+    hold_max_age_s: Annotated[float, at_most(0.15)] = 0.15
+    teleop_speed: Annotated[float, at_most(0.25)] = 0.25
+    teleop_turn: Annotated[float, at_most(1.0)] = 0.6
+    teleop_base_speed: Annotated[float, at_most(0.15)] = 0.15
     teleop_base: Literal["free", "transit"] = "free"
     hierarchy: HierarchyConfig = HierarchyConfig()
 

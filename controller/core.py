@@ -1,38 +1,38 @@
 """The controller without wires: newest inputs and intents in, commands and state out. No clock, no thread.
 
-Supervision (`controller/supervisor.py`) says whether the robot may move, `controller/movement.py` how it does, the
-queue what is cut; here one period and one request pass through them in their order.
+Supervision (`controller/supervision/supervisor.py`) says whether the robot may move, `controller/work/movement.py` how
+it does, the queue what is cut; here one period and one request pass through them in their order.
 """
 
 import math
 from collections.abc import Iterable
 
-from controller.authority import ABOUT_CONTROL, client_of
 from controller.config import ControllerConfig
-from controller.interface import Inputs, Outputs
-from controller.journal import ApproachRow, Journal, OrderRow, PreviewRow, RequestRow, TicketRow
-from controller.lines import Lines
-from controller.modes import Event
-from controller.motion import Tracking
-from controller.movement import Moved, Movement
-from controller.newest import Newest
-from controller.next_cut import Found
-from controller.operator import Operator
-from controller.permission import EVENTS, Situation, allowed, refusal
-from controller.preview import ABOUT_PREVIEWS, Previews
-from controller.preview_plan import PreviewRequest
-from controller.queue import PointQueue, Ticket
+from controller.interface import Outputs, StepInputs
+from controller.ledger.journal import ApproachRow, EventLogger, Journal, OrderRow, PreviewRow, RequestRow, TicketRow
+from controller.motion.follower import Tracking
+from controller.planning.plan_manager import PlanManager
+from controller.planning.preview import ABOUT_PREVIEWS, PreviewManager
+from controller.planning.preview_plan import PreviewRequest
+from controller.planning.work_plan import PlanRequest
 from controller.report import controller_state
-from controller.session import Session
-from controller.supervisor import Supervisor
+from controller.supervision.authority import ABOUT_CONTROL, client_of
+from controller.supervision.modes import Event
+from controller.supervision.permission import EVENTS, Situation, allowed, refusal
+from controller.supervision.stale_messages import StaleMessageFilter
+from controller.supervision.supervisor import Supervisor
 from controller.whole_body.task import Method
-from controller.work_plan import PlanRequest
-from rolling_panda import intents
+from controller.work.movement import MotionResult, Movement
+from controller.work.next_cut import Found
+from controller.work.point_queue import PointQueue, Ticket
+from controller.work.queue_requests import QueueRequests
 from rolling_panda import messages as m
+from rolling_panda.bounds import wider
 from rolling_panda.config import RobotConfig
-from rolling_panda.control_messages import StopRecord
 from rolling_panda.errors import ControlError
-from rolling_panda.look_messages import PictureRequest
+from rolling_panda.messages import commands as intents
+from rolling_panda.messages.perception import PictureRequest
+from rolling_panda.messages.supervision import StopRecord
 
 _STATE_S, _STOPS_S = 0.05, 0.5
 
@@ -66,17 +66,22 @@ class Controller:
         """
         self._config = config
         self._journal = Journal()
-        self._lines = Lines(self._journal)
+        self._event_log = EventLogger(self._journal)
         self._queue = PointQueue(config, self._journal)
-        self._session = Session(self._queue)
-        self._previews = Previews(self._queue, self._journal, config.hierarchy)
+        self._plans = PlanManager(self._queue)
+        self._previews = PreviewManager(self._queue, self._journal, config.hierarchy)
         permit = self._previews.permit
-        self._movement = Movement(config, robot_config, self._queue, self._lines, run_id, self._known, method, permit)
-        self._supervisor = Supervisor(config, self._movement, self._lines, starts)
-        self._operator = Operator(self._queue)
-        self._inputs, self._newest = Inputs(), Newest()
+        self._movement = Movement(
+            config, robot_config, self._queue, self._event_log, run_id, self._known, method, permit
+        )
+        self._supervisor = Supervisor(config, self._movement, self._event_log, starts)
+        self._queue_requests = QueueRequests(self._queue)
+        self._inputs, self._stale_filter = StepInputs(), StaleMessageFilter()
         self._points_seen: object = None
         self._state_due = self._stops_due = -math.inf
+        self._wider = (*wider("controller", config), *wider("robot", robot_config))
+        for line in self._wider:
+            self._event_log.say("warning", f"set wider than usual: {line}")
 
     @property
     def mode(self) -> m.Mode:
@@ -110,15 +115,15 @@ class Controller:
         self._queue.restore(rows)
         self._supervisor.restore(stops)
 
-    def step(self, inputs: Inputs, now: float) -> Outputs:
+    def step(self, inputs: StepInputs, now: float) -> Outputs:
         """One control period.
 
         Args:
             inputs: Newest of everything.
             now: Monotonic time (s), the clock of the inputs' arrival times.
         """
-        self._lines.now = now
-        inputs = self._newest.of(inputs)
+        self._event_log.now = now
+        inputs = self._stale_filter.of(inputs)
         self._take(inputs, now)
         supervisor = self._supervisor
         supervisor.review(now)
@@ -132,11 +137,11 @@ class Controller:
             self._state_due = now + _STATE_S
             request, wanted = self._review(now), self._review_preview(now)
             preview, shown = self._previews.message(now), self._previews.motion(now)
-            plan, state, control = self._session.message(now), self._report(now), supervisor.authority.message(now)
+            plan, state, control = self._plans.message(now), self._report(now), supervisor.authority.message(now)
         if supervisor.stops.changed or now >= self._stops_due:
             self._stops_due, stops = now + _STOPS_S, supervisor.stops.message()
         picture = self._picture(now)
-        events, records = self._lines.take(), self._journal.take()
+        events, records = self._event_log.take(), self._journal.take()
         return Outputs(
             motion=motion,
             cut=cut,
@@ -161,7 +166,8 @@ class Controller:
             intent: What is asked.
             now: Monotonic time (s).
         """
-        self._lines.now = now
+        self._event_log.now = now
+        self._supervisor.authority.saw(intent, now)
         if isinstance(intent, ABOUT_CONTROL):
             refused = self._supervisor.authority.ask(intent, now)
         else:
@@ -171,13 +177,13 @@ class Controller:
             row = RequestRow(asked=intent, ok=not refused, reason=refused[:500], mode=self.mode)
             self._journal.add("request", intent.user, row)
         if refused:
-            self._lines.say("warning", f"{intent.user}: {what} refused: {refused}")
+            self._event_log.say("warning", f"{intent.user}: {what} refused: {refused}")
             return m.Answer(ok=False, reason=refused[:500])
-        if told := self._operator.told(intent):
-            self._lines.say("info", f"{intent.user}: {told}")
+        if told := self._queue_requests.told(intent):
+            self._event_log.say("info", f"{intent.user}: {told}")
         return m.Answer(ok=True)
 
-    def _take(self, inputs: Inputs, now: float) -> None:
+    def _take(self, inputs: StepInputs, now: float) -> None:
         self._inputs = inputs
         self._journal.observe(inputs.ledger, now)
         self._journal.stops(inputs.stops)
@@ -187,13 +193,15 @@ class Controller:
         if inputs.bridge is not None:
             look = None if inputs.look is None else inputs.look.message
             for text in sequence.watch(inputs.bridge.message, look, now):
-                self._lines.say("info", text)
+                self._event_log.say("info", text)
         if inputs.points is not None and inputs.points is not self._points_seen:
             self._points_seen = inputs.points
             for text in self._queue.update(inputs.points.message, sequence.in_canes):
-                self._lines.say("warning", text)
+                self._event_log.say("warning", text)
+        if back := self._queue.restored():
+            self._event_log.say("info", f"accepted again, as the rule was taken back: {back}"[:500])
 
-    def _move(self, now: float) -> Moved:
+    def _move(self, now: float) -> MotionResult:
         """What moves the robot in this period, and what that changes."""
         supervisor = self._supervisor
         try:
@@ -225,7 +233,7 @@ class Controller:
 
     def _situation(self, now: float, intent: intents.Intent | None = None) -> Situation:
         refused = self._previews.start_refused()
-        return self._supervisor.situation(self._queue.next() is not None, refused, now, intent)
+        return self._supervisor.situation(self._queue.waits, refused, now, intent)
 
     def _do(self, intent: intents.Intent, now: float) -> str:
         """Do what was not refused; returns what the content itself is refused for."""
@@ -235,9 +243,9 @@ class Controller:
         if isinstance(intent, intents.Pause) and movement.homing:
             movement.stay()
             supervisor.remark(f"bringing the arm home was stopped by {intent.user}")
-            self._lines.say("info", supervisor.state.reason)
+            self._event_log.say("info", supervisor.state.reason)
             return ""
-        if isinstance(intent, intents.Survey) and (unknown := self._operator.unknown_place(intent)):
+        if isinstance(intent, intents.Survey) and (unknown := self._queue_requests.unknown_place(intent)):
             return unknown
         client, event = client_of(intent), EVENTS.get(type(intent))
         if isinstance(intent, intents.OF_HOLDER):
@@ -257,24 +265,25 @@ class Controller:
             return f"{intent.point_id} is being worked on: pause first"
         if isinstance(intent, ABOUT_PREVIEWS):
             return self._previews.do(intent, now)
-        return self._operator.points(intent)
+        return self._queue_requests.points(intent)
 
     def _review(self, now: float) -> PlanRequest | None:
         """Look after the session's plan."""
         obstacles, movement = self._inputs.obstacles, self._movement
         measured = movement.body.measured
-        return self._session.review(
+        return self._plans.review(
             made=self._inputs.plan,
             q=None if measured is None else movement.sequence.clear_of_canes(measured.q),
             obstacles=() if obstacles is None else obstacles.message.capsules,
             at_rest=not movement.homing and self.mode != "TELEOP" and movement.at_rest,
             working=self.mode == "AUTO",
             now=now,
+            busy=movement.sequence.active,
         )
 
     def _known(self, ticket: Ticket) -> Found:
         """What is known of how to make a cut: as an approved preview has shown it, else as the plan says."""
-        return self._previews.known(ticket) or self._session.known(ticket)
+        return self._previews.known(ticket) or self._plans.known(ticket)
 
     def _review_preview(self, now: float) -> PreviewRequest | None:
         """Look after the preview."""
@@ -284,7 +293,7 @@ class Controller:
             made=self._inputs.preview,
             q=None if measured is None else measured.q,
             obstacles=() if obstacles is None else obstacles.message.capsules,
-            cuts=self._session.cuts,
+            cuts=self._plans.cuts,
             at_rest=not movement.homing and self.mode != "TELEOP" and movement.at_rest,
             working=self.mode == "AUTO",
             look_s=movement.sequence.look_s,
@@ -306,5 +315,7 @@ class Controller:
             queue=self._queue.entries(),
             nearest=movement.body.surroundings.model.nearest,
             order=self._queue.order.state,
+            interrupted=self._supervisor.interrupted,
+            wider=self._wider,
             now=now,
         )

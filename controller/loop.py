@@ -7,16 +7,18 @@ import time
 from collections import deque
 from typing import Generic
 
-from controller.acknowledged import Acknowledged
+from controller.command_inbox import CommandInbox, CommitBarrier
 from controller.core import Controller
-from controller.intent_desk import IntentDesk
-from controller.interface import Inputs, Outputs, Sample
-from controller.ledger_writer import LedgerWriter
-from controller.plan_worker import PlanWorker
+from controller.inputs import Sample
+from controller.interface import Outputs, StepInputs
+from controller.ledger.journal import LedgerState
+from controller.ledger.writer import LedgerWriter
+from controller.planner_process import PlannerProcess
 from controller.stop_file import StopFile
 from rolling_panda import messages as m
 from rolling_panda.errors import ServiceError
-from rolling_panda.loop_clock import LoopClock
+from rolling_panda.messages.supervision import StopState
+from rolling_panda.runtime.loop_clock import LoopClock
 from rolling_panda.topics import (
     BRIDGE,
     CONTROL,
@@ -43,7 +45,7 @@ from rolling_panda.topics import (
     TELEOP,
     Topic,
 )
-from rolling_panda.transport import Msg, Slot, Transport
+from rolling_panda.transport.zenoh import Msg, Slot, Transport
 
 #: The most that passes for the loop between two turns, in periods.
 _LONGEST_TURN = 5
@@ -77,7 +79,7 @@ class Loop:
         transport: Transport,
         rate_hz: float,
         ledger: LedgerWriter,
-        planner: PlanWorker | None = None,
+        planner: PlannerProcess | None = None,
         stop_file: StopFile | None = None,
     ) -> None:
         """Subscribe and announce; nothing runs before `run`.
@@ -91,8 +93,8 @@ class Loop:
             stop_file: Keeps what is latched for the next start; without one, nothing is kept.
         """
         self._planner, self._ledger = planner, ledger
-        self._acknowledged = Acknowledged()
-        self._desk = IntentDesk(controller, self._acknowledged)
+        self._barrier = CommitBarrier()
+        self._commands = CommandInbox(controller, self._barrier)
         self._controller, self._transport, self._period = controller, transport, 1.0 / rate_hz
         self._clock = LoopClock(time.monotonic(), _LONGEST_TURN * self._period)
         self._joints, self._odometry = self._newest(JOINTS), self._newest(ODOMETRY)
@@ -104,8 +106,8 @@ class Loop:
         transport.subscribe(HEARTBEAT, self._on_heartbeat)
         self._said: queue.SimpleQueue[str] = queue.SimpleQueue()
         transport.on_reject = lambda topic, reason: self._said.put(f"refused on {topic}: {reason}")
-        transport.serve(INTENT, self._desk.ask)
-        self._lines = transport.feed(EVENT, 1000)
+        transport.serve(INTENT, self._commands.ask)
+        self._log_events = transport.feed(EVENT, 1000)
         self._look, self._picture = self._newest(LOOK), transport.publisher(PICTURE)
         self._motion, self._cut = transport.publisher(MOTION), transport.publisher(CUT)
         self._state, self._event = transport.publisher(CONTROLLER), transport.publisher(EVENT)
@@ -113,15 +115,16 @@ class Loop:
         self._preview = transport.publisher(PREVIEW)
         self._preview_motion = transport.publisher(PREVIEW_MOTION)
         self._latched, self._stop_file = transport.publisher(STOPS), stop_file or StopFile()
+        self._stops_told: StopState | None = None
         self._report, self._report_due = transport.publisher(REPORT), 0.0
         self._ticks: deque[float] = deque(maxlen=min(round(rate_hz), _TIMED))
         self._tick_s = 0.0
         self._count = self._late = 0
 
-    def update(self) -> Inputs:
+    def update(self) -> StepInputs:
         """The newest of everything."""
         beats = self._beats
-        return Inputs(
+        return StepInputs(
             joints=self._joints.sample(),
             odometry=self._odometry.sample(),
             bridge=self._bridge.sample(),
@@ -136,12 +139,17 @@ class Loop:
             wall_time=time.time(),
             plan=None if self._planner is None else self._planner.newest,
             preview=None if self._planner is None else self._planner.newest_preview,
-            ledger=self._ledger.state,
+            ledger=self._recorded(),
             look=self._look.sample(),
             tick_s=self._tick_s,
             ticks=self._count,
             late_ticks=self._late,
         )
+
+    def _recorded(self) -> LedgerState:
+        """How far what must survive a restart is on disk: the ledger, and the stops that are latched."""
+        state = self._ledger.state
+        return LedgerState(state.durable, state.failure or self._stop_file.failure)
 
     def publish(self, outputs: Outputs, now: float) -> None:
         """Send what is due; the state when all that it tells is durable."""
@@ -156,11 +164,15 @@ class Loop:
             threading.Thread(target=self._release, args=(outputs.release,), daemon=True).start()
         if outputs.state is not None:
             state = outputs.state
-            self._acknowledged.hold(self._controller.recorded, now, lambda _: self._state.put(state))
+            self._barrier.hold(self._controller.recorded, now, lambda _: self._state.put(state))
             self._tick_s = statistics.median(self._ticks) if self._ticks else 0.0
         if outputs.stops is not None:
-            self._latched.put(outputs.stops)
             self._stop_file.keep(outputs.stops)
+            self._stops_told = outputs.stops
+        # What is told to be latched is so after a restart as well; where the disk does not take it, there is a fault.
+        if self._stops_told is not None and (self._stop_file.kept or self._stop_file.failure):
+            self._latched.put(self._stops_told)
+            self._stops_told = None
         if outputs.control is not None:
             self._control.put(outputs.control)
         if outputs.request is not None and self._planner is not None:
@@ -188,11 +200,11 @@ class Loop:
             self._late += started - began > _LATE * self._period
             began = started
             now = self._clock.turn(started)
-            self._desk.decide(now)
+            self._commands.decide(now)
             outputs = self._controller.step(self.update(), now)
             self._ticks.append(time.monotonic() - started)
             self.publish(outputs, now)
-            self._acknowledged.settle(self._ledger.state, now)
+            self._barrier.settle(self._ledger.state, now)
             self._record_lines()
             self._publish_said()
             due += self._period
@@ -213,7 +225,7 @@ class Loop:
 
     def _record_lines(self) -> None:
         """What the other processes log goes into the ledger; the controller's own lines are in its records."""
-        for line in self._lines.drain():
+        for line in self._log_events.drain():
             if line.message.process != self._transport.process:
                 self._ledger.note(line.message)
 

@@ -1,14 +1,14 @@
-"""The controller's state for the wire."""
+"""The message of the controller state."""
 
 from controller.config import ControllerConfig
-from controller.interface import Inputs
-from controller.modes import State
-from controller.motion import Measured, Tracking
+from controller.inputs import Inputs
+from controller.motion.follower import Measured, Tracking
+from controller.supervision.modes import State
 from controller.whole_body.collision import Clearance
 from controller.whole_body.joint_limits import margin
 from controller.whole_body.manipulability import arm_omega
 from rolling_panda import messages as m
-from rolling_panda.robot_model import RobotModel, pose_message
+from rolling_panda.model.robot import RobotModel, pose_message
 
 
 def controller_state(
@@ -25,6 +25,8 @@ def controller_state(
     queue: tuple[m.QueueEntry, ...],
     nearest: Clearance | None,
     order: m.QueueOrder,
+    interrupted: m.Interrupted,
+    wider: tuple[str, ...],
     now: float,
 ) -> m.ControllerState:
     """The message of what the controller does and sees now.
@@ -42,6 +44,8 @@ def controller_state(
         queue: Points in the order of work.
         nearest: What the last step's method found nearest to the robot.
         order: Whose order that is.
+        interrupted: What a pause or a protective stop has ended.
+        wider: What the configuration sets less strictly than usual.
         now: Monotonic time (s).
     """
     omega = 0.0
@@ -73,6 +77,8 @@ def controller_state(
         held_by="" if tracking is None else tracking.reason[:500],
         near=None if tracking is None or nearest is None else _nearness(nearest),
         order=order,
+        interrupted=interrupted,
+        wider=wider,
     )
 
 

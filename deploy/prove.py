@@ -153,6 +153,8 @@ def main() -> int:
     parser.add_argument("--real", action="store_true", help=f"compose.real.yaml too, on fakes ({REAL_IMAGE})")
     arguments = parser.parse_args()
     services: dict[str, Any] = yaml.safe_load((ROOT / "compose.yaml").read_text())["services"]
+    # It ends when the certificates are there.
+    del services["certificates"]
     proof, password = Proof(), secrets.token_urlsafe(16)
 
     def engine(*words: str, feed: str = "") -> str:
@@ -178,9 +180,8 @@ def main() -> int:
                 base.append("--build-arg=LOCK=requirements-real.lock")
                 subprocess.run([arguments.engine, "build", *base, "-t", REAL_IMAGE, str(ROOT)], check=True)
         (here / "users").mkdir(mode=0o700)
-        words = "rolling-panda certificates --out /here/certificates"
-        words += " && rolling-panda user add ada --role supervisor --file /here/users/users.json --password-stdin"
-        words += " && chown -R 10001:10001 /here/certificates /here/users"
+        words = "rolling-panda user add ada --role supervisor --file /here/users/users.json --password-stdin"
+        words += " && chown -R 10001:10001 /here/users"
         engine(
             "run",
             "--rm",

@@ -1,5 +1,6 @@
 """Start perception: `python -m perception` or `rolling-panda perception`."""
 
+import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -7,15 +8,20 @@ from pathlib import Path
 from perception.config import PerceptionConfig
 from perception.loop import Loop
 from perception.pipeline import Perception
-from perception.segmenter_choice import choose_segmenter
+from perception.segmentation.segmenter_choice import choose_segmenter
 from rolling_panda.config import RobotConfig, load_section
-from rolling_panda.process import ProcessContext, run_process
-from rolling_panda.robot_model import RobotModel
+from rolling_panda.model.robot import RobotModel
+from rolling_panda.runtime.process import ProcessContext, run_process
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run until told to stop; returns the exit code."""
-    return run_process("perception", "Finds pruning points in the camera's frames.", run, argv=argv)
+    return run_process("perception", "Finds pruning points in the camera's frames.", run, argv=argv, check=_check)
+
+
+def _check(arguments: argparse.Namespace) -> None:
+    load_section(arguments.config, "perception", PerceptionConfig)
+    load_section(arguments.config, "robot", RobotConfig)
 
 
 def run(context: ProcessContext) -> None:

@@ -167,6 +167,14 @@ class LookConfig(Struct, frozen=True, forbid_unknown_fields=True):
     node_room: Positive = 0.008
 
 
+class Thickest(Struct, frozen=True, forbid_unknown_fields=True):
+    """Greatest plausible radius of a post, of a trunk, and of a cordon (m)."""
+
+    post: Positive = 0.09
+    trunk: Positive = 0.07
+    cordon: Positive = 0.04
+
+
 class ObstacleConfig(Struct, frozen=True, forbid_unknown_fields=True):
     """What becomes an obstacle that the arm keeps away from.
 
@@ -176,7 +184,8 @@ class ObstacleConfig(Struct, frozen=True, forbid_unknown_fields=True):
             canes for any of them, and what is as thick has been seen from farther away before (m).
         farthest: The same for farther ones (m).
         cell: Size of the cells in which points are gathered (m).
-        hits: Frames that must have shown a cell.
+        hits: Frames that must have shown a cell, more than refuted it.
+        cells: Cells of each kind that are remembered at most; the farthest are forgotten.
         points: Pixels of one class used of a frame, about.
         least: Cells that a rod needs.
         shortest: Length that a rod needs (m).
@@ -184,6 +193,10 @@ class ObstacleConfig(Struct, frozen=True, forbid_unknown_fields=True):
         wire_apart: Wires farther apart than this in height are two (m).
         piece: A cordon is cut into pieces of this length (m).
         piece_apart: What is farther than this above, below or behind the rest of a piece is no part of it (m).
+        off_row: What is farther than this before or behind the row is none of its wood (m).
+        lean: A post or a trunk that leans by more than this is none (rad).
+        turn: The same of a cordon's or a wire's angle to the row (rad).
+        thickest: What is thicker is none of its kind.
         most: Rods kept at most; of canes the nearest.
         canes: Whether what stays of the canes is among them.
     """
@@ -193,6 +206,7 @@ class ObstacleConfig(Struct, frozen=True, forbid_unknown_fields=True):
     farthest: Positive = 2.0
     cell: Positive = 0.02
     hits: Hits = 3
+    cells: Annotated[int, Meta(ge=1000, le=10**7)] = 50000
     points: Annotated[int, Meta(ge=10, le=100000)] = 4000
     least: Annotated[int, Meta(ge=2, le=1000)] = 4
     shortest: Positive = 0.05
@@ -200,6 +214,10 @@ class ObstacleConfig(Struct, frozen=True, forbid_unknown_fields=True):
     wire_apart: Positive = 0.06
     piece: Positive = 0.15
     piece_apart: Positive = 0.06
+    off_row: Positive = 0.15
+    lean: Positive = 0.26
+    turn: Positive = 0.6
+    thickest: Thickest = Thickest()
     most: Annotated[int, Meta(ge=1, le=500)] = 200
     canes: bool = True
 

@@ -13,12 +13,10 @@ from perception.pipeline import Perception
 from perception.worker import Worker
 from rolling_panda import messages as m
 from rolling_panda import topics
-from rolling_panda.camera_messages import CameraFrame
-from rolling_panda.crop_messages import PointCrop
-from rolling_panda.look_messages import CloseLook
-from rolling_panda.plant_requests import PlantRequest
-from rolling_panda.row_messages import Obstacles
-from rolling_panda.transport import Received, Transport
+from rolling_panda.messages.commands import PlantRequest
+from rolling_panda.messages.perception import CloseLook, Obstacles, PointCrop
+from rolling_panda.messages.robot import CameraFrame
+from rolling_panda.transport.zenoh import Received, Transport
 
 
 @dataclass(frozen=True)
@@ -27,6 +25,7 @@ class _Result:
     withdrawn: tuple[str, ...]
     obstacles: Obstacles
     crops: tuple[PointCrop, ...]
+    left_out: str
 
 
 @dataclass(frozen=True)
@@ -38,6 +37,8 @@ class _Asked:
 _Job = CameraFrame | _Asked
 #: How long an operator's question waits for the worker (s); less than the service's timeout.
 _ANSWER_S = 1.8
+#: What was left out as implausible is told this often at most (s).
+_LEFT_OUT_S = 60.0
 
 
 class Loop:
@@ -72,6 +73,7 @@ class Loop:
         self._sequence = 0
         self._sent = self._sent_obstacles = self._sent_crop = -1e9
         self._last_error = ""
+        self._left_out, self._told_left_out = "", -1e9
         self._shown: frozenset[str] = frozenset()
         self._hanging = False
 
@@ -133,6 +135,10 @@ class Loop:
             # Mostly since it was cut. Where somebody had accepted it, the controller warns.
             self._tell("info", text, now)
         self._shown = shown
+        if result.left_out != self._left_out and now - self._told_left_out >= _LEFT_OUT_S:
+            self._left_out, self._told_left_out = result.left_out, now
+            if result.left_out:
+                self._tell("info", f"taken for wood where none can be, and left out: {result.left_out}", now)
 
     def _show_crops(self, crops: tuple[PointCrop, ...]) -> None:
         wanted = {(crop.point_id, crop.revision): crop for crop in crops}
@@ -185,4 +191,4 @@ def _work(perception: Perception, job: _Job, tell: Callable[[CloseLook], None]) 
             tell(perception.look_closely(job))
         points = perception.process(job)
     obstacles = Obstacles(header=points.header, capsules=perception.obstacles)
-    return _Result(points, perception.withdrawn, obstacles, perception.crops)
+    return _Result(points, perception.withdrawn, obstacles, perception.crops, perception.left_out)

@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from perception.config import PerceptionConfig, RuleConfig
-from perception.network_segmenter import NetworkSegmenter
-from perception.photograph import R_LEVEL, Photograph, load_photograph
 from perception.pipeline import with_widening
-from perception.segmenter_choice import SHIPPED
-from perception.still import Still, StillPoint, read_still
+from perception.segmentation.network_segmenter import NetworkSegmenter
+from perception.segmentation.photograph import R_LEVEL, Photograph, load_photograph
+from perception.segmentation.segmenter_choice import SHIPPED
+from perception.single_image import Still, StillPoint, read_still
 from rolling_panda.errors import InputError, RollingPandaError
-from rolling_panda.messages import WOOD_CLASSES
+from rolling_panda.messages.types import WOOD_CLASSES
 from rolling_panda.resources import resource
 
 #: One colour a class, for the palette of classes.png and the overlay.
@@ -60,8 +60,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         rule = _rule(words.system, words.nodes_kept, words.offset)
         if not words.depth_unit > 0.0:
             raise InputError(f"--depth-unit {words.depth_unit}: give the metres a count, more than 0")
-        segmenter = NetworkSegmenter(words.weights or resource(SHIPPED))
+        # Before the network with its threads: what cannot be read ends at once.
         photograph = load_photograph(words.image, words.depth, words.intrinsics, words.depth_unit)
+        segmenter = NetworkSegmenter(words.weights or resource(SHIPPED))
         labels = segmenter.classify(photograph.color, photograph.depth)
         config = with_widening(replace(PerceptionConfig(), rule=rule), segmenter.widening)
         still = read_still(photograph, labels, config)

@@ -1,40 +1,51 @@
 """Camera frames in, pruning points out."""
 
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from perception.abstention import MoreToSee, OpenPlaces, abstention
-from perception.album import Album, Crop
-from perception.by_hand import moved_by_hand, point_by_hand
-from perception.cane_lines import cane_lines
-from perception.centreline import centrelines
-from perception.clearance import Rods
-from perception.close_look import look_closely, no_look
-from perception.config import PerceptionConfig
-from perception.fragments import find_fragments, find_wood
-from perception.frame import View, decode_frame
-from perception.keep_out import as_known, in_view
-from perception.linking import link
-from perception.mending import mended
-from perception.numbering import RowNumbers, SpurNumber
-from perception.obstacles import ObstacleMap
-from perception.plant import Plant
-from perception.plant_map import PlantMap
-from perception.rules import apply_rule
-from perception.segmenter import Segmenter
-from perception.sightings import Sightings
-from perception.staying import StayingCanes
-from perception.topology import build_plant
-from perception.tracker import Proposal, Tracked, Tracker
+from perception.config import PerceptionConfig, RuleConfig
+from perception.obstacles.obstacle_map import ObstacleMap
+from perception.plant.cane_lines import cane_lines
+from perception.plant.clearance import Rods
+from perception.plant.map import PlantMap
+from perception.plant.model import Array, Plant, Spur
+from perception.plant.numbering import RowNumbers, SpurNumber
+from perception.plant.undecided_sites import MoreToSee, OpenPlaces, abstention
+from perception.rules.by_hand import moved_by_hand, point_by_hand
+from perception.rules.keep_out import as_known, in_view
+from perception.rules.registry import apply_rule
+from perception.rules.spur import Decision
+from perception.segmentation.frame import View, decode_frame
+from perception.segmentation.mending import mended
+from perception.segmentation.segmenter import Segmenter
+from perception.skeleton.centreline import centrelines
+from perception.skeleton.fragments import find_fragments, find_wood
+from perception.skeleton.linking import link
+from perception.skeleton.topology import build_plant
+from perception.tracking.close_up import look_closely, no_look
+from perception.tracking.crop_cache import Crop, CropCache
+from perception.tracking.retained_canes import RetainedCanes
+from perception.tracking.sightings import Sightings
+from perception.tracking.tracker import Proposal, Tracked, Tracker
 from rolling_panda import messages as m
-from rolling_panda.camera_messages import CameraFrame
-from rolling_panda.crop_messages import PointCrop
 from rolling_panda.errors import InputError
-from rolling_panda.look_messages import CloseLook
-from rolling_panda.plant_requests import AddPoint, AddPointInImage, MovePoint, PlantRequest, SetRule
-from rolling_panda.robot_model import RobotModel
-from rolling_panda.row_messages import Capsule
+from rolling_panda.messages.commands import (
+    AddPoint,
+    AddPointInImage,
+    MovePoint,
+    PlantRequest,
+    SetRule,
+    TakeRuleBack,
+    TryRule,
+)
+from rolling_panda.messages.perception import Capsule, CloseLook, PointCrop
+from rolling_panda.messages.robot import CameraFrame
+from rolling_panda.model.robot import RobotModel
 
 _CORDON = m.WOOD_CLASSES.index("cordon")
 #: A point by hand this near to another would be the same cut (m).
@@ -45,6 +56,21 @@ _SHORTEST = 1e-6
 _LEAST_CORDON = 200
 #: A spur this near to the middle of the picture is before the camera (m).
 _BEFORE_IT = 0.3
+#: So many changes of the rule can be taken back, the last one first.
+_MOST_BACK = 20
+#: A cut this near to one that was made would be the same, or above it on the same cane (m).
+_SAME_CUT = 0.02
+
+
+@dataclass(frozen=True)
+class _BeforeRule:
+    """What a change of the rule replaced: the rule and what it had made of the vines, and how many cuts were seen."""
+
+    rule: RuleConfig
+    tracker: Tracker
+    open: OpenPlaces
+    told: tuple[m.Abstention, ...]
+    severed: int
 
 
 class Perception:
@@ -69,9 +95,12 @@ class Perception:
         self._stamp = 0.0
         self._canes: tuple[tuple[m.Vector3, ...], ...] = ()
         self._map = ObstacleMap(config.obstacles)
-        self._staying = StayingCanes(config.obstacles)
-        self._album = Album()
+        self._staying = RetainedCanes(config.obstacles)
+        self._album = CropCache()
         self._crops: dict[str, PointCrop] = {}
+        self._before: list[_BeforeRule] = []
+        self._severed: list[m.Vector3] = []
+        """Where wood was found cut."""
         self.sightings = Sightings()
         """Where the camera was."""
         self.known = PlantMap()
@@ -157,8 +186,13 @@ class Perception:
 
     def answer(self, request: PlantRequest) -> m.Answer:
         """Do what an operator asks for; a refusal changes nothing."""
+        self.withdrawn = ()
         if isinstance(request, SetRule):
             return self._set_rule(request)
+        if isinstance(request, TryRule):
+            return self._try_rule(request)
+        if isinstance(request, TakeRuleBack):
+            return self._take_rule_back(request)
         if isinstance(request, MovePoint):
             return self._move(request)
         if isinstance(request, AddPoint):
@@ -196,20 +230,19 @@ class Perception:
         )
 
     @property
+    def left_out(self) -> str:
+        """What was taken for posts, trunks, cordons or wires where none can be, counted in words; empty for nothing."""
+        counted = sorted(self._map.left_out.items())
+        return ", ".join(f"{n} {kind}{'' if n == 1 else 's'} {reason}" for (kind, reason), n in counted)
+
+    @property
     def crops(self) -> tuple[PointCrop, ...]:
         """A picture of every point shown whose spur some image shows, in the order of the points."""
         return tuple(self._crops.values())
 
     @property
     def _rule(self) -> m.PruningRule:
-        rule = self._config.rule
-        return m.PruningRule(
-            system=rule.system,
-            nodes_kept=rule.nodes_kept,
-            fruiting_nodes=rule.fruiting_nodes,
-            keeper_diameter=rule.keeper_diameter,
-            offset=rule.offset,
-        )
+        return _as_told(self._config.rule)
 
     def _explained(self, points: tuple[m.PruningPoint, ...]) -> tuple[m.PruningPoint, ...]:
         """The points with what stands around them; their pictures are renewed where a revision has none."""
@@ -244,30 +277,73 @@ class Perception:
         return m.Answer(ok=True, reason=self._tracker.move(request.point_id, cut).reason)
 
     def _set_rule(self, request: SetRule) -> m.Answer:
-        asked = request.rule
-        rule = replace(
-            self._config.rule,
-            system=asked.system,
-            nodes_kept=asked.nodes_kept,
-            fruiting_nodes=asked.fruiting_nodes,
-            keeper_diameter=asked.keeper_diameter,
-            offset=asked.offset,
+        rule = _with_numbers(self._config.rule, request.rule)
+        if rule == self._config.rule:
+            return m.Answer(ok=True, reason="this rule is in force already")
+        before = _BeforeRule(
+            self._config.rule, self._tracker.copy(), copy.deepcopy(self._open), self._told, len(self._severed)
         )
+        self._before = [*self._before, before][-_MOST_BACK:]
         self._config = replace(self._config, rule=rule)
-        spurs = {known.number: known.as_spur() for known in self.known.spurs}
-        proposals = []
-        keep_out = as_known(self.obstacles, rule)
+        judged = self._judged(rule)
         self._open.clear()
-        for number, spur in spurs.items():
-            beside = [cane.axis for other in spurs.values() if other is not spur for cane in other.canes]
-            decision = apply_rule(spur, rule, np.concatenate([np.zeros((0, 3)), *beside]), keep_out)
-            proposals += [Proposal(cut, number) for cut in decision.cuts]
-            place = _vector(spur.position)
-            self._open.note(number, bool(decision.cuts), list(decision.abstained), place, before=False)
+        for number, spur, decision in judged:
+            self._open.note(number, bool(decision.cuts), list(decision.abstained), _vector(spur.position), before=False)
+        proposals = _proposals(judged)
         self._tracker.restart(proposals)
         self._staying.choose(self.known.spurs, self._tracker.shown(), rule)
         self._told = self._left_open(self._tracker.points())
         return m.Answer(ok=True, reason=f"{len(proposals)} points by the new rule")
+
+    def _try_rule(self, request: TryRule) -> m.Answer:
+        """What a rule would change, found on a copy."""
+        rule = _with_numbers(self._config.rule, request.rule)
+        now = {point.point_id: point.digest for point in self._tracker.points()}
+        tried = self._tracker.copy()
+        if rule != self._config.rule:
+            tried.restart(_proposals(self._judged(rule)))
+        then = {point.point_id: point.digest for point in tried.points()}
+        effect = m.RuleEffect(
+            moved=tuple(name for name in now if name in then and then[name] != now[name]),
+            gone=tuple(name for name in now if name not in then),
+            added=len(then.keys() - now.keys()),
+        )
+        return m.Answer(ok=True, reason=f"{len(then)} points by that rule", effect=effect)
+
+    def _take_rule_back(self, request: TakeRuleBack) -> m.Answer:
+        if request.rule != self._rule:
+            return m.Answer(ok=False, reason="the rule has been changed since; look again")
+        if not self._before:
+            return m.Answer(ok=False, reason="perception knows of no rule before this one; set it by its numbers")
+        before = self._before.pop()
+        self._config = replace(self._config, rule=before.rule)
+        cut = np.array(self._severed[before.severed :]).reshape(-1, 3)
+        self._tracker.return_to(before.tracker, lambda number, place: self._stands(number, place, cut))
+        self._open, self._told = before.open, before.told
+        self._staying.choose(self.known.spurs, self._tracker.shown(), before.rule)
+        return m.Answer(ok=True, reason=f"{len(self._tracker.points())} points by the rule before")
+
+    def _stands(self, number: SpurNumber, place: Array, cut: Array) -> bool:
+        """Whether none of some cuts (N×3, m, odom) was made at a place of a spur, or below it on the same cane."""
+        for made in cut:
+            if float(np.linalg.norm(made - place)) < _SAME_CUT:
+                return False
+            here, there = self.known.nearest_cane(place), self.known.nearest_cane(made)
+            if here is None or there is None or here[0].number != number:
+                continue
+            if here[1] is there[1] and here[3] >= there[3]:
+                return False
+        return True
+
+    def _judged(self, rule: RuleConfig) -> list[tuple[SpurNumber, Spur, Decision]]:
+        """What a rule says of each spur as all frames have shown it."""
+        spurs = {known.number: known.as_spur() for known in self.known.spurs}
+        keep_out = as_known(self.obstacles, rule)
+        judged = []
+        for number, spur in spurs.items():
+            beside = [cane.axis for other in spurs.values() if other is not spur for cane in other.canes]
+            judged.append((number, spur, apply_rule(spur, rule, np.concatenate([np.zeros((0, 3)), *beside]), keep_out)))
+        return judged
 
     def _left_open(self, points: tuple[m.PruningPoint, ...]) -> tuple[m.Abstention, ...]:
         return self._open.told({SpurNumber(point.vine, point.spur) for point in points})
@@ -276,6 +352,7 @@ class Perception:
         self.withdrawn = tracked.withdrawn
         for place in tracked.severed:
             self.known.sever(place)
+            self._severed.append(_vector(place))
 
     def _tell_obstacles(
         self, view: View, labels: NDArray[np.uint8], rods: tuple[Capsule, ...], numbers: tuple[SpurNumber, ...]
@@ -324,6 +401,31 @@ class Perception:
             canes=canes,
             rule=self._rule,
         )
+
+
+def _as_told(rule: RuleConfig) -> m.PruningRule:
+    return m.PruningRule(
+        system=rule.system,
+        nodes_kept=rule.nodes_kept,
+        fruiting_nodes=rule.fruiting_nodes,
+        keeper_diameter=rule.keeper_diameter,
+        offset=rule.offset,
+    )
+
+
+def _with_numbers(rule: RuleConfig, asked: m.PruningRule) -> RuleConfig:
+    return replace(
+        rule,
+        system=asked.system,
+        nodes_kept=asked.nodes_kept,
+        fruiting_nodes=asked.fruiting_nodes,
+        keeper_diameter=asked.keeper_diameter,
+        offset=asked.offset,
+    )
+
+
+def _proposals(judged: Sequence[tuple[SpurNumber, Spur, Decision]]) -> list[Proposal]:
+    return [Proposal(cut, number) for number, _, decision in judged for cut in decision.cuts]
 
 
 def with_widening(config: PerceptionConfig, widening: float) -> PerceptionConfig:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rolling_panda import messages as m
-from rolling_panda.camera_messages import CameraFrame
+from rolling_panda.messages.robot import CameraFrame
 
 _VECTOR = {"type": "object", "properties": {name: {"type": "number"} for name in "xyz"}}
 _QUATERNION = {"type": "object", "properties": {name: {"type": "number"} for name in "xyzw"}}

@@ -4,9 +4,11 @@ import bisect
 from collections import defaultdict
 
 from recorder.tape import Recorded, Tape
-from rolling_panda import control_messages, topics
 from rolling_panda import messages as m
-from rolling_panda.replay_messages import ReplayState, SeekReplay
+from rolling_panda import topics
+from rolling_panda.messages import supervision as control_messages
+from rolling_panda.messages.commands import SeekReplay
+from rolling_panda.messages.supervision import ReplayState
 from rolling_panda.topics import Topic
 
 # What the robot tells of itself; commands and what pages ask for stay in the recording.

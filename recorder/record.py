@@ -12,10 +12,11 @@ from typing import Any
 from recorder.recording import Recording
 from rolling_panda import messages as m
 from rolling_panda.errors import RollingPandaError
-from rolling_panda.priority import take_priority
-from rolling_panda.process import add_common_arguments, end_with_parent, stop_on_signals, wire_config
+from rolling_panda.runtime.priority import take_priority
+from rolling_panda.runtime.process import add_common_arguments, end_with_parent, stop_on_signals, wire_config
 from rolling_panda.topics import TOPICS, Topic
-from rolling_panda.transport import Onlooker
+from rolling_panda.transport.access import RECORDER
+from rolling_panda.transport.zenoh import Onlooker
 
 # Twice as often as a killed recorder may lose.
 _FLUSH_S = 0.4
@@ -38,7 +39,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     # The robot comes first.
     take_priority("background")
     try:
-        with Onlooker(wire_config(arguments), arguments.robot_id) as wire:
+        with Onlooker(wire_config(arguments), arguments.robot_id, RECORDER) as wire:
             count, lost = record(wire, arguments.out, stopping)
     except RollingPandaError as error:
         print(f"rolling-panda record: {error}", file=sys.stderr)

@@ -11,21 +11,25 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+from msgspec.structs import replace
+
 from recorder.player import Player, played
 from recorder.tape import read_tape
 from rolling_panda import messages as m
 from rolling_panda import topics
+from rolling_panda.cli.demo import choose_router_port, write_secret
+from rolling_panda.cli.demo_supervisor import Supervisor
 from rolling_panda.config import TransportConfig
-from rolling_panda.demo import choose_router_port, write_secret
-from rolling_panda.demo_supervisor import Supervisor
 from rolling_panda.errors import InputError, RollingPandaError
-from rolling_panda.launch import python_command
-from rolling_panda.process import ROBOT_ID, stop_on_signals
-from rolling_panda.replay_messages import SeekReplay
-from rolling_panda.router import DEFAULT_ENDPOINT
+from rolling_panda.messages.commands import SeekReplay
+from rolling_panda.runtime.launch import python_command
+from rolling_panda.runtime.process import ROBOT_ID, stop_on_signals
 from rolling_panda.topics import TOPICS
-from rolling_panda.transport import Router, Transport
+from rolling_panda.transport.certificates import make
+from rolling_panda.transport.settings import DEFAULT_ENDPOINT
+from rolling_panda.transport.zenoh import Router, Transport
 
+_HOST = "127.0.0.1"
 _PERIOD_S = 0.01
 _STATE_S = 0.1
 _REFUSAL = m.Answer(ok=False, reason="this is a recording; nothing can be asked of the robot")
@@ -50,17 +54,22 @@ def _run(arguments: argparse.Namespace, stopping: threading.Event) -> int:
     tape = read_tape(arguments.file)
     if not tape.whole:
         print(f"{arguments.file} ends in the middle: its recorder was killed", flush=True)
-    endpoint = f"tcp/127.0.0.1:{choose_router_port(DEFAULT_ENDPOINT)}"
+    endpoint = f"tls/{_HOST}:{choose_router_port(DEFAULT_ENDPOINT)}"
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="rolling-panda-")))
-        stack.callback(Router(TransportConfig(mode="router", connect=(), listen=(endpoint,))).close)
-        stage = stack.enter_context(Stage(endpoint, Player(tape, arguments.file.name, time.monotonic())))
+        certificates = str(folder / "certificates")
+        make(folder / "certificates", (_HOST,), None)
+        wire = TransportConfig(connect=(endpoint,), certificates=certificates)
+        router = replace(wire, mode="router", connect=(), listen=(endpoint,))
+        stack.callback(Router(router).close)
+        stage = stack.enter_context(Stage(wire, Player(tape, arguments.file.name, time.monotonic())))
         supervisor = Supervisor(folder)
         stack.callback(supervisor.end)
         token, token_file = secrets.token_urlsafe(32), folder / "sign-in-token"
         write_secret(token_file, token)
-        words = ["--connect", endpoint, "--port", str(arguments.port), "--sign-in-token-file", str(token_file)]
-        supervisor.start("server", python_command("server", [*words, "--state", str(folder), "--exit-with-parent"]))
+        words = ["--connect", endpoint, "--certificates", certificates, "--port", str(arguments.port)]
+        words += ["--sign-in-token-file", str(token_file), "--state", str(folder), "--exit-with-parent"]
+        supervisor.start("server", python_command("server", words))
         page = f"http://127.0.0.1:{arguments.port}"
         print(f"{arguments.file}: {tape.duration_s:.0f} s, {len(tape.rows)} messages", flush=True)
         print(f"\nSign in once with this link, on this machine:\n\n    {page}/sign-in?token={token}\n", flush=True)
@@ -75,10 +84,9 @@ def _run(arguments: argparse.Namespace, stopping: threading.Event) -> int:
 class Stage:
     """The wire on which a player stands in for those who were recorded."""
 
-    def __init__(self, endpoint: str, player: Player) -> None:
+    def __init__(self, config: TransportConfig, player: Player) -> None:
         """Announce them, and refuse what is asked of them."""
         self._player, self._lock = player, threading.Lock()
-        config = TransportConfig(connect=(endpoint,))
         self._wires = {process: Transport(config, process, ROBOT_ID) for process in _ABSENT}
         self._put: dict[str, Any] = {}
         for topic in TOPICS:

@@ -2,6 +2,6 @@
 
 import sys
 
-from rolling_panda.cli import main
+from rolling_panda.cli.main import main
 
 sys.exit(main())

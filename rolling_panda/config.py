@@ -12,11 +12,31 @@ from typing import Annotated, Any, Literal, TypeVar
 import msgspec
 from msgspec import Meta, Struct
 
+from rolling_panda.bounds import at_most, check, within
 from rolling_panda.errors import ConfigError
 
 SECTIONS = ("transport", "robot", "bridge", "vineyard", "camera", "controller", "perception", "server", "real")
 Positive = Annotated[float, Meta(gt=0.0, le=1e6)]
 Section = TypeVar("Section", bound=Struct)
+
+# Limits of the arm's joints by its data sheet (rad).
+_Q1 = Annotated[float, within(-2.8973, 2.8973)]
+_Q2 = Annotated[float, within(-1.7628, 1.7628)]
+_Q4 = Annotated[float, within(-3.0718, -0.0698)]
+_Q6 = Annotated[float, within(-0.0175, 3.7525)]
+#: A posture that the arm can take.
+ArmPosture = tuple[_Q1, _Q2, _Q1, _Q4, _Q1, _Q6, _Q1]
+# What the arm's joints can do, by its data sheet (rad/s², rad/s³). Less than half could not stop it in time.
+_A15 = Annotated[float, at_most(15.0, 7.5)]
+_A7 = Annotated[float, at_most(7.5, 3.75)]
+_A10 = Annotated[float, at_most(10.0, 5.0)]
+_A12 = Annotated[float, at_most(12.5, 6.25)]
+_A20 = Annotated[float, at_most(20.0, 10.0)]
+_J7500 = Annotated[float, at_most(7500.0, 3750.0)]
+_J3750 = Annotated[float, at_most(3750.0, 1875.0)]
+_J5000 = Annotated[float, at_most(5000.0, 2500.0)]
+_J6250 = Annotated[float, at_most(6250.0, 3125.0)]
+_J10000 = Annotated[float, at_most(10000.0, 5000.0)]
 
 
 class TransportConfig(Struct, frozen=True, forbid_unknown_fields=True):
@@ -24,19 +44,25 @@ class TransportConfig(Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         mode: `client` of a router, the `router` itself, or `peer` with explicit endpoints.
-        connect: Endpoints to connect to, as `tcp/HOST:PORT`, or `tls/HOST:PORT` with certificates.
+        connect: Endpoints to connect to, as `tls/HOST:PORT`, or `tcp/HOST:PORT` on a plain wire.
         listen: Endpoints to listen on.
         connect_timeout_s: How long to try before giving up at the start; later losses are retried for ever.
-        certificates: Folder with ca.pem and this process's NAME.pem and NAME.key, for mutual TLS; empty for none.
+        certificates: Folder with ca.pem and this process's NAME.pem and NAME.key, for mutual TLS. What lies in a folder
+            of the robot's id there comes first.
         robots: Ids of the robots that a router with certificates serves.
+        field: Keys of the devices behind the drivers, which a router with certificates carries between the bridge and
+            whoever has the certificate of the devices; empty for none.
+        plain_wire: Neither certificates nor access control, on this machine's loopback address alone.
     """
 
     mode: Literal["client", "peer", "router"] = "client"
-    connect: tuple[str, ...] = ("tcp/127.0.0.1:7447",)
+    connect: tuple[str, ...] = ("tls/127.0.0.1:7447",)
     listen: tuple[str, ...] = ()
     connect_timeout_s: Positive = 10.0
     certificates: str = ""
     robots: tuple[str, ...] = ("rp1",)
+    field: tuple[str, ...] = ()
+    plain_wire: bool = False
 
 
 class RobotConfig(Struct, frozen=True, forbid_unknown_fields=True):
@@ -52,12 +78,14 @@ class RobotConfig(Struct, frozen=True, forbid_unknown_fields=True):
         arm_jerk: Limit of each arm joint (rad/s³).
     """
 
-    wheel_radius: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.0
-    track: Annotated[float, Meta(ge=0.0, le=3.0)] = 0.0
+    # 5 % about the vendor's: a wrong radius makes every speed on the ground wrong by as much.
+    wheel_radius: Annotated[float, within(0.127, 0.141, or_zero=True)] = 0.0
+    track: Annotated[float, within(0.48, 0.535, or_zero=True)] = 0.0
     rho: Annotated[float, Meta(ge=-1.0, le=1.0)] = 0.0
-    wheel_velocity: Positive = 11.2
-    wheel_acceleration: Positive = 17.9
-    arm_acceleration: tuple[Positive, Positive, Positive, Positive, Positive, Positive, Positive] = (
+    wheel_velocity: Annotated[float, at_most(11.2)] = 11.2
+    # Less than the lower bound could not bring the base to rest from 0.3 m/s before the watchdog's deadline.
+    wheel_acceleration: Annotated[float, at_most(17.9, 12.5)] = 17.9
+    arm_acceleration: tuple[_A15, _A7, _A10, _A12, _A15, _A20, _A20] = (
         15.0,
         7.5,
         10.0,
@@ -66,7 +94,7 @@ class RobotConfig(Struct, frozen=True, forbid_unknown_fields=True):
         20.0,
         20.0,
     )
-    arm_jerk: tuple[Positive, Positive, Positive, Positive, Positive, Positive, Positive] = (
+    arm_jerk: tuple[_J7500, _J3750, _J5000, _J6250, _J7500, _J10000, _J10000] = (
         7500.0,
         3750.0,
         5000.0,
@@ -94,6 +122,7 @@ def load_section(path: Path, name: str, kind: type[Section]) -> Section:
             raise ConfigError(f"{path}: unknown section [{section}]{_nearest(section, SECTIONS)}")
     table = document.get(name, {})
     _check_keys(path, name, table, kind)
+    check(str(path), name, table, kind)
     try:
         return msgspec.convert(table, kind)
     except msgspec.ValidationError as error:

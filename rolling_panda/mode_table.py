@@ -1,13 +1,13 @@
 """The supervision machine as one table: what happens in which mode, where it leads, and who may cause it.
 
-`controller/modes.py` steps it; the diagram and the table in `docs/safety.md` are made from it.
+`controller/supervision/modes.py` steps it; the diagram and the table in `docs/safety.md` are made from it.
 """
 
 from dataclasses import dataclass
 from enum import Enum
 from typing import Final, Literal
 
-from rolling_panda.messages import Mode
+from rolling_panda.messages.types import Mode
 
 #: Who may cause a transition. `holder` holds the lease on the robot's motion, `system` is the program itself.
 Who = Literal["system", "anyone", "operator", "holder", "supervisor"]
@@ -70,8 +70,8 @@ ROWS: Final[tuple[Row, ...]] = (
     Row("IDLE", Event.ARM, "READY", "holder", "the robot's own data are fresh and the bridge follows"),
     Row("READY", Event.HOLD, "TELEOP", "holder", "pressed anew, with a view of the robot that is fresh"),
     Row("TELEOP", Event.RELEASE, "READY", "system", "let go, or silence"),
-    Row("READY", Event.START, "AUTO", "holder", "a point is accepted, a supervisor is present"),
-    Row("AUTO", Event.FINISHED, "READY", "system", "no accepted point is left"),
+    Row("READY", Event.START, "AUTO", "holder", "a point is accepted and in reach, a supervisor is present"),
+    Row("AUTO", Event.FINISHED, "READY", "system", "no accepted point in reach is left"),
     Row("AUTO", Event.PAUSE, "PAUSED", "operator"),
     Row("TELEOP", Event.PAUSE, "PAUSED", "operator"),
     Row("AUTO", Event.LOST, "PAUSED", "system", "lease, supervisor, server or perception lost, or a cut is UNKNOWN"),

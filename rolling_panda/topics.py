@@ -8,21 +8,20 @@ from typing import Any, Generic, Literal, TypeVar
 
 from msgspec import Struct
 
-from rolling_panda import (
-    camera_messages,
-    control_messages,
-    crop_messages,
-    intents,
-    look_messages,
-    plan_messages,
-    plant_requests,
-    preview_messages,
-    replay_messages,
-    report_messages,
-    row_messages,
-    teleop_messages,
-)
 from rolling_panda import messages as m
+from rolling_panda.messages import commands as commands_messages
+from rolling_panda.messages import commands as intents
+from rolling_panda.messages import commands as plant_requests
+from rolling_panda.messages import perception as crop_messages
+from rolling_panda.messages import perception as look_messages
+from rolling_panda.messages import perception as row_messages
+from rolling_panda.messages import robot as camera_messages
+from rolling_panda.messages import supervision as control_messages
+from rolling_panda.messages import supervision as plan_messages
+from rolling_panda.messages import supervision as preview_messages
+from rolling_panda.messages import supervision as report_messages
+from rolling_panda.messages import supervision as supervision_messages
+from rolling_panda.messages import supervision as teleop_messages
 
 #: A robot that nobody has named otherwise.
 ROBOT_ID = "rp1"
@@ -41,6 +40,7 @@ class Topic(Generic[Msg]):
         name: Last part of the key.
         message: The only type accepted on it.
         sender: Process that publishes, several with commas between, or "any".
+        readers: Processes and other programs that it is carried to. A recorder is sent every topic.
         rate_hz: Nominal rate; 0 = when something happens.
         priority: Zenoh priority.
         congestion: What happens to a message when the wire is full.
@@ -52,6 +52,7 @@ class Topic(Generic[Msg]):
     name: str
     message: type[Msg]
     sender: str
+    readers: str
     rate_hz: float
     priority: Priority
     congestion: Congestion
@@ -62,6 +63,10 @@ class Topic(Generic[Msg]):
     def said_by(self, process: m.Process) -> bool:
         """Whether this process may publish it."""
         return self.sender == "any" or process in self.sender.split(", ")
+
+    def read_by(self, name: str) -> bool:
+        """Whether it is carried to this process or program."""
+        return name == "recorder" or name in self.readers.split(", ")
 
 
 @dataclass(frozen=True)
@@ -85,107 +90,107 @@ class Service(Generic[Req]):
 
 # fmt: off
 MOTION = Topic(
-    "command/motion", m.MotionCommand, "controller", 100, "REAL_TIME", "DROP",
+    "command/motion", m.MotionCommand, "controller", "bridge", 100, "REAL_TIME", "DROP",
     "velocity of every actuator, newest wins", express=True,
 )
 CUT = Topic(
-    "command/cut", m.CutCommand, "controller", 0, "REAL_TIME", "BLOCK",
+    "command/cut", m.CutCommand, "controller", "bridge", 0, "REAL_TIME", "BLOCK",
     "close the blades once, repeated until seen", express=True,
 )
 PICTURE = Topic(
-    "command/picture", look_messages.PictureRequest, "controller", 0, "REAL_TIME", "DROP",
+    "command/picture", look_messages.PictureRequest, "controller", "bridge", 0, "REAL_TIME", "DROP",
     "take a picture of a point now, repeated until taken", express=True,
 )
 STOP = Topic(
-    "command/stop", m.StopRequest, "any", 0, "REAL_TIME", "BLOCK",
+    "command/stop", m.StopRequest, "any", "bridge, controller", 0, "REAL_TIME", "BLOCK",
     "software stop, sent several times", express=True,
 )
 TELEOP = Topic(
-    "operator/teleop", teleop_messages.TeleopTarget, "server", 30, "REAL_TIME", "DROP",
+    "operator/teleop", teleop_messages.TeleopTarget, "server", "controller", 30, "REAL_TIME", "DROP",
     "where the held gizmo is", express=True,
 )
 JOINTS = Topic(
-    "state/joints", m.JointState, "bridge", 100, "INTERACTIVE_HIGH", "DROP",
+    "state/joints", m.JointState, "bridge", "controller, server", 100, "INTERACTIVE_HIGH", "DROP",
     "measured wheels and arm", express=True,
 )
 ODOMETRY = Topic(
-    "state/odometry", m.Odometry, "bridge", 50, "INTERACTIVE_HIGH", "DROP",
+    "state/odometry", m.Odometry, "bridge", "controller, server", 50, "INTERACTIVE_HIGH", "DROP",
     "base pose and twist from the wheels", express=True,
 )
 BRIDGE = Topic(
-    "state/bridge", m.BridgeState, "bridge", 20, "INTERACTIVE_HIGH", "DROP",
+    "state/bridge", m.BridgeState, "bridge", "controller, server, onlooker", 20, "INTERACTIVE_HIGH", "DROP",
     "latch, watchdog, cutter, refusals",
 )
 CONTROLLER = Topic(
-    "state/controller", m.ControllerState, "controller", 20, "INTERACTIVE_HIGH", "DROP",
+    "state/controller", m.ControllerState, "controller", "bridge, server, onlooker", 20, "INTERACTIVE_HIGH", "DROP",
     "mode, queue, tracking",
 )
 PRESENCE = Topic(
-    "operator/presence", control_messages.Presence, "server", 5, "REAL_TIME", "DROP",
+    "operator/presence", control_messages.Presence, "server", "controller", 5, "REAL_TIME", "DROP",
     "who is there; it renews the lease", express=True,
 )
 CONTROL = Topic(
-    "state/control", control_messages.ControlState, "controller", 20, "INTERACTIVE_HIGH", "DROP",
+    "state/control", control_messages.ControlState, "controller", "server", 20, "INTERACTIVE_HIGH", "DROP",
     "who holds control of the robot's motion",
 )
 STOPS = Topic(
-    "state/stops", control_messages.StopState, "bridge, controller", 2, "INTERACTIVE_HIGH", "DROP",
+    "state/stops", control_messages.StopState, "bridge, controller", "server", 2, "INTERACTIVE_HIGH", "DROP",
     "stops latched by the bridge and by the controller, at once when they change", latched=True,
 )
 HARDWARE_STOP = Topic(
-    "simulation/hardware-stop", control_messages.HardwareStop, "any", 0, "INTERACTIVE_HIGH", "BLOCK",
+    "simulation/hardware-stop", control_messages.HardwareStop, "any", "bridge, devices", 0, "INTERACTIVE_HIGH", "BLOCK",
     "the emergency stop button of the simulated robot",
 )
 PLAN = Topic(
-    "controller/plan", plan_messages.SessionPlan, "controller", 0.2, "DATA_LOW", "DROP",
+    "controller/plan", plan_messages.SessionPlan, "controller", "server", 0.2, "DATA_LOW", "DROP",
     "the session's plan, at once when it changes", latched=True,
 )
 PREVIEW = Topic(
-    "controller/preview", preview_messages.PreviewState, "controller", 2, "DATA_LOW", "DROP",
+    "controller/preview", preview_messages.PreviewState, "controller", "server", 2, "DATA_LOW", "DROP",
     "whether there is a preview of the work, and who has approved it, at once when it changes", latched=True,
 )
 PREVIEW_MOTION = Topic(
-    "controller/preview-motion", preview_messages.PreviewMotion, "controller", 0.2, "DATA_LOW", "DROP",
+    "controller/preview-motion", preview_messages.PreviewMotion, "controller", "server", 0.2, "DATA_LOW", "DROP",
     "the motion of the preview, at once when it is made", latched=True,
 )
 REPORT = Topic(
-    "controller/report", report_messages.SessionReport, "controller", 0.2, "BACKGROUND", "DROP",
+    "controller/report", report_messages.SessionReport, "controller", "server", 0.2, "BACKGROUND", "DROP",
     "what was cut, refused and who held control since the controller started", latched=True,
 )
 HEARTBEAT = Topic(
-    "heartbeat", m.Heartbeat, "any", 20, "INTERACTIVE_HIGH", "DROP",
+    "heartbeat", m.Heartbeat, "any", "controller, server, onlooker", 20, "INTERACTIVE_HIGH", "DROP",
     "a process's loop is turning",
 )
 EVENT = Topic(
-    "event", m.LogEvent, "any", 0, "DATA_LOW", "BLOCK",
+    "event", m.LogEvent, "any", "controller, server", 0, "DATA_LOW", "BLOCK",
     "what happened, and why something was refused",
 )
 CAMERA = Topic(
-    "camera/frame", camera_messages.CameraFrame, "bridge", 2, "DATA_LOW", "DROP",
+    "camera/frame", camera_messages.CameraFrame, "bridge", "perception, server", 2, "DATA_LOW", "DROP",
     "RGB-D frame with the posture it was taken in",
 )
 POINTS = Topic(
-    "perception/points", m.PruningPoints, "perception", 2, "DATA_LOW", "DROP",
+    "perception/points", m.PruningPoints, "perception", "controller, server", 2, "DATA_LOW", "DROP",
     "every pruning point held true now", latched=True,
 )
 CROPS = Topic(
-    "perception/crops", crop_messages.PointCrop, "perception", 2, "BACKGROUND", "DROP",
+    "perception/crops", crop_messages.PointCrop, "perception", "server", 2, "BACKGROUND", "DROP",
     "a point's picture, at once when it is new, then one after the other", latched=True,
 )
 LOOK = Topic(
-    "perception/look", look_messages.CloseLook, "perception", 0, "INTERACTIVE_HIGH", "DROP",
+    "perception/look", look_messages.CloseLook, "perception", "controller", 0, "INTERACTIVE_HIGH", "DROP",
     "what a picture that was asked for shows of its point", express=True,
 )
 OBSTACLES = Topic(
-    "perception/obstacles", row_messages.Obstacles, "perception", 1, "DATA_LOW", "DROP",
+    "perception/obstacles", row_messages.Obstacles, "perception", "controller, server", 1, "DATA_LOW", "DROP",
     "posts, trunks, cordons and wires seen so far", latched=True,
 )
 SCENERY = Topic(
-    "scenery", row_messages.Scenery, "bridge", 0.5, "BACKGROUND", "DROP",
+    "scenery", row_messages.Scenery, "bridge", "server", 0.5, "BACKGROUND", "DROP",
     "the simulated row, for display only", latched=True,
 )
 REPLAY = Topic(
-    "replay/state", replay_messages.ReplayState, "controller", 10, "INTERACTIVE_HIGH", "DROP",
+    "replay/state", supervision_messages.ReplayState, "controller", "server", 10, "INTERACTIVE_HIGH", "DROP",
     "a recording is played in the robot's place", latched=True,
 )
 
@@ -199,7 +204,8 @@ TOPICS: tuple[Topic[Any], ...] = (
 INTENT: Service[intents.Intent] = Service(
     "service/intent",
     (
-        intents.Arm, intents.AcceptPoint, intents.RejectPoint, intents.ReconsiderPoint, intents.ResolvePoint,
+        intents.Arm, intents.AcceptPoint, intents.RejectPoint, intents.ReconsiderPoint,
+        intents.RestoreAccepted, intents.ResolvePoint,
         intents.AcceptAll, intents.MoveInQueue, intents.PlannersOrder, intents.TurnApproach,
         intents.AskPreview, intents.ApprovePreview, intents.RequirePreview, intents.Start, intents.Survey,
         intents.Pause, intents.Resume, intents.Home, intents.Acknowledge, intents.Reset, intents.TakeControl,
@@ -212,11 +218,14 @@ RELEASE: Service[m.ReleaseStop] = Service(
 )
 PLANT: Service[plant_requests.PlantRequest] = Service(
     "service/plant",
-    (plant_requests.SetRule, plant_requests.AddPoint, plant_requests.AddPointInImage, plant_requests.MovePoint),
-    "perception", 2.0, "another pruning rule, or a point by hand, or moved by hand",
+    (
+        plant_requests.SetRule, plant_requests.TryRule, plant_requests.TakeRuleBack, plant_requests.AddPoint,
+        plant_requests.AddPointInImage, plant_requests.MovePoint,
+    ),
+    "perception", 2.0, "another pruning rule, what one would change, or a point by hand, or moved by hand",
 )
-SEEK: Service[replay_messages.SeekReplay] = Service(
-    "service/seek", (replay_messages.SeekReplay,), "controller", 1.0, "another place in the recording that is played",
+SEEK: Service[commands_messages.SeekReplay] = Service(
+    "service/seek", (commands_messages.SeekReplay,), "controller", 1.0, "another place in the recording that is played",
 )
 SERVICES: tuple[Service[Any], ...] = (INTENT, RELEASE, PLANT, SEEK)
 # fmt: on

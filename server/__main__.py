@@ -2,15 +2,16 @@
 
 import argparse
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
-from rolling_panda.process import run_process
-from server.service import run
+from rolling_panda.runtime.process import run_process
+from server.service import check, run
 
 
-def main() -> int:
-    """Run the process."""
-    return run_process("server", "Serve the operator's page, REST and the 3-D view.", run, add_arguments)
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the process; returns the exit code."""
+    return run_process("server", "Serve the operator's page, REST and the 3-D view.", run, add_arguments, argv, check)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -12,29 +12,30 @@ from starlette.routing import Match, Mount
 from starlette.types import ASGIApp, Scope
 
 from rolling_panda import __version__
-from rolling_panda.messages import Severity
-from rolling_panda.page_messages import PageEvents, PagePoints, PageState
-from rolling_panda.plan_messages import SessionPlan
+from rolling_panda.messages.page import PageEvents, PagePoints, PageState
+from rolling_panda.messages.supervision import SessionPlan, SessionReport
+from rolling_panda.messages.types import Severity
 from rolling_panda.resources import resource
-from server.camera_api import camera_router
-from server.control_api import control_router
-from server.desk import Desk, Result
-from server.front import Front
-from server.guard import Guard, is_protected
-from server.operator_api import answer, operator_router
-from server.order_api import order_router
-from server.page_files import PageFiles
-from server.pages import pages_router
-from server.plant_api import plant_router
-from server.preview_api import preview_router
-from server.reception import Reception
-from server.replay_api import replay_router
-from server.report_api import report_router
-from server.robot_api import robot_router
-from server.robots_api import path_of, robots_router
-from server.sessions import Session
-from server.site import page_router, site_router
-from server.viser_proxy import viser_router
+from server.api.answers import answer
+from server.api.camera import camera_router
+from server.api.control import Control, control_router
+from server.api.guard import Guard, is_open, is_protected
+from server.api.operator import operator_router
+from server.api.order import order_router
+from server.api.page_files import PageFiles
+from server.api.pages import pages_router
+from server.api.plant import plant_router
+from server.api.preview import Previewed, preview_router
+from server.api.replay import replay_router
+from server.api.report import report_router
+from server.api.robot import robot_router
+from server.api.robots import path_of, robots_router
+from server.api.site import page_router, site_router
+from server.auth.sessions import Session
+from server.robot_router import RobotRouter
+from server.robots.app_state import AppState
+from server.robots.context import Result, RobotContext
+from server.scene.viser_proxy import viser_router
 
 _ABOUT = (
     "Everything that the page can do. Sign in with `POST /api/sign-in` and the token of a sign-in link, keep the "
@@ -44,15 +45,24 @@ _ABOUT = (
 )
 
 
+#: What requests are answered with that FastAPI does not know.
+_MESSAGES = (PageState, PagePoints, PageEvents, SessionPlan, SessionReport, Previewed, Control)
+
+
 class _Application(FastAPI):
-    """Describes the page's own messages too, which FastAPI does not know."""
+    """Describes the page's own messages and the session's cookie too, which FastAPI does not know."""
+
+    cookie = ""
 
     def openapi(self) -> dict[str, Any]:
         document = super().openapi()
-        _, messages = msgspec.json.schema_components(
-            (PageState, PagePoints, PageEvents, SessionPlan), ref_template="#/components/schemas/{name}"
-        )
-        document.setdefault("components", {}).setdefault("schemas", {}).update(messages)
+        _, messages = msgspec.json.schema_components(_MESSAGES, ref_template="#/components/schemas/{name}")
+        components = document.setdefault("components", {})
+        components.setdefault("schemas", {}).update(messages)
+        components["securitySchemes"] = {"session": {"type": "apiKey", "in": "cookie", "name": self.cookie}}
+        for path, methods in document["paths"].items():
+            for operation in methods.values():
+                operation["security"] = [] if is_open(path) else [{"session": []}]
         return document
 
 
@@ -63,7 +73,7 @@ class _PageFiles(Mount):
         return (Match.NONE, {}) if is_protected(scope["path"]) else super().matches(scope)
 
 
-def create_app(reception: Reception, origins: frozenset[str]) -> ASGIApp:
+def create_app(reception: AppState, origins: frozenset[str]) -> ASGIApp:
     """The guarded application; `origins` are the exact origins that the page may have.
 
     One robot is at `/`. Several are at `/robots/NAME/` each, and `/` has what is about all of them.
@@ -71,12 +81,12 @@ def create_app(reception: Reception, origins: frozenset[str]) -> ASGIApp:
     if len(reception.desks) == 1:
         (desk,) = reception.desks.values()
         return robot_app(reception, desk, origins)
-    robots = {name: robot_app(reception, desk, origins) for name, desk in reception.desks.items()}
-    return Front(robots, _hall(reception, origins))
+    robots = {name: robot_app(reception, desk, origins, path_of(name)) for name, desk in reception.desks.items()}
+    return RobotRouter(robots, _hall(reception, origins))
 
 
-def robot_app(reception: Reception, desk: Desk, origins: frozenset[str]) -> ASGIApp:
-    """Everything about one robot."""
+def robot_app(reception: AppState, desk: RobotContext, origins: frozenset[str], path: str = "/") -> ASGIApp:
+    """Everything about one robot, which is at this path."""
 
     def dropped(session: Session, kind: str) -> None:
         desk.note("warning", f"a view of {session.user} sent {kind!r} to the 3-D view; dropped", session.client)
@@ -97,10 +107,10 @@ def robot_app(reception: Reception, desk: Desk, origins: frozenset[str]) -> ASGI
         pages_router(desk),
         viser_router(desk.scene, desk.may_move, desk.dragged, dropped),
     )
-    return _guarded(routers, files, reception, origins, desk.note)
+    return _guarded(routers, files, reception, origins, desk.note, path)
 
 
-def _hall(reception: Reception, origins: frozenset[str]) -> ASGIApp:
+def _hall(reception: AppState, origins: frozenset[str]) -> ASGIApp:
     """What several robots have in common."""
     first = path_of(next(iter(reception.desks)))
     files = PageFiles(web := resource("web"))
@@ -111,9 +121,10 @@ def _hall(reception: Reception, origins: frozenset[str]) -> ASGIApp:
 def _guarded(
     routers: Sequence[APIRouter],
     files: PageFiles,
-    reception: Reception,
+    reception: AppState,
     origins: frozenset[str],
     note: Callable[[Severity, str, str], None],
+    path: str = "/",
 ) -> ASGIApp:
     app = _Application(
         title="Rolling Panda",
@@ -123,7 +134,9 @@ def _guarded(
         docs_url=None,
         redoc_url=None,
         redirect_slashes=False,
+        servers=None if path == "/" else [{"url": path.rstrip("/")}],
     )
+    app.cookie = reception.cookie
     for router in routers:
         app.include_router(router)
     app.router.routes.append(_PageFiles("/", files, name="web"))
@@ -146,6 +159,16 @@ async def _invalid(_: Request, error: Exception) -> JSONResponse:
     return answer(Result(422, False, "; ".join(words)[:500] or "the request is wrong"))
 
 
-async def _failed(_: Request, error: Exception) -> JSONResponse:
-    status = error.status_code if isinstance(error, HTTPException) else 500
-    return answer(Result(status, False, str(getattr(error, "detail", ""))[:500]))
+async def _failed(request: Request, error: Exception) -> JSONResponse:
+    if not isinstance(error, HTTPException):
+        return answer(Result(500, False, ""))
+    if error.status_code == 400:
+        # FastAPI's answer to bytes that are no text.
+        return answer(Result(422, False, "the body is not JSON in UTF-8"))
+    told = answer(Result(error.status_code, False, str(error.detail)[:500]))
+    told.headers.update(error.headers or {})
+    if error.status_code == 405:
+        # Each route knows of its own method alone, and two may share a path.
+        path = getattr(request.scope.get("route"), "path_format", "")
+        told.headers["Allow"] = ", ".join(request.app.openapi()["paths"].get(path, {"get": None})).upper()
+    return told

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from rolling_panda.config import Positive
+from rolling_panda.bounds import at_least, at_most
 
 
 class ServerConfig(Struct, frozen=True, forbid_unknown_fields=True):
@@ -28,17 +28,17 @@ class ServerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         origins: Further origins that the page may be served under, as `https://HOST`, beside the loopback ones.
     """
 
-    page_rate_hz: Positive = 10.0
-    onlooker_rate_hz: Positive = 5.0
-    scene_rate_hz: Positive = 30.0
-    teleop_rate_hz: Positive = 30.0
-    hold_timeout_s: Positive = 0.15
-    hold_resume_s: Positive = 1.0
-    view_timeout_s: Positive = 0.5
-    stop_confirm_s: Positive = 0.5
-    unread_s: Positive = 10.0
-    session_idle_s: Positive = 12 * 3600.0
-    invite_s: Positive = 600.0
+    page_rate_hz: Annotated[float, at_least(2.0, 100.0)] = 10.0
+    onlooker_rate_hz: Annotated[float, at_least(1.0, 100.0)] = 5.0
+    scene_rate_hz: Annotated[float, Meta(ge=1.0, le=100.0)] = 30.0
+    teleop_rate_hz: Annotated[float, at_least(10.0, 200.0)] = 30.0
+    hold_timeout_s: Annotated[float, at_most(0.15)] = 0.15
+    hold_resume_s: Annotated[float, at_most(1.0)] = 1.0
+    view_timeout_s: Annotated[float, at_most(0.5)] = 0.5
+    stop_confirm_s: Annotated[float, at_most(2.0)] = 0.5
+    unread_s: Annotated[float, at_most(60.0)] = 10.0
+    session_idle_s: Annotated[float, at_most(86400.0)] = 12 * 3600.0
+    invite_s: Annotated[float, at_most(3600.0)] = 600.0
     log_lines: Annotated[int, Meta(ge=200, le=100_000)] = 1000
-    max_body_bytes: Annotated[int, Meta(ge=1024, le=1 << 20)] = 64 << 10
+    max_body_bytes: Annotated[int, at_most(1 << 20, 1024)] = 64 << 10
     origins: tuple[str, ...] = ()

@@ -9,10 +9,10 @@ import time
 from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
-from rolling_panda.robot_model import configuration
+from rolling_panda.model.robot import configuration
 from rolling_panda.topics import HEARTBEAT, PRESENCE
-from server.desk import Desk
-from server.reception import Reception
+from server.robots.app_state import AppState
+from server.robots.context import RobotContext
 
 #: Posture older than this (s) is drawn grey: it is only the last known one.
 _STALE_S = 1.0
@@ -25,7 +25,7 @@ _ACCOUNTS_S = 0.5
 class Loop:
     """The server's periodic work for one robot."""
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: RobotContext) -> None:
         """Nothing runs yet."""
         self._desk = desk
         self._turns = 0
@@ -62,10 +62,12 @@ class Loop:
 
     async def _scene(self, now: float) -> None:
         desk = self._desk
+        desk.scene.fly(now)
         posture = desk.link.posture(now)
         if posture is not None:
             desk.scene.move(configuration(posture.base, posture.position))
             desk.scene.robot.set_grey(posture.age_s > _STALE_S)
+        desk.scene.fall.step(now)
 
     async def _teleop(self, now: float) -> None:
         desk = self._desk
@@ -81,6 +83,8 @@ class Loop:
             desk.points = points
             desk.scene.show_points(points.points)
             desk.wake_pages()
+        bridge = desk.link.bridge.peek()
+        desk.scene.show_cuts(points.points, bridge.message if bridge is not None else None, now)
         received = desk.link.points.peek()
         if received is not None:
             desk.scene.show_canes(received.message.canes)
@@ -90,7 +94,7 @@ class Loop:
         scenery = desk.link.scenery.peek()
         if scenery is not None and scenery.at != self._scenery_at:
             self._scenery_at = scenery.at
-            desk.scene.show_row(scenery.message)
+            desk.scene.show_row(scenery.message, now)
         tool = desk.view.tool(now)
         if tool is not None:
             led = desk.teleop.holder if desk.teleop.leads_gizmo else None
@@ -113,7 +117,7 @@ class Loop:
             desk.wake_pages()
 
 
-def watch_accounts(reception: Reception) -> Coroutine[Any, Any, None]:
+def watch_accounts(reception: AppState) -> Coroutine[Any, Any, None]:
     """Endless: whoever's account has been removed is out soon."""
 
     async def look(now: float) -> None:

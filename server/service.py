@@ -1,5 +1,6 @@
 """Puts the server together and runs it until the process is asked to end."""
 
+import argparse
 import asyncio
 import contextlib
 import re
@@ -12,30 +13,47 @@ from pathlib import Path
 import uvicorn
 from starlette.types import ASGIApp
 
+from rolling_panda.bounds import wider
 from rolling_panda.config import load_section
 from rolling_panda.errors import InputError
-from rolling_panda.garbage import keep_what_is_there
-from rolling_panda.process import ProcessContext
-from rolling_panda.robot_model import RobotModel
-from rolling_panda.transport import Transport
-from server.access import Access, Tls, access
+from rolling_panda.model.robot import RobotModel
+from rolling_panda.runtime.garbage import keep_what_is_there
+from rolling_panda.runtime.process import ProcessContext, wire_config
+from rolling_panda.transport.settings import PLAIN_WARNING
+from rolling_panda.transport.zenoh import Transport
+from server.api.reading_socket import ReadingSocket
 from server.app import create_app
+from server.auth.access import Access, Tls, access
+from server.auth.passwords import Passwords
+from server.auth.sessions import Sessions
 from server.config import ServerConfig
-from server.desk import Desk
-from server.event_log import EventLog
 from server.loop import Loop, watch_accounts
-from server.page_view import PageView
-from server.passwords import Passwords
-from server.presence import PresentPeople
-from server.reading_socket import ReadingSocket
-from server.reception import Reception
-from server.robot_link import RobotLink
-from server.robot_meshes import Part, robot_parts
-from server.scene import Scene
-from server.sessions import Sessions
-from server.teleop import TeleopHold
+from server.robots.app_state import AppState
+from server.robots.context import RobotContext
+from server.robots.event_log import EventLog
+from server.robots.link import RobotLink
+from server.robots.page_view import PageView
+from server.robots.presence import PresentPeople
+from server.robots.teleop import TeleopHold
+from server.scene.robot_meshes import Part, robot_parts
+from server.scene.scene import Scene
 
 _POLL_S = 0.05
+
+
+def check(arguments: argparse.Namespace) -> Access:
+    """How people come in, as the command line asks for it.
+
+    Raises:
+        InputError: Options or files do not fit.
+        ConfigError: The configuration is wrong.
+    """
+    load_section(arguments.config, "server", ServerConfig)
+    robots = [arguments.robot_id, *arguments.also_robot_id]
+    _check_names(robots)
+    if arguments.also_robot_id and (certificates := wire_config(arguments).certificates):
+        _check_certificates(Path(certificates), robots)
+    return access(arguments)
 
 
 def run(context: ProcessContext) -> None:
@@ -46,13 +64,7 @@ def run(context: ProcessContext) -> None:
     """
     config = load_section(context.config_path, "server", ServerConfig)
     arguments = context.arguments
-    _check_names([arguments.robot_id, *arguments.also_robot_id])
-    if arguments.also_robot_id and context.wire.certificates:
-        raise InputError(
-            f"a server's certificate names one robot, so with --certificates the router would refuse what is said to "
-            f"{arguments.also_robot_id[0]}: start a server for each robot, on a port of its own"
-        )
-    allowed = access(arguments)
+    allowed = check(arguments)
     with listen(arguments.host, arguments.port) as door:
         port = int(door.getsockname()[1])
         sessions = Sessions(config.session_idle_s)
@@ -117,7 +129,7 @@ async def serve(
     """
     allowed = allowed or Access()
     port = int(door.getsockname()[1])
-    reception = Reception(
+    reception = AppState(
         sessions,
         address,
         # Cookies do not know ports: two servers on one machine must not sign each other's people out.
@@ -155,7 +167,9 @@ async def serve(
             desk.link.close()
 
 
-def _desk(config: ServerConfig, wire: Transport, model: RobotModel, parts: list[Part], reception: Reception) -> Desk:
+def _desk(
+    config: ServerConfig, wire: Transport, model: RobotModel, parts: list[Part], reception: AppState
+) -> RobotContext:
     """The desk of the robot on this wire, with a 3-D view of its own."""
     loop = asyncio.get_running_loop()
 
@@ -173,17 +187,21 @@ def _desk(config: ServerConfig, wire: Transport, model: RobotModel, parts: list[
         on_sightline=lambda owner, origin, direction: desk.sighted(owner, origin, direction),
         on_stranger=lambda: desk.note("warning", "refused a connection to the 3-D view from outside the page"),
     )
-    link = RobotLink(wire)
-    desk = Desk(
+    link, told = RobotLink(wire), wider("server", config)
+    desk = RobotContext(
         config,
         link,
         scene,
-        PageView(link, model),
+        PageView(link, model, told, wire.plain),
         EventLog(config.log_lines),
         TeleopHold(config),
         PresentPeople(),
         held_elsewhere=lambda session: reception.held_elsewhere(session, desk),
     )
+    for line in told:
+        desk.note("warning", f"set wider than usual: {line}")
+    if wire.plain:
+        desk.note("error", PLAIN_WARNING)
     return desk
 
 
@@ -222,6 +240,17 @@ async def _site(
         await asyncio.sleep(_POLL_S)
     site.should_exit = True
     await serving
+
+
+def _check_certificates(folder: Path, robots: list[str]) -> None:
+    """With one robot's certificate the router would drop what is said to another without a word."""
+    for name in robots:
+        if not (folder / name).is_dir():
+            every = " ".join(f"--robot {each}" for each in robots)
+            raise InputError(
+                f"there is no folder {folder / name}: of several robots each has certificates of its own; make them "
+                f"with `rolling-panda certificates --out DIR {every}`"
+            )
 
 
 def _check_names(robots: list[str]) -> None:

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
-from played_page import browser, page, server, tab
 from playwright.sync_api import sync_playwright
+
+from tests.support.played_page import browser, page, server, tab
 
 __all__ = ["browser", "page", "server", "tab"]
 
@@ -35,7 +36,7 @@ def ordinary_scheduling(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     the processor from the server that it waits for.
     """
     for module in ("process", "router"):
-        monkeypatch.setattr(f"rolling_panda.{module}.take_priority", lambda role: None)
+        monkeypatch.setattr(f"rolling_panda.runtime.{module}.take_priority", lambda role: None)
     before = os.sched_getscheduler(0), os.getpriority(os.PRIO_PROCESS, 0)
     yield
     assert (os.sched_getscheduler(0), os.getpriority(os.PRIO_PROCESS, 0)) == before, "a test changed its own priority"

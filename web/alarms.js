@@ -1,7 +1,8 @@
 // What needs somebody now: how bad it is, what it is, and what to do about it.
 
+import { afterFault, afterPause, afterProtectiveStop, afterStop, awayFromLimit, waitingWork } from "./advice.js";
 import { history } from "./history.js";
-import { isGone, isLive, link, pageState, points, roundTrip, staleWords } from "./state.js";
+import { isGone, isLive, isOpening, link, pageState, points, staleWords } from "./state.js";
 import { counted, inWords } from "./words.js";
 
 /** @typedef {import("./messages.js").PageState} PageState */
@@ -10,6 +11,8 @@ import { counted, inWords } from "./words.js";
 const DEGREE = 180 / Math.PI;
 /** Pages whose round trip (ms) is longer may not lead the tool. */
 const SLOW_MS = 200;
+/** So many samples of the history (3 s) one after the other: a browser that loads the 3-D view is slow for a moment. */
+const SLOW_SAMPLES = 12;
 /** Share of late control periods, and over how many samples of the history it is counted (10 s). */
 const LATE_SHARE = 0.02;
 const LATE_SAMPLES = 40;
@@ -28,7 +31,7 @@ const GONE = Object.freeze({
  */
 export function alarms() {
   const state = pageState.get();
-  const found = link.get().status === "open" || state === null ? [] : [noLink()];
+  const found = link.get().status === "open" || isOpening() ? [] : [noLink()];
   if (state !== null && found.length === 0) found.push(...ofProcesses(), ...ofModes(state), ...ofWork(state));
   return found.sort((a, b) => Number(a.severity === "warning") - Number(b.severity === "warning"));
 }
@@ -69,16 +72,20 @@ function ofModes({ controller, bridge, stops }) {
   const reason = controller?.reason ? `: ${controller.reason}` : "";
   switch (controller?.mode) {
     case "ESTOP_LATCHED":
-      found.push(alarm("stopped", "error", `Stopped${reason}`, "See that the row is clear, write why it is safe to go on, and press Reset."));
+      found.push(alarm("stopped", "error", `Stopped${reason}`, afterStop()));
       break;
     case "PROTECTIVE_STOP":
-      found.push(alarm("protective", "error", `Protective stop${reason}`, "Mend the cause, then press Acknowledge."));
+      found.push(alarm("protective", "error", `Protective stop${reason}`, afterProtectiveStop(controller)));
       break;
     case "PAUSED":
-      found.push(alarm("paused", "warning", `Paused${reason}`, "When that is seen to, press Resume, then Start."));
+      found.push(alarm("paused", "warning", `Paused${reason}`, afterPause(controller)));
       break;
     case "FAULT":
-      found.push(alarm("fault", "error", `Fault${reason}`, "Mend the cause; a supervisor presses Acknowledge."));
+      found.push(alarm("fault", "error", `Fault${reason}`, afterFault(controller)));
+      break;
+    case "READY":
+      // In the place of the pause: a resume alone begins nothing.
+      if (waitingWork(controller)) found.push(alarm("paused", "warning", "The work waits to be begun again", waitingWork(controller)));
       break;
   }
   if (bridge?.cutter === "jammed") {
@@ -95,8 +102,14 @@ function ofModes({ controller, bridge, stops }) {
  * @param {PageState} state
  * @returns {Alarm[]}
  */
-function ofWork({ controller, bridge }) {
+function ofWork({ controller, bridge, wider, plain_wire }) {
   const found = [];
+  if (plain_wire) {
+    found.push(alarm("plain", "error", "The robot's wire is plain: every program on its machine can move it", "Start the program again without --plain-wire."));
+  }
+  if (wider.length > 0) {
+    found.push(alarm("wider", "warning", `Set wider than usual: ${wider.join("; ")}`, "If nobody means that, have the configuration changed back."));
+  }
   const unknown = points.get()?.points.filter((row) => row.entry.state === "UNKNOWN").length ?? 0;
   if (unknown > 0) {
     found.push(alarm("unknown", "warning", `${counted(unknown, "cut")} ended unknown`, "Look at the plant, and say on the row whether it is cut."));
@@ -109,13 +122,14 @@ function ofWork({ controller, bridge }) {
       found.push(alarm("late", "warning", "Control periods come too late", "Close other programs on the robot's computer."));
     }
     if (controller.joint_margin * DEGREE < 5) {
-      found.push(alarm("margin", "warning", "A joint of the arm is near its limit", "Lead the tool back, or press Home."));
+      found.push(alarm("margin", "warning", "A joint of the arm is near its limit", awayFromLimit(controller)));
     }
     if (controller.manipulability < 0.02) {
-      found.push(alarm("singular", "warning", "The arm is nearly stretched out", "Lead the tool back towards the base, or press Home."));
+      found.push(alarm("singular", "warning", "The arm is nearly stretched out", awayFromLimit(controller)));
     }
   }
-  if ((roundTrip.get() ?? 0) > SLOW_MS) {
+  const trips = history.of("page-round-trip").slice(-SLOW_SAMPLES);
+  if (trips.length === SLOW_SAMPLES && trips.every((trip) => trip.value > SLOW_MS)) {
     found.push(alarm("trip", "warning", "The link between this page and the server is slow", "Leading the tool may end by itself."));
   }
   return found;

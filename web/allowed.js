@@ -26,6 +26,7 @@ const NEEDS = Object.freeze({
   PlannersOrder: "The order cannot be changed",
   RejectPoint: "Points cannot be rejected",
   ReconsiderPoint: "Decisions cannot be taken back",
+  RestoreAccepted: "Acceptances cannot be restored",
   ResolvePoint: "How a cut ended cannot be said",
 });
 
@@ -54,7 +55,9 @@ export function whyNot(intent) {
   const ofHolder = OF_HOLDER.includes(intent) && controller.mode !== "FAULT";
   if (controller.allowed.includes(intent)) return ofHolder ? whyNotHolder() : "";
   if (!INTENTS.includes(/** @type {any} */ (intent))) return `There is no ${intent}`;
-  if (intent === "Start" && controller.mode === "READY" && countOf("ACCEPTED") === 0) return "Accept a point first";
+  if (intent === "Start" && controller.mode === "READY" && countOf("ACCEPTED") === 0) {
+    return countOf("UNREACHABLE") > 0 ? "No accepted point can be reached" : "Accept a point first";
+  }
   if (intent === "Start" && controller.mode === "READY" && whyNoStart()) return whyNoStart();
   return `${NEEDS[intent]}; the mode is ${MODE_WORDS[controller.mode]}`;
 }

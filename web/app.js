@@ -22,7 +22,9 @@ import "./components/rp-teleoperation.js";
 import "./components/rp-toasts.js";
 import "./components/rp-view-tools.js";
 import { guardPlacing } from "./by-hand.js";
+import { isBound } from "./decisions.js";
 import { listenForDriveKeys, watchGamepad } from "./driving.js";
+import { followWork } from "./following.js";
 import { explainGreyed } from "./greyed.js";
 import { keepControl } from "./here.js";
 import { keepHistory } from "./history.js";
@@ -40,12 +42,13 @@ guardPlacing();
 keepHistory();
 keepControl();
 guardLooking();
+followWork();
 window.setInterval(() => now.set(performance.now()), 250);
 socket.open();
 // What is about accepted points comes with the first of them, or later where the link was lost just then.
 let coming = false;
 const wait = points.subscribe(async (page) => {
-  if (coming || !page?.points.some((row) => row.entry.state === "ACCEPTED")) return;
+  if (coming || !page?.points.some((row) => isBound(row))) return;
   coming = true;
   try {
     await Promise.all([import("./components/rp-order.js"), import("./components/rp-preview.js")]);

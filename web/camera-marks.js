@@ -2,7 +2,7 @@
 
 import { setText, svg } from "./element.js";
 import { selected } from "./state.js";
-import { select } from "./teleoperation.js";
+import { bring } from "./teleoperation.js";
 import { POINT_WORDS } from "./words.js";
 
 /** @typedef {import("./messages.js").PagePoint} PagePoint */
@@ -12,6 +12,7 @@ import { POINT_WORDS } from "./words.js";
 const SIGNS = Object.freeze({
   PROPOSED: "M0 -.5v1",
   ACCEPTED: "M-3 .2l2.2 2.2L3 -2.4",
+  UNREACHABLE: "M-4.5 0h9",
   INTENT: "M-3 -3l6 6M3 -3l-6 6M0 -4v8",
   DONE: "M-3 .2l2.2 2.2L3 -2.4M-4.5 5.5h9",
   FAILED_NOT_CUT: "M0 -3.6v4M0 2.8v.6",
@@ -67,7 +68,7 @@ export class CameraMarks {
         svg("path", { class: "sign" }),
         svg("title"),
       );
-      mark.addEventListener("click", () => select(point.point_id));
+      mark.addEventListener("click", () => bring(point.point_id));
       this.marks.set(point.point_id, mark);
       this.overlay.append(mark);
     }

@@ -2,6 +2,7 @@
 
 import { whyNot, whyNothing } from "./allowed.js";
 import { ask } from "./api.js";
+import { SURE } from "./messages.js";
 import { isLive, points, say } from "./state.js";
 import { signal } from "./store.js";
 import { POINT_WORDS, counted } from "./words.js";
@@ -13,7 +14,7 @@ import { POINT_WORDS, counted } from "./words.js";
 /** @type {ReadonlySet<PointState>} */
 const CAN_ACCEPT = new Set(/** @type {PointState[]} */ (["PROPOSED", "REJECTED", "FAILED_NOT_CUT"]));
 /** @type {ReadonlySet<PointState>} */
-const CAN_REJECT = new Set(/** @type {PointState[]} */ (["PROPOSED", "ACCEPTED", "FAILED_NOT_CUT"]));
+const CAN_REJECT = new Set(/** @type {PointState[]} */ (["PROPOSED", "ACCEPTED", "UNREACHABLE", "FAILED_NOT_CUT"]));
 /** So many decisions can be taken back, the last one first. */
 const MOST = 100;
 
@@ -29,9 +30,19 @@ export function isUnknown(row) {
   return row.entry.state === "UNKNOWN";
 }
 
+/**
+ * Has somebody accepted it, whether or not the robot can come there?
+ *
+ * @param {PagePoint|undefined} row
+ */
+export function isBound(row) {
+  return row?.entry.state === "ACCEPTED" || row?.entry.state === "UNREACHABLE";
+}
+
 /** @param {PagePoint} row */
 export function whyNotAccept(row) {
   if (isUnknown(row)) return whyNot("ResolvePoint");
+  if (row.entry.state === "UNREACHABLE") return "It is accepted, and cannot be reached";
   if (!CAN_ACCEPT.has(row.entry.state)) return `It is ${POINT_WORDS[row.entry.state].toLowerCase()}`;
   return whyNot("AcceptPoint");
 }
@@ -62,16 +73,28 @@ export async function reject(row, reason) {
   return done;
 }
 
-/** @param {number} confidence */
-export async function acceptAll(confidence) {
-  const open = (points.get()?.points ?? []).filter(
-    (row) => row.entry.state === "PROPOSED" && row.point.confidence >= confidence,
-  );
-  const done = await ask("Accepting all", "api/points/accept-all", { confidence });
+/**
+ * Is it a proposal that has to be looked at by itself?
+ *
+ * @param {PagePoint} row
+ */
+export function isUnsure(row) {
+  return row.entry.state === "PROPOSED" && row.point.confidence < SURE;
+}
+
+/** Proposed points that may be accepted all at once. */
+export function sureOnes() {
+  return (points.get()?.points ?? []).filter((row) => row.entry.state === "PROPOSED" && !isUnsure(row));
+}
+
+/** Accept all of those; the less sure ones are decided one by one. */
+export async function acceptAll() {
+  const open = sureOnes();
+  const done = await ask("Accepting all", "api/points/accept-all", { confidence: SURE });
   if (done) {
     remember(`accepted ${counted(open.length, "point")}`, async () => {
       // Those that have been cut meanwhile, or were decided anew, stay as they are.
-      const accepted = open.map((row) => now(row)).filter((row) => row?.entry.state === "ACCEPTED");
+      const accepted = open.map((row) => now(row)).filter(isBound);
       const back = await Promise.all(accepted.map((row) => row && send(row, "Taking back", "reconsider", {})));
       return back.every(Boolean);
     });
@@ -85,7 +108,7 @@ export async function acceptAll(confidence) {
  * @param {PagePoint} row
  */
 export function whyNotMove(row) {
-  if (row.entry.state === "ACCEPTED") return "It is accepted; take that back first";
+  if (isBound(row)) return "It is accepted; take that back first";
   if (!CAN_ACCEPT.has(row.entry.state)) return `It is ${POINT_WORDS[row.entry.state].toLowerCase()}`;
   return whyNothing() || (isLive("perception") ? "" : "Perception is not there");
 }
@@ -129,7 +152,7 @@ export function remember(words, back) {
  */
 async function goBack(before) {
   const { state, reason } = before.entry;
-  if (state === "ACCEPTED") {
+  if (isBound(before)) {
     return send(before, "Accepting", "accept", { revision: before.point.revision, digest: before.point.digest });
   }
   if (state === "REJECTED") return send(before, "Rejecting", "reject", { reason });

@@ -15,56 +15,59 @@ export const INTENTS: readonly string[];
 export const OF_HOLDER: readonly string[];
 
 export const TEXT_MAX_LENGTH: number;
+export const SURE: number;
 
-export type Vector3 = [number, number, number];
+export type Covariance = [number, number, number, number, number, number];
+
+export type CutKind = "spur cut"|"renewal cut"|"cane cut"|"by hand";
+
+export type Need = "another look"|"operator";
 
 export type UnitVector3 = [number, number, number];
 
-export type QuatXyzw = [number, number, number, number];
+export type Vector3 = [number, number, number];
 
-export type ArmVector = [number, number, number, number, number, number, number];
+export type WoodClass = "background"|"ground"|"post"|"trunk"|"cordon"|"spur"|"cane"|"node"|"wire"|"hose"|"old cut";
+
+export type Finding = "seen"|"changed"|"severed"|"unseen";
 
 export type Actuated = [number, number, number, number, number, number, number, number, number];
 
 export type ActuatedVelocity = [number, number, number, number, number, number, number, number, number];
 
-export type Role = "viewer"|"operator"|"supervisor";
+export type BridgeKind = "sim"|"real"|"fakes";
 
-export type Process = "bridge"|"controller"|"perception"|"server";
+export type Outcome = ""|"DONE"|"FAILED_NOT_CUT"|"UNKNOWN";
+
+export type Interrupted = ""|"work"|"survey"|"teleoperation";
 
 export type Mode = "IDLE"|"READY"|"TELEOP"|"AUTO"|"PAUSED"|"PROTECTIVE_STOP"|"FAULT"|"ESTOP_LATCHED";
 
 export type Phase = ""|"APPROACH"|"LOOK"|"ADVANCE"|"CUT"|"RETREAT"|"SURVEY";
 
-export type PointState = "PROPOSED"|"ACCEPTED"|"INTENT"|"DONE"|"FAILED_NOT_CUT"|"UNKNOWN"|"REJECTED";
+export type PointState = "PROPOSED"|"ACCEPTED"|"UNREACHABLE"|"INTENT"|"DONE"|"FAILED_NOT_CUT"|"UNKNOWN"|"REJECTED";
 
-export type Severity = "info"|"warning"|"error";
+export type Process = "bridge"|"controller"|"perception"|"server";
 
-export type Outcome = ""|"DONE"|"FAILED_NOT_CUT"|"UNKNOWN";
-
-export type Need = "another look"|"operator";
-
-export type WoodClass = "background"|"ground"|"post"|"trunk"|"cordon"|"spur"|"cane"|"node"|"wire"|"hose"|"old cut";
-
-export type BridgeKind = "sim"|"real"|"fakes";
-
-export type CutKind = "spur cut"|"renewal cut"|"cane cut"|"by hand";
-
-export type Covariance = [number, number, number, number, number, number];
+export type Role = "viewer"|"operator"|"supervisor";
 
 export type PlanState = "none"|"planning"|"valid"|"void";
 
+export type PreviewPhase = "none"|"waiting"|"rolling"|"ready"|"approved"|"expired";
+
 export type ArmVelocities = [number, number, number, number, number, number, number];
+
+export type QuatXyzw = [number, number, number, number];
+
+export type ArmVector = [number, number, number, number, number, number, number];
+
+export type Severity = "info"|"warning"|"error";
 
 export type GizmoAxes = "tool"|"base"|"world";
 
 export type CameraPreset = "follow"|"row"|"tool"|"top";
 
 export type Layer = "plant"|"points"|"trail"|"camera"|"cloud"|"simulated";
-
-export type Finding = "seen"|"changed"|"severed"|"unseen";
-
-export type PreviewPhase = "none"|"waiting"|"rolling"|"ready"|"approved"|"expired";
 
 /** Is a process connected, and how old is its last word (s; None before the first). */
 export interface ProcessPresence {
@@ -194,6 +197,10 @@ export interface ControllerState {
   near: Nearness|null;
   /** Whose order that is. */
   order: QueueOrder;
+  /** What a pause or a protective stop has ended; empty once something is begun, or the robot disarmed. */
+  interrupted: Interrupted;
+  /** Numbers of safety that its configuration sets less strictly than usual, within their hard bounds. */
+  wider: string[];
 }
 
 /** How many messages of a topic were refused for one reason. */
@@ -233,6 +240,8 @@ export interface BridgeState {
   rejections: RejectionCount[];
   /** Charge of the base; None where nobody tells, as in the simulation. */
   battery: number|null;
+  /** Numbers of safety that its configuration sets less strictly than usual, within their hard bounds. */
+  wider: string[];
 }
 
 /** Bridge → all: measured actuated coordinates, [θ_l, θ_r, q₁…q₇] (rad, rad/s), as sensor_msgs/JointState. */
@@ -355,6 +364,10 @@ export interface PageState {
   speed_shares: number[];
   /** The recording that is played; None with a robot. */
   replay: ReplayState|null;
+  /** Numbers of safety that a process's configuration sets less strictly than usual. */
+  wider: string[];
+  /** The robot's wire is not protected: every program on its machine can move it. */
+  plain_wire: boolean;
 }
 
 /** What the plan says of one accepted point. */
@@ -603,10 +616,13 @@ export interface ShowPreview {
   time: number|null;
 }
 
-/** Highlight a point in the 3-D view; empty = none. */
+/** Highlight a point in the 3-D view and bring this session's cameras there; empty = none. */
 export interface Select {
   type: "Select";
+  /** Of the point. */
   point_id: string;
+  /** The page follows the work, and nobody has chosen: who has just moved a camera keeps it for a while. */
+  follow?: boolean;
 }
 
 /** One cut and how it ended, or a point that was given up before the blades were asked to close. */
@@ -631,12 +647,13 @@ export interface CutReport {
   seconds: number;
 }
 
-/** The cuts of one vine by outcome, and the time they took together (s). */
+/** The cuts of one vine by outcome, points accepted there that cannot be reached, and the time of the cuts (s). */
 export interface VineReport {
   vine: number;
   done: number;
   not_cut: number;
   unknown: number;
+  unreachable: number;
   seconds: number;
 }
 
@@ -666,7 +683,7 @@ export interface SessionReport {
   cuts: CutReport[];
   /** All cuts, those left out of `cuts` too. */
   cut_count: number;
-  /** Each vine with a cut, by its number; all cuts count. */
+  /** Each vine with a cut or a point that cannot be reached, by its number; all of them count. */
   vines: VineReport[];
   /** The newest refusals. */
   refusals: RefusalReport[];

@@ -6,16 +6,19 @@ export const PROCESSES = Object.freeze(["bridge", "controller", "perception", "s
 
 export const MODES = Object.freeze(["IDLE", "READY", "TELEOP", "AUTO", "PAUSED", "PROTECTIVE_STOP", "FAULT", "ESTOP_LATCHED"]);
 
-export const POINT_STATES = Object.freeze(["PROPOSED", "ACCEPTED", "INTENT", "DONE", "FAILED_NOT_CUT", "UNKNOWN", "REJECTED"]);
+export const POINT_STATES = Object.freeze(["PROPOSED", "ACCEPTED", "UNREACHABLE", "INTENT", "DONE", "FAILED_NOT_CUT", "UNKNOWN", "REJECTED"]);
 
 export const SEVERITIES = Object.freeze(["info", "warning", "error"]);
 
 export const ROLES = Object.freeze(["viewer", "operator", "supervisor"]);
 
 /** What `ControllerState.allowed` may contain. */
-export const INTENTS = Object.freeze(["Arm", "AcceptPoint", "RejectPoint", "ReconsiderPoint", "ResolvePoint", "AcceptAll", "MoveInQueue", "PlannersOrder", "TurnApproach", "AskPreview", "ApprovePreview", "RequirePreview", "Start", "Survey", "Pause", "Resume", "Home", "Acknowledge", "Reset", "TakeControl", "RequestControl", "GrantControl", "ReturnControl"]);
+export const INTENTS = Object.freeze(["Arm", "AcceptPoint", "RejectPoint", "ReconsiderPoint", "RestoreAccepted", "ResolvePoint", "AcceptAll", "MoveInQueue", "PlannersOrder", "TurnApproach", "AskPreview", "ApprovePreview", "RequirePreview", "Start", "Survey", "Pause", "Resume", "Home", "Acknowledge", "Reset", "TakeControl", "RequestControl", "GrantControl", "ReturnControl"]);
 
 /** Of these, what is for who holds control, but for the end of a fault. */
 export const OF_HOLDER = Object.freeze(["Arm", "Start", "Survey", "Resume", "Home", "Acknowledge"]);
 
 export const TEXT_MAX_LENGTH = 500;
+
+/** From this confidence on points are accepted all at once. */
+export const SURE = 0.8;

@@ -1,6 +1,6 @@
 // The order of work: which accepted point comes when, whose order it is, and how it is changed.
 
-import { whyNot } from "./allowed.js";
+import { countOf, whyNot } from "./allowed.js";
 import { ask } from "./api.js";
 import { pageState, points } from "./state.js";
 import { counted } from "./words.js";
@@ -20,11 +20,13 @@ export function orderedBy() {
 /** How many there are, whose order it is, and how long the work takes, in words. */
 export function orderWords() {
   const rows = workOrder();
-  if (rows.length === 0) return "Order of work: nothing accepted";
+  const beyond = countOf("UNREACHABLE");
+  const more = beyond > 0 ? ` · ${beyond} cannot be reached` : "";
+  if (rows.length === 0) return `Order of work: nothing ${beyond > 0 ? "to work on" : "accepted"}${more}`;
   const plan = points.get()?.plan;
   const long = plan?.state === "valid" ? `, ${durationWords(plan.duration_s)}` : "";
   const whose = orderedBy() ? `by ${orderedBy()}` : "by the plan";
-  return `Order of work: ${counted(rows.length, "point")}, ${whose}${long}`;
+  return `Order of work: ${counted(rows.length, "point")}, ${whose}${long}${more}`;
 }
 
 /** @param {number} seconds */

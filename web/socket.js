@@ -2,7 +2,7 @@
 
 import { isSignedIn } from "./api.js";
 import { preview } from "./preview-state.js";
-import { link, points, roundTrip, say, selected, takeEvents, takeState } from "./state.js";
+import { link, points, roundTrip, say, takeEvents, takeState } from "./state.js";
 
 /** @typedef {import("./messages.js").FromServer} FromServer */
 /** @typedef {import("./messages.js").FromPage} FromPage */
@@ -30,6 +30,8 @@ export class Link {
     this.onsightline = () => {};
     /** Called with the distance of two places that were clicked. @type {(told: import("./messages.js").Measured) => void} */
     this.onmeasured = () => {};
+    /** Called when a point was clicked in this session's 3-D view. @type {(pointId: string) => void} */
+    this.onselected = () => {};
     this.attempts = 0;
     this.silentTurns = 0;
     this.number = 0;
@@ -129,7 +131,7 @@ export class Link {
         this.firstEvents = false;
         break;
       case "Selected":
-        selected.set(message.point_id);
+        this.onselected(message.point_id);
         break;
       case "Sightline":
         this.onsightline(message);

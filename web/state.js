@@ -28,19 +28,39 @@ export const log = signal(/** @type {readonly PageEvent[]} */ ([]));
 export const toasts = signal(/** @type {readonly Toast[]} */ ([]));
 /** Identifier of the chosen point, empty when none. */
 export const selected = signal("");
+/** Counts how often the point that is chosen already was chosen again. */
+export const brought = signal(0);
 /** Round trip page → server → page in ms; null before the first. */
 export const roundTrip = signal(/** @type {number|null} */ (null));
 /** The page's clock (ms), moved on four times a second so that ages grow on screen. */
 export const now = signal(performance.now());
 /** When the newest `PageState` came in (page's clock, ms). */
 let stateAt = 0;
+/** How often the page's clock has moved on since it came, or since the page was opened. */
+let turns = 0;
+now.subscribe(() => {
+  turns += 1;
+});
+/**
+ * After so many turns (1 s) without a state the server is silent. Turns and not milliseconds alone: while the browser
+ * loads the 3-D view nothing of this page runs, what has come waits unread, and that is no silence.
+ */
+const SILENT_TURNS = 4;
+/** So many turns (5 s) a page that has just been opened waits for its first word before that is an alarm. */
+const FIRST_TURNS = 20;
 let nextToast = 1;
 let nextLocalLine = -1;
 
 /** @param {PageState} message */
 export function takeState(message) {
   stateAt = performance.now();
+  turns = 0;
   pageState.set(message);
+}
+
+/** Has this page only just been opened, so that nothing can be said yet of what it has not heard? */
+export function isOpening() {
+  return pageState.get() === null && link.get().status !== "signed-out" && turns < FIRST_TURNS;
 }
 
 /**
@@ -137,8 +157,8 @@ export function isLive(process) {
   const state = pageState.get();
   const age = processAge(process);
   if (state === null || link.get().status !== "open") return false;
-  if (process !== "server" && isGone(process)) return false;
-  return age !== null && age < OLD_AFTER_S[process];
+  if (process === "server") return turns < SILENT_TURNS || (age ?? 0) < OLD_AFTER_S.server;
+  return !isGone(process) && age !== null && age < OLD_AFTER_S[process];
 }
 
 /**

@@ -3,7 +3,7 @@
 import { whyNoTeleoperation } from "./allowed.js";
 import { HoldToMove } from "./hold.js";
 import { Link } from "./socket.js";
-import { pageState, selected, showToast } from "./state.js";
+import { brought, pageState, selected, showToast } from "./state.js";
 import { signal } from "./store.js";
 import { isTyping } from "./stop.js";
 
@@ -51,11 +51,68 @@ export function showAxes(along) {
   showGizmo();
 }
 
-/** @param {string} pointId Empty = none. */
+/** When somebody has last chosen, or looked for something, himself (ms). */
+let lookedAt = -Infinity;
+/** When the last choice was told (ms). */
+let toldAt = -Infinity;
+/** A press that gives a row the focus and chooses it is one choice (ms). */
+const ONE_PRESS_MS = 400;
+
+/** Somebody looks for himself. */
+export function touched() {
+  lookedAt = performance.now();
+}
+
+export function touchedAt() {
+  return lookedAt;
+}
+
+/**
+ * Somebody chooses a point: list, picture and 3-D view are brought there.
+ *
+ * @param {string} pointId Empty = none.
+ */
 export function select(pointId) {
-  if (pointId === selected.get()) return;
+  touched();
+  if (pointId !== selected.get()) tell(pointId);
+}
+
+/**
+ * The same by a press, which brings them there again where the point is chosen already.
+ *
+ * @param {string} pointId
+ */
+export function bring(pointId) {
+  touched();
+  if (pointId !== selected.get() || performance.now() - toldAt > ONE_PRESS_MS) tell(pointId);
+}
+
+/**
+ * Nobody has chosen: the robot is at this point.
+ *
+ * @param {string} pointId
+ */
+export function goAlong(pointId) {
   selected.set(pointId);
+  socket.send({ type: "Select", point_id: pointId, follow: true });
+}
+
+socket.onselected = (/** @type {string} */ pointId) => {
+  touched();
+  show(pointId);
+};
+
+/** @param {string} pointId */
+function tell(pointId) {
+  toldAt = performance.now();
+  show(pointId);
   socket.send({ type: "Select", point_id: pointId });
+}
+
+/** @param {string} pointId */
+function show(pointId) {
+  if (pointId === selected.get()) brought.set(brought.get() + 1);
+  else selected.set(pointId);
 }
 
 /** Let go whenever the operator can no longer be holding on purpose. */

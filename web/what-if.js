@@ -1,35 +1,31 @@
-// What has become of the points since a moment ago, for somebody who tries another rule.
+// Another pruning rule: what it would change is asked first, and changes nothing; applied, it can be taken back.
 
-import { counted } from "./words.js";
+import { ask, post } from "./api.js";
+import { remember } from "./decisions.js";
 
-/** @typedef {import("./messages.js").PagePoint} PagePoint */
-/** @typedef {{ changed: number, gone: number, added: number, voided: number, all: number }} Changes */
+/** @typedef {import("./messages.js").PruningRule} PruningRule */
 
 /**
- * @param {readonly PagePoint[]} before
- * @param {readonly PagePoint[]} after
- * @returns {Changes}
+ * What a rule would change, in words; or why nobody knows.
+ *
+ * @param {PruningRule} rule
  */
-export function changesSince(before, after) {
-  const now = new Map(after.map((row) => [row.point.point_id, row]));
-  const changes = { changed: 0, gone: 0, added: 0, voided: 0, all: after.length };
-  for (const row of before) {
-    const later = now.get(row.point.point_id);
-    now.delete(row.point.point_id);
-    if (!later) changes.gone += 1;
-    else if (later.point.digest !== row.point.digest) changes.changed += 1;
-    if (row.entry.state === "ACCEPTED" && later?.entry.state === "PROPOSED") changes.voided += 1;
-  }
-  changes.added = now.size;
-  return changes;
+export function tryRule(rule) {
+  return post("api/rule/what-if", rule);
 }
 
-/** @param {Changes} changes */
-export function changeWords({ changed, gone, added, voided, all }) {
-  const parts = [];
-  if (changed) parts.push(`${changed} moved`);
-  if (added) parts.push(`${added} new`);
-  if (gone) parts.push(`${gone} gone`);
-  if (voided) parts.push(`${counted(voided, "acceptance")} void`);
-  return `${counted(all, "point")}: ${parts.length > 0 ? parts.join(", ") : "no change"}`;
+/** @param {PruningRule} rule */
+export async function applyRule(rule) {
+  const done = await ask("The rule", "api/rule", rule);
+  // Taken back while it is still in force, or refused: somebody else's rule is not undone from here.
+  if (done) remember(`the rule ${ruleWords(rule)}`, () => ask("Taking the rule back", "api/rule/undo", rule));
+  return done;
+}
+
+/** @param {PruningRule} rule */
+export function ruleWords(rule) {
+  const nodes = rule.system === "guyot" ? `${rule.nodes_kept} + ${rule.fruiting_nodes}` : `${rule.nodes_kept}`;
+  const word = rule.system === "guyot" ? "Guyot" : "Spur";
+  const thick = Number((1000 * rule.keeper_diameter).toFixed(1));
+  return `${word} · ${nodes} nodes · ≥ ${thick} mm · ${Math.round(1000 * rule.offset)} mm past`;
 }

@@ -4,6 +4,7 @@
 export const POINT_WORDS = Object.freeze({
   PROPOSED: "Proposed",
   ACCEPTED: "Accepted",
+  UNREACHABLE: "Cannot reach",
   INTENT: "Cutting",
   DONE: "Done",
   FAILED_NOT_CUT: "Not cut",

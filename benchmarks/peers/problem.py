@@ -9,22 +9,22 @@ import pinocchio as pin
 
 from controller.config import ControllerConfig
 from controller.whole_body.actuation import Actuation
-from controller.whole_body.box import Box
-from controller.whole_body.task import Demand, ToolTask
+from controller.whole_body.task import IkProblem, ToolTask
+from controller.whole_body.velocity_bounds import VelocityBounds
+from rolling_panda.model.robot import RobotModel, panda_urdf
 from rolling_panda.resources import resource
-from rolling_panda.robot_model import RobotModel, panda_urdf
 
 _JOIN = (("arm_mount", "panda_link0"), ("panda_link8", "cutter_link"))
 
 
-def write_problem(folder: Path, demands: Sequence[Demand], config: ControllerConfig) -> None:
+def write_problem(folder: Path, demands: Sequence[IkProblem], config: ControllerConfig) -> None:
     """Write `robot.urdf` and `problem.npz`.
 
     For each demand: q (12), the pose that asks for the demanded twist within one period (target), the velocities sent
     last (v, 12, over q), and the posture (12). Limits are over q (12), whose joints are in `names`.
     """
     robot, dt = RobotModel(), 1.0 / config.rate_hz
-    actuation, box = Actuation(robot.drive), Box(robot, config, dt)
+    actuation, box = Actuation(robot.drive), VelocityBounds(robot, config, dt)
     # Velocities of actuators are no problem for a solver of tool poses.
     demands = [demand for demand in demands if isinstance(demand.tool, ToolTask)]
     targets = []

@@ -10,7 +10,7 @@ from typing import Any
 
 from benchmarks.peers.problem import write_problem
 from controller.config import ControllerConfig
-from controller.whole_body.task import Demand
+from controller.whole_body.task import IkProblem
 
 #: Name, script, and the package to install in an environment of its own.
 PEERS = (
@@ -24,7 +24,9 @@ _LIMIT_S = 180.0
 _FEW = 0.05
 
 
-def run_peers(demands: Sequence[Demand], config: ControllerConfig, environments: Path | None) -> list[dict[str, Any]]:
+def run_peers(
+    demands: Sequence[IkProblem], config: ControllerConfig, environments: Path | None
+) -> list[dict[str, Any]]:
     """One entry for each peer: its figures, or `absent` with the reason.
 
     Args:

@@ -16,19 +16,21 @@ from pathlib import Path
 from typing import Protocol
 
 from bridge.fakes.bodies import AirBlades, ArmBody, BladeBody, ExactArm, LaggingWheels, WheelBody
-from bridge.fakes.camera import KEY, pack
 from bridge.fakes.control_box import ControlBox
 from bridge.fakes.cutter import FakeCutter
 from bridge.fakes.mp500 import FakeMp500
 from bridge.real.config import RealConfig
+from bridge.real.picture_link import KEY, pack
 from rolling_panda import topics
 from rolling_panda.config import RobotConfig, TransportConfig, load_section
 from rolling_panda.errors import InputError, RollingPandaError
-from rolling_panda.priority import take_priority
-from rolling_panda.process import ROBOT_ID, stop_on_signals
+from rolling_panda.model.robot import RobotModel
 from rolling_panda.resources import resource
-from rolling_panda.robot_model import RobotModel
-from rolling_panda.transport import ForeignWire, Onlooker
+from rolling_panda.runtime.priority import take_priority
+from rolling_panda.runtime.process import ROBOT_ID, stop_on_signals
+from rolling_panda.transport.access import DEVICES
+from rolling_panda.transport.settings import add_wire_arguments
+from rolling_panda.transport.zenoh import ForeignWire, Onlooker
 
 
 class Device(Protocol):
@@ -62,6 +64,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--connect", metavar="ENDPOINT", help="router that base and cutter are behind; without it none is"
     )
+    add_wire_arguments(parser)
     parser.add_argument(
         "--arm", metavar="ADDRESS", help="loopback address of the arm's control box (with --seed: the configuration's)"
     )
@@ -86,13 +89,21 @@ def _bodies(arguments: argparse.Namespace, picture_hz: float, stack: ExitStack) 
     from bridge.fakes.vineyard_plant import VineyardPlant
     from bridge.sim.build import simulated_robot
 
-    wire = ForeignWire(TransportConfig(connect=(arguments.connect,)))
+    wire = ForeignWire(_wire(arguments), DEVICES)
     stack.callback(wire.close)
     send = wire.publisher(KEY)
     robot = simulated_robot(arguments.config, arguments.seed, arguments.trace, "device")
     plant = VineyardPlant(robot, picture_hz, lambda picture, at: send(pack(picture, at)))
     stack.callback(plant.close)
     return _Bodies(plant, plant, plant)
+
+
+def _wire(arguments: argparse.Namespace) -> TransportConfig:
+    return TransportConfig(
+        connect=(arguments.connect,),
+        certificates="" if arguments.certificates is None else str(arguments.certificates),
+        plain_wire=arguments.plain_wire,
+    )
 
 
 def _run(arguments: argparse.Namespace) -> None:
@@ -113,13 +124,13 @@ def _run(arguments: argparse.Namespace) -> None:
             box = devices["arm"] = ControlBox(address, bodies.arm)
             stack.callback(box.close)
         if arguments.connect is not None:
-            wire = TransportConfig(connect=(arguments.connect,))
+            wire = _wire(arguments)
             drive = RobotModel(load_section(arguments.config, "robot", RobotConfig)).drive
-            base = devices["base"] = FakeMp500(ForeignWire(wire), bodies.wheels, drive)
+            base = devices["base"] = FakeMp500(ForeignWire(wire, DEVICES), bodies.wheels, drive)
             stack.callback(base.close)
-            cutter = devices["cutter"] = FakeCutter(ForeignWire(wire), real.cutter.service, bodies.blades)
+            cutter = devices["cutter"] = FakeCutter(ForeignWire(wire, DEVICES), real.cutter.service, bodies.blades)
             stack.callback(cutter.close)
-            buttons = Onlooker(wire, ROBOT_ID)
+            buttons = Onlooker(wire, ROBOT_ID, DEVICES)
             stack.callback(buttons.close)
             buttons.subscribe(topics.HARDWARE_STOP, lambda said, _: base.tell(["press" if said.pressed else "free"]))
             turning = threading.Thread(target=base.run, args=(ended,), name="mp500")

@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from rolling_panda.differential_drive import Array
+from rolling_panda.model.differential_drive import Array
 
 TICK_S = 0.001
 #: Posture in which an arm without a row around it begins: the survey posture (rad).

@@ -2,21 +2,25 @@
 
 It judges every command as the control box does: velocity, acceleration and jerk within the data sheet, or a reflex; a
 missing command is extrapolated with the last acceleration; after 20 in a row it stops. Its millisecond lasts until the
-command has come, for `PATIENCE_S` at most, so that a busy machine loses no packets.
+command has come, for `PATIENCE_S` at most, so that a busy machine loses no packets. While the client waits for a core
+that others have, the box waits too: only a client that had one, or wants none, has lost a packet.
 """
 
+import contextlib
 import select
 import socket
 import struct
 import threading
 import time
+from collections import deque
 
 import numpy as np
 
 from bridge.fakes import control_box_protocol as p
 from bridge.fakes.bodies import TICK_S, ArmBody
-from rolling_panda.differential_drive import Array
+from bridge.fakes.client_process import ClientProcess
 from rolling_panda.errors import InputError
+from rolling_panda.model.differential_drive import Array
 
 PATIENCE_S = 0.03
 # Behind by more than this (s), what was missed is left out.
@@ -58,7 +62,8 @@ class ControlBox:
         self._state = p.State(q=body.q, dq=body.dq)
         self._motion: int | None = None
         self._begun = self._pressed = False
-        self._in_a_row = self._lost = self._commands = self._to_drop = self._recoveries = 0
+        self._in_a_row = self._lost = self._commands = self._to_lose = self._recoveries = 0
+        self._rows: deque[int] = deque()
         self._recovery: tuple[int, int] | None = None
         self._worst = np.zeros(3)
         self._breaches: list[str] = []
@@ -66,6 +71,7 @@ class ControlBox:
         self._still_at: float | None = None
         self._moved = 0
         self._client: socket.socket | None = None
+        self._process: ClientProcess | None = None
         self._target: tuple[str, int] | None = None
         try:
             self._listener = socket.create_server((address, p.PORT))
@@ -89,7 +95,10 @@ class ControlBox:
             time.sleep(max(0.0, due - now))
 
     def tell(self, words: list[str]) -> None:
-        """Collide, press or free the user stop, lose the next packets, or forget what was monitored."""
+        """Collide, press or free the user stop, lose a row of packets, or forget what was monitored.
+
+        A row begins once a command has come after the one before: two of them are never one longer row.
+        """
         with self._lock:
             match words:
                 case ["collide"]:
@@ -101,7 +110,7 @@ class ControlBox:
                     if self._state.mode == p.USER_STOPPED:
                         self._state.mode = p.IDLE
                 case ["drop", count]:
-                    self._to_drop = int(count)
+                    self._rows.append(int(count))
                 case ["clear"]:
                     self._breaches, self._worst, self._lost = [], np.zeros(3), 0
 
@@ -133,11 +142,12 @@ class ControlBox:
         if self._client is None and select.select([self._listener], [], [], 0.0)[0]:
             self._client, _ = self._listener.accept()
             self._client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self._process = ClientProcess(self._client)
 
     def _gone(self, client: socket.socket) -> None:
         """The client has left: brake, as the box does."""
         client.close()
-        self._client = self._target = None
+        self._client = self._target = self._process = None
         with self._lock:
             self._motion = None
             self._rest()
@@ -150,12 +160,14 @@ class ControlBox:
     def _requests(self) -> None:
         client = self._client
         while client is not None and select.select([client], [], [], 0.0)[0]:
-            head = client.recv(p.HEADER.size, socket.MSG_WAITALL)
-            if len(head) < p.HEADER.size:
+            try:
+                head = client.recv(p.HEADER.size, socket.MSG_WAITALL)
+                command, number, size = p.HEADER.unpack(head)
+                body = client.recv(size - p.HEADER.size, socket.MSG_WAITALL) if size > p.HEADER.size else b""
+            except (ConnectionError, struct.error):
+                # It was killed, perhaps with replies that it had not read.
                 self._gone(client)
                 return
-            command, number, size = p.HEADER.unpack(head)
-            body = client.recv(size - p.HEADER.size, socket.MSG_WAITALL) if size > p.HEADER.size else b""
             with self._lock:
                 self._request(client, command, number, body)
 
@@ -190,7 +202,9 @@ class ControlBox:
 
     def _say(self, command: int, number: int, status: int, more: bytes = b"") -> None:
         if self._client is not None:
-            self._client.sendall(p.reply(command, number, status, more))
+            # Who has gone is seen where its next request would be read.
+            with contextlib.suppress(ConnectionError):
+                self._client.sendall(p.reply(command, number, status, more))
 
     def _finish(self, status: int) -> None:
         if self._motion is not None:
@@ -232,15 +246,31 @@ class ControlBox:
 
     def _receive(self) -> tuple[object, ...] | None:
         """The answer to the state just sent; None when it has not come in time or gets lost."""
-        end = time.monotonic() + PATIENCE_S
+        command = self._answer(PATIENCE_S)
+        if command is None and self._process is not None:
+            self._process.watch()
+            while command is None and self._process.waits_for_a_core(PATIENCE_S):
+                command = self._answer(TICK_S)
+            # It may have answered between the two looks.
+            command = command or self._answer(0.0)
+        return None if command is None or self._loses() else command
+
+    def _answer(self, limit_s: float) -> tuple[object, ...] | None:
+        end = time.monotonic() + limit_s
         while select.select([self._udp], [], [], max(0.0, end - time.monotonic()))[0]:
             command = p.COMMAND.unpack(self._udp.recv(4096))
             if command[0] == self._state.number:
-                if self._to_drop > 0:
-                    self._to_drop -= 1
-                    return None
                 return command
         return None
+
+    def _loses(self) -> bool:
+        """Whether the command that has come is one of a row to lose."""
+        if self._to_lose == 0 and self._rows and self._in_a_row == 0:
+            self._to_lose = self._rows.popleft()
+        if self._to_lose == 0:
+            return False
+        self._to_lose -= 1
+        return True
 
     def _follow(self, command: tuple[object, ...] | None) -> None:
         state = self._state

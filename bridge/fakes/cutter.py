@@ -2,7 +2,7 @@
 
 from bridge.fakes.bodies import BladeBody
 from bridge.real import ros_messages as ros
-from rolling_panda.transport import ForeignWire
+from rolling_panda.transport.zenoh import ForeignWire
 
 
 class FakeCutter:

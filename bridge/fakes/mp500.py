@@ -9,8 +9,8 @@ import numpy as np
 from bridge.fakes.bodies import WheelBody
 from bridge.real import mp500
 from bridge.real import ros_messages as ros
-from rolling_panda.differential_drive import DifferentialDrive
-from rolling_panda.transport import ForeignWire
+from rolling_panda.model.differential_drive import DifferentialDrive
+from rolling_panda.transport.zenoh import ForeignWire
 
 RATE_HZ = 50.0
 # The maker's own.

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from bridge.core.interface import Measurement, Setpoint
+from bridge.core.picture import Picture
 from bridge.fakes.bodies import TICK_S
-from bridge.interface import Measurement, Setpoint
-from bridge.picture import Picture
-from bridge.sim.robot import SimulatedRobot
-from rolling_panda.differential_drive import Array
+from bridge.sim.robot.robot import SimulatedRobot
+from rolling_panda.model.differential_drive import Array
 
 _PICTURE_TICKS = 10
 # However slow the machine: the blades take a third of a second of the robot's own time.

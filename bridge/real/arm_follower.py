@@ -10,10 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from bridge.limiter import Limiter
-from bridge.watchdog import Watchdog
-from rolling_panda.differential_drive import Array
-from rolling_panda.robot_model import ARM_XI, Limits
+from bridge.core.limiter import Limiter
+from bridge.core.watchdog import Watchdog
+from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.robot import ARM_XI, Limits
 
 TICK_S = 0.001
 # Targets that come in farther apart than this (s) are followed as if they had come so: the delay must stay small.

@@ -6,7 +6,7 @@ from multiprocessing.context import SpawnContext
 import numpy as np
 
 from bridge.real.arm_memory import Memory
-from rolling_panda.differential_drive import Array
+from rolling_panda.model.differential_drive import Array
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rolling_panda.differential_drive import Array
+from rolling_panda.model.differential_drive import Array
 
 _TEXT = 400
 _TRIES = 100

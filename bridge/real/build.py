@@ -9,21 +9,22 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from bridge.config import BridgeConfig
-from bridge.core import TICK_S, BridgeCore
-from bridge.cut_memory import CutMemory
-from bridge.memory import Memory
-from bridge.odometer import Odometer
+from bridge.core.bridge import TICK_S, BridgeCore
+from bridge.core.cut_memory import CutMemory
+from bridge.core.odometer import Odometer
+from bridge.core.state_memory import Memory
 from bridge.real.config import CameraConfig, CutterConfig, RealConfig
 from bridge.real.cutter import Cutter, CutterStatus
 from bridge.real.mp500 import Mp500
 from bridge.real.panda import Panda
 from bridge.real.realsense import RealSense, open_realsense
 from bridge.real.robot import RealRobot
+from rolling_panda.bounds import wider
 from rolling_panda.config import RobotConfig, TransportConfig, load_section
 from rolling_panda.errors import InputError
-from rolling_panda.messages import BridgeKind
-from rolling_panda.robot_model import RobotModel
-from rolling_panda.transport import ForeignWire, Rejections
+from rolling_panda.messages.types import BridgeKind
+from rolling_panda.model.robot import RobotModel
+from rolling_panda.transport.zenoh import ForeignWire, Rejections
 
 _FIRST_STATE_S = 15.0
 _LOOPBACK = "127."
@@ -139,7 +140,13 @@ def real_bridge(
         TransportError: The base's or the cutter's wire cannot be reached.
     """
     config = load_section(config_path, "bridge", BridgeConfig)
-    model = RobotModel(load_section(config_path, "robot", RobotConfig))
+    limits = load_section(config_path, "robot", RobotConfig)
+    told = (
+        *wider("bridge", config),
+        *wider("robot", limits),
+        *wider("real", load_section(config_path, "real", RealConfig)),
+    )
+    model = RobotModel(limits)
     devices = open_devices(config_path, wire, model, moving, fakes)
     try:
         wait_for_states(devices)
@@ -149,7 +156,7 @@ def real_bridge(
     robot = RealRobot(devices.base, devices.arm, devices.blades, devices.camera, moving)
     odometer = Odometer(model.drive, config.odometry, TICK_S)
     kind: BridgeKind = "fakes" if fakes else "real"
-    return BridgeCore(robot, config, model.limits, odometer, kind, None, rejections, cuts, memory)
+    return BridgeCore(robot, config, model.limits, odometer, kind, None, rejections, cuts, memory, told)
 
 
 def wait_for_states(devices: Devices, limit_s: float = _FIRST_STATE_S) -> None:
@@ -168,14 +175,14 @@ def wait_for_states(devices: Devices, limit_s: float = _FIRST_STATE_S) -> None:
 
 def _reached(wire: TransportConfig, connect: str) -> TransportConfig:
     """The program's own router, or another one that asks for no certificates."""
-    return replace(wire, connect=(connect,), certificates="") if connect else wire
+    return replace(wire, connect=(connect,), certificates="", plain_wire=False) if connect else wire
 
 
 def _camera(wire: TransportConfig, config: CameraConfig, fakes: bool) -> RealSense:
     if not fakes:
         return open_realsense(config)
     # Here and not above: nothing of the fakes is loaded where there are none.
-    from bridge.fakes.software_camera import open_fake_realsense
+    from bridge.real.software_realsense import open_fake_realsense
 
     return open_fake_realsense(ForeignWire(wire), config.rate_hz)
 

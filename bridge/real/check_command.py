@@ -8,7 +8,7 @@ from bridge.real.commissioning import inspect, table
 from bridge.real.config import RealConfig
 from rolling_panda.config import RobotConfig, TransportConfig, load_section
 from rolling_panda.errors import InputError
-from rolling_panda.robot_model import RobotModel
+from rolling_panda.model.robot import RobotModel
 
 # Long enough for the arm's process to start and connect.
 _SETTLE_S = 6.0

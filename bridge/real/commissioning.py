@@ -9,7 +9,7 @@ import numpy as np
 from bridge.real import mp500
 from bridge.real.build import Devices, NoCutter
 from bridge.real.config import RealConfig
-from rolling_panda.robot_model import ARM_Q, Limits
+from rolling_panda.model.robot import ARM_Q, Limits
 
 _WATCH_S = 2.0
 # Half of the rate that the maker's node has by default.

@@ -4,10 +4,12 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
-from rolling_panda.config import Positive
+from rolling_panda.bounds import at_least, at_most, within
 
 Key = Annotated[str, Meta(max_length=200)]
-Vector = tuple[float, float, float]
+#: Where the centre of what hangs on the flange may be (m), and what its inertia may be (kg·m²).
+_Centre = Annotated[float, within(-0.3, 0.3)]
+_Inertia = Annotated[float, Meta(ge=0.0, le=0.1)]
 
 
 class BaseConfig(Struct, frozen=True, forbid_unknown_fields=True):
@@ -26,12 +28,12 @@ class BaseConfig(Struct, frozen=True, forbid_unknown_fields=True):
 
     connect: Key = ""
     namespace: Key = ""
-    command_hz: Annotated[float, Meta(ge=10.0, le=200.0)] = 50.0
-    fade_s: Positive = 0.07
-    deadline_s: Positive = 0.2
-    stale_s: Positive = 0.2
-    unmonitored_s: Positive = 1.0
-    runaway_s: Positive = 1.0
+    command_hz: Annotated[float, at_least(20.0, 200.0)] = 50.0
+    fade_s: Annotated[float, at_most(0.1)] = 0.07
+    deadline_s: Annotated[float, at_most(0.2)] = 0.2
+    stale_s: Annotated[float, at_most(0.3)] = 0.2
+    unmonitored_s: Annotated[float, at_most(2.0)] = 1.0
+    runaway_s: Annotated[float, at_most(1.0)] = 1.0
 
 
 class ArmConfig(Struct, frozen=True, forbid_unknown_fields=True):
@@ -52,14 +54,14 @@ class ArmConfig(Struct, frozen=True, forbid_unknown_fields=True):
 
     address: Key = ""
     realtime: Literal["enforce", "ignore"] = "enforce"
-    fade_s: Positive = 0.07
-    deadline_s: Positive = 0.2
-    joint_margin: Positive = 0.01
+    fade_s: Annotated[float, at_most(0.1)] = 0.07
+    deadline_s: Annotated[float, at_most(0.2)] = 0.2
+    joint_margin: Annotated[float, at_least(0.005, 0.2)] = 0.01
     load_mass: Annotated[float, Meta(ge=0.0, le=3.0)] = 1.2
-    load_center: Vector = (0.0, 0.0, 0.08)
-    load_inertia: Vector = (0.004, 0.004, 0.002)
-    contact_torque: Positive = 20.0
-    contact_force: Positive = 30.0
+    load_center: tuple[_Centre, _Centre, _Centre] = (0.0, 0.0, 0.08)
+    load_inertia: tuple[_Inertia, _Inertia, _Inertia] = (0.004, 0.004, 0.002)
+    contact_torque: Annotated[float, at_most(40.0)] = 20.0
+    contact_force: Annotated[float, at_most(60.0)] = 30.0
 
 
 class CutterConfig(Struct, frozen=True, forbid_unknown_fields=True):
@@ -74,8 +76,8 @@ class CutterConfig(Struct, frozen=True, forbid_unknown_fields=True):
 
     service: Key = ""
     connect: Key = ""
-    timeout_s: Positive = 2.0
-    retry_s: Positive = 1.0
+    timeout_s: Annotated[float, at_most(2.5)] = 2.0
+    retry_s: Annotated[float, at_least(0.5, 60.0)] = 1.0
 
 
 class CameraConfig(Struct, frozen=True, forbid_unknown_fields=True):

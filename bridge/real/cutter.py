@@ -9,12 +9,12 @@ import threading
 import time
 from dataclasses import dataclass
 
-from bridge.interface import CutterState
+from bridge.core.interface import CutterState
 from bridge.real import ros_messages as ros
 from bridge.real.config import CutterConfig
 from rolling_panda.errors import MessageError, ServiceError
-from rolling_panda.messages import Outcome
-from rolling_panda.transport import ForeignWire
+from rolling_panda.messages.types import Outcome
+from rolling_panda.transport.zenoh import ForeignWire
 
 
 @dataclass(frozen=True)

@@ -16,12 +16,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bridge.core.watchdog import Watchdog
 from bridge.real import ros_messages as ros
 from bridge.real.config import BaseConfig
-from bridge.watchdog import Watchdog
-from rolling_panda.differential_drive import Array, DifferentialDrive
 from rolling_panda.errors import MessageError, ServiceError
-from rolling_panda.transport import ForeignWire
+from rolling_panda.model.differential_drive import Array, DifferentialDrive
+from rolling_panda.transport.zenoh import ForeignWire
 
 COMMAND, WHEELS, ODOMETRY = "cmd_vel", "drives/joint_states", "odom"
 EMERGENCY, BATTERY = "emergency_stop_state", "battery_state"

@@ -10,9 +10,9 @@ import numpy as np
 
 from bridge.real.arm_link import ArmLink, ArmState
 from bridge.real.config import ArmConfig
-from rolling_panda.differential_drive import Array
 from rolling_panda.errors import InputError
-from rolling_panda.robot_model import Limits
+from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.robot import Limits
 
 # A state older than this (s) is a fault: the control box tells a thousand a second, and stops an arm that lost 20.
 _STALE_S = 0.08

@@ -15,8 +15,8 @@ from panda_py import libfranka
 from bridge.real.arm_follower import ArmFollower
 from bridge.real.arm_link import ArmLink, ArmState
 from bridge.real.config import ArmConfig
-from rolling_panda.priority import take_priority
-from rolling_panda.robot_model import Limits
+from rolling_panda.model.robot import Limits
+from rolling_panda.runtime.priority import take_priority
 
 _RETRY_S = 1.0
 # How long the bridge may be silent before this process asks whether it still exists (s).

@@ -7,10 +7,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from bridge.picture import Picture, encode_picture
+from bridge.core.picture import Picture, encode_picture
 from bridge.real.config import CameraConfig
-from rolling_panda.camera_messages import Intrinsics
 from rolling_panda.errors import InputError
+from rolling_panda.messages.robot import Intrinsics
 
 _WAIT_MS = 1000
 # No frame for so long (s) is a fault worth telling: at 30 frames a second, sixty of them.

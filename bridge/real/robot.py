@@ -4,12 +4,12 @@ from typing import Protocol
 
 import numpy as np
 
-from bridge.interface import Measurement, Setpoint
-from bridge.picture import Picture
+from bridge.core.interface import Measurement, Setpoint
+from bridge.core.picture import Picture
 from bridge.real.arm_link import ArmState
 from bridge.real.cutter import CutterStatus
 from bridge.real.mp500 import BaseState
-from rolling_panda.differential_drive import Array
+from rolling_panda.model.differential_drive import Array
 
 READ_ONLY = "the bridge was started with --readonly"
 
@@ -73,7 +73,7 @@ class Camera(Protocol):
 
 
 class RealRobot:
-    """Implements `bridge.interface.Robot`; nothing here waits for a device."""
+    """Implements `bridge.core.interface.Robot`; nothing here waits for a device."""
 
     def __init__(self, base: Base, arm: Arm, blades: Blades, camera: Camera | None, moving: bool = True) -> None:
         """Put together what is connected already.

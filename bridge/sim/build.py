@@ -4,21 +4,22 @@ from pathlib import Path
 from typing import Literal
 
 from bridge.config import BridgeConfig
-from bridge.core import TICK_S, BridgeCore
-from bridge.cut_memory import CutMemory
-from bridge.memory import Memory
-from bridge.odometer import Odometer
-from bridge.sim.camera_config import CameraConfig
-from bridge.sim.photographer import InlinePhotographer, Photographer, ProcessPhotographer
-from bridge.sim.robot import SimulatedRobot
-from bridge.sim.trace import TraceWriter
-from bridge.sim.vineyard import grow
-from bridge.sim.vineyard_config import VineyardConfig
+from bridge.core.bridge import TICK_S, BridgeCore
+from bridge.core.cut_memory import CutMemory
+from bridge.core.odometer import Odometer
+from bridge.core.state_memory import Memory
+from bridge.sim.camera.config import CameraConfig
+from bridge.sim.camera.render_process import InlinePhotographer, Photographer, ProcessPhotographer
+from bridge.sim.robot.robot import SimulatedRobot
+from bridge.sim.robot.trace import TraceWriter
+from bridge.sim.vineyard.config import VineyardConfig
+from bridge.sim.vineyard.grow import grow
 from rolling_panda import topics
+from rolling_panda.bounds import wider
 from rolling_panda.config import RobotConfig, load_section
-from rolling_panda.control_messages import HardwareStop
-from rolling_panda.robot_model import RobotModel
-from rolling_panda.transport import Onlooker, Rejections
+from rolling_panda.messages.supervision import HardwareStop
+from rolling_panda.model.robot import RobotModel
+from rolling_panda.transport.zenoh import Onlooker, Rejections
 
 
 def simulated_bridge(
@@ -46,10 +47,12 @@ def simulated_bridge(
         ConfigError: A section is wrong, or the trace cannot be written.
     """
     config = load_section(config_path, "bridge", BridgeConfig)
-    model = RobotModel(load_section(config_path, "robot", RobotConfig))
+    limits = load_section(config_path, "robot", RobotConfig)
+    model = RobotModel(limits)
     odometer = Odometer(model.drive, config.odometry, TICK_S, seed)
     robot = simulated_robot(config_path, seed, trace, camera)
-    return BridgeCore(robot, config, model.limits, odometer, "sim", robot.scenery, rejections, cuts, memory)
+    told = (*wider("bridge", config), *wider("robot", limits))
+    return BridgeCore(robot, config, model.limits, odometer, "sim", robot.scenery, rejections, cuts, memory, told)
 
 
 def simulated_robot(

@@ -1,1 +1,1 @@
-"""Planning: where to stand, how to hold the arm, and how to get there within the limits. Pure: no clock, no wire."""
+"""Base places, arm postures and motions within the limits. Pure: no clock, no wire."""

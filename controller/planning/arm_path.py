@@ -1,4 +1,4 @@
-"""A way for the arm from one posture to another, clear of everything: straight, by way of a known posture, or searched.
+"""Collision-free arm paths: straight, through a tucked posture, or by RRT-Connect.
 
 The search is RRT-Connect (Kuffner and LaValle, 2000): two trees of postures, one from each end, grow towards random
 postures and towards each other. What it finds is shortened by cutting corners. Seeded: the same question has the same
@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller.planning.limits import PlanLimits
+from controller.motion.speed_limits import PlanLimits
 from controller.whole_body.collision import CollisionModel, Pair
-from rolling_panda.differential_drive import Array
-from rolling_panda.robot_model import ARM_Q
+from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.robot import ARM_Q
 
 #: Largest joint step (rad) between two looks at the distances.
 _LOOK = 0.05

@@ -1,4 +1,4 @@
-"""From one base pose to another for two wheels: turn, drive straight, turn; blended where that is quicker.
+"""Motions of a differential drive between two poses: turn, drive, turn, with optional overlap.
 
 Blended, the base turns already (or still) while it drives, which makes an arc of changing curvature. Where it ends
 then depends on both at once, so that the first turn and the distance are found by Newton's method on the very arcs
@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller.planning.limits import PlanLimits
-from controller.planning.profile import Profile, durations, quickest
-from rolling_panda.differential_drive import Array, DifferentialDrive
+from controller.motion.speed_limits import PlanLimits
+from controller.motion.trajectory import Profile, durations, quickest
+from rolling_panda.model.differential_drive import Array, DifferentialDrive
 
 _NEAR, _ITERATIONS, _NUDGE = 1e-11, 12, 1e-6
 #: Shorter drives than this are not driven: the base only turns (m).

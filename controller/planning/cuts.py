@@ -1,4 +1,4 @@
-"""Plans the work on accepted points: a stand for each cut, clear of what stands around, in the order of least time."""
+"""Planner of the accepted cuts: a collision-free posture for each, in the order of least time."""
 
 import hashlib
 
@@ -6,27 +6,25 @@ import msgspec
 import numpy as np
 
 from controller.config import ControllerConfig
-from controller.cut_clearance import CutClearance
-from controller.interface import Sample
-from controller.plan_report import planned_points
+from controller.inputs import Sample
+from controller.motion.speed_limits import plan_limits
+from controller.motion.surroundings import obstacles_of
+from controller.motion.torque import torque_report
 from controller.planning.base_path import BasePlanner
-from controller.planning.goal import Stand
-from controller.planning.limits import plan_limits
-from controller.planning.path import PathPlanner
+from controller.planning.path import PathPlanner, Stand
 from controller.planning.plan import Plan
-from controller.planning.session import SessionPlanner, Stop, Target
-from controller.reach import CutPlan, PostureSearch, Unreachable
-from controller.surroundings import obstacles_of
-from controller.torque import torque_report
+from controller.planning.scheduler import Scheduler, Stop, Target
+from controller.planning.work_plan import PlannedCut, PlanRequest, WorkPlan, planned_points
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.manipulability import arm_omega
-from controller.work_plan import PlannedCut, PlanRequest, WorkPlan
+from controller.work.cut_clearance import CutClearance
+from controller.work.posture_search import CutPlan, PostureSearch, Unreachable
 from rolling_panda.config import RobotConfig
-from rolling_panda.differential_drive import Array
 from rolling_panda.errors import ControlError
-from rolling_panda.messages import Header, PruningPoint
-from rolling_panda.robot_model import RobotModel
-from rolling_panda.row_messages import Obstacles
+from rolling_panda.messages.perception import Obstacles, PruningPoint
+from rolling_panda.messages.types import Header
+from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.robot import RobotModel
 
 #: From the blades' command to its outcome (s); an estimate, for the session's length alone.
 CLOSING_S = 0.5
@@ -56,7 +54,7 @@ class CutPlanner:
             dt=max(1.0 / config.rate_hz, _ROW_S),
         )
         paths = PathPlanner(robot, self._collision, self._limits)
-        self._sessions = SessionPlanner(paths, BasePlanner(robot.drive, self._limits), self._limits, config.tool_speed)
+        self._sessions = Scheduler(paths, BasePlanner(robot.drive, self._limits), self._limits, config.tool_speed)
         self._clearance = CutClearance(RobotModel(robot_config), config)
         self._search = PostureSearch(RobotModel(robot_config), config, self._clearance.admits)
 
@@ -117,7 +115,7 @@ class CutPlanner:
         hold_s = 2.0 * config.clearance / config.advance_speed + config.slow_zone / config.cut_speed + CLOSING_S
         least = self._collision.least(cut.q_clear).distance
         stand = Stand(cut.q_clear, 0.0, cut.joint_margin, cut.manipulability, least)
-        return Target(name, cut.poses.clear, hold_s=hold_s, stand=stand)
+        return Target(name, stand, hold_s)
 
     def _cut(self, point: PruningPoint, cut: CutPlan, stop: Stop) -> PlannedCut | str:
         """All that is said of a cut, or why its way is not to be driven."""

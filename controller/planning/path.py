@@ -1,24 +1,22 @@
-"""From a configuration to a tool pose: a stand, a way for the base and one for the arm, put together and looked over.
+"""Motions of base and arm from one configuration to another, checked for collisions.
 
-Stands are tried from the best on. Base and arm move at the same time where that is clear; where it is not, one after
+Base and arm move at the same time where that is clear; where it is not, one after
 the other, then with the arm folded while the base drives, and round what is in the way.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from controller.motion.speed_limits import PlanLimits
 from controller.planning.arm_path import ArmPath, ArmPathPlanner, Blocked
 from controller.planning.base_path import BaseMotion, BasePlanner
-from controller.planning.goal import GOOD_OMEGA, GoalChooser, Stand
-from controller.planning.limits import PlanLimits
 from controller.planning.plan import Plan, Wait, arm_samples, assemble, orders
 from controller.whole_body.collision import Clearance, CollisionModel
 from controller.whole_body.manipulability import arm_omega
-from rolling_panda.differential_drive import Array
-from rolling_panda.robot_model import ARM_Q, RobotModel
+from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.robot import ARM_Q, RobotModel
 
 #: Arm folded over the base for driving among obstacles.
 _FOLDED = np.array([0.0, -1.2, 0.0, -2.7, 0.0, 1.9, 0.785])
@@ -30,6 +28,25 @@ _OUTLINE = (-0.523, 0.190, 0.290)
 _WAYS = 2
 #: Between rows that are looked at, distances may fall below the clearance by this much (m).
 _BETWEEN = 0.005
+
+
+@dataclass(frozen=True)
+class Stand:
+    """A configuration with the tool at the goal.
+
+    Attributes:
+        q: Configuration (12); the wheels' entries are those of the start.
+        time: Estimated time to get there (s).
+        margin: Least distance to a joint limit (rad).
+        omega: Manipulability of the arm.
+        clearance: Least distance between the robot's parts, from the ground and from obstacles (m).
+    """
+
+    q: Array
+    time: float
+    margin: float
+    omega: float
+    clearance: float
 
 
 @dataclass(frozen=True)
@@ -56,7 +73,7 @@ class Refused:
 
 
 class PathPlanner:
-    """Plans motions to tool poses. Uses its robot model's work space: one instance a thread."""
+    """Plans motions to configurations. Uses its robot model's work space: one instance a thread."""
 
     def __init__(self, robot: RobotModel, collision: CollisionModel, limits: PlanLimits, seed: int = 0) -> None:
         """Bind the parts.
@@ -69,40 +86,6 @@ class PathPlanner:
         """
         self._robot, self._collision, self._limits = robot, collision, limits
         self._base, self._arm = BasePlanner(robot.drive, limits), ArmPathPlanner(collision, limits, seed)
-        self._goals = GoalChooser(robot, collision, limits, seed)
-
-    def plan(
-        self,
-        q: Array,
-        T_odom_tool: Any,
-        free_axis: bool = False,
-        base_fixed: bool = False,
-        together: bool = True,
-        good_omega: float = GOOD_OMEGA,
-    ) -> Planned | Refused:
-        """A motion from rest at a configuration to rest with the tool at a pose.
-
-        Args:
-            q: Configuration (12) at the start. It may be outside joint limits or too near to something; the motion then
-                leads out of that first.
-            T_odom_tool: Goal (pin.SE3).
-            free_axis: True where the rotation about the tool's y does not matter.
-            base_fixed: True where only the arm may move.
-            together: False to drive first, stop, and then reach.
-            good_omega: Manipulability at the goal from which on more is worth no time.
-        """
-        if not (np.isfinite(q).all() and np.isfinite(T_odom_tool.homogeneous).all()):
-            return Refused("the start or the goal is not finite; give numbers")
-        found = self._goals.find(q, T_odom_tool, free_axis, base_fixed, good_omega)
-        reason = found.reason
-        for stand in found.stands:
-            planned = self.to_stand(q, stand, together)
-            if isinstance(planned, Planned):
-                return planned
-            reason = (
-                f"{len(found.stands)} postures at the goal are clear, but none is reached; the last: {planned.reason}"
-            )
-        return Refused(reason)
 
     def tool(self, q: Array) -> Array:
         """Place of the tool (3, m, odom) at a configuration (12)."""

@@ -1,4 +1,4 @@
-"""A planned motion as data: one row a control period, exactly as the wheels and the joints will move."""
+"""A planned motion as data: one row a control period."""
 
 import hashlib
 from collections.abc import Iterator
@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from controller.motion.speed_limits import PlanLimits
+from controller.motion.trajectory import quickest
 from controller.planning.arm_path import ArmPath
 from controller.planning.base_path import BaseMotion
-from controller.planning.limits import PlanLimits
-from controller.planning.profile import quickest
-from rolling_panda.differential_drive import NQ, NXI, Array
-from rolling_panda.robot_model import ARM_Q, ARM_XI, RobotModel
+from rolling_panda.model.differential_drive import NQ, NXI, Array
+from rolling_panda.model.robot import ARM_Q, ARM_XI, RobotModel
 
 #: No point of the robot is farther than this (m) from the axis of each arm joint, the tool included.
 _LEVERS = np.array([1.25, 1.25, 0.95, 0.95, 0.6, 0.55, 0.4])
@@ -41,11 +41,6 @@ class Plan:
     def duration(self) -> float:
         """Time from the first row to the last (s)."""
         return float(self.t[-1])
-
-    @property
-    def base_travel(self) -> float:
-        """Length of the base's way (m)."""
-        return float(np.hypot(*np.diff(self.q[:, :2], axis=0).T).sum())
 
     def looks(self) -> "Looks":
         """Bounds of how far anything moves between rows."""

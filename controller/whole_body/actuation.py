@@ -1,4 +1,4 @@
-"""The coordinates that the methods reckon in: ν = [v, ω, q̇₁…q̇₇], forward speed and yaw rate instead of the wheels.
+"""Velocity coordinates of the methods: ν = [v, ω, q̇₁…q̇₇], forward speed and yaw rate instead of wheels.
 
 In ν the limits of the base are bounds of single entries, and a task of the base is a row with a single 1. ν and ξ̇ are
 one to one: θ̇_l = (v − μω)/R, θ̇_r = (v + μω)/R.
@@ -6,8 +6,8 @@ one to one: θ̇_l = (v − μω)/R, θ̇_r = (v + μω)/R.
 
 import numpy as np
 
-from controller.compiled import NOTHING, PACKED, VECTOR, compiled
-from rolling_panda.differential_drive import Array, DifferentialDrive
+from controller.whole_body.compiled import NOTHING, PACKED, VECTOR, compiled
+from rolling_panda.model.differential_drive import Array, DifferentialDrive
 
 
 class Actuation:

@@ -19,8 +19,15 @@ import numpy as np
 from msgspec import Struct
 from scipy.linalg.lapack import dsyev
 
-from controller.whole_body.unlimited import RIDGE, factor, unlimited
-from rolling_panda.differential_drive import Array
+from controller.whole_body.compiled import FLAG, MATRIX, NOTHING, NUMBER, PACKED, VECTOR, compiled
+from controller.whole_body.small_matrices import (
+    cholesky,
+    inverse_norm_squared,
+    orthogonalize,
+    solve_cholesky,
+    solve_upper_transposed,
+)
+from rolling_panda.model.differential_drive import Array
 
 #: κ: a path is left by about this share of the velocity that is missing along it.
 _SLOWER = 1e-3
@@ -111,7 +118,7 @@ class Cascade:
         k = p.A.shape[0]
         Q, R, nu = np.empty((n, n)), np.empty((n, m)), np.empty(n)
         factor(p.J, p.speed, Q, R)
-        if not (p.keep_path and p.scale < 1.0) and unlimited(
+        if not (p.keep_path and p.scale < 1.0) and unconstrained_solution(
             Q, R, p.b, p.c, p.speed, p.T, p.t, p.lower, p.upper, p.A, p.A_lower, p.A_upper, self._damping_from, nu
         ):
             return Answer(nu, 1.0, None, -1)
@@ -256,3 +263,85 @@ def given_up(slack: Array | None) -> int:
         return -1
     worst = int(slack.argmax())
     return worst if float(slack[worst]) > _GIVEN_UP else -1
+
+
+#: Makes the normal equations definite where no task has a say.
+RIDGE = 1e-8
+
+
+@compiled(NOTHING(MATRIX, VECTOR, PACKED, PACKED))
+def factor(J: Array, speed: Array, Q: Array, R: Array) -> None:
+    """Q (n×n, orthogonal) and R (n×m, its first m rows upper triangular) with (J · speed)ᵀ = Q R."""
+    m, n = J.shape
+    for i in range(m):
+        for j in range(n):
+            R[j, i] = J[i, j] * speed[j]
+    orthogonalize(R, Q)
+
+
+@compiled(
+    FLAG(PACKED, PACKED, VECTOR, VECTOR, VECTOR, MATRIX, VECTOR, VECTOR, VECTOR, MATRIX, VECTOR, VECTOR, NUMBER, VECTOR)
+)
+def unconstrained_solution(
+    Q: Array,
+    R: Array,
+    b: Array,
+    c: Array,
+    speed: Array,
+    T: Array,
+    t: Array,
+    lower: Array,
+    upper: Array,
+    A: Array,
+    A_lower: Array,
+    A_upper: Array,
+    damping_from: float,
+    nu: Array,
+) -> bool:
+    """Write into nu (n) what answers everything; False where an inequality or damping has a say.
+
+    Rᵀ y = b + c gives the tool its velocity; min ‖T (speed · (Q₁ y + Z z)) − t‖² gives z by its normal equations.
+    """
+    n, m = R.shape
+    if inverse_norm_squared(R, m) * damping_from**2 > 1.0:
+        return False
+    y = b + c
+    solve_upper_transposed(R, y)
+    for i in range(n):
+        nu[i] = 0.0
+        for j in range(m):
+            nu[i] += speed[i] * Q[i, j] * y[j]
+    if n > m:
+        H, z = np.zeros((n - m, n - m)), np.zeros(n - m)
+        along = np.empty(n - m)
+        for row in range(len(t)):
+            rest = t[row]
+            along[:] = 0.0
+            for i in range(n):
+                if T[row, i] != 0.0:
+                    rest -= T[row, i] * nu[i]
+                    for j in range(n - m):
+                        along[j] += T[row, i] * speed[i] * Q[i, m + j]
+            for j in range(n - m):
+                z[j] += along[j] * rest
+                for k in range(j + 1):
+                    H[j, k] += along[j] * along[k]
+        for j in range(n - m):
+            H[j, j] += RIDGE
+        if not cholesky(H):
+            return False
+        solve_cholesky(H, z)
+        for i in range(n):
+            for j in range(n - m):
+                nu[i] += speed[i] * Q[i, m + j] * z[j]
+    # What is not a number satisfies nothing.
+    for i in range(n):
+        if not lower[i] <= nu[i] <= upper[i]:
+            return False
+    for row in range(len(A_lower)):
+        moved = 0.0
+        for i in range(n):
+            moved += A[row, i] * nu[i]
+        if not A_lower[row] <= moved <= A_upper[row]:
+            return False
+    return True

@@ -1,4 +1,4 @@
-"""Distances between the robot, the ground and obstacles, and how they change with ξ̇.
+"""Distances between robot, ground and obstacles, and their derivatives over ξ̇.
 
 Shapes are in Coal behind Pinocchio, so that one call computes every distance. Which pairs it computes is decided by a
 broad phase: spheres around the robot's parts against the obstacles' axes. `dampers`, which runs every control period,
@@ -16,7 +16,6 @@ import numpy as np
 import pinocchio as pin
 from msgspec import Struct
 
-from controller.compiled import FLAG, MATRIX, NOTHING, NUMBER, VECTOR, compiled
 from controller.whole_body.collision_geometry import (
     BLADES,
     Shapes,
@@ -24,13 +23,14 @@ from controller.whole_body.collision_geometry import (
     bounding_radius,
     part_of,
     robot_geometry,
+    self_pairs,
     shapes_of,
 )
-from controller.whole_body.collision_pairs import self_pairs
+from controller.whole_body.compiled import FLAG, MATRIX, NOTHING, NUMBER, VECTOR, compiled
 from controller.whole_body.obstacle import Axes, Obstacle
-from rolling_panda.differential_drive import NQ, NXI, Array
 from rolling_panda.errors import ControlError, InputError
-from rolling_panda.robot_model import Kinematics, RobotModel
+from rolling_panda.model.differential_drive import NQ, NXI, Array
+from rolling_panda.model.robot import Kinematics, RobotModel
 
 Pair = tuple[str, str]
 #: How far (m) a part may have moved before the pairs near it are looked for again.

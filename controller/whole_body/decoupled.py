@@ -1,4 +1,4 @@
-"""Method `decoupled`: drive, stop, then reach. The baseline that whole-body control is compared with.
+"""Method `decoupled`: drive, stop, then reach. The baseline of the comparisons.
 
 While the base is not at the posture's goal it turns towards it, drives there and turns into the goal's heading, with
 the arm still; the motion's clock waits for it. Then the base stands and the arm alone takes the tool to where it
@@ -14,9 +14,9 @@ from controller.config import ControllerConfig
 from controller.whole_body.actuation import Actuation
 from controller.whole_body.nullspace import Nullspace
 from controller.whole_body.saturation import Saturation
-from controller.whole_body.task import Demand, Solution
-from rolling_panda.differential_drive import NXI
-from rolling_panda.robot_model import RobotModel
+from controller.whole_body.task import IkProblem, Solution
+from rolling_panda.model.differential_drive import NXI
+from rolling_panda.model.robot import RobotModel
 
 #: The base is at its goal: along and across (m), heading (rad). What is missing, the arm makes good.
 _NEAR, _TURNED = 0.02, 0.02
@@ -40,29 +40,29 @@ class Decoupled:
         self._saturation = Saturation(robot, config, dt)
         self._wheels = Actuation(robot.drive).wheels
 
-    def solve(self, demand: Demand) -> Solution:
-        """The actuator velocities that answer the demand; see `Method.solve`."""
-        reach = self._arm.solve(replace(demand, base="frozen"))
-        goal = demand.posture.goal
-        if demand.base == "frozen" or goal is None or not demand.finite:
+    def solve(self, problem: IkProblem) -> Solution:
+        """The actuator velocities that answer the problem; see `Method.solve`."""
+        reach = self._arm.solve(replace(problem, base="frozen"))
+        goal = problem.posture.goal
+        if problem.base == "frozen" or goal is None or not problem.finite:
             return reach
-        v, omega = self._drive(demand, float(goal[0]), float(goal[1]), float(goal[2]))
+        v, omega = self._drive(problem, float(goal[0]), float(goal[1]), float(goal[2]))
         driving = v != 0.0 or omega != 0.0
-        still = not demand.sent[:2].any()
-        if not driving and still and not demand.posture.rate[:2].any():
+        still = not problem.sent[:2].any()
+        if not driving and still and not problem.posture.rate[:2].any():
             return reach
         wanted = np.zeros(NXI)
         wanted[:2] = self._wheels @ (v, omega)
-        limited = self._saturation.apply(wanted, demand.q, demand.sent)
+        limited = self._saturation.apply(wanted, problem.q, problem.sent)
         # While the base carries the tool along the clock runs, but not past what the base has still to do.
-        ahead = math.hypot(float(goal[0] - demand.posture.q[0]), float(goal[1] - demand.posture.q[1])) > _ARRIVED
+        ahead = math.hypot(float(goal[0] - problem.posture.q[0]), float(goal[1] - problem.posture.q[1])) > _ARRIVED
         return Solution(limited.xi, float(ahead or still and not driving), reach.manipulability)
 
-    def _drive(self, demand: Demand, x: float, y: float, phi: float) -> tuple[float, float]:
+    def _drive(self, problem: IkProblem, x: float, y: float, phi: float) -> tuple[float, float]:
         """Forward speed and yaw rate towards a base pose; both 0 at it."""
         config = self._config
-        dx, dy = x - float(demand.q[0]), y - float(demand.q[1])
-        c, s = math.cos(float(demand.q[2])), math.sin(float(demand.q[2]))
+        dx, dy = x - float(problem.q[0]), y - float(problem.q[1])
+        c, s = math.cos(float(problem.q[2])), math.sin(float(problem.q[2]))
         ahead, aside = c * dx + s * dy, c * dy - s * dx
         distance = math.hypot(dx, dy)
         if distance > _NEAR:
@@ -74,7 +74,7 @@ class Decoupled:
                 return 0.0, omega
             braking = math.sqrt(config.base_acceleration * distance)
             return way * min(config.base_speed, braking, _DRIVE_GAIN * distance), omega
-        turn = math.remainder(phi - float(demand.q[2]), math.tau)
+        turn = math.remainder(phi - float(problem.q[2]), math.tau)
         if abs(turn) > _TURNED:
             return 0.0, max(-config.base_yaw_rate, min(config.base_yaw_rate, _GAIN * turn))
         return 0.0, 0.0

@@ -12,8 +12,8 @@ import numpy as np
 import pinocchio as pin
 from scipy.linalg import cho_factor, cho_solve
 
-from rolling_panda.differential_drive import NQ, Array
-from rolling_panda.robot_model import RobotModel
+from rolling_panda.model.differential_drive import NQ, Array
+from rolling_panda.model.robot import RobotModel
 
 
 @dataclass(frozen=True)

@@ -13,24 +13,23 @@ from msgspec import Struct
 
 from controller.config import ControllerConfig
 from controller.whole_body.actuation import Actuation
-from controller.whole_body.box import Bounds, Box
 from controller.whole_body.cascade import Answer, Cascade, Problem, given_up
+from controller.whole_body.compiled import COUNT, MATRIX, NOTHING, NUMBER, PACKED, VECTOR, compiled
 from controller.whole_body.guards.axle import AxleAhead
-from controller.whole_body.hierarchy_rows import guard_rows, sendable, tool_rows, wheel_rows, without_base
 from controller.whole_body.manipulability import ArmManipulability, Manipulability
-from controller.whole_body.task import ActuatorTask, Demand, Guard, Solution
+from controller.whole_body.task import ActuatorTask, Guard, IkProblem, SecondaryTask, Solution
 from controller.whole_body.tasks.arm_posture import ArmPosture
 from controller.whole_body.tasks.base_reference import BaseReference
 from controller.whole_body.tasks.joint_centre import JointCentre
 from controller.whole_body.tasks.manipulability import ClimbManipulability
 from controller.whole_body.tasks.smoothness import Smoothness
-from controller.whole_body.tasks.task import SecondaryTask
-from rolling_panda.differential_drive import NXI, Array
-from rolling_panda.robot_model import ARM_XI, RobotModel
+from controller.whole_body.velocity_bounds import Bounds, VelocityBounds
+from rolling_panda.model.differential_drive import NXI, Array
+from rolling_panda.model.robot import ARM_XI, RobotModel
 
 #: A clock slower than this stands still.
 _HELD = 1e-2
-#: A hand whose demand is answered by less than the rest is told what holds the tool back.
+#: A hand whose problem is answered by less than the rest is told what holds the tool back.
 _MISSED = 0.5
 #: Velocities of the tool that weigh the same (m/s, rad/s): what damping is measured in, whatever speed is planned.
 _SPEED, _TURN = 0.3, 0.8
@@ -65,7 +64,7 @@ class Hierarchy:
         """
         settings = config.hierarchy
         self._actuation = Actuation(robot.drive)
-        self._box = Box(robot, config, dt)
+        self._box = VelocityBounds(robot, config, dt)
         self._cascade = Cascade(settings.damping, settings.damping_from)
         self._manipulability = ArmManipulability()
         self._climb = ClimbManipulability(
@@ -88,21 +87,21 @@ class Hierarchy:
             Smoothness(weights.smoothness, self._actuation, speed),
         )
 
-    def solve(self, demand: Demand) -> Solution:
-        """The actuator velocities that answer the demand; see `Method.solve`."""
-        if not demand.finite:
-            return self._brake(demand, "the demand holds a number that is not finite", _NOWHERE)
-        bounds = self._box.at(demand.q, demand.sent, demand.sent_before, demand.wheel_cap)
-        self._climb.now = manipulability = self._manipulability.at(demand.kinematics.J)
-        base = bounds.ramp if demand.held is None else self._actuation.twist @ demand.held
+    def solve(self, problem: IkProblem) -> Solution:
+        """The actuator velocities that answer the problem; see `Method.solve`."""
+        if not problem.finite:
+            return self._brake(problem, "the problem holds a number that is not finite", _NOWHERE)
+        bounds = self._box.at(problem.q, problem.sent, problem.sent_before, problem.wheel_cap)
+        self._climb.now = manipulability = self._manipulability.at(problem.kinematics.J)
+        base = bounds.ramp if problem.held is None else self._actuation.twist @ problem.held
         for task, jacobian, target in self._tasks:
-            task.write(demand, jacobian, target)
-        rows = self._inequalities(demand, bounds)
-        J, wanted, share = self._tool(demand)
-        answer = self._cascade.solve(self._problem(demand, bounds, rows, J, wanted, share, base))
+            task.write(problem, jacobian, target)
+        rows = self._inequalities(problem, bounds)
+        J, wanted, share = self._tool(problem)
+        answer = self._cascade.solve(self._problem(problem, bounds, rows, J, wanted, share, base))
         if answer is None:
-            return self._brake(demand, "no velocity satisfies the limits; the robot brakes", manipulability)
-        return self._solution(demand, answer, base, bounds, share, rows.names, manipulability)
+            return self._brake(problem, "no velocity satisfies the limits; the robot brakes", manipulability)
+        return self._solution(problem, answer, base, bounds, share, rows.names, manipulability)
 
     # --- parts of the problem ----------------------------------------------------------------------------------------
 
@@ -119,27 +118,34 @@ class Hierarchy:
             at += task.rows
         self._tasks = tuple(places)
 
-    def _tool(self, demand: Demand) -> tuple[Array, Array, float]:
+    def _tool(self, problem: IkProblem) -> tuple[Array, Array, float]:
         """J over ν, what is wanted of J ν as far as the speed cap allows, and the share of it that this is, 0…1.
 
         Weighted by the limits of the tool or of the actuators themselves.
         """
-        if isinstance(demand.tool, ActuatorTask):
+        if isinstance(problem.tool, ActuatorTask):
             # Of a base that is given nothing can be wanted; its rows would only outnumber the arm's joints.
-            wanted = _ARM if demand.arm_only else _ALL
+            wanted = _ARM if problem.arm_only else _ALL
             shares = np.diag(1.0 / self._box.speed)[wanted]
-            return shares, shares @ self._actuation.nu(demand.tool.xi), 1.0
-        m = 5 if demand.tool.free_axis else 6
+            return shares, shares @ self._actuation.nu(problem.tool.xi), 1.0
+        m = 5 if problem.tool.free_axis else 6
         J, b = np.empty((m, NXI)), np.empty(m)
-        R = demand.kinematics.T_odom_tool.rotation
+        R = problem.kinematics.T_odom_tool.rotation
         share = tool_rows(
-            demand.kinematics.J_xi, R, demand.tool.twist, demand.speed_cap, self._actuation.wheels, self._weight, J, b
+            problem.kinematics.J_xi,
+            R,
+            problem.tool.twist,
+            problem.speed_cap,
+            self._actuation.wheels,
+            self._weight,
+            J,
+            b,
         )
         return J, b, share
 
-    def _inequalities(self, demand: Demand, bounds: Bounds) -> _Rows:
+    def _inequalities(self, problem: IkProblem, bounds: Bounds) -> _Rows:
         """Rows of the guards, then those of the wheels, over ν."""
-        found = [rows for guard in self.guards if (rows := guard.rows(demand)).names]
+        found = [rows for guard in self.guards if (rows := guard.rows(problem)).names]
         names = sum((rows.names for rows in found), ())
         k = len(names)
         A, lower, upper = np.empty((k + 2, NXI)), np.empty(k + 2), np.empty(k + 2)
@@ -150,14 +156,14 @@ class Hierarchy:
         return _Rows(A, lower, upper, names)
 
     def _problem(
-        self, demand: Demand, bounds: Bounds, rows: _Rows, J: Array, b: Array, share: float, base: Array
+        self, problem: IkProblem, bounds: Bounds, rows: _Rows, J: Array, b: Array, share: float, base: Array
     ) -> Problem:
-        keep_path, speed, k = demand.tool.keep_path, self._box.speed, len(rows.names)
-        rise = min(1.0, (max(demand.scale, 0.0) + self._rise) / share) if share > 0.0 else 1.0
+        keep_path, speed, k = problem.tool.keep_path, self._box.speed, len(rows.names)
+        rise = min(1.0, (max(problem.scale, 0.0) + self._rise) / share) if share > 0.0 else 1.0
         T, t, A, low, high = self._T, self._t, rows.A, rows.lower, rows.upper
         c = self._nothing[: len(b)]
-        if not demand.arm_only:
-            sent = self._actuation.nu(demand.sent)
+        if not problem.arm_only:
+            sent = self._actuation.nu(problem.sent)
             return Problem(J, b, c, speed, sent, bounds.lower, bounds.upper, A, low, high, k, T, t, rise, keep_path)
         # What the base does meanwhile is made good by the arm; the wheels' rows have no say then.
         A, low, high = A[:k], low[:k], high[:k]
@@ -165,14 +171,14 @@ class Hierarchy:
             c, t, low = without_base(J, base, c), without_base(T, base, t), without_base(A, base, low)
         J, T, A = J[:, ARM_XI], T[:, ARM_XI], A[:, ARM_XI]
         lower, upper = bounds.lower[ARM_XI], bounds.upper[ARM_XI]
-        sent, speed = demand.sent[ARM_XI], speed[ARM_XI]
+        sent, speed = problem.sent[ARM_XI], speed[ARM_XI]
         return Problem(J, b, c, speed, sent, lower, upper, A, low, high, k, T, t, rise, keep_path)
 
     # --- the answer --------------------------------------------------------------------------------------------------
 
     def _solution(
         self,
-        demand: Demand,
+        problem: IkProblem,
         answer: Answer,
         base: Array,
         bounds: Bounds,
@@ -180,25 +186,25 @@ class Hierarchy:
         names: tuple[str, ...],
         manipulability: Manipulability,
     ) -> Solution:
-        free = ARM_XI if demand.arm_only else _ALL
+        free = ARM_XI if problem.arm_only else _ALL
         xi = np.empty(NXI)
         sendable(answer.nu, base, self._actuation.wheels, bounds.wheel_lower, bounds.wheel_upper, xi)
-        if demand.held is not None:
-            xi[:2] = demand.sent[:2]
+        if problem.held is not None:
+            xi[:2] = problem.sent[:2]
         scale = answer.scale * share
         worst = given_up(answer.slack)
         if worst >= 0:
             return Solution(xi, scale, manipulability.value, False, _too_near(names, worst))
-        held = demand.tool.keep_path and answer.scale < _HELD
+        held = problem.tool.keep_path and answer.scale < _HELD
         if held or (answer.missing > _MISSED and answer.holds >= 0):
             what = _holder(answer.holds, free, names)
             # A hand that slides along what holds it has its answer; it is only told.
             return Solution(xi, scale, manipulability.value, not held, f"{what} holds the tool back")
         return Solution(xi, scale, manipulability.value)
 
-    def _brake(self, demand: Demand, reason: str, manipulability: Manipulability) -> Solution:
+    def _brake(self, problem: IkProblem, reason: str, manipulability: Manipulability) -> Solution:
         """The strongest braking of every actuator; from a velocity that is not a number, rest."""
-        sent, before = demand.sent, demand.sent_before
+        sent, before = problem.sent, problem.sent_before
         if not math.isfinite(float(sent.sum() + before.sum())):
             return Solution(np.zeros(NXI), 0.0, manipulability.value, False, reason)
         return Solution(self._box.brake(sent, before), 0.0, manipulability.value, False, reason)
@@ -214,3 +220,94 @@ def _holder(index: int, free: slice, names: tuple[str, ...]) -> str:
         return bounds[index]
     row = index - len(bounds)
     return names[row] if 0 <= row < len(names) else "a limit of the wheels"
+
+
+@compiled(NUMBER(MATRIX, MATRIX, VECTOR, NUMBER, PACKED, VECTOR, PACKED, VECTOR))
+def tool_rows(
+    J_xi: Array, R: Array, twist: Array, speed_cap: float, wheels: Array, weight: Array, J: Array, b: Array
+) -> float:
+    """Write J (m×9) and b (m) of the tool's task; m = 5 leaves the rotation about the tool's y free.
+
+    Args:
+        J_xi: Over ξ̇ (6×9).
+        R: Rotation of the tool, R_odom_tool (3×3).
+        twist: Wanted (6).
+        speed_cap: Largest speed of the tool's origin (m/s); b is of a twist that is slowed to it.
+        wheels: Of [v, ω].
+        weight: Of the rows (6).
+        J: Written.
+        b: Written.
+
+    Returns:
+        The share of the twist that the speed cap allows, 0…1.
+    """
+    m = len(b)
+    speed = math.sqrt(twist[0] ** 2 + twist[1] ** 2 + twist[2] ** 2)
+    share = max(speed_cap, 0.0) / speed if speed > speed_cap else 1.0
+    for row in range(m):
+        for j in range(9):
+            J[row, j] = 0.0
+        b[row] = 0.0
+        # About the tool's own x and z where its y is free, about odom's axes otherwise.
+        axis = 2 * (row - 3)
+        for i in range(6):
+            along = 1.0 if i == row else 0.0
+            if m == 5 and row >= 3:
+                along = R[i - 3, axis] if i >= 3 else 0.0
+            if along != 0.0:
+                along *= weight[row]
+                b[row] += along * share * twist[i]
+                for j in range(2):
+                    J[row, j] += along * (J_xi[i, 0] * wheels[0, j] + J_xi[i, 1] * wheels[1, j])
+                for j in range(2, 9):
+                    J[row, j] += along * J_xi[i, j]
+    return share
+
+
+@compiled(COUNT(MATRIX, VECTOR, PACKED, COUNT, PACKED, VECTOR, VECTOR))
+def guard_rows(A_xi: Array, least: Array, wheels: Array, at: int, A: Array, lower: Array, upper: Array) -> int:
+    """Write rows A_xi ξ̇ ≥ least (k×9, k) into A, lower and upper from row `at` on; returns the row after them."""
+    for i in range(len(least)):
+        for j in range(2):
+            A[at, j] = A_xi[i, 0] * wheels[0, j] + A_xi[i, 1] * wheels[1, j]
+        for j in range(2, 9):
+            A[at, j] = A_xi[i, j]
+        lower[at], upper[at] = least[i], math.inf
+        at += 1
+    return at
+
+
+@compiled(NOTHING(PACKED, VECTOR, VECTOR, COUNT, PACKED, VECTOR, VECTOR))
+def wheel_rows(wheels: Array, least: Array, most: Array, at: int, A: Array, lower: Array, upper: Array) -> None:
+    """Write the bounds of the wheels' speeds (2) into A, lower and upper from row `at` on."""
+    for i in range(2):
+        for j in range(9):
+            A[at + i, j] = wheels[i, j] if j < 2 else 0.0
+        lower[at + i], upper[at + i] = least[i], most[i]
+
+
+def without_base(rows: Array, base: Array, rest: Array) -> Array:
+    """What rows (k×9, over ν or ξ̇) leave of `rest` (k) for the arm, the base's share of them being `base` (2)."""
+    left = np.empty(len(rest))
+    _without_base(rows, base, rest, left)
+    return left
+
+
+@compiled(NOTHING(MATRIX, VECTOR, VECTOR, VECTOR))
+def _without_base(rows: Array, base: Array, rest: Array, left: Array) -> None:
+    for i in range(len(rest)):
+        left[i] = rest[i] - rows[i, 0] * base[0] - rows[i, 1] * base[1]
+
+
+@compiled(NOTHING(VECTOR, VECTOR, PACKED, VECTOR, VECTOR, VECTOR))
+def sendable(nu: Array, base: Array, wheels: Array, least: Array, most: Array, xi: Array) -> None:
+    """Write ξ̇ (9): of ν (9), or of ν without its first two (7) where the base does `base` (2) by itself.
+
+    Rounding of the way back to the wheels' speeds stays inside their bounds `least` and `most` (2).
+    """
+    fixed = 9 - len(nu)
+    v, omega = (base[0], base[1]) if fixed else (nu[0], nu[1])
+    for i in range(2):
+        xi[i] = min(max(wheels[i, 0] * v + wheels[i, 1] * omega, least[i]), most[i])
+    for i in range(2, 9):
+        xi[i] = nu[i - fixed]

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from rolling_panda.differential_drive import NXI, Array
-from rolling_panda.robot_model import ARM_Q, ARM_XI, Limits
+from rolling_panda.model.differential_drive import NXI, Array
+from rolling_panda.model.robot import ARM_Q, ARM_XI, Limits
 
 
 class LimitRepulsion:

@@ -3,16 +3,13 @@
 Of the ARM, as the paper's text says: the whole robot's Jacobian, which its formula prints, hides arm singularities.
 """
 
-from typing import Any
-
 import numpy as np
-import pinocchio as pin
 from msgspec import Struct
 
-from controller.compiled import MATRIX, NUMBER, VECTOR, compiled
+from controller.whole_body.compiled import MATRIX, NUMBER, VECTOR, compiled
 from controller.whole_body.small_matrices import cholesky, solve_cholesky
-from rolling_panda.differential_drive import NXI, Array
-from rolling_panda.robot_model import ARM_Q, ARM_XI, RobotModel
+from rolling_panda.model.differential_drive import NXI, Array
+from rolling_panda.model.robot import ARM_Q, ARM_XI
 
 _REGULAR = 1e-9
 
@@ -78,16 +75,3 @@ def arm_omega(J: Array) -> float:
     """ω of the arm from the tool's Jacobian J (6×12)."""
     arm = J[:, ARM_Q]
     return float(np.sqrt(max(np.linalg.det(arm @ arm.T), 0.0)))
-
-
-def arm_hessian(robot: RobotModel, q: Array) -> Array:
-    """∂J/∂q of the tool over all of q, (6, 12, 12) as [row, column of J, q], by Pinocchio.
-
-    Its Python binding returns the array with its axes mislabelled; reading the same memory in Fortran order as
-    (6, nv, nv) is right, which the tests check against finite differences.
-    """
-    nv = robot.model.nv
-    pin.computeJointJacobians(robot.model, robot.data, q)
-    pin.computeJointKinematicHessians(robot.model, robot.data, q)
-    raw: Any = pin.getFrameKinematicHessian(robot.model, robot.data, robot.tool_id, pin.LOCAL_WORLD_ALIGNED)
-    return np.asarray(raw).ravel().reshape((6, nv, nv), order="F")

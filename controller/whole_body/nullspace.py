@@ -19,9 +19,9 @@ from controller.whole_body.actuation import Actuation
 from controller.whole_body.joint_limits import LimitRepulsion
 from controller.whole_body.manipulability import ArmManipulability
 from controller.whole_body.saturation import Saturation
-from controller.whole_body.task import ActuatorTask, Demand, Solution
-from rolling_panda.differential_drive import NXI, Array
-from rolling_panda.robot_model import ARM_Q, ARM_XI, RobotModel
+from controller.whole_body.task import ActuatorTask, IkProblem, Solution
+from rolling_panda.model.differential_drive import NXI, Array
+from rolling_panda.model.robot import ARM_Q, ARM_XI, RobotModel
 
 
 class Nullspace:
@@ -46,59 +46,59 @@ class Nullspace:
         self._frozen_weight[:2] = 0.0
         self._damping = np.eye(6) * config.damping**2
 
-    def solve(self, demand: Demand) -> Solution:
-        """The actuator velocities that answer the demand; see `Method.solve`."""
-        if not demand.finite:
-            return self._brake(demand, "the demand holds a number that is not finite", 0.0)
-        manipulability = self._manipulability.at(demand.kinematics.J)
-        wanted = self._wanted(demand, manipulability.gradient)
+    def solve(self, problem: IkProblem) -> Solution:
+        """The actuator velocities that answer the problem; see `Method.solve`."""
+        if not problem.finite:
+            return self._brake(problem, "the problem holds a number that is not finite", 0.0)
+        manipulability = self._manipulability.at(problem.kinematics.J)
+        wanted = self._wanted(problem, manipulability.gradient)
         if wanted is None:
-            return self._brake(demand, "the velocity of the tool has no finite answer", manipulability.value)
-        linear = demand.kinematics.J_xi[:3] @ wanted
+            return self._brake(problem, "the velocity of the tool has no finite answer", manipulability.value)
+        linear = problem.kinematics.J_xi[:3] @ wanted
         speed = math.sqrt(float(linear @ linear))
-        share = max(demand.speed_cap, 0.0) / speed if speed > demand.speed_cap else 1.0
-        limited = self._saturation.apply(wanted * share, demand.q, demand.sent)
+        speed_scale = max(problem.speed_cap, 0.0) / speed if speed > problem.speed_cap else 1.0
+        limited = self._saturation.apply(wanted * speed_scale, problem.q, problem.sent)
         reason = (
             "the wanted velocity leaves a limit, for instance of a joint; the robot brakes" if limited.braked else ""
         )
-        return Solution(limited.xi, limited.scale * share, manipulability.value, not limited.braked, reason)
+        return Solution(limited.xi, limited.scale * speed_scale, manipulability.value, not limited.braked, reason)
 
-    def _wanted(self, demand: Demand, gradient: Array) -> Array | None:
+    def _wanted(self, problem: IkProblem, gradient: Array) -> Array | None:
         """ξ̇ (9) before any limit; None where the equations have no finite answer."""
-        if isinstance(demand.tool, ActuatorTask):
-            return demand.tool.xi
-        config, J = self._config, demand.kinematics.J_xi
-        frozen = demand.base == "frozen"
+        if isinstance(problem.tool, ActuatorTask):
+            return problem.tool.xi
+        config, J = self._config, problem.kinematics.J_xi
+        frozen = problem.base == "frozen"
         W_inv = self._frozen_weight if frozen else self._inverse_weight
-        secondary = self._repulsion.at(demand.q)
+        secondary = self._repulsion.at(problem.q)
         secondary += config.gain_manipulability * gradient
-        secondary += self._posture(demand)
+        secondary += self._posture(problem)
         if frozen:
             secondary[:2] = 0.0
         WJt = W_inv @ J.T
         # J⁺b + (I − J⁺J)z = z + J⁺(b − J z): one factorisation, no projector.
-        _, multiplier, info = dposv(J @ WJt + self._damping, demand.tool.twist - J @ secondary)
+        _, multiplier, info = dposv(J @ WJt + self._damping, problem.tool.twist - J @ secondary)
         if info != 0 or not math.isfinite(float(multiplier.sum())):
             return None
         wanted: Array = secondary + WJt @ multiplier
         return wanted
 
-    def _posture(self, demand: Demand) -> Array:
+    def _posture(self, problem: IkProblem) -> Array:
         """Velocity over ξ (9) towards the posture: base along its heading and parallel to it, arm joints to theirs."""
-        config, q, reference, rate = self._config, demand.q, demand.posture.q, demand.posture.rate
+        config, q, reference, rate = self._config, problem.q, problem.posture.q, problem.posture.rate
         out = np.empty(NXI)
         c, s = math.cos(reference[2]), math.sin(reference[2])
         speed = 0.0
-        if demand.base == "row":
+        if problem.base == "row":
             along = c * (reference[0] - q[0]) + s * (reference[1] - q[1])
             speed = config.gain_posture * along + c * rate[0] + s * rate[1]
             speed = max(-config.base_speed, min(config.base_speed, speed))
-        turn = 0.0 if demand.base == "transit" else config.gain_heading * math.sin(reference[2] - q[2])
+        turn = 0.0 if problem.base == "transit" else config.gain_heading * math.sin(reference[2] - q[2])
         turn = max(-config.base_yaw_rate, min(config.base_yaw_rate, turn))
         out[:2] = self._wheels @ (speed, turn)
         out[ARM_XI] = config.gain_posture * (reference[ARM_Q] - q[ARM_Q]) + rate[ARM_Q]
         return out
 
-    def _brake(self, demand: Demand, reason: str, manipulability: float) -> Solution:
-        sent = demand.sent if math.isfinite(float(demand.sent.sum())) else np.zeros(NXI)
+    def _brake(self, problem: IkProblem, reason: str, manipulability: float) -> Solution:
+        sent = problem.sent if math.isfinite(float(problem.sent.sum())) else np.zeros(NXI)
         return Solution(self._saturation.brake(sent), 0.0, manipulability, False, reason)

@@ -1,13 +1,13 @@
-"""What stands beside the robot: posts, wires, cordon, trunks and canes as capsules in odom."""
+"""Obstacles as capsules in odom: posts, wires, cordons, trunks and canes."""
 
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from controller.compiled import MATRIX, NOTHING, PACKED, VECTOR, compiled
-from rolling_panda.differential_drive import Array
+from controller.whole_body.compiled import MATRIX, NOTHING, PACKED, VECTOR, compiled
 from rolling_panda.errors import InputError
+from rolling_panda.model.differential_drive import Array
 
 Point = tuple[float, float, float]
 _POINT = 1e-12

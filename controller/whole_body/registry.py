@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 
 from controller.config import ControllerConfig
-from controller.whole_body.braked import Braked
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.decoupled import Decoupled
 from controller.whole_body.guards.collision import CollisionGuard
@@ -11,10 +10,11 @@ from controller.whole_body.guards.tipping import TippingGuard
 from controller.whole_body.hierarchy import Hierarchy
 from controller.whole_body.nullspace import Nullspace
 from controller.whole_body.saturation import Saturation
+from controller.whole_body.speed_scaling import SpeedScaling
 from controller.whole_body.task import Guard, Method
 from controller.whole_body.tipping import Tipping
 from rolling_panda.errors import ConfigError
-from rolling_panda.robot_model import RobotModel
+from rolling_panda.model.robot import RobotModel
 
 Maker = Callable[[RobotModel, ControllerConfig, float, CollisionModel | None], Method]
 
@@ -55,20 +55,20 @@ def _hierarchy(robot: RobotModel, config: ControllerConfig, dt: float, collision
     return Hierarchy(robot, config, dt, guards(robot, config, dt, collision))
 
 
-def _braked(make: Callable[[RobotModel, ControllerConfig, float], Method]) -> Maker:
+def _with_speed_scaling(make: Callable[[RobotModel, ControllerConfig, float], Method]) -> Maker:
     """Methods that know no inequalities beyond the limits are braked where obstacles are known."""
 
     def maker(robot: RobotModel, config: ControllerConfig, dt: float, collision: CollisionModel | None) -> Method:
         method = make(robot, config, dt)
         if collision is None or not config.hierarchy.collisions:
             return method
-        return Braked(method, CollisionGuard(collision, config.hierarchy, dt), Saturation(robot, config, dt))
+        return SpeedScaling(method, CollisionGuard(collision, config.hierarchy, dt), Saturation(robot, config, dt))
 
     return maker
 
 
 METHODS: dict[str, Maker] = {
     Hierarchy.name: _hierarchy,
-    Nullspace.name: _braked(Nullspace),
-    Decoupled.name: _braked(Decoupled),
+    Nullspace.name: _with_speed_scaling(Nullspace),
+    Decoupled.name: _with_speed_scaling(Decoupled),
 }

@@ -1,14 +1,14 @@
-"""Limits of what is sent: velocity, acceleration and jerk against what was sent last, and braking before a limit."""
+"""Limits of velocity, acceleration and jerk, and braking before joint limits."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from controller.compiled import FLAG, NOTHING, VECTOR, compiled
 from controller.config import ControllerConfig
 from controller.whole_body.actuation import Actuation
-from rolling_panda.differential_drive import NXI, Array
-from rolling_panda.robot_model import ARM_Q, ARM_XI, RobotModel
+from controller.whole_body.compiled import FLAG, NOTHING, VECTOR, compiled
+from rolling_panda.model.differential_drive import NXI, Array
+from rolling_panda.model.robot import ARM_Q, ARM_XI, RobotModel
 
 _SLACK = 1e-9
 

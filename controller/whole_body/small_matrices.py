@@ -1,11 +1,11 @@
-"""Factorisations of matrices with a dozen rows at most, where LAPACK's cost of a call exceeds the work."""
+"""Factorisations of small matrices, faster than a LAPACK call."""
 
 import math
 
 import numpy as np
 
-from controller.compiled import COUNT, FLAG, NOTHING, NUMBER, PACKED, VECTOR, compiled
-from rolling_panda.differential_drive import Array
+from controller.whole_body.compiled import COUNT, FLAG, NOTHING, NUMBER, PACKED, VECTOR, compiled
+from rolling_panda.model.differential_drive import Array
 
 
 @compiled(NOTHING(PACKED, PACKED))

@@ -1,4 +1,4 @@
-"""What a whole-body method is asked for, and what it answers."""
+"""Problem and solution of a whole-body method, and the interfaces of methods, guards and tasks."""
 
 import math
 from dataclasses import dataclass, field
@@ -7,9 +7,9 @@ from typing import ClassVar, Literal, Protocol
 import numpy as np
 from msgspec import Struct
 
-from controller.compiled import MATRIX, NUMBER, VECTOR, compiled
-from rolling_panda.differential_drive import NQ, NXI, Array
-from rolling_panda.robot_model import Kinematics
+from controller.whole_body.compiled import MATRIX, NUMBER, VECTOR, compiled
+from rolling_panda.model.differential_drive import NQ, NXI, Array
+from rolling_panda.model.robot import Kinematics
 
 BaseMode = Literal["row", "free", "transit", "frozen"]
 """What the base is for.
@@ -64,7 +64,7 @@ class Posture:
 
 
 @dataclass(frozen=True)
-class Demand:
+class IkProblem:
     """One control period's problem.
 
     Attributes:
@@ -136,7 +136,7 @@ class Solution(Struct, frozen=True):
         xi: ξ̇ to send (9), within every limit of velocity, acceleration and joint position.
         scale: Rate of the motion's clock, 0…1.
         manipulability: ω of the arm.
-        feasible: False when the demand could not be answered: the robot brakes, or a constraint gives way.
+        feasible: False when the problem could not be answered: the robot brakes, or a constraint gives way.
         reason: What is in the way, in words; a hand that slides along it is told too. Empty where nothing is.
     """
 
@@ -163,7 +163,7 @@ class Guard(Protocol):
 
     name: str
 
-    def rows(self, demand: Demand) -> Inequalities:
+    def rows(self, problem: IkProblem) -> Inequalities:
         """What has to hold in this period."""
         ...
 
@@ -177,6 +177,30 @@ class Method(Protocol):
     name: str
     flows: bool
 
-    def solve(self, demand: Demand) -> Solution:
-        """The actuator velocities that answer the demand, within the limits. Raises nothing for any numbers in it."""
+    def solve(self, problem: IkProblem) -> Solution:
+        """The actuator velocities that answer the problem, within the limits. Raises nothing for any numbers in it."""
+        ...
+
+
+class SecondaryTask(Protocol):
+    """A velocity that some part of the robot should have, as far as the tool's task leaves it free.
+
+    Attributes:
+        name: Of the task.
+        rows: Number of its rows.
+    """
+
+    name: str
+    rows: int
+
+    def begin(self, jacobian: Array) -> None:
+        """Write what is the same in every period. Called once, with all zeros."""
+        ...
+
+    def write(self, problem: IkProblem, jacobian: Array, target: Array) -> None:
+        """Write √weight · J (rows×9, over ν) and √weight · target (rows).
+
+        `jacobian` and `target` are the task's own places in the stack of all tasks, kept from period to period: what a
+        task never writes stays zero.
+        """
         ...

@@ -1,4 +1,4 @@
-"""Keeping the robot on its wheels: the zero-moment point inside the support triangle, as rows over ξ̈.
+"""Tipping constraint: the zero-moment point inside the support triangle, as rows over ξ̈.
 
 The triangle has its corners at the two driven wheels and at the rear caster. The caster swivels, so that its contact is
 somewhere on a circle about its pivot; the triangle is taken as small as any direction makes it. On flat ground the
@@ -16,10 +16,10 @@ import numpy as np
 import pinocchio as pin
 from msgspec import Struct
 
-from controller.compiled import MATRIX, NOTHING, NUMBER, VECTOR, compiled
+from controller.whole_body.compiled import MATRIX, NOTHING, NUMBER, VECTOR, compiled
 from controller.whole_body.dynamics import acceleration_of_q
-from rolling_panda.differential_drive import NQ, NXI, Array
-from rolling_panda.robot_model import RobotModel
+from rolling_panda.model.differential_drive import NQ, NXI, Array
+from rolling_panda.model.robot import RobotModel
 
 #: Distance of the caster's contact from its pivot (m, vendor's mesh).
 _CASTER_TRAIL = 0.060

@@ -1,4 +1,4 @@
-"""A whole-body method at two rates: all nine velocities at the base's, the arm's seven at its own, which is higher.
+"""A whole-body method at two rates: base and arm at the base rate, the arm alone at its higher rate.
 
 In a period of the base the method is asked twice. Once for all nine velocities over the base's period, of which the
 base's are sent. And, as in every other period, for the arm's over its own: with the wheels' command as it is, and the
@@ -12,13 +12,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from controller.compiled import MATRIX, NOTHING, VECTOR, compiled
-from controller.whole_body.task import ActuatorTask, Demand, Method, Solution, ToolTask
-from rolling_panda.differential_drive import NXI, Array
+from controller.whole_body.compiled import MATRIX, NOTHING, VECTOR, compiled
+from controller.whole_body.task import ActuatorTask, IkProblem, Method, Solution, ToolTask
+from rolling_panda.model.differential_drive import NXI, Array
 
 
 class TwoRates:
-    """A method for `Demand`s that come every period of the arm; `begin` each period before `solve`."""
+    """A method for `IkProblem`s that come every period of the arm; `begin` each period before `solve`."""
 
     def __init__(self, arm: Method, base: Method, every: int) -> None:
         """Bind the method for each period, and the same for a period of the base.
@@ -49,30 +49,30 @@ class TwoRates:
             self._sent, self._sent_before = sent, self._sent
         self._before, self._wheels = before, wheels
 
-    def solve(self, demand: Demand) -> Solution:
-        """The actuator velocities that answer the demand; see `Method.solve`."""
-        sent = demand.sent
+    def solve(self, problem: IkProblem) -> Solution:
+        """The actuator velocities that answer the problem; see `Method.solve`."""
+        sent = problem.sent
         wheels = sent[:2] if self._wheels is None else self._wheels
-        if self._every == 1 or demand.base == "frozen":
-            return self._arm.solve(replace(demand, tool=_made_good(demand, wheels), before=self._before))
+        if self._every == 1 or problem.base == "frozen":
+            return self._arm.solve(replace(problem, tool=_made_good(problem, wheels), before=self._before))
         if self._period == 0:
-            base = self._base.solve(replace(demand, before=self._sent_before))
+            base = self._base.solve(replace(problem, before=self._sent_before))
             sent = sent.copy()
             sent[:2] = base.xi[:2]
         before = self._before.copy()
         # Seen from the arm's periods, the base gets to what it was told at a constant acceleration.
         for wheel in (0, 1):
             before[wheel] = sent[wheel] - (sent[wheel] - self._sent[wheel]) / self._every
-        return self._arm.solve(replace(demand, sent=sent, before=before, held=wheels))
+        return self._arm.solve(replace(problem, sent=sent, before=before, held=wheels))
 
 
-def _made_good(demand: Demand, wheels: Array) -> ToolTask | ActuatorTask:
-    """The demand's tool with the twist that the base owes: what its wheels were told beyond what they do."""
-    tool = demand.tool
+def _made_good(problem: IkProblem, wheels: Array) -> ToolTask | ActuatorTask:
+    """The problem's tool with the twist that the base owes: what its wheels were told beyond what they do."""
+    tool = problem.tool
     if not isinstance(tool, ToolTask):
         return tool
     twist = np.empty(6)
-    _owed(demand.kinematics.J_xi, demand.sent, wheels, tool.twist, twist)
+    _owed(problem.kinematics.J_xi, problem.sent, wheels, tool.twist, twist)
     return ToolTask(twist, tool.free_axis, tool.keep_path)
 
 

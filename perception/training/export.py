@@ -8,13 +8,13 @@ from pathlib import Path
 import onnx
 import torch
 
-from perception.network_input import CHANNELS
+from perception.segmentation.network_input import CHANNELS
 from perception.training.compact import CompactLabeller
 from perception.training.fit import BATCH, CROP, WEIGHTS, Trainer
 from perception.training.network import Labeller
 from perception.training.scenes import TRAINING_SEED, VALIDATION_SEED, VIEWS
 from perception.training.score import Confusion
-from rolling_panda.messages import WOOD_CLASSES
+from rolling_panda.messages.types import WOOD_CLASSES
 
 _OPSET = 17
 

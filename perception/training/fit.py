@@ -9,10 +9,10 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from perception.network_input import CHANNELS, network_input
+from perception.segmentation.network_input import CHANNELS, network_input
 from perception.training.network import Network
 from perception.training.scenes import Scenes
-from rolling_panda.messages import WOOD_CLASSES, WoodClass
+from rolling_panda.messages.types import WOOD_CLASSES, WoodClass
 
 #: Side of a crop and crops a step.
 CROP, BATCH = 256, 8

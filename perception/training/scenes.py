@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
-from bridge.sim.camera import Camera
-from bridge.sim.camera_config import CameraConfig
-from bridge.sim.vineyard import grow
-from bridge.sim.vineyard_config import VineyardConfig
+from bridge.sim.camera.config import CameraConfig
+from bridge.sim.camera.renderer import Camera
+from bridge.sim.vineyard.config import VineyardConfig
+from bridge.sim.vineyard.grow import grow
 
 #: Seeds of training rows begin here, those of validation rows at the second number: far from any that people use.
 TRAINING_SEED, VALIDATION_SEED = 7_000_000, 8_000_000

@@ -6,10 +6,10 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from perception.network_input import network_input
+from perception.segmentation.network_input import network_input
 from perception.training.network import Labeller
 from perception.training.scenes import Scenes
-from rolling_panda.messages import WOOD_CLASSES
+from rolling_panda.messages.types import WOOD_CLASSES
 
 _CANE = (WOOD_CLASSES.index("cane"), WOOD_CLASSES.index("node"))
 #: Every so many lines of a picture are looked at; wider stretches are canes side by side (px).

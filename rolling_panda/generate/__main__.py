@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rolling_panda.errors import RollingPandaError
-from rolling_panda.generate import modes
+from rolling_panda.generate import bounds, modes
 from rolling_panda.generate.javascript import messages_module, messages_types
 from rolling_panda.generate.markdown import fill
 from rolling_panda.generate.router import router_config
@@ -22,7 +22,7 @@ def generated(root: Path = ROOT) -> dict[Path, str]:
         root / "web" / "messages.d.ts": messages_types(),
         root / "assets" / "config" / "router.json5": router_config(),
         wire: fill(wire.read_text(encoding="utf-8")),
-        safety: fill(safety.read_text(encoding="utf-8"), modes.BLOCKS, "docs/safety.md"),
+        safety: fill(safety.read_text(encoding="utf-8"), modes.BLOCKS | bounds.BLOCKS, "docs/safety.md"),
     }
 
 

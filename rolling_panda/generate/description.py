@@ -9,18 +9,8 @@ from typing import Any, Literal, Union, get_args, get_origin
 
 import msgspec
 
-from rolling_panda import (
-    camera_messages,
-    control_messages,
-    crop_messages,
-    look_messages,
-    messages,
-    page_messages,
-    plan_messages,
-    preview_messages,
-    row_messages,
-    teleop_messages,
-)
+from rolling_panda import messages
+from rolling_panda.messages import page
 
 _ATTRIBUTE = re.compile(r"^ {4}(\w+): (.*)$")
 
@@ -96,18 +86,7 @@ def is_union(hint: Any) -> bool:
 def aliases() -> dict[str, Any]:
     """Named types of the message modules that are no structs: bounded numbers and texts, vectors, literals."""
     out: dict[str, Any] = {}
-    for module in (
-        messages,
-        page_messages,
-        camera_messages,
-        control_messages,
-        crop_messages,
-        look_messages,
-        plan_messages,
-        preview_messages,
-        row_messages,
-        teleop_messages,
-    ):
+    for module in (messages, page):
         for name, value in vars(module).items():
             if not name.startswith("_") and not is_union(value) and get_origin(value) is not None:
                 out.setdefault(name, value)

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, get_args, get_origin
 
 import msgspec
 
-from rolling_panda import intents, messages, page_messages
+from rolling_panda import messages
 from rolling_panda.errors import MessageError
 from rolling_panda.generate.description import (
     StructDescription,
@@ -18,7 +18,9 @@ from rolling_panda.generate.description import (
     reachable,
     union_members,
 )
-from rolling_panda.report_messages import SessionReport
+from rolling_panda.messages import commands as intents
+from rolling_panda.messages import page as page_messages
+from rolling_panda.messages.supervision import SessionReport
 
 #: Named literals whose values the page lists, and the name of the list.
 CONSTANTS = {
@@ -51,6 +53,9 @@ def messages_module() -> str:
         f"export const OF_HOLDER = Object.freeze([{holders}]);\n"
     )
     parts.append(f"export const TEXT_MAX_LENGTH = {_text_length()};\n")
+    parts.append(
+        f"/** From this confidence on points are accepted all at once. */\nexport const SURE = {intents.SURE};\n"
+    )
     return "\n".join(parts)
 
 
@@ -62,7 +67,7 @@ def messages_types() -> str:
     parts = [_HEADER]
     parts.extend(f"export const {list_name}: readonly {name}[];\n" for name, list_name in CONSTANTS.items())
     parts.append("export const INTENTS: readonly string[];\nexport const OF_HOLDER: readonly string[];\n")
-    parts.append("export const TEXT_MAX_LENGTH: number;\n")
+    parts.append("export const TEXT_MAX_LENGTH: number;\nexport const SURE: number;\n")
     parts.extend(_type(name, _spelled_out(hint)) for name, hint in aliases().items() if _is_worth_a_name(hint))
     said = union_members(page_messages.FromPage)
     parts.extend(_interface(describe(struct), struct in said) for struct in structs)

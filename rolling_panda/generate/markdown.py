@@ -6,9 +6,10 @@ from typing import Annotated, Any, Literal, get_args, get_origin
 
 import msgspec
 
-from rolling_panda import messages, page_messages
+from rolling_panda import messages
 from rolling_panda.errors import MessageError
 from rolling_panda.generate.description import alias_name, aliases, describe, is_union, reachable, union_members
+from rolling_panda.messages import page as page_messages
 from rolling_panda.topics import SERVICES, TOPICS
 
 _BLOCK = re.compile(r"(<!-- generated: ([a-z-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
@@ -60,6 +61,7 @@ def topics_table() -> str:
                 f"`{topic.name}`",
                 _link(topic.message),
                 topic.sender,
+                topic.readers,
                 rate,
                 topic.priority,
                 topic.congestion,
@@ -67,7 +69,9 @@ def topics_table() -> str:
                 topic.about,
             )
         )
-    return table(("topic", "message", "sender", "rate", "priority", "congestion", "carried", "what"), rows)
+    return table(
+        ("topic", "message", "sender", "carried to", "rate", "priority", "congestion", "carried", "what"), rows
+    )
 
 
 def services_table() -> str:

@@ -1,8 +1,8 @@
-"""The configuration of a stand-alone Zenoh router: mutual TLS and the access control of `rolling_panda.wire_access`."""
+"""The configuration of a stand-alone Zenoh router: mutual TLS, and access control from the topic table."""
 
 import json
 
-from rolling_panda.wire_access import access_control
+from rolling_panda.transport.access import access_control
 
 _HEAD = """\
 // Configuration of a Zenoh router (zenohd 1.x) for the robot's wire: mutual TLS, and everything refused that the table

@@ -2,7 +2,7 @@
 
 import pytest
 
-from benchmarks.apart import apart
+from benchmarks.faults.forked_trials import apart
 from rolling_panda.errors import RollingPandaError
 
 

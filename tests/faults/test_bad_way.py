@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from benchmarks.bad_way import BadWay, Parcel, WayFault
+from benchmarks.faults.lossy_link import BadWay, Parcel, WayFault
 
 
 @pytest.fixture

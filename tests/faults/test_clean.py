@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import pytest
 
-from benchmarks.clean import EndlessRow, main, work
+from benchmarks.faults.clean import EndlessRow, main, work
 
 
 def test_work_goes_on_without_a_stop_and_with_jitter_on_the_ways(tmp_path, monkeypatch, capsys):
     # Calm and rough seconds in turns, so that a short run has both.
-    monkeypatch.setattr("benchmarks.clean._CALM_S", 2.0)
+    monkeypatch.setattr("benchmarks.faults.clean._CALM_S", 2.0)
     file = tmp_path / "clean.json"
     assert main(["--seconds", "8", "--json", str(file)]) == 0
     found = json.loads(file.read_text())

@@ -3,14 +3,14 @@
 import time
 
 import pytest
-from fake_wire import FakeWire
-from running_server import running_server
 
-from benchmarks.crowd import looked_at
-from benchmarks.faults import loaded
+from benchmarks.faults.run import loaded
+from benchmarks.page.crowd import looked_at
 from bridge.config import BridgeConfig
 from rolling_panda.config import load_section
 from rolling_panda.errors import RollingPandaError
+from tests.support.fake_wire import FakeWire
+from tests.support.running_server import running_server
 
 
 # Pages are other programs, which take their time to begin.

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from benchmarks.fault_judge import Trial, braking_after, judge, last_taken, quiet_after, replays, summary, violations
-from benchmarks.fault_world import MODEL
-from bridge.sim.trace import ROW
+from benchmarks.faults.judge import Trial, braking_after, judge, last_taken, quiet_after, replays, summary, violations
+from benchmarks.faults.world import MODEL
+from bridge.sim.robot.trace import ROW
 
 
 def rows(*setpoints, epoch=1):

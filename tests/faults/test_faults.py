@@ -8,12 +8,12 @@ from functools import partial
 import pytest
 from msgspec.structs import replace as replace_field
 
-from benchmarks.apart import apart
-from benchmarks.fault_kinds import FAULTS
-from benchmarks.fault_world import World
-from benchmarks.faults import deal, main, run_trial, start
-from rolling_panda import intents
-from rolling_panda.teleop_messages import BaseVelocity
+from benchmarks.faults.forked_trials import apart
+from benchmarks.faults.kinds import FAULTS
+from benchmarks.faults.run import deal, main, run_trial, start
+from benchmarks.faults.world import World
+from rolling_panda.messages import commands as intents
+from rolling_panda.messages.supervision import BaseVelocity
 
 NAMED = {fault.name: fault for fault in FAULTS}
 SHORT = ("software stop", "controller killed, base at full speed", "an older controller's commands")
@@ -101,7 +101,7 @@ def test_trials_are_dealt_out_to_the_faults_of_a_requirement_each_with_a_seed_of
 def test_a_fault_that_is_not_survived_in_time_is_told_and_counted(tmp_path, monkeypatch, capsys):
     # With a limit that nothing can keep, the same stop is a failure.
     strict = replace(NAMED["software stop in automatic work"], limit_s=0.001)
-    monkeypatch.setattr("benchmarks.faults.FAULTS", (strict,))
+    monkeypatch.setattr("benchmarks.faults.run.FAULTS", (strict,))
     file = tmp_path / "faults.json"
     assert main(["--seed", "4", "--trials", "1", "--json", str(file)]) == 1
     document = json.loads(file.read_text())

@@ -4,14 +4,14 @@ import time
 
 import pytest
 
-from benchmarks.bad_way import WayFault
-from benchmarks.faulty_router import FaultyRouter, obey
-from benchmarks.live_robot import free_port
+from benchmarks.faults.faulty_router import FaultyRouter, obey
+from benchmarks.faults.live_robot import free_port
+from benchmarks.faults.lossy_link import WayFault
 from rolling_panda import messages as m
 from rolling_panda.config import TransportConfig
 from rolling_panda.errors import ServiceError
 from rolling_panda.topics import CONTROLLER, MOTION, RELEASE, STOP
-from rolling_panda.transport import Transport
+from rolling_panda.transport.zenoh import Transport
 
 pytestmark = pytest.mark.alone
 COMMAND = m.MotionCommand(epoch=1, token="a", sequence=1, echo=1, xi=(0.0,) * 9)
@@ -23,7 +23,9 @@ def wire():
     """The router, and bridge and controller at their doors."""
     doors = {name: f"tcp/127.0.0.1:{free_port()}" for name in ("bridge", "controller", "server")}
     router = FaultyRouter(doors, "rp1", seed=1)
-    sessions = {name: Transport(TransportConfig(connect=(doors[name],)), name, "rp1") for name in doors}
+    sessions = {
+        name: Transport(TransportConfig(connect=(doors[name],), plain_wire=True), name, "rp1") for name in doors
+    }
     yield router, sessions
     for session in sessions.values():
         session.close()

@@ -5,8 +5,8 @@ import math
 
 import pytest
 
-from benchmarks.faults import main
-from benchmarks.live_fault_kinds import LIVE_FAULTS
+from benchmarks.faults.live_fault_kinds import LIVE_FAULTS
+from benchmarks.faults.run import main
 
 # Starts all processes, and each fault takes some seconds.
 pytestmark = [pytest.mark.alone, pytest.mark.slow]

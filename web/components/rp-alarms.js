@@ -31,6 +31,8 @@ class RpAlarms extends HTMLElement {
         setText(known.act, each.act);
       }
       for (const [id, { row, seen }] of rows) {
+        // What was to be done about it is no advice any more.
+        row.classList.toggle("gone", seen < at);
         if (at - seen < LINGER_MS) continue;
         row.remove();
         rows.delete(id);

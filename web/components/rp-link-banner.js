@@ -2,7 +2,7 @@
 
 import { element, setText } from "../element.js";
 import { icon } from "../icons.js";
-import { link, now, stateAge } from "../state.js";
+import { isOpening, link, now, stateAge } from "../state.js";
 import { drawOn } from "../store.js";
 import { ageWords, counted } from "../words.js";
 
@@ -15,7 +15,7 @@ class RpLinkBanner extends HTMLElement {
     this.append(element("div", { class: "banner-head" }, icon("gone"), title), words, hint);
     drawOn([link, now], () => {
       const { status, attempts } = link.get();
-      const shown = status !== "open" && !(status === "connecting" && attempts === 0);
+      const shown = status !== "open" && !isOpening();
       document.body.classList.toggle("no-link", shown);
       if (this.hidden !== !shown) {
         this.hidden = !shown;

@@ -2,9 +2,9 @@
 
 import { element, setAttribute, setEnabled, setText } from "../element.js";
 import { moveTo, orderWords, plannersOrder, whyNoMove, whyNoPlannersOrder, workOrder } from "../order.js";
-import { link, now, pageState, points, selected } from "../state.js";
+import { brought, link, now, pageState, points, selected } from "../state.js";
 import { drawOn } from "../store.js";
-import { select } from "../teleoperation.js";
+import { bring, select } from "../teleoperation.js";
 import { inWords } from "../words.js";
 
 /** @typedef {import("../messages.js").PagePoint} PagePoint */
@@ -49,7 +49,11 @@ class RpOrder extends HTMLElement {
     this.list.addEventListener("keydown", (event) => this.key(event));
     this.list.addEventListener("click", (event) => this.choose(event));
     this.list.addEventListener("pointerdown", (event) => this.drag(event));
-    this.box.addEventListener("toggle", () => this.draw());
+    this.box.addEventListener("toggle", () => {
+      this.reveal(this.place(selected.get()));
+      this.draw();
+    });
+    drawOn([selected, brought], () => this.reveal(this.place(selected.get())));
     drawOn([points, pageState, link, now, selected], () => {
       setText(words, orderWords());
       setEnabled(back, whyNoPlannersOrder(), "Work in the order that the plan finds the quickest");
@@ -87,14 +91,12 @@ class RpOrder extends HTMLElement {
       this.space?.append(row);
     }
     const [, number, name, way] = row.children;
-    const refused = point.plan && !point.plan.order ? point.plan.reason : "";
-    const why = inWords([refused, point.entry.reason].filter(Boolean).join(" · "));
+    const why = inWords(point.entry.reason);
     if (number) setText(number, `${at + 1}`);
     if (name) setText(name, `${point.point.point_id} · vine ${point.point.vine}, spur ${point.point.spur}`);
-    if (way) setText(way, refused ? "refused" : point.plan ? `${point.plan.duration_s.toFixed(1)} s` : "");
+    if (way) setText(way, point.plan ? `${point.plan.duration_s.toFixed(1)} s` : "");
     setAttribute(row, "data-point-id", point.point.point_id);
     setAttribute(row, "title", why || point.point.reason);
-    row.classList.toggle("refused", why !== "");
     row.classList.toggle("dragged", point.point.point_id === this.dragged);
     setAttribute(row, "aria-selected", String(point.point.point_id === selected.get()));
   }
@@ -107,7 +109,7 @@ class RpOrder extends HTMLElement {
   /** @param {MouseEvent} event */
   choose(event) {
     const row = /** @type {Element} */ (event.target).closest(".order-row");
-    if (row instanceof HTMLElement) select(row.dataset.pointId ?? "");
+    if (row instanceof HTMLElement) bring(row.dataset.pointId ?? "");
   }
 
   /** @param {KeyboardEvent} event */
@@ -129,7 +131,7 @@ class RpOrder extends HTMLElement {
   /** @param {number} at */
   reveal(at) {
     const { list } = this;
-    if (!list) return;
+    if (!list || at < 0 || list.clientHeight === 0) return;
     if (at * ROW < list.scrollTop) list.scrollTop = at * ROW;
     else if ((at + 1) * ROW > list.scrollTop + list.clientHeight) list.scrollTop = (at + 1) * ROW - list.clientHeight;
   }

@@ -1,9 +1,9 @@
 // One row of the queue: a pruning point, why it is where it is, and what may be done with it.
 
-import { accept, isUnknown, reject, whyNotAccept, whyNotReject } from "../decisions.js";
+import { accept, isUnknown, isUnsure, reject, whyNotAccept, whyNotReject } from "../decisions.js";
 import { element, setEnabled, setText } from "../element.js";
 import { icon, setIcon } from "../icons.js";
-import { select } from "../teleoperation.js";
+import { bring, select } from "../teleoperation.js";
 import { POINT_WORDS, counted, inWords } from "../words.js";
 
 /** @typedef {import("../messages.js").PagePoint} PagePoint */
@@ -52,7 +52,7 @@ export class RpPoint extends HTMLElement {
       this.reason,
     );
     this.addEventListener("click", (event) => {
-      if (!(/** @type {Element} */ (event.target).closest("button"))) this.choose();
+      if (this.row && !(/** @type {Element} */ (event.target).closest("button"))) bring(this.row.point.point_id);
     });
     this.addEventListener("focus", () => this.choose());
   }
@@ -94,9 +94,10 @@ export class RpPoint extends HTMLElement {
     setText(this.word, POINT_WORDS[entry.state]);
     setText(this.place, point.point_id);
     const thick = `${(2000 * point.radius).toFixed(1)} mm`;
-    const sure = `${Math.round(100 * point.confidence)} %`;
+    // Rounded down: what reads like enough to be accepted with all others is enough.
+    const sure = `${Math.floor(100 * point.confidence + 1e-9)} %`;
     const planned = row.plan?.order ? `no. ${row.plan.order}, way ${row.plan.duration_s.toFixed(1)} s` : "";
-    setText(this.facts, `${point.nodes_kept}/${point.nodes_seen} nodes · ${thick} · ${sure}`);
+    setText(this.facts, `${point.nodes_kept}/${point.nodes_seen} nodes · ${thick} · ${isUnsure(row) ? "only " : ""}${sure}`);
     const kept = `Keeps ${point.nodes_kept} of ${counted(point.nodes_seen, "node")}`;
     this.facts.title = `${kept}; the cane is ${thick} thick; confidence ${sure}${planWords(row)}`;
     setText(this.reason, inWords([planned, entry.reason, point.reason].filter(Boolean).join(" · ")));

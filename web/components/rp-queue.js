@@ -2,11 +2,12 @@
 
 import { countOf, whyNot } from "../allowed.js";
 import { placing, setPlacing, whyNoPlacing } from "../by-hand.js";
-import { accept, acceptAll, decisions, undo, whyNoUndo, whyNotAccept, whyNotReject } from "../decisions.js";
+import { accept, acceptAll, decisions, sureOnes, undo, whyNoUndo, whyNotAccept, whyNotReject } from "../decisions.js";
 import { element, panelHead, setAttribute, setEnabled, setText } from "../element.js";
 import { icon } from "../icons.js";
+import { SURE } from "../messages.js";
 import { guardLookAgain, placeItem, placeWords } from "../look-again.js";
-import { link, now, pageState, points, selected, staleWords } from "../state.js";
+import { brought, link, now, pageState, points, selected, staleWords } from "../state.js";
 import { drawOn } from "../store.js";
 import { select } from "../teleoperation.js";
 import { counted } from "../words.js";
@@ -20,6 +21,8 @@ import { RpReason } from "./rp-reason.js";
 const MAY = Object.freeze(["AcceptPoint", "RejectPoint", "ResolvePoint"]);
 /** How long a process has been gone is in the reasons too, and grows all the time. */
 const AGE = /[\d.]+ (s|min|h)\b/g;
+/** Height of a group's heading, which stays at the top of the list (px). */
+const HEADING = 20;
 /** How many rows a page of the list is. */
 const PAGE = 6;
 /** Keys that go to another row: from one, of so many. @type {Readonly<Record<string, (at: number, last: number) => number>>} */
@@ -31,7 +34,6 @@ const STEPS = Object.freeze({
   Home: () => 0,
   End: (_, last) => last,
 });
-const THRESHOLDS = Object.freeze([0, 0.5, 0.7, 0.9]);
 
 class RpQueue extends HTMLElement {
   connectedCallback() {
@@ -46,7 +48,7 @@ class RpQueue extends HTMLElement {
     ];
     list.addEventListener("keydown", (event) => this.key(event));
     list.addEventListener("reject", (event) => this.askWhy(/** @type {RpPoint} */ (event.target)));
-    this.append(head, document.createElement("rp-rule"), orderOfWork(), element("div", { class: "queue-tools" }, summary, ...acceptEvery(), addByHand()), list, empty, element("div", { class: "open-places" }, ...open.map((each) => each.box)));
+    this.append(head, document.createElement("rp-rule"), orderOfWork(), element("div", { class: "queue-tools" }, summary, acceptEvery(), addByHand()), list, empty, element("div", { class: "open-places" }, ...open.map((each) => each.box)));
 
     /** @type {Map<string, HTMLElement>} */
     const groups = new Map();
@@ -75,6 +77,8 @@ class RpQueue extends HTMLElement {
       this.choose();
     });
     drawOn([selected], () => this.choose());
+    drawOn([brought], () => this.reveal());
+    this.list = list;
   }
 
   /** @type {Map<string, RpPoint>} */
@@ -83,6 +87,8 @@ class RpQueue extends HTMLElement {
   order = [];
   /** The row that is marked as chosen. */
   chosen = "";
+  /** @type {HTMLElement|undefined} */
+  list;
   /** The point that the robot is at. */
   active = "";
   reason = new RpReason();
@@ -129,7 +135,23 @@ class RpQueue extends HTMLElement {
     this.details.show(row);
     if (this.details.parentElement === item) return;
     item.append(this.details);
-    item.scrollIntoView({ block: "nearest" });
+    this.reveal();
+  }
+
+  /** Scroll the list, and nothing else of the page, to the chosen row. */
+  reveal() {
+    const item = this.rows.get(selected.get());
+    const list = this.list;
+    if (!item || !list) return;
+    const scroll = () => {
+      const [box, frame] = [item.getBoundingClientRect(), list.getBoundingClientRect()];
+      const top = frame.top + HEADING;
+      if (box.top < top || box.height > frame.bottom - top) list.scrollTop += box.top - top;
+      else if (box.bottom > frame.bottom) list.scrollTop += box.bottom - frame.bottom;
+    };
+    scroll();
+    // Rows that were out of sight have their heights only now.
+    window.requestAnimationFrame(scroll);
   }
 
   /**
@@ -215,20 +237,18 @@ function undoButton() {
 }
 
 function acceptEvery() {
-  const least = element("select", { id: "least-confidence", attributes: { "aria-label": "Least confidence to accept" } });
-  for (const value of THRESHOLDS) {
-    const words = value === 0 ? "any %" : `≥ ${value * 100} %`;
-    least.append(element("option", { text: words, attributes: { value: String(value) } }));
-  }
-  const button = element("button", { id: "accept-all", text: "Accept all", attributes: { type: "button" } });
-  button.addEventListener("click", () => {
-    void acceptAll(Number(least.value));
-  });
+  const button = element("button", { id: "accept-all", attributes: { type: "button" } });
+  button.addEventListener("click", () => void acceptAll());
   drawOn([points, pageState, link, now], () => {
-    const why = whyNot("AcceptAll") || (countOf("PROPOSED") === 0 ? "There is no proposed point" : "");
-    setEnabled(button, why, "Accept every proposed point with this confidence");
+    const sure = sureOnes().length;
+    const unsure = countOf("PROPOSED") - sure;
+    const words = `≥ ${Math.round(100 * SURE)} % sure`;
+    setText(button, `Accept all ${sure} (${words})`);
+    const none = unsure === 0 ? "There is no proposed point" : `No proposed point is ${words}: decide one by one`;
+    const rest = unsure === 0 ? "" : `; ${unsure} less sure: decide one by one`;
+    setEnabled(button, whyNot("AcceptAll") || (sure === 0 ? none : ""), `Accept every proposed point that is ${words}${rest}`);
   });
-  return [button, least];
+  return button;
 }
 
 function addByHand() {
@@ -283,8 +303,10 @@ function groupOf(row) {
 function summaryWords(rows) {
   if (rows.length === 0) return "";
   const notCut = countOf("FAILED_NOT_CUT");
+  const beyond = countOf("UNREACHABLE");
+  const reach = beyond > 0 ? ` · ${beyond} cannot be reached` : "";
   const more = notCut > 0 ? ` · ${notCut} not cut` : "";
-  return `${rows.length} found · ${countOf("ACCEPTED")} accepted · ${countOf("DONE")} done${more}`;
+  return `${rows.length} found · ${countOf("ACCEPTED")} accepted${reach} · ${countOf("DONE")} done${more}`;
 }
 
 function emptyWords() {

@@ -14,7 +14,7 @@ export class RpReport extends HTMLElement {
     this.timer = 0;
     this.words = element("p", { class: "hint", attributes: { role: "status" } });
     this.sums = element("dl", { class: "sums number" });
-    this.vines = table("By vine", ["Vine", "Done", "Not cut", "Unknown", "Minutes"]);
+    this.vines = table("By vine", ["Vine", "Done", "Not cut", "Unknown", "Out of reach", "Minutes"]);
     this.cuts = table("Cuts, the newest first", ["Ended", "Point", "Vine", "Outcome", "Seconds", "Accepted by"]);
     this.refusals = table("Refused, the newest first", ["When", "Who", "Asked for", "Why"]);
     this.control = table("Control", ["When", "Who", "What"]);
@@ -57,17 +57,18 @@ export class RpReport extends HTMLElement {
     const since = report.began_at > 0 ? `since ${clockWords(report.began_at)}` : "nothing recorded yet";
     const left = report.cut_count - report.cuts.length;
     setText(this.words, `From the ledger, ${since}${left > 0 ? `; ${left} older cuts are in the ledger alone` : ""}.`);
-    const count = (/** @type {"done"|"not_cut"|"unknown"} */ name) => report.vines.reduce((sum, vine) => sum + vine[name], 0);
+    const count = (/** @type {"done"|"not_cut"|"unknown"|"unreachable"} */ name) => report.vines.reduce((sum, vine) => sum + vine[name], 0);
     sums(this.sums, [
       ["Done", count("done")],
       ["Not cut", count("not_cut")],
       ["Unknown", count("unknown")],
+      ["Out of reach", count("unreachable")],
       ["Seconds a cut", ended.length > 0 ? (seconds / ended.length).toFixed(1) : "–"],
       ["Vines", report.vines.length],
       ["Refused", report.refusal_count],
     ]);
     this.vines.show(
-      report.vines.map((vine) => [vine.vine, vine.done, vine.not_cut, vine.unknown, (vine.seconds / 60).toFixed(1)]),
+      report.vines.map((vine) => [vine.vine, vine.done, vine.not_cut, vine.unknown, vine.unreachable, (vine.seconds / 60).toFixed(1)]),
       "No vine has been worked on yet.",
     );
     this.cuts.show(

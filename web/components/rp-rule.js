@@ -1,19 +1,19 @@
-// The pruning rule: what is tried here holds at once, and the points of all that was seen follow it.
+// The pruning rule. A slider only asks what another one would change; applied, it holds, and Undo takes it back.
 
 import { whyNothing } from "../allowed.js";
-import { post } from "../api.js";
 import { element, setEnabled, setText } from "../element.js";
-import { isLive, link, now, pageState, points, say } from "../state.js";
+import { isLive, link, now, pageState, points } from "../state.js";
 import { drawOn } from "../store.js";
-import { changesSince, changeWords } from "../what-if.js";
+import { applyRule, ruleWords, tryRule } from "../what-if.js";
 
 /** @typedef {import("../messages.js").PruningRule} PruningRule */
 /** @typedef {"nodes_kept"|"fruiting_nodes"|"keeper_diameter"|"offset"} Quantity */
 
-/** While somebody drags on, no more than one request waits for another (ms). */
+/** A dragged slider asks when it has rested for so long (ms); points that change meanwhile, after so long. */
 const SETTLE_MS = 150;
-/** Changes that come so long after the answer (ms) are no longer the rule's doing. */
-const WATCH_MS = 2500;
+const AGAIN_MS = 1000;
+/** So long (ms) an applied rule is shown before perception has said that it holds. */
+const PATIENCE_MS = 2500;
 
 /** @type {readonly { name: Quantity, label: string, unit: string, scale: number, range: [number, number, number] }[]} */
 const QUANTITIES = Object.freeze([
@@ -34,25 +34,31 @@ class RpRule extends HTMLElement {
     super();
     this.summary = element("span");
     this.outcome = element("p", { class: "rule-outcome", attributes: { role: "status" } });
-    this.back = element("button", { id: "rule-back", class: "quiet", text: "Put back", attributes: { type: "button" } });
+    this.apply = element("button", { id: "rule-apply", class: "primary", text: "Apply", attributes: { type: "button" } });
+    this.discard = element("button", { id: "rule-discard", class: "quiet", text: "Discard", attributes: { type: "button" } });
     /** @type {Map<Quantity, { row: HTMLElement, input: HTMLInputElement, value: HTMLElement }>} */
     this.sliders = new Map();
     /** @type {HTMLInputElement[]} */
     this.systems = [];
-    /** What somebody has set here and perception has not yet; null when nothing. @type {PruningRule|null} */
-    this.wanted = null;
-    /** The rule before the first change. @type {PruningRule|null} */
-    this.former = null;
-    this.timer = 0;
+    /** What the sliders say where that is not the rule in force; null where it is. @type {PruningRule|null} */
+    this.draft = null;
+    /** The rule that was applied last, until perception prunes by it. @type {PruningRule|null} */
+    this.applied = null;
+    /** Is it known what the draft would change? */
+    this.known = false;
     this.asking = false;
+    this.timer = 0;
+    /** @type {import("../messages.js").PagePoints|null} */
+    this.page = null;
   }
 
   connectedCallback() {
     const summary = element("summary", {}, this.summary);
     const body = element("div", { class: "rule-body" }, this.systemChoice(), ...QUANTITIES.map((each) => this.slider(each)));
-    body.append(element("div", { class: "rule-foot" }, this.outcome, this.back));
+    body.append(element("div", { class: "rule-foot" }, this.outcome, this.discard, this.apply));
     this.append(element("details", { class: "rule" }, summary, body));
-    this.back.addEventListener("click", () => this.former && this.want(this.former));
+    this.apply.addEventListener("click", () => void this.hold());
+    this.discard.addEventListener("click", () => this.want(points.get()?.rule ?? null));
     drawOn([points, pageState, link, now], () => this.draw());
   }
 
@@ -91,71 +97,78 @@ class RpRule extends HTMLElement {
 
   /** @param {Partial<PruningRule>} part */
   change(part) {
-    const rule = this.wanted ?? points.get()?.rule;
+    const rule = this.draft ?? this.applied ?? points.get()?.rule;
     if (rule) this.want({ ...rule, ...part });
   }
 
-  /** @param {PruningRule} rule */
+  /** @param {PruningRule|null} rule What the sliders say. */
   want(rule) {
-    this.former ??= points.get()?.rule ?? null;
-    this.wanted = rule;
-    window.clearTimeout(this.timer);
-    this.timer = window.setTimeout(() => void this.ask(), SETTLE_MS);
+    const held = this.applied ?? points.get()?.rule ?? null;
+    this.draft = rule && held && !same(rule, held) ? rule : null;
+    this.known = false;
+    setText(this.outcome, this.draft ? "Finding out what it would change…" : "");
+    this.askIn(SETTLE_MS);
     this.draw();
   }
 
-  async ask() {
-    if (this.asking || this.wanted === null) return;
-    this.asking = true;
-    const asked = this.wanted;
-    const before = points.get()?.points ?? [];
-    setText(this.outcome, "Trying it…");
-    const answer = await post("api/rule", asked);
-    this.asking = false;
-    if (this.wanted !== asked) {
-      void this.ask();
-      return;
-    }
-    if (!answer.ok) {
-      this.wanted = null;
-      setText(this.outcome, `Not done: ${answer.reason}`);
-      if (answer.status !== 409 && answer.status !== 503) say("error", `Rule refused: ${answer.reason}`);
-      this.draw();
-      return;
-    }
-    this.watch(before, asked);
+  /** @param {number} delay (ms) */
+  askIn(delay) {
+    window.clearTimeout(this.timer);
+    this.timer = 0;
+    if (this.draft) this.timer = window.setTimeout(() => void this.ask(), delay);
   }
 
-  /**
-   * Tell what becomes of the points, as it comes in. What was set stays on the sliders until perception says the same.
-   *
-   * @param {readonly import("../messages.js").PagePoint[]} before
-   * @param {PruningRule} asked
-   */
-  watch(before, asked) {
-    const settle = () => {
-      if (this.wanted === asked) this.wanted = null;
-    };
-    const tell = () => {
-      const page = points.get();
-      if (page?.rule && ruleWords(page.rule) === ruleWords(asked)) settle();
-      setText(this.outcome, changeWords(changesSince(before, page?.points ?? [])));
-    };
-    const stop = points.subscribe(tell);
+  /** What the draft would change. */
+  async ask() {
+    this.timer = 0;
+    const asked = this.draft;
+    if (asked === null || this.asking) return;
+    this.asking = true;
+    const answer = await tryRule(asked);
+    this.asking = false;
+    if (this.draft !== asked) {
+      if (!this.timer) this.askIn(0);
+      return;
+    }
+    this.known = answer.ok;
+    setText(this.outcome, answer.ok ? `If applied: ${answer.reason}` : `Not known: ${answer.reason}`);
+    if (!answer.ok) this.askIn(AGAIN_MS);
+    this.draw();
+  }
+
+  /** From now on points are by the draft. */
+  async hold() {
+    const rule = this.draft;
+    if (rule === null) return;
+    this.known = false;
+    this.draw();
+    if (!(await applyRule(rule))) {
+      this.askIn(0);
+      return;
+    }
+    this.applied = rule;
+    this.draft = null;
+    setText(this.outcome, "Applied. Undo takes it back, with the acceptances that it made void.");
     window.setTimeout(() => {
-      stop();
-      settle();
+      if (this.applied === rule) this.applied = null;
       this.draw();
-    }, WATCH_MS);
-    tell();
+    }, PATIENCE_MS);
+    this.draw();
   }
 
   draw() {
-    const rule = this.wanted ?? points.get()?.rule ?? null;
+    const page = points.get();
+    const held = page?.rule ?? null;
+    if (this.applied && held && same(this.applied, held)) this.applied = null;
+    if (this.draft && held && same(this.draft, held)) this.want(held);
+    // What it would change may be something else with every new picture.
+    if (page !== this.page && this.draft && !this.timer && !this.asking) this.askIn(AGAIN_MS);
+    this.page = page;
+    const rule = this.draft ?? this.applied ?? held;
     this.hidden = rule === null;
     if (rule === null) return;
     const why = whyNothing() || (isLive("perception") ? "" : "Perception is not there");
-    setText(this.summary, ruleWords(rule));
+    setText(this.summary, `${ruleWords(this.applied ?? held ?? rule)}${this.draft ? " · another one is tried" : ""}`);
     for (const input of this.systems) {
       if (input.checked !== (input.value === rule.system)) input.checked = input.value === rule.system;
       setEnabled(input, why);
@@ -169,17 +182,16 @@ class RpRule extends HTMLElement {
       setText(slider.value, `${shown}${unit}`);
       slider.row.hidden = name === "fruiting_nodes" && rule.system !== "guyot";
     }
-    const changed = this.former !== null && QUANTITIES.some(({ name }) => this.former?.[name] !== rule[name]);
-    this.back.hidden = !changed && (this.former === null || this.former.system === rule.system);
-    setEnabled(this.back, why, "The rule as it was before it was changed here; acceptances that are void stay void");
+    this.apply.hidden = this.discard.hidden = this.draft === null;
+    setEnabled(this.apply, why || (this.known ? "" : "It is not known yet what it would change"), "From now on points are by this rule; Undo takes it back");
   }
 }
 
-/** @param {PruningRule} rule */
-function ruleWords(rule) {
-  const nodes = rule.system === "guyot" ? `${rule.nodes_kept} + ${rule.fruiting_nodes}` : `${rule.nodes_kept}`;
-  const word = rule.system === "guyot" ? "Guyot" : "Spur";
-  const thick = Number((1000 * rule.keeper_diameter).toFixed(1));
-  return `${word} · ${nodes} nodes · ≥ ${thick} mm · ${Math.round(1000 * rule.offset)} mm past`;
+/**
+ * @param {PruningRule} one
+ * @param {PruningRule} other
+ */
+function same(one, other) {
+  return ruleWords(one) === ruleWords(other) && one.fruiting_nodes === other.fruiting_nodes;
 }
 customElements.define("rp-rule", RpRule);

@@ -4,7 +4,7 @@ import { post } from "../api.js";
 import { element, setText } from "../element.js";
 import { icon, setIcon } from "../icons.js";
 import { PROCESSES } from "../messages.js";
-import { isLive, link, now, pageState, processAge, roundTrip, say, stateAge } from "../state.js";
+import { isLive, isOpening, link, now, pageState, processAge, roundTrip, say, stateAge } from "../state.js";
 import { drawOn } from "../store.js";
 import { ageWords } from "../words.js";
 
@@ -40,13 +40,13 @@ class RpStatusBar extends HTMLElement {
       drawOn([pageState, link, now], () => {
         const live = isLive(process);
         // Without the server nothing is known of the others.
-        const unknown = process !== "server" && !isLive("server");
+        const unknown = process === "server" ? isOpening() : !isLive("server");
         const seconds = processAge(process);
         const since = seconds === null ? "not seen" : `gone ${ageWords(seconds)}`;
         chip.dataset.present = unknown ? "unknown" : String(live);
         setIcon(shape, unknown ? "UNKNOWN" : live ? "present" : "gone");
         setText(age, live || unknown ? "" : since);
-        chip.title = unknown ? `${process}: not known without the server` : live ? `${process} is there` : `${process}: ${since}`;
+        chip.title = unknown ? `${process}: ${isOpening() ? "not heard yet" : "not known without the server"}` : live ? `${process} is there` : `${process}: ${since}`;
       });
     }
     return box;
@@ -59,8 +59,9 @@ class RpStatusBar extends HTMLElement {
       const age = stateAge();
       const trip = roundTrip.get();
       const open = link.get().status === "open";
-      chip.dataset.quality = !open || age === null || age > 1 ? "bad" : (trip ?? 0) > 200 || age > 0.5 ? "poor" : "good";
-      setText(words, open && trip !== null ? `${trip.toFixed(0)} ms · ${ageWords(age ?? 0)}` : "no link");
+      const opening = isOpening();
+      chip.dataset.quality = opening ? "" : !open || age === null || age > 1 ? "bad" : (trip ?? 0) > 200 || age > 0.5 ? "poor" : "good";
+      setText(words, open && trip !== null ? `${trip.toFixed(0)} ms · ${ageWords(age ?? 0)}` : opening ? "connecting…" : "no link");
       chip.title = "Round trip between this page and the server, and the age of the newest state";
     });
     return chip;

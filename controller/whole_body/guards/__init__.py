@@ -1,1 +1,1 @@
-"""Inequalities that come before the tool's task, one source a file."""
+"""Inequality constraints above the tool task, one source a file."""

@@ -1,4 +1,4 @@
-"""In transit the tool stays ahead of the axle.
+"""Guard: the tool stays ahead of the axle in transit.
 
 With the tool at (a, b) in base_link the base gives it the velocity [v − bω, aω]: only from ahead (a > 0, driving
 forward) does steering towards a tool that moves sideways come to rest. Behind the axle the base jack-knifes, as a
@@ -10,9 +10,9 @@ import math
 
 import numpy as np
 
-from controller.whole_body.task import NO_ROWS, Demand, Inequalities
-from rolling_panda.differential_drive import NXI
-from rolling_panda.robot_model import ARM_Q, ARM_XI
+from controller.whole_body.task import NO_ROWS, IkProblem, Inequalities
+from rolling_panda.model.differential_drive import NXI
+from rolling_panda.model.robot import ARM_Q, ARM_XI
 
 #: Fastest way back to `ahead` (m/s).
 _BACK = 0.1
@@ -28,15 +28,15 @@ class AxleAhead:
         """Keep the tool `ahead` (m) of the axle, approached at `rate` (1/s)."""
         self._ahead, self._rate = ahead, rate
 
-    def rows(self, demand: Demand) -> Inequalities:
+    def rows(self, problem: IkProblem) -> Inequalities:
         """ȧ depends on the arm alone: the base carries the tool along."""
-        if demand.base != "transit":
+        if problem.base != "transit":
             return NO_ROWS
-        x, y, phi = demand.q[:3].tolist()
+        x, y, phi = problem.q[:3].tolist()
         c, s = math.cos(phi), math.sin(phi)
-        tool = demand.kinematics.T_odom_tool.translation
+        tool = problem.kinematics.T_odom_tool.translation
         a = c * (float(tool[0]) - x) + s * (float(tool[1]) - y)
         A = np.zeros((1, NXI))
-        J = demand.kinematics.J
+        J = problem.kinematics.J
         A[0, ARM_XI] = c * J[0, ARM_Q] + s * J[1, ARM_Q]
         return Inequalities(A, np.array([min(-self._rate * (a - self._ahead), _BACK)]), _NAMES)

@@ -1,4 +1,4 @@
-"""The robot keeps its distance from itself, the ground and obstacles.
+"""Guard: distances of the robot to itself, the ground and obstacles.
 
 For each pair of parts nearer than d_i, with n the direction between their nearest points and ḋ = nᵀ(v_b − v_a):
 
@@ -13,12 +13,12 @@ import math
 
 import numpy as np
 
-from controller.compiled import NOTHING, NUMBER, VECTOR, compiled
+from controller.config import HierarchyConfig, is_cane
 from controller.whole_body.collision import CollisionModel
-from controller.whole_body.hierarchy_config import HierarchyConfig, is_cane
-from controller.whole_body.task import NO_ROWS, Demand, Inequalities
-from rolling_panda.differential_drive import Array
+from controller.whole_body.compiled import NOTHING, NUMBER, VECTOR, compiled
+from controller.whole_body.task import NO_ROWS, IkProblem, Inequalities
 from rolling_panda.errors import ControlError
+from rolling_panda.model.differential_drive import Array
 
 
 class CollisionGuard:
@@ -34,13 +34,13 @@ class CollisionGuard:
         self._cane = config.cane_speed, config.cane_braking
         self._dt = dt
 
-    def rows(self, demand: Demand) -> Inequalities:
+    def rows(self, problem: IkProblem) -> Inequalities:
         """What has to hold in this period."""
         try:
-            near = self.model.dampers(demand.q, self._influence, demand.kinematics)
+            near = self.model.dampers(problem.q, self._influence, problem.kinematics)
         except ControlError:
-            # The demand's kinematics are those of another robot model, or of an earlier moment.
-            near = self.model.dampers(demand.q, self._influence)
+            # The problem's kinematics are those of another robot model, or of an earlier moment.
+            near = self.model.dampers(problem.q, self._influence)
         if not near.pairs:
             return NO_ROWS
         k = len(near.pairs)

@@ -1,11 +1,11 @@
-"""The arm's joints go to the posture's."""
+"""Task: the arm joints follow the posture."""
 
 import numpy as np
 
-from controller.compiled import NOTHING, NUMBER, VECTOR, compiled
-from controller.whole_body.task import Demand
-from rolling_panda.differential_drive import Array
-from rolling_panda.robot_model import ARM_XI
+from controller.whole_body.compiled import NOTHING, NUMBER, VECTOR, compiled
+from controller.whole_body.task import IkProblem
+from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.robot import ARM_XI
 
 
 class ArmPosture:
@@ -28,10 +28,10 @@ class ArmPosture:
         """Each joint has a row of its own."""
         jacobian[:, ARM_XI] = np.diag(self._share)
 
-    def write(self, demand: Demand, jacobian: Array, target: Array) -> None:
+    def write(self, problem: IkProblem, jacobian: Array, target: Array) -> None:
         """Write the targets."""
-        posture = demand.posture
-        _follow(posture.q, posture.rate, demand.q, self._gain, self._share, target)
+        posture = problem.posture
+        _follow(posture.q, posture.rate, problem.q, self._gain, self._share, target)
 
 
 @compiled(NOTHING(VECTOR, VECTOR, VECTOR, NUMBER, VECTOR, VECTOR))

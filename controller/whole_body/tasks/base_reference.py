@@ -1,4 +1,4 @@
-"""The base follows the posture's place and heading.
+"""Task: the base follows place and heading of the posture.
 
 With the error (e_x, e_y, e_φ) of the reference in base_link:
 v = v_ref cos e_φ + k_x e_x, ω = ω_ref + k_y v_ref e_y + k_φ sin e_φ, the classic law for a unicycle (Kanayama 1990).
@@ -7,8 +7,8 @@ A distance to the side is made good by steering while the base drives, as a diff
 
 import math
 
-from controller.whole_body.task import Demand
-from rolling_panda.differential_drive import Array
+from controller.whole_body.task import IkProblem
+from rolling_panda.model.differential_drive import Array
 
 #: k_y: a base 0.1 m beside its line turns towards it by half of that share of its way (rad/m²).
 _SIDE = 4.0
@@ -37,18 +37,18 @@ class BaseReference:
     def begin(self, jacobian: Array) -> None:
         """Nothing is the same in every mode."""
 
-    def write(self, demand: Demand, jacobian: Array, target: Array) -> None:
+    def write(self, problem: IkProblem, jacobian: Array, target: Array) -> None:
         """Write the rows."""
-        mode = demand.base
+        mode = problem.base
         place = self._shares[0] if mode == "row" else 0.0
         heading = self._shares[1] if mode in ("row", "free") else 0.0
         jacobian[0, 0], jacobian[1, 1] = place, heading
         if heading == 0.0:
             target[0] = target[1] = 0.0
             return
-        x, y, phi = demand.q[:3].tolist()
-        x_ref, y_ref, phi_ref = demand.posture.q[:3].tolist()
-        x_rate, y_rate, turn = demand.posture.rate[:3].tolist()
+        x, y, phi = problem.q[:3].tolist()
+        x_ref, y_ref, phi_ref = problem.posture.q[:3].tolist()
+        x_rate, y_rate, turn = problem.posture.rate[:3].tolist()
         c, s = math.cos(phi), math.sin(phi)
         ahead = c * (x_ref - x) + s * (y_ref - y)
         aside = c * (y_ref - y) - s * (x_ref - x)

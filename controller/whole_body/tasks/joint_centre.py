@@ -1,9 +1,9 @@
-"""Joints near a limit go back towards their middle."""
+"""Task: joints near a limit return towards their middle."""
 
-from controller.compiled import MATRIX, NOTHING, NUMBER, VECTOR, compiled
-from controller.whole_body.task import Demand
-from rolling_panda.differential_drive import Array
-from rolling_panda.robot_model import ARM_Q, ARM_XI, Limits
+from controller.whole_body.compiled import MATRIX, NOTHING, NUMBER, VECTOR, compiled
+from controller.whole_body.task import IkProblem
+from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.robot import ARM_Q, ARM_XI, Limits
 
 
 class JointCentre:
@@ -29,9 +29,9 @@ class JointCentre:
     def begin(self, jacobian: Array) -> None:
         """Nothing is the same in every posture."""
 
-    def write(self, demand: Demand, jacobian: Array, target: Array) -> None:
+    def write(self, problem: IkProblem, jacobian: Array, target: Array) -> None:
         """Write the rows."""
-        _go_back(demand.q, self._low, self._high, self._scale, self._gain, jacobian, target)
+        _go_back(problem.q, self._low, self._high, self._scale, self._gain, jacobian, target)
 
 
 @compiled(NOTHING(VECTOR, VECTOR, VECTOR, VECTOR, NUMBER, MATRIX, VECTOR))

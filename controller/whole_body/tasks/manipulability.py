@@ -1,13 +1,13 @@
-"""The arm climbs to postures in which it is more dexterous."""
+"""Task: the arm increases its manipulability."""
 
 import math
 
 import numpy as np
 
-from controller.compiled import MATRIX, NOTHING, NUMBER, VECTOR, compiled
+from controller.whole_body.compiled import MATRIX, NOTHING, NUMBER, VECTOR, compiled
 from controller.whole_body.manipulability import Manipulability
-from controller.whole_body.task import Demand
-from rolling_panda.differential_drive import NXI, Array
+from controller.whole_body.task import IkProblem
+from rolling_panda.model.differential_drive import NXI, Array
 
 #: A gradient of this length has no direction.
 _FLAT = 1e-6
@@ -35,7 +35,7 @@ class ClimbManipulability:
     def begin(self, jacobian: Array) -> None:
         """Nothing is the same in every posture."""
 
-    def write(self, demand: Demand, jacobian: Array, target: Array) -> None:
+    def write(self, problem: IkProblem, jacobian: Array, target: Array) -> None:
         """Write the row."""
         now = self.now
         lack = 0.0 if now is None else max(1.0 - now.value / self._good, 0.0)

@@ -1,11 +1,11 @@
-"""Velocities change no more than they have to."""
+"""Task: small changes of velocity."""
 
 import numpy as np
 
-from controller.compiled import NOTHING, PACKED, VECTOR, compiled
 from controller.whole_body.actuation import Actuation
-from controller.whole_body.task import Demand
-from rolling_panda.differential_drive import NXI, Array
+from controller.whole_body.compiled import NOTHING, PACKED, VECTOR, compiled
+from controller.whole_body.task import IkProblem
+from rolling_panda.model.differential_drive import NXI, Array
 
 
 class Smoothness:
@@ -22,9 +22,9 @@ class Smoothness:
         """Each actuator has a row of its own."""
         jacobian[:] = np.diag(self._share)
 
-    def write(self, demand: Demand, jacobian: Array, target: Array) -> None:
+    def write(self, problem: IkProblem, jacobian: Array, target: Array) -> None:
         """Write the targets."""
-        _keep(self._actuation.twist, demand.sent, self._share, target)
+        _keep(self._actuation.twist, problem.sent, self._share, target)
 
 
 @compiled(NOTHING(PACKED, VECTOR, VECTOR, VECTOR))

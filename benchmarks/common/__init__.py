@@ -1,0 +1,1 @@
+"""What several benchmarks share: worlds, intervals, documents and plots."""

@@ -1,0 +1,212 @@
+"""The whole robot in one thread: bridge, controller and perception on one simulated clock, without sockets or sleeping.
+
+What the processes exchange over the wire is handed over directly, at the rates they have there, so that the same seed
+and the same operator give the same trace, faster than real time.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Self
+
+import msgspec
+
+from bridge.core.bridge import TICK_S, BridgeOutputs
+from bridge.sim.build import simulated_bridge
+from bridge.sim.robot.robot import SimulatedRobot
+from controller.config import ControllerConfig
+from controller.core import Controller
+from controller.inputs import Sample
+from controller.interface import Outputs, StepInputs
+from controller.ledger.journal import LedgerState
+from controller.motion.base_estimate import BaseEstimate
+from controller.motion.follower import Tracking
+from controller.planning.cuts import CutPlanner
+from controller.planning.work_plan import WorkPlan
+from perception.config import PerceptionConfig
+from perception.pipeline import Perception
+from perception.segmentation.segmenter_choice import choose_segmenter
+from rolling_panda import messages as m
+from rolling_panda.config import RobotConfig, load_section
+from rolling_panda.messages import commands as intents
+from rolling_panda.messages.perception import CloseLook, Obstacles
+from rolling_panda.messages.supervision import Person, Presence
+from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.robot import RobotModel
+from rolling_panda.resources import resource
+
+# A frame takes perception about this long, so its points come later by as much.
+_PERCEPTION_S = 0.15
+# A closer look is at a part of a frame, and comes before the rest of it.
+_LOOK_S = 0.08
+# A plan of some points takes about this long.
+_PLANNING_S = 1.0
+
+
+class ClosedLoop:
+    """A simulated robot with an operator who is always present. `now` is simulated time (s)."""
+
+    def __init__(
+        self,
+        seed: int,
+        trace: Path | None = None,
+        config_path: Path | None = None,
+        method: str | None = None,
+        watch: Callable[["ClosedLoop", Tracking], None] | None = None,
+        plans: bool = True,
+        looks: bool = True,
+        segmenter: str = "",
+    ) -> None:
+        """Grow the row and stand the robot beside it.
+
+        Args:
+            seed: Of the row and of the camera's noise.
+            trace: File for the record of what was actuated.
+            config_path: TOML configuration; None takes the simulation's.
+            method: Whole-body method; None takes the configured one.
+            plans: False leaves the session's plan away.
+            looks: False cuts without a closer look before, and takes the cutter's word afterwards.
+            segmenter: Name of the segmenter; empty takes the configured one.
+            watch: Called after each control period in which the tool follows a trajectory.
+        """
+        path = config_path or resource("assets/config/sim.toml")
+        self.bridge = simulated_bridge(path, seed, trace)
+        robot = load_section(path, "robot", RobotConfig)
+        config = load_section(path, "controller", ControllerConfig)
+        if method is not None:
+            config = msgspec.structs.replace(config, method=method)
+        if not looks:
+            config = msgspec.structs.replace(config, confirm=False, verify=False)
+        self.controller = Controller(config, robot)
+        self._drive = RobotModel(robot).drive
+        self._control_ticks = max(1, round(1.0 / (config.rate_hz * TICK_S)))
+        self._control_hz = config.rate_hz
+        self._people: tuple[str, ...] = ()
+        self._watch = watch
+        self._planner = CutPlanner(config, robot) if plans else None
+        self._planned: tuple[float, WorkPlan] | None = None
+        seeing = load_section(path, "perception", PerceptionConfig)
+        weights = Path(seeing.weights) if seeing.weights else None
+        self.perception = Perception(seeing, choose_segmenter(segmenter or seeing.segmenter, weights))
+        self.now = 0.0
+        self.inputs = StepInputs(present=frozenset(m.PROCESSES))
+        self.state: m.ControllerState | None = None
+        self.events: list[m.LogEvent] = []
+        self._ticks = 0
+        self._looked: tuple[float, CloseLook] | None = None
+        self._seen: tuple[float, m.PruningPoints] | None = None
+
+    def tick(self) -> None:
+        """Advance one millisecond."""
+        self._ticks += 1
+        self.now = self._ticks * TICK_S
+        self._receive(self.bridge.step(self.now))
+        if self._ticks % self._control_ticks == 0:
+            self.inputs = replace(
+                self.inputs, server_seen=self.now, perception_seen=self.now, presence=Sample(self._present(), self.now)
+            )
+            self._send(self.controller.step(self.inputs, self.now))
+            tracking = self.controller.tracking
+            if self._watch is not None and tracking is not None and tracking.desired is not None:
+                self._watch(self, tracking)
+            self.inputs = replace(self.inputs, stops=(), ledger=LedgerState(self.controller.recorded))
+
+    def run(self, seconds: float) -> None:
+        """Advance by simulated seconds."""
+        for _ in range(round(seconds / TICK_S)):
+            self.tick()
+
+    def run_until(self, condition: Callable[[], bool], limit_s: float) -> bool:
+        """Advance until `condition()` holds; False when it does not within `limit_s` simulated seconds."""
+        end = self.now + limit_s
+        while self.now < end:
+            for _ in range(10):
+                self.tick()
+            if condition():
+                return True
+        return False
+
+    def ask(self, intent: intents.Intent) -> m.Answer:
+        """What an operator asks for, answered at once."""
+        if intent.user not in self._people:
+            # Who asks is there, which the controller hears in its next period.
+            self._people = (*self._people, intent.user)
+            self.run(1.0 / self._control_hz)
+        return self.controller.answer(intent, self.now)
+
+    def stop(self, reason: str) -> None:
+        """Press the software stop."""
+        request = m.StopRequest(stop_id=f"stop-{self._ticks}", source="server", user="operator", reason=reason)
+        self.bridge.on_stop(request, self.now)
+        self.inputs = replace(self.inputs, stops=(request,))
+
+    def queue(self, *states: m.PointState) -> Iterator[m.QueueEntry]:
+        """Entries of the queue in these states, in the order of work; all without states."""
+        entries = () if self.state is None else self.state.queue
+        return (entry for entry in entries if not states or entry.state in states)
+
+    def true_tool(self) -> Array:
+        """Where the simulated tool really is (3, m, world): ground truth, for judging alone."""
+        robot = self.bridge.robot
+        assert isinstance(robot, SimulatedRobot)
+        position: Array = robot.true_tool()[:3, 3]
+        return position
+
+    def configuration(self) -> Array:
+        """Configuration (12) as measured now; needs a joint state and an odometry."""
+        joints, odometry = self.inputs.joints, self.inputs.odometry
+        assert joints is not None and odometry is not None
+        return BaseEstimate(self._drive).configuration(joints.message, odometry.message)
+
+    def close(self) -> None:
+        """Close the trace."""
+        self.bridge.robot.close()
+
+    def __enter__(self) -> Self:
+        """Return the loop."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the trace."""
+        self.close()
+
+    def _present(self) -> Presence:
+        people = tuple(Person(name, name, "supervisor", 0.0, 0.0) for name in self._people)
+        return Presence(sequence=self._ticks, people=people)
+
+    def _receive(self, outputs: BridgeOutputs) -> None:
+        if outputs.joints is not None:
+            self.inputs = replace(self.inputs, joints=Sample(outputs.joints, self.now))
+        if outputs.odometry is not None:
+            self.inputs = replace(self.inputs, odometry=Sample(outputs.odometry, self.now))
+        if outputs.state is not None:
+            self.inputs = replace(self.inputs, bridge=Sample(outputs.state, self.now))
+        if outputs.frame is not None and outputs.frame.point_id:
+            self._looked = self.now + _LOOK_S, self.perception.look_closely(outputs.frame)
+        if self._looked is not None and self.now >= self._looked[0]:
+            self.inputs, self._looked = replace(self.inputs, look=Sample(self._looked[1], self.now)), None
+        if outputs.frame is not None:
+            self._seen = self.now + _PERCEPTION_S, self.perception.process(outputs.frame)
+        if self._seen is not None and self.now >= self._seen[0]:
+            points = self._seen[1]
+            obstacles = Obstacles(header=points.header, capsules=self.perception.obstacles)
+            self.inputs = replace(self.inputs, points=Sample(points, self.now), obstacles=Sample(obstacles, self.now))
+            self._seen = None
+        self.events.extend(outputs.events)
+
+    def _send(self, outputs: Outputs) -> None:
+        if outputs.motion is not None:
+            self.bridge.on_motion(outputs.motion, self.now)
+        if outputs.cut is not None:
+            self.bridge.on_cut(outputs.cut, self.now)
+        if outputs.picture is not None:
+            self.bridge.on_picture(outputs.picture)
+        if outputs.release is not None:
+            self.bridge.on_release(outputs.release, self.now)
+        if outputs.state is not None:
+            self.state = outputs.state
+        if outputs.request is not None and self._planner is not None:
+            self._planned = self.now + _PLANNING_S, self._planner.plan(outputs.request)
+        if self._planned is not None and self.now >= self._planned[0]:
+            self.inputs, self._planned = replace(self.inputs, plan=self._planned[1]), None
+        self.events.extend(outputs.events)

@@ -1,0 +1,1 @@
+"""Control: step time, reach, rows worked off, and what recording costs."""

@@ -1,0 +1,204 @@
+"""One target and one method: plan where the method plans, then closed-loop control of a kinematic robot.
+
+The robot does in each period exactly what is sent: velocities as commanded, the base on the arc of its wheels. What the
+method sends is not limited again, so that a limit that it breaks is seen.
+"""
+
+import time
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import msgspec
+import numpy as np
+
+from benchmarks.control.goal_planner import GOOD_OMEGA, GoalPlanner
+from benchmarks.control.plan_follower import PlanFollower
+from benchmarks.control.reach_judge import POSITION, ROTATION, BaseBounds, Trajectory, goal_error
+from controller.config import ControllerConfig, HierarchyConfig
+from controller.motion.follower import tool_error
+from controller.motion.speed_limits import plan_limits
+from controller.motion.trajectory import PoseTrajectory, Rates
+from controller.planning.path import Refused
+from controller.whole_body.collision import CollisionModel
+from controller.whole_body.registry import make_method
+from controller.whole_body.task import IkProblem, Method, Posture, Solution, ToolTask
+from rolling_panda.model.differential_drive import NXI, Array
+from rolling_panda.model.robot import RobotModel
+
+MethodName = Literal["hierarchy", "nullspace", "decoupled"]
+METHODS: tuple[MethodName, ...] = ("hierarchy", "nullspace", "decoupled")
+#: Longest motion (s), and the control period (s).
+LIMIT_S, DT = 30.0, 0.01
+#: The base's vendor's planner: 0.8 m/s, 0.6 rad/s.
+BASE = BaseBounds(0.8, 0.6)
+_GAIN = 3.0
+#: What has not arrived this long before the time is over stops (s).
+_STOPPING_S = 0.8
+#: A motion ends when the tool is nearer than this share of the tolerance and every joint and wheel as good as at rest
+#: (rad/s), so that it may stop within one period.
+_BETTER, _REST = 0.2, 0.02
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a run gave.
+
+    Attributes:
+        trajectory: What was done; a single row where nothing was.
+        infeasible: Periods in which the method could not do all that was asked.
+        planned_s: Processor time of planning (s).
+        reason: Why there is no plan, or the method's last complaint; empty where all went well.
+        refused: True where no plan was found and nothing moved.
+    """
+
+    trajectory: Trajectory
+    infeasible: int
+    planned_s: float
+    reason: str
+    refused: bool = False
+
+
+class Runner:
+    """Runs targets with one method. One instance a process."""
+
+    def __init__(self, method: MethodName, seed: int = 0) -> None:
+        """Build robot, planner and method.
+
+        Args:
+            method: `hierarchy` follows a plan, base and arm together; `decoupled` a plan that drives, stops, and then
+                reaches, with the same controller; `nullspace` is the paper's: a straight screw, without a plan.
+            seed: Of the planner.
+        """
+        self.robot = RobotModel()
+        self.collision = CollisionModel(RobotModel())
+        config = bench_config(method)
+        self._config, self._method_name = config, method
+        self._method: Method = make_method(self.robot, config, DT)
+        limits = plan_limits(self.robot, BASE.speed, BASE.yaw_rate, config.base_acceleration, dt=DT)
+        planning = RobotModel()
+        self._planner = GoalPlanner(planning, CollisionModel(planning), limits, seed)
+
+    def run(self, q: Array, goal: Any, free: bool, base_fixed: bool = False, good_omega: float = GOOD_OMEGA) -> Outcome:
+        """From rest at a configuration (12) towards a tool pose (pin.SE3); see `GoalPlanner.plan`."""
+        if self._method_name == "nullspace":
+            return self._straight(q, goal, free, base_fixed)
+        began = time.process_time()
+        planned = self._planner.plan(
+            q, goal, free, base_fixed, together=self._method_name != "decoupled", good_omega=good_omega
+        )
+        planned_s = time.process_time() - began
+        if isinstance(planned, Refused):
+            return Outcome(Trajectory(np.zeros(1), q[None], np.zeros((1, NXI))), 0, planned_s, planned.reason, True)
+        follower = PlanFollower(self.robot, self._method, planned.plan, _GAIN, free, base_fixed)
+        loop = _Loop(self.robot, q)
+        while loop.time < LIMIT_S - DT / 2:
+            kinematics = self.robot.kinematics(loop.q)
+            if follower.done and _arrived(goal_error(kinematics.T_odom_tool, goal, free), loop.xi):
+                break
+            if loop.time > LIMIT_S - _STOPPING_S:
+                loop.stop()
+            else:
+                loop.take(follower.step(loop.q, kinematics, loop.xi))
+        return loop.outcome(planned_s)
+
+    def _straight(self, q: Array, goal: Any, free: bool, base_fixed: bool) -> Outcome:
+        config = self._config
+        trajectory = PoseTrajectory(
+            self.robot.pose(q, self.robot.tool_id),
+            goal,
+            Rates(config.tool_speed, config.tool_acceleration, config.tool_jerk),
+            Rates(config.tool_turn, 3.0 * config.tool_acceleration, 3.0 * config.tool_jerk),
+        )
+        loop, clock = _Loop(self.robot, q), 0.0
+        scale = 1.0
+        while loop.time < LIMIT_S - DT / 2:
+            kinematics = self.robot.kinematics(loop.q)
+            if clock >= trajectory.duration and _arrived(goal_error(kinematics.T_odom_tool, goal, free), loop.xi):
+                break
+            if loop.time > LIMIT_S - _STOPPING_S:
+                loop.stop()
+                continue
+            wanted = trajectory.at(clock)
+            error = _GAIN * tool_error(kinematics.T_odom_tool, wanted.T_odom_tool)
+            solution = self._method.solve(
+                IkProblem(
+                    q=loop.q,
+                    kinematics=kinematics,
+                    sent=loop.xi,
+                    tool=ToolTask(wanted.twist + error, free_axis=free),
+                    # No posture is wanted: where the robot is, is right.
+                    posture=Posture(loop.q),
+                    base="frozen" if base_fixed else "free",
+                    scale=scale,
+                )
+            )
+            scale = solution.scale
+            clock += DT * scale
+            loop.take(solution)
+        return loop.outcome(0.0)
+
+
+class _Loop:
+    """The kinematic robot and its record."""
+
+    def __init__(self, robot: RobotModel, q: Array) -> None:
+        self.q, self.xi, self.time = q.copy(), np.zeros(NXI), 0.0
+        self._drive, self._slowing = robot.drive, 0.5 * DT * robot.limits.acceleration
+        self._rows: list[Array] = [q.copy()]
+        self._sent: list[Array] = []
+        self._infeasible, self._reason = 0, ""
+
+    def take(self, solution: Solution) -> None:
+        """One period with what the method sends."""
+        if not solution.feasible:
+            self._infeasible, self._reason = self._infeasible + 1, solution.reason
+        self._move(solution.xi)
+
+    def _move(self, xi: Array) -> None:
+        self.xi = xi
+        self.q = self.q.copy()
+        self.q[:3] = self._drive.integrate(self.q[:3], float(self.xi[0] * DT), float(self.xi[1] * DT))
+        self.q[3:] += self.xi * DT
+        self.time += DT
+        self._rows.append(self.q)
+        self._sent.append(self.xi)
+
+    def stop(self) -> None:
+        """One period of slowing down along the same direction, at half of the rated accelerations."""
+        largest = float((np.abs(self.xi) / self._slowing).max())
+        self._move(np.zeros(NXI) if largest <= 1.0 else self.xi * (1.0 - 1.0 / largest))
+
+    def outcome(self, planned_s: float) -> Outcome:
+        """What was done."""
+        t: Array = DT * np.arange(len(self._rows), dtype=np.float64)
+        xi = np.vstack([*self._sent, np.zeros(NXI)])
+        return Outcome(Trajectory(t, np.array(self._rows), xi), self._infeasible, planned_s, self._reason)
+
+
+def bench_config(method: MethodName) -> ControllerConfig:
+    """The controller with the arm's full rates and the base's as its vendor's planner has them."""
+    return msgspec.structs.replace(
+        ControllerConfig(),
+        method="nullspace" if method == "nullspace" else "hierarchy",
+        base_speed=BASE.speed,
+        base_yaw_rate=BASE.yaw_rate,
+        base_acceleration=0.8,
+        base_yaw_acceleration=1.3,
+        arm_share=1.0,
+        arm_acceleration_share=1.0,
+        joint_margin=0.005,
+        # 4√2 m in 30 s with the quintic's peak at 1.875 of the mean.
+        tool_speed=0.8,
+        tool_turn=1.0,
+        # The plan has chosen its postures: in the null space nothing else is wanted, and where it leads past a
+        # singularity, damping would only lead off it.
+        hierarchy=HierarchyConfig(manipulability=0.0, joint_centre=0.0, damping=1e-5),
+    )
+
+
+def _arrived(error: Array, xi: Array) -> bool:
+    return bool(
+        float(np.linalg.norm(error[:3])) < _BETTER * POSITION
+        and float(np.linalg.norm(error[3:])) < _BETTER * ROTATION
+        and float(np.abs(xi).max()) < _REST
+    )

@@ -1,0 +1,279 @@
+"""`rolling-panda bench row`: accept what was detected, cut it in physics, judge by the simulator's own trace.
+
+Several methods work on the same accepted points: a seed's row looks the same to each before the first cut.
+"""
+
+import argparse
+import math
+import re
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from msgspec.structs import replace
+
+from benchmarks.common.closed_loop import ClosedLoop
+from benchmarks.common.documents import machine, one_row_a_line
+from benchmarks.control.cane_touches import Cane, CaneTouches, staying_rods
+from benchmarks.control.cut_truth import true_cut
+from benchmarks.control.row_report import Cut, RowRun, mean_stages, summarise, tell, tell_stages
+from benchmarks.control.row_stages import StageClock
+from benchmarks.control.row_walk import walk
+from bridge.sim.robot import trace
+from bridge.sim.robot.robot import SimulatedRobot
+from bridge.sim.vineyard.row import Row
+from bridge.sim.vineyard.truth import judge
+from controller.config import ControllerConfig
+from controller.motion.follower import Tracking
+from controller.whole_body.registry import METHODS
+from perception.segmentation.segmenter_choice import SEGMENTERS
+from rolling_panda import messages as m
+from rolling_panda.config import load_section
+from rolling_panda.messages import commands as intents
+from rolling_panda.resources import resource
+
+#: A point in another state than these has ended: cut, given up, or void after a closer look.
+_OPEN: tuple[m.PointState, ...] = ("ACCEPTED", "INTENT")
+_SURVEY_S = 6.0
+_LOOK_S, _LIMIT_S = 3.0, 120.0
+#: Periods between two looks at what touches a cane.
+_LOOK_EVERY = 4
+
+
+def cut_row(
+    seed: int,
+    points: int,
+    method: str,
+    pictures: float,
+    along: float = 0.0,
+    plans: bool = True,
+    looks: bool = True,
+    segmenter: str = "",
+) -> RowRun:
+    """Survey from the start posture, accept up to `points` of what was detected, work through them.
+
+    A refused acceptance is not among the cuts, as an operator sees the refusal.
+
+    Args:
+        seed: Of the row.
+        points: Most points to accept.
+        method: Whole-body method.
+        pictures: The camera takes a second while the robot moves; they are most of what a run costs.
+        along: With a distance (m), not these points but the whole row is worked off until the base has come so far,
+            with everything that is found on the way.
+        plans: False works without the session's plan.
+        looks: False cuts without the closer looks before and after.
+        segmenter: In place of the configured one.
+    """
+    errors: list[float] = []
+    clock = StageClock(load_section(resource("assets/config/sim.toml"), "controller", ControllerConfig))
+
+    def watch(loop: ClosedLoop, tracking: Tracking) -> None:
+        if loop.controller.mode == "AUTO":
+            clock.note(loop, tracking)
+            if len(errors) % _LOOK_EVERY == 0:
+                row = _row(loop)
+                touches.look(loop.configuration(), row.standing(), row.revision)
+            errors.append(float(np.linalg.norm(loop.true_tool() - tracking.desired.translation)))
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "trace"
+        config = _config(Path(folder) / "row.toml", pictures)
+        with ClosedLoop(seed, path, config, method, watch, plans, looks, segmenter) as loop:
+            touches, truths = CaneTouches(staying_rods(_row(loop))), judge(_row(loop))
+            accepted = [] if along else _accept(loop, points)
+            begin, other_s = loop.now, 0.0
+            if along:
+                loop.run(_SURVEY_S)
+                loop.ask(intents.Arm(user="bench"))
+                clock.begin(loop.now)
+                work_s, other_s = walk(loop, along)
+                accepted, durations = [entry for entry in loop.queue() if entry.accepted_position is not None], {}
+            else:
+                loop.ask(intents.Start(user="bench"))
+                clock.begin(begin)
+                durations = _work(loop, [entry.point_id for entry in accepted])
+                work_s = sum(durations.values()) if durations else loop.now - begin
+            ends = {entry.point_id: entry for entry in loop.queue()}
+            stops = sum("PROTECTIVE_STOP" in event.text for event in loop.events)
+        record = trace.read(path)
+    events = {event["point_id"]: event for event in record.events if event["event"] == "cut"}
+    severed: dict[str, list[dict[str, Any]]] = {}
+    for bite in record.events:
+        severed.setdefault(bite.get("point_id", ""), []).extend(bite.get("severed", ()))
+    cuts = []
+    for entry in accepted:
+        event, where = events.get(entry.point_id), entry.accepted_position
+        assert where is not None
+        pieces = severed.get(entry.point_id, [])
+        end = ends.get(entry.point_id, replace(entry, state="PROPOSED", reason="perception does not see it any more"))
+        truth = true_cut(truths, pieces)
+        cuts.append(
+            Cut(
+                method=method,
+                seed=seed,
+                point_id=entry.point_id,
+                state=end.state,
+                reason=end.reason,
+                distance=min((math.dist(piece["point"], where) for piece in pieces), default=None),
+                tool_error=None if event is None else math.dist(event["blade"], where),
+                duration_s=durations.get(entry.point_id, 0.0),
+                true_right=truth.right,
+                harm=truth.harm,
+            )
+        )
+    return RowRun(
+        method=method,
+        seed=seed,
+        cuts=tuple(cuts),
+        work_s=work_s,
+        other_s=other_s,
+        path_rms=math.sqrt(float(np.mean(np.square(errors)))) if errors else 0.0,
+        contacts=int(np.count_nonzero(record.rows["contacts"])),
+        self_contacts=int(np.count_nonzero(record.rows["self_contacts"])),
+        stops=stops,
+        stages=clock.stages,
+        limits=clock.limits,
+        canes_touched=_spared(touches, record.events),
+        staying_touched=_named(touches.touched_staying),
+    )
+
+
+def _row(loop: ClosedLoop) -> Row:
+    robot = loop.bridge.robot
+    assert isinstance(robot, SimulatedRobot)
+    return robot.row
+
+
+def _config(path: Path, pictures: float) -> Path:
+    """The simulation's configuration with another rate of pictures."""
+    text = resource("assets/config/sim.toml").read_text(encoding="utf-8")
+    usual = re.compile(r"^camera_moving_hz = .*$", re.MULTILINE)
+    path.write_text(usual.sub(f"camera_moving_hz = {pictures}", text, count=1), encoding="utf-8")
+    return path
+
+
+def _spared(touches: CaneTouches, events: Sequence[dict[str, Any]]) -> dict[str, str]:
+    """What was touched, but for the canes that were cut."""
+    cut = {(piece["vine"], piece["spur"], piece["cane"]) for event in events for piece in event.get("severed", ())}
+    return _named({cane: parts for cane, parts in touches.touched.items() if cane not in cut})
+
+
+def _named(touched: dict[Cane, set[str]]) -> dict[str, str]:
+    return {
+        f"vine {vine}, spur {spur}, cane {cane}": ", ".join(sorted(parts))
+        for (vine, spur, cane), parts in sorted(touched.items())
+    }
+
+
+def _accept(loop: ClosedLoop, points: int) -> list[m.QueueEntry]:
+    loop.run(_SURVEY_S)
+    loop.ask(intents.Arm(user="bench"))
+    loop.ask(intents.AcceptAll(user="bench", confidence=0.0))
+    loop.run(0.2)
+    accepted = list(loop.queue("ACCEPTED"))
+    for entry in accepted[points:]:
+        loop.ask(intents.RejectPoint(user="bench", point_id=entry.point_id, reason="not in this run"))
+    # An operator looks at the queue, with or without a plan, before starting.
+    loop.run(_LOOK_S)
+    return accepted[:points]
+
+
+def _work(loop: ClosedLoop, todo: list[str]) -> dict[str, float]:
+    """Run until every point has ended or the work stands still. Returns simulated seconds a point."""
+    durations: dict[str, float] = {}
+    begin = loop.now
+    while len(durations) < len(todo):
+
+        def ended() -> set[str]:
+            return set(todo) - set(durations) - {entry.point_id for entry in loop.queue(*_OPEN)}
+
+        if not loop.run_until(lambda: bool(ended()), _LIMIT_S):
+            break
+        for point_id in ended():
+            durations[point_id] = loop.now - begin
+            begin = loop.now
+    loop.run(3.0)
+    return durations
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the benchmark; returns the exit code."""
+    parser = argparse.ArgumentParser(prog="rolling-panda bench row", description=__doc__)
+    parser.add_argument("--seed", type=int, default=0, help="first seed (default: 0)")
+    parser.add_argument("--count", type=int, default=10, help="rows to work off (default: 10)")
+    parser.add_argument("--points", type=int, default=4, help="most points accepted in a row (default: 4)")
+    parser.add_argument(
+        "--method",
+        action="append",
+        choices=tuple(METHODS),
+        help="whole-body method; may be given several times (default: all of them)",
+    )
+    parser.add_argument(
+        "--along",
+        type=float,
+        default=0.0,
+        metavar="METRES",
+        help="work along the row until the base has come so far, with every point that is found on the way",
+    )
+    parser.add_argument(
+        "--pictures", type=float, default=0.7, help="pictures a second while the robot moves (default: 0.7)"
+    )
+    parser.add_argument("--no-looks", action="store_true", help="cut without the closer looks before and after")
+    parser.add_argument("--segmenter", default="", choices=SEGMENTERS, help="in place of the configured one")
+    parser.add_argument("--stages", action="store_true", help="say where the time of a cut goes")
+    parser.add_argument("--no-plan", action="store_true", help="work along the row without the session's plan")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows and the summary here")
+    parser.add_argument("--plot", type=Path, metavar="FILE", help="draw the time of a cut by method and stage (PNG)")
+    arguments = parser.parse_args(argv)
+    methods = arguments.method or list(METHODS)
+    runs: list[RowRun] = []
+    print(f"{'method':<10} {'seed':>4} {'accepted':>8} {'right':>6} {'s a cut':>8} {'contacts':>8} {'× real time':>11}")
+    for seed in range(arguments.seed, arguments.seed + arguments.count):
+        for method in methods:
+            begin = time.perf_counter()
+            run = cut_row(
+                seed,
+                arguments.points,
+                method,
+                arguments.pictures,
+                arguments.along,
+                not arguments.no_plan,
+                not arguments.no_looks,
+                arguments.segmenter,
+            )
+            runs.append(run)
+            tell(run, (run.work_s + _SURVEY_S) / (time.perf_counter() - begin))
+    print()
+    summary = {method: summarise([run for run in runs if run.method == method]) for method in methods}
+    names = list(next(iter(summary.values())))
+    print(f"{'':<18}" + "".join(f"{method:>12}" for method in methods))
+    for name in names:
+        print(f"{name:<18}" + "".join(f"{summary[method][name]:>12}" for method in methods))
+    if arguments.stages:
+        tell_stages({method: [run for run in runs if run.method == method] for method in methods})
+    if arguments.plot is not None:
+        # Drawing is for development; without its library the rest works.
+        from benchmarks.control.row_plot import draw
+
+        draw({method: mean_stages([run for run in runs if run.method == method]) for method in methods}, arguments.plot)
+    if arguments.json is not None:
+        document = {
+            "pictures_hz": arguments.pictures,
+            "looks": not arguments.no_looks,
+            "segmenter": arguments.segmenter,
+            "machine": machine(),
+            "summary": summary,
+            "results": [asdict(run) for run in runs],
+        }
+        arguments.json.write_text(one_row_a_line(document), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

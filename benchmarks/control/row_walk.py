@@ -1,0 +1,73 @@
+"""An operator who works along a whole row: accepts what is found, starts, drives on where nothing is left."""
+
+import math
+from dataclasses import replace
+
+from benchmarks.common.closed_loop import ClosedLoop
+from controller.inputs import Sample
+from rolling_panda.messages import commands as intents
+from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
+
+_USER = "bench"
+#: How often the operator looks at what was found (s), and how long they let the camera look at a new place (s).
+_LOOK_S, _SURVEY_S = 0.5, 3.0
+#: How far they drive on at a time (m), and how fast (m/s).
+_ON, _SPEED = 0.6, 0.25
+#: What brings the arm home, or a row to its end, takes no longer than this (s).
+_PATIENCE_S = 60.0
+
+
+def walk(loop: ClosedLoop, end: float, limit_s: float = 600.0) -> tuple[float, float]:
+    """Work until the base has come to `end` (m along the row) and nothing is left to cut.
+
+    Args:
+        loop: Armed and at the beginning of the row.
+        end: Place of the base (m).
+        limit_s: Longest time (s, simulated).
+
+    Returns:
+        Seconds of automatic work, and seconds of all else: looking, driving on by hand, bringing the arm home.
+    """
+    working = other = 0.0
+    until = loop.now + limit_s
+    while loop.now < until:
+        loop.ask(intents.AcceptAll(user=_USER, confidence=0.0))
+        if loop.controller.mode == "PAUSED":
+            loop.ask(intents.Resume(user=_USER))
+            loop.run(0.05)
+        if loop.ask(intents.Start(user=_USER)).ok:
+            begin = loop.now
+            while loop.now < until and (loop.controller.mode == "AUTO" or loop.now - begin < 0.1):
+                loop.run(_LOOK_S)
+                # What comes into view on the way is accepted too, and worked on without a stop.
+                loop.ask(intents.AcceptAll(user=_USER, confidence=0.0))
+            working += loop.now - begin
+            continue
+        if _place(loop) >= end:
+            break
+        begin = loop.now
+        _go_on(loop, min(_ON, end - _place(loop) + 0.02))
+        other += loop.now - begin
+    return working, other
+
+
+def _place(loop: ClosedLoop) -> float:
+    odometry = loop.inputs.odometry
+    return 0.0 if odometry is None else odometry.message.pose.x
+
+
+def _go_on(loop: ClosedLoop, distance: float) -> None:
+    """Arm home, drive on by hand, look."""
+    if loop.ask(intents.Home(user=_USER)).ok:
+        loop.run(0.1)
+        loop.run_until(lambda: loop.state is not None and "home" in loop.state.reason, _PATIENCE_S)
+        loop.run_until(lambda: loop.state is not None and "being brought" not in loop.state.reason, _PATIENCE_S)
+    begin, goal = loop.now, _place(loop) + distance
+    while _place(loop) < goal and loop.now - begin < _PATIENCE_S:
+        left = goal - _place(loop)
+        drive = BaseVelocity(linear=min(_SPEED, math.sqrt(0.4 * max(left, 0.0)) + 0.01), angular=0.0)
+        held = TeleopTarget(sequence=round(100 * loop.now), hold=True, user=_USER, base=drive)
+        loop.inputs = replace(loop.inputs, teleop=Sample(held, loop.now))
+        loop.run(0.05)
+    loop.inputs = replace(loop.inputs, teleop=None)
+    loop.run(_SURVEY_S)

@@ -1,0 +1,288 @@
+"""One robot under faults: the real bridge core and controller on a plant with servo lag, on one simulated clock.
+
+Between them are links that drop, delay, repeat, reorder or hold back what they carry. What is judged is the record at
+the plant's actuators, in the form of the simulator's trace, and nothing that the program says of itself.
+"""
+
+import random
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any, cast
+
+import msgspec
+import numpy as np
+
+from bridge.config import BridgeConfig, OdometryConfig
+from bridge.core.bridge import TICK_S, BridgeCore
+from bridge.core.interface import Measurement, Setpoint
+from bridge.core.odometer import Odometer
+from bridge.core.picture import Picture
+from bridge.core.state_memory import Memory
+from bridge.sim.robot.trace import ROW, Trace
+from controller.config import ControllerConfig
+from controller.core import Controller
+from controller.inputs import Sample
+from controller.interface import Outputs, StepInputs
+from controller.ledger.journal import LedgerState
+from rolling_panda import messages as m
+from rolling_panda.config import RobotConfig
+from rolling_panda.messages import commands as intents
+from rolling_panda.messages.perception import Obstacles
+from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
+from rolling_panda.model.robot import RobotModel, configuration, pose_message
+from server.auth.sessions import Session
+from server.robots.presence import PresentPeople
+
+MODEL = RobotModel()
+_USER = "ada"
+_CONTROL_TICKS = 10
+#: A page speaks, and the server tells who is there, each in so many periods of 1 ms.
+_PAGE_TICKS, _PRESENCE_TICKS = 50, 200
+
+
+class LaggedRobot:
+    """Velocity servos with a first-order lag; every step is recorded as the simulator's trace records it."""
+
+    def __init__(self, arm: tuple[float, ...]) -> None:
+        """Stand at rest with the arm in this posture (7, rad)."""
+        self.now = Measurement(np.array([0.0, 0.0, *arm]), np.zeros(9), "open", "", "", "")
+        self.rows: list[tuple[float, np.ndarray[Any, Any], np.ndarray[Any, Any], int, int]] = []
+        #: Where in the record a bridge began: from one to the next nobody keeps acceleration.
+        self.begun: list[int] = []
+        #: Share of what is sent that each actuator does.
+        self.follows = np.ones(9)
+        self._share = TICK_S / np.array([0.05] * 2 + [0.02] * 7)
+
+    def read(self) -> Measurement:
+        """What was measured last."""
+        return self.now
+
+    def write(self, setpoint: Setpoint) -> None:
+        """One step of 1 ms."""
+        velocity = self.now.velocity + (self.follows * setpoint.xi - self.now.velocity) * self._share
+        self.now = replace(self.now, velocity=velocity, position=self.now.position + velocity * TICK_S)
+        self.rows.append((setpoint.at, setpoint.xi, velocity, setpoint.epoch, setpoint.sequence))
+
+    def cut(self, cut_id: str, point_id: str) -> None:
+        """Cuts at once."""
+        self.now = replace(self.now, cut_id=cut_id, outcome="DONE")
+
+    def capture(self, expose: bool) -> Picture | None:
+        """There is no camera."""
+        return None
+
+    def close(self) -> None:
+        """Nothing to close."""
+
+    def trace(self) -> Trace:
+        """The record."""
+        rows = np.zeros(len(self.rows), ROW)
+        clocks, sent, velocity, epochs, sequences = zip(*self.rows, strict=True)
+        rows["time"] = rows["clock"] = clocks
+        rows["setpoint"], rows["velocity"] = np.array(sent), np.array(velocity)
+        rows["epoch"], rows["sequence"] = epochs, sequences
+        return Trace(rows, ())
+
+
+@dataclass
+class Link:
+    """A hop. `loss`, `twice` are shares, `delay` and `jitter` seconds; `held` keeps everything back until it ends."""
+
+    rng: random.Random
+    loss: float = 0.0
+    twice: float = 0.0
+    delay: float = 0.001
+    jitter: float = 0.0
+    held: bool = False
+    waiting: list[tuple[float, Any]] = field(default_factory=list)
+
+    def push(self, message: Any, now: float) -> None:
+        """Something is sent."""
+        if self.rng.random() < self.loss:
+            return
+        for _ in range(2 if self.rng.random() < self.twice else 1):
+            self.waiting.append((now + self.delay + self.rng.random() * self.jitter, message))
+
+    def arrived(self, now: float) -> list[Any]:
+        """What comes out now, in the order in which it comes."""
+        if self.held:
+            return []
+        due = sorted((item for item in self.waiting if item[0] <= now), key=lambda item: item[0])
+        self.waiting = [item for item in self.waiting if item[0] > now]
+        return [message for _, message in due]
+
+
+class World:
+    """Bridge, controller and what the server and perception say, stepped by milliseconds."""
+
+    def __init__(self, seed: int, hand_speed: float | None = None) -> None:
+        """Everything is well; nothing moves yet. `hand_speed` (m/s) is in place of the configured one."""
+        self.rng = random.Random(seed)
+        self.config = ControllerConfig()
+        if hand_speed is not None:
+            self.config = msgspec.structs.replace(self.config, teleop_base_speed=hand_speed)
+        self.robot = LaggedRobot(self.config.home)
+        self.memory = Memory()
+        self.bridge = self.new_bridge()
+        self.controller = self.new_controller(1)
+        self.starts = 1
+        self.motion, self.state, self.odometry = (Link(self.rng) for _ in range(3))
+        self.now = 0.0
+        self.ticks = 0
+        self.inputs = StepInputs(present=frozenset(m.PROCESSES))
+        self.alive = self.server = self.heard = self.watched = self.perception = True
+        self.held: BaseVelocity | m.Pose | None = None
+        self.holds = True
+        self.modes: list[str] = []
+        self.commanded: m.MotionCommand | None = None
+        self.intruder: Callable[[World], None] = lambda world: None
+        self._people: tuple[str, ...] = ()
+        self._there = PresentPeople()
+
+    def new_bridge(self) -> BridgeCore:
+        """A bridge that remembers what the last one did."""
+        odometer = Odometer(MODEL.drive, OdometryConfig(), TICK_S)
+        return BridgeCore(self.robot, BridgeConfig(), MODEL.limits, odometer, "sim", memory=self.memory)
+
+    def new_controller(self, starts: int) -> Controller:
+        """A controller that starts for the so-manieth time."""
+        return Controller(self.config, RobotConfig(), starts=starts)
+
+    def restart_controller(self) -> None:
+        """It ends and starts again, with no memory of what it was doing."""
+        self.starts += 1
+        self.controller = self.new_controller(self.starts)
+        self.inputs = StepInputs(present=self.inputs.present)
+
+    def tick(self) -> None:
+        """One millisecond."""
+        self.ticks += 1
+        self.now = self.ticks * TICK_S
+        out = self.bridge.step(self.now)
+        for message in (out.joints, out.state):
+            if message is not None:
+                self.state.push(message, self.now)
+        if out.odometry is not None:
+            self.odometry.push(out.odometry, self.now)
+        for message in (*self.state.arrived(self.now), *self.odometry.arrived(self.now)):
+            self._hear(Sample(message, self.now))
+        for command in self.motion.arrived(self.now):
+            self.bridge.on_motion(command, self.now)
+        self.intruder(self)
+        if self.ticks % _CONTROL_TICKS == 0 and self.alive:
+            self._control()
+
+    def run(self, seconds: float) -> None:
+        """Let time pass."""
+        for _ in range(round(seconds / TICK_S)):
+            self.tick()
+
+    def ask(self, intent: intents.Intent) -> None:
+        """What the operator asks must be granted here."""
+        answer = self.controller.answer(intent, self.now)
+        if not answer.ok:
+            raise RuntimeError(f"{type(intent).__name__}: {answer.reason}")
+
+    def stop(self) -> None:
+        """Somebody presses the software stop; it takes the way of a message to both."""
+        request = m.StopRequest(stop_id=f"s{self.ticks}", source="server", user=_USER, reason="trial")
+        self.bridge.on_stop(request, self.now)
+        self.inputs = replace(self.inputs, stops=(request,))
+
+    def work(self) -> None:
+        """Automatic work on a point that is far away, until base and arm move."""
+        self._people = (_USER,)
+        self.run(0.3)
+        far = m.PruningPoint(
+            point_id="p", revision=1, position=(2.5, 0.75, 1.0), tangent=(0.0, 0.0, 1.0), radius=0.004, confidence=0.9,
+            nodes_seen=5, nodes_kept=2, vine=0, spur=0, reason="trial",
+        )  # fmt: skip
+        points = m.PruningPoints(header=m.Header(self.now, "odom"), segmenter="none", frames=1, points=(far,))
+        self.inputs = replace(self.inputs, points=Sample(points, self.now))
+        self.run(0.02)
+        for intent in (
+            intents.Arm(user=_USER),
+            intents.AcceptAll(user=_USER, confidence=0.0),
+            intents.Start(user=_USER),
+        ):
+            self.ask(intent)
+        self._until_it_moves(1.2)
+
+    def drive(self) -> None:
+        """An operator drives the base by hand at its greatest speed."""
+        self._armed()
+        self.held = BaseVelocity(self.config.base_speed, 0.0)
+        wheel = self.config.teleop_base_speed / MODEL.drive.wheel_radius
+        self._until_it_moves(0.95 * wheel)
+
+    def lead(self) -> None:
+        """An operator leads the tool along the row, far ahead of it."""
+        self._armed()
+        joints, odometry = self.inputs.joints, self.inputs.odometry
+        assert joints is not None and odometry is not None
+        q = configuration(odometry.message.pose, joints.message.position)
+        here = MODEL.pose(q, MODEL.tool_id)
+        here.translation[0] += 2.0
+        self.held = pose_message(here)
+        self._until_it_moves(0.6)
+
+    def _armed(self) -> None:
+        self._people = (_USER,)
+        self.run(0.3)
+        self.ask(intents.Arm(user=_USER))
+        # A hold from before arming would count for nothing.
+        self.run(0.05)
+
+    def _until_it_moves(self, wheel: float) -> None:
+        for _ in range(600):
+            self.run(0.01)
+            if abs(self.robot.now.velocity[:2]).min() > wheel:
+                return
+        raise RuntimeError(f"the robot does not move: {self.controller.mode}")
+
+    def _hear(self, sample: Sample[Any]) -> None:
+        if isinstance(sample.message, m.JointState):
+            self.inputs = replace(self.inputs, joints=sample)
+        elif isinstance(sample.message, m.BridgeState):
+            self.inputs = replace(self.inputs, bridge=sample)
+        else:
+            self.inputs = replace(self.inputs, odometry=sample)
+
+    def _control(self) -> None:
+        changes: dict[str, Any] = {}
+        if self.server:
+            changes["server_seen"] = self.now
+            if self.heard and self.ticks % _PAGE_TICKS == 0:
+                self._pages_speak()
+            if self.ticks % _PRESENCE_TICKS == 0:
+                changes["presence"] = Sample(self._there.message(self.now), self.now)
+            if self.held is not None and self.heard:
+                base = self.held if isinstance(self.held, BaseVelocity) else None
+                pose = None if base is not None else cast(m.Pose, self.held)
+                target = TeleopTarget(sequence=self.ticks, hold=self.holds, user=_USER, base=base, target=pose)
+                changes["teleop"] = Sample(target, self.now)
+        if self.perception:
+            stamp = m.Header(self.now, "odom")
+            changes["perception_seen"] = self.now
+            changes["obstacles"] = Sample(Obstacles(header=stamp, capsules=()), self.now)
+        self.inputs = replace(self.inputs, **changes)
+        self._send(self.controller.step(self.inputs, self.now))
+        self.inputs = replace(self.inputs, stops=(), ledger=LedgerState(self.controller.recorded))
+        self.modes.append(self.controller.mode)
+
+    def _pages_speak(self) -> None:
+        """Each page says that it is there, and which state it has drawn."""
+        for name in self._people:
+            session = Session("", name, "supervisor", 0.0, client=name)
+            self._there.heard(session, self.now)
+            if self.watched:
+                self._there.saw(session, self.now)
+
+    def _send(self, out: Outputs) -> None:
+        if out.motion is not None:
+            self.commanded = out.motion
+            self.motion.push(out.motion, self.now)
+        if out.cut is not None:
+            self.bridge.on_cut(out.cut, self.now)
+        if out.release is not None:
+            self.bridge.on_release(out.release, self.now)

@@ -1,0 +1,1 @@
+"""The page in a real browser, its load on the machine, and its pictures."""

@@ -1,0 +1,175 @@
+"""`rolling-panda bench pictures`: the operator's page in each of its states, as pictures for the documents.
+
+What needs the 3-D view is taken from a running demo. States that are rare there are the real page's too, but with a
+server that plays them; behind its controls stands a still of the demo's 3-D view.
+"""
+
+import argparse
+import importlib
+import shutil
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+from PIL import Image
+
+from benchmarks.page.pictures_live import walk_through
+from rolling_panda.errors import InputError
+
+ROOT = Path(__file__).resolve().parents[2]
+#: Without the 3-D view.
+FLAT_FLAGS = ("--no-sandbox", "--disable-gpu")
+#: It needs WebGL, and a machine without a graphics card draws it in software.
+FLAGS = (
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--ignore-gpu-blocklist",
+)
+DESKTOP, TABLET = (1280, 800), (1024, 768)
+#: So many colours are enough for a page, and a third of the size.
+COLOURS = 64
+STILL = "view.jpg"
+_PATIENCE_MS = 60_000
+
+#: Played states: what of the page is shown. All of it where nothing is said.
+PARTS = {
+    "rule": "rp-queue",
+    "order": "rp-queue",
+    "why-rejected": "rp-queue",
+    "places": "rp-queue",
+    "all-states": "rp-queue",
+    "refused-plan": "rp-queue",
+    "unknown-cut": "rp-queue",
+    "by-hand": "main",
+    "preview-expired": ".middle",
+    "held-back": ".middle",
+    "teleoperate-base": ".middle",
+    "teleoperate-joints": ".middle",
+    "stop-pressed": ".middle",
+    "paused": ".top",
+    "survey": ".top",
+    "fault": ".top",
+    "asked-for-control": ".top",
+    "other-has-control": ".top",
+    "invite": ".top, .invitation",
+    "viewer": ".top",
+    "refused": ".middle, rp-toasts",
+    "replay": "rp-replay",
+    "signed-out": ".middle, rp-link-banner",
+}
+#: What is shown on a tablet, in the dark, too.
+DARK = ("points", "stopped", "charts")
+
+
+class Album:
+    """Keeps what is on a page, or a part of it, as a small file."""
+
+    def __init__(self, folder: Path) -> None:
+        """Pictures go to `folder`."""
+        self.folder = folder
+        folder.mkdir(parents=True, exist_ok=True)
+
+    def take(self, page: Any, name: str, part: str = "") -> None:
+        """Keep the page as `name`; with `part`, a selector, only the least box that holds all that it finds."""
+        clip = page.evaluate(_BOX, part) if part else None
+        picture = Image.open(BytesIO(page.screenshot(clip=clip))).convert("RGB")
+        small = picture.quantize(COLOURS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+        small.save(self.folder / f"{name}.png", optimize=True)
+        print(f"{name}.png", flush=True)
+
+    def keep_still(self, page: Any) -> None:
+        """Keep the 3-D view alone, for states that are played."""
+        shown = "on => { document.querySelector('rp-view-tools').style.visibility = on ? '' : 'hidden' }"
+        page.evaluate(shown, False)
+        page.locator("rp-scene").screenshot(path=self.folder / STILL, type="jpeg", quality=70)
+        page.evaluate(shown, True)
+
+
+_BOX = """part => {
+  const boxes = [...document.querySelectorAll(part)].map(each => each.getBoundingClientRect()).filter(box => box.width);
+  const x = Math.max(0, Math.min(...boxes.map(box => box.left)) - 8);
+  const y = Math.max(0, Math.min(...boxes.map(box => box.top)) - 8);
+  const right = Math.min(innerWidth, Math.max(...boxes.map(box => box.right)) + 8);
+  const bottom = Math.min(innerHeight, Math.max(...boxes.map(box => box.bottom)) + 8);
+  return {x, y, width: right - x, height: bottom - y};
+}"""
+
+
+@contextmanager
+def new_page(browser: Any, size: tuple[int, int], scheme: str = "light") -> Iterator[Any]:
+    """A page of this size. The 3-D client reads the language and dies on an empty one."""
+    context = browser.new_context(
+        locale="en-US", viewport={"width": size[0], "height": size[1]}, color_scheme=scheme, reduced_motion="reduce"
+    )
+    page = context.new_page()
+    page.set_default_timeout(_PATIENCE_MS)
+    yield page
+    context.close()
+
+
+def played(browser: Any, album: Album, only: Sequence[str]) -> None:
+    """Pictures of the states that a server plays: those that the tests of the page bring it to.
+
+    Raises:
+        InputError: The tests are not here.
+    """
+    if not (ROOT / "tests" / "support" / "page_states.py").exists():
+        raise InputError(f"{ROOT / 'tests'} is not there: take the pictures in a checkout of the project")
+    sys.path.insert(0, str(ROOT / "tests"))
+    states, server = (
+        importlib.import_module("tests.support.page_states"),
+        importlib.import_module("tests.support.played_server"),
+    )
+    still = album.folder / STILL
+    wanted = [(name, DESKTOP, "light", name, PARTS.get(name, "")) for name in states.STATES]
+    wanted += [(name, TABLET, "dark", f"tablet-{name}", "") for name in DARK]
+    for name, size, scheme, called, part in wanted:
+        if only and called not in only:
+            continue
+        with new_page(browser, size, scheme) as page:
+            player = server.PlayedServer(view=still.read_bytes() if still.exists() else b"")
+            player.attach(page)
+            page.goto(f"{server.ORIGIN}/")
+            page.locator("rp-scene iframe.loaded").wait_for()
+            states.STATES[name](page, player)
+            # Warnings of a page that has only just begun are none of the state's.
+            page.wait_for_timeout(700)
+            album.take(page, called, part)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Take the pictures; returns the exit code."""
+    parser = argparse.ArgumentParser(prog="rolling-panda bench pictures", description=__doc__)
+    parser.add_argument("--out", type=Path, default=ROOT / "docs/images/page", help="folder (default: %(default)s)")
+    parser.add_argument("--part", choices=("all", "live", "played"), default="all", help="which (default: all)")
+    parser.add_argument("--only", nargs="*", default=(), metavar="NAME", help="these played pictures alone")
+    parser.add_argument("--seed", type=int, default=0, help="row to grow (default: 0)")
+    parser.add_argument("--port", type=int, default=8767, help="port of the demo's page (default: 8767)")
+    arguments = parser.parse_args(argv)
+    chromium = shutil.which("chromium")
+    if chromium is None:
+        parser.error("Chromium is not installed")
+    # Here and not above: `rolling-panda bench` lists its commands where there is no browser too.
+    from playwright.sync_api import sync_playwright
+
+    album = Album(arguments.out)
+    with sync_playwright() as playwright:
+        if arguments.part != "played":
+            browser = playwright.chromium.launch(executable_path=chromium, args=list(FLAGS))
+            with new_page(browser, DESKTOP) as page:
+                walk_through(page, album, arguments.port, arguments.seed)
+            browser.close()
+        if arguments.part != "live":
+            browser = playwright.chromium.launch(executable_path=chromium, args=list(FLAT_FLAGS))
+            played(browser, album, arguments.only)
+            browser.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

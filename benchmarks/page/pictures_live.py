@@ -1,0 +1,104 @@
+"""A morning's work on the page of a running demo, as an operator would go through it, with a picture of each step."""
+
+from typing import Any, Protocol
+
+from benchmarks.page.demo_under_test import Demo
+
+#: So many points are accepted: enough to see the work, and soon done.
+FEW = 4
+
+
+class Keeps(Protocol):
+    """What takes the pictures."""
+
+    def take(self, page: Any, name: str, part: str = "") -> None:
+        """Keep what is on the page."""
+
+    def keep_still(self, page: Any) -> None:
+        """Keep the 3-D view alone."""
+
+
+def walk_through(page: Any, album: Keeps, port: int, seed: int) -> None:
+    """From signing in to leading the tool by hand, on a demo of its own."""
+    demo = Demo(port, seed)
+    try:
+        page.goto(f"http://127.0.0.1:{port}/")
+        page.locator("#token").wait_for()
+        album.take(page, "sign-in", ".card")
+        # Drawn in software the view is slow, and work is paused while nobody looks on.
+        with demo.watched():
+            page.goto(demo.post("invite", user="Ada", role="supervisor")["link"])
+            for step in (_find, _preview, _work, _charts_and_report, _by_hand):
+                step(page, album)
+    finally:
+        demo.close()
+
+
+def _rest(page: Any, seconds: float = 3.0) -> None:
+    """Let the 3-D view catch up with the robot: there is nothing on the page that says when it has."""
+    page.wait_for_timeout(1000.0 * seconds)
+
+
+def _mode(page: Any, mode: str) -> None:
+    page.locator(f'#mode[data-mode="{mode}"]').wait_for()
+
+
+def _press(page: Any, button: str) -> None:
+    page.locator(f'{button}[aria-disabled="false"]').click()
+
+
+def _find(page: Any, album: Keeps) -> None:
+    page.locator("rp-scene iframe.loaded").wait_for()
+    page.locator("rp-point").nth(2).wait_for()
+    page.locator("rp-camera img").wait_for()
+    _rest(page, 8.0)
+    album.keep_still(page)
+    _press(page, "#arm")
+    _mode(page, "READY")
+    page.locator("rp-point").first.click(position={"x": 60, "y": 12})
+    page.locator(".crop.loaded").wait_for()
+    _rest(page)
+    album.take(page, "live-points")
+
+
+def _preview(page: Any, album: Keeps) -> None:
+    for _ in range(FEW):
+        page.locator('rp-point[data-state="PROPOSED"] .accept').first.click()
+        _rest(page, 0.5)
+    page.locator("rp-point .reason", has_text="no. 1,").wait_for()
+    page.evaluate("document.querySelector('rp-queue .groups').scrollTop = 0")
+    _press(page, "#preview")
+    page.locator('#approve-preview[aria-disabled="false"]').wait_for()
+    slider = page.locator("#preview-time")
+    slider.fill(str(0.6 * float(slider.get_attribute("max"))))
+    _rest(page)
+    album.take(page, "live-preview")
+    _press(page, "#approve-preview")
+
+
+def _work(page: Any, album: Keeps) -> None:
+    _press(page, "#start")
+    _mode(page, "AUTO")
+    page.locator('rp-point[data-state="INTENT"], rp-point[data-state="DONE"]').first.wait_for()
+    album.take(page, "live-running")
+    _mode(page, "READY")
+
+
+def _charts_and_report(page: Any, album: Keeps) -> None:
+    page.locator('[data-opens="charts"]').click()
+    _rest(page)
+    album.take(page, "live-charts")
+    page.locator("#close-drawer").click()
+    page.locator('[data-opens="report"]').click()
+    page.locator("rp-report tbody tr").first.wait_for()
+    album.take(page, "live-report")
+    page.locator("#close-drawer").click()
+
+
+def _by_hand(page: Any, album: Keeps) -> None:
+    _press(page, "#teleop")
+    _rest(page)
+    # A browser that draws in software may be silent for so long that its control has ended.
+    page.wait_for_function("!document.querySelector('rp-toasts .toast')")
+    album.take(page, "live-teleoperate")
+    page.locator("#teleop").click()

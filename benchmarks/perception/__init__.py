@@ -1,0 +1,1 @@
+"""Perception: surveys of unseen rows and the judges of their points."""

@@ -1,0 +1,55 @@
+"""Records where the camera is while the robot works along a row, for `bench obstacles`."""
+
+import tempfile
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from benchmarks.common.closed_loop import ClosedLoop
+from benchmarks.control.row_walk import walk
+from benchmarks.perception.obstacles import Place, Track
+from bridge.core.bridge import BridgeOutputs
+from bridge.sim.robot.robot import SimulatedRobot
+from rolling_panda.messages import commands as intents
+from rolling_panda.resources import resource
+
+#: Places that are kept, evenly in time, and how far the base goes along the row (m).
+_KEPT, _END = 160, 3.4
+_SURVEY_S = 6.0
+
+
+class _Watched(ClosedLoop):
+    """Notes the places of all frames that perception gets."""
+
+    def __init__(self, seed: int, trace: Path) -> None:
+        super().__init__(seed, trace, resource("assets/config/sim.toml"), segmenter="labels")
+        self.places: list[Place] = []
+
+    def _receive(self, outputs: BridgeOutputs) -> None:
+        frame, robot = outputs.frame, self.bridge.robot
+        assert isinstance(robot, SimulatedRobot)
+        if frame is not None:
+            camera = tuple(np.round(robot.true_camera(), 6).ravel().tolist())
+            self.places.append(Place(frame.base, frame.position, camera))
+        super()._receive(outputs)
+
+
+def record(seed: int, path: Path) -> str:
+    """Work along a row in a closed loop with classes from the simulator, and write where the camera was.
+
+    Args:
+        seed: Of the row.
+        path: File to write.
+
+    Returns:
+        What came of it, in words.
+    """
+    with tempfile.TemporaryDirectory() as folder, _Watched(seed, Path(folder) / "trace") as loop:
+        loop.run(_SURVEY_S)
+        loop.ask(intents.Arm(user="bench"))
+        walk(loop, _END)
+        places, seconds = loop.places, loop.now
+    kept = [places[int(k * len(places) / _KEPT)] for k in range(min(_KEPT, len(places)))]
+    path.write_bytes(msgspec.json.format(msgspec.json.encode(Track(seed, round(seconds, 1), tuple(kept))), indent=0))
+    return f"{len(places)} pictures in {seconds:.0f} s of work, {len(kept)} places kept in {path}"

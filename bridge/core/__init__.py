@@ -1,0 +1,1 @@
+"""The bridge without wires: validation, limits, latches, watchdog and cut memory."""

@@ -1,0 +1,380 @@
+"""The bridge without wires: commands in, one tick of 1 ms, and what is due to be sent out.
+
+The latch, the watchdog and the limits are here and are the bridge's own: no other process can overrule them.
+"""
+
+import secrets
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bridge.config import BridgeConfig
+from bridge.core.camera_trigger import CameraTrigger, Posture
+from bridge.core.cut_memory import CutMemory
+from bridge.core.cut_orders import FORGETFUL, CutOrders
+from bridge.core.interface import Measurement, Robot, Setpoint
+from bridge.core.latch import StopLatch
+from bridge.core.limiter import Limiter
+from bridge.core.odometer import Odometer
+from bridge.core.refusals import Refusals
+from bridge.core.robot_faults import RobotFaults
+from bridge.core.round_trip import RoundTrip
+from bridge.core.state_memory import Memory, Remembered
+from bridge.core.time_ratio import TimeRatio
+from bridge.core.validator import CommandValidator
+from bridge.core.watchdog import Watchdog
+from rolling_panda import messages as m
+from rolling_panda.messages.perception import Capsule, PictureRequest, Scenery
+from rolling_panda.messages.robot import CameraFrame
+from rolling_panda.messages.supervision import StopState
+from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.robot import Limits
+from rolling_panda.topics import BRIDGE, CUT, MOTION, ODOMETRY, PICTURE, STOPS
+from rolling_panda.transport.zenoh import Rejections
+
+TICK_S = 0.001
+_ODOMETRY_TICKS = round(1 / ODOMETRY.rate_hz / TICK_S)
+_STATE_TICKS = round(1 / BRIDGE.rate_hz / TICK_S)
+_STOPS_TICKS = round(1 / STOPS.rate_hz / TICK_S)
+# At most so fast (rad/s) are wheels and joints when the blades may begin to close: 5 mm/s at the axle, and what holding
+# the tool in place takes.
+_CUT_WHEELS, _CUT_JOINTS = 0.04, 0.1
+MOVING_CUT = "the robot is not at rest"
+# A robot that nobody has stepped for so long (s) has come to rest by its own deadlines, or is on its way: what is sent
+# begins with how it really moves.
+_STANDSTILL_S = 0.05
+# Faster than this (rad/s) is motion that the camera should follow.
+_MOVING = 0.01
+
+SceneryOf = Callable[[], tuple[int, tuple[Capsule, ...]]]
+
+
+@dataclass(frozen=True)
+class BridgeOutputs:
+    """What is due after a tick; None or empty when nothing is."""
+
+    joints: m.JointState | None = None
+    odometry: m.Odometry | None = None
+    state: m.BridgeState | None = None
+    frame: CameraFrame | None = None
+    scenery: Scenery | None = None
+    events: tuple[m.LogEvent, ...] = ()
+    stops: StopState | None = None
+
+
+class BridgeCore:
+    """Stands between the wire and a robot; one thread. `now` is the robot's own time (s), and never goes back.
+
+    `clock` is the machine's, for the record and for the real-time factor, where it differs: a simulation that is too
+    slow loses time.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        config: BridgeConfig,
+        limits: Limits,
+        odometer: Odometer,
+        kind: m.BridgeKind,
+        scenery: SceneryOf | None = None,
+        rejections: Rejections | None = None,
+        cuts: CutMemory | None = None,
+        memory: Memory | None = None,
+        wider: tuple[str, ...] = (),
+    ) -> None:
+        """Start with the watchdog tripped, at rest, without a stop.
+
+        Args:
+            robot: Simulated or real.
+            config: Deadlines and rates.
+            limits: Of the robot, over ξ.
+            odometer: Follows the wheels.
+            kind: What the robot is, for people.
+            scenery: Revision and rods to show; None on a real robot.
+            rejections: Table of refusals shared with the transport.
+            cuts: Remembers cuts through restarts; None for as long as this lives.
+            memory: What survives a restart; None forgets.
+            wider: What the configuration sets less strictly than usual, to be told.
+        """
+        self.robot = robot
+        self.refusals = Refusals(rejections)
+        self.kind = kind
+        self._odometer = odometer
+        self._scenery = scenery
+        self._scenery_ticks = round(config.scenery_s / TICK_S)
+        self._scenery_revision = -1
+        self._memory = memory or Memory()
+        before = self._memory.remembered
+        self._gate = CommandValidator(limits.velocity, config.max_age_s, before.epoch, before.token)
+        self._latch = StopLatch(before.stops, before.released, before.released_by)
+        self._watchdog = Watchdog(config.fade_s, config.deadline_s)
+        self._limiter = Limiter(limits, config.wheel_acceleration, config.joint_margin, TICK_S)
+        self._faults = RobotFaults()
+        self._orders = CutOrders(cuts)
+        self._shutter = CameraTrigger(config.camera_moving_hz, config.camera_resting_hz, TICK_S)
+        self._pace = TimeRatio()
+        self._ticks = 0
+        self._joint_ticks = round(1 / config.joints_hz / TICK_S)
+        self._round_trip = RoundTrip()
+        self._clock = self._wall = 0.0
+        self._stepped = float("-inf")
+        self._stops_due = True
+        self._desired: Array = np.zeros_like(limits.velocity)
+        self._was_tripped = True
+        self._measured = robot.read()
+        self._odometer.follow(self._measured.position[:2])
+        self._cut_id = ""
+        self._outcome: m.Outcome = ""
+        self._wider = wider
+        self._events: list[tuple[m.Severity, str]] = [("warning", f"set wider than usual: {line}") for line in wider]
+        self._state_due = True
+
+    @property
+    def joints_s(self) -> float:
+        """Period of the joint states (s)."""
+        return self._joint_ticks * TICK_S
+
+    def on_motion(self, command: m.MotionCommand, now: float, clock: float | None = None) -> None:
+        """Take a motion command received at `now`; a refused one is counted and changes nothing."""
+        epoch = self._gate.epoch
+        reason = self._gate.refuse(command, now, not np.any(self._limiter.sent))
+        if reason is not None:
+            self.refusals.add(MOTION.name, reason)
+            return
+        if command.epoch != epoch:
+            self._remember()
+        self._desired = np.array(command.xi)
+        self._watchdog.feed(now, self._limiter.braking_s(self._desired))
+        self._round_trip.back(command.echo, self._clock if clock is None else clock)
+
+    def on_cut(self, command: m.CutCommand, now: float) -> None:
+        """Close the blades, once for a `cut_id`."""
+        inhibited = ""
+        if self._latch.stop_id:
+            inhibited = "the software stop is latched"
+        elif self._faults.current:
+            inhibited = self._faults.current
+        elif self._watchdog.tripped(now) or self._gate.must_rest:
+            inhibited = "no valid setpoint keeps the cutter enabled"
+        wrong = self._gate.refuse_cut(command, now) or self._unsteady()
+        verdict, reason = self._orders.judge(command, wrong, self._measured.cutter == "open", inhibited)
+        if verdict == "refuse":
+            self.refusals.add(CUT.name, reason)
+        if verdict == "cut":
+            self.robot.cut(command.cut_id, command.point_id)
+            self._measured = replace(self._measured, cutter="closing", cut_id=command.cut_id, outcome="", detail="")
+            self._begin_cut(command.cut_id, "")
+        elif verdict == "refuse" and reason in (inhibited, FORGETFUL):
+            self._begin_cut(command.cut_id, "FAILED_NOT_CUT")
+
+    def on_picture(self, request: PictureRequest) -> None:
+        """Take a picture as soon as the camera is free; only for the controller whose commands are taken."""
+        if request.epoch != self._gate.epoch:
+            self.refusals.add(PICTURE.name, "not the controller's that commands the robot")
+            return
+        self._shutter.want(request)
+
+    def _unsteady(self) -> str | None:
+        speed = np.abs(self._measured.velocity)
+        still = speed[:2].max() <= _CUT_WHEELS and speed[2:].max() <= _CUT_JOINTS
+        return None if still else MOVING_CUT
+
+    def on_stop(self, request: m.StopRequest, now: float, wall_time: float = 0.0) -> None:
+        """Latch a stop; repetitions change nothing. `wall_time` (s since 1970) is for people."""
+        if self._latch.stop(request, wall_time):
+            what = "emergency stop" if request.source == "hardware" else "software stop"
+            self._say("warning", f"{what} by {request.user or request.source}: {request.reason}")
+            self._stops_changed()
+
+    def _stops_changed(self) -> None:
+        self._state_due = self._stops_due = True
+        self._remember()
+
+    def _watch_button(self, now: float) -> None:
+        pressed = self._measured.emergency
+        if pressed and not self._latch.hardware:
+            stop_id = f"hardware-{secrets.token_hex(8)}"
+            reason = "the emergency stop button of the robot is pressed"
+            self.on_stop(m.StopRequest(stop_id=stop_id, source="hardware", user="", reason=reason), now, self._wall)
+        if pressed != self._latch.hardware:
+            self._latch.hardware, self._stops_due = pressed, True
+
+    def on_release(self, request: m.ReleaseStop, now: float) -> m.Answer:
+        """Release the latched stop that the request names. Nothing moves before a setpoint at rest has come."""
+        reason = self._latch.release(request)
+        if reason:
+            return m.Answer(ok=False, reason=reason)
+        self._halt()
+        self._faults.released(now)
+        self._stops_changed()
+        self._say("info", f"software stop released by {request.user}: {request.reason}")
+        return m.Answer(ok=True)
+
+    def step(self, now: float, clock: float | None = None, wall_time: float = 0.0) -> BridgeOutputs:
+        """Advance one tick of 1 ms; `clock` is `now` unless given, `wall_time` (s since 1970) is for people."""
+        self._clock, self._wall = now if clock is None else clock, wall_time
+        if now - self._stepped > _STANDSTILL_S:
+            self._measured = self.robot.read()
+            self._limiter.restart(self._measured.velocity)
+        self._stepped = now
+        self._watch_button(now)
+        tripped = self._watch(now)
+        stopped = bool(self._latch.stop_id)
+        share = 0.0 if stopped or self._faults.current else self._watchdog.trust(now)
+        xi = self._limiter.step(share * self._desired, self._measured.position[2:])
+        blades = not (stopped or tripped)
+        releases = self._faults.releases
+        self.robot.write(Setpoint(xi, blades, self._gate.epoch, self._gate.sequence, self._clock, releases))
+        self._measured = self.robot.read()
+        self._ticks += 1
+        self._follow_cut()
+        return self._outputs(now)
+
+    def _watch(self, now: float) -> bool:
+        self._watch_robot(now)
+        tripped = self._watchdog.tripped(now) or bool(self._faults.current)
+        if tripped and not self._was_tripped:
+            self._halt()
+            if not self._faults.current:
+                self._say("warning", "no valid setpoint: base 0, arm holds, cutter inhibited")
+        elif self._was_tripped and not tripped:
+            self._say("info", "setpoints come in: the robot follows")
+        if tripped != self._was_tripped:
+            self._state_due = True
+        self._was_tripped = tripped
+        return tripped
+
+    def _watch_robot(self, now: float) -> None:
+        measured = self._measured
+        # A bridge that cannot remember stops and tokens would not know after a restart what must not move.
+        fault = measured.fault or self._memory.failure
+        change = self._faults.follow(fault, measured.severe, bool(self._latch.stop_id), now)
+        if change is not None:
+            self._halt()
+            self._say("warning" if self._faults.current else "info", change.text)
+            if change.stop is not None:
+                self.on_stop(change.stop, now, self._wall)
+
+    def _halt(self) -> None:
+        self._desired = np.zeros_like(self._desired)
+        self._gate.require_rest()
+
+    def _remember(self) -> None:
+        latch = self._latch
+        self._memory.keep(Remembered(self._gate.epoch, self._gate.token, latch.stops, latch.over, latch.released_by))
+
+    def _begin_cut(self, cut_id: str, outcome: m.Outcome) -> None:
+        self._cut_id, self._outcome = cut_id, outcome
+        self._state_due = True
+
+    def _follow_cut(self) -> None:
+        measured = self._measured
+        if measured.cut_id == self._cut_id and measured.outcome != self._outcome:
+            self._outcome = measured.outcome
+            severity: m.Severity = "info" if measured.outcome == "DONE" else "warning"
+            self._say(severity, f"cut {self._cut_id}: {measured.outcome}, {measured.detail}")
+            self._shutter.wake(self._ticks)
+            self._state_due = True
+
+    def _say(self, severity: m.Severity, text: str) -> None:
+        self._events.append((severity, text[:500]))
+
+    def _outputs(self, now: float) -> BridgeOutputs:
+        joints = odometry = state = frame = None
+        ticks = self._ticks
+        if ticks % self._joint_ticks == 0:
+            self._odometer.follow(self._measured.position[:2])
+            joints = self._joint_state(now)
+            self._gate.sent(joints.sequence, now)
+            self._round_trip.out(joints.sequence, self._clock)
+            frame = self._frame(now)
+            if ticks % _ODOMETRY_TICKS == 0:
+                self._odometer.measure(ticks, now, self._measured.velocity[:2])
+            odometry = self._odometer.due(ticks)
+        if self._state_due or ticks % _STATE_TICKS == 0:
+            state = self._state(now)
+            self._events += [("warning", line) for line in self.refusals.lines(now)]
+        stops = None
+        self._stops_due |= ticks % _STOPS_TICKS == 0
+        # A stop is told to be latched when a restart would find it; where the disk does not take it, that is told too.
+        if self._stops_due and (self._memory.kept or self._memory.failure):
+            self._stops_due = False
+            stops = StopState(
+                process="bridge",
+                stops=self._latch.stops,
+                released_by=self._latch.released_by,
+                hardware=self._latch.hardware,
+            )
+        scenery = self._scenery_message(now) if self._scenery_is_due() else None
+        events, self._events = self._events, []
+        return BridgeOutputs(
+            joints,
+            odometry,
+            state,
+            frame,
+            scenery,
+            tuple(
+                m.LogEvent(header=m.Header(now), process="bridge", severity=severity, text=text[:500])
+                for severity, text in events
+            ),
+            stops,
+        )
+
+    def _joint_state(self, now: float) -> m.JointState:
+        return m.JointState(
+            header=m.Header(now),
+            sequence=self._ticks // self._joint_ticks,
+            position=actuated(self._measured.position),
+            velocity=actuated(self._measured.velocity),
+        )
+
+    def _state(self, now: float) -> m.BridgeState:
+        self._state_due = False
+        self._round_trip.forget(self._clock)
+        return m.BridgeState(
+            header=m.Header(now),
+            kind=self.kind,
+            epoch=self._gate.epoch,
+            watchdog=self._was_tripped,
+            stop_id=self._latch.stop_id,
+            stopped_by=self._latch.stopped_by,
+            cutter=self._measured.cutter,
+            cut_id=self._cut_id,
+            outcome=self._outcome,
+            real_time_factor=self._pace.factor(self._ticks * TICK_S, self._clock),
+            round_trip_s=self._round_trip.median,
+            round_trip_worst_s=self._round_trip.worst,
+            rejections=self.refusals.counts(),
+            battery=self._measured.battery,
+            wider=self._wider,
+        )
+
+    def _frame(self, now: float) -> CameraFrame | None:
+        measured: Measurement = self._measured
+        if bool(np.abs(measured.velocity).max() > _MOVING):
+            self._shutter.wake(self._ticks)
+        posture = Posture(self._clock, m.Header(now, "camera"), self._odometer.pose, actuated(measured.position))
+        self._shutter.follow(posture)
+        expose = self._shutter.due(self._ticks)
+        if expose:
+            self._shutter.exposed(self._ticks, posture)
+        picture = self.robot.capture(expose)
+        return None if picture is None else self._shutter.frame(picture)
+
+    def _scenery_is_due(self) -> bool:
+        if self._scenery is None:
+            return False
+        return self._ticks % self._scenery_ticks == 1 or self._scenery()[0] != self._scenery_revision
+
+    def _scenery_message(self, now: float) -> Scenery | None:
+        if self._scenery is None:
+            return None
+        self._scenery_revision, capsules = self._scenery()
+        return Scenery(header=m.Header(now, "odom"), revision=self._scenery_revision, capsules=capsules)
+
+
+def actuated(values: Array) -> m.Actuated:
+    """Values over ξ (9) as the wire has them."""
+    a, b, c, d, e, f, g, h, i = (float(value) for value in values)
+    return a, b, c, d, e, f, g, h, i

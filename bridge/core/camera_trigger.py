@@ -1,0 +1,90 @@
+"""When the camera takes a picture, and the posture that belongs to it."""
+
+from collections import deque
+from typing import NamedTuple
+
+from bridge.core.picture import Picture
+from rolling_panda import messages as m
+from rolling_panda.messages.perception import PictureRequest
+from rolling_panda.messages.robot import CameraFrame
+
+# After motion or a cut the plant model wants some more pictures before the camera rests (s).
+_AWAKE_S = 4.0
+# A picture that is older than this (s) gets the oldest posture that is remembered.
+_REMEMBERED_S = 2.0
+
+
+class Posture(NamedTuple):
+    """Where the robot was when: the machine's clock (s), and what a frame says of it."""
+
+    clock: float
+    header: m.Header
+    base: m.PlanarPose
+    position: m.Actuated
+
+
+class CameraTrigger:
+    """Pictures at the moving rate while awake, at the resting rate otherwise; one at a time. Counts in ticks."""
+
+    def __init__(self, moving_hz: float, resting_hz: float, tick_s: float) -> None:
+        """Start awake, with the first picture due at once."""
+        self._moving = round(1 / moving_hz / tick_s)
+        self._resting = round(1 / resting_hz / tick_s)
+        self._awake = round(_AWAKE_S / tick_s)
+        self._awake_until = self._awake
+        self._last = -self._resting
+        self._waiting: tuple[Posture, PictureRequest | None] | None = None
+        self._postures: deque[Posture] = deque()
+        self._wanted: PictureRequest | None = None
+        self._taken = (-1, -1)
+        self._sequence = 0
+
+    def wake(self, ticks: int) -> None:
+        """Something moves or has changed."""
+        self._awake_until = ticks + self._awake
+
+    def want(self, request: PictureRequest) -> None:
+        """A picture is wanted as soon as the camera is free; a request that was done or overtaken changes nothing."""
+        if (request.epoch, request.number) > self._taken:
+            self._wanted, self._taken = request, (request.epoch, request.number)
+
+    def due(self, ticks: int) -> bool:
+        """Whether to expose now; never while a picture is on its way."""
+        period = self._moving if ticks < self._awake_until else self._resting
+        return self._waiting is None and (self._wanted is not None or ticks - self._last >= period)
+
+    def follow(self, posture: Posture) -> None:
+        """The robot is here now: a camera that exposes at moments of its own tells later when that was."""
+        self._postures.append(posture)
+        while posture.clock - self._postures[0].clock > _REMEMBERED_S:
+            self._postures.popleft()
+
+    def exposed(self, ticks: int, posture: Posture) -> None:
+        """An exposure is asked for in this posture."""
+        self._last = ticks
+        self._waiting = (posture, self._wanted)
+        self._wanted = None
+
+    def frame(self, picture: Picture) -> CameraFrame | None:
+        """The message for the picture of the last exposure; None for one that nobody asked for."""
+        if self._waiting is None:
+            return None
+        posture, wanted = self._waiting
+        self._waiting = None
+        taken_at = picture.taken_at
+        if taken_at is not None and self._postures:
+            posture = min(self._postures, key=lambda known: abs(known.clock - taken_at))
+        self._sequence += 1
+        return CameraFrame(
+            header=posture.header,
+            sequence=self._sequence,
+            intrinsics=picture.intrinsics,
+            base=posture.base,
+            position=posture.position,
+            color_jpeg=picture.color_jpeg,
+            depth_zlib=picture.depth_zlib,
+            depth_unit=picture.depth_unit,
+            labels_zlib=picture.labels_zlib,
+            point_id="" if wanted is None else wanted.point_id,
+            number=0 if wanted is None else wanted.number,
+        )

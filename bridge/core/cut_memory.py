@@ -1,0 +1,122 @@
+"""Which cuts were ever ordered, kept through every restart: the blades close for a `cut_id` at most once."""
+
+import os
+import threading
+from collections import deque
+from pathlib import Path
+from typing import Literal, Protocol
+
+from rolling_panda.errors import InputError
+from rolling_panda.runtime.priority import take_priority
+from rolling_panda.runtime.state_folder import sync_folder
+
+FILE = "cuts"
+#: At the end the last entry is waited for this long (s).
+_END_S = 2.0
+
+Kept = Literal["kept", "waiting", "failed"]
+
+
+class CutMemory(Protocol):
+    """Remembers cut ids."""
+
+    @property
+    def known(self) -> frozenset[str]:
+        """What was kept before this start."""
+
+    def keep(self, cut_id: str) -> Kept:
+        """Ask for a cut to be remembered, as often as wished; `kept` once it can no longer be forgotten."""
+
+
+class ForLife:
+    """Remembers for as long as the process lives, which is as long as a simulated row exists."""
+
+    @property
+    def known(self) -> frozenset[str]:
+        """Nothing was before."""
+        return frozenset()
+
+    def keep(self, cut_id: str) -> Kept:
+        """Kept at once: who asks remembers it too."""
+        return "kept"
+
+
+class CutFile:
+    """Remembers in a file with one id a line, each flushed to disk by a thread of its own. Close it when done.
+
+    A disk that hangs delays the cut, never the loop that asks.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        """Read what was kept in a folder.
+
+        Raises:
+            InputError: The file cannot be read or written.
+        """
+        self._path = folder / FILE
+        try:
+            descriptor = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o600)
+            with os.fdopen(descriptor, "rb") as file:
+                lines = file.read().decode("utf-8", "replace").splitlines()
+            sync_folder(folder)
+        except OSError as error:
+            raise InputError(
+                f"cannot remember cuts in {self._path}: {error.strerror}; give another folder with --state"
+            ) from error
+        self._known = frozenset(lines)
+        self._told: dict[str, Kept] = {}
+        self._waiting: deque[str] = deque()
+        self._some = threading.Condition()
+        self._closing = False
+        self._thread = threading.Thread(target=self._run, name="cut-memory", daemon=True)
+        self._thread.start()
+
+    @property
+    def known(self) -> frozenset[str]:
+        """What was kept before this start."""
+        return self._known
+
+    def keep(self, cut_id: str) -> Kept:
+        """Ask for a cut to be remembered; `failed` for good where the disk does not take it."""
+        with self._some:
+            if cut_id not in self._told:
+                self._told[cut_id] = "waiting"
+                self._waiting.append(cut_id)
+                self._some.notify()
+            return self._told[cut_id]
+
+    def close(self) -> None:
+        """Write what waits and end."""
+        with self._some:
+            self._closing = True
+            self._some.notify()
+        self._thread.join(_END_S)
+
+    def _run(self) -> None:
+        # Scheduling is a thread's own: the disk comes after the control loop.
+        take_priority("interface")
+        while True:
+            with self._some:
+                while not self._waiting and not self._closing:
+                    self._some.wait()
+                if not self._waiting:
+                    return
+                cut_id = self._waiting.popleft()
+            told: Kept = "kept" if self._write(cut_id) else "failed"
+            with self._some:
+                self._told[cut_id] = told
+
+    def _write(self, cut_id: str) -> bool:
+        try:
+            descriptor = os.open(self._path, os.O_WRONLY | os.O_APPEND)
+            try:
+                # A line that was cut off by a full disk or a killed process stays for itself.
+                line = f"\n{cut_id}\n".encode()
+                if os.write(descriptor, line) != len(line):
+                    return False
+                os.fsync(descriptor)
+            finally:
+                os.close(descriptor)
+        except OSError:
+            return False
+        return True

@@ -1,0 +1,78 @@
+"""The latched stops: every one is kept, and they hold until the newest is released by its own id."""
+
+from rolling_panda.messages.robot import ReleaseStop, StopRequest
+from rolling_panda.messages.supervision import StopRecord
+
+#: What is told of latched stops, the newest first, and how many released ones are remembered.
+_MOST, _OVER = 50, 1000
+
+
+class StopLatch:
+    """Remembers stops. One that has been released does not latch again when late repetitions of it arrive.
+
+    Whoever releases names the newest stop, so that one that they have not seen is never released with the others.
+    """
+
+    def __init__(
+        self, stops: tuple[StopRecord, ...] = (), released: tuple[str, ...] = (), released_by: str = ""
+    ) -> None:
+        """Start with what was latched and released before.
+
+        Args:
+            stops: Latched, the newest first.
+            released: Ids that latch nothing any more.
+            released_by: Who released the last ones, and why.
+        """
+        self.stops = stops
+        self.released_by = released_by
+        self._over = dict.fromkeys(released)
+        #: The hardware stop is pressed: nothing is released before it is not.
+        self.hardware = False
+
+    @property
+    def stop_id(self) -> str:
+        """The newest one, empty when none is latched."""
+        return self.stops[0].stop_id if self.stops else ""
+
+    @property
+    def stopped_by(self) -> str:
+        """Who pressed the newest one and why."""
+        if not self.stops:
+            return ""
+        newest = self.stops[0]
+        return f"{newest.user or newest.source}: {newest.reason}"[:500]
+
+    @property
+    def over(self) -> tuple[str, ...]:
+        """Ids of released stops."""
+        return tuple(self._over)
+
+    def stop(self, request: StopRequest, wall_time: float = 0.0) -> bool:
+        """Latch; True when this request had not been latched before.
+
+        Args:
+            request: As decoded.
+            wall_time: Now (s since 1970), for people.
+        """
+        if request.stop_id in self._over or any(stop.stop_id == request.stop_id for stop in self.stops):
+            return False
+        record = StopRecord(request.stop_id, request.source, request.user, request.reason, max(0.0, wall_time))
+        # Of very many the first ones stay beside the newest: they say how it began.
+        self.stops = (record, *(self.stops if len(self.stops) < _MOST else (*self.stops[: _MOST - 2], self.stops[-1])))
+        return True
+
+    def release(self, request: ReleaseStop) -> str:
+        """Release all; the reason why not, or an empty text."""
+        if not self.stops:
+            return "no stop is latched"
+        if self.hardware:
+            return "the robot's emergency stop button is pressed: release it first"
+        if request.stop_id != self.stop_id:
+            return f"the latched stop is {self.stop_id}, not {request.stop_id}"
+        for stop in self.stops:
+            self._over[stop.stop_id] = None
+        while len(self._over) > _OVER:
+            self._over.pop(next(iter(self._over)))
+        self.stops = ()
+        self.released_by = f"{request.user}: {request.reason}"[:500]
+        return ""

@@ -1,0 +1,54 @@
+"""What the robot itself says keeps it from moving: told once, and latched where a person has to look first."""
+
+import secrets
+from dataclasses import dataclass
+
+from rolling_panda.messages.robot import StopRequest
+
+# So long after a person's release (s) the robot may take to recover before it is stopped anew.
+_RECOVERY_S = 3.0
+
+
+@dataclass(frozen=True)
+class FaultChange:
+    """A fault begins or ends: a line for the log, and the stop to latch where one is due."""
+
+    text: str
+    stop: StopRequest | None
+
+
+class RobotFaults:
+    """Follows the robot's own faults from measurement to measurement. Times are the robot's (s)."""
+
+    def __init__(self) -> None:
+        """Start without a fault."""
+        self.current = ""
+        self.releases = 0
+        self._recovering_until = float("-inf")
+
+    def follow(self, fault: str, severe: bool, stopped: bool, now: float) -> FaultChange | None:
+        """What the newest measurement changes; None for nothing.
+
+        Args:
+            fault: Why the robot does not move; empty when it does.
+            severe: Whether a person has to release it.
+            stopped: Whether a stop is latched already.
+            now: Present time.
+        """
+        new = fault != self.current
+        # What a person has released and the robot has not recovered from is a stop of its own again.
+        again = bool(fault) and severe and not stopped and now >= self._recovering_until
+        if not new and not again:
+            return None
+        self.current = fault
+        if not fault:
+            return FaultChange("the robot is ready again; it waits for a setpoint at rest", None)
+        stop = None
+        if severe and not stopped and now >= self._recovering_until:
+            stop = StopRequest(stop_id=f"robot-{secrets.token_hex(8)}", source="robot", user="", reason=fault[:500])
+        return FaultChange(f"the robot does not move: {fault}", stop)
+
+    def released(self, now: float) -> None:
+        """A person has released the stop: the robot may recover."""
+        self.releases += 1
+        self._recovering_until = now + _RECOVERY_S

@@ -1,0 +1,1 @@
+"""The simulated eye-in-hand camera."""

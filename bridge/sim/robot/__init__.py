@@ -1,0 +1,1 @@
+"""The simulated base, arm and cutter."""

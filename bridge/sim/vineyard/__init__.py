@@ -1,0 +1,1 @@
+"""The simulated row, its growth, its file and its truth."""

@@ -1,0 +1,88 @@
+"""`rolling-panda vineyard`: grow a row from a seed, write it with its truth as one file, and picture it."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import msgspec
+import numpy as np
+from PIL import Image, ImageDraw
+
+from bridge.sim.camera.config import CameraConfig
+from bridge.sim.camera.renderer import Camera
+from bridge.sim.vineyard.config import VineyardConfig
+from bridge.sim.vineyard.file import Vineyard, right_places, save
+from bridge.sim.vineyard.grow import grow
+from bridge.sim.vineyard.row import Array
+from rolling_panda.config import load_section
+from rolling_panda.errors import RollingPandaError
+
+#: The picture shows this much of the row from this far (m).
+_ACROSS, _AWAY = 2.4, 1.4
+_MARK = 5
+
+
+def picture(vineyard: Vineyard, vine: int = 0) -> Image.Image:
+    """A vine from the front, with a red ring at every place where a cut is right.
+
+    Args:
+        vineyard: The row.
+        vine: In the middle of the picture.
+    """
+    config = vineyard.config
+    camera = Camera(CameraConfig(width=1280, height=960, horizontal_fov_deg=_angle()), vineyard.seed)
+    place = np.eye(4)
+    place[:3, :3] = np.column_stack([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
+    place[:3, 3] = [config.first_vine_x + vine * config.vine_spacing, config.row_distance - _AWAY, 1.1]
+    image = Image.fromarray(camera.render(vineyard.row, place).color)
+    draw = ImageDraw.Draw(image)
+    for u, v in _pixels(camera, place, right_places(vineyard)):
+        draw.ellipse((u - _MARK, v - _MARK, u + _MARK, v + _MARK), outline=(230, 30, 30), width=2)
+    return image
+
+
+def _angle() -> float:
+    return float(np.degrees(2 * np.arctan2(_ACROSS / 2, _AWAY)))
+
+
+def _pixels(camera: Camera, place: Array, points: Array) -> list[tuple[float, float]]:
+    k = camera.intrinsics
+    x, y, z = ((points - place[:3, 3]) @ place[:3, :3]).T
+    return [(float(u), float(v)) for u, v in zip(k.cx + k.fx * x / z, k.cy + k.fy * y / z, strict=True)]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command; returns the exit code."""
+    parser = argparse.ArgumentParser(prog="rolling-panda vineyard", description=__doc__)
+    parser.add_argument("--seed", type=int, default=0, help="not negative; the same seed gives the same row")
+    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="JSON to write; a PNG goes beside it")
+    parser.add_argument("--vines", type=int, help="how many (default: as configured)")
+    parser.add_argument("--training", choices=("cordon", "guyot"), help="how the vines are trained")
+    parser.add_argument("--config", type=Path, metavar="FILE", help="TOML file with a section [vineyard]")
+    words = parser.parse_args(argv)
+    try:
+        if words.seed < 0:
+            parser.error(f"--seed {words.seed} is negative; give 0 or more")
+        config = VineyardConfig() if words.config is None else load_section(words.config, "vineyard", VineyardConfig)
+        if words.training is not None:
+            config = msgspec.structs.replace(config, training=words.training)
+        if words.vines is not None:
+            if not 1 <= words.vines <= 100:
+                parser.error(f"--vines {words.vines}: give 1 to 100")
+            config = msgspec.structs.replace(config, vines=words.vines)
+        vineyard = Vineyard(words.seed, config, grow(config, words.seed))
+        save(words.out, vineyard)
+        picture(vineyard).save(words.out.with_suffix(".png"))
+    except RollingPandaError as error:
+        print(f"rolling-panda vineyard: {error}", file=sys.stderr)
+        return 1
+    print(
+        f"{config.vines} vines ({config.training}), {len(vineyard.row.rods)} rods, {len(right_places(vineyard))} cuts"
+    )
+    print(f"{words.out}\n{words.out.with_suffix('.png')}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

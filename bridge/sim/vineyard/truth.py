@@ -1,0 +1,167 @@
+"""Where a grower would cut the simulated row: the judge for tests and benchmarks, never an input of perception.
+
+The rule of spur pruning with two count nodes: keep the lowest cane that is thick enough, take the stub with its other
+canes off in one cut beyond it, and shorten it a little past its second node; the basal bud is not counted.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bridge.sim.vineyard.row import Array, Rod, Row
+
+#: Count nodes that stay; cut past the last one: at best, least and most; internodes shorter than this are halved (m).
+KEPT_NODES = 2
+BEST_PAST, LEAST_PAST, MOST_PAST = 0.020, 0.010, 0.030
+SHORT_INTERNODE = 0.040
+#: A cane at least as thick as this makes a new spur (m).
+GOOD_DIAMETER = 0.006
+#: Wood left on either side of a cut through the stub (m).
+_STUB_MARGIN = 0.004
+
+
+@dataclass(frozen=True)
+class RightCut:
+    """A stretch of one rod where a cut is right.
+
+    Attributes:
+        rod: Index in the row.
+        least: End nearer to the root (3, m, world).
+        best: Where the rule puts the blades (3, m, world).
+        most: End farther from the root (3, m, world).
+        tangent: Unit vector along the wood, away from the root (3).
+    """
+
+    rod: int
+    least: Array
+    best: Array
+    most: Array
+    tangent: Array
+
+    def past_best(self, point: Array) -> float:
+        """How far beyond the best place `point` (3, m) is along the wood (m, signed)."""
+        return float((point - self.best) @ self.tangent)
+
+    def holds(self, rod: int, point: Array) -> bool:
+        """Whether cutting rod `rod` at `point` (3, m) is right."""
+        return rod == self.rod and float((point - self.least) @ self.tangent) >= 0.0 >= self.past_most(point)
+
+    def past_most(self, point: Array) -> float:
+        """How far beyond the last right place `point` (3, m) is along the wood (m, signed)."""
+        return float((point - self.most) @ self.tangent)
+
+
+@dataclass(frozen=True)
+class SpurTruth:
+    """What is right for one spur.
+
+    Attributes:
+        vine: Vine along the row.
+        spur: Spur on the vine.
+        canes: How many canes it carries.
+        keeper: The cane that becomes the new spur.
+        diameter: Of the keeper in its first internode (m).
+        nodes: Middles of the keeper's count nodes, base first (N×3, m, world); the basal bud is not one.
+        cut: On the keeper; None where it has fewer nodes than are kept.
+        renewal: On the stub, beyond the keeper; None where the keeper is the last cane on it.
+        surplus: Canes nearer to the cordon than the keeper, each of which needs a cut of its own.
+    """
+
+    vine: int
+    spur: int
+    canes: int
+    keeper: int
+    diameter: float
+    nodes: Array
+    cut: RightCut | None
+    renewal: RightCut | None
+    surplus: tuple[int, ...]
+
+
+def judge(row: Row) -> tuple[SpurTruth, ...]:
+    """The truth for every spur that carries canes, in the order of vines and spurs; `row` has not been cut yet."""
+    stubs: dict[tuple[int, int], int] = {}
+    chains: dict[tuple[int, int], dict[int, list[tuple[int, Rod]]]] = {}
+    for index, rod in row.standing():
+        if rod.kind == "spur":
+            stubs[rod.vine, rod.spur] = index
+        elif rod.cane >= 0:
+            chains.setdefault((rod.vine, rod.spur), {}).setdefault(rod.cane, []).append((index, rod))
+    # Shoots of a Guyot vine stand on no stub (`bridge.sim.vineyard.truth_guyot`).
+    return tuple(_judge_spur(row, stubs[place], place, chains[place]) for place in sorted(chains) if place in stubs)
+
+
+def _judge_spur(
+    row: Row, stub_index: int, place: tuple[int, int], chains: dict[int, list[tuple[int, Rod]]]
+) -> SpurTruth:
+    stub = row.rods[stub_index]
+    assert stub is not None
+    along = {cane: _along(stub, chain[0][1].start) for cane, chain in chains.items()}
+    upwards = sorted(chains, key=along.__getitem__)
+    diameters = {cane: _diameter(chain) for cane, chain in chains.items()}
+    good = [cane for cane in upwards if diameters[cane] >= GOOD_DIAMETER]
+    keeper = good[0] if good else max(upwards, key=diameters.__getitem__)
+    beyond = [cane for cane in upwards if along[cane] > along[keeper]]
+    middles = [rod.at(0.5)[0] for _, rod in chains[keeper] if rod.kind == "node"][1:]
+    return SpurTruth(
+        vine=place[0],
+        spur=place[1],
+        canes=len(chains),
+        keeper=keeper,
+        diameter=diameters[keeper],
+        nodes=np.array(middles).reshape(-1, 3),
+        cut=shortening(chains[keeper], KEPT_NODES),
+        renewal=_renewal(stub_index, stub, along[keeper], along[beyond[0]]) if beyond else None,
+        surplus=tuple(cane for cane in upwards if along[cane] < along[keeper]),
+    )
+
+
+def shortening(chain: list[tuple[int, Rod]], kept: int) -> RightCut | None:
+    """Where a cane is cut so that so many count nodes stay; None where it has fewer.
+
+    Args:
+        chain: Its rods with their indices, base first.
+        kept: Count nodes that stay.
+    """
+    nodes = [k for k, (_, rod) in enumerate(chain) if rod.kind == "node"]
+    if len(nodes) <= kept:
+        return None
+    last = nodes[kept]
+    index, rod = chain[last + 1]
+    half = _length(chain[last][1]) / 2
+    length = _length(rod)
+    best, least, most = BEST_PAST - half, LEAST_PAST - half, MOST_PAST - half
+    if len(nodes) > kept + 1:
+        following = _length(chain[nodes[kept + 1]][1]) / 2
+        if half + length + following < SHORT_INTERNODE:
+            best = (half + length + following) / 2 - half
+    least, most = max(least, 0.0), min(most, length)
+    return stretch(index, rod, least, min(max(best, least), most), most)
+
+
+def _renewal(index: int, stub: Rod, keeper: float, following: float) -> RightCut:
+    least, most = keeper + _STUB_MARGIN, following - _STUB_MARGIN
+    if most < least:
+        least = most = (keeper + following) / 2
+    return stretch(index, stub, least, (least + most) / 2, most)
+
+
+def stretch(index: int, rod: Rod, least: float, best: float, most: float) -> RightCut:
+    """The right stretch of a rod, by distances from its start (m)."""
+    tangent = (rod.end - rod.start) / _length(rod)
+    points = [rod.start + distance * tangent for distance in (least, best, most)]
+    return RightCut(index, points[0], points[1], points[2], tangent)
+
+
+def _diameter(chain: list[tuple[int, Rod]]) -> float:
+    # The first internode past the basal bud, where a grower looks; the stub of a cane that has no bud.
+    rod = chain[2][1] if len(chain) > 2 else chain[0][1]
+    return 2.0 * rod.at(0.5)[1]
+
+
+def _along(stub: Rod, point: Array) -> float:
+    return float((point - stub.start) @ (stub.end - stub.start)) / _length(stub)
+
+
+def _length(rod: Rod) -> float:
+    return float(np.linalg.norm(rod.end - rod.start))

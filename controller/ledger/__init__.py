@@ -1,0 +1,1 @@
+"""The tamper-evident record: rows, writer, checks and the session report."""

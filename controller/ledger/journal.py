@@ -1,0 +1,158 @@
+"""Records of the controller and how many of them are durable: the side of the ledger without files."""
+
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+import msgspec
+
+from rolling_panda import messages as m
+from rolling_panda.messages import commands as intents
+
+#: What a row is about: a life of a point, an order of work, whether previews are required, what
+#: somebody asked and how it was answered, a stop, a
+#: log line, a start.
+Kind = Literal["ticket", "order", "approach", "preview", "request", "stop", "event", "start"]
+
+
+@dataclass(frozen=True)
+class Record:
+    """A row to be written: `number` grows with each record of one start, `name` says whose or which."""
+
+    number: int
+    kind: Kind
+    name: str
+    body: msgspec.Struct
+
+
+@dataclass(frozen=True)
+class LedgerState:
+    """What has become of the records: all up to number `durable` are on disk; `failure` says why no more are."""
+
+    durable: int = 0
+    failure: str = ""
+
+
+class TicketRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A point's life at one moment; `hash` binds the acceptance, WITHDRAWN says that perception has taken it back."""
+
+    point: m.PruningPoint
+    state: m.PointState | Literal["WITHDRAWN"]
+    reason: str = ""
+    user: str = ""
+    accepted: m.PruningPoint | None = None
+    hash: str = ""
+    cut_id: str = ""
+
+
+class OrderRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The order of work as `user` has put it, none where the plan says; `revision` counts people's changes of it."""
+
+    order: tuple[str, ...]
+    revision: int
+    user: str = ""
+
+
+class ApproachRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """By how much `user` wants the approach to a point turned about its cane (rad); None leaves it to the search."""
+
+    azimuth: float | None
+    user: str = ""
+
+
+class PreviewRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Whether a cut needs its preview to be approved, and who said so."""
+
+    required: bool
+    user: str = ""
+
+
+class RequestRow(msgspec.Struct, frozen=True, kw_only=True):
+    """What somebody asked for and how it was answered; refusals too."""
+
+    asked: intents.AnyIntent
+    ok: bool
+    reason: str
+    mode: m.Mode
+
+
+class Journal:
+    """Numbers records and knows which of them are durable. No clock: `now` is given."""
+
+    def __init__(self) -> None:
+        """Start with nothing to record."""
+        self._waiting: list[Record] = []
+        self._state = LedgerState()
+        self._number = 0
+        self._unwritten_since: float | None = None
+        self._stops: deque[str] = deque(maxlen=100)
+
+    @property
+    def number(self) -> int:
+        """Of the newest record."""
+        return self._number
+
+    @property
+    def failure(self) -> str:
+        """Why nothing is being recorded; empty when it is."""
+        return self._state.failure
+
+    def add(self, kind: Kind, name: str, body: msgspec.Struct) -> int:
+        """Record something; returns its number."""
+        self._number += 1
+        self._waiting.append(Record(self._number, kind, name, body))
+        return self._number
+
+    def stops(self, requests: Iterable[m.StopRequest]) -> None:
+        """Record stops; each is sent several times."""
+        for stop in requests:
+            if stop.stop_id not in self._stops:
+                self._stops.append(stop.stop_id)
+                self.add("stop", stop.user or stop.source, stop)
+
+    def take(self) -> tuple[Record, ...]:
+        """What was added since the last time, for the ledger."""
+        records, self._waiting = tuple(self._waiting), []
+        return records
+
+    def observe(self, state: LedgerState, now: float) -> None:
+        """Take in how far the ledger is."""
+        if state.durable > self._state.durable or state.durable >= self._number:
+            self._unwritten_since = None
+        if state.durable < self._number and self._unwritten_since is None:
+            self._unwritten_since = now
+        self._state = state
+
+    def holds(self, number: int) -> bool:
+        """Is the record of this number durable?"""
+        return number <= self._state.durable
+
+    def trouble(self, now: float, patience_s: float) -> str:
+        """Why the ledger cannot be relied on; empty when it can."""
+        if self._state.failure:
+            return self._state.failure
+        if self._unwritten_since is not None and now - self._unwritten_since > patience_s:
+            return f"the ledger has taken nothing for {now - self._unwritten_since:.1f} s: is its disk full or hanging?"
+        return ""
+
+
+class EventLogger:
+    """Collects what is said until it is taken. `now` is set by the step or the answer under way."""
+
+    def __init__(self, journal: Journal) -> None:
+        """Nothing is said yet; what will be goes into the journal too."""
+        self._journal = journal
+        self._events: list[m.LogEvent] = []
+        self.now = 0.0
+
+    def say(self, severity: m.Severity, text: str) -> None:
+        """One line, of 500 characters at most."""
+        event = m.LogEvent(header=m.Header(self.now), process="controller", severity=severity, text=text[:500])
+        self._events.append(event)
+        self._journal.add("event", "controller", event)
+
+    def take(self) -> tuple[m.LogEvent, ...]:
+        """What was said since the last time."""
+        events, self._events = tuple(self._events), []
+        return events

@@ -1,0 +1,143 @@
+"""Report of a session, built from durable ledger rows. No clock: each row has its time."""
+
+from collections import deque
+from collections.abc import Iterable
+from datetime import datetime
+
+import msgspec
+from msgspec.structs import replace
+
+from controller.ledger.journal import RequestRow, TicketRow
+from rolling_panda.messages import commands as intents
+from rolling_panda.messages.supervision import ControlReport, CutReport, RefusalReport, SessionReport, VineReport
+
+#: What goes over the wire of each; the ledger has all.
+_MOST_CUTS, _MOST_REFUSALS, _MOST_CHANGES = 500, 100, 100
+_ENDED = ("DONE", "FAILED_NOT_CUT", "UNKNOWN")
+_CONTROL: dict[type[intents.Intent], str] = {
+    intents.TakeControl: "took control",
+    intents.GrantControl: "gave control to who had asked",
+    intents.ReturnControl: "returned control",
+}
+
+
+class SessionReportBuilder:
+    """Takes rows in their order; `report` is what they come to."""
+
+    def __init__(self) -> None:
+        """Nothing has happened."""
+        self._began = self._written = self._ready_since = 0.0
+        self._cuts: dict[str, CutReport] = {}
+        #: Points that were accepted and no cut was begun for yet; points that were given up so.
+        self._accepted: set[str] = set()
+        self._given_up: set[str] = set()
+        #: Vine of each accepted point that cannot be reached now.
+        self._beyond: dict[str, int] = {}
+        self._refusals: deque[RefusalReport] = deque(maxlen=_MOST_REFUSALS)
+        self._control: deque[ControlReport] = deque(maxlen=_MOST_CHANGES)
+        self._refused = 0
+
+    def take(self, at: str, body: msgspec.Struct) -> bool:
+        """A row was written at a time (ISO 8601). Returns whether it is one that the report tells of."""
+        when = datetime.fromisoformat(at).timestamp()
+        first = self._began == 0.0
+        self._began, self._written = self._began or when, when
+        match body:
+            case TicketRow():
+                return self._ticket(body, when) or first
+            case RequestRow() if not body.ok:
+                self._refused += 1
+                asked = type(body.asked).__name__
+                self._refusals.append(RefusalReport(at=when, user=body.asked.user, asked=asked, reason=body.reason))
+            case RequestRow() if isinstance(body.asked, intents.Start):
+                self._ready_since = when
+            case RequestRow() if type(body.asked) in _CONTROL:
+                what = _CONTROL[type(body.asked)]
+                self._control.append(ControlReport(at=when, user=body.asked.user, what=what))
+            case _:
+                return first
+        return True
+
+    def report(self) -> SessionReport:
+        """Everything up to now."""
+        cuts = list(self._cuts.values())
+        return SessionReport(
+            began_at=self._began,
+            written_at=self._written,
+            cuts=tuple(cuts[-_MOST_CUTS:]),
+            cut_count=len(cuts),
+            vines=_by_vine(cuts, self._beyond.values()),
+            refusals=tuple(self._refusals),
+            refusal_count=self._refused,
+            control=tuple(self._control),
+        )
+
+    def _ticket(self, row: TicketRow, when: float) -> bool:
+        """Returns whether the report tells of it. A point keeps the id of its last cut when it is accepted anew."""
+        point_id = row.point.point_id
+        before = self._beyond.pop(point_id, None)
+        if row.state == "UNREACHABLE":
+            self._beyond[point_id] = row.point.vine
+        beyond = self._beyond.get(point_id) != before
+        if row.state == "FAILED_NOT_CUT":
+            if point_id in self._given_up:
+                return beyond
+            if point_id in self._accepted or not row.cut_id:
+                self._give_up(row, when)
+                return True
+        self._given_up.discard(point_id)
+        if row.state == "ACCEPTED":
+            self._accepted.add(point_id)
+        else:
+            self._accepted.discard(point_id)
+        if not row.cut_id:
+            return beyond
+        self._cut(row, when)
+        return True
+
+    def _cut(self, row: TicketRow, when: float) -> None:
+        known = self._cuts.get(row.cut_id)
+        if row.state == "INTENT":
+            point = row.point
+            cut = CutReport(cut_id=row.cut_id, point_id=point.point_id, vine=point.vine, spur=point.spur, user=row.user)
+            self._cuts[row.cut_id] = cut
+        elif known is not None and row.state in _ENDED:
+            told = replace(known, outcome=row.state, reason=row.reason[:500], user=row.user or known.user)
+            if not known.outcome:
+                # Somebody may say later how it ended, which takes the robot no time.
+                told = replace(told, ended_at=when, seconds=max(when - self._ready_since, 0.0))
+                self._ready_since = when
+            self._cuts[row.cut_id] = told
+
+    def _give_up(self, row: TicketRow, when: float) -> None:
+        point = row.point
+        self._given_up.add(point.point_id)
+        self._accepted.discard(point.point_id)
+        self._cuts[f"{point.point_id} given up at {when}"] = CutReport(
+            point_id=point.point_id,
+            vine=point.vine,
+            spur=point.spur,
+            outcome="FAILED_NOT_CUT",
+            reason=row.reason[:500],
+            user=row.user,
+            ended_at=when,
+            seconds=max(when - self._ready_since, 0.0),
+        )
+        self._ready_since = when
+
+
+def _by_vine(cuts: list[CutReport], beyond: Iterable[int]) -> tuple[VineReport, ...]:
+    vines: dict[int, VineReport] = {}
+    for cut in cuts:
+        vine = vines.get(cut.vine, VineReport(vine=cut.vine))
+        vines[cut.vine] = replace(
+            vine,
+            done=vine.done + (cut.outcome == "DONE"),
+            not_cut=vine.not_cut + (cut.outcome == "FAILED_NOT_CUT"),
+            unknown=vine.unknown + (cut.outcome == "UNKNOWN"),
+            seconds=vine.seconds + cut.seconds,
+        )
+    for number in beyond:
+        vine = vines.get(number, VineReport(vine=number))
+        vines[number] = replace(vine, unreachable=vine.unreachable + 1)
+    return tuple(vines[number] for number in sorted(vines))

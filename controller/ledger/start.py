@@ -1,0 +1,123 @@
+"""The controller's start: what it restores from the ledger, what it records first, and the durable count of starts."""
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+import msgspec
+
+from controller.ledger.journal import ApproachRow, OrderRow, PreviewRow, Record, TicketRow
+from controller.ledger.store import Ledger
+from rolling_panda import __version__
+from rolling_panda.cli.about import About, about
+from rolling_panda.errors import InputError, LedgerError
+from rolling_panda.runtime.state_folder import replace_durably
+
+Row = TypeVar("Row", bound=msgspec.Struct)
+
+
+class StartRow(msgspec.Struct, frozen=True, kw_only=True):
+    """A process has started: which program on which Python, and with which configuration."""
+
+    program: About
+    run_id: str
+    config_sha256: str
+    config: str
+
+
+class _Version(msgspec.Struct, frozen=True):
+    version: str
+
+
+class _Start(msgspec.Struct, frozen=True):
+    """What any version says of its start."""
+
+    program: _Version
+
+
+def start_record(config: Path, run_id: str) -> Record:
+    """The record of this start, with the whole configuration."""
+    content = config.read_bytes()
+    row = StartRow(
+        program=about(),
+        run_id=run_id,
+        config_sha256=hashlib.sha256(content).hexdigest(),
+        config=content.decode("utf-8", "replace"),
+    )
+    return Record(0, "start", "controller", row)
+
+
+@dataclass(frozen=True)
+class Restored:
+    """What was recorded before: points, and what people want: order of work, previews, approaches."""
+
+    tickets: tuple[TicketRow, ...] = ()
+    order: OrderRow | None = None
+    preview: PreviewRow | None = None
+    approaches: tuple[tuple[str, ApproachRow], ...] = ()
+
+
+def restored(folder: Path) -> Restored:
+    """The newest rows in the ledger of a folder.
+
+    Raises:
+        LedgerError: The ledger cannot be opened, or a row is not what this version writes.
+    """
+    with Ledger(folder) as ledger:
+        orders, previews = _newest(ledger, "order", OrderRow), _newest(ledger, "preview", PreviewRow)
+        approaches = [name for name, _ in ledger.newest("approach")]
+        return Restored(
+            tuple(_newest(ledger, "ticket", TicketRow)),
+            orders[-1] if orders else None,
+            previews[-1] if previews else None,
+            tuple(zip(approaches, _newest(ledger, "approach", ApproachRow), strict=True)),
+        )
+
+
+def _newest(ledger: Ledger, kind: str, row: type[Row]) -> list[Row]:
+    found = []
+    for name, body in ledger.newest(kind):
+        try:
+            found.append(msgspec.json.decode(body, type=row))
+        except msgspec.MsgspecError as error:
+            raise LedgerError(
+                f"the ledger {ledger.path} tells of {kind} {name} what this version, {__version__}, does not "
+                f"understand: {error}. It was last written by {_written_by(ledger)}: use that version, or keep the "
+                f"folder and give another one with --state"
+            ) from error
+    return found
+
+
+def _written_by(ledger: Ledger) -> str:
+    try:
+        starts = [msgspec.json.decode(body, type=_Start) for _, body in ledger.newest("start")]
+    except msgspec.MsgspecError:
+        starts = []
+    return f"version {starts[-1].program.version}" if starts else "a version that did not say which"
+
+
+_NAME = "controller-starts"
+
+
+def count_start(folder: Path) -> int:
+    """Count one more start; it is on disk when this returns.
+
+    Raises:
+        InputError: The count cannot be read or written.
+    """
+    path = folder / _NAME
+    try:
+        text = path.read_text(encoding="ascii") if path.exists() else "0"
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"cannot read the count of starts in {path}: {error}") from error
+    if not text.strip().isdecimal():
+        raise InputError(
+            f"{path} holds {text[:40]!r}, no count of starts; with every other process ended, remove it to begin anew"
+        )
+    starts = int(text) + 1
+    try:
+        replace_durably(path, f"{starts}\n".encode())
+    except OSError as error:
+        raise InputError(f"cannot count this start in {path}: {error.strerror}") from error
+    return starts

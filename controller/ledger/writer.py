@@ -1,0 +1,144 @@
+"""Ledger writer on its own thread. The control loop never waits for it."""
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterable
+from datetime import UTC, datetime
+from typing import Protocol
+
+import msgspec
+
+from controller.ledger.journal import Kind, LedgerState, Record
+from controller.ledger.session_report import SessionReportBuilder
+from controller.ledger.store import Entry
+from rolling_panda import messages as m
+from rolling_panda.errors import LedgerError
+from rolling_panda.runtime.priority import take_priority
+
+#: After a failure it tries again this often (s).
+_AGAIN_S = 0.5
+#: At the end the last records are waited for this long (s).
+_END_S = 2.0
+#: Rows in one transaction, at most.
+_BATCH = 500
+#: Lines of other processes' logs that are recorded: so many at once, then so many a second. Whoever makes the server
+#: refuse a thousand requests a second must not fill the disk with it.
+_LINES_AT_ONCE = 200.0
+_LINES_A_SECOND = 20.0
+
+
+class Store(Protocol):
+    """What records are written to."""
+
+    def append(self, entries: Iterable[Entry]) -> int:
+        """Add rows durably, all or none."""
+
+    def close(self) -> None:
+        """Let go of it."""
+
+
+class LeftOut(msgspec.Struct, frozen=True):
+    """So many log lines of other processes came too fast to be recorded."""
+
+    text: str
+    lines: int
+
+
+class LedgerWriter:
+    """Hand records over with `write` and `note`; `state` says how far they are. Close it when done."""
+
+    def __init__(self, open_store: Callable[[], Store], clock: Callable[[], float] = time.monotonic) -> None:
+        """Start the thread, which opens the ledger and keeps trying while it cannot."""
+        self._open, self._clock = open_store, clock
+        self._waiting: deque[tuple[str, Record]] = deque()
+        self._some = threading.Condition()
+        self._closing = False
+        self._state = LedgerState()
+        self._account = SessionReportBuilder()
+        #: Of what is durable; made anew on the writer's thread when something in it changes.
+        self.report = self._account.report()
+        self._tokens, self._filled_at, self._left_out = _LINES_AT_ONCE, clock(), 0
+        self._thread = threading.Thread(target=self._run, name="ledger", daemon=True)
+        self._thread.start()
+
+    @property
+    def state(self) -> LedgerState:
+        """How far the ledger is."""
+        return self._state
+
+    def write(self, records: Iterable[Record]) -> None:
+        """Record these, in this order; returns at once."""
+        added = [(_now(), record) for record in records]
+        if added:
+            with self._some:
+                self._waiting.extend(added)
+                self._some.notify()
+
+    def note(self, line: m.LogEvent) -> None:
+        """Record a line of another process's log; returns at once. Too many are counted instead."""
+        now = self._clock()
+        self._tokens = min(_LINES_AT_ONCE, self._tokens + (now - self._filled_at) * _LINES_A_SECOND)
+        self._filled_at = now
+        if self._tokens < 1.0:
+            self._left_out += 1
+            return
+        self._tokens -= 1.0
+        if self._left_out:
+            text = f"{self._left_out} lines of other processes' logs came too fast to be recorded"
+            self.write([_unnumbered("event", "controller", LeftOut(text, self._left_out))])
+            self._left_out = 0
+        self.write([_unnumbered("event", line.process, line)])
+
+    def close(self) -> None:
+        """Write what waits, if that is possible soon, and close the ledger."""
+        with self._some:
+            self._closing = True
+            self._some.notify()
+        self._thread.join(_END_S)
+
+    def _run(self) -> None:
+        # Scheduling is a thread's own: the disk must not keep the control loop waiting.
+        take_priority("interface")
+        store: Store | None = None
+        while True:
+            batch = self._next()
+            if not batch:
+                break
+            try:
+                store = store or self._open()
+                store.append(_entry(at, record) for at, record in batch)
+            except LedgerError as error:
+                self._state = LedgerState(self._state.durable, str(error))
+                with self._some:
+                    if self._closing:
+                        break
+                    self._some.wait(_AGAIN_S)
+                continue
+            with self._some:
+                for _ in batch:
+                    self._waiting.popleft()
+            if any([self._account.take(at, record.body) for at, record in batch]):
+                self.report = self._account.report()
+            self._state = LedgerState(max([self._state.durable, *(record.number for _, record in batch)]))
+        if store is not None:
+            store.close()
+
+    def _next(self) -> list[tuple[str, Record]]:
+        """The records to write next, which stay at the head of those that wait; none when it is time to end."""
+        with self._some:
+            while not self._waiting and not self._closing:
+                self._some.wait()
+            return [self._waiting[index] for index in range(min(_BATCH, len(self._waiting)))]
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="microseconds")
+
+
+def _unnumbered(kind: Kind, name: str, body: msgspec.Struct) -> Record:
+    return Record(0, kind, name, body)
+
+
+def _entry(at: str, record: Record) -> Entry:
+    return Entry(at, record.kind, record.name, msgspec.json.encode(record.body).decode())

@@ -1,0 +1,102 @@
+"""Base pose estimate from wheel angles and delayed, noisy odometry."""
+
+import math
+from collections import deque
+
+import numpy as np
+
+from rolling_panda import messages as m
+from rolling_panda.model.differential_drive import Array, DifferentialDrive, Pose
+
+#: Odometry is carried forward by no more than this (s); older odometry is a fault, not something to guess from.
+_LONGEST = 0.1
+#: Share of what odometry says otherwise that is believed at once: its noise must not shake the tool.
+_BELIEVED = 0.2
+#: What odometry says further away than this (m, rad) is no noise: the estimate begins anew.
+_ELSEWHERE = 0.05
+
+
+def wheels_ahead(wheels: Array, sent: Array, ahead: float, lag: float) -> Array:
+    """Velocities that the wheels will have (2, rad/s): they follow their command with a first-order lag.
+
+    Args:
+        wheels: As measured (2, rad/s).
+        sent: What they were told last (2, rad/s).
+        ahead: How far to look (s).
+        lag: Time constant (s); 0 takes them for what they were told.
+    """
+    left = math.exp(-ahead / lag) if lag > 0.0 else 0.0
+    return np.array([told + (now - told) * left for now, told in zip(wheels.tolist(), sent.tolist(), strict=True)])
+
+
+class BaseEstimate:
+    """The base's pose at the time of the joint states: p̂ = p + what the wheels have turned since odometry's p was true.
+
+    The stamps of joint states and odometry are of one clock, the sender's, so that their difference holds whatever the
+    wire's delay is.
+    """
+
+    def __init__(self, drive: DifferentialDrive) -> None:
+        """Know nothing yet; `drive` is the base's geometry."""
+        self._drive = drive
+        #: Of the last joint states: stamp, the wheels' angles and the pose by the wheels alone, in a frame of its own.
+        self._past: deque[tuple[float, float, float, Pose]] = deque()
+        #: That frame in odom: x, y, turn.
+        self._frame: Pose = (0.0, 0.0, 0.0)
+        self._odometry: m.Odometry | None = None
+
+    def configuration(self, joints: m.JointState, odometry: m.Odometry) -> Array:
+        """Q (12) at the time of the joint state."""
+        q = np.empty(12)
+        q[3:] = joints.position
+        stamp = joints.header.stamp
+        self._roll(stamp, joints.position[0], joints.position[1], odometry)
+        if odometry is not self._odometry:
+            self._odometry = odometry
+            self._correct(odometry, stamp)
+        q[:3] = self._in_odom(self._past[-1][3])
+        return q
+
+    def _roll(self, stamp: float, left: float, right: float, odometry: m.Odometry) -> None:
+        """Go on by what the wheels have turned."""
+        past = self._past
+        if past and stamp < past[-1][0]:
+            past.clear()
+        if past and stamp == past[-1][0]:
+            return
+        if past:
+            _, left_before, right_before, pose = past[-1]
+            pose = self._drive.rolled(pose, left - left_before, right - right_before)
+        else:
+            pose, self._frame = self._carried(odometry, stamp), (0.0, 0.0, 0.0)
+        past.append((stamp, left, right, pose))
+        while past[0][0] < stamp - _LONGEST:
+            past.popleft()
+
+    def _correct(self, odometry: m.Odometry, stamp: float) -> None:
+        """Move the frame by what the odometry says of the pose at its time, compared with what was believed."""
+        then = odometry.header.stamp
+        known = next((entry for entry in reversed(self._past) if entry[0] <= then), None)
+        if known is None or stamp - then > _LONGEST:
+            return
+        at, _, _, (rolled_x, rolled_y, rolled_phi) = known
+        x, y, phi = self._in_odom((rolled_x, rolled_y, rolled_phi))
+        x_said, y_said, phi_said = self._carried(odometry, at)
+        wrong = x_said - x, y_said - y, math.remainder(phi_said - phi, math.tau)
+        share = 1.0 if max(map(abs, wrong)) > _ELSEWHERE else _BELIEVED
+        x, y, turn = x + share * wrong[0], y + share * wrong[1], self._frame[2] + share * wrong[2]
+        c, s = math.cos(turn), math.sin(turn)
+        self._frame = (x - c * rolled_x + s * rolled_y, y - s * rolled_x - c * rolled_y, turn)
+
+    def _in_odom(self, rolled: Pose) -> Pose:
+        x, y, turn = self._frame
+        c, s = math.cos(turn), math.sin(turn)
+        rolled_x, rolled_y, phi = rolled
+        return x + c * rolled_x - s * rolled_y, y + s * rolled_x + c * rolled_y, phi + turn
+
+    def _carried(self, odometry: m.Odometry, stamp: float) -> Pose:
+        """Odometry's pose carried along its arc to a stamp, earlier or later."""
+        ahead = min(max(stamp - odometry.header.stamp, -_LONGEST), _LONGEST)
+        left, right = self._drive.wheels(odometry.linear * ahead, odometry.angular * ahead)
+        pose = odometry.pose
+        return self._drive.rolled((pose.x, pose.y, pose.phi), left, right)

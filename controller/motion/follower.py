@@ -1,0 +1,263 @@
+"""Followers of tool motions, arm motions and teleoperation."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from msgspec import Struct
+
+from controller.config import ControllerConfig
+from controller.motion.tool_motion import ToolMotion
+from controller.motion.trajectory import Rates, ToolState, quintic
+from controller.whole_body.compiled import MATRIX, NOTHING, NUMBER, VECTOR, compiled
+from controller.whole_body.task import ActuatorTask, BaseMode, IkProblem, Method, Posture, Solution, ToolTask
+from rolling_panda.model.differential_drive import NXI, Array
+from rolling_panda.model.robot import ARM_Q, ARM_XI, Kinematics
+
+
+@dataclass(frozen=True)
+class Measured:
+    """The robot in one control period.
+
+    Attributes:
+        q: Configuration (12).
+        kinematics: Of the tool at q.
+        sent: ξ̇ sent last (9, rad/s).
+    """
+
+    q: Array
+    kinematics: Kinematics
+    sent: Array
+
+
+class Tracking(Struct, frozen=True):
+    """What following a motion gave.
+
+    Attributes:
+        xi: ξ̇ to send (9), within every limit.
+        desired: T_odom_tool wanted now (pin.SE3), None when only joints are moved.
+        position_error: Of the tool against `desired` (m).
+        rotation_error: The same (rad).
+        manipulability: ω of the arm.
+        feasible: False when what was wanted could not be done within the limits.
+        reason: Why not, in words; empty when it could.
+        done: True when the motion's clock has run out.
+        scale: Rate of the motion's clock, 0…1.
+    """
+
+    xi: Array
+    desired: Any
+    position_error: float
+    rotation_error: float
+    manipulability: float
+    feasible: bool
+    reason: str
+    done: bool
+    scale: float = 1.0
+
+
+class Follower:
+    """Turns motions into velocities by the whole-body method."""
+
+    def __init__(self, config: ControllerConfig, method: Method, dt: float) -> None:
+        """Bind the parts for a control period of `dt` (s)."""
+        self._config, self._method, self._dt = config, method, dt
+        self._J_before: Array | None = None
+        self._gains = np.repeat([config.gain_position, config.gain_rotation], 3)
+        self._lag = config.arm_lag_s + 0.5 * dt if config.arm_lag_s else 0.0
+
+    @property
+    def flows(self) -> bool:
+        """Whether the legs of a way may flow into each other."""
+        return self._method.flows
+
+    def follow(self, motion: ToolMotion, robot: Measured) -> Tracking:
+        """One period along a tool motion."""
+        wanted = motion.desired()
+        pose = robot.kinematics.T_odom_tool
+        error = tool_error(pose, nearest_about_y(pose, wanted.T_odom_tool) if motion.free_axis else wanted.T_odom_tool)
+        out = self._method.solve(
+            IkProblem(
+                robot.q,
+                robot.kinematics,
+                robot.sent,
+                ToolTask(self._twist(wanted, motion.scale, error, robot), motion.free_axis),
+                motion.posture(),
+                motion.base,
+                motion.cap(pose),
+                motion.scale,
+            )
+        )
+        motion.advance(out.scale, self._dt)
+        return _tracking(out, wanted.T_odom_tool, error, motion.done)
+
+    def _twist(self, wanted: ToolState, scale: float, error: Array, robot: Measured) -> Array:
+        """Twist (6) to ask for: the wanted one, what makes good the error, and a lead for the servos' lag."""
+        J, twist = robot.kinematics.J_xi, np.empty(6)
+        before, self._J_before = J if self._J_before is None else self._J_before, J
+        _ask(
+            wanted.twist,
+            wanted.acceleration,
+            scale,
+            J,
+            before,
+            robot.sent,
+            self._lag,
+            self._dt,
+            self._gains,
+            error,
+            twist,
+        )
+        return twist
+
+    def jog(self, xi: Array, robot: Measured) -> Tracking:
+        """One period of the actuators' own velocities ξ̇ (9, rad/s), within the limits and clear of obstacles."""
+        problem = IkProblem(robot.q, robot.kinematics, robot.sent, ActuatorTask(xi), Posture(robot.q), "free")
+        return _tracking(self._method.solve(problem), None, np.zeros(6), False)
+
+    def carry(self, goal: Any, linear: float, angular: float, robot: Measured, speed_scale: float = 1.0) -> Tracking:
+        """One period with the tool kept to a pose while the base moves under it, as far as the arm allows.
+
+        Args:
+            goal: T_odom_tool wanted (pin.SE3).
+            linear: Forward velocity of the base (m/s).
+            angular: Its yaw rate (rad/s).
+            robot: Measured robot.
+            speed_scale: Share of the tool's speed to use.
+        """
+        rate = np.zeros(len(robot.q))
+        heading = float(robot.q[2])
+        rate[:3] = linear * math.cos(heading), linear * math.sin(heading), angular
+        return self._towards(goal, Posture(robot.q, rate), robot, "row", speed_scale)
+
+    def seek(
+        self, goal: Any, q_goal: Array, robot: Measured, base: BaseMode = "free", speed_scale: float = 1.0
+    ) -> Tracking:
+        """One period towards a pose that may move (teleoperation): proportional, at a bounded speed and turn.
+
+        Args:
+            goal: T_odom_tool wanted (pin.SE3).
+            q_goal: Configuration (12) of which heading and arm posture are kept to.
+            robot: Measured robot.
+            base: What the base is for.
+            speed_scale: Share of the tool's speed to use.
+        """
+        posture = q_goal.copy()
+        posture[:2] = robot.q[:2]
+        return self._towards(goal, Posture(posture), robot, base, speed_scale)
+
+    def _towards(self, goal: Any, posture: Posture, robot: Measured, base: BaseMode, speed_scale: float) -> Tracking:
+        error = tool_error(robot.kinematics.T_odom_tool, goal)
+        twist = self._gains * error
+        bounds = speed_scale * self._config.teleop_speed, speed_scale * self._config.teleop_turn
+        for part, bound in zip((slice(0, 3), slice(3, 6)), bounds, strict=True):
+            size = _length(twist[part])
+            if size > bound:
+                twist[part] *= bound / size
+        problem = IkProblem(
+            robot.q,
+            robot.kinematics,
+            robot.sent,
+            ToolTask(twist, keep_path=False),
+            posture,
+            base,
+            bounds[0],
+            wheel_cap=self._config.teleop_base_speed,
+        )
+        return _tracking(self._method.solve(problem), goal, error, False)
+
+
+def _tracking(out: Solution, desired: Any, error: Array, done: bool) -> Tracking:
+    vx, vy, vz, wx, wy, wz = error.tolist()
+    position, rotation = math.hypot(vx, vy, vz), math.hypot(wx, wy, wz)
+    return Tracking(out.xi, desired, position, rotation, out.manipulability, out.feasible, out.reason, done, out.scale)
+
+
+class ArmMotion:
+    """A motion of the arm's joints with the base still: quintic in every joint."""
+
+    def __init__(self, config: ControllerConfig, start: Array, goal: Array) -> None:
+        """Plan from one posture (7) to another (7)."""
+        self._start, self._span = start, goal - start
+        self._gain = config.gain_position
+        self.duration = Rates(0.6, 1.0, 10.0).duration(float(np.abs(self._span).max()))
+        self.time = 0.0
+
+    @property
+    def done(self) -> bool:
+        """True when the clock has reached the end."""
+        return self.time >= self.duration
+
+    def step(self, robot: Measured, follower: Follower, dt: float) -> Tracking:
+        """One period of `dt` (s); what holds the joints back slows the motion's clock."""
+        progress = quintic(self.time, self.duration)
+        xi = np.zeros(NXI)
+        xi[ARM_XI] = self._span * progress.rate + self._gain * (self._start + self._span * progress.s - robot.q[ARM_Q])
+        tracking = follower.jog(xi, robot)
+        self.time += dt * tracking.scale
+        return tracking
+
+
+def tool_error(T_odom_tool: Any, T_odom_goal: Any) -> Array:
+    """Twist (6, odom's axes, at the tool) that takes the tool to the goal in one second: the SE(3) logarithm."""
+    error = np.empty(6)
+    _turned(T_odom_tool.rotation, pin.log6(T_odom_tool.actInv(T_odom_goal)).vector, error)
+    return error
+
+
+@compiled(NOTHING(VECTOR, VECTOR, NUMBER, MATRIX, MATRIX, VECTOR, NUMBER, NUMBER, VECTOR, VECTOR, VECTOR))
+def _ask(
+    wanted: Array,
+    acceleration: Array,
+    scale: float,
+    J: Array,
+    J_before: Array,
+    sent: Array,
+    lag: float,
+    dt: float,
+    gains: Array,
+    error: Array,
+    twist: Array,
+) -> None:
+    """Twist = ẋ_d + K e + τ (ẍ_d − J̇ ξ̇): wanted beforehand, so that the servos have what is wanted when it is.
+
+    Args:
+        wanted: ẋ_d (6).
+        acceleration: Its rate at full speed (6), which counts with `scale`.
+        scale: Rate of the motion's clock.
+        J: J_ξ now (6×9).
+        J_before: J_ξ a period ago (6×9).
+        sent: ξ̇ (9).
+        lag: τ (s).
+        dt: Period (s).
+        gains: K (6).
+        error: e (6).
+        twist: Written (6).
+    """
+    for i in range(6):
+        drift = 0.0
+        for j in range(9):
+            drift += (J[i, j] - J_before[i, j]) * sent[j] / dt
+        twist[i] = wanted[i] + gains[i] * error[i] + lag * (scale * acceleration[i] - drift)
+
+
+@compiled(NOTHING(MATRIX, VECTOR, VECTOR))
+def _turned(R: Array, screw: Array, twist: Array) -> None:
+    """Both halves of a screw (6), turned by R (3×3) and written into twist (6)."""
+    for i in range(3):
+        for half in (0, 3):
+            twist[half + i] = R[i, 0] * screw[half] + R[i, 1] * screw[half + 1] + R[i, 2] * screw[half + 2]
+
+
+def nearest_about_y(T_odom_tool: Any, T_odom_goal: Any) -> Any:
+    """The goal (pin.SE3) turned about its own y axis until its orientation is nearest to the tool's."""
+    M = T_odom_goal.rotation.T @ T_odom_tool.rotation
+    angle = math.atan2(M[0, 2] - M[2, 0], M[0, 0] + M[2, 2])
+    return pin.SE3(T_odom_goal.rotation @ pin.exp3(np.array([0.0, angle, 0.0])), T_odom_goal.translation)
+
+
+def _length(vector: Array) -> float:
+    """Euclidean length, in a tenth of the time that numpy.linalg.norm takes."""
+    return math.sqrt(float(vector @ vector))

@@ -1,0 +1,63 @@
+"""Commands to the actuators: checked, smoothed, numbered and signed with the token."""
+
+import numpy as np
+
+from controller.identity import Token
+from controller.whole_body.saturation import Saturation
+from rolling_panda import messages as m
+from rolling_panda.model.differential_drive import NXI, Array
+
+#: So many periods of rest come first under a new token: the bridge takes no other beginning, and one may be lost.
+_AT_REST_FIRST = 3
+
+BRAKED = "a velocity outside the limits was not sent; the robot brakes"
+
+
+class Setpoints:
+    """Remembers what was sent last: `sent` (9, rad/s), and `before` in the period before that."""
+
+    def __init__(self, saturation: Saturation) -> None:
+        """At rest."""
+        self._saturation = saturation
+        self._number = 0
+        self._token: Token | None = None
+        self._rest = 0
+        self.sent: Array = np.zeros(NXI)
+        self.before: Array = self.sent
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether nothing moves by what was sent last."""
+        return not np.any(self.sent)
+
+    def admits(self, xi: Array) -> bool:
+        """Whether ξ̇ (9) is finite and inside the limits, after what was sent last."""
+        return self._saturation.admits(xi, self.sent)
+
+    def smooth(self, xi: Array) -> Array:
+        """The last gate: what `admits` refuses becomes braking, and the arm's jerk is kept."""
+        if not self.admits(xi):
+            xi = self._saturation.brake(self.sent)
+        return self._saturation.smooth(xi, self.sent, self.before)
+
+    def command(self, xi: Array, token: Token, echo: int) -> m.MotionCommand:
+        """The message for ξ̇ (9), which counts as sent; `echo` is the joint state that it was computed from."""
+        if token != self._token:
+            # Control changes hands at rest.
+            self._token, self._rest = token, _AT_REST_FIRST if self.at_rest else 0
+        if self._rest > 0:
+            self._rest, xi = self._rest - 1, np.zeros(NXI)
+        self.sent, self.before = xi, self.sent
+        self._number += 1
+        a, b, c, d, e, f, g, h, i = xi.tolist()
+        return m.MotionCommand(
+            epoch=token.epoch,
+            token=token.nonce,
+            sequence=self._number,
+            echo=echo,
+            xi=(a, b, c, d, e, f, g, h, i),
+        )
+
+    def withhold(self) -> None:
+        """Nothing is sent in this period."""
+        self.sent = self.before = np.zeros(NXI)

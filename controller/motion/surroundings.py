@@ -1,0 +1,95 @@
+"""Obstacles from perception for the collision model, and allowed contacts of the blades."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from controller.inputs import Sample
+from controller.whole_body.collision import CollisionModel
+from controller.whole_body.obstacle import Axes, Obstacle
+from rolling_panda.messages.perception import Capsule, Obstacles
+from rolling_panda.model.differential_drive import Array
+
+#: A rod thinner than this is watched as if it were this thick (m).
+_THINNEST = 0.001
+#: The spur that is cut has a cane this near to the cut (m): what stays of a cane ends just below it, and shears cut a
+#: stub beside the cane that stays on it.
+_ON_SPUR = 0.045
+
+
+class Surroundings:
+    """Keeps a collision model up to date with the newest obstacles, and with which of them the blades may touch."""
+
+    def __init__(self, model: CollisionModel) -> None:
+        """Begin with nothing around."""
+        self.model = model
+        self._seen: Sample[Obstacles] | None = None
+        self._places: tuple[Array, ...] = ()
+        self._canes: tuple[Capsule, ...] = ()
+        self._names: tuple[str, ...] = ()
+        self._axes = Axes(())
+
+    def take(self, obstacles: Sample[Obstacles] | None) -> None:
+        """Take the newest message; one that was taken before costs nothing."""
+        if obstacles is None or obstacles is self._seen:
+            return
+        changed = self._seen is None or obstacles.message.capsules != self._seen.message.capsules
+        self._seen = obstacles
+        if not changed:
+            return
+        around = obstacles_of(obstacles.message.capsules)
+        self.model.set_obstacles(around)
+        both = list(zip(obstacles.message.capsules, around, strict=True))
+        self._canes = tuple(capsule for capsule, _ in both if capsule.kind == "cane")
+        canes = tuple(obstacle for capsule, obstacle in both if capsule.kind == "cane")
+        self._names, self._axes = tuple(cane.name for cane in canes), Axes(canes)
+        self._allow()
+
+    def work_at(self, places: tuple[Array, ...]) -> None:
+        """Let the blades touch the spurs that are cut at these places (3, m, odom), and nothing else of the robot.
+
+        Beside a cut they may also push aside canes of which it is not decided that they stay.
+        """
+        if len(places) == len(self._places) and all(map(np.array_equal, places, self._places)):
+            return
+        self._places = places
+        self._allow()
+
+    def _allow(self) -> None:
+        self.model.allow({self._names[index] for index in touchable(self._canes, self._axes, self._places)})
+
+
+def touchable(canes: Sequence[Capsule], axes: Axes, places: Sequence[Array]) -> set[int]:
+    """Which canes the blades may touch when they cut at these places: the spurs there, and what may yet be cut off.
+
+    Args:
+        canes: That stay, or of which it is not decided.
+        axes: Of the same.
+        places: Of the cuts (3, m, odom).
+    """
+    allowed: set[int] = set()
+    if not canes or not len(places):
+        return allowed
+    for row in axes.gaps(np.array(places), np.zeros(len(places))):
+        nearest = int(np.argmin(row))
+        if row[nearest] >= _ON_SPUR:
+            continue
+        spur = canes[nearest].vine, canes[nearest].spur
+        for index, (cane, gap) in enumerate(zip(canes, row.tolist(), strict=True)):
+            if (cane.vine, cane.spur) == spur or cane.undecided and gap < _ON_SPUR:
+                allowed.add(index)
+    return allowed
+
+
+def obstacles_of(capsules: Sequence[Capsule]) -> list[Obstacle]:
+    """What the wire says stands around, as the collision model has it; named by kind, number and spur."""
+    return [
+        Obstacle(
+            f"{capsule.kind} {number}" + (f" of vine {capsule.vine}, spur {capsule.spur}" if capsule.spur >= 0 else ""),
+            capsule.kind,
+            capsule.start,
+            capsule.end,
+            max(capsule.start_radius, capsule.end_radius, _THINNEST),
+        )
+        for number, capsule in enumerate(capsules)
+    ]

@@ -1,0 +1,100 @@
+"""Hold-to-run teleoperation."""
+
+from typing import Any
+
+import numpy as np
+
+from controller.config import ControllerConfig
+from controller.identity import Client
+from controller.inputs import Sample
+from controller.motion.follower import Follower, Measured, Tracking
+from rolling_panda.errors import ModelError
+from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
+from rolling_panda.model.differential_drive import NXI, Array, DifferentialDrive
+from rolling_panda.model.robot import ARM_XI, placement
+
+#: Who sees the robot no later than this (s) moves it at full speed, who sees it later than that at the slowest.
+_PROMPT_S, _LATE_S, _SLOWEST = 0.25, 0.5, 0.25
+
+
+class Teleoperation:
+    """Watches the hold and follows it. A hold must be pressed anew after anything else has ended it."""
+
+    def __init__(self, config: ControllerConfig, follower: Follower, drive: DifferentialDrive) -> None:
+        """Bind the parts."""
+        self._config, self._follower, self._drive = config, follower, drive
+        self._posture: Array = np.concatenate([[0.0, 0.0, config.row_heading, 0.0, 0.0], config.reach])
+        self._newest: Sample[TeleopTarget] | None = None
+        self._message: TeleopTarget | None = None
+        self._goal: Any = None
+        self.pressed = True
+        self.client = Client("", "")
+
+    def holding(self, teleop: Sample[TeleopTarget] | None, now: float) -> bool:
+        """Whether the operator holds now: the newest demand says so, is fresh, and is one that can be followed."""
+        newest = self._take(teleop)
+        if newest is None or not newest.message.hold or now - newest.at > self._config.hold_max_age_s:
+            self.pressed = True
+            return False
+        message = newest.message
+        if message is not self._message:
+            self._message, self._goal = message, None
+            if message.target is not None:
+                try:
+                    self._goal = placement(message.target)
+                except ModelError:
+                    self._message = None
+        self.client = Client(message.client or message.user, message.user)
+        return self._message is not None and _means_something(message)
+
+    def _take(self, teleop: Sample[TeleopTarget] | None) -> Sample[TeleopTarget] | None:
+        """The newest demand by its number; one that comes late or twice counts for nothing.
+
+        After a silence that has ended the hold any number is taken: a server that has started again counts from one.
+        """
+        last = self._newest
+        if teleop is not None and (
+            last is None
+            or teleop.message.sequence > last.message.sequence
+            or teleop.at - last.at > self._config.hold_max_age_s
+        ):
+            self._newest = teleop
+        return self._newest
+
+    def refuse(self) -> None:
+        """What is held now counts no more; it must be released first."""
+        self.pressed = False
+
+    def step(self, robot: Measured) -> Tracking:
+        """One period of what is held."""
+        message = self._message
+        assert message is not None
+        xi, speed_scale = np.zeros(NXI), message.share * latency_speed_scale(message.round_trip_s)
+        if message.joints is not None:
+            xi[ARM_XI] = speed_scale * np.array(message.joints)
+            return self._follower.jog(xi, robot)
+        if self._goal is None:
+            assert message.base is not None
+            xi[:2] = self._drive.wheels(*self._driven(message.base, speed_scale))
+            return self._follower.jog(xi, robot)
+        if message.base is None:
+            return self._follower.seek(self._goal, self._posture, robot, self._config.teleop_base, speed_scale)
+        return self._follower.carry(self._goal, *self._driven(message.base, speed_scale), robot, speed_scale)
+
+    def _driven(self, base: BaseVelocity, speed_scale: float) -> tuple[float, float]:
+        """Forward velocity (m/s) and yaw rate (rad/s), slowed alike until no wheel is too fast to brake in time."""
+        fastest = abs(base.linear) + abs(base.angular) * self._drive.half_track
+        share = speed_scale * min(1.0, self._config.teleop_base_speed / fastest) if fastest > 0.0 else 0.0
+        return share * base.linear, share * base.angular
+
+
+def latency_speed_scale(round_trip_s: float) -> float:
+    """Share of the speed that a hand gets, by how late it sees the robot: all up to 0.25 s, a quarter from 0.5 s on."""
+    slow = (round_trip_s - _PROMPT_S) / (_LATE_S - _PROMPT_S)
+    return 1.0 - (1.0 - _SLOWEST) * min(max(slow, 0.0), 1.0)
+
+
+def _means_something(message: TeleopTarget) -> bool:
+    """Either a tool target or a base velocity or both, or joint velocities alone."""
+    tool_or_base = message.target is not None or message.base is not None
+    return tool_or_base != (message.joints is not None)

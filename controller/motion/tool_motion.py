@@ -1,0 +1,275 @@
+"""A tool motion of straight legs that overlap, with the posture along it."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from controller.config import ControllerConfig
+from controller.motion.trajectory import Correction, PoseTrajectory, Rates, ToolState, quintic, quintic_time
+from controller.whole_body.compiled import NOTHING, NUMBER, VECTOR, compiled
+from controller.whole_body.task import BaseMode, Posture
+from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.robot import ARM_Q
+
+#: What is reckoned with for the arm's joints on a leg (rad/s, rad/s², rad/s³).
+_ARM = Rates(1.3, 4.0, 60.0)
+#: By how much the base's time may be too short (s).
+_ROOM_S = 0.02
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A straight way of the tool.
+
+    Attributes:
+        goal: T_odom_tool at its end (pin.SE3).
+        q_goal: Configuration (12) wanted at its end, for the null space.
+        speed: Largest tool speed (m/s).
+        frozen_within: Distance to its goal within which only the arm moves (m); infinite: on the whole leg.
+        frozen_until: Distance from its beginning until which only the arm moves (m).
+    """
+
+    goal: Any
+    q_goal: Array
+    speed: float
+    frozen_within: float = 0.0
+    frozen_until: float = 0.0
+
+
+@dataclass(frozen=True)
+class _Timed:
+    """A leg in its place: from rest to rest, its time counted from `begin` (s)."""
+
+    begin: float
+    trajectory: PoseTrajectory
+    span: Array
+    leg: Leg
+
+    @property
+    def end(self) -> float:
+        return self.begin + self.trajectory.duration
+
+    def free(self, until: float) -> tuple[float, float] | None:
+        """When the base may move (s), `until` at the latest; None when it may not."""
+        length, arm_until, within = self.trajectory.length, self.leg.frozen_until, self.leg.frozen_within
+        begin, end, duration = self.begin, self.end, self.trajectory.duration
+        if arm_until + within > 0.0:
+            if arm_until + within >= length:
+                return None
+            begin += duration * quintic_time(arm_until / length)
+            end -= duration * (1.0 - quintic_time(1.0 - within / length))
+        return (begin, min(end, until)) if begin < min(end, until) else None
+
+
+class ToolMotion:
+    """Legs one after the other; a leg begins while the one before it still comes to rest.
+
+    Each leg is a quintic from rest to rest. Where two overlap, their motions add up, so that the tool rounds the corner
+    between them without stopping; velocity and acceleration stay continuous. The base has a quintic of its own, from
+    when it may move for the first time to when it may for the last: under way while the arm alone follows the tool's
+    path. The clock advances as far as the limits let it.
+    """
+
+    def __init__(
+        self,
+        config: ControllerConfig,
+        start: Any,
+        q_start: Array,
+        legs: Sequence[Leg],
+        slow_end: bool = False,
+        free_axis: bool = False,
+        flows: bool = True,
+        waits: bool = False,
+    ) -> None:
+        """Plan.
+
+        Args:
+            config: Of the controller.
+            start: T_odom_tool at the beginning (pin.SE3).
+            q_start: Configuration (12) at the beginning.
+            legs: At least one.
+            slow_end: True for the way to the cut: the last `slow_zone` is at `cut_speed`.
+            free_axis: True where the rotation about the tool's y does not matter.
+            flows: False makes every leg end at rest before the next one begins.
+            waits: True where it may have to wait at its end until it is extended: the base may still move there.
+        """
+        self._config, self._slow_end, self.free_axis = config, slow_end, free_axis
+        self._flows, self._waits_until = flows, math.inf if waits and flows else 0.0
+        self._start, self._q_start, self._legs = start, q_start, _timed(config, start, q_start, legs, flows)
+        self.goal, self.q_goal, self.speed = legs[-1].goal, legs[-1].q_goal, max(leg.speed for leg in legs)
+        self._goal_place = self.goal.translation.tolist()
+        self._free = _free(self._legs)
+        self._base_span = self.q_goal[:2] - q_start[:2]
+        self.legs = len(legs)
+        self.duration = max(leg.end for leg in self._legs)
+        self.time, self.scale = 0.0, 1.0
+        self._corrections: list[Correction] = []
+        self._settled: Posture | None = None
+
+    @property
+    def done(self) -> bool:
+        """True when the clock has reached the end."""
+        return self.time >= self.duration
+
+    @property
+    def leg(self) -> int:
+        """Number of the leg that has begun last."""
+        return max(i for i, leg in enumerate(self._legs) if i == 0 or self.time >= leg.begin)
+
+    @property
+    def base(self) -> BaseMode:
+        """What the base is for now."""
+        if self._free is None:
+            return "frozen"
+        return "row" if self._free[0] <= self.time < max(self._free[1], self._waits_until) else "frozen"
+
+    def extend(self, leg: Leg) -> None:
+        """Go on with one more leg, to a cut, with the base where it ends now; it flows into what is left of the last.
+
+        Args:
+            leg: Its end is the goal from now on, and the last `slow_zone` is slow.
+        """
+        config, last = self._config, self._legs[-1]
+        made = _placed(config, last.leg.goal, last.leg.q_goal, [leg], self._flows, None, 0.0)[0]
+        begin = last.end
+        if self._flows:
+            begin -= config.blend * min(last.trajectory.duration, made.trajectory.duration)
+        made = replace(made, begin=max(begin, self.time))
+        self._legs = (*self._legs, made)
+        free = made.free(math.inf)
+        self._waits_until = 0.0 if free is None else free[1]
+        self.goal, self.q_goal, self.speed = leg.goal, leg.q_goal, max(self.speed, leg.speed)
+        self._goal_place, self._slow_end = leg.goal.translation.tolist(), True
+        self.legs, self.duration = len(self._legs), max(self.duration, made.end)
+
+    def shift(self, by: Array) -> None:
+        """Move the goal by (3, m, odom) from now on, without a jump of velocity or acceleration."""
+        config = self._config
+        # At the speed of the last part, so that a late correction does not hurry the blades.
+        made = Correction.within(self.time, by, Rates(config.cut_speed, config.tool_acceleration, config.tool_jerk))
+        self._corrections.append(made)
+        self.goal = pin.SE3(self.goal.rotation, self.goal.translation + by)
+        self.duration = max(self.duration, made.end)
+
+    def settle(self, q: Array) -> None:
+        """From now on keep the tool where it should be and the arm otherwise as it is at q (12), once."""
+        if self._settled is None:
+            self._settled = Posture(q.copy())
+
+    def advance(self, scale: float, dt: float) -> None:
+        """Let the clock run at the rate `scale` for one period of `dt` (s)."""
+        self.scale = scale
+        self.time += dt * scale
+
+    def desired(self) -> ToolState:
+        """Where the tool should be now, its twist and the rate of that."""
+        position, R = self._start.translation.copy(), np.array(self._start.rotation, order="C")
+        twist, acceleration = np.zeros(6), np.zeros(6)
+        for leg in self._legs:
+            if self.time <= leg.begin:
+                break
+            leg.trajectory.add(self.time - leg.begin, position, R, twist, acceleration)
+        for made in self._corrections:
+            done = made.progress(self.time)
+            position += done.s * made.by
+            twist[:3] += done.rate * made.by
+            acceleration[:3] += done.acceleration * made.by
+        return ToolState(pin.SE3(R, position), twist, acceleration)
+
+    def posture(self) -> Posture:
+        """Base and arm as they should be now: the arm straight from leg to leg, heading as at the goal."""
+        if self._settled is not None:
+            return self._settled
+        q, rate = self._q_start.copy(), np.zeros(len(self._q_start))
+        for leg in self._legs:
+            if self.time <= leg.begin:
+                break
+            progress = quintic(self.time - leg.begin, leg.trajectory.duration)
+            _go_along(leg.span, progress.s, progress.rate, q, rate)
+        if self._free is None:
+            q[:2], rate[:2] = self._q_start[:2], 0.0
+        else:
+            progress = quintic(self.time - self._free[0], self._free[1] - self._free[0])
+            q[:2] = self._q_start[:2] + self._base_span * progress.s
+            rate[:2] = self._base_span * progress.rate
+        q[2], rate[2] = self.q_goal[2], 0.0
+        return Posture(q, rate, self.q_goal)
+
+    def cap(self, T_odom_tool: Any) -> float:
+        """Largest tool speed (m/s) at this tool pose."""
+        if not self._slow_end:
+            return self.speed * 1.2
+        config = self._config
+        away = math.dist(self._goal_place, T_odom_tool.translation.tolist()) - config.slow_zone
+        return math.sqrt(config.cut_speed**2 + 2.0 * config.slow_braking * max(away, 0.0))
+
+
+@compiled(NOTHING(VECTOR, NUMBER, NUMBER, VECTOR, VECTOR))
+def _go_along(span: Array, s: float, rate: float, q: Array, q_rate: Array) -> None:
+    """Add s · span to q and rate · span to its rate (12 each)."""
+    for i in range(len(span)):
+        q[i] += s * span[i]
+        q_rate[i] += rate * span[i]
+
+
+def _timed(
+    config: ControllerConfig, start: Any, q_start: Array, legs: Sequence[Leg], flows: bool
+) -> tuple[_Timed, ...]:
+    """The legs in their places, with time enough for the base between them."""
+    travel = float(np.hypot(*(legs[-1].q_goal[:2] - q_start[:2])))
+    # With room for feedback.
+    base_s = Rates(0.8 * config.base_speed, 0.75 * config.base_acceleration, 10.0).duration(travel)
+    # The leg that waits for the base: where the tool's line matters least.
+    waits = next((i for i, leg in enumerate(legs) if leg.frozen_until == leg.frozen_within == 0.0), None)
+    extra = 0.0
+    while True:
+        timed = _placed(config, start, q_start, legs, flows, waits, extra)
+        free = _free(timed)
+        if waits is None or free is None or free[1] - free[0] >= base_s - _ROOM_S:
+            return timed
+        # A leg that grows overlaps with more of its neighbours, so that this converges from below.
+        extra = timed[waits].trajectory.duration + base_s - (free[1] - free[0])
+
+
+def _placed(
+    config: ControllerConfig,
+    start: Any,
+    q_start: Array,
+    legs: Sequence[Leg],
+    flows: bool,
+    waits: int | None,
+    at_least: float,
+) -> tuple[_Timed, ...]:
+    out: list[_Timed] = []
+    for number, leg in enumerate(legs):
+        span = leg.q_goal - q_start
+        # The joints need their time too, with room for feedback.
+        arm_s = _ARM.duration(float(np.abs(span[ARM_Q]).max()))
+        trajectory = PoseTrajectory(
+            start,
+            leg.goal,
+            Rates(leg.speed, config.tool_acceleration, config.tool_jerk),
+            Rates(config.tool_turn, 3.0 * config.tool_acceleration, 3.0 * config.tool_jerk),
+            max(arm_s, at_least) if number == waits else arm_s,
+            straight=True,
+        )
+        begin = 0.0
+        if out:
+            before = out[-1]
+            begin = before.end
+            if flows:
+                begin -= config.blend * min(before.trajectory.duration, trajectory.duration)
+        out.append(_Timed(begin, trajectory, span, leg))
+        start, q_start = leg.goal, leg.q_goal
+    return tuple(out)
+
+
+def _free(legs: tuple[_Timed, ...]) -> tuple[float, float] | None:
+    """From when to when the base may move (s). Of two legs that overlap the later one says."""
+    ends = (*(leg.begin for leg in legs[1:]), math.inf)
+    times = [free for leg, end in zip(legs, ends, strict=True) if (free := leg.free(end)) is not None]
+    return (times[0][0], times[-1][1]) if times else None

@@ -1,0 +1,49 @@
+"""Tracking error: integrated commands against measurements. Pure."""
+
+import math
+
+import numpy as np
+
+from rolling_panda import messages as m
+from rolling_panda.model.differential_drive import NXI, Array
+
+#: By how much wheels and joints may be away from what was sent (rad). In motion at full speed the servos'
+#: lag and the wire's take up 0.1 rad of a joint and 0.3 rad of a wheel.
+WHEELS_RAD, JOINTS_RAD = 1.0, 0.35
+#: What was missed long ago is forgotten with this time constant (s).
+_FORGETS_S = 1.0
+#: After a longer gap between two joint states (s) nothing can be said of the time between.
+_GAP_S = 0.06
+_LIMIT = np.array([WHEELS_RAD] * 2 + [JOINTS_RAD] * (NXI - 2))
+
+
+class TrackingErrorMonitor:
+    """Adds up the difference between what was sent and what was measured, on the bridge's own clock."""
+
+    def __init__(self) -> None:
+        """Nothing has been sent."""
+        self._behind: Array = np.zeros(NXI)
+        self._stamp = -math.inf
+
+    def take(self, joints: m.JointState, sent: Array) -> None:
+        """Take in a joint state and the ξ̇ (9, rad/s) sent before it; the same one again changes nothing."""
+        passed = joints.header.stamp - self._stamp
+        self._stamp = joints.header.stamp
+        if not 0.0 < passed <= _GAP_S:
+            if passed != 0.0:
+                self._behind = np.zeros(NXI)
+            return
+        self._behind += passed * (sent - np.array(joints.velocity) - self._behind / _FORGETS_S)
+
+    @property
+    def reason(self) -> str:
+        """Which actuator does not do what it is told, and by how much; empty when all do."""
+        excess = np.abs(self._behind) - _LIMIT
+        worst = int(np.argmax(excess))
+        if excess[worst] <= 0.0:
+            return ""
+        name = ("the left wheel", "the right wheel")[worst] if worst < 2 else f"joint {worst - 1}"
+        return (
+            f"the robot does not follow: {name} is {abs(self._behind[worst]):.2f} rad away from what was sent, "
+            f"allowed are {_LIMIT[worst]}"
+        )

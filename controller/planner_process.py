@@ -1,0 +1,149 @@
+"""Planner in its own process at low priority. The control loop sends requests and never waits."""
+
+import multiprocessing
+import os
+import signal
+import threading
+from multiprocessing.connection import Connection
+
+from controller.config import ControllerConfig
+from controller.planning.preview_plan import Preview, PreviewRequest
+from controller.planning.work_plan import PlanRequest, WorkPlan
+from rolling_panda.config import RobotConfig
+from rolling_panda.errors import RollingPandaError
+from rolling_panda.runtime.priority import take_priority
+
+#: How long the process is waited for when it is told to end (s).
+_END_S = 2.0
+
+
+class PlannerProcess:
+    """The newest request of each kind is worked on, one at a time, previews first. Close it when done.
+
+    `newest` is the last plan, `newest_preview` the last preview.
+    """
+
+    def __init__(self, config: ControllerConfig, robot_config: RobotConfig) -> None:
+        """Start the process; it is ready some seconds later.
+
+        Args:
+            config: Of the controller.
+            robot_config: Of the robot.
+        """
+        self._configs = config, robot_config
+        self._waiting = threading.Condition()
+        self._plan: PlanRequest | None = None
+        self._preview: PreviewRequest | None = None
+        self._process: multiprocessing.process.BaseProcess | None = None
+        self._closing = False
+        self.newest: WorkPlan | None = None
+        self.newest_preview: Preview | None = None
+        self._thread = threading.Thread(target=self._run, name="planner", daemon=True)
+        self._thread.start()
+
+    @property
+    def pid(self) -> int | None:
+        """Of the planning process; None while there is none."""
+        process = self._process
+        return None if process is None else process.pid
+
+    def ask(self, request: PlanRequest | PreviewRequest) -> None:
+        """Do this next."""
+        with self._waiting:
+            if isinstance(request, PreviewRequest):
+                self._preview = request
+            else:
+                self._plan = request
+            self._waiting.notify()
+
+    def close(self) -> None:
+        """End the process, in the middle of a plan too."""
+        with self._waiting:
+            self._closing = True
+            if self._process is not None:
+                self._process.terminate()
+            self._waiting.notify()
+        self._thread.join(_END_S)
+
+    def _run(self) -> None:
+        # Scheduling is a thread's own, and the process that it starts inherits it.
+        take_priority("background")
+        connection = self._start()
+        while (request := self._next()) is not None and connection is not None:
+            try:
+                connection.send(request)
+                self._keep(connection.recv())
+            except (EOFError, OSError):
+                self._keep(_failed(request, "the planning process ended; it is being started again"))
+                connection.close()
+                connection = self._start()
+        if connection is not None:
+            connection.close()
+        if self._process is not None:
+            self._process.join(_END_S)
+
+    def _keep(self, made: WorkPlan | Preview) -> None:
+        if isinstance(made, Preview):
+            self.newest_preview = made
+        else:
+            self.newest = made
+
+    def _next(self) -> PlanRequest | PreviewRequest | None:
+        """Waits for a request; None when closing."""
+        with self._waiting:
+            while self._plan is None and self._preview is None and not self._closing:
+                self._waiting.wait()
+            if self._closing:
+                return None
+            if self._preview is not None:
+                preview, self._preview = self._preview, None
+                return preview
+            plan, self._plan = self._plan, None
+            return plan
+
+    def _start(self) -> Connection | None:
+        """A new process; None when closing."""
+        context = multiprocessing.get_context("spawn")
+        here, there = context.Pipe()
+        process = context.Process(target=_plan, args=(there, *self._configs), name="planner", daemon=True)
+        with self._waiting:
+            if self._closing:
+                return None
+            process.start()
+            self._process = process
+        there.close()
+        return here
+
+
+def _plan(connection: Connection, config: ControllerConfig, robot_config: RobotConfig) -> None:
+    """The process: answers requests until nobody is there to ask any more."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, name="parent-watch", daemon=True).start()
+    # What only planning needs is loaded here alone.
+    from controller.planning.cuts import CutPlanner
+    from controller.planning.rollout import Rollout
+
+    planner, rollout = CutPlanner(config, robot_config), Rollout(config, robot_config)
+    while True:
+        try:
+            request = connection.recv()
+        except EOFError:
+            return
+        try:
+            made = rollout.roll(request) if isinstance(request, PreviewRequest) else planner.plan(request)
+        except RollingPandaError as error:
+            made = _failed(request, str(error))
+        connection.send(made)
+
+
+def _failed(request: PlanRequest | PreviewRequest, why: str) -> WorkPlan | Preview:
+    if isinstance(request, PreviewRequest):
+        return Preview(request, failure=why)
+    return WorkPlan(request, failure=why)
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

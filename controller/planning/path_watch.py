@@ -1,0 +1,201 @@
+"""Clearance of a previewed motion from obstacles that were detected since.
+
+More of the row comes into sight all the time, and what was seen before is seen better; a motion that was approved stays
+what it was as long as nothing new is too near to it. New is what sticks out by more than `SAME` of all that was known.
+It is too near to a part of the robot where it is nearer than control lets it come, or nearer than the least distance
+that was shown for that cut, or than plans keep where that is less.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from controller.config import HierarchyConfig
+from controller.motion.speed_limits import PlanLimits
+from controller.motion.surroundings import obstacles_of, touchable
+from controller.planning.preview_plan import STEP, Preview, SweptVolume
+from controller.whole_body.collision_geometry import BLADES
+from controller.whole_body.compiled import NOTHING, NUMBER, PACKED, VECTOR, compiled
+from controller.whole_body.obstacle import Axes
+from rolling_panda.messages.perception import Capsule
+from rolling_panda.messages.supervision import PreviewedCut
+from rolling_panda.messages.types import WOOD_CLASSES
+from rolling_panda.model.differential_drive import Array
+
+#: What was known, seen again, is where it was to within this (m).
+SAME = 0.005
+#: Places of the motion that are looked at together.
+_BLOCK = 16
+#: Between two places along an axis that are looked at (m).
+_SPACING = 0.01
+
+
+class PathWatch:
+    """Made once a preview. A look takes about a millisecond, and longer where much has come close."""
+
+    def __init__(self, preview: Preview, swept: SweptVolume, settings: HierarchyConfig) -> None:
+        """Look after one motion.
+
+        Args:
+            preview: What was shown.
+            swept: The room that it takes up.
+            settings: Say which distances are kept.
+        """
+        self._preview, self._swept = preview, swept
+        self._before = preview.request.obstacles
+        self._known = frozenset(self._before)
+        self._axes = Axes(tuple(obstacles_of(self._before)))
+        parts = swept.shapes.parts
+        self._blades = [part == BLADES for part in parts]
+        self._kept = {
+            kind: np.array([settings.kept((part, f"{kind} ")) + STEP for part in parts]) for kind in WOOD_CLASSES
+        }
+        self._most = max(PlanLimits.clearance, *(float(kept.max()) for kept in self._kept.values()))
+        self._ways = [_Way(swept, cut) for cut in preview.cuts]
+        self._low = np.min([way.low.min(axis=0, initial=np.inf) for way in self._ways], axis=0, initial=np.inf)
+        self._high = np.max([way.high.max(axis=0, initial=-np.inf) for way in self._ways], axis=0, initial=-np.inf)
+
+    def changed(self, now: Sequence[Capsule], first: str = "") -> str:
+        """What has come too near, in words; empty where nothing has.
+
+        Args:
+            now: What stands around now.
+            first: Point that the work has come to; the motion before that has been made. Empty: none has.
+        """
+        fresh = [capsule for capsule in now if capsule not in self._known]
+        spots = self._new_spots(fresh)
+        if not len(spots):
+            return ""
+        canes = tuple(capsule for capsule in now if capsule.kind == "cane")
+        axes = Axes(tuple(obstacles_of(canes)))
+        points = {point.point_id: np.array(point.position) for point in self._preview.request.points}
+        cuts = self._preview.cuts
+        begun = not first
+        worst, words = 0.0, ""
+        for number, cut in enumerate(cuts):
+            begun = begun or cut.point_id == first
+            if not begun:
+                continue
+            places = [points[each.point_id] for each in cuts[number : number + 2]]
+            touched = {canes[index] for index in touchable(canes, axes, places)}
+            needed = self._needed(fresh, spots, cut, touched)
+            lacking, part, spot, distance = self._worst(self._ways[number], spots, needed)
+            if lacking > worst:
+                worst = lacking
+                kind, name = fresh[int(spots[spot, 4])].kind, self._swept.shapes.parts[part]
+                words = _words(kind, name, cut.point_id, distance, distance + lacking)
+        return words
+
+    def _new_spots(self, fresh: Sequence[Capsule]) -> Array:
+        """Places on what is new (m×5): where, the radius there, and of which capsule; only near the motion."""
+        rows = [_spots(capsule, number) for number, capsule in enumerate(fresh)]
+        spots = np.vstack([*rows, np.empty((0, 5))])
+        room = spots[:, 3:4] + self._most
+        near = ((spots[:, :3] > self._low - room) & (spots[:, :3] < self._high + room)).all(axis=1)
+        spots = np.ascontiguousarray(spots[near])
+        if len(spots) and self._before:
+            sticks_out = self._axes.gaps(spots[:, :3], -spots[:, 3]).min(axis=1)
+            spots = np.ascontiguousarray(spots[sticks_out > SAME])
+        return spots
+
+    def _needed(self, fresh: Sequence[Capsule], spots: Array, cut: PreviewedCut, touched: set[Capsule]) -> Array:
+        """How far each part has to be from each spot on the way to a cut (p×m, m); −∞ where it may touch it."""
+        shown = min(cut.clearance, PlanLimits.clearance) - SAME
+        needed = np.maximum(np.column_stack([self._kept[capsule.kind] for capsule in fresh]), shown)
+        needed[np.ix_(self._blades, [capsule in touched for capsule in fresh])] = -math.inf
+        return np.ascontiguousarray(needed[:, spots[:, 4].astype(int)])
+
+    def _worst(self, way: "_Way", spots: Array, needed: Array) -> tuple[float, int, int, float]:
+        """By how much the nearest is too near (m), of which part and spot it is, and its distance (m)."""
+        shapes, out = self._swept.shapes, np.zeros(5)
+        spots = np.ascontiguousarray(spots[:, :4])
+        _look(way.placed, way.low, way.high, shapes.half, shapes.around, spots, needed, out)
+        lacking, _, part, spot, distance = out.tolist()
+        return lacking, int(part), int(spot), distance
+
+
+class _Way:
+    """The part of a motion that belongs to one cut, with boxes around pieces of it."""
+
+    def __init__(self, swept: SweptVolume, cut: PreviewedCut) -> None:
+        on_the_way = (swept.time >= cut.begins_s) & (swept.time <= cut.ends_s)
+        placed, shapes = swept.placed[on_the_way], swept.shapes
+        reach = (np.linalg.norm(shapes.half, axis=1) + shapes.around)[:, None]
+        pieces = [placed[first : first + _BLOCK, :, 9:] for first in range(0, len(placed), _BLOCK)]
+        none = np.empty((0, 3))
+        self.placed = np.ascontiguousarray(placed.reshape(-1, 12))
+        self.low = np.vstack([none, *(piece.min(axis=0) - reach for piece in pieces)])
+        self.high = np.vstack([none, *(piece.max(axis=0) + reach for piece in pieces)])
+
+
+def _spots(capsule: Capsule, number: int) -> Array:
+    """Places along the axis of a capsule (m×5)."""
+    start, end = np.array(capsule.start), np.array(capsule.end)
+    count = math.ceil(float(np.linalg.norm(end - start)) / _SPACING) + 1
+    along = np.linspace(0.0, 1.0, count)[:, None]
+    radius = max(capsule.start_radius, capsule.end_radius)
+    return np.hstack([start + along * (end - start), np.tile([radius, number], (count, 1))])
+
+
+def _words(kind: str, part: str, point_id: str, distance: float, needed: float) -> str:
+    where = f"{1e3 * distance:.0f} mm from" if distance > 0.0 else "in"
+    return f"a {kind} is seen {where} the way of {part} to {point_id}, {1e3 * needed:.0f} mm are needed"
+
+
+@compiled(NUMBER(VECTOR, VECTOR, NUMBER, VECTOR))
+def _distance(placed: Array, half: Array, around: float, spot: Array) -> float:
+    """From a part, placed (12), to a ball (4: middle and radius); negative where they overlap."""
+    square = 0.0
+    for axis in range(3):
+        along = 0.0
+        for i in range(3):
+            along += placed[3 * i + axis] * (spot[i] - placed[9 + i])
+        over = max(abs(along) - half[axis], 0.0)
+        square += over * over
+    distance: float = math.sqrt(square) - around - spot[3]
+    return distance
+
+
+@compiled(NOTHING(PACKED, PACKED, PACKED, PACKED, VECTOR, PACKED, PACKED, VECTOR))
+def _look(
+    placed: Array,
+    low: Array,
+    high: Array,
+    half: Array,
+    around: Array,
+    spots: Array,
+    needed: Array,
+    out: Array,
+) -> None:
+    """Write what lacks most: by how much (m), row of `placed`, part, spot, distance (m); nothing where nothing lacks.
+
+    Args:
+        placed: All parts of one place after the other (k p×12).
+        low: Corner of a box around each part at `_BLOCK` places after each other (blocks p×3, m).
+        high: The opposite corner.
+        half: Of the parts (p×3, m).
+        around: Of the parts (p, m).
+        spots: Middle and radius (m×4, m).
+        needed: (p×m, m).
+        out: Written (5).
+    """
+    parts = len(around)
+    for block in range(len(low)):
+        part = block % parts
+        first = (block // parts) * _BLOCK
+        last = min(first + _BLOCK, len(placed) // parts)
+        for spot in range(len(spots)):
+            room = spots[spot, 3] + needed[part, spot]
+            near = room > 0.0
+            for axis in range(3):
+                at = spots[spot, axis]
+                near = near and low[block, axis] - room < at < high[block, axis] + room
+            if not near:
+                continue
+            for place in range(first, last):
+                row = place * parts + part
+                distance = _distance(placed[row], half[part], around[part], spots[spot])
+                if needed[part, spot] - distance > out[0]:
+                    out[0], out[1], out[2], out[3] = needed[part, spot] - distance, row, part, spot
+                    out[4] = distance

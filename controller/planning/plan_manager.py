@@ -1,0 +1,159 @@
+"""Requests, validity and state of the session plan."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from controller.planning.plan_validity import ObstacleWatch, approaches_changed, place_changed, points_changed
+from controller.planning.work_plan import PlannedCut, PlanRequest, WorkPlan, session_plan
+from controller.work.point_queue import PointQueue, Ticket
+from controller.work.posture_search import CutPlan
+from rolling_panda.messages.perception import Capsule
+from rolling_panda.messages.supervision import PlanState, SessionPlan
+from rolling_panda.model.differential_drive import Array
+
+#: A plan is asked for when nothing has changed for so long (s), as operators accept one point after the other.
+_SETTLED_S = 0.3
+#: Between two requests (s): while the robot works, more of the row comes into view all the time.
+_PAUSE_S = 2.0
+#: The same after planning failed.
+_AGAIN_S = 10.0
+#: The plan is repeated this often for those who come later (s).
+_REPEAT_S = 5.0
+
+
+class PlanManager:
+    """Keeps one plan. `review` it now and then; between reviews `known` answers for single points."""
+
+    def __init__(self, queue: PointQueue) -> None:
+        """Begin without a plan."""
+        self._queue = queue
+        self._plan: WorkPlan | None = None
+        self._cuts: dict[str, PlannedCut] = {}
+        self._state: PlanState = "none"
+        self._reason = "no point is accepted"
+        self._asked: PlanRequest | None = None
+        self._number = 0
+        self._quiet_since = self._asked_at = -np.inf
+        self._wanted: tuple[object, ...] = ()
+        self._fresh = True
+        self._said_at = -np.inf
+        self._watch = ObstacleWatch((), np.empty((0, 2)), ())
+        self._compared: object = None
+        self._in_the_way = ""
+
+    @property
+    def valid(self) -> bool:
+        """Whether work follows the plan."""
+        return self._state == "valid"
+
+    def review(
+        self,
+        made: WorkPlan | None,
+        q: Array | None,
+        obstacles: Sequence[Capsule],
+        at_rest: bool,
+        working: bool,
+        now: float,
+        busy: str = "",
+    ) -> PlanRequest | None:
+        """Take a new plan, judge the one there is, and ask for another where that is due.
+
+        Args:
+            made: Newest answer of the planner; the same object until there is another.
+            q: Configuration (12) now, None before the first measurement.
+            obstacles: What stands in the way now.
+            at_rest: Whether the robot stands still.
+            working: Whether the robot works off the queue, which moves it from where the plan begins.
+            now: Monotonic time (s).
+            busy: The point that is worked on now; empty when none.
+
+        Returns:
+            What to plan; None when nothing is to be planned now.
+        """
+        if made is not None and self._asked is not None and made.request.number == self._asked.number:
+            self._take(made)
+        accepted, order, turned = self._queue.accepted(), self._queue.order.by_hand, self._queue.approaches.turned
+        if (accepted, order, turned) != self._wanted:
+            self._wanted, self._quiet_since = (accepted, order, turned), now
+        why = self._why_void(q, obstacles, at_rest, working)
+        self._judge(why, bool(accepted))
+        if self.valid and self._plan is not None:
+            refused = {point_id: text[:500] for point_id, text in self._plan.refused.items()}
+            self._queue.reach(self._plan.request.points, refused, busy)
+        pause = _AGAIN_S if self._plan is not None and self._plan.failure else _PAUSE_S
+        due = self._asked is None and now - self._quiet_since >= _SETTLED_S and now - self._asked_at >= pause
+        if self.valid or not due or not accepted or q is None or not (at_rest or working):
+            return None
+        self._number += 1
+        self._asked_at = now
+        self._asked = PlanRequest(self._number, q.copy(), accepted, tuple(obstacles), order, turned)
+        self._judge(why, True)
+        return self._asked
+
+    @property
+    def cuts(self) -> dict[str, CutPlan] | None:
+        """What the plan says of each point that it works on; None while one is being made."""
+        if self._state == "planning" or (self._state in ("none", "void") and self._queue.next() is not None):
+            return None
+        return {name: cut.cut for name, cut in self._cuts.items()} if self.valid else {}
+
+    def known(self, ticket: Ticket) -> CutPlan | None:
+        """What the plan says of a point as it was accepted; None where it says nothing that holds."""
+        plan, point_id = self._plan, ticket.point.point_id
+        if plan is None or ticket.accepted not in plan.request.points:
+            return None
+        if plan.request.turned != self._queue.approaches.turned:
+            return None
+        cut = self._cuts.get(point_id)
+        return cut.cut if cut is not None and self.valid else None
+
+    def message(self, now: float) -> SessionPlan | None:
+        """The plan for the wire where it is due: changed, or not said for a while."""
+        if not self._fresh and now - self._said_at < _REPEAT_S:
+            return None
+        self._fresh, self._said_at = False, now
+        return session_plan(None if self._state == "none" else self._plan, self._state, self._reason, now)
+
+    def _take(self, made: WorkPlan) -> None:
+        self._asked, self._plan = None, made
+        self._cuts = {cut.point.point_id: cut for cut in made.cuts}
+        self._watch, self._compared = ObstacleWatch.of(made), None
+        self._fresh = True
+
+    def _why_void(self, q: Array | None, obstacles: Sequence[Capsule], at_rest: bool, working: bool) -> str:
+        plan = self._plan
+        if plan is None:
+            return ""
+        if plan.failure:
+            return f"planning failed: {plan.failure}"
+        why = points_changed(plan, self._queue.tickets(), self._queue.order.by_hand)
+        why = why or approaches_changed(plan.request.turned, self._queue.approaches.turned)
+        if not why:
+            if self._compared is not obstacles:
+                self._compared = obstacles
+                self._in_the_way = self._watch.changed(obstacles)
+            why = self._in_the_way
+        if at_rest and not working and q is not None:
+            why = why or place_changed(plan, q)
+        return why
+
+    def _judge(self, why: str, work: bool) -> None:
+        if not work and self._asked is None:
+            self._say("none", "no point is accepted")
+        elif self._plan is not None and not why:
+            self._say("valid", "")
+        elif self._asked is not None:
+            self._say("planning", why or "the first plan is being made")
+        else:
+            self._say("none" if self._plan is None else "void", why or "waiting to plan")
+
+    def _say(self, state: PlanState, reason: str) -> None:
+        if (state, reason) == (self._state, self._reason):
+            return
+        self._state, self._reason, self._fresh = state, reason, True
+        plan = self._plan
+        if self.valid and plan is not None:
+            self._queue.arrange(tuple(cut.point.point_id for cut in plan.cuts))
+        else:
+            self._queue.arrange(())

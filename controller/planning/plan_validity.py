@@ -1,0 +1,138 @@
+"""Validity of a plan: changes of the points, the obstacles and the place of the robot."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from controller.motion.surroundings import obstacles_of
+from controller.planning.work_plan import WorkPlan
+from controller.whole_body.obstacle import Axes, Obstacle
+from controller.work.point_queue import BOUND, Ticket
+from rolling_panda.messages.perception import Capsule
+from rolling_panda.messages.types import PointState
+from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.robot import ARM_Q
+
+#: Something stands where nothing within this of it (m) stood when the plan was made.
+OBSTACLE_TOLERANCE = 0.05
+#: The robot at rest has left the place that the plan begins from: base (m), heading and arm joints (rad).
+PLACE_TOLERANCE, TURN_TOLERANCE, JOINT_TOLERANCE = 0.05, 0.05, 0.1
+#: No point of the robot is farther than this from the middle of its axle (m): what stands beyond is not in its way.
+_REACH = 1.3
+#: A cane matters where the tool goes in among the canes: its half width, with the camera beside it, and some room (m).
+_BESIDE_TOOL = 0.12
+#: Rows of a way between two places of the base that are looked at.
+_LOOK = 20
+#: Places along an obstacle's axis that are compared, as shares of its length.
+_SHARES = np.linspace(0.0, 1.0, 9)
+#: What became of a point by the work itself leaves the plan for the others as it is.
+_WORKED: frozenset[PointState] = frozenset({"INTENT", "DONE", "FAILED_NOT_CUT", "UNKNOWN"})
+
+
+def points_changed(plan: WorkPlan, tickets: Iterable[Ticket], order: tuple[str, ...] = ()) -> str:
+    """How the accepted points and their order differ from the planned ones; empty where they do not.
+
+    Args:
+        plan: The plan.
+        tickets: All of the queue.
+        order: That people want them in.
+    """
+    planned = {point.point_id: point for point in plan.request.points}
+    now = {ticket.point.point_id: ticket for ticket in tickets}
+    for point_id, ticket in now.items():
+        if ticket.state not in BOUND:
+            continue
+        if point_id not in planned:
+            return f"{point_id} was accepted after it was made"
+        if ticket.accepted != planned[point_id]:
+            return f"{point_id} was accepted anew"
+    for point_id in planned:
+        if point_id not in now or now[point_id].state not in {*BOUND, *_WORKED}:
+            return f"{point_id} is no longer accepted"
+    return "" if plan.request.order == order else "the order of work was changed after it was made"
+
+
+def approaches_changed(before: tuple[tuple[str, float], ...], now: tuple[tuple[str, float], ...]) -> str:
+    """To which point somebody wants another approach than before; empty where to none."""
+    for point_id, _ in sorted(set(before) ^ set(now)):
+        return f"the approach to {point_id} was turned after it was made"
+    return ""
+
+
+def place_changed(plan: WorkPlan, q: Array) -> str:
+    """How far a robot at rest at q (12) is from where the plan begins; empty within the tolerances."""
+    return away_from(plan.request.q, q)
+
+
+def away_from(start: Array, q: Array) -> str:
+    """How far a robot at rest at q (12) is from another configuration (12); empty within the tolerances."""
+    away = q - start
+    moved, turned = float(np.hypot(*away[:2])), abs(float(away[2]))
+    arm = float(np.abs(away[ARM_Q]).max())
+    if moved > PLACE_TOLERANCE:
+        return f"the robot stands {moved:.2f} m from where it begins"
+    if turned > TURN_TOLERANCE:
+        return f"the robot is turned by {np.degrees(turned):.0f}° from where it begins"
+    if arm > JOINT_TOLERANCE:
+        return f"a joint of the arm is {arm:.2f} rad from where it begins"
+    return ""
+
+
+class ObstacleWatch:
+    """Looks out for what a plan has not reckoned with. Made once a plan; a look takes about a millisecond."""
+
+    def __init__(self, before: tuple[Capsule, ...], track: Array, lines: Sequence[tuple[Array, Array]]) -> None:
+        """Remember what stood around, and where robot and tool will be.
+
+        Args:
+            before: What stood around.
+            track: Places of the base (n×2, m).
+            lines: Of the tool into each cut: from, to (3 each, m).
+        """
+        self._before, self._track = before, track
+        self._axes = Axes(tuple(obstacles_of(self._before)))
+        self._lines = Axes(tuple(Obstacle("", "line", _point(a), _point(b), _BESIDE_TOOL) for a, b in lines))
+
+    @classmethod
+    def of(cls, plan: WorkPlan) -> "ObstacleWatch":
+        """For the session's plan."""
+        ways = [cut.way.q[:, :2] for cut in plan.cuts]
+        track = np.vstack([*(way[::_LOOK] for way in ways), *(way[-1:] for way in ways), np.empty((0, 2))])
+        lines = [(cut.cut.poses.clear.translation, cut.cut.poses.cut.translation) for cut in plan.cuts]
+        return cls(plan.request.obstacles, track, lines)
+
+    def changed(self, now: Sequence[Capsule]) -> str:
+        """What stands in the plan's way where nothing stood; empty where nothing does.
+
+        What has gone changes nothing, nor does what is out of the robot's reach all the way, nor a cane that is not
+        beside the tool's line into a cut.
+
+        Args:
+            now: What stands around now.
+        """
+        if now is self._before or now == self._before or not now or not len(self._track):
+            return ""
+        start, end = np.array([c.start for c in now]), np.array([c.end for c in now])
+        radius = np.array([max(c.start_radius, c.end_radius) for c in now])
+        places = (start[:, None] + _SHARES[:, None] * (end - start)[:, None]).reshape(-1, 3)
+        new = np.full(len(places), True)
+        if self._before:
+            # How far each place sticks out of the one that it sticks out of the least.
+            new = self._axes.gaps(places, -np.repeat(radius, len(_SHARES))).min(axis=1) > OBSTACLE_TOLERANCE
+        for index in np.flatnonzero(new):
+            kind = now[int(index) // len(_SHARES)].kind
+            if self._in_the_way(places[index], kind == "cane"):
+                x, y, z = places[index]
+                return f"a {kind} is seen at ({x:.1f}, {y:.1f}, {z:.1f}) m that was not when it was made"
+        return ""
+
+    def _in_the_way(self, place: Array, cane: bool) -> bool:
+        if cane:
+            # More canes come into view all along the row; only the tool goes in among them.
+            return float(self._lines.gaps(place[None], np.zeros(1)).min()) < 0.0
+        return float(np.hypot(*(place[:2] - self._track).T).min()) < _REACH
+
+
+def _point(at: Array) -> tuple[float, float, float]:
+    x, y, z = at.tolist()
+    return x, y, z

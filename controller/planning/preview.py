@@ -1,0 +1,283 @@
+"""Previews of the work: requests, validity and approval.
+
+Where people require it, no cut begins without an approval. An approval is for one motion: from where the robot stood,
+over these points in this order, among what stood around. What follows it cuts from the postures that were shown.
+"""
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from controller.config import HierarchyConfig
+from controller.ledger.journal import Journal, PreviewRow
+from controller.planning.path_watch import PathWatch
+from controller.planning.plan_validity import approaches_changed, away_from
+from controller.planning.preview_plan import Preview, PreviewRequest, motion_message, state_message
+from controller.work.point_queue import PointQueue, Ticket
+from controller.work.posture_search import CutPlan
+from rolling_panda.messages import commands as intents
+from rolling_panda.messages.perception import Capsule, PruningPoint
+from rolling_panda.messages.supervision import PreviewMotion, PreviewPhase, PreviewState
+from rolling_panda.model.differential_drive import Array
+
+#: Intents about previews.
+ABOUT_PREVIEWS: Final = (intents.AskPreview, intents.ApprovePreview, intents.RequirePreview)
+#: A preview shows so many points at most.
+MOST = 10
+#: It is repeated this often for those who come later (s).
+_STATE_S, _MOTION_S = 0.5, 5.0
+#: For so long a plan is waited for (s); then each posture is searched for, as in work without one.
+_PLAN_S = 15.0
+
+
+class PreviewManager:
+    """Keeps one preview. `review` it now and then; `permit` and `known` answer for single points in between."""
+
+    def __init__(self, queue: PointQueue, journal: Journal, settings: HierarchyConfig) -> None:
+        """Nothing is asked for, and nothing is required.
+
+        Args:
+            queue: Of the points.
+            journal: Records what people decide.
+            settings: Say which distances are kept.
+        """
+        self._queue, self._journal, self._settings = queue, journal, settings
+        self.required = False
+        self._preview: Preview | None = None
+        self._asked: PreviewRequest | None = None
+        self._wanted: str | None = None
+        self._wanted_at = -np.inf
+        self._number = 0
+        self._phase: PreviewPhase = "none"
+        self._reason = self._approved_by = ""
+        self._begun = False
+        self._order: tuple[str, ...] = ()
+        self._watch: PathWatch | None = None
+        self._compared: object = None
+        self._in_the_way = ""
+        self._fresh = self._fresh_motion = True
+        self._said_at = self._moved_at = -np.inf
+
+    def restore(self, row: PreviewRow) -> None:
+        """Take up what was required before a restart."""
+        self.required = row.required
+
+    def do(self, intent: intents.Intent, now: float) -> str:
+        """What an operator asks of previews; returns why not, empty when done."""
+        if isinstance(intent, intents.RequirePreview):
+            self.required, self._fresh = intent.required, True
+            self._journal.add("preview", "preview", PreviewRow(required=intent.required, user=intent.user))
+            return ""
+        if isinstance(intent, intents.AskPreview):
+            return self._want(intent.point_id, now)
+        if isinstance(intent, intents.ApprovePreview):
+            return self._approve(intent.preview_hash, intent.user)
+        return f"{type(intent).__name__} is nothing about previews"
+
+    def start_refused(self) -> str:
+        """Why work may not begin for want of an approval; empty when it may."""
+        if not self.required or self._phase == "approved":
+            return ""
+        if self._phase == "ready":
+            return "look at the preview and approve it first"
+        if self._phase == "expired":
+            return f"the preview has expired: {self._reason}; ask for another one"
+        return "a preview before each cut is required: ask for one and approve it"
+
+    def begin(self) -> None:
+        """Work begins."""
+        self._begun = self._phase == "approved"
+
+    def permit(self, ticket: Ticket) -> str:
+        """Why the way to a cut may not begin or go on for want of an approval; empty when it may."""
+        if not self.required:
+            return ""
+        name, preview = ticket.point.point_id, self._preview
+        if preview is None or not self._approved_by:
+            return f"the way to {name} waits for its preview to be approved"
+        if self._phase == "expired":
+            return f"the approved preview has expired: {self._reason}"
+        names = [cut.point_id for cut in preview.cuts]
+        points = {point.point_id: point for point in preview.request.points}
+        if name not in names or points[name] != ticket.accepted:
+            return f"{name} is not in the approved preview as it is accepted now"
+        shown = preview.cuts[names.index(name)]
+        if shown.cut_s is None:
+            return f"the approved preview shows {name} as {shown.result}"[:300]
+        for before in names[: names.index(name)]:
+            earlier = self._queue.get(before)
+            if earlier is None or earlier.state not in ("INTENT", "DONE"):
+                return f"{before} was left, so that the way to {name} is another one than was approved"
+        return ""
+
+    def known(self, ticket: Ticket) -> CutPlan | None:
+        """The posture that the preview has shown for a cut, where work follows an approved one; else None."""
+        preview = self._preview
+        if preview is None or not self._begun or ticket.accepted not in preview.request.points:
+            return None
+        return preview.plans.get(ticket.point.point_id)
+
+    def review(
+        self,
+        made: Preview | None,
+        q: Array | None,
+        obstacles: Sequence[Capsule],
+        cuts: dict[str, CutPlan] | None,
+        at_rest: bool,
+        working: bool,
+        look_s: float,
+        now: float,
+    ) -> PreviewRequest | None:
+        """Take a new preview, judge the one there is, and ask for the one that is wanted.
+
+        Args:
+            made: Newest answer; the same object until there is another.
+            q: Configuration (12) now, None before the first measurement.
+            obstacles: What stands in the way now.
+            cuts: What the session's plan says of points; None while one is being made.
+            at_rest: Whether the robot stands still.
+            working: Whether it works off the queue.
+            look_s: From asking for a picture to knowing what it shows, as it was last (s).
+            now: Monotonic time (s).
+
+        Returns:
+            What to roll forward; None when nothing is to be.
+        """
+        if made is not None and self._asked is not None and made.request.number == self._asked.number:
+            self._take(made)
+        if self._phase in ("ready", "approved") and q is not None:
+            if why := self._changed(q, obstacles, at_rest, working):
+                self._say("expired", why)
+        if self._begun and not working:
+            self._begun = False
+            # The robot stands elsewhere now, and some of the points are cut.
+            self._say("expired", "the work that it was approved for has ended")
+        if self._wanted is None or working or self._asked is not None:
+            return None
+        if not at_rest or q is None:
+            self._say("waiting", "the robot still moves")
+            return None
+        if cuts is None and now - self._wanted_at < _PLAN_S:
+            self._say("waiting", "the plan is being made")
+            return None
+        points = self._points(self._wanted)
+        self._wanted = None
+        if not points:
+            self._say("none", self._queue.waits or "no point is accepted")
+            return None
+        self._number += 1
+        following, names = self._queue.next(), tuple(point.point_id for point in points)
+        # Until it is of no use any more, only people change the order that it shows.
+        self._order = names if following is not None and following.point.point_id == names[0] else ()
+        turned = self._queue.approaches.turned
+        self._asked = PreviewRequest(self._number, q.copy(), points, tuple(obstacles), dict(cuts or {}), look_s, turned)
+        self._say("rolling", "")
+        return self._asked
+
+    def message(self, now: float) -> PreviewState | None:
+        """The state for the wire where it is due."""
+        if not self._fresh and now - self._said_at < _STATE_S:
+            return None
+        self._fresh, self._said_at = False, now
+        shown = self._preview if self._phase in ("ready", "approved", "expired") else None
+        left = 0 if shown is None else max(0, self._queue.count("ACCEPTED") - len(shown.cuts))
+        return state_message(shown, self.required, self._phase, self._reason, self._approved_by, left, now)
+
+    def motion(self, now: float) -> PreviewMotion | None:
+        """The motion for the wire where it is due."""
+        if self._preview is None or (not self._fresh_motion and now - self._moved_at < _MOTION_S):
+            return None
+        self._fresh_motion, self._moved_at = False, now
+        return motion_message(self._preview, now)
+
+    def _want(self, point_id: str, now: float) -> str:
+        ticket = self._queue.get(point_id) if point_id else self._queue.next()
+        if ticket is None:
+            return f"there is no point {point_id!r}" if point_id else self._queue.waits
+        if ticket.state != "ACCEPTED" or not ticket.seen:
+            if ticket.state == "UNREACHABLE":
+                return f"{point_id} cannot be reached: {ticket.reason}"[:500]
+            return f"{point_id} is {ticket.state}; accept it first" if ticket.seen else f"{point_id} is not seen now"
+        self._wanted, self._wanted_at, self._asked = point_id, now, None
+        self._approved_by = ""
+        self._say("waiting", "")
+        return ""
+
+    def _approve(self, digest: str, user: str) -> str:
+        preview = self._preview
+        if preview is None or self._phase not in ("ready", "approved", "expired"):
+            return "there is no preview to approve; ask for one"
+        if digest != preview.digest:
+            return f"the preview is another one now: {preview.digest[:8]}, not {digest[:8]}; look again"
+        if self._phase == "expired":
+            return f"the preview has expired: {self._reason}; ask for another one"
+        following, first = self._queue.next(), preview.request.points[0].point_id
+        if following is not None and following.point.point_id != first:
+            return f"{following.point.point_id} comes before {first} in the order of work: move {first} to the front"
+        self._approved_by = user
+        self._say("approved", "")
+        return ""
+
+    def _take(self, made: Preview) -> None:
+        self._asked, self._approved_by = None, ""
+        if made.failure:
+            self._preview = None
+            self._say("none", f"the preview failed: {made.failure}")
+            return
+        self._preview, self._fresh_motion = made, True
+        self._watch = None if made.swept is None else PathWatch(made, made.swept, self._settings)
+        self._compared, self._in_the_way = None, ""
+        self._say("ready", "")
+
+    def _changed(self, q: Array, obstacles: Sequence[Capsule], at_rest: bool, working: bool) -> str:
+        """What has changed since the preview was made, in words; empty where nothing has."""
+        preview, watch = self._preview, self._watch
+        if preview is None or watch is None:
+            return ""
+        if not working and at_rest and (why := away_from(preview.request.q, q)):
+            return why
+        if why := self._points_changed(preview, working):
+            return why
+        if why := approaches_changed(preview.request.turned, self._queue.approaches.turned):
+            return why
+        if self._compared is not obstacles:
+            self._compared = obstacles
+            self._in_the_way = watch.changed(obstacles, self._come_to(preview))
+        return self._in_the_way
+
+    def _come_to(self, preview: Preview) -> str:
+        """The point that is worked on now, or next."""
+        for cut in preview.cuts:
+            ticket = self._queue.get(cut.point_id)
+            if ticket is not None and ticket.state in ("ACCEPTED", "INTENT"):
+                return cut.point_id
+        return preview.cuts[-1].point_id if preview.cuts else ""
+
+    def _points_changed(self, preview: Preview, working: bool) -> str:
+        for point in preview.request.points:
+            ticket = self._queue.get(point.point_id)
+            if ticket is not None and ticket.state == "UNREACHABLE":
+                return f"{point.point_id} cannot be reached any more"
+            if ticket is None or ticket.state not in ("ACCEPTED", "INTENT", "DONE", "FAILED_NOT_CUT", "UNKNOWN"):
+                return f"{point.point_id} is no longer accepted"
+            if ticket.state == "ACCEPTED" and ticket.accepted != point:
+                return f"{point.point_id} was revised"
+        following = self._queue.next()
+        first = preview.request.points[0].point_id
+        if self._phase == "approved" and not working and following is not None and following.point.point_id != first:
+            return f"the order has changed: {following.point.point_id} comes before {first}"
+        return ""
+
+    def _points(self, point_id: str) -> tuple[PruningPoint, ...]:
+        """What is to be shown, in the order of work: one point, which then comes first, or the next few."""
+        tickets = [ticket for ticket in self._queue.in_order() if ticket.state == "ACCEPTED" and ticket.seen]
+        if point_id:
+            tickets = [ticket for ticket in tickets if ticket.point.point_id == point_id]
+        return tuple(ticket.accepted for ticket in tickets[:MOST] if ticket.accepted is not None)
+
+    def _say(self, phase: PreviewPhase, reason: str) -> None:
+        if (phase, reason) == (self._phase, self._reason):
+            return
+        self._phase, self._reason, self._fresh = phase, reason, True
+        self._queue.hold(self._order if phase in ("rolling", "ready", "approved") else ())

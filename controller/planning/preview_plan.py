@@ -1,0 +1,149 @@
+"""A preview as data: the request, the motion, the volume that it sweeps, and its messages."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from controller.whole_body.collision import CollisionModel
+from controller.whole_body.collision_geometry import Shapes
+from controller.work.posture_search import CutPlan
+from rolling_panda import messages as m
+from rolling_panda.messages.perception import Capsule, PruningPoint
+from rolling_panda.messages.supervision import PreviewedCut, PreviewMotion, PreviewPhase, PreviewRow, PreviewState
+from rolling_panda.model.differential_drive import Array
+
+#: No point of the robot is farther from one place to the next (m).
+STEP = 0.005
+
+
+@dataclass(frozen=True, eq=False)
+class SweptVolume:
+    """A motion, place by place.
+
+    Attributes:
+        shapes: Of the robot's parts.
+        time: Of each place (k, s).
+        placed: Rotation, row by row, and middle of each part in odom (k×p×12).
+    """
+
+    shapes: Shapes
+    time: Array
+    placed: Array
+
+
+@dataclass(frozen=True, eq=False)
+class PreviewRequest:
+    """Everything that a preview depends on, apart from the configuration.
+
+    Attributes:
+        number: Grows by one a request.
+        q: Configuration (12) at the start, at rest.
+        points: Accepted points, each as it was accepted, in the order of work.
+        obstacles: What stands in the way.
+        cuts: What the session's plan says of points, by id; the others are searched for as in work.
+        turned: Points of which somebody has said the turn of the approach about the cane, and that (rad).
+        look_s: From asking for a picture to knowing what it shows (s).
+    """
+
+    number: int
+    q: Array
+    points: tuple[PruningPoint, ...]
+    obstacles: tuple[Capsule, ...] = ()
+    cuts: dict[str, CutPlan] = field(default_factory=dict)
+    look_s: float = 0.5
+    turned: tuple[tuple[str, float], ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Preview:
+    """Answer to a request.
+
+    Attributes:
+        request: What was asked.
+        cuts: For the wire, in order; those that were not come to are not in it.
+        plans: Posture of each cut that was found, by id; who follows the preview cuts from these.
+        rows: The motion, thinned out.
+        duration: Of all of it (s).
+        digest: SHA-256 of the request, the configuration and the motion; empty when there is none.
+        failure: Why there is none; empty when there is one.
+        swept: The room that the motion takes up; None when there is none.
+    """
+
+    request: PreviewRequest
+    cuts: tuple[PreviewedCut, ...] = ()
+    plans: dict[str, CutPlan] = field(default_factory=dict)
+    rows: tuple[PreviewRow, ...] = ()
+    duration: float = 0.0
+    digest: str = ""
+    failure: str = ""
+    swept: SweptVolume | None = None
+
+
+def state_message(
+    preview: Preview | None,
+    required: bool,
+    phase: PreviewPhase,
+    reason: str,
+    approved_by: str,
+    left: int,
+    now: float,
+) -> PreviewState:
+    """The message of the state.
+
+    Args:
+        preview: What is shown; None when nothing is.
+        required: Whether no cut begins without an approval.
+        phase: Of the preview.
+        reason: Why it is in that phase.
+        approved_by: Who has approved it.
+        left: Accepted points that are not in it.
+        now: Monotonic time (s).
+    """
+    header = m.Header(now, "odom")
+    if preview is None:
+        return PreviewState(header=header, required=required, phase=phase, reason=reason[:500])
+    q = preview.request.q
+    a, b, c, d, e, f, g, h, i = q[3:].tolist()
+    return PreviewState(
+        header=header,
+        required=required,
+        phase=phase,
+        reason=reason[:500],
+        preview_hash=preview.digest,
+        approved_by=approved_by,
+        start=_planar(q),
+        position=(a, b, c, d, e, f, g, h, i),
+        duration_s=preview.duration,
+        cuts=preview.cuts,
+        left=left,
+    )
+
+
+def motion_message(preview: Preview, now: float) -> PreviewMotion:
+    """The message of the motion."""
+    return PreviewMotion(header=m.Header(now, "odom"), preview_hash=preview.digest, rows=preview.rows)
+
+
+def _planar(q: Array) -> m.PlanarPose:
+    x, y, phi = q[:3].tolist()
+    return m.PlanarPose(x, y, phi)
+
+
+def sweep(model: CollisionModel, times: Sequence[float], configurations: Sequence[Array]) -> SweptVolume:
+    """The room that is taken up by a motion through these configurations (12), which are closer than a place needs."""
+    shapes = model.shapes
+    reach = np.linalg.norm(shapes.half, axis=1) + shapes.around
+    every = [model.placed(q) for q in configurations]
+    kept = [0] if every else []
+    for number in range(1, len(every)):
+        if number == len(every) - 1 or _farthest(every[number + 1], every[kept[-1]], reach) > STEP:
+            kept.append(number)
+    placed = np.array([every[number] for number in kept]).reshape(-1, len(shapes.parts), 12)
+    return SweptVolume(shapes, np.array([times[number] for number in kept]), placed)
+
+
+def _farthest(placed: Array, before: Array, reach: Array) -> float:
+    """How far a point of the robot has moved at most (m)."""
+    turned = np.linalg.norm(placed[:, :9] - before[:, :9], axis=1) / np.sqrt(2.0)
+    return float((np.linalg.norm(placed[:, 9:] - before[:, 9:], axis=1) + turned * reach).max())

@@ -1,0 +1,310 @@
+"""Simulation of the work as the controller would execute it from the present state.
+
+It is the controller's own sequence, whole-body law and limits, period by period, on a robot without mass. Cutter and
+camera answer as they should. Nothing is planned a second time, so that what is shown is what will be sent.
+"""
+
+import hashlib
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import msgspec
+import numpy as np
+
+from controller.config import ControllerConfig
+from controller.identity import Token
+from controller.inputs import Inputs, Sample
+from controller.ledger.journal import EventLogger, Journal, LedgerState
+from controller.motion.follower import Measured
+from controller.planning.cuts import CLOSING_S
+from controller.planning.preview_plan import Preview, PreviewRequest, sweep
+from controller.whole_body.collision import CollisionModel
+from controller.whole_body.joint_limits import margin
+from controller.whole_body.manipulability import arm_omega
+from controller.work.movement import MotionResult, Movement
+from controller.work.point_queue import PointQueue, Ticket
+from controller.work.posture_search import CutPlan, Unreachable
+from rolling_panda import messages as m
+from rolling_panda.config import RobotConfig
+from rolling_panda.errors import ControlError
+from rolling_panda.messages.perception import CloseLook, Obstacles
+from rolling_panda.messages.supervision import PreviewedCut, PreviewRow
+from rolling_panda.mode_table import Event
+from rolling_panda.model.differential_drive import NXI, Array, DifferentialDrive
+from rolling_panda.model.robot import Limits
+
+#: Between two rows of the motion that is shown (s).
+ROW_S = 0.1
+#: A preview ends after so long a point (s).
+_LONGEST_S = 90.0
+_TOKEN = Token(1, "preview")
+
+
+class Rollout:
+    """Answers preview requests. The same request, asked of any instance, has the same answer."""
+
+    def __init__(self, config: ControllerConfig, robot_config: RobotConfig) -> None:
+        """Nothing is built yet: each preview begins with a robot of its own."""
+        self._config, self._robot_config = config, robot_config
+
+    def roll(self, request: PreviewRequest) -> Preview:
+        """The work on the points of a request; takes about a tenth of the time of the work itself.
+
+        Raises:
+            ControlError: The request's configuration is not finite.
+        """
+        if not np.isfinite(request.q).all():
+            raise ControlError(f"a preview from {request.q.tolist()} was asked for; every coordinate must be finite")
+        return _Run(self._config, self._robot_config, request).all()
+
+
+class _Run:
+    """One preview under way."""
+
+    def __init__(self, config: ControllerConfig, robot_config: RobotConfig, request: PreviewRequest) -> None:
+        self._configs, self._request, self._dt = (config, robot_config), request, 1.0 / config.rate_hz
+        self._journal = Journal()
+        self._queue = PointQueue(config, self._journal)
+        self._queue.update(m.PruningPoints(header=m.Header(), segmenter="", frames=0, points=request.points))
+        for point in request.points:
+            self._queue.accept(point.point_id, point.revision, "preview")
+        for point_id, azimuth in request.turned:
+            self._queue.approaches.turn(point_id, azimuth, "preview")
+        self._queue.arrange(tuple(point.point_id for point in request.points))
+        self._movement = Movement(config, robot_config, self._queue, EventLogger(self._journal), "preview", self._known)
+        robot = self._movement.body.robot
+        self._actuators = ActuatorLag(robot.drive, request.q, config.base_lag_s, config.arm_lag_s, self._dt)
+        self._log = CutLog(robot.limits, self._movement.body.surroundings.model, self._queue)
+        self._obstacles = Sample(Obstacles(header=m.Header(0.0, "odom"), capsules=request.obstacles), 0.0)
+        self._asked: set[int] = set()
+        self._coming: deque[tuple[float, CloseLook]] = deque()
+        self._look: Sample[CloseLook] | None = None
+        self._closing: tuple[str, str, float] | None = None
+        self._cut: set[str] = set()
+        self._plans: dict[str, CutPlan] = {}
+        self._hash = hashlib.sha256()
+
+    def all(self) -> Preview:
+        """Work until the work ends."""
+        rows: list[PreviewRow] = []
+        times: list[float] = []
+        way: list[Array] = []
+        every = max(1, round(ROW_S / self._dt))
+        longest = math.ceil(_LONGEST_S * len(self._request.points) / self._dt)
+        self._movement.sequence.begin()
+        why = f"it takes longer than {_LONGEST_S:.0f} s a point"
+        now = 0.0
+        for number in range(longest):
+            now = number * self._dt
+            moved = self._period(number, now)
+            if number % every == 0 or moved.event is not None:
+                rows.append(self._look_at(now))
+            times.append(now)
+            way.append(self._actuators.q.copy())
+            self._hash.update(np.ascontiguousarray(way[-1], dtype="<f8").tobytes())
+            if moved.event is not None:
+                event, why = moved.event
+                why = "" if event is Event.FINISHED else why
+                break
+        cuts = self._log.cuts(now, why)
+        swept = sweep(self._movement.body.surroundings.model, times, way)
+        return Preview(self._request, cuts, self._plans, tuple(rows), now, self._digest(), swept=swept)
+
+    def _period(self, number: int, now: float) -> MotionResult:
+        """One control period, and what the robot does of it."""
+        movement, sequence = self._movement, self._movement.sequence
+        inputs = self._inputs(number, now)
+        self._journal.take()
+        self._journal.observe(LedgerState(self._journal.number), now)
+        movement.take(inputs)
+        look = None if inputs.look is None else inputs.look.message
+        assert inputs.bridge is not None
+        sequence.watch(inputs.bridge.message, look, now)
+        moved = movement.step("AUTO", True, now)
+        command = movement.send(moved.xi, _TOKEN, inputs.joints, latched=False)
+        if moved.cut is not None and (self._closing is None or self._closing[0] != moved.cut[0]):
+            self._closing = (*moved.cut, now)
+            self._log.closed(moved.cut[1], now)
+        due = sequence.picture(now)
+        if due is not None and due[0] not in self._asked:
+            # Of two points at the same time, too: of the cut before, and of the next one.
+            self._asked.add(due[0])
+            self._coming.append((now + self._request.look_s, self._shown(*due)))
+        if command is not None:
+            self._actuators.step(np.array(command.xi))
+        return moved
+
+    def _inputs(self, number: int, now: float) -> Inputs:
+        header = m.Header(now, "odom")
+        a, b, c, d, e, f, g, h, i = self._actuators.q[3:].tolist()
+        j, k, n, o, p, r, s, t, u = self._actuators.xi.tolist()
+        drive = self._movement.body.robot.drive
+        linear, angular = drive.twist(j, k)
+        joints = m.JointState(
+            header=header, sequence=number, position=(a, b, c, d, e, f, g, h, i), velocity=(j, k, n, o, p, r, s, t, u)
+        )
+        base = _planar(self._actuators.q)
+        odometry = m.Odometry(header=header, sequence=number, pose=base, linear=linear, angular=angular)
+        if self._coming and now >= self._coming[0][0]:
+            self._look = Sample(self._coming.popleft()[1], now)
+        bridge = Sample(self._bridge(now), now)
+        return Inputs(Sample(joints, now), Sample(odometry, now), bridge, obstacles=self._obstacles, look=self._look)
+
+    def _bridge(self, now: float) -> m.BridgeState:
+        cut_id, point_id, since = self._closing or ("", "", now)
+        done = bool(cut_id) and now - since > CLOSING_S
+        if done:
+            self._cut.add(point_id)
+        return m.BridgeState(
+            header=m.Header(now),
+            kind="sim",
+            epoch=_TOKEN.epoch,
+            watchdog=False,
+            stop_id="",
+            stopped_by="",
+            cutter="closing" if cut_id and not done else "open",
+            cut_id=cut_id,
+            outcome="DONE" if done else "",
+            real_time_factor=1.0,
+        )
+
+    def _shown(self, number: int, point_id: str) -> CloseLook:
+        """A picture that shows what is expected."""
+        ticket, header = self._queue.get(point_id), m.Header(0.0, "odom")
+        if ticket is None or point_id in self._cut:
+            return CloseLook(header=header, point_id=point_id, number=number, finding="severed")
+        point = ticket.point
+        return CloseLook(
+            header=header,
+            point_id=point_id,
+            number=number,
+            finding="seen",
+            position=point.position,
+            tangent=point.tangent,
+        )
+
+    def _known(self, ticket: Ticket) -> CutPlan | Unreachable | None:
+        return self._request.cuts.get(ticket.point.point_id)
+
+    def _look_at(self, now: float) -> PreviewRow:
+        measured, sequence = self._movement.body.measured, self._movement.sequence
+        assert measured is not None
+        self._log.look(measured, sequence.active, now)
+        if sequence.active and sequence.plan is not None:
+            self._plans[sequence.active] = sequence.plan
+        q = measured.q
+        x, y, z = measured.kinematics.T_odom_tool.translation.tolist()
+        a, b, c, d, e, f, g, h, i = q[3:].tolist()
+        return PreviewRow(now, _planar(q), (a, b, c, d, e, f, g, h, i), (x, y, z))
+
+    def _digest(self) -> str:
+        encode = msgspec.msgpack.Encoder(order="deterministic").encode
+        request, out = self._request, self._hash
+        for part in (*self._configs, request.points, request.obstacles, request.turned, request.look_s):
+            out.update(encode(part))
+        out.update(np.ascontiguousarray(request.q, dtype="<f8").tobytes())
+        return out.hexdigest()
+
+
+def _planar(q: Array) -> m.PlanarPose:
+    x, y, phi = q[:3].tolist()
+    return m.PlanarPose(x, y, phi)
+
+
+@dataclass
+class _Least:
+    """The least of everything since a point was begun with."""
+
+    point_id: str
+    begins: float
+    closed: float | None = None
+    clearance: float = 1e3
+    between: tuple[str, str] = ("", "")
+    omega: float = 1e3
+    margin: float = 1e3
+
+
+class CutLog:
+    """`look` at the robot now and then; `cuts` at the end."""
+
+    def __init__(self, limits: Limits, collision: CollisionModel, queue: PointQueue) -> None:
+        """Nothing has been worked on.
+
+        Args:
+            limits: Of the joints.
+            collision: Knows what stands around, and what the blades may touch now.
+            queue: Knows what became of each point.
+        """
+        self._limits, self._collision, self._queue = limits, collision, queue
+        self._points: list[_Least] = []
+
+    def look(self, robot: Measured, active: str, now: float) -> None:
+        """The robot is on the way to, at, or from the `active` point; empty: of the last one still."""
+        if active and (not self._points or self._points[-1].point_id != active):
+            begins = now if self._points else 0.0
+            self._points.append(_Least(active, begins))
+        if not self._points:
+            return
+        least = self._points[-1]
+        near = self._collision.least(robot.q)
+        if near.distance < least.clearance:
+            least.clearance, least.between = near.distance, near.pair
+        least.omega = min(least.omega, arm_omega(robot.kinematics.J))
+        least.margin = min(least.margin, margin(robot.q, self._limits))
+
+    def closed(self, point_id: str, now: float) -> None:
+        """The blades close on a point."""
+        for least in self._points:
+            if least.point_id == point_id and least.closed is None:
+                least.closed = now
+
+    def cuts(self, now: float, why: str) -> tuple[PreviewedCut, ...]:
+        """All of them, the work having ended `now`, early for the reason `why`; empty when nothing was left."""
+        ends = [each.begins for each in self._points[1:]] + [now]
+        return tuple(self._cut(each, end, why) for each, end in zip(self._points, ends, strict=True))
+
+    def _cut(self, least: _Least, ends: float, why: str) -> PreviewedCut:
+        ticket = self._queue.get(least.point_id)
+        done = least.closed is not None
+        reason = why if ticket is None or ticket.state in ("ACCEPTED", "INTENT") else ticket.reason
+        return PreviewedCut(
+            point_id=least.point_id,
+            revision=0 if ticket is None else ticket.point.revision,
+            begins_s=least.begins,
+            cut_s=least.closed,
+            ends_s=ends,
+            result="cut" if done else f"not cut: {reason}"[:500],
+            clearance=least.clearance,
+            between=least.between,
+            manipulability=least.omega,
+            joint_margin=least.margin,
+        )
+
+
+class ActuatorLag:
+    """Where the robot goes by what is sent. `step` it once a control period."""
+
+    def __init__(self, drive: DifferentialDrive, q: Array, wheel_lag_s: float, arm_lag_s: float, dt: float) -> None:
+        """At rest.
+
+        Args:
+            drive: Of the base.
+            q: Configuration (12).
+            wheel_lag_s: Time constant of the wheels (s).
+            arm_lag_s: Of the arm's joints (s).
+            dt: Control period (s).
+        """
+        self._drive, self._dt = drive, dt
+        self.q, self.xi = q.copy(), np.zeros(NXI)
+        lags = (*[wheel_lag_s] * 2, *[arm_lag_s] * (NXI - 2))
+        self._left = np.array([math.exp(-dt / lag) if lag > 0.0 else 0.0 for lag in lags])
+        self._late = np.array(lags) * (1.0 - self._left)
+
+    def step(self, command: Array) -> None:
+        """One period with ξ̇ (9, rad/s) sent at its beginning."""
+        behind = self.xi - command
+        turned = command * self._dt + behind * self._late
+        self.xi = command + behind * self._left
+        self.q[:3] = self._drive.integrate(self.q[:3], float(turned[0]), float(turned[1]))
+        self.q[3:] += turned

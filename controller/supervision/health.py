@@ -1,0 +1,185 @@
+"""Freshness limits of the inputs and the reaction to stale data."""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from controller.config import ControllerConfig
+from controller.inputs import Inputs
+from rolling_panda import topics
+from rolling_panda.messages.robot import BridgeState
+from rolling_panda.messages.types import Mode
+
+Action = Literal["none", "pause", "protect", "fault"]
+
+
+@dataclass(frozen=True)
+class Health:
+    """How fresh everything is, in seconds on this process's clock; infinite where nothing ever came.
+
+    Attributes:
+        joints: Age of the newest joint state.
+        odometry: Age of the newest odometry.
+        bridge: Age of the newest bridge state.
+        server: Age of the server's newest heartbeat.
+        perception: Age of perception's newest heartbeat.
+        present: Processes connected now.
+        watchdog: The bridge says that its watchdog holds the robot.
+        overruled: The bridge has accepted a newer controller than this one.
+        refused: How many motion commands the bridge has refused since its start.
+        ledger: Why what is done cannot be recorded; empty when it can.
+        tracking_error: Why the robot does not do what it is told; empty when it does.
+        obstacles: Age of the picture behind what is known to stand around.
+    """
+
+    joints: float
+    odometry: float
+    bridge: float
+    server: float
+    perception: float
+    present: frozenset[str]
+    watchdog: bool
+    overruled: bool
+    refused: int = 0
+    ledger: str = ""
+    tracking_error: str = ""
+    obstacles: float = 0.0
+
+
+def health(inputs: Inputs, epoch: int | None, now: float, ledger: str = "", tracking_error: str = "") -> Health:
+    """How fresh the inputs are.
+
+    Args:
+        inputs: Newest of everything.
+        epoch: Of this controller, None before the first bridge state.
+        now: Monotonic time (s).
+        ledger: Why what is done cannot be recorded.
+        tracking_error: Why the robot does not do what it is told.
+    """
+
+    def age(at: float | None) -> float:
+        return math.inf if at is None else now - at
+
+    bridge = inputs.bridge
+    return Health(
+        joints=age(inputs.joints.at if inputs.joints is not None else None),
+        odometry=age(inputs.odometry.at if inputs.odometry is not None else None),
+        bridge=age(bridge.at if bridge is not None else None),
+        server=age(inputs.server_seen),
+        perception=age(inputs.perception_seen),
+        present=inputs.present,
+        watchdog=bridge is not None and bridge.message.watchdog,
+        overruled=bridge is not None and epoch is not None and bridge.message.epoch > epoch,
+        refused=0 if bridge is None else _refused(bridge.message),
+        ledger=ledger,
+        tracking_error=tracking_error,
+        obstacles=_picture_age(inputs, now),
+    )
+
+
+def _refused(bridge: BridgeState) -> int:
+    return sum(each.count for each in bridge.rejections if each.topic == topics.MOTION.name)
+
+
+def _picture_age(inputs: Inputs, now: float) -> float:
+    """The greater of how long ago the obstacles came, and how far their picture's stamp is from the newest joints'.
+
+    Both stamps are of the bridge's clock. Perception repeats its newest message, so that its arrival alone says little;
+    and a stamp from the future is as wrong as an old one.
+    """
+    obstacles, joints = inputs.obstacles, inputs.joints
+    if obstacles is None or joints is None:
+        return math.inf
+    return max(now - obstacles.at, abs(joints.message.header.stamp - obstacles.message.header.stamp))
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What to do, and why. `none` with an empty reason when all is well."""
+
+    action: Action
+    reason: str = ""
+
+
+FINE = Verdict("none")
+
+
+def check(mode: Mode, moving: bool, health: Health, config: ControllerConfig) -> Verdict:
+    """The most severe thing that the inputs demand in a mode.
+
+    Args:
+        mode: Of the machine.
+        moving: True where motion may be under way outside AUTO and TELEOP (bringing the arm home).
+        health: Of the inputs.
+        config: Ages allowed.
+    """
+    if health.overruled:
+        return Verdict("fault", "another controller commands this robot")
+    if health.ledger:
+        return Verdict("fault", health.ledger)
+    if not moving and mode not in ("AUTO", "TELEOP"):
+        return FINE
+    why = sensors(health, config)
+    if why:
+        return Verdict("protect", why)
+    if health.watchdog:
+        return Verdict("protect", "the bridge's watchdog holds the robot: no valid command reached it in time")
+    why = supervision(health, config, teleoperated=mode == "TELEOP")
+    if not why and mode == "AUTO":
+        why = perception(health, config)
+    return Verdict("pause", why) if why else FINE
+
+
+def cause(health: Health, config: ControllerConfig) -> str:
+    """Why a PROTECTIVE_STOP or FAULT could not be left now; empty when its cause is gone."""
+    if health.overruled:
+        return "another controller commands this robot"
+    return health.ledger or sensors(health, config) or ("watchdog" if health.watchdog else "")
+
+
+def sensors(health: Health, config: ControllerConfig) -> str:
+    """Why the robot's own data do not allow motion; empty when they do."""
+    if health.tracking_error:
+        return health.tracking_error
+    if health.joints > config.joints_max_age_s:
+        return f"joint states are {_age(health.joints)} old, allowed are {config.joints_max_age_s} s"
+    if health.odometry > config.odometry_max_age_s:
+        return f"odometry is {_age(health.odometry)} old, allowed are {config.odometry_max_age_s} s"
+    if health.bridge > config.bridge_max_age_s:
+        return f"the bridge's state is {_age(health.bridge)} old, allowed are {config.bridge_max_age_s} s"
+    return ""
+
+
+def supervision(health: Health, config: ControllerConfig, teleoperated: bool) -> str:
+    """Why the server does not allow motion; empty when it does.
+
+    Args:
+        health: Of the inputs.
+        config: Ages allowed.
+        teleoperated: A hand's motion needs a fresher link than work that somebody only watches. Either way a server
+            that has ended, instead of being slow, is noticed at once by its absence.
+    """
+    allowed = config.hold_link_max_age_s if teleoperated else config.server_max_age_s
+    return _process("server", health.server, allowed, health.present)
+
+
+def perception(health: Health, config: ControllerConfig) -> str:
+    """Why perception does not allow automatic work; empty when it does."""
+    if health.obstacles > config.obstacles_max_age_s:
+        return (
+            f"the newest picture of what stands around is {_age(health.obstacles)} old, "
+            f"allowed are {config.obstacles_max_age_s} s"
+        )
+    return _process("perception", health.perception, config.perception_max_age_s, health.present)
+
+
+def _process(name: str, age: float, allowed: float, present: frozenset[str]) -> str:
+    if name not in present:
+        return f"the {name} process is gone"
+    if age > allowed:
+        return f"the {name} process is silent for {_age(age)}, allowed are {allowed} s"
+    return ""
+
+
+def _age(age: float) -> str:
+    return "endlessly" if age == float("inf") else f"{age:.2f} s"

@@ -1,0 +1,156 @@
+"""The lease of control: one holder at a time, valid while it is renewed. Pure: `now` is an argument."""
+
+import math
+import secrets
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from controller.identity import Client, Token
+
+#: So many leases can be given between two starts of the controller.
+_LEASES_A_START: Final = 1 << 20
+#: A lease whose holder has said nothing for so long has ended (s).
+LIFE_S: Final = 1.0
+#: A request that nobody has answered for so long is forgotten (s).
+_REQUEST_S: Final = 30.0
+
+
+class Lease:
+    """Who holds control. The robot changes hands only at rest; until then nobody but who holds it moves it."""
+
+    def __init__(self, draw: Callable[[], str]) -> None:
+        """Nobody holds control.
+
+        Args:
+            draw: Gives the random part of a new token.
+        """
+        self._draw = draw
+        self._renewed = self._asked = -math.inf
+        self.holder: Client | None = None
+        self.coming: Client | None = None
+        self.requested: Client | None = None
+        self.token: Token | None = None
+        self.told = self._lost = ""
+        self.told_number = 0
+
+    def begin(self, epoch: int) -> None:
+        """Count tokens from here; what the robot does before somebody holds control is to stand still."""
+        self.token = Token(epoch, self._draw())
+
+    def begin_anew(self) -> None:
+        """A newer token for whoever holds control."""
+        if self.token is not None:
+            self.begin(self.token.epoch + 1)
+
+    def held_by(self, client: Client) -> bool:
+        """Whether this client holds control and nobody is about to take it."""
+        return self.coming is None and self.holder is not None and self.holder.key == client.key
+
+    def refusal(self, client: Client) -> str:
+        """Why a client may neither move the robot nor get control by the way; empty when it may."""
+        if self.coming is not None:
+            return f"control goes over to {self.coming.user}; wait until the robot is at rest"
+        if self.holder is None or self.holder.key == client.key:
+            return ""
+        return f"{self.holder.user} holds control of this robot; ask for it, or take it"
+
+    def claim(self, client: Client, now: float) -> None:
+        """Give control to a client that `refusal` lets through; the robot is at rest."""
+        if self.holder is None:
+            self._give(client, now, f"{client.user} holds control")
+
+    def take(self, client: Client, confirmed: bool, now: float) -> str:
+        """Take control, from somebody else only on purpose; why not, empty when it comes."""
+        if self.held_by(client):
+            return ""
+        if self.coming is not None and self.coming.key != client.key:
+            return f"{self.coming.user} is taking control already"
+        if self.holder is not None and not confirmed:
+            return f"{self.holder.user} holds control; confirm to take it from them: the robot stops first"
+        self.coming = client
+        return ""
+
+    def request(self, client: Client, now: float) -> str:
+        """Ask the holder to grant control; why not, empty when asked."""
+        if self.holder is None:
+            return "nobody holds control: take it"
+        if self.holder.key == client.key:
+            return "you hold control already"
+        if self.requested is not None and self.requested.key != client.key:
+            return f"{self.requested.user} has asked already"
+        self.requested, self._asked = client, now
+        self._tell(f"{client.user} asks {self.holder.user} for control")
+        return ""
+
+    def grant(self, client: Client) -> str:
+        """The holder gives control to who has asked; why not, empty when it goes over."""
+        if not self.held_by(client):
+            return "only who holds control can grant it"
+        if self.requested is None:
+            return "nobody asks for control"
+        self.coming = self.requested
+        return ""
+
+    def give_back(self, client: Client) -> str:
+        """The holder gives control up; why not, empty when done."""
+        if self.holder is None or self.holder.key != client.key:
+            return "you do not hold control"
+        self._lost = f"{client.user} gave control back"
+        self._drop(self._lost)
+        return ""
+
+    def renew(self, heard: Mapping[str, float]) -> None:
+        """When (s) each client, by its key, said something last: the holder's lease lives from then on."""
+        if self.holder is not None:
+            self._renewed = max(self._renewed, heard.get(self.holder.key, -math.inf))
+
+    def review(self, at_rest: bool, now: float) -> str:
+        """Let time pass. Returns why who moved the robot no longer may; empty when nothing ended.
+
+        Args:
+            at_rest: Whether the robot stands still, so that it may change hands.
+            now: Monotonic time (s).
+        """
+        if self.requested is not None and now - self._asked > _REQUEST_S:
+            self.requested = None
+        lost, self._lost = self._lost, ""
+        if self.holder is not None and self.left(now) <= 0.0:
+            lost = f"control by {self.holder.user} has ended: nothing was heard from them for {LIFE_S:.0f} s"
+            self._drop(lost)
+        if self.coming is not None and at_rest:
+            before, client = self.holder, self.coming
+            self._give(client, now, f"{client.user} holds control{f', before {before.user}' if before else ''}")
+        return lost
+
+    def left(self, now: float) -> float:
+        """How long the lease still lives without a word of its holder (s); 0 without one."""
+        return 0.0 if self.holder is None else max(0.0, self._renewed + LIFE_S - now)
+
+    def _give(self, client: Client, now: float, told: str) -> None:
+        self.holder, self.coming, self._renewed = client, None, now
+        if self.requested is not None and self.requested.key == client.key:
+            self.requested = None
+        self.begin_anew()
+        self._tell(told)
+
+    def _drop(self, told: str) -> None:
+        self.holder = self.requested = None
+        self._tell(told)
+
+    def _tell(self, told: str) -> None:
+        self.told, self.told_number = told, self.told_number + 1
+
+
+def draw_nonce() -> str:
+    """The random part of a new token, 64 bits."""
+    return secrets.token_hex(8)
+
+
+def first_epoch(starts: int, seen: int) -> int:
+    """Where a controller begins to count: above all that it gave out before, and above what the bridge has seen.
+
+    Args:
+        starts: How often a controller of this robot has started, this time included.
+        seen: Newest epoch that the bridge has accepted.
+    """
+    return max(starts * _LEASES_A_START, seen + 1)

@@ -1,0 +1,107 @@
+"""Latch of software stops. A stop stays latched until the bridge shows its release."""
+
+from rolling_panda import messages as m
+from rolling_panda.messages import commands as intents
+from rolling_panda.messages.supervision import StopRecord, StopState
+
+#: How long the bridge may take to show that it has released a stop, before it may be asked again (s).
+_RELEASE_S = 1.0
+#: What is told of latched stops, the newest first.
+_MOST = 50
+
+
+class StopLatch:
+    """Takes stop requests and the bridge's latch together; asks the bridge for release; forgets nothing by itself.
+
+    The bridge's latch says which id is to be released: that of the newest stop that it holds.
+    """
+
+    def __init__(self, stops: tuple[StopRecord, ...] = ()) -> None:
+        """Start with what was latched before, the newest first."""
+        self._pending: dict[str, StopRecord] = {stop.stop_id: stop for stop in reversed(stops)}
+        self._over: set[str] = set()
+        self._asked: intents.Reset | None = None
+        self._asked_at = 0.0
+        self._due: m.ReleaseStop | None = None
+        self._released_by = ""
+        self._told: tuple[str, ...] | None = None
+
+    @property
+    def reset_reason(self) -> str:
+        """Why the last stop was reset, in words."""
+        return f"reset by {self._asked.user}: {self._asked.reason}" if self._asked is not None else "reset"
+
+    @property
+    def latched(self) -> str:
+        """Why the robot is stopped, empty when it is not."""
+        return _words(next(reversed(self._pending.values()))) if self._pending else ""
+
+    @property
+    def changed(self) -> bool:
+        """Whether there is something that `message` has not told yet."""
+        return self._told != tuple(self._pending)
+
+    def message(self) -> StopState:
+        """What is latched here, for the wire and for the next start."""
+        self._told = tuple(self._pending)
+        stops = tuple(reversed(self._pending.values()))[:_MOST]
+        return StopState(process="controller", stops=stops, released_by=self._released_by)
+
+    def take(self, stops: tuple[m.StopRequest, ...], bridge: m.BridgeState | None, wall_time: float = 0.0) -> str:
+        """Latch what is new; returns why the robot is stopped, empty when nothing new was latched.
+
+        A request is sent several times with one id: once released, its echoes latch nothing. What the bridge holds
+        latched always counts.
+        """
+        latched = ""
+        for stop in stops:
+            if stop.stop_id not in self._pending and stop.stop_id not in self._over:
+                record = StopRecord(stop.stop_id, stop.source, stop.user, stop.reason, max(0.0, wall_time))
+                self._latch(record)
+                latched = _words(record)
+        if bridge is not None and bridge.stop_id and bridge.stop_id not in self._pending:
+            record = StopRecord(bridge.stop_id, "bridge", "", bridge.stopped_by, max(0.0, wall_time))
+            self._latch(record)
+            latched = latched or _words(record)
+        return latched
+
+    def ask_release(self, intent: intents.Reset, bridge: m.BridgeState | None, now: float) -> str:
+        """A supervisor resets; returns why not. The release goes to the bridge, and only its state ends the latch."""
+        if bridge is None:
+            return "the bridge has not said yet what it holds: reset again in a moment"
+        newest = bridge.stop_id or next(reversed(self._pending), "")
+        if intent.stop_id and intent.stop_id != newest:
+            return "another stop was pressed meanwhile: look who pressed it and why, then reset again"
+        if self._asked is not None and now - self._asked_at < _RELEASE_S:
+            return "the reset is under way"
+        self._asked, self._asked_at = intent, now
+        if bridge.stop_id:
+            self._due = m.ReleaseStop(stop_id=bridge.stop_id, user=intent.user, reason=intent.reason)
+        return ""
+
+    def release_due(self) -> m.ReleaseStop | None:
+        """The release to send now, once."""
+        due, self._due = self._due, None
+        return due
+
+    def released(self, bridge: m.BridgeState | None) -> bool:
+        """True once, when a reset was asked for and the bridge shows no latch."""
+        if self._asked is None or not self._pending or self._due is not None:
+            return False
+        if bridge is None or bridge.stop_id:
+            return False
+        self._over |= set(self._pending)
+        self._pending = {}
+        self._released_by = f"{self._asked.user}: {self._asked.reason}"[:500]
+        return True
+
+    def _latch(self, record: StopRecord) -> None:
+        self._pending[record.stop_id] = record
+        self._asked = self._due = None
+
+
+def _words(stop: StopRecord) -> str:
+    if stop.source == "hardware":
+        return f"emergency stop: {stop.reason}"
+    who = stop.user or ("" if stop.source == "bridge" else stop.source)
+    return f"software stop by {who}: {stop.reason}" if who else f"software stop: {stop.reason}"

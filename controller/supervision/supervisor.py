@@ -1,0 +1,190 @@
+"""Supervision of one robot: mode, latched stops, control authority and health of the inputs."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Final
+
+from controller.config import ControllerConfig
+from controller.identity import Client
+from controller.inputs import Inputs
+from controller.ledger.journal import EventLogger
+from controller.supervision import health as safety
+from controller.supervision import modes
+from controller.supervision.authority import Authority, client_of
+from controller.supervision.lease import draw_nonce
+from controller.supervision.modes import Event
+from controller.supervision.permission import Situation
+from controller.supervision.stop_latch import StopLatch
+from controller.work.movement import Movement
+from rolling_panda import messages as m
+from rolling_panda.messages import commands as intents
+from rolling_panda.messages.supervision import StopRecord
+
+#: A bridge whose watchdog has held the robot for so long (s) is offered another token.
+_ANEW_S: Final = 2.0
+
+
+class Supervisor:
+    """The machine of modes with everything that drives it. `take` the inputs of each period first, then `review`."""
+
+    def __init__(self, config: ControllerConfig, movement: Movement, event_log: EventLogger, starts: int) -> None:
+        """Start in IDLE.
+
+        Args:
+            config: Section `[controller]`.
+            movement: What is ended when a mode ends.
+            event_log: Records events for people.
+            starts: How often a controller of this robot has started, counted durably.
+        """
+        self._config, self._movement, self._event_log = config, movement, event_log
+        self.stops = StopLatch()
+        self.authority = Authority(draw_nonce, config.supervision_s, starts)
+        self.state = modes.boot()
+        #: What was under way when it was paused or stopped for its protection, until something is begun.
+        self.interrupted: m.Interrupted = ""
+        self._inputs = Inputs()
+        #: When the bridge last did as it was told, and how many commands it had refused by then.
+        self._obeyed, self._refused = 0.0, 0
+        self.health = safety.health(self._inputs, None, 0.0)
+
+    @property
+    def mode(self) -> m.Mode:
+        """Mode of the machine."""
+        return self.state.mode
+
+    @property
+    def bridge(self) -> m.BridgeState | None:
+        """Newest word of the bridge."""
+        return self._inputs.bridge.message if self._inputs.bridge is not None else None
+
+    def restore(self, stops: Iterable[StopRecord]) -> None:
+        """Take up the latched stops of an earlier start."""
+        self.stops = StopLatch(tuple(stops))
+        self.state = modes.boot(self.stops.latched)
+
+    def take(self, inputs: Inputs, trouble: str, now: float) -> None:
+        """Take in how fresh everything is.
+
+        Args:
+            inputs: Newest of everything.
+            trouble: Why the ledger cannot be relied on; empty when it can.
+            now: Monotonic time (s).
+        """
+        self._inputs = inputs
+        if self.bridge is not None and self.authority.token is None:
+            self.authority.begin(self.bridge.epoch)
+            self._obeyed = now
+        token, tracking_error = self.authority.token, self._movement.body.tracking_error.reason
+        self.health = safety.health(inputs, None if token is None else token.epoch, now, trouble, tracking_error)
+
+    def review(self, now: float) -> None:
+        """End what must not go on, and begin what an operator's hand holds."""
+        self._review_token(now)
+        inputs, bridge = self._inputs, self.bridge
+        latched = self.stops.take(inputs.stops, bridge, inputs.wall_time)
+        if latched:
+            self.event(Event.STOP, now, latched)
+        elif self.stops.released(bridge):
+            self.event(Event.RESET, now, self.stops.reset_reason, modes.OPERATOR)
+        if lost := self.authority.review(inputs.presence, self._movement.at_rest, now):
+            self._pause(lost, now)
+        verdict = safety.check(self.mode, self._movement.homing, self.health, self._config)
+        if verdict.action == "fault":
+            self.event(Event.FAULT, now, verdict.reason)
+        elif verdict.action == "protect":
+            self.event(Event.PROTECT, now, verdict.reason)
+        elif verdict.action == "pause":
+            self._pause(verdict.reason, now)
+        self._movement.sequence.finish_cut_and_pause(self.authority.unwatched(now))
+        self.state = modes.observe(self.state, safety.cause(self.health, self._config), now)
+        self._review_hold(now)
+
+    def event(self, event: Event, now: float, reason: str, by: modes.Rights = modes.SYSTEM) -> str:
+        """Put an event to the machine; what it changes is logged. Returns the refusal."""
+        before = self.state
+        transition = modes.step(before, event, now, reason, by)
+        self.state = transition.state
+        if self.mode != before.mode:
+            self._note_interruption(before.mode)
+            self._movement.leave(before.mode)
+            worse = modes.severity(self.mode) >= modes.severity("PAUSED")
+            self._event_log.say("warning" if worse else "info", f"{before.mode} → {self.mode}: {self.state.reason}")
+        return transition.refused
+
+    def _note_interruption(self, before: m.Mode) -> None:
+        if before in modes.MOVING and self.mode in ("PAUSED", "PROTECTIVE_STOP"):
+            at_work: m.Interrupted = "survey" if self._movement.sequence.phase == "SURVEY" else "work"
+            self.interrupted = "teleoperation" if before == "TELEOP" else at_work
+        elif before in modes.MOVING or self.mode not in ("READY", "PAUSED", "PROTECTIVE_STOP"):
+            self.interrupted = ""
+
+    def remark(self, reason: str) -> None:
+        """Why the robot is in its mode is another reason from now on."""
+        self.state = replace(self.state, reason=reason)
+
+    def busy(self) -> str:
+        """What has to end before a motion may begin; empty when nothing."""
+        return self._movement.busy(self.bridge)
+
+    def situation(self, waits: str, approval: str, now: float, intent: intents.Intent | None = None) -> Situation:
+        """What a permission depends on.
+
+        Args:
+            waits: Why no accepted point can be worked on; empty when one can.
+            approval: Why work may not begin for want of an approved preview; empty when it may.
+            now: Monotonic time (s).
+            intent: What is asked; None for whoever may operate.
+        """
+        client, authority = Client("", "") if intent is None else client_of(intent), self.authority
+        return Situation(
+            rights=modes.OPERATOR if intent is None else authority.rights(client, intent.role),
+            not_theirs="" if intent is None else authority.refusal(client, intent.role),
+            unwatched=authority.unwatched(now),
+            config=self._config,
+            state=self.state,
+            health=self.health,
+            homing=self._movement.homing,
+            busy=self.busy(),
+            waits=waits,
+            approval=approval,
+        )
+
+    def _review_token(self, now: float) -> None:
+        """One command with a spoilt number far ahead, once accepted, would have all others refused for good."""
+        health = self.health
+        if health.watchdog and not health.overruled:
+            if now - self._obeyed < _ANEW_S or not self._movement.at_rest:
+                return
+            if health.refused > self._refused:
+                self.authority.begin_anew()
+                self._event_log.say(
+                    "warning", f"the bridge refused every command for {_ANEW_S:.0f} s: a new token begins"
+                )
+        self._obeyed, self._refused = now, health.refused
+
+    def _pause(self, reason: str, now: float) -> None:
+        """What moves comes to rest, and nothing resumes by itself."""
+        if self.mode in modes.MOVING:
+            self.event(Event.LOST, now, reason)
+        elif self._movement.homing:
+            self._movement.stay()
+            self._event_log.say("warning", f"bringing the arm home was stopped: {reason}")
+
+    def _review_hold(self, now: float) -> None:
+        hand = self._movement.teleoperation
+        holding = hand.holding(self._inputs.teleop, now)
+        client = hand.client
+        not_theirs = self.authority.refusal(client, "operator") if holding else ""
+        holding = holding and not (not_theirs and self.mode == "TELEOP")
+        if self.mode == "TELEOP" and not holding:
+            self.event(Event.RELEASE, now, "the hold was released")
+        elif self.mode == "READY" and holding and hand.pressed:
+            why = not_theirs or self.busy() or safety.sensors(self.health, self._config)
+            why = why or safety.supervision(self.health, self._config, True)
+            if why:
+                hand.refuse()
+                self._event_log.say("warning", f"teleoperation refused: {why}")
+            else:
+                self.authority.claim(client, now)
+                rights = self.authority.rights(client, "operator")
+                self.event(Event.HOLD, now, f"{client.user} moves the robot", rights)

@@ -1,0 +1,1 @@
+"""The work on accepted points: queue, order, postures, cut sequence, survey and homing."""

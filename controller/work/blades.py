@@ -1,0 +1,93 @@
+"""One cut from its first command to its outcome, in every mode."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from controller.config import ControllerConfig
+from controller.work.point_queue import PointQueue
+from rolling_panda import messages as m
+
+#: A cut command is repeated this often until the bridge has seen it (s).
+_REPEAT_S = 0.05
+_OUTCOMES: dict[str, str] = {
+    "DONE": "cut",
+    "FAILED_NOT_CUT": "the cutter reports that nothing was cut",
+    "UNKNOWN": "the cutter does not know whether it cut",
+}
+
+
+Ended = Callable[[str, m.Outcome, str, float], None]
+
+
+@dataclass
+class _Cut:
+    """A cut under way: the blades may have moved."""
+
+    point_id: str
+    cut_id: str
+    deadline: float
+    record: int
+    asked_at: float = -math.inf
+
+
+class Blades:
+    """Asks for cuts, one at a time, and hands what became of each to the queue."""
+
+    def __init__(self, config: ControllerConfig, queue: PointQueue, run_id: str, ended: Ended | None = None) -> None:
+        """Bind the parts.
+
+        Args:
+            config: Of the controller.
+            queue: Holds the intents, and takes what became of them.
+            run_id: Makes the cut ids of this start unlike those of any other.
+            ended: Is told the cutter's word in place of the queue: point, outcome, words, now.
+        """
+        self._ended = ended
+        self._timeout_s, self._queue, self._run_id = config.cut_timeout_s, queue, run_id
+        self._cuts = 0
+        self._cut: _Cut | None = None
+
+    @property
+    def busy(self) -> bool:
+        """Whether a cut has been asked for and how it ends is not known yet: the blades may be closing."""
+        return self._cut is not None
+
+    def begin(self, point_id: str, now: float) -> None:
+        """Intend a cut at a point; no command is sent before that intent is durable."""
+        self._cuts += 1
+        cut_id = f"{self._run_id}-{self._cuts}"
+        self._cut = _Cut(point_id, cut_id, now + self._timeout_s, self._queue.intend(point_id, cut_id))
+
+    def command(self, now: float) -> tuple[str, str] | None:
+        """(cut_id, point_id) to command in this period; None between repetitions and before the intent is durable."""
+        cut = self._cut
+        if cut is None or now - cut.asked_at < _REPEAT_S or not self._queue.recorded(cut.record):
+            return None
+        cut.asked_at = now
+        return cut.cut_id, cut.point_id
+
+    def watch(self, bridge: m.BridgeState, now: float) -> tuple[str, ...]:
+        """Take in how the cut ended; returns what happened, in words."""
+        cut = self._cut
+        if cut is None:
+            return ()
+        if bridge.cut_id == cut.cut_id and bridge.outcome:
+            self._cut = None
+            text = _OUTCOMES[bridge.outcome]
+            if self._ended is not None:
+                self._ended(cut.point_id, bridge.outcome, text, now)
+            else:
+                self._queue.resolve(cut.point_id, bridge.outcome, text)
+            return (f"{cut.point_id}: {text}",)
+        if now > cut.deadline and cut.asked_at == -math.inf:
+            self._cut = None
+            text = f"no order was given within {self._timeout_s} s"
+            self._queue.resolve(cut.point_id, "FAILED_NOT_CUT", text)
+            return (f"{cut.point_id}: not cut: {text}",)
+        if now > cut.deadline:
+            self._cut = None
+            text = f"no word from the cutter for {self._timeout_s} s; look whether it is cut"
+            self._queue.resolve(cut.point_id, "UNKNOWN", text)
+            return (f"{cut.point_id}: UNKNOWN: {text}",)
+        return ()

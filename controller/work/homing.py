@@ -1,0 +1,90 @@
+"""Motions of the arm out of the canes and back to its survey posture, with the base at rest."""
+
+import math
+
+import numpy as np
+
+from controller.config import ControllerConfig
+from controller.motion.follower import ArmMotion, Follower, Measured, Tracking
+from controller.motion.tool_motion import Leg, ToolMotion
+from controller.work.cut_pose import escape_pose
+from controller.work.motion_timeout import MotionTimeout
+from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.robot import ARM_Q
+
+#: The posture is reached (rad).
+_NEAR = 0.01
+#: A clock that runs slower than this for so long (s) has met something.
+_HELD, _PATIENCE_S = 0.02, 1.5
+#: Near enough to the place clear of the canes to go on (m).
+_CLEAR = 0.02
+
+
+class Homing:
+    """One way home; `step` it until `done`, drop it to stop."""
+
+    def __init__(self, config: ControllerConfig, follower: Follower, dt: float) -> None:
+        """Bind the parts for a control period of `dt` (s)."""
+        self._config, self._follower, self._dt = config, follower, dt
+        self._goal = np.array(config.home)
+        heading = config.row_heading
+        self._left = np.array([-np.sin(heading), np.cos(heading), 0.0])
+        self._out: ToolMotion | None = None
+        self._in: ArmMotion | None = None
+        self._held_s = 0.0
+        self.done = False
+        #: Why the arm does not get home, in words; empty while it may.
+        self.blocked = ""
+
+    def step(self, robot: Measured) -> Array:
+        """One period: ξ̇ to send (9)."""
+        if self._in is None:
+            depth = float(robot.kinematics.T_odom_tool.translation @ self._left)
+            depth -= self._config.row_distance - self._config.clearance - 0.03
+            if self._out is None and depth > 0.0:
+                pose = robot.kinematics.T_odom_tool
+                goal = escape_pose(pose, self._left, depth)
+                out = Leg(goal, robot.q, self._config.advance_speed, math.inf)
+                self._out = ToolMotion(self._config, pose, robot.q, [out])
+            if self._out is not None:
+                tracking = self._follower.follow(self._out, robot)
+                if not tracking.done or tracking.position_error > _CLEAR:
+                    self._wait(tracking.done or tracking.scale < _HELD, tracking)
+                    return tracking.xi
+            self._in = ArmMotion(self._config, robot.q[ARM_Q].copy(), self._goal)
+        tracking = self._in.step(robot, self._follower, self._dt)
+        self._wait(tracking.scale < _HELD, tracking)
+        self.done = self._in.done and float(np.abs(robot.q[ARM_Q] - self._goal).max()) < _NEAR
+        return tracking.xi
+
+    def _wait(self, held: bool, tracking: Tracking) -> None:
+        """Give up when something has held the arm for long enough."""
+        self._held_s = self._held_s + self._dt if held else 0.0
+        if self._held_s > _PATIENCE_S:
+            self.blocked = tracking.reason or "something holds the arm back"
+
+
+class Withdrawal:
+    """One way out with the base still: each joint goes straight to where the way in began, and so away from its limit.
+
+    Obstacles are kept clear of as ever; the blades leave the line by which they came in, by some centimetres at most.
+    """
+
+    def __init__(self, config: ControllerConfig, follower: Follower, q: Array, q_clear: Array) -> None:
+        """Plan from q (12) to the arm posture of `q_clear` (12), clear of the canes."""
+        self._follower, self._dt = follower, 1.0 / config.rate_hz
+        self._goal = q_clear[ARM_Q].copy()
+        self._motion = ArmMotion(config, q[ARM_Q].copy(), self._goal)
+        self._timeout = MotionTimeout(config.reach_timeout_s, self._dt)
+        self._timeout.begin(self._motion.duration)
+        #: Whether the arm is there, and whether waiting for it is of no use any longer.
+        self.done = self.late = False
+
+    def step(self, robot: Measured, now: float) -> Tracking:
+        """One period."""
+        tracking = self._motion.step(robot, self._follower, self._dt)
+        self._timeout.note(tracking)
+        self._timeout.over(tracking, now, 0.0)
+        self.done = self._motion.done and float(abs(robot.q[ARM_Q] - self._goal).max()) < _NEAR
+        self.late = not self.done and self._timeout.late(now)
+        return tracking

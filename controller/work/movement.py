@@ -1,0 +1,191 @@
+"""Motion sources by mode: cut sequence, teleoperation and homing. Permission is not decided here."""
+
+from dataclasses import dataclass
+
+from controller.config import ControllerConfig
+from controller.identity import Token
+from controller.inputs import Inputs, Sample
+from controller.ledger.journal import EventLogger
+from controller.motion.body import Body
+from controller.motion.follower import Measured, Tracking
+from controller.motion.setpoints import BRAKED
+from controller.motion.teleoperation import Teleoperation
+from controller.whole_body.task import Method
+from controller.work.cut_clearance import CutClearance
+from controller.work.cut_sequence import CutSequence
+from controller.work.homing import Homing
+from controller.work.next_cut import Known, Permit
+from controller.work.point_queue import PointQueue
+from controller.work.posture_search import PostureSearch
+from rolling_panda import messages as m
+from rolling_panda.config import RobotConfig
+from rolling_panda.mode_table import Event
+from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.robot import RobotModel
+
+
+@dataclass(frozen=True)
+class MotionResult:
+    """What one period of a mode gave.
+
+    Attributes:
+        xi: ξ̇ to send (9).
+        cut: The cut to command, as its id and its point's; None while there is none.
+        event: What it is to the machine of modes, and why; None while the mode goes on.
+        remark: Why the robot is in its mode from now on, in words; empty as before.
+    """
+
+    xi: Array
+    cut: tuple[str, str] | None = None
+    event: tuple[Event, str] | None = None
+    remark: str = ""
+
+
+class Movement:
+    """The robot's body with everything that can move it. `take` the inputs of each period first, then `step`."""
+
+    def __init__(
+        self,
+        config: ControllerConfig,
+        robot_config: RobotConfig,
+        queue: PointQueue,
+        event_log: EventLogger,
+        run_id: str,
+        known: Known,
+        method: Method | None = None,
+        permit: Permit = lambda _: "",
+    ) -> None:
+        """Build the robot's model and all that moves it.
+
+        Args:
+            config: Section `[controller]`.
+            robot_config: Section `[robot]`.
+            queue: What is to be cut.
+            event_log: Records events for people.
+            run_id: Makes this start's cut ids unlike any other's.
+            known: What a plan says of a point.
+            method: Whole-body method in place of the configured one.
+            permit: Why a point may not be gone to; empty when it may.
+
+        Raises:
+            ConfigError: There is no such method.
+            ModelError: A robot description is missing.
+        """
+        self._config, self._event_log = config, event_log
+        self.body = body = Body(config, robot_config, method)
+        self._saturation, self._setpoints = body.saturation, body.setpoints
+        self._clearance = CutClearance(RobotModel(robot_config), config)
+        search = PostureSearch(RobotModel(robot_config), config, self._clearance.admits)
+        self.sequence = CutSequence(config, search, body.follower, body.saturation, queue, run_id, known, permit)
+        self.teleoperation = Teleoperation(config, body.follower, body.robot.drive)
+        self._homing: Homing | None = None
+        #: Of the motion that the last step followed; None while nothing was followed.
+        self.tracking: Tracking | None = None
+
+    @property
+    def homing(self) -> bool:
+        """Whether the arm is being brought home."""
+        return self._homing is not None
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether nothing moves by what was sent last."""
+        return self._setpoints.at_rest
+
+    def take(self, inputs: Inputs) -> None:
+        """Take in what was measured and what stands around."""
+        self.body.take(inputs)
+        self.body.surroundings.work_at(self.sequence.places)
+        self._clearance.take(inputs.obstacles)
+
+    def go_home(self) -> None:
+        """Begin to bring the arm home."""
+        self._homing = Homing(self._config, self.body.follower, self.body.dt)
+
+    def stay(self) -> None:
+        """Stop bringing the arm home."""
+        self._homing = None
+
+    def leave(self, mode: m.Mode) -> None:
+        """A mode has ended, and with it what moved the robot in it."""
+        self._homing = None
+        if mode == "AUTO":
+            self.sequence.abort()
+        self.teleoperation.refuse()
+
+    def busy(self, bridge: m.BridgeState | None) -> str:
+        """What has to end before a motion may begin; empty when nothing."""
+        if self._homing is not None:
+            return "the arm is being brought home; wait until it is there"
+        if self.sequence.cutting or (bridge is not None and bridge.cutter == "closing"):
+            return "the blades are closing; wait until the cut has ended"
+        return ""
+
+    def ramp(self) -> MotionResult:
+        """Come to rest, or stay there."""
+        return MotionResult(self._saturation.ramp(self._setpoints.sent))
+
+    def step(self, mode: m.Mode, held: bool, now: float) -> MotionResult:
+        """One period.
+
+        Args:
+            mode: Of the supervision machine.
+            held: Whether somebody holds control.
+            now: Monotonic time (s).
+
+        Raises:
+            ControlError: What was wanted cannot be computed.
+        """
+        self.tracking = None
+        robot = self.body.measured
+        if robot is None or not held or mode not in ("READY", "TELEOP", "AUTO"):
+            return self.ramp()
+        if mode == "TELEOP":
+            self.tracking = self.teleoperation.step(robot)
+            return MotionResult(self.tracking.xi)
+        return self._bring_home(robot) if mode == "READY" else self._work(robot, now)
+
+    def send(
+        self, xi: Array, token: Token | None, joints: Sample[m.JointState] | None, latched: bool
+    ) -> m.MotionCommand | None:
+        """The command for ξ̇ (9); what is not finite or outside the limits is not sent, the robot brakes.
+
+        Args:
+            xi: Wanted.
+            token: That it stands on; without one nothing leaves.
+            joints: Newest joint state, which it answers.
+            latched: A stop is, so that nothing leaves once the robot stands.
+        """
+        if not self._setpoints.admits(xi):
+            self._event_log.say("error", BRAKED)
+        xi = self._setpoints.smooth(xi)
+        if token is None or joints is None or (latched and not xi.any()):
+            self._setpoints.withhold()
+            return None
+        return self._setpoints.command(xi, token, joints.message.sequence)
+
+    def _work(self, robot: Measured, now: float) -> MotionResult:
+        work = self.sequence.step(robot, now)
+        self.tracking = work.tracking
+        for text in work.events:
+            self._event_log.say("warning", text)
+        event = None
+        if work.pause:
+            event = Event.LOST, work.pause
+        elif work.finished:
+            event = Event.FINISHED, work.summary
+        return MotionResult(work.xi, work.cut, event)
+
+    def _bring_home(self, robot: Measured) -> MotionResult:
+        homing = self._homing
+        if homing is None:
+            return self.ramp()
+        xi = homing.step(robot)
+        if homing.blocked:
+            self._event_log.say("warning", f"bringing the arm home was stopped: {homing.blocked}")
+            self._homing = None
+        elif homing.done:
+            self._homing = None
+            self._event_log.say("info", "the arm is home")
+            return MotionResult(xi, remark="the arm is home")
+        return MotionResult(xi)

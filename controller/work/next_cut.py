@@ -1,0 +1,93 @@
+"""Selection of the next cut and its posture search, a few iterations a period."""
+
+from collections.abc import Callable, Generator
+
+import numpy as np
+
+from controller.work.point_queue import PointQueue, Ticket
+from controller.work.posture_search import CutPlan, PostureSearch, Unreachable
+from rolling_panda.messages.perception import PruningPoint
+from rolling_panda.model.differential_drive import Array
+
+Found = CutPlan | Unreachable | None
+Known = Callable[[Ticket], Found]
+Permit = Callable[[Ticket], str]
+
+
+class NextCut:
+    """The search for one point's plan. `look` for the next point, `step` each period, read `found`."""
+
+    def __init__(
+        self,
+        search: PostureSearch,
+        queue: PointQueue,
+        iterations: int,
+        known: Known = lambda _: None,
+        permit: Permit = lambda _: "",
+    ) -> None:
+        """Look at nothing yet.
+
+        Args:
+            search: Of postures.
+            queue: Says which point is next.
+            iterations: Of the search in one period.
+            known: What a plan says of a ticket's point, which is then not searched for.
+            permit: Why a ticket's point may not be gone to; empty when it may.
+        """
+        self._search, self._queue, self._iterations, self._known = search, queue, iterations, known
+        self.permit = permit
+        #: Why the next point may not be gone to; empty when it may, and where there is none.
+        self.refused = ""
+        self.forget()
+
+    def forget(self) -> None:
+        """Drop what was looked at."""
+        self._ticket: Ticket | None = None
+        self._finding: Generator[None, None, CutPlan | Unreachable] | None = None
+        self.found: CutPlan | Unreachable | None = None
+
+    @property
+    def point_id(self) -> str:
+        """The point looked at; empty when none."""
+        return "" if self._ticket is None else self._ticket.point.point_id
+
+    @property
+    def accepted(self) -> PruningPoint | None:
+        """The point looked at as it was accepted, which is what the plan is for; None when none."""
+        return None if self._ticket is None else self._ticket.accepted
+
+    def look(self, q: Array) -> bool:
+        """Begin with the next accepted point, from configuration q (12), unless it is looked at already.
+
+        Returns:
+            False when no point is accepted, or the next one may not be gone to.
+        """
+        ticket = self._queue.next()
+        self.refused = "" if ticket is None else self.permit(ticket)
+        if ticket is None or ticket.accepted is None or self.refused:
+            self.forget()
+            return False
+        if not self.stands:
+            self._ticket, self.found, self._finding = ticket, self._known(ticket), None
+            if self.found is not None:
+                return True
+            at, along = np.array(ticket.accepted.position), np.array(ticket.accepted.tangent)
+            azimuth = self._queue.approaches.of(ticket.point.point_id)
+            self._finding = self._search.find(at, along, q, azimuth)
+        return True
+
+    @property
+    def stands(self) -> bool:
+        """Whether what is looked at is still the next point, accepted as it was."""
+        ticket, following = self._ticket, self._queue.next()
+        return ticket is not None and following is not None and following.accepted is ticket.accepted
+
+    def step(self) -> None:
+        """Search for one period."""
+        for _ in range(self._iterations):
+            if self._finding is None:
+                return
+            try:
+                next(self._finding)
+            except StopIteration as end:
+                self.found, self._finding = end.value, None

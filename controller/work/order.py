@@ -1,0 +1,154 @@
+"""The order of work and the approach directions that operators have chosen."""
+
+import math
+from collections.abc import Callable, Sequence
+
+from controller.ledger.journal import ApproachRow, Journal, OrderRow
+from rolling_panda.messages.supervision import QueueOrder
+
+
+class WorkOrder:
+    """What order is wanted. People's changes are counted, so that two of them at once do not undo each other."""
+
+    def __init__(self, journal: Journal) -> None:
+        """Along the row; changes by people are recorded in `journal`."""
+        self._journal = journal
+        self._by_hand: tuple[str, ...] = ()
+        self._planned: tuple[str, ...] = ()
+        self._held: tuple[str, ...] = ()
+        self._state = QueueOrder()
+
+    @property
+    def state(self) -> QueueOrder:
+        """For the wire."""
+        return self._state
+
+    @property
+    def by_hand(self) -> tuple[str, ...]:
+        """Points in the order that people have put them in; empty while the plan says."""
+        return self._by_hand
+
+    def restore(self, row: OrderRow) -> None:
+        """Take up the order of an earlier start."""
+        self._by_hand, self._state = row.order, QueueOrder(row.revision, row.user)
+
+    def plan(self, order: tuple[str, ...]) -> None:
+        """The plan works in this order; none, and it is that along the row."""
+        self._planned = order
+
+    def hold(self, order: tuple[str, ...]) -> bool:
+        """Work on these first, whatever is planned; people may still change it. Returns whether that is new."""
+        changed = order != self._held
+        self._held = order
+        return changed
+
+    def move(self, point_id: str, before: str, revision: int, user: str, accepted: Sequence[str]) -> str:
+        """Put a point before another one, or at the end; returns why not, empty when done.
+
+        Args:
+            point_id: What is moved.
+            before: What is worked on after it; empty for the end.
+            revision: Of the order that the operator saw.
+            user: Who moves it.
+            accepted: Accepted points in the order of now.
+        """
+        if why := self._outdated(revision):
+            return why
+        for name in (point_id, before):
+            if name and name not in accepted:
+                return f"{name} is not accepted; only accepted points have a place in the order of work"
+        if point_id == before:
+            return f"{point_id} cannot come before itself"
+        order = [name for name in accepted if name != point_id]
+        order.insert(order.index(before) if before else len(order), point_id)
+        self._change(tuple(order), user)
+        return ""
+
+    def give_back(self, revision: int) -> str:
+        """Work in the plan's order again; returns why not, empty when done."""
+        if why := self._outdated(revision):
+            return why
+        if not self._by_hand:
+            return "the order is the plan's already"
+        self._change((), "")
+        return ""
+
+    def arranged(self, along: Sequence[str], accepted: Callable[[str], bool]) -> list[str]:
+        """All points in their order.
+
+        By hand or held, those that people have not seen in their order come after it. By plan, accepted points that it
+        does not name stay in their places along the row.
+
+        Args:
+            along: All points along the row.
+            accepted: Whether a point is accepted.
+        """
+        places = [name for name in along if accepted(name)]
+        known = set(places)
+        wanted = [name for name in self._planned if name in known]
+        lead = [*self._by_hand, *(name for name in self._held if name not in self._by_hand)]
+        if lead:
+            among = set(wanted)
+            following = iter(wanted)
+            planned = [next(following) if name in among else name for name in places]
+            first = [name for name in lead if name in known]
+            begun = set(first)
+            wanted = [*first, *(name for name in planned if name not in begun)]
+        among = set(wanted)
+        following = iter(wanted)
+        return [next(following) if name in among else name for name in along]
+
+    def _outdated(self, revision: int) -> str:
+        if revision == self._state.revision:
+            return ""
+        by = f"{self._state.user} has" if self._state.user else "somebody has"
+        return f"{by} changed the order since: number {revision} was seen, it is {self._state.revision} now"
+
+    def _change(self, order: tuple[str, ...], user: str) -> None:
+        self._by_hand, self._state = order, QueueOrder(self._state.revision + 1, user)
+        self._journal.add("order", "order", OrderRow(order=order, revision=self._state.revision, user=user))
+
+
+#: Beyond this the tool would come along the row or from behind it (rad).
+LARGEST = math.radians(75.0)
+
+
+class Approaches:
+    """Kept by point; without a word about a point the search chooses."""
+
+    def __init__(self, journal: Journal) -> None:
+        """Nobody has said anything; what they will is recorded in `journal`."""
+        self._journal = journal
+        self._turned: dict[str, float] = {}
+        self._told: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def turned(self) -> tuple[tuple[str, float], ...]:
+        """Points and turns (rad), by id; the same object until one changes."""
+        return self._told
+
+    def of(self, point_id: str) -> float | None:
+        """Turn about the cane that is wanted for a point (rad); None leaves it to the search."""
+        return self._turned.get(point_id)
+
+    def restore(self, rows: tuple[tuple[str, ApproachRow], ...]) -> None:
+        """Take up what was said before a restart."""
+        for point_id, row in rows:
+            self._put(point_id, row.azimuth)
+
+    def turn(self, point_id: str, azimuth: float | None, user: str) -> str:
+        """Approach a point so from now on; returns why not, empty when done."""
+        if azimuth is not None and not abs(azimuth) <= LARGEST:
+            return (
+                f"the approach cannot be turned by {math.degrees(azimuth):.0f}°; at most {math.degrees(LARGEST):.0f}°"
+            )
+        self._put(point_id, azimuth)
+        self._journal.add("approach", point_id, ApproachRow(azimuth=azimuth, user=user))
+        return ""
+
+    def _put(self, point_id: str, azimuth: float | None) -> None:
+        if azimuth is None:
+            self._turned.pop(point_id, None)
+        else:
+            self._turned[point_id] = azimuth
+        self._told = tuple(sorted(self._turned.items()))

@@ -1,0 +1,214 @@
+"""Posture search for a cut: base place along the row, approach azimuth and arm posture.
+
+The search is a generator that yields once an iteration, so that a control period pays for a few iterations only.
+"""
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from controller.config import ControllerConfig
+from controller.work.cut_pose import CutPoses, cut_poses
+from rolling_panda.errors import InputError
+from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.robot import ARM_Q, RobotModel
+
+#: Places of the cut ahead of the axle (m), in order of preference.
+OFFSETS = (0.15, 0.05, 0.25, -0.05, 0.35, -0.15, 0.45)
+#: Approaches in order of preference: turn about the cane and tilt out of the plane square to it (rad). A cut may lean
+#: by 15° (spur-pruning practice); coming from below brings high points into reach, and either way passes a wire.
+APPROACHES = (
+    (0.0, 0.0),
+    (0.0, 0.2),
+    (0.0, 0.26),
+    (0.0, -0.26),
+    (0.35, 0.0),
+    (-0.35, 0.0),
+    (0.35, 0.2),
+    (-0.35, 0.2),
+    (0.7, 0.0),
+    (-0.7, 0.0),
+)
+#: Tilts where somebody has said the turn about the cane (rad), in order of preference.
+TILTS = (0.0, 0.2, 0.26, -0.26)
+#: From the arm's shoulder to its wrist at most, over elbow and wrist offsets (m, Panda's dimensions), and from the
+#: wrist to the flange (m).
+_ARM_LENGTH, _WRIST_TO_FLANGE = 0.3266 + 0.3928 + 0.088, 0.107
+_SHOULDER_HEIGHT = 0.333
+_GOOD_MARGIN, _GOOD_OMEGA = 0.25, 0.035
+_LEAST_MARGIN, _LEAST_OMEGA = 0.08, 0.012
+_ITERATIONS, _LARGEST_STEP, _PULL = 45, 0.25, 0.02
+_DAMPING = np.eye(6) * 1e-4
+
+
+@dataclass(frozen=True)
+class CutPlan:
+    """A cut that can be reached.
+
+    Attributes:
+        poses: Tool poses of the cut.
+        q_clear: Configuration (12) at `poses.clear`.
+        q_stand_off: The same at the stand-off.
+        q_cut: The same at the cut; the base stands where it stood at the stand-off.
+        joint_margin: Least distance to a joint limit on the way (rad).
+        manipulability: Least ω of the arm on the way.
+    """
+
+    poses: CutPoses
+    q_clear: Array
+    q_stand_off: Array
+    q_cut: Array
+    joint_margin: float
+    manipulability: float
+
+
+@dataclass(frozen=True)
+class Unreachable:
+    """No posture was found, and why, in words."""
+
+    reason: str
+
+
+@dataclass(frozen=True)
+class _Posture:
+    q: Array
+    margin: float
+    omega: float
+
+
+class PostureSearch:
+    """Finds cut plans. Has its own robot model, so that a search may rest while control goes on."""
+
+    def __init__(
+        self, robot: RobotModel, config: ControllerConfig, admits: Callable[[CutPlan], bool] = lambda _: True
+    ) -> None:
+        """Remember the model and the row's direction.
+
+        Args:
+            robot: Model of its own.
+            config: Of the controller.
+            admits: Whether a plan will do for other reasons than reach; what it refuses is passed over.
+        """
+        self._robot, self._config, self._admits = robot, config, admits
+        c, s = np.cos(config.row_heading), np.sin(config.row_heading)
+        self._along, self._left = np.array([c, s, 0.0]), np.array([-s, c, 0.0])
+        self._base_id = robot.frame_id("base_link")
+        neutral = np.zeros(12)
+        mount = robot.pose(neutral, robot.frame_id("arm_mount"))
+        flange, tool = robot.pose(neutral, robot.flange_id), robot.pose(neutral, robot.tool_id)
+        self._shoulder = mount.translation + np.array([0.0, 0.0, _SHOULDER_HEIGHT])
+        self._tool_length = float(flange.actInv(tool).translation[2])
+        margin = config.joint_margin + 0.02
+        self._lower = robot.limits.lower[ARM_Q] + margin
+        self._upper = robot.limits.upper[ARM_Q] - margin
+
+    def find(
+        self, position: Array, tangent: Array, q: Array, azimuth: float | None = None
+    ) -> Generator[None, None, CutPlan | Unreachable]:
+        """Search, yielding once an iteration.
+
+        Args:
+            position: Of the cut (3, m, odom).
+            tangent: Along the cane (3, odom).
+            q: Configuration (12) now: the base keeps its distance to the row.
+            azimuth: Turn of the approach about the cane (rad) that somebody wants; None leaves it to the search.
+        """
+        best: CutPlan | None = None
+        self._passed_over = False
+        seeds = (np.array(self._config.reach), np.array(self._config.home))
+        base = np.array([q[0], q[1], 0.0])
+        lateral = float(base @ self._left)
+        config = self._config
+        approaches = APPROACHES if azimuth is None else tuple((azimuth, tilt) for tilt in TILTS)
+        for turn, tilt in approaches:
+            try:
+                poses = cut_poses(position, tangent, self._left, config.stand_off, config.clearance, turn, tilt)
+            except InputError as error:
+                return Unreachable(str(error))
+            for offset in OFFSETS:
+                place = (float(position @ self._along) - offset) * self._along + lateral * self._left
+                start = q.copy()
+                start[:3] = place[0], place[1], config.row_heading
+                if self._too_far(poses.cut, start):
+                    continue
+                for seed in seeds:
+                    plan = yield from self._try(poses, start, seed)
+                    if plan is None:
+                        continue
+                    if plan.joint_margin >= _GOOD_MARGIN and plan.manipulability >= _GOOD_OMEGA:
+                        return plan
+                    if best is None or _quality(plan) > _quality(best):
+                        best = plan
+            # A good posture with the straight approach is worth more than a better one from aside.
+            if best is not None:
+                return best
+        return Unreachable(self._why(position, lateral))
+
+    def _too_far(self, goal: Any, q: Array) -> bool:
+        """Whether the stretched arm would not get there, which saves most of a vain search."""
+        T_odom_base = self._robot.pose(q, self._base_id)
+        shoulder = T_odom_base.act(self._shoulder)
+        wrist = goal.translation - (self._tool_length + _WRIST_TO_FLANGE) * goal.rotation[:, 2]
+        return float(np.linalg.norm(wrist - shoulder)) > _ARM_LENGTH
+
+    def _try(self, poses: CutPoses, start: Array, seed: Array) -> Generator[None, None, CutPlan | None]:
+        q = start.copy()
+        q[ARM_Q] = seed
+        stand_off = yield from self._solve(q, poses.stand_off, seed)
+        if stand_off is None:
+            return None
+        # From the stand-off both ways, as the robot will move.
+        cut = yield from self._solve(stand_off.q, poses.cut, stand_off.q[ARM_Q])
+        if cut is None:
+            return None
+        clear = yield from self._solve(stand_off.q, poses.clear, stand_off.q[ARM_Q])
+        if clear is None:
+            return None
+        margin = min(stand_off.margin, cut.margin, clear.margin)
+        omega = min(stand_off.omega, cut.omega, clear.omega)
+        if margin < _LEAST_MARGIN or omega < _LEAST_OMEGA:
+            return None
+        plan = CutPlan(poses, clear.q, stand_off.q, cut.q, margin, omega)
+        if self._admits(plan):
+            return plan
+        self._passed_over = True
+        return None
+
+    def _solve(self, q: Array, goal: Any, posture: Array) -> Generator[None, None, _Posture | None]:
+        """Damped least squares for the arm alone, inside its limits, pulled towards `posture` in the null space."""
+        q = q.copy()
+        limits = self._robot.limits
+        for _ in range(_ITERATIONS):
+            k = self._robot.kinematics(q)
+            error = np.empty(6)
+            error[:3] = goal.translation - k.T_odom_tool.translation
+            error[3:] = pin.log3(goal.rotation @ k.T_odom_tool.rotation.T)
+            J = k.J[:, ARM_Q]
+            if float(np.abs(error[:3]).max()) < 2e-4 and float(np.abs(error[3:]).max()) < 2e-3:
+                arm = q[ARM_Q]
+                margin = float(np.minimum(arm - limits.lower[ARM_Q], limits.upper[ARM_Q] - arm).min())
+                return _Posture(q, margin, float(np.sqrt(max(np.linalg.det(J @ J.T), 0.0))))
+            pull = _PULL * (posture - q[ARM_Q])
+            step = pull + J.T @ np.linalg.solve(J @ J.T + _DAMPING, error - J @ pull)
+            largest = float(np.abs(step).max())
+            if largest > _LARGEST_STEP:
+                step *= _LARGEST_STEP / largest
+            q[ARM_Q] = np.clip(q[ARM_Q] + step, self._lower, self._upper)
+            yield
+        return None
+
+    def _why(self, position: Array, lateral: float) -> str:
+        if self._passed_over:
+            return "every posture that reaches it comes too near to something that stands around it"
+        distance = float(position @ self._left) - lateral
+        return (
+            f"no posture of the arm reaches it: it is {distance:.2f} m beside the robot's path and "
+            f"{position[2]:.2f} m high"
+        )
+
+
+def _quality(plan: CutPlan) -> float:
+    return min(plan.joint_margin / _GOOD_MARGIN, 1.0) + min(plan.manipulability / _GOOD_OMEGA, 1.0)

@@ -1,0 +1,58 @@
+"""History of the pruning rules, with the acceptances that each change made void."""
+
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
+
+from rolling_panda.messages.perception import PruningRule
+
+Acceptance = TypeVar("Acceptance")
+#: So many changes can be taken back, the last one first.
+_MOST = 20
+
+
+@dataclass(eq=False)
+class Change(Generic[Acceptance]):
+    """Another rule, and the acceptances that it made void, by point, as they were."""
+
+    former: PruningRule
+    rule: PruningRule
+    voided: dict[str, Acceptance] = field(default_factory=dict)
+
+
+class RuleHistory(Generic[Acceptance]):
+    """The newest changes. Perception says that a rule is in force, people that one is taken back, in either order."""
+
+    def __init__(self) -> None:
+        """Nothing has changed yet."""
+        self._changes: list[Change[Acceptance]] = []
+        #: What is taken back as soon as perception says so; None while nothing is.
+        self._coming: Change[Acceptance] | None = None
+
+    def changed(
+        self, former: PruningRule, rule: PruningRule, voided: dict[str, Acceptance]
+    ) -> dict[str, Acceptance] | None:
+        """Perception prunes by another rule; returns the acceptances to be restored with it, None where it is new."""
+        coming, self._coming = self._coming, None
+        if coming is not None and (coming.rule, coming.former) == (former, rule):
+            self._changes.remove(coming)
+            return coming.voided
+        self._changes = [*self._changes, Change(former, rule, voided)][-_MOST:]
+        return None
+
+    def take_back(self, rule: PruningRule, now: PruningRule | None) -> dict[str, Acceptance] | None | str:
+        """Somebody takes the change to `rule` back while `now` is in force.
+
+        Returns:
+            The acceptances to be restored at once; None where perception has yet to say that the rule is the former
+            one; or why nothing can be taken back.
+        """
+        changes = self._changes
+        if changes and changes[-1].rule == rule == now:
+            self._coming = changes[-1]
+            return None
+        if len(changes) > 1 and changes[-1].rule == now == changes[-2].former and changes[-2].rule == rule:
+            # Perception was the quicker one: its going back looked like another change.
+            voided = changes[-2].voided
+            self._changes = changes[:-2]
+            return voided
+        return "the controller knows of no acceptance that this rule made void; accept anew what is to be cut"

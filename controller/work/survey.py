@@ -1,0 +1,175 @@
+"""The survey drive: with the arm in its looking posture slowly along the row, so that perception sees every vine.
+
+Where places need another look at the end of the way, the robot goes back over it and looks from the other side. An
+operator may also send it to one place that was left open: it looks from either side of it and from before it.
+"""
+
+import math
+
+import numpy as np
+
+from controller.config import ControllerConfig
+from controller.motion.follower import Follower, Measured, Tracking
+from controller.whole_body.saturation import Saturation
+from controller.work.homing import Homing
+from controller.work.point_queue import PointQueue
+from controller.work.stages import StepResult
+from rolling_panda import messages as m
+from rolling_panda.messages import commands as intents
+from rolling_panda.model.differential_drive import NXI, Array
+
+#: How the base slows down towards the end of the way (m/s²), and how near is there (m).
+_BRAKING, _NEAR = 0.2, 0.005
+#: Back to the line along the row: of the heading (1/s), and of the distance from it (1/m², times the speed squared).
+_GAIN_HEADING, _GAIN_ASIDE = 1.2, 6.0
+#: At the end of a way the last pictures are waited for (s).
+_PICTURES_S = 2.0
+#: Where a place is looked at again from: so far beside it along the row (m), the camera before it once.
+_SIDES = (-0.22, 0.0, 0.22)
+#: What moves by less than this in the time (m, s) is held back by something.
+_LEAST, _PATIENCE_S = 0.01, 3.0
+
+
+class Survey:
+    """One survey of a stretch. `step` it each period until its work is finished, drop it to stop."""
+
+    def __init__(
+        self,
+        config: ControllerConfig,
+        follower: Follower,
+        saturation: Saturation,
+        queue: PointQueue,
+        asked: intents.Survey | None = None,
+    ) -> None:
+        """Bind the parts.
+
+        Args:
+            config: Of the controller.
+            follower: Moves arm and base within the limits.
+            saturation: Brings to rest.
+            queue: Knows what perception holds true.
+            asked: Length of the stretch, ahead along the row from where the robot is, or the place to look at.
+        """
+        self._config, self._follower, self._saturation, self._queue = config, follower, saturation, queue
+        self._homing: Homing | None = Homing(config, follower, 1.0 / config.rate_hz)
+        c, s = math.cos(config.row_heading), math.sin(config.row_heading)
+        self._along, self._left = np.array([c, s]), np.array([-s, c])
+        self._distance = 0.0 if asked is None else asked.distance
+        self._place = None if asked is None or asked.vine == 0 else open_place(queue.perceived, asked.vine, asked.spur)
+        self._line: tuple[float, float] | None = None
+        self._goal = 0.0
+        self._stops: list[float] = []
+        self._again = self._place is not None
+        self._there_at: float | None = None
+        self._moved: tuple[float, float] | None = None
+
+    def step(self, robot: Measured, now: float) -> StepResult:
+        """One period.
+
+        Args:
+            robot: Measured robot.
+            now: Monotonic time (s).
+        """
+        if self._homing is not None:
+            xi = self._homing.step(robot)
+            if self._homing.blocked:
+                return StepResult(self._saturation.ramp(robot.sent), pause=f"survey: {self._homing.blocked}")
+            if self._homing.done:
+                self._homing = None
+            return StepResult(xi)
+        x, aside = float(robot.q[:2] @ self._along), float(robot.q[:2] @ self._left)
+        if self._line is None:
+            self._line = x, aside
+            self._stops = self._waypoints(robot, x)
+            self._goal = self._stops.pop(0)
+        if abs(self._goal - x) > _NEAR and self._there_at is None:
+            return self._drive(robot, x, aside - self._line[1], now)
+        return self._wait(robot, now)
+
+    def _drive(self, robot: Measured, x: float, aside: float, now: float) -> StepResult:
+        left = self._goal - x
+        speed = math.copysign(min(self._config.survey_speed, math.sqrt(2.0 * _BRAKING * abs(left))), left)
+        turned = math.remainder(float(robot.q[2]) - self._config.row_heading, math.tau)
+        turning = -_GAIN_HEADING * turned - _GAIN_ASIDE * speed * aside
+        xi = np.zeros(NXI)
+        xi[:2] = _wheels(robot, speed, turning)
+        tracking: Tracking = self._follower.jog(xi, robot)
+        if self._moved is None or abs(x - self._moved[0]) > _LEAST:
+            self._moved = x, now
+        elif now - self._moved[1] > _PATIENCE_S:
+            why = tracking.reason or "something holds the base back"
+            return StepResult(self._saturation.ramp(robot.sent), pause=f"survey: {why}")
+        return StepResult(tracking.xi)
+
+    def _wait(self, robot: Measured, now: float) -> StepResult:
+        xi = self._saturation.ramp(robot.sent)
+        if self._there_at is None:
+            self._there_at = now
+        if now - self._there_at < _PICTURES_S:
+            return StepResult(xi)
+        if self._stops:
+            self._goal, self._there_at, self._moved = self._stops.pop(0), None, None
+            return StepResult(xi)
+        if self._line is not None and not self._again and self._unclear() > 0:
+            self._again, self._goal, self._there_at, self._moved = True, self._line[0], None, None
+            text = f"{_counted(self._unclear(), 'place')} to be looked at again: the survey goes back over its way"
+            return StepResult(xi, events=(text,))
+        return StepResult(xi, finished=True, summary=self._summary())
+
+    def _waypoints(self, robot: Measured, x: float) -> list[float]:
+        """Where the base goes along the row (m), one after the other: the near side of a place first."""
+        if self._place is None or self._place.position is None:
+            return [x + self._distance]
+        # The arm is home: the camera is at the tool, so far ahead of the base.
+        ahead = float(robot.kinematics.T_odom_tool.translation[:2] @ self._along) - x
+        before = float(np.array(self._place.position)[:2] @ self._along) - ahead
+        stops = [before + side for side in _SIDES]
+        return stops if abs(stops[0] - x) <= abs(stops[-1] - x) else stops[::-1]
+
+    def _unclear(self) -> int:
+        perceived = self._queue.perceived
+        return 0 if perceived is None else sum(each.needs == "another look" for each in perceived.abstained)
+
+    def _summary(self) -> str:
+        perceived = self._queue.perceived
+        if perceived is None:
+            return "the survey has ended; perception has told nothing"
+        if self._place is not None:
+            return looked_again(perceived, self._place)
+        named = [(point.vine, point.spur) for point in perceived.points]
+        named += [(each.vine, each.spur) for each in perceived.abstained if each.vine > 0]
+        vines, spurs = len({vine for vine, _ in named}), len(set(named))
+        asking = sum(each.needs == "operator" for each in perceived.abstained)
+        found = f"{_counted(vines, 'vine')}, {_counted(spurs, 'spur')}, {_counted(len(perceived.points), 'point')}"
+        left = f"{_counted(self._unclear(), 'place')} still unclear, {_counted(asking, 'place')} for you to decide"
+        return f"surveyed: {found}; {left}"
+
+
+def open_place(perceived: m.PruningPoints | None, vine: int, spur: int) -> m.Abstention | None:
+    """A place that is open and was seen somewhere, by its spur; None where there is none."""
+    left = () if perceived is None else perceived.abstained
+    found = [each for each in left if (each.vine, each.spur) == (vine, spur) and each.position is not None]
+    return next((each for each in found if each.needs == "another look"), found[0] if found else None)
+
+
+def looked_again(perceived: m.PruningPoints, place: m.Abstention) -> str:
+    """What became of a place, in words."""
+    where = f"looked again at vine {place.vine}, spur {place.spur}"
+    left = open_place(perceived, place.vine, place.spur)
+    shown = [point.point_id for point in perceived.points if (point.vine, point.spur) == (place.vine, place.spur)]
+    parts = [f"{', '.join(shown)} shown"] if shown else []
+    if left is not None:
+        parts.append(f"{'for you to decide' if left.needs == 'operator' else 'still unclear'}: {left.reason}")
+    return f"{where}: {'; '.join(parts) or 'nothing is left open'}"[:500]
+
+
+def _wheels(robot: Measured, speed: float, turning: float) -> Array:
+    """Wheel velocities (2, rad/s) that give the base a forward speed (m/s) and a yaw rate (rad/s)."""
+    S, heading = robot.kinematics.S, float(robot.q[2])
+    forward = math.cos(heading) * S[0, :2] + math.sin(heading) * S[1, :2]
+    out: Array = np.linalg.solve(np.stack([forward, S[2, :2]]), np.array([speed, turning]))
+    return out
+
+
+def _counted(number: int, word: str) -> str:
+    return f"{number} {word}" if number == 1 else f"{number} {word}s"

@@ -1,0 +1,1 @@
+"""Posts, trunks, cordons and wires that the robot keeps away from."""

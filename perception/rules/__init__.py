@@ -1,0 +1,1 @@
+"""Pruning rules: from a spur to cuts, and what the blades must keep out of."""

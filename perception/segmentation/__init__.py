@@ -1,0 +1,1 @@
+"""Frames and photographs to a class for each pixel."""

@@ -1,0 +1,151 @@
+"""A camera frame as arrays: decoded, checked, and placed in odom by the posture the robot measured."""
+
+import io
+import math
+import zlib
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from rolling_panda import messages as m
+from rolling_panda.errors import MessageError
+from rolling_panda.messages.robot import CameraFrame, Intrinsics
+from rolling_panda.model.robot import RobotModel, configuration
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class View:
+    """One decoded frame.
+
+    Attributes:
+        sequence: Of the frame.
+        stamp: When it was taken (s, sender's clock).
+        intrinsics: Of all images; a pixel's centre has whole coordinates.
+        depth: H×W, along the optical axis (m); 0 = no return.
+        labels: H×W class indices, or None without a label camera.
+        color_jpeg: As it came.
+        R: Rotation of the camera in odom (3×3).
+        t: Position of the camera in odom (3, m).
+    """
+
+    sequence: int
+    stamp: float
+    intrinsics: Intrinsics
+    depth: NDArray[np.float32]
+    labels: NDArray[np.uint8] | None
+    color_jpeg: bytes
+    R: Array
+    t: Array
+
+    def points(self, rows: Any, cols: Any, depth: Any) -> Array:
+        """Positions in odom (N×3, m) of pixels (fractions allowed) at `depth` (N, m)."""
+        k = self.intrinsics
+        x = (np.asarray(cols, float) - k.cx) / k.fx * depth
+        y = (np.asarray(rows, float) - k.cy) / k.fy * depth
+        out: Array = np.stack([x, y, np.asarray(depth, float)], axis=-1) @ self.R.T + self.t
+        return out
+
+    def pixels(self, points: Array) -> Array:
+        """Columns, rows (px) and depth (m) of `points` (N×3, odom), as N×3; depth ≤ 0 is behind the camera."""
+        camera = (np.atleast_2d(points) - self.t) @ self.R
+        k = self.intrinsics
+        z = camera[:, 2]
+        safe = np.where(np.abs(z) < 1e-9, 1e-9, z)
+        return np.stack([k.fx * camera[:, 0] / safe + k.cx, k.fy * camera[:, 1] / safe + k.cy, z], axis=1)
+
+    def part(self, rows: slice, cols: slice) -> "View":
+        """What a window of the frame shows, as a frame of its own; what reaches beyond the image is cut off.
+
+        Raises:
+            MessageError: The colour image is no JPEG of the right size.
+        """
+        k = self.intrinsics
+        top, bottom = max(0, rows.start), min(k.height, rows.stop)
+        left, right = max(0, cols.start), min(k.width, cols.stop)
+        window = slice(top, bottom), slice(left, right)
+        jpeg = b""
+        if self.color_jpeg:
+            out = io.BytesIO()
+            # Hardly compressed: it is read once, at once.
+            Image.fromarray(self.color()[window]).save(out, "JPEG", quality=98, subsampling=0)
+            jpeg = out.getvalue()
+        return replace(
+            self,
+            intrinsics=Intrinsics(right - left, bottom - top, k.fx, k.fy, k.cx - left, k.cy - top),
+            depth=self.depth[window],
+            labels=None if self.labels is None else self.labels[window],
+            color_jpeg=jpeg,
+        )
+
+    def color(self) -> NDArray[np.uint8]:
+        """The H×W×3 colour image.
+
+        Raises:
+            MessageError: Not a JPEG of the size that the intrinsics say.
+        """
+        k = self.intrinsics
+        try:
+            with Image.open(io.BytesIO(self.color_jpeg), formats=("JPEG",)) as image:
+                if image.size != (k.width, k.height):
+                    raise MessageError(f"colour image is {image.size}; the intrinsics say {(k.width, k.height)}")
+                return np.asarray(image.convert("RGB"), dtype=np.uint8)
+        except (OSError, SyntaxError) as error:
+            raise MessageError(f"colour image is not a JPEG: {error}") from error
+
+
+def decode_frame(frame: CameraFrame, model: RobotModel) -> View:
+    """Unpack a frame and place its camera by forward kinematics of the measured posture.
+
+    Args:
+        frame: As received.
+        model: The robot; its work space is used.
+
+    Raises:
+        MessageError: An image is corrupt or of the wrong size, a class is unknown, or the posture is not finite.
+    """
+    k = frame.intrinsics
+    posture = (frame.base.x, frame.base.y, frame.base.phi, *frame.position)
+    if len(frame.position) != 9 or not all(math.isfinite(value) for value in posture):
+        raise MessageError(f"frame {frame.sequence}: the posture must be 12 finite numbers, got {posture}")
+    if not (k.fx > 0.0 and k.fy > 0.0 and all(math.isfinite(value) for value in (k.fx, k.fy, k.cx, k.cy))):
+        raise MessageError(f"frame {frame.sequence}: focal lengths must be positive and finite, got {k}")
+    if not 0.0 < frame.depth_unit <= 0.01:
+        raise MessageError(f"frame {frame.sequence}: depth_unit {frame.depth_unit} is outside 0…0.01 m")
+    counts = _image(frame.depth_zlib, k, "<u2", "depth", frame.sequence)
+    labels = None
+    if frame.labels_zlib:
+        labels = _image(frame.labels_zlib, k, "u1", "label", frame.sequence)
+        if labels.max(initial=0) >= len(m.WOOD_CLASSES):
+            raise MessageError(
+                f"frame {frame.sequence}: class {labels.max()} is unknown; there are {len(m.WOOD_CLASSES)}"
+            )
+    T_odom_camera = model.pose(configuration(frame.base, frame.position), model.camera_id)
+    return View(
+        sequence=frame.sequence,
+        stamp=frame.header.stamp,
+        intrinsics=k,
+        depth=counts.astype(np.float32) * np.float32(frame.depth_unit),
+        labels=labels,
+        color_jpeg=frame.color_jpeg,
+        R=np.array(T_odom_camera.rotation),
+        t=np.array(T_odom_camera.translation),
+    )
+
+
+def _image(data: bytes, k: Intrinsics, kind: str, name: str, sequence: int) -> NDArray[Any]:
+    expected = k.width * k.height * np.dtype(kind).itemsize
+    unpack = zlib.decompressobj()
+    try:
+        # One byte more than expected tells too long from right, and bounds what a hostile stream can unpack to.
+        raw = unpack.decompress(data, expected + 1)
+    except zlib.error as error:
+        raise MessageError(f"frame {sequence}: the {name} image is corrupt: {error}") from error
+    if len(raw) != expected or not unpack.eof:
+        raise MessageError(f"frame {sequence}: the {name} image has not the {expected} bytes of {k.width}×{k.height}")
+    return np.frombuffer(raw, dtype=kind).reshape(k.height, k.width)

@@ -1,0 +1,1 @@
+"""Cane pixels to canes: fragments, links, centre lines and topology."""

@@ -1,0 +1,1 @@
+"""The `rolling-panda` command and its subcommands that belong to no process."""

@@ -1,0 +1,87 @@
+"""The `rolling-panda` command.
+
+The processes are started by name and replace this program, so that nothing here imports them.
+"""
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+from rolling_panda import __version__
+from rolling_panda.cli import demo, status
+from rolling_panda.errors import RollingPandaError
+from rolling_panda.runtime import router
+from rolling_panda.runtime.launch import child_environment, python_command
+
+#: Commands that are another module's: what runs, and one line for people.
+FORWARDED = {
+    "bridge": ("bridge", "the robot: simulated, with its own watchdog and limits"),
+    "controller": ("controller", "whole-body control and the supervision state machine"),
+    "perception": ("perception", "camera frames to pruning points"),
+    "server": ("server", "the operator's page and its REST interface"),
+    "record": ("recorder.record", "write down all that is on the robot's wire, for Foxglove and for `replay`"),
+    "replay": ("recorder.replay", "a recording on the operator's page, with a scrubber; nothing moves"),
+    "audit": ("controller.ledger.audit", "what was decided, refused and done: check the record or write it out"),
+    "user": ("server.auth.user_command", "who may sign in with a password"),
+    "certificates": (
+        "rolling_panda.transport.certificates",
+        "certificates of one's own for mutual TLS on the robot's wire",
+    ),
+    "perceive": ("perception.perceive", "classes and pruning points of one photograph"),
+    "vineyard": ("bridge.sim.vineyard.command", "grow a simulated row, write and picture it"),
+    "bench": ("benchmarks", "measurements: time of a control step, cuts in simulated rows"),
+}
+
+_OWN: dict[str, tuple[Any, str, str]] = {
+    "demo": (
+        demo,
+        "everything at once on this machine, in simulation",
+        "Start the whole program in simulation on this machine, print a link to sign in with, and end everything on "
+        "Ctrl-C or when one process ends.",
+    ),
+    "router": (
+        router,
+        "the place on the network where the processes meet",
+        "Run the router that the processes connect to, until Ctrl-C.",
+    ),
+    "status": (
+        status,
+        "which processes are up",
+        "Listen on the wire for a moment and say which processes are up. Exit code 1 when one is silent.",
+    ),
+}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command; returns the exit code."""
+    words = list(sys.argv[1:] if argv is None else argv)
+    if words and words[0] in FORWARDED:
+        module = FORWARDED[words[0]][0]
+        command = python_command(module, words[1:])
+        sys.stdout.flush()
+        os.execve(command[0], command, child_environment())
+    arguments = _parser().parse_args(words)
+    try:
+        return int(arguments.run(arguments))
+    except RollingPandaError as error:
+        print(f"rolling-panda {arguments.command}: {error}", file=sys.stderr)
+        return 1
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="rolling-panda",
+        description="Supervise and teleoperate a mobile manipulator that prunes grapevines, from a browser.",
+        epilog="`rolling-panda COMMAND --help` explains a command. Start with `rolling-panda demo`.",
+    )
+    parser.add_argument("--version", action="version", version=f"rolling-panda {__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    for name, (module, about, description) in _OWN.items():
+        command = commands.add_parser(name, help=about, description=description)
+        command.set_defaults(run=module.run)
+        module.add_arguments(command)
+    for name, (_, about) in FORWARDED.items():
+        commands.add_parser(name, help=about, add_help=False)
+    return parser

@@ -1,0 +1,1 @@
+"""How a process starts, keeps time, keeps state and ends."""

@@ -1,0 +1,1 @@
+"""Zenoh: publishers, newest-wins slots, feeds, services, and access control."""

@@ -1,0 +1,126 @@
+"""How Zenoh is set: where to connect, nothing found by itself, mutual TLS, a plain wire only where it is asked for."""
+
+import argparse
+import ipaddress
+import re
+from pathlib import Path
+from typing import Any
+
+from rolling_panda.config import TransportConfig
+from rolling_panda.errors import TransportError
+from rolling_panda.transport.access import access_control
+
+#: Where the router is unless somebody says otherwise.
+DEFAULT_ENDPOINT = "tls/127.0.0.1:7447"
+PLAIN_ENDPOINT = "tcp/127.0.0.1:7447"
+#: For people, wherever a plain wire is.
+PLAIN_WARNING = (
+    "The wire is plain: every program on this machine can move the robot. Leave out --plain-wire to close it."
+)
+
+
+def add_wire_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options that say how the wire is protected."""
+    parser.add_argument(
+        "--certificates",
+        type=Path,
+        metavar="DIR",
+        help="mutual TLS with the files from there; see `rolling-panda certificates --help`",
+    )
+    parser.add_argument(
+        "--plain-wire",
+        action="store_true",
+        help="without certificates, on the loopback address alone: every program on this machine can move the robot",
+    )
+
+
+def wire_settings(config: TransportConfig, name: str, robot_id: str = "", foreign: bool = False) -> dict[str, Any]:
+    """Zenoh's settings, by path.
+
+    Args:
+        config: Where, and by which certificates.
+        name: Whose certificate is shown.
+        robot_id: Of the robot whose wire it is; what lies in a folder of that name comes first.
+        foreign: The wire of the devices behind the drivers, which may be plain anywhere; it carries no key of a robot.
+
+    Raises:
+        TransportError: There is no certificate and nobody asked for a plain wire, one is missing, or an endpoint does
+            not fit.
+    """
+    settings = {
+        "mode": config.mode,
+        "connect/endpoints": list(config.connect),
+        "listen/endpoints": list(config.listen),
+        "connect/timeout_ms": round(config.connect_timeout_s * 1000),
+        "connect/exit_on_failure": True,
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/enabled": False,
+    }
+    if config.certificates:
+        return settings | _secure(config, name, robot_id)
+    if not foreign:
+        _check_plain(config)
+    return settings
+
+
+def _check_plain(config: TransportConfig) -> None:
+    """Refuse a plain wire that nobody asked for, or that another machine would reach."""
+    if not config.plain_wire:
+        raise TransportError(
+            "no certificates for the robot's wire: give --certificates DIR, the folder that the demo prints or that "
+            "`rolling-panda certificates --out DIR` makes; or --plain-wire for a wire on this machine that every "
+            "program here can use to move the robot"
+        )
+    for endpoint in (*config.connect, *config.listen):
+        if not _on_loopback(endpoint):
+            raise TransportError(
+                f"got {endpoint}; a plain wire is tcp/HOST:PORT on the loopback address, as {PLAIN_ENDPOINT}. "
+                "For another machine give --certificates DIR in place of --plain-wire"
+            )
+
+
+def _on_loopback(endpoint: str) -> bool:
+    found = re.fullmatch(r"tcp/(?:\[([0-9a-fA-F:.]+)\]|([^\[\]:/#?]+)):[0-9]+", endpoint)
+    if found is None:
+        return False
+    host = found[1] or found[2]
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def certificate_folder(config: TransportConfig, robot_id: str = "") -> Path:
+    """Where the certificates of a robot are: in a folder of its name, where there is one."""
+    folder = Path(config.certificates).resolve()
+    own = folder / robot_id
+    return own if robot_id and own.is_dir() else folder
+
+
+def _secure(config: TransportConfig, name: str, robot_id: str) -> dict[str, Any]:
+    """Mutual TLS with the files of `name`; a router refuses what the table of topics does not let a sender say."""
+    if config.plain_wire:
+        raise TransportError("--plain-wire and --certificates were given: give one of the two")
+    folder = certificate_folder(config, robot_id)
+    authority, certificate, private = (folder / file for file in ("ca.pem", f"{name}.pem", f"{name}.key"))
+    for file in (authority, certificate, private):
+        if not file.is_file():
+            raise TransportError(
+                f"there is no certificate file {file}; make a folder with `rolling-panda certificates --out DIR`"
+            )
+    plain = [endpoint for endpoint in (*config.connect, *config.listen) if not endpoint.startswith("tls/")]
+    if plain:
+        raise TransportError(f"with certificates every endpoint is tls/HOST:PORT; got {', '.join(plain)}")
+    side = "listen" if config.mode == "router" else "connect"
+    settings: dict[str, Any] = {
+        "transport/link/tls/root_ca_certificate": str(authority),
+        "transport/link/tls/enable_mtls": True,
+        "transport/link/tls/verify_name_on_connect": True,
+        f"transport/link/tls/{side}_certificate": str(certificate),
+        f"transport/link/tls/{side}_private_key": str(private),
+    }
+    if config.mode == "router":
+        settings["access_control"] = access_control(config.robots, config.field)
+    return settings

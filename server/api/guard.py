@@ -1,0 +1,174 @@
+"""The door of the server: origin, session and size of every request, and the headers of every answer.
+
+Default-deny: whatever lies under `/api/`, `/camera/`, `/viser`, `/robots` (of a robot that is not there) or a WebSocket
+needs a session, except the few listed.
+"""
+
+import time
+from collections.abc import Callable
+from http.cookies import CookieError, SimpleCookie
+
+import msgspec
+from starlette.datastructures import MutableHeaders
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from server.auth.sessions import Session, Sessions
+
+_PUBLIC = frozenset({"/api/sign-in", "/api/health", "/api/openapi.json"})
+#: Requests whose body only labels them: one that is too long is left out, and the request goes on.
+_LABELLED = frozenset({"/api/stop"})
+_PROTECTED = ("/api", "/camera", "/viser", "/ws", "/robots")
+_SAFE_METHODS = frozenset({"GET", "HEAD"})
+
+PAGE_POLICY = (
+    "default-src 'self'; img-src 'self' data: blob:; object-src 'none'; base-uri 'none'; form-action 'self'; "
+    "frame-ancestors 'none'"
+)
+#: The 3-D client is one file with inline script, WebAssembly and blobs. It may be framed by our page only.
+VIEW_POLICY = (
+    "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval' blob: data:; "
+    "worker-src blob: data:; connect-src 'self' blob: data:; img-src 'self' data: blob:; "
+    "style-src 'self' 'unsafe-inline'; font-src 'self' data:; object-src 'none'; base-uri 'none'; "
+    "frame-ancestors 'self'"
+)
+
+
+class Guard:
+    """ASGI middleware around the whole application."""
+
+    def __init__(
+        self,
+        app: ASGIApp,
+        sessions: Sessions,
+        origins: frozenset[str],
+        cookie: str,
+        max_body: int,
+        on_refusal: Callable[[str], None],
+    ) -> None:
+        """Guard `app`; `on_refusal(text)` hears of refused origins."""
+        self._app = app
+        self._sessions = sessions
+        self._origins = origins
+        self._cookie = cookie
+        self._max_body = max_body
+        self._on_refusal = on_refusal
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Let a request through or answer it here."""
+        if scope["type"] == "http":
+            await self._http(scope, receive, send)
+        elif scope["type"] == "websocket":
+            await self._websocket(scope, receive, send)
+        else:
+            await self._app(scope, receive, send)
+
+    async def _http(self, scope: Scope, receive: Receive, send: Send) -> None:
+        path: str = scope["path"]
+
+        async def with_headers(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                _add_headers(MutableHeaders(scope=message), path, scope.get("scheme") == "https")
+            await send(message)
+
+        if scope["method"] not in _SAFE_METHODS and not self._origin_allowed(scope):
+            await _refuse(with_headers, 403, "this request does not come from the page of this server (Origin)")
+            return
+        session = self.session(scope)
+        if session is None and not is_open(path):
+            await _refuse(with_headers, 401, "sign in first: open the sign-in link of this server")
+            return
+        body = await _read_body(receive, self._max_body)
+        if body is None and path in _LABELLED:
+            body = b""
+        if body is None:
+            await _refuse(with_headers, 413, f"a request body has at most {self._max_body} bytes")
+            return
+        scope.setdefault("state", {})["session"] = session
+        await self._app(scope, _Replay(body, receive), with_headers)
+
+    async def _websocket(self, scope: Scope, receive: Receive, send: Send) -> None:
+        session = self.session(scope)
+        if session is None or not self._origin_allowed(scope):
+            await receive()
+            # Closing before accepting makes the HTTP answer 403.
+            await send({"type": "websocket.close", "code": 1008, "reason": "sign in first"})
+            return
+        scope.setdefault("state", {})["session"] = session
+        await self._app(scope, receive, send)
+
+    def session(self, scope: Scope) -> Session | None:
+        """The session of a request's cookie."""
+        for name, value in scope["headers"]:
+            if name == b"cookie":
+                try:
+                    morsel = SimpleCookie(value.decode("latin-1")).get(self._cookie)
+                except CookieError:
+                    continue
+                if morsel is not None:
+                    return self._sessions.find(morsel.value, time.monotonic())
+        return None
+
+    def _origin_allowed(self, scope: Scope) -> bool:
+        origins = [value.decode("latin-1") for name, value in scope["headers"] if name == b"origin"]
+        if len(origins) == 1 and origins[0] in self._origins:
+            return True
+        self._on_refusal(f"refused {scope['path'][:80]!r} from origin {', '.join(origins)[:80] or 'none'!r}")
+        return False
+
+
+class _Replay:
+    """Gives the application the body that was read here, then the rest of the connection's messages."""
+
+    def __init__(self, body: bytes, receive: Receive) -> None:
+        self._body: bytes | None = body
+        self._receive = receive
+
+    async def __call__(self) -> Message:
+        if self._body is None:
+            return await self._receive()
+        body, self._body = self._body, None
+        return {"type": "http.request", "body": body, "more_body": False}
+
+
+def is_protected(path: str) -> bool:
+    """Does this path need a session, unless it is one of the few public ones?"""
+    return any(path == root or path.startswith(root + "/") for root in _PROTECTED)
+
+
+def is_open(path: str) -> bool:
+    """May this path be asked for without a session?"""
+    return path in _PUBLIC or not is_protected(path)
+
+
+async def _read_body(receive: Receive, limit: int) -> bytes | None:
+    body = b""
+    while True:
+        message = await receive()
+        if message["type"] != "http.request":
+            return body
+        chunk: bytes = message.get("body", b"")
+        body += chunk
+        if len(body) > limit:
+            return None
+        if not message.get("more_body", False):
+            return body
+
+
+async def _refuse(send: Send, status: int, reason: str) -> None:
+    body = msgspec.json.encode({"ok": False, "reason": reason})
+    headers = [(b"content-type", b"application/json"), (b"content-length", str(len(body)).encode())]
+    await send({"type": "http.response.start", "status": status, "headers": headers})
+    await send({"type": "http.response.body", "body": body})
+
+
+def _add_headers(headers: MutableHeaders, path: str, secure: bool) -> None:
+    view = path == "/viser" or path.startswith("/viser/")
+    headers["Content-Security-Policy"] = VIEW_POLICY if view else PAGE_POLICY
+    if secure:
+        headers["Strict-Transport-Security"] = "max-age=31536000"
+    headers["X-Content-Type-Options"] = "nosniff"
+    # "no-referrer" would make browsers send `Origin: null` with some of the page's own requests.
+    headers["Referrer-Policy"] = "same-origin"
+    headers["Cross-Origin-Opener-Policy"] = "same-origin"
+    headers["Cross-Origin-Resource-Policy"] = "same-origin"
+    headers.setdefault("Cache-Control", "no-store" if is_protected(path) else "no-cache")

@@ -1,0 +1,1 @@
+"""Users, passwords, sessions and the throttle of sign-in attempts."""

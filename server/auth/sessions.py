@@ -1,0 +1,139 @@
+"""Who is signed in: single-use sign-in tokens, sessions in memory, and a growing delay after bad attempts.
+
+No clock here: `now` is seconds of a monotonic clock, given by the caller.
+"""
+
+import asyncio
+import hashlib
+import secrets
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from rolling_panda.errors import InputError
+from rolling_panda.messages.types import Role
+from server.auth.throttle import LoginThrottle
+
+_TOKEN_BYTES = 32
+
+
+class SignInError(InputError):
+    """A sign-in was refused; `wait_s` says for how long further ones are refused too."""
+
+    def __init__(self, reason: str, wait_s: float = 0.0) -> None:
+        """Keep the reason and the delay."""
+        super().__init__(reason)
+        self.wait_s = wait_s
+
+
+@dataclass(eq=False)
+class Session:
+    """One signed-in person or script.
+
+    Attributes:
+        session_id: The cookie's value; never logged.
+        user: Name for logs.
+        role: What they may do.
+        used_at: When the session was last used (s).
+        account: Fingerprint of the account that was signed in to with a password; empty for a link's session.
+        ended: Set when the session is over; its sockets close.
+        client: Tells this session from others of the same name, on the wire and on pages; says nothing of the cookie.
+    """
+
+    session_id: str
+    user: str
+    role: Role
+    used_at: float
+    account: str = ""
+    ended: asyncio.Event = field(default_factory=asyncio.Event)
+    client: str = field(default_factory=lambda: secrets.token_hex(8))
+
+    @property
+    def may_operate(self) -> bool:
+        """True for roles that may move the robot."""
+        return self.role in ("operator", "supervisor")
+
+
+@dataclass(frozen=True)
+class _Invitation:
+    user: str
+    role: Role
+    expires_at: float
+
+
+class Sessions:
+    """Tokens and sessions. Only digests of tokens are kept."""
+
+    def __init__(self, idle_s: float) -> None:
+        """Nobody is signed in; a session unused for `idle_s` ends."""
+        self._idle_s = idle_s
+        self._invitations: dict[str, _Invitation] = {}
+        self._sessions: dict[str, Session] = {}
+        self._attempts = LoginThrottle()
+
+    def invite(self, user: str, role: Role, expires_at: float = float("inf")) -> str:
+        """A new sign-in token of 256 bits, good for one sign-in until `expires_at` (s)."""
+        token = secrets.token_urlsafe(_TOKEN_BYTES)
+        self.admit(token, user, role, expires_at)
+        return token
+
+    def admit(self, token: str, user: str, role: Role, expires_at: float = float("inf")) -> None:
+        """Accept `token`, made elsewhere, for one sign-in.
+
+        Raises:
+            InputError: The token is too short to be a secret.
+        """
+        if len(token) < 22:
+            raise InputError(f"the sign-in token has {len(token)} characters; it must have at least 22 (128 bits)")
+        self._invitations[_digest(token)] = _Invitation(user, role, expires_at)
+
+    def sign_in(self, token: str, now: float, address: str = "") -> Session:
+        """Use a token up and open a session; `address` is where the attempt comes from.
+
+        Raises:
+            SignInError: Unknown, used or expired token, or too many bad attempts before this one.
+        """
+        wait = self._attempts.wait((address,), now)
+        if wait > 0.0:
+            raise SignInError(f"too many bad sign-ins; try again in {wait:.0f} s", wait)
+        invitation = self._invitations.pop(_digest(token), None)
+        if invitation is None or now > invitation.expires_at:
+            self._attempts.failed((address,), now)
+            raise SignInError("this sign-in link has been used, has expired or is not from this server")
+        self._attempts.succeeded((address,))
+        return self.open(invitation.user, invitation.role, now)
+
+    def open(self, user: str, role: Role, now: float, account: str = "") -> Session:
+        """A new session for somebody who has shown who they are."""
+        session = Session(secrets.token_urlsafe(_TOKEN_BYTES), user, role, now, account)
+        self._sessions[_digest(session.session_id)] = session
+        return session
+
+    def find(self, session_id: str, now: float) -> Session | None:
+        """The live session of a cookie value, marked as used now; None when there is none."""
+        session = self._sessions.get(_digest(session_id))
+        if session is None:
+            return None
+        if now - session.used_at > self._idle_s:
+            self.end(session)
+            return None
+        session.used_at = now
+        return session
+
+    def everyone(self) -> tuple[Session, ...]:
+        """Every live session."""
+        return tuple(self._sessions.values())
+
+    def void(self, accounts: Mapping[str, str]) -> tuple[Session, ...]:
+        """Sessions whose account is gone or has changed, given the fingerprint of each user's account by name."""
+        sessions = self._sessions.values()
+        return tuple(each for each in sessions if each.account and accounts.get(each.user) != each.account)
+
+    def end(self, session: Session) -> None:
+        """Sign out; safe to call twice."""
+        self._sessions.pop(_digest(session.session_id), None)
+        session.ended.set()
+
+
+def _digest(secret: str) -> str:
+    # Looking up a digest takes the same time whatever part of the secret was right.
+    return hashlib.sha256(secret.encode("utf-8", "surrogatepass")).hexdigest()

@@ -1,0 +1,194 @@
+"""The server's end of the robot's wire: newest states in, intents, stops and teleoperation out.
+
+Zenoh calls back on its own threads; those only store to slots and feeds, which the server's event loop reads.
+"""
+
+import asyncio
+import secrets
+import threading
+import time
+from collections import deque
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+from rolling_panda import messages as m
+from rolling_panda import topics
+from rolling_panda.messages import commands as intents
+from rolling_panda.messages.commands import PlantRequest, SeekReplay
+from rolling_panda.messages.page import ProcessPresence
+from rolling_panda.messages.perception import PointCrop
+from rolling_panda.messages.robot import CameraFrame
+from rolling_panda.messages.supervision import Presence, StopState, TeleopTarget
+from rolling_panda.transport.zenoh import Received, Transport
+
+_STOP_REPEATS = 5
+_STOP_SPACING_S = 0.025
+#: Images of the camera that are kept: a page asks for the one that it was told of, and newer ones may have come since.
+_MOST_IMAGES = 5
+#: Pictures of points that are kept; of 8 kB each at most.
+_MOST_CROPS = 3000
+
+
+@dataclass(frozen=True)
+class Posture:
+    """Where the robot is now, as measured: base in odom, [θ_l, θ_r, q₁…q₇] (rad), and the age of the older (s)."""
+
+    base: m.PlanarPose
+    position: m.Actuated
+    age_s: float
+
+
+class RobotLink:
+    """Everything that the server hears from the robot and says to it."""
+
+    def __init__(self, transport: Transport) -> None:
+        """Subscribe to what the page and the 3-D view need."""
+        self._transport = transport
+        self.joints = transport.slot(topics.JOINTS)
+        self.odometry = transport.slot(topics.ODOMETRY)
+        self.bridge = transport.slot(topics.BRIDGE)
+        self.controller = transport.slot(topics.CONTROLLER)
+        self.replay = transport.slot(topics.REPLAY)
+        self.camera = transport.slot(topics.CAMERA)
+        self.images: dict[int, bytes] = {}
+        """Of the newest few frames, by their sequence."""
+        transport.subscribe(topics.CAMERA, self._on_frame)
+        self.points = transport.slot(topics.POINTS)
+        self.plan = transport.slot(topics.PLAN)
+        self.preview = transport.slot(topics.PREVIEW)
+        self.preview_motion = transport.slot(topics.PREVIEW_MOTION)
+        self.report = transport.slot(topics.REPORT)
+        self.scenery = transport.slot(topics.SCENERY)
+        self.obstacles = transport.slot(topics.OBSTACLES)
+        self.crops: dict[str, PointCrop] = {}
+        """The newest picture of each point, by its id."""
+        transport.subscribe(topics.CROPS, self._on_crop)
+        self.control = transport.slot(topics.CONTROL)
+        self.stops: dict[str, Received[StopState]] = {}
+        transport.subscribe(topics.STOPS, self._on_stops)
+        self.events = transport.feed(topics.EVENT, 500)
+        self._heard: dict[str, float] = {}
+        transport.subscribe(topics.HEARTBEAT, self._on_heartbeat)
+        self._stop = transport.publisher(topics.STOP)
+        self._teleop = transport.publisher(topics.TELEOP)
+        self._beat = transport.publisher(topics.HEARTBEAT)
+        self._presence = transport.publisher(topics.PRESENCE)
+        self._event = transport.publisher(topics.EVENT)
+        # Its own thread, so that a controller that does not answer can never delay anything else.
+        self._callers = ThreadPoolExecutor(max_workers=4, thread_name_prefix="intent")
+        self._writer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="event")
+        self.refused: deque[tuple[str, str]] = deque(maxlen=100)
+        transport.on_reject = lambda topic, reason: self.refused.append((topic, reason))
+
+    async def ask(self, intent: intents.Intent) -> m.Answer:
+        """Ask the controller.
+
+        Raises:
+            ServiceError: It did not answer in time.
+        """
+        loop = asyncio.get_running_loop()
+        return await loop.run_in_executor(self._callers, self._transport.call, topics.INTENT, intent)
+
+    async def ask_perception(self, request: PlantRequest) -> m.Answer:
+        """Ask perception.
+
+        Raises:
+            ServiceError: It did not answer in time.
+        """
+        loop = asyncio.get_running_loop()
+        return await loop.run_in_executor(self._callers, self._transport.call, topics.PLANT, request)
+
+    async def seek(self, request: SeekReplay) -> m.Answer:
+        """Ask who plays a recording.
+
+        Raises:
+            ServiceError: Nobody does.
+        """
+        loop = asyncio.get_running_loop()
+        return await loop.run_in_executor(self._callers, self._transport.call, topics.SEEK, request)
+
+    def stop(self, user: str, reason: str) -> str:
+        """Send the software stop now and again a few times over 100 ms; its id. It needs no controller.
+
+        On a thread of its own: the topic blocks when the wire is full, and the server's loop must not wait for that.
+        """
+        request = m.StopRequest(stop_id=f"s-{secrets.token_hex(8)}", source="server", user=user, reason=reason)
+
+        def send() -> None:
+            self._stop.put(request)
+            for _ in range(_STOP_REPEATS - 1):
+                time.sleep(_STOP_SPACING_S)
+                self._stop.put(request)
+
+        threading.Thread(target=send, name="stop", daemon=True).start()
+        return request.stop_id
+
+    def not_latched(self, stop_id: str) -> tuple[str, ...]:
+        """Of bridge and controller those that have not said that they hold this stop latched."""
+        told = {process: {stop.stop_id for stop in state.message.stops} for process, state in self.stops.items()}
+        bridge = self.bridge.peek()
+        if bridge is not None:
+            told.setdefault("bridge", set()).add(bridge.message.stop_id)
+        return tuple(process for process in ("bridge", "controller") if stop_id not in told.get(process, ()))
+
+    def teleop(self, target: TeleopTarget) -> None:
+        """Publish where the held gizmo is."""
+        self._teleop.put(target)
+
+    def presence_of(self, people: Presence) -> None:
+        """Say who is there."""
+        self._presence.put(people)
+
+    def beat(self, sequence: int) -> None:
+        """Say that the server's loop has turned."""
+        self._beat.put(m.Heartbeat(process="server", sequence=sequence))
+
+    def event(self, severity: m.Severity, text: str, now: float) -> None:
+        """Publish a line of the log, on a thread of its own, as this topic blocks too."""
+        event = m.LogEvent(header=m.Header(stamp=now), process="server", severity=severity, text=text[:500])
+        self._writer.submit(self._event.put, event)
+
+    def posture(self, now: float) -> Posture | None:
+        """The measured posture, or None before the first joints and odometry."""
+        joints, odometry = self.joints.peek(), self.odometry.peek()
+        if joints is None or odometry is None:
+            return None
+        return Posture(odometry.message.pose, joints.message.position, now - min(joints.at, odometry.at))
+
+    def presence(self, now: float) -> tuple[ProcessPresence, ...]:
+        """One row a process: connected, and the age of its last word."""
+        present = self._transport.present()
+        ages = {
+            "bridge": min(self.joints.age(now), self.bridge.age(now)),
+            "controller": self.controller.age(now),
+            "perception": self.points.age(now),
+        }
+        rows = []
+        for process in m.PROCESSES:
+            heard = min(ages.get(process, float("inf")), now - self._heard.get(process, float("-inf")))
+            age = None if heard == float("inf") else max(heard, 0.0)
+            rows.append(ProcessPresence(process, process in present, age))
+        return tuple(rows)
+
+    def close(self) -> None:
+        """Stop waiting for answers."""
+        self._callers.shutdown(wait=False, cancel_futures=True)
+        self._writer.shutdown(wait=False, cancel_futures=True)
+
+    def _on_frame(self, message: CameraFrame, at: float) -> None:
+        self.images[message.sequence] = message.color_jpeg
+        if len(self.images) > _MOST_IMAGES:
+            del self.images[next(iter(self.images))]
+
+    def _on_crop(self, message: PointCrop, at: float) -> None:
+        # Renewed at the end, so that points long gone are the first to be forgotten.
+        self.crops.pop(message.point_id, None)
+        self.crops[message.point_id] = message
+        if len(self.crops) > _MOST_CROPS:
+            del self.crops[next(iter(self.crops))]
+
+    def _on_stops(self, message: StopState, at: float) -> None:
+        self.stops[message.process] = Received(message, at)
+
+    def _on_heartbeat(self, message: m.Heartbeat, at: float) -> None:
+        self._heard[message.process] = at

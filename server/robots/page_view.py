@@ -1,0 +1,205 @@
+"""What the page is shown, put together from the newest messages of the robot."""
+
+import math
+
+import msgspec
+import numpy as np
+
+from rolling_panda import messages as m
+from rolling_panda.messages.page import PagePlan, PagePoint, PagePoints, PageState
+from rolling_panda.messages.robot import CameraFrame
+from rolling_panda.messages.supervision import SessionPlan
+from rolling_panda.messages.types import Role
+from rolling_panda.model.robot import ARM_Q, RobotModel, configuration, pose_message
+from server.auth.sessions import Session
+from server.robots.limits import speed_shares
+from server.robots.link import RobotLink
+
+#: A count of frames alone is not worth sending every point again more often than this (s).
+_RECOUNT_S = 5.0
+#: The cane's direction in an image is told from a place so far along its tangent (m).
+_BEYOND = 0.05
+_NOT_QUEUED = "the controller has not taken it up yet"
+
+
+class PageView:
+    """Builds `PageState` and `PagePoints`. The last known state stays, with its age."""
+
+    def __init__(
+        self, link: RobotLink, model: RobotModel, wider: tuple[str, ...] = (), plain_wire: bool = False
+    ) -> None:
+        """Show what is heard.
+
+        Args:
+            link: To read from.
+            model: Projects points into the image.
+            wider: What is set so in the server itself.
+            plain_wire: Whether the robot's wire is not protected.
+        """
+        self._wider, self._plain_wire = wider, plain_wire
+        self._link = link
+        self._model = model
+        self._seen: dict[str, m.PruningPoint] = {}
+        self._made_from: tuple[object, ...] = ()
+        self._made: PagePoints | None = None
+        self._made_at = 0.0
+
+    @property
+    def arm_limits(self) -> tuple[tuple[float, float], ...]:
+        """Lower and upper limit of each joint of the arm (rad)."""
+        limits = self._model.limits
+        return tuple(zip(limits.lower[ARM_Q].tolist(), limits.upper[ARM_Q].tolist(), strict=True))
+
+    def state(self, number: int, viewers: int, now: float) -> PageState:
+        """The state of this moment, addressed to nobody yet."""
+        controller, bridge = self._link.controller.peek(), self._link.bridge.peek()
+        replay = self._link.replay.peek()
+        joints, odometry = self._link.joints.peek(), self._link.odometry.peek()
+        camera, control = self._link.camera.peek(), self._link.control.peek()
+        return PageState(
+            number=number,
+            user="",
+            role="viewer",
+            viewers=viewers,
+            processes=self._link.presence(now),
+            controller=msgspec.structs.replace(controller.message, queue=()) if controller else None,
+            controller_age_s=max(now - controller.at, 0.0) if controller else None,
+            bridge=bridge.message if bridge else None,
+            bridge_age_s=max(now - bridge.at, 0.0) if bridge else None,
+            joints=joints.message if joints else None,
+            base=odometry.message.pose if odometry else None,
+            camera_frame=camera.message.sequence if camera else 0,
+            control=control.message if control else None,
+            replay=replay.message if replay else None,
+            stops=tuple(self._link.stops[process].message for process in sorted(self._link.stops)),
+            # The same section may be read by several processes, from one file.
+            wider=tuple(
+                dict.fromkeys(
+                    (
+                        *(bridge.message.wider if bridge else ()),
+                        *(controller.message.wider if controller else ()),
+                        *self._wider,
+                    )
+                )
+            ),
+            plain_wire=self._plain_wire,
+            speed_shares=() if joints is None else speed_shares(joints.message, self._model.limits),
+        )
+
+    def tool(self, now: float) -> m.Pose | None:
+        """Measured T_odom_tool, or None before the robot has said where it is."""
+        posture = self._link.posture(now)
+        if posture is None:
+            return None
+        return pose_message(self._model.pose(configuration(posture.base, posture.position), self._model.tool_id))
+
+    def camera(self, frame: CameraFrame) -> m.Pose:
+        """T_odom_camera when a frame was taken."""
+        return pose_message(self._model.pose(configuration(frame.base, frame.position), self._model.camera_id))
+
+    def points(self, now: float) -> PagePoints:
+        """Every point in the order of work; those that perception no longer sees stay while the queue has them.
+
+        The same object as before while nothing has changed; the count of frames alone is renewed now and then.
+        """
+        received, controller = self._link.points.peek(), self._link.controller.peek()
+        camera = self._link.camera.peek()
+        queue = controller.message.queue if controller else ()
+        plan = self._link.plan.peek()
+        made_from = (received, camera, queue, plan)
+        before = self._made
+        if before is not None and made_from == self._made_from:
+            return before
+        made = self._make_points(
+            received.message if received else None,
+            queue,
+            camera.message if camera else None,
+            plan.message if plan else None,
+        )
+        self._made_from = made_from
+        if before is not None:
+            recounted = msgspec.structs.replace(before, frames=made.frames)
+            if made == before or (made == recounted and now - self._made_at <= _RECOUNT_S):
+                return before
+        self._made, self._made_at = made, now
+        return made
+
+    def _make_points(
+        self,
+        perceived: m.PruningPoints | None,
+        queue: tuple[m.QueueEntry, ...],
+        camera: CameraFrame | None,
+        plan: SessionPlan | None,
+    ) -> PagePoints:
+        points = perceived.points if perceived else ()
+        queued = {entry.point_id for entry in queue}
+        current = {point.point_id: point for point in points}
+        recorded = {entry.point_id: entry.recorded for entry in queue if entry.recorded is not None}
+        self._seen = recorded | {key: point for key, point in self._seen.items() if key in queued} | current
+        rows = [(self._seen[entry.point_id], entry) for entry in queue if entry.point_id in self._seen]
+        rows += [
+            (point, m.QueueEntry(point.point_id, "PROPOSED", _NOT_QUEUED))
+            for point in points
+            if point.point_id not in queued
+        ]
+        pixels = project([point.position for point, _ in rows], camera, self._model)
+        beyond = project([_beyond(point) for point, _ in rows], camera, self._model)
+        planned = (
+            {} if plan is None or plan.state != "valid" else {each.plan.point_id: each.plan for each in plan.points}
+        )
+        return PagePoints(
+            points=tuple(
+                PagePoint(
+                    point,
+                    entry,
+                    pixel,
+                    _angle(pixel, further),
+                    planned.get(point.point_id) if entry.state in ("ACCEPTED", "UNREACHABLE") else None,
+                )
+                for (point, entry), pixel, further in zip(rows, pixels, beyond, strict=True)
+            ),
+            abstained=perceived.abstained if perceived else (),
+            segmenter=perceived.segmenter if perceived else "",
+            frames=perceived.frames if perceived else 0,
+            image_size=(camera.intrinsics.width, camera.intrinsics.height) if camera else (0, 0),
+            plan=PagePlan(plan.state, plan.reason, plan.plan_hash, plan.duration_s) if plan else None,
+            rule=perceived.rule if perceived else None,
+        )
+
+
+def _beyond(point: m.PruningPoint) -> m.Vector3:
+    """A place on the cane's tangent, past the cut."""
+    x, y, z = (np.array(point.position) + _BEYOND * np.array(point.tangent)).tolist()
+    return x, y, z
+
+
+def _angle(here: tuple[float, float] | None, there: tuple[float, float] | None) -> float | None:
+    """Direction from one pixel to another (rad); None where the cane points at the camera or leaves the image."""
+    if here is None or there is None or here == there:
+        return None
+    return round(math.atan2(there[1] - here[1], there[0] - here[0]), 2)
+
+
+def addressed(state: PageState, session: Session) -> PageState:
+    """The same state for one reader."""
+    role: Role = session.role
+    return msgspec.structs.replace(state, user=session.user, role=role, client=session.client)
+
+
+def project(
+    positions: list[m.Vector3], frame: CameraFrame | None, model: RobotModel
+) -> list[tuple[float, float] | None]:
+    """Pixels of points in odom (m) in a camera frame, whole numbers; None where outside the image or behind."""
+    if frame is None or not positions:
+        return [None] * len(positions)
+    camera = model.pose(configuration(frame.base, frame.position), model.camera_id)
+    points = (np.array(positions) - camera.translation) @ camera.rotation
+    lens = frame.intrinsics
+    pixels: list[tuple[float, float] | None] = []
+    for x, y, z in points:
+        if z < 0.05:
+            pixels.append(None)
+            continue
+        u, v = float(round(lens.fx * x / z + lens.cx)), float(round(lens.fy * y / z + lens.cy))
+        pixels.append((u, v) if 0 <= u < lens.width and 0 <= v < lens.height else None)
+    return pixels

@@ -1,0 +1,1 @@
+"""The 3-D view; all of viser is in here."""

@@ -1,0 +1,137 @@
+"""The gizmos of the 3-D view: one a session, shown on that session's views alone."""
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import viser
+
+from rolling_panda import messages as m
+from rolling_panda.messages.page import GizmoAxes
+from rolling_panda.model.robot import placement
+
+#: Length of the gizmo's arrows, seen from the side (CSS px).
+GIZMO_PX = 110.0
+_NAME = "/gizmo"
+#: The gizmo follows the tool while nobody has dragged it; smaller movements (m, quaternion parts) are not sent.
+_FOLLOW = 1e-3
+
+
+@dataclass
+class _Gizmo:
+    """One session's. Its arrows may lie along other axes than the tool's: `offset` is the tool's rotation in them."""
+
+    pose: m.Pose
+    axes: GizmoAxes = "tool"
+    drawn: Any = field(default_factory=pin.Quaternion.Identity)
+    offset: Any = field(default_factory=pin.Quaternion.Identity)
+    dragged: bool = False
+    handles: dict[int, viser.TransformControlsHandle] = field(default_factory=dict)
+
+
+class SceneGizmos:
+    """Shows gizmos and works out where they were dragged. Used from the server's loop alone."""
+
+    def __init__(self) -> None:
+        """No gizmo is shown."""
+        self._gizmos: dict[str, _Gizmo] = {}
+        self.heading = 0.0
+        """Of the base in odom (rad), for gizmos along its axes."""
+
+    def shown(self, owner: str) -> bool:
+        """Has this session a gizmo now?"""
+        return owner in self._gizmos
+
+    def show(self, owner: str, pose: m.Pose, clients: list[viser.ClientHandle], axes: GizmoAxes = "tool") -> None:
+        """Show the gizmo of `owner` at a pose in odom on these views, its arrows along these axes."""
+        gizmo = self._gizmos.setdefault(owner, _Gizmo(pose))
+        gizmo.axes = axes
+        self._place(gizmo, pose)
+        for client in clients:
+            self.attach(owner, client)
+
+    def attach(self, owner: str, client: viser.ClientHandle) -> None:
+        """Add the gizmo of `owner`, if it is shown, to a view that has just opened."""
+        gizmo = self._gizmos.get(owner)
+        if gizmo is None or client.client_id in gizmo.handles:
+            return
+        handle = client.scene.add_transform_controls(
+            _NAME,
+            # As large on the screen (px) from near and far, so that a finger can take it.
+            fixed=True,
+            scale=GIZMO_PX,
+            line_width=4.0,
+            depth_test=False,
+            wxyz=_wxyz(gizmo.drawn),
+            position=gizmo.pose.position,
+        )
+        gizmo.handles[client.client_id] = handle
+
+    def drag(self, owner: str, position: m.Vector3, wxyz: tuple[float, float, float, float]) -> m.Pose | None:
+        """`owner` has dragged the arrows to here in odom; where the tool shall go, None when that is nowhere."""
+        gizmo, drawn = self._gizmos.get(owner), pin.Quaternion(*wxyz)
+        if gizmo is None or drawn.norm() < 1e-9:
+            return None
+        for handle in gizmo.handles.values():
+            # Viser sends what differs from what it believes to be drawn, so it has to know that the browser moved it.
+            handle.position[:], handle.wxyz[:] = position, wxyz
+        drawn.normalize()
+        gizmo.drawn = drawn
+        qx, qy, qz, qw = ((drawn * gizmo.offset).coeffs()).tolist()
+        gizmo.pose, gizmo.dragged = m.Pose(position, (qx, qy, qz, qw)), True
+        return gizmo.pose
+
+    def detach(self, client_id: int) -> None:
+        """A view has closed."""
+        for gizmo in self._gizmos.values():
+            gizmo.handles.pop(client_id, None)
+
+    def hide(self, owner: str) -> None:
+        """Remove the gizmo of `owner`."""
+        gizmo = self._gizmos.pop(owner, None)
+        if gizmo is not None:
+            for handle in gizmo.handles.values():
+                handle.remove()
+
+    def follow(self, tool: m.Pose, holder: str | None) -> list[str]:
+        """Keep every gizmo that nobody has dragged at the tool, except that of `holder`; whose gizmos moved."""
+        moved = []
+        for owner, gizmo in self._gizmos.items():
+            if owner != holder and not gizmo.dragged and _apart(gizmo.pose, tool) > _FOLLOW:
+                self._place(gizmo, tool)
+                moved.append(owner)
+        return moved
+
+    def reset(self, owner: str, tool: m.Pose | None) -> None:
+        """Bring a gizmo back to the tool; where that is not known now, it follows as soon as it is."""
+        gizmo = self._gizmos.get(owner)
+        if gizmo is not None:
+            gizmo.dragged = False
+            if tool is not None:
+                self._place(gizmo, tool)
+
+    def pose(self, owner: str) -> m.Pose | None:
+        """Where the gizmo of `owner` is in odom, or None without one."""
+        gizmo = self._gizmos.get(owner)
+        return None if gizmo is None else gizmo.pose
+
+    def _place(self, gizmo: _Gizmo, pose: m.Pose) -> None:
+        gizmo.pose, gizmo.dragged = pose, False
+        tool = pin.Quaternion(placement(pose).rotation)
+        heading = 0.5 * self.heading
+        base = pin.Quaternion(math.cos(heading), 0.0, 0.0, math.sin(heading))
+        gizmo.drawn = {"tool": tool, "base": base, "world": pin.Quaternion.Identity()}[gizmo.axes]
+        gizmo.offset = gizmo.drawn.inverse() * tool
+        for handle in gizmo.handles.values():
+            handle.position = pose.position
+            handle.wxyz = _wxyz(gizmo.drawn)
+
+
+def _wxyz(quaternion: Any) -> tuple[float, float, float, float]:
+    return (quaternion.w, quaternion.x, quaternion.y, quaternion.z)
+
+
+def _apart(a: m.Pose, b: m.Pose) -> float:
+    return float(np.abs(np.array([*a.position, *a.quat_xyzw]) - np.array([*b.position, *b.quat_xyzw])).max())

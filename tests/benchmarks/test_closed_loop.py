@@ -1,0 +1,84 @@
+"""The whole robot on one simulated clock, without sockets: what an operator asks for is what the actuators do."""
+
+import hashlib
+import math
+from pathlib import Path
+
+import pytest
+
+from benchmarks.common.closed_loop import ClosedLoop
+from bridge.sim.robot import trace
+from rolling_panda import messages as m
+from rolling_panda.messages import commands as intents
+
+
+def surveyed(seed: int, path: Path) -> ClosedLoop:
+    """A loop that has looked at the row long enough, armed."""
+    loop = ClosedLoop(seed, path)
+    assert loop.run_until(lambda: len(list(loop.queue("PROPOSED"))) >= 3, 15.0), "too few points were detected"
+    assert loop.ask(intents.Arm(user="test")).ok
+    return loop
+
+
+def accept(loop: ClosedLoop, count: int) -> list[m.QueueEntry]:
+    """Accept the first `count` points; their entries."""
+    proposed = loop.inputs.points.message.points if loop.inputs.points is not None else ()
+    for point in proposed[:count]:
+        assert loop.ask(intents.AcceptPoint(user="test", point_id=point.point_id, revision=point.revision)).ok
+    loop.run(0.1)
+    return list(loop.queue("ACCEPTED"))
+
+
+def test_nothing_moves_before_start_and_then_the_cane_is_severed_where_it_was_accepted(tmp_path: Path) -> None:
+    loop = surveyed(3, tmp_path / "trace")
+    (entry,) = accept(loop, 1)
+    loop.run(1.0)
+    started = loop.now
+    assert loop.ask(intents.Start(user="test")).ok
+    assert loop.run_until(lambda: any(loop.queue("DONE", "FAILED_NOT_CUT", "UNKNOWN")), 40.0)
+    assert [done.point_id for done in loop.queue("DONE")] == [entry.point_id]
+    loop.close()
+    record = trace.read(tmp_path / "trace")
+    before = record.rows[record.rows["clock"] <= started]
+    assert len(before) > 100 and abs(before["setpoint"]).max() == 0.0
+    (cut,) = record.events
+    assert cut["point_id"] == entry.point_id
+    assert entry.accepted_position is not None
+    assert min(math.dist(piece["point"], entry.accepted_position) for piece in cut["severed"]) < 0.010
+
+
+def test_the_stop_halts_a_moving_robot_and_only_a_reset_with_a_start_moves_it_again(tmp_path: Path) -> None:
+    loop = surveyed(2, tmp_path / "trace")
+    accept(loop, 2)
+    loop.ask(intents.Start(user="test"))
+
+    def driving() -> bool:
+        odometry = loop.inputs.odometry
+        return odometry is not None and abs(odometry.message.linear) > 0.05
+
+    assert loop.run_until(driving, 15.0), "the base never moved"
+    pressed = loop.now
+    loop.stop("test")
+    loop.run(2.0)
+    assert loop.state is not None and loop.state.mode == "ESTOP_LATCHED"
+    refused = loop.ask(intents.Start(user="test"))
+    assert not refused.ok and "stop" in refused.reason.lower()
+    assert loop.ask(intents.Reset(user="test", role="supervisor", reason="the test goes on")).ok
+    loop.run(2.0)
+    assert loop.state.mode == "IDLE"
+    loop.close()
+    record = trace.read(tmp_path / "trace")
+    assert record.still_after(pressed) < 0.5
+
+
+@pytest.mark.parametrize("seed", [5])
+def test_the_same_seed_gives_the_same_trace(tmp_path: Path, seed: int) -> None:
+    digests = []
+    for name in ("first", "second"):
+        loop = surveyed(seed, tmp_path / name)
+        accept(loop, 1)
+        loop.ask(intents.Start(user="test"))
+        loop.run(2.0)
+        loop.close()
+        digests.append(hashlib.sha256((tmp_path / name).read_bytes()).hexdigest())
+    assert digests[0] == digests[1]

@@ -1,0 +1,49 @@
+"""Pictures of the page: small, of the part that matters, and one of every state for the documents that show them."""
+
+import re
+from pathlib import Path
+
+import pytest
+from PIL import Image
+from playwright.sync_api import Page
+
+from benchmarks.page import pictures
+from rolling_panda.errors import InputError
+from tests.support.page_states import STATES
+from tests.support.played_page import box_of
+
+FOLDER = pictures.ROOT / "docs/images/page"
+
+
+@pytest.mark.browser
+def test_a_picture_is_of_the_part_that_matters_in_few_colours(page: Page, tmp_path: Path) -> None:
+    album = pictures.Album(tmp_path / "new")
+    album.take(page, "all")
+    album.take(page, "two", "rp-queue, rp-camera")
+    with Image.open(tmp_path / "new/all.png") as all_of_it, Image.open(tmp_path / "new/two.png") as part:
+        assert all_of_it.size == (1280, 800)
+        queue, camera = box_of(page.locator("rp-queue")), box_of(page.locator("rp-camera"))
+        assert part.width == pytest.approx(camera["x"] + camera["width"] - queue["x"] + 16, abs=2)
+        assert part.height == pytest.approx(queue["height"] + 16, abs=2)
+        assert len(part.convert("RGB").getcolors() or ()) in range(16, pictures.COLOURS + 1)
+
+
+def test_every_state_is_pictured_and_the_folder_is_small() -> None:
+    taken = {path.stem for path in FOLDER.glob("*.png")}
+    assert set(STATES) <= taken, "take them with `rolling-panda bench pictures`"
+    assert sum(path.stat().st_size for path in FOLDER.iterdir()) < 3e6
+    assert set(pictures.PARTS) | set(pictures.DARK) <= set(STATES)
+
+
+@pytest.mark.parametrize("document", ["README.md", "docs/operator-guide.md"])
+def test_what_documents_show_is_there(document: str) -> None:
+    path = pictures.ROOT / document
+    shown = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", path.read_text(encoding="utf-8"))
+    assert shown
+    assert [name for name in shown if not (path.parent / name).exists()] == []
+
+
+def test_without_the_tests_it_says_what_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pictures, "ROOT", tmp_path)
+    with pytest.raises(InputError, match="in a checkout of the project"):
+        pictures.played(None, pictures.Album(tmp_path), ())

@@ -1,0 +1,21 @@
+"""The figures over rows: what was severed by the program's own place, and by the truth."""
+
+from benchmarks.control.row_report import Cut, RowRun, summarise
+from benchmarks.control.row_stages import LIMITS, STAGES
+
+
+def cut(state="DONE", distance: float | None = 0.001, right=True, harm="") -> Cut:
+    return Cut("hierarchy", 1, "p", state, "", distance, 0.0001, 3.0, right, harm)
+
+
+def run(*cuts: Cut) -> RowRun:
+    zeros = dict.fromkeys(STAGES, 0.0), dict.fromkeys(LIMITS, 0.0)
+    return RowRun("hierarchy", 1, cuts, 3.0 * len(cuts), 0.0, 0.001, 0, 0, 0, *zeros, {}, {})
+
+
+def test_a_void_acceptance_counts_as_not_cut_and_a_lost_node_as_harm() -> None:
+    rows = [run(cut(), cut("PROPOSED", None, False)), run(cut(right=False, harm="a node"), cut("UNKNOWN", None, False))]
+    summary = summarise(rows)
+    assert (summary["accepted"], summary["void"], summary["unknown"], summary["harmed"]) == (4, 1, 1, 1)
+    assert summary["truly_right"] == 0.25 and summary["right_place"] == 0.5
+    assert summary["truly_right_low"] < 0.25 and summary["cut_s_mean"] == 3.0

@@ -1,0 +1,67 @@
+import numpy as np
+import pytest
+
+from benchmarks.common.kinematic_robot import KinematicRobot
+from benchmarks.control.row_stages import LIMITS, STAGES, StageClock
+from controller.config import ControllerConfig
+from controller.core import Controller
+from rolling_panda import messages as m
+from rolling_panda.config import RobotConfig
+from rolling_panda.messages import commands as intents
+
+
+def point(number):
+    return m.PruningPoint(
+        point_id=f"p{number}",
+        revision=1,
+        position=(0.3 + 0.12 * number, 0.76, 1.05),
+        tangent=(0.0, 0.0, 1.0),
+        radius=0.004,
+        confidence=0.9,
+        nodes_seen=3,
+        nodes_kept=2,
+        vine=0,
+        spur=number,
+        reason="test",
+    )
+
+
+def work(config, count=3):
+    """Cut a few points; the clock that looked on, and how long it took (s)."""
+    robot = KinematicRobot(Controller(config, RobotConfig()), config.home)
+    robot.show(tuple(point(number) for number in range(count)))
+    robot.step()
+    for intent in (intents.Arm(user="t"), intents.AcceptAll(user="t"), intents.Start(user="t")):
+        assert robot.ask(intent).ok
+    clock, begin = StageClock(config), robot.now
+    clock.begin(begin)
+    while robot.now < 60.0:
+        robot.step()
+        tracking = robot.controller.tracking
+        if robot.controller.mode == "AUTO" and tracking is not None and tracking.desired is not None:
+            clock.note(robot, tracking)
+        if robot.now > begin + 1.0 and robot.controller.mode != "AUTO":
+            break
+    assert sum(entry.state == "DONE" for entry in robot.state.queue) == count
+    clock.end(robot.now)
+    return clock, robot.now - begin
+
+
+def test_every_second_has_one_stage_and_the_blades_take_theirs():
+    config = ControllerConfig()
+    clock, spent = work(config)
+    assert tuple(clock.stages) == STAGES and tuple(clock.limits) == LIMITS
+    assert sum(clock.stages.values()) == pytest.approx(spent, abs=1e-6)
+    assert 3 * 0.3 < clock.stages["blades"] < 3 * 0.7
+    assert 0.0 <= clock.stages["standing"] < 0.1 * spent
+    # The slow zone at its speed, and little more.
+    assert clock.stages["slow"] == pytest.approx(3 * config.slow_zone / config.cut_speed, rel=0.25)
+    under_way = sum(clock.stages[stage] for stage in ("transfer", "advance", "slow", "retreat"))
+    assert sum(clock.limits.values()) == pytest.approx(under_way, abs=1e-6)
+
+
+def test_the_limit_that_binds_is_named():
+    free, _ = work(ControllerConfig())
+    slow_joints, _ = work(ControllerConfig(arm_share=0.3))
+    assert slow_joints.limits["joint velocity"] > 1.0 > free.limits["joint velocity"]
+    assert np.argmax(list(slow_joints.limits.values())) == LIMITS.index("joint velocity")

@@ -1,0 +1,197 @@
+"""What every bridge keeps, judged by its plant: a factory a robot, the same tests for each."""
+
+import math
+import random
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from bridge.config import BridgeConfig
+from bridge.core.bridge import TICK_S, BridgeCore
+from bridge.core.odometer import Odometer
+from bridge.core.robot_time import RealTime, SteppedTime
+from bridge.sim.robot.robot import SimulatedRobot
+from bridge.sim.vineyard.row import Row
+from rolling_panda import messages as m
+from rolling_panda.config import load_section
+from rolling_panda.resources import resource
+from tests.support.bridge_rig import FORWARD, MODEL, REST, NoCamera, Parts, Rig, SimulatedPlant
+
+
+def simulated() -> Parts:
+    config = load_section(resource("assets/config/sim.toml"), "bridge", BridgeConfig)
+    plant = SimulatedPlant(SimulatedRobot(config, Row(()), NoCamera()))
+
+    def start() -> BridgeCore:
+        return BridgeCore(plant, config, MODEL.limits, Odometer(MODEL.drive, config.odometry, TICK_S), "sim")
+
+    return Parts(start, plant, lambda: SteppedTime(0.0, TICK_S), real=False, close=plant.robot.close)
+
+
+def real() -> Parts:
+    for driver in ("panda_py", "rosbags"):
+        pytest.importorskip(driver, reason="the extra `real` is not installed: pip install '.[real]'")
+    from tests.support.real_rig import RealPlant
+
+    plant = RealPlant()
+    return Parts(plant.start, plant, lambda: RealTime(time.monotonic(), TICK_S), real=True, close=plant.close)
+
+
+@pytest.fixture(params=[simulated, pytest.param(real, marks=pytest.mark.alone)])
+def rig(request: pytest.FixtureRequest) -> Iterator[Rig]:
+    factory: Callable[[], Parts] = request.param
+    rig = Rig(factory())
+    yield rig
+    rig.close()
+
+
+def stop(stop_id: str = "s1") -> m.StopRequest:
+    return m.StopRequest(stop_id=stop_id, source="page", user="ada", reason="button")
+
+
+def release(stop_id: str = "s1") -> m.ReleaseStop:
+    return m.ReleaseStop(stop_id=stop_id, user="ada", reason="checked")
+
+
+def test_telemetry_comes_at_its_rates_with_growing_sequences(rig: Rig) -> None:
+    rig.run(2.0, REST)
+    joints = [out.joints.sequence for out in rig.outputs if out.joints]
+    odometry = [out.odometry.sequence for out in rig.outputs if out.odometry]
+    frames = [out.frame.sequence for out in rig.outputs if out.frame]
+    assert len(joints) == pytest.approx(200, abs=6)
+    assert len(odometry) == pytest.approx(100, abs=4)
+    assert len([out for out in rig.outputs if out.state]) == pytest.approx(41, abs=5)
+    assert len(frames) >= 2
+    for sequences in (joints, odometry, frames):
+        assert sequences == sorted(set(sequences))
+
+
+def test_base_and_arm_follow_and_the_telemetry_says_what_they_do(rig: Rig) -> None:
+    rig.drive_on()
+    joints = next(out.joints for out in reversed(rig.outputs) if out.joints)
+    odometry = next(out.odometry for out in reversed(rig.outputs) if out.odometry)
+    assert joints.velocity == pytest.approx(FORWARD, abs=0.1)
+    assert odometry.linear == pytest.approx(0.2, abs=0.02)
+    assert odometry.pose.x > 0.1
+    assert not rig.state.watchdog
+    assert rig.plant.breaches() == []
+
+
+def test_silence_of_the_controller_brings_everything_to_rest_in_time(rig: Rig) -> None:
+    rig.drive_on()
+    rig.run(0.6, None)
+    assert rig.at_rest()
+    assert rig.state.watchdog
+    rig.run(0.3, FORWARD)
+    assert rig.at_rest(), "it woke moving"
+    rig.run(0.1, REST)
+    assert rig.until(lambda: not rig.at_rest(), FORWARD)
+    assert rig.plant.breaches() == []
+
+
+def test_a_command_computed_from_an_old_state_is_not_actuated(rig: Rig) -> None:
+    rig.drive_on()
+    stale = rig.echo
+    for _ in range(60):
+        rig.run(0.01, None)
+        rig.echo = stale
+        rig.command(FORWARD)
+    assert rig.at_rest()
+    assert "too old" in rig.refusals
+
+
+def test_duplicates_reorders_and_replays_are_not_actuated(rig: Rig) -> None:
+    rig.run(0.2, REST)
+    rng = random.Random(5)
+    old = [rig.message(tuple(-v for v in FORWARD)) for _ in range(50)]
+    for _ in range(60):
+        rig.run(0.01, REST)
+        for message in rng.sample(old, 5):
+            rig.core.on_motion(message, rig.now)
+        assert rig.at_rest()
+    assert "sequence not newer" in rig.refusals
+
+
+def test_an_older_token_actuates_nothing(rig: Rig) -> None:
+    rig.epoch = 5
+    rig.run(0.2, REST)
+    rig.epoch = 4
+    rig.run(0.5, FORWARD)
+    assert rig.at_rest()
+    assert "older" in rig.refusals
+    rig.cut("c1", epoch=4)
+    rig.run(0.1, REST)
+    assert rig.plant.bites() == 0
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, 1e308, 100.0])
+def test_a_number_that_no_limit_allows_refuses_the_whole_command(rig: Rig, bad: float) -> None:
+    rig.run(0.2, REST)
+    rig.run(0.3, (*FORWARD[:8], bad))
+    assert rig.at_rest()
+    assert rig.refusals.count("command/motion") >= 1
+    assert rig.plant.breaches() == []
+
+
+def test_random_commands_break_no_limit(rig: Rig) -> None:
+    rng = random.Random(3)
+    rig.run(0.2, REST)
+    for _ in range(30):
+        rig.run(0.1, tuple(rng.uniform(-2.0, 2.0) for _ in range(9)))
+    rig.run(0.6, None)
+    assert rig.plant.breaches() == []
+    assert rig.at_rest()
+
+
+def test_a_stop_latches_and_its_release_moves_nothing(rig: Rig) -> None:
+    rig.drive_on()
+    rig.core.on_stop(stop(), rig.now)
+    rig.run(0.5, FORWARD)
+    assert rig.at_rest()
+    assert rig.state.stop_id == "s1"
+    assert not rig.core.on_release(release("other"), rig.now).ok
+    assert rig.core.on_release(release(), rig.now).ok
+    rig.run(0.4, FORWARD)
+    assert rig.at_rest(), "the release moved it"
+    rig.run(0.2, REST)
+    assert rig.until(lambda: not rig.at_rest(), FORWARD)
+    assert rig.plant.breaches() == []
+
+
+def test_a_cut_is_made_once_however_often_it_is_asked_for_and_its_end_is_told(rig: Rig) -> None:
+    rig.run(0.3, REST)
+    for _ in range(20):
+        rig.cut("c1")
+        rig.run(0.01, REST)
+    assert rig.until(lambda: rig.state.cut_id == "c1" and rig.state.outcome != "", REST)
+    assert rig.until(lambda: rig.state.cutter == "open", REST)
+    rig.cut("c1")
+    rig.run(0.3, REST)
+    assert rig.plant.bites() == 1
+    rig.cut("c2")
+    assert rig.until(lambda: rig.state.cut_id == "c2" and rig.state.outcome != "", REST)
+    assert rig.plant.bites() == 2
+
+
+def test_a_cut_during_a_stop_is_not_made_and_is_spent(rig: Rig) -> None:
+    rig.run(0.3, REST)
+    rig.core.on_stop(stop(), rig.now)
+    rig.cut("c1")
+    rig.run(0.1, REST)
+    assert (rig.state.cut_id, rig.state.outcome) == ("c1", "FAILED_NOT_CUT")
+    rig.core.on_release(release(), rig.now)
+    rig.run(0.2, REST)
+    rig.cut("c1")
+    rig.run(0.3, REST)
+    assert rig.plant.bites() == 0
+
+
+def test_a_bridge_that_starts_again_does_not_wake_moving(rig: Rig) -> None:
+    rig.drive_on()
+    rig.start()
+    rig.run(0.6, FORWARD)
+    assert rig.at_rest()
+    assert rig.state.watchdog
+    rig.run(0.2, REST)
+    assert rig.until(lambda: not rig.at_rest(), FORWARD)

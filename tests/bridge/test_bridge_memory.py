@@ -1,0 +1,22 @@
+import pytest
+
+from bridge.core.state_memory import Remembered, open_memory
+from rolling_panda.errors import InputError
+from rolling_panda.messages.supervision import StopRecord
+
+
+def test_what_is_kept_is_known_after_a_restart(tmp_path):
+    kept = Remembered(epoch=9, token="ab", stops=(StopRecord("s1", "server", "ada", "dog", 1.0),), released=("s0",))
+    memory = open_memory(tmp_path)
+    assert memory.remembered == Remembered()
+    memory.keep(kept)
+    memory.close()
+    again = open_memory(tmp_path)
+    assert again.remembered == kept and again.failure == ""
+    again.close()
+
+
+def test_a_memory_that_cannot_be_read_starts_nothing(tmp_path):
+    (tmp_path / "bridge.json").write_text('{"epoch": "nine"}')
+    with pytest.raises(InputError, match="look whether the robot may move"):
+        open_memory(tmp_path)

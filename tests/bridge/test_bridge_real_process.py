@@ -1,0 +1,140 @@
+"""`rolling-panda bridge real` as a process, on devices in other processes."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.support.live_robot import free_port
+
+for driver in ("panda_py", "pyrealsense2", "rosbags"):
+    pytest.importorskip(driver, reason="the extra `real` is not installed: pip install '.[real]'")
+
+from rolling_panda import messages as m  # noqa: E402
+from rolling_panda import topics  # noqa: E402
+from rolling_panda.config import TransportConfig  # noqa: E402
+from rolling_panda.model.robot import RobotModel  # noqa: E402
+from rolling_panda.resources import resource  # noqa: E402
+from rolling_panda.runtime.launch import child_environment  # noqa: E402
+from rolling_panda.transport.zenoh import Router, Transport  # noqa: E402
+from tests.support.device_process import DeviceProcess  # noqa: E402
+
+pytestmark = pytest.mark.alone
+
+ADDRESS = f"127.0.{os.getpid() % 250 + 1}.7"
+REST = (0.0,) * 9
+FORWARD = (*RobotModel().drive.wheels(0.2, 0.0), 0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class Site:
+    """A router, a base and an arm, and a configuration that names them."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.endpoint = f"tcp/127.0.0.1:{free_port()}"
+        self.router = Router(TransportConfig(mode="router", connect=(), listen=(self.endpoint,), plain_wire=True))
+        self.base = DeviceProcess("base", "--plain-wire", "--connect", self.endpoint)
+        self.arm = DeviceProcess("arm", "--arm", ADDRESS)
+        text = resource("assets/config/real.toml").read_text()
+        text = text.replace("tls/127.0.0.1:7447", self.endpoint).replace('address = ""', f'address = "{ADDRESS}"')
+        text = text.replace('realtime = "enforce"', 'realtime = "ignore"').replace("width = 848", "enabled = false", 1)
+        self.config = folder / "real.toml"
+        self.config.write_text(text)
+
+    def command(self, *options: str) -> list[str]:
+        state = str(self.folder / "state")
+        return [
+            sys.executable,
+            "-m",
+            "bridge",
+            "real",
+            "--config",
+            str(self.config),
+            "--state",
+            state,
+            "--plain-wire",
+            *options,
+        ]
+
+    def close(self) -> None:
+        self.base.close()
+        self.arm.close()
+        self.router.close()
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    site = Site(tmp_path_factory.mktemp("site"))
+    yield site
+    site.close()
+
+
+def until(condition: Callable[[], bool], limit_s: float = 20.0) -> None:
+    end = time.monotonic() + limit_s
+    while not condition():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.01)
+
+
+def moved(site: Site) -> float:
+    return float(np.abs(site.base.tell()["travel"]).max() + site.arm.tell()["commands"])
+
+
+def test_the_check_moves_nothing_and_names_what_is_missing(site: Site) -> None:
+    before = moved(site)
+    done = subprocess.run(
+        site.command("--check"), capture_output=True, text=True, timeout=60, env=child_environment(), check=False
+    )
+    rows = {line[4:].split("  ")[0]: line[:2] for line in done.stdout.splitlines()}
+    assert rows["base: wheel speeds"] == rows["base: free to move"] == rows["arm: ready to move"] == "ok"
+    assert rows["base: own odometry"] == rows["base: battery"] == "ok"
+    assert rows["camera"] == rows["cutter"] == "NO"
+    assert done.returncode == 1
+    assert "nothing was moved" in done.stderr
+    assert moved(site) == before
+    assert site.base.tell()["commands"] == 0
+
+
+@pytest.mark.parametrize("readonly", [True, False])
+def test_it_follows_the_wire_or_only_tells_the_robots_state(site: Site, readonly: bool) -> None:
+    bridge = subprocess.Popen(site.command(*["--readonly"] * readonly), env=child_environment())
+    transport = Transport(TransportConfig(connect=(site.endpoint,), plain_wire=True), "controller", "rp1")
+    try:
+        joints, state = transport.slot(topics.JOINTS), transport.slot(topics.BRIDGE)
+        events, motion = transport.feed(topics.EVENT, 100), transport.publisher(topics.MOTION)
+        until(lambda: joints.peek() is not None and state.peek() is not None)
+        first = joints.peek()
+        assert first is not None
+        np.testing.assert_allclose(first.message.position[2:], site.arm.tell()["q"], atol=1e-6)
+        before, sequence = moved(site), 0
+        for xi, seconds in ((REST, 0.5), (FORWARD, 1.5)):
+            end = time.monotonic() + seconds
+            while time.monotonic() < end:
+                got = joints.take()
+                if got is not None:
+                    sequence += 1
+                    echo = got.message.sequence
+                    motion.put(m.MotionCommand(epoch=1, sequence=sequence, echo=echo, xi=xi))  # type: ignore[arg-type]
+                time.sleep(0.002)
+        wheels, newest = site.base.tell()["wheels"], state.peek()
+        assert newest is not None and newest.message.kind == "real"
+        if readonly:
+            assert moved(site) == before
+            assert newest.message.watchdog
+            assert any("--readonly" in event.message.text for event in events.drain())
+        else:
+            np.testing.assert_allclose(wheels, FORWARD[:2], atol=0.1)
+            np.testing.assert_allclose(site.arm.tell()["dq"], FORWARD[2:], atol=0.02)
+            assert [*site.base.tell()["breaches"], *site.arm.tell()["breaches"]] == []
+    finally:
+        bridge.send_signal(signal.SIGINT)
+        code = bridge.wait(10)
+        transport.close()
+    assert code == 0
+    assert np.abs(site.arm.tell()["dq"]).max() == 0.0

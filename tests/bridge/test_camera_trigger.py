@@ -1,0 +1,73 @@
+from dataclasses import replace
+
+from bridge.core.camera_trigger import CameraTrigger, Posture
+from bridge.core.picture import Picture
+from rolling_panda import messages as m
+from rolling_panda.messages.perception import PictureRequest
+from rolling_panda.messages.robot import Intrinsics
+
+PICTURE = Picture(Intrinsics(4, 4, 1.0, 1.0, 2.0, 2.0), b"c", b"d", b"l")
+Q = (0.0,) * 9
+
+
+def posture(clock: float, x: float = 0.0) -> Posture:
+    return Posture(clock, m.Header(clock, "camera"), m.PlanarPose(x), Q)
+
+
+def exposures(shutter: CameraTrigger, first: int, last: int, step: int = 10) -> list[int]:
+    out = []
+    for ticks in range(first, last, step):
+        if shutter.due(ticks):
+            shutter.exposed(ticks, posture(ticks * 1e-3))
+            assert shutter.frame(PICTURE) is not None
+            out.append(ticks)
+    return out
+
+
+def test_two_a_second_while_awake_then_one_in_two_seconds() -> None:
+    shutter = CameraTrigger(2.0, 0.5, 1e-3)
+    assert exposures(shutter, 0, 4000) == list(range(0, 4000, 500))
+    assert exposures(shutter, 4000, 12000) == [5500, 7500, 9500, 11500]
+    shutter.wake(12000)
+    assert exposures(shutter, 12000, 13000) == [12000, 12500]
+
+
+def test_never_two_exposures_at_once_and_the_posture_is_that_of_the_exposure() -> None:
+    shutter = CameraTrigger(2.0, 0.5, 1e-3)
+    shutter.exposed(0, posture(0.25, 1.0))
+    assert not shutter.due(5000)
+    frame = shutter.frame(PICTURE)
+    assert frame is not None
+    assert (frame.header.stamp, frame.base.x, frame.sequence) == (0.25, 1.0, 1)
+    assert shutter.frame(PICTURE) is None
+
+
+def test_a_picture_that_is_asked_for_is_taken_at_once_and_once_and_carries_its_point() -> None:
+    shutter = CameraTrigger(2.0, 0.5, 1e-3)
+    assert exposures(shutter, 0, 10) == [0]
+    shutter.want(PictureRequest(epoch=1, number=4, point_id="p7"))
+    assert shutter.due(20)
+    shutter.exposed(20, posture(0.02))
+    shutter.want(PictureRequest(epoch=1, number=4, point_id="p7"))
+    frame = shutter.frame(PICTURE)
+    assert frame is not None and (frame.point_id, frame.number) == ("p7", 4)
+    assert not shutter.due(30), "a repetition takes no second picture"
+    shutter.want(PictureRequest(epoch=1, number=3, point_id="p6"))
+    assert not shutter.due(30), "an older request comes too late"
+    shutter.exposed(600, posture(0.6))
+    usual = shutter.frame(PICTURE)
+    assert usual is not None and usual.point_id == ""
+
+
+def test_a_picture_that_knows_when_it_was_taken_gets_the_posture_of_that_moment() -> None:
+    shutter = CameraTrigger(2.0, 0.5, 1e-3)
+    for k in range(300):
+        shutter.follow(posture(k * 0.01, k * 0.003))
+        if k == 100:
+            shutter.exposed(1000, posture(1.0, 0.3))
+    frame = shutter.frame(replace(PICTURE, taken_at=1.504))
+    assert frame is not None
+    assert (frame.header.stamp, frame.base.x) == (1.5, 0.45)
+    shutter.exposed(3000, posture(3.0, 0.9))
+    frame = shutter.frame(replace(PICTURE, taken_at=-5.0))
+    assert frame is not None and frame.header.stamp == 0.99, "of two seconds the oldest"

@@ -1,0 +1,153 @@
+"""The blades close at most once for a cut, whenever the bridge is killed and whatever the disk does."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from bridge.core.cut_memory import FILE, CutFile
+from bridge.core.cut_orders import FORGETFUL, CutOrders
+from rolling_panda.errors import InputError
+from rolling_panda.messages.robot import CutCommand
+from rolling_panda.runtime.launch import child_environment
+
+
+def order(cut_id: str) -> CutCommand:
+    return CutCommand(epoch=3, cut_id=cut_id, point_id="p1")
+
+
+def judged(orders: CutOrders, cut_id: str, inhibited: str = "") -> tuple[str, str]:
+    """What comes of an order that is repeated until something does."""
+    end = time.monotonic() + 20.0
+    while True:
+        verdict, reason = orders.judge(order(cut_id), None, True, inhibited)
+        if verdict != "wait":
+            return verdict, reason
+        assert time.monotonic() < end
+        time.sleep(0.001)
+
+
+def test_a_cut_waits_until_it_cannot_be_forgotten_and_is_known_after_a_restart(tmp_path: Path) -> None:
+    memory = CutFile(tmp_path)
+    assert judged(CutOrders(memory), "run-1") == ("cut", "")
+    assert b"run-1\n" in (tmp_path / FILE).read_bytes()
+    memory.close()
+    again = CutFile(tmp_path)
+    orders = CutOrders(again)
+    assert judged(orders, "run-1") == ("known", "")
+    assert judged(orders, "run-2") == ("cut", "")
+    again.close()
+
+
+def test_an_order_that_was_spent_stays_so_after_a_restart(tmp_path: Path) -> None:
+    memory = CutFile(tmp_path)
+    assert judged(CutOrders(memory), "run-1", "stopped") == ("refuse", "stopped")
+    memory.close()
+    again = CutFile(tmp_path)
+    assert judged(CutOrders(again), "run-1") == ("known", "")
+    again.close()
+
+
+def test_a_stop_between_two_repetitions_spends_the_order(tmp_path: Path) -> None:
+    memory = CutFile(tmp_path)
+    orders = CutOrders(memory)
+    assert orders.judge(order("a"), None, True, "")[0] in ("wait", "cut")
+    orders.judge(order("b"), None, True, "stopped")
+    assert judged(orders, "b") == ("known", "")
+    memory.close()
+
+
+def test_a_disk_that_hangs_keeps_nobody_waiting_but_the_blades(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    go, real = threading.Event(), os.fsync
+    memory = CutFile(tmp_path)
+    monkeypatch.setattr(os, "fsync", lambda descriptor: (go.wait(20.0), real(descriptor)))
+    orders = CutOrders(memory)
+    began = time.monotonic()
+    verdicts = {orders.judge(order("a"), None, True, "")[0] for _ in range(1000)}
+    assert verdicts == {"wait"} and time.monotonic() - began < 1.0
+    go.set()
+    assert judged(orders, "a") == ("cut", "")
+    memory.close()
+
+
+def test_a_full_disk_means_no_cut_now_or_later(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    memory = CutFile(tmp_path)
+    orders = CutOrders(memory)
+
+    def full(descriptor: int) -> None:
+        raise OSError(28, "no space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", full)
+        assert judged(orders, "a") == ("refuse", FORGETFUL)
+    assert judged(orders, "a") == ("known", "")
+    assert judged(orders, "b") == ("cut", "")
+    memory.close()
+
+
+def test_a_half_written_line_spoils_no_other(tmp_path: Path) -> None:
+    (tmp_path / FILE).write_bytes(b"\nrun-1\n\nrun-")
+    memory = CutFile(tmp_path)
+    assert judged(CutOrders(memory), "run-2") == ("cut", "")
+    memory.close()
+    again = CutFile(tmp_path)
+    assert {"run-1", "run-2"} <= again.known
+    again.close()
+
+
+def test_a_folder_that_cannot_be_used_is_named(tmp_path: Path) -> None:
+    (tmp_path / FILE).mkdir()
+    with pytest.raises(InputError, match="cannot remember cuts in .*--state"):
+        CutFile(tmp_path)
+
+
+#: Orders and memory are the product's; the blades are a file that is written at once.
+BRIDGE = """
+import os, sys, time
+from pathlib import Path
+from bridge.core.cut_memory import CutFile
+from bridge.core.cut_orders import CutOrders
+from rolling_panda.messages import CutCommand
+
+orders = CutOrders(CutFile(Path(sys.argv[1])))
+blades = os.open(sys.argv[2], os.O_WRONLY | os.O_APPEND | os.O_CREAT)
+first = int(sys.argv[3])
+print("up", flush=True)
+# The controller repeats the orders that it has had no word of, and then gives new ones.
+for number in range(max(0, first - 3), 10**9):
+    while True:
+        verdict, _ = orders.judge(CutCommand(epoch=3, cut_id=f"run-{number}", point_id="p"), None, True, "")
+        if verdict == "cut":
+            os.write(blades, f"{number}\\n".encode())
+        if verdict != "wait":
+            break
+        time.sleep(0.0005)
+    print(number, flush=True)
+"""
+
+
+@pytest.mark.parametrize("kills", [20, pytest.param(1000, marks=pytest.mark.slow)])
+def test_no_cut_is_made_twice_when_the_bridge_is_killed(tmp_path: Path, kills: int) -> None:
+    blades, reached, chance = tmp_path / "blades", 0, random.Random(11)
+    for _ in range(kills):
+        child = subprocess.Popen(
+            [sys.executable, "-c", BRIDGE, str(tmp_path), str(blades), str(reached)],
+            stdout=subprocess.PIPE,
+            env=child_environment(),
+        )
+        assert child.stdout is not None and child.stdout.readline() == b"up\n"
+        time.sleep(chance.uniform(0.0, 0.1))
+        os.kill(child.pid, signal.SIGKILL)
+        said = [int(line) for line in child.stdout.read().splitlines(keepends=True) if line.endswith(b"\n")]
+        child.stdout.close()
+        child.wait()
+        reached = max([reached, *said])
+    made = Counter(blades.read_text().split())
+    assert len(made) >= kills // 2 and set(made.values()) == {1}

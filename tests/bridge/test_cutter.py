@@ -1,0 +1,106 @@
+import numpy as np
+import pytest
+
+from bridge.config import BridgeConfig
+from bridge.sim.robot.cutter import Cutter, bite
+from bridge.sim.vineyard.row import Rod, Row
+from rolling_panda.messages.types import WoodClass
+
+CONFIG = BridgeConfig()
+# Blades 1 m up, approaching along world y; the tool's y points down, so upright canes pass the blade plane squarely.
+TOOL = np.array([[1.0, 0, 0, 0.0], [0, 0, 1, 0.0], [0, -1, 0, 1.0], [0, 0, 0, 1]])
+
+
+def upright(x: float = 0.0, y: float = 0.0, radius: float = 0.004, kind: WoodClass = "cane", parent: int = -1) -> Rod:
+    return Rod(kind, np.array([x, y, 0.8]), np.array([x, y, 1.4]), radius, radius, parent)
+
+
+def along_row(kind: WoodClass, z: float, radius: float) -> Rod:
+    return Rod(kind, np.array([-1.0, 0.0, z]), np.array([1.0, 0.0, z]), radius, radius)
+
+
+def test_a_cane_between_the_blades_is_severed_at_the_blade_plane() -> None:
+    bud = Rod("node", np.array([0, 0, 1.2]), np.array([0, 0, 1.21]), 0.005, 0.005, parent=0)
+    result = bite(Row((upright(), bud)), TOOL, CONFIG)
+    assert [item.index for item in result.severed] == [0]
+    assert result.severed[0].point == pytest.approx([0.0, 0.0, 1.0])
+    cane = result.row.rods[0]
+    assert cane is not None
+    assert cane.end[2] == pytest.approx(1.0)
+    assert result.row.rods[1] is None
+    assert result.row.revision == 1
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "cut"),
+    [(0.014, 0.0, True), (0.016, 0.0, False), (-0.016, 0.0, False), (0.0, 0.017, True), (0.0, 0.019, False)],
+)
+def test_only_what_is_within_the_opening_and_the_blades_reach(x: float, y: float, cut: bool) -> None:
+    result = bite(Row((upright(x, y),)), TOOL, CONFIG)
+    assert bool(result.severed) == cut
+    assert result.detail == ("" if cut else "nothing between the blades")
+    assert not result.jammed
+
+
+def test_a_cane_that_ends_below_the_blades_is_not_cut() -> None:
+    short = Rod("cane", np.array([0, 0, 0.8]), np.array([0, 0, 0.999]), 0.004, 0.004)
+    assert bite(Row((short,)), TOOL, CONFIG).severed == ()
+
+
+def test_two_canes_are_both_severed_and_both_reported() -> None:
+    row = Row((upright(-0.01), upright(0.01), upright(0.3)))
+    result = bite(row, TOOL, CONFIG)
+    assert [item.index for item in result.severed] == [0, 1]
+    assert result.row.rods[2] is row.rods[2]
+
+
+@pytest.mark.parametrize(
+    ("hard", "words"),
+    [
+        (along_row("wire", 1.0, 0.00125), "a wire"),
+        (along_row("cordon", 1.01, 0.015), "a cordon"),
+        (upright(kind="post", radius=0.038, x=0.04), "a post"),
+        (upright(radius=0.013), "26 mm is too thick"),
+    ],
+)
+def test_wire_post_and_thick_wood_jam_the_blades_and_nothing_is_severed(hard: Rod, words: str) -> None:
+    row = Row((upright(0.005), hard))
+    result = bite(row, TOOL, CONFIG)
+    assert result.jammed
+    assert words in result.detail
+    assert result.severed == ()
+    assert result.row is row
+
+
+def test_a_wire_beside_the_blade_plane_does_not_jam() -> None:
+    assert not bite(Row((upright(), along_row("wire", 1.01, 0.00125))), TOOL, CONFIG).jammed
+
+
+def test_nothing_at_all_is_nothing() -> None:
+    assert bite(Row(()), TOOL, CONFIG).detail == "nothing between the blades"
+
+
+def test_the_blades_meet_after_the_closing_time_and_open_as_long() -> None:
+    cutter = Cutter(CONFIG)
+    cutter.begin("c1", "p1")
+    steps = 0
+    while not cutter.step(0.001, True):
+        steps += 1
+        assert cutter.state == "closing"
+    assert steps + 1 == 300
+    cutter.finish("DONE", "severed 1 cane", jammed=False)
+    for _ in range(299):
+        cutter.step(0.001, True)
+        assert cutter.state == "opening"
+    cutter.step(0.001, True)
+    assert cutter.state == "open"
+    assert cutter.outcome == "DONE"
+
+
+def test_an_inhibited_cutter_opens_without_cutting() -> None:
+    cutter = Cutter(CONFIG)
+    cutter.begin("c1", "p1")
+    assert not cutter.step(0.001, True)
+    assert not cutter.step(0.001, False)
+    assert (cutter.state, cutter.outcome) == ("opening", "FAILED_NOT_CUT")
+    assert not any(cutter.step(0.001, True) for _ in range(1000))

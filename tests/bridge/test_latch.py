@@ -1,0 +1,78 @@
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bridge.core.latch import StopLatch
+from rolling_panda.messages.robot import ReleaseStop, StopRequest
+
+
+def stop(stop_id: str) -> StopRequest:
+    return StopRequest(stop_id=stop_id, source="page", user="ada", reason="button")
+
+
+def release(stop_id: str) -> ReleaseStop:
+    return ReleaseStop(stop_id=stop_id, user="ada", reason="checked")
+
+
+def test_every_stop_is_kept_and_all_hold_until_the_newest_is_released() -> None:
+    latch = StopLatch()
+    assert latch.stop(stop("a"), 10.0)
+    assert latch.stop(stop("b"), 11.0)
+    assert not latch.stop(stop("a"), 12.0)
+    assert [(each.stop_id, each.wall_time) for each in latch.stops] == [("b", 11.0), ("a", 10.0)]
+    assert latch.stop_id == "b"
+    assert "ada" in latch.stopped_by
+    assert "latched stop is b" in latch.release(release("a"))
+    assert latch.stop_id == "b"
+    assert latch.release(release("b")) == ""
+    assert latch.stop_id == "" and latch.stops == () and latch.released_by == "ada: checked"
+
+
+def test_late_repetitions_of_released_stops_do_not_latch_again() -> None:
+    latch = StopLatch()
+    latch.stop(stop("a"))
+    latch.stop(stop("b"))
+    latch.release(release("b"))
+    assert not latch.stop(stop("a")) and not latch.stop(stop("b"))
+    assert latch.stop(stop("c"))
+
+
+def test_a_restart_releases_nothing_and_forgets_nothing() -> None:
+    latch = StopLatch()
+    latch.stop(stop("a"))
+    latch.release(release("a"))
+    latch.stop(stop("b"))
+    again = StopLatch(latch.stops, latch.over, latch.released_by)
+    assert again.stop_id == "b" and again.released_by == "ada: checked"
+    assert not again.stop(stop("a"))
+
+
+def test_while_the_button_is_pressed_nothing_is_released() -> None:
+    latch = StopLatch()
+    latch.stop(stop("a"))
+    latch.hardware = True
+    assert "button is pressed" in latch.release(release("a"))
+    latch.hardware = False
+    assert latch.release(release("a")) == ""
+
+
+def test_there_is_nothing_to_release_without_a_stop() -> None:
+    assert StopLatch().release(release("a")) == "no stop is latched"
+
+
+@given(st.lists(st.tuples(st.booleans(), st.integers(0, 80)), max_size=200))
+def test_it_is_open_only_after_a_release_of_the_newest(script: list[tuple[bool, int]]) -> None:
+    latch = StopLatch()
+    newest, over = "", set()
+    for pressed, number in script:
+        name = f"s{number}"
+        if pressed:
+            known = {each.stop_id for each in latch.stops}
+            if latch.stop(stop(name)):
+                assert name not in over and name not in known
+                newest = name
+        elif latch.release(release(name)) == "":
+            assert name == newest
+            over |= {name}
+            newest = ""
+        assert latch.stop_id == newest
+        assert len(latch.stops) <= 50

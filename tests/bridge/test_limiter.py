@@ -1,0 +1,66 @@
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bridge.core.limiter import Limiter
+from rolling_panda.model.robot import ARM_Q, ARM_XI, RobotModel
+
+LIMITS = RobotModel().limits
+LOWER, UPPER = LIMITS.lower[ARM_Q], LIMITS.upper[ARM_Q]
+DT = 0.001
+
+
+def limiter() -> Limiter:
+    return Limiter(LIMITS, 13.5, 0.01, DT)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.lists(st.lists(st.floats(-1e6, 1e6), min_size=9, max_size=9), min_size=1, max_size=6),
+    st.floats(0.05, 0.95),
+)
+def test_any_input_keeps_velocity_acceleration_jerk_and_joint_limits(goals: list[list[float]], where: float) -> None:
+    bound, arm = limiter(), LOWER + where * (UPPER - LOWER)
+    before, last = np.zeros(9), np.zeros(7)
+    for goal in goals:
+        for _ in range(400):
+            sent = bound.step(np.array(goal), arm)
+            assert np.all(np.abs(sent) <= LIMITS.velocity + 1e-12)
+            assert np.all(np.abs(sent - before) <= LIMITS.acceleration * DT + 1e-12)
+            assert np.all(np.abs(sent - before)[:2] <= 13.5 * DT + 1e-12)
+            change = (sent - before)[ARM_XI]
+            assert np.all(np.abs(change - last) <= LIMITS.jerk[ARM_XI] * DT**2 + 1e-12)
+            before, last = sent, change
+            arm = arm + sent[ARM_XI] * DT
+            assert np.all((arm > LOWER) & (arm < UPPER))
+
+
+def test_a_reachable_setpoint_is_sent_on_unchanged() -> None:
+    bound, goal = limiter(), np.array([1.0, -1.0, 0.3, 0.2, 0.1, -0.1, 0.0, 0.1, -0.3])
+    arm = (LOWER + UPPER) / 2
+    for _ in range(200):
+        sent = bound.step(goal, arm)
+    assert np.array_equal(sent, goal)
+
+
+def test_from_beyond_a_limit_a_joint_may_come_back() -> None:
+    bound, arm = limiter(), UPPER + 0.05
+    for _ in range(10):
+        assert np.all(bound.step(np.full(9, 1.0), arm)[ARM_XI] <= 0.0)
+    for _ in range(10):
+        sent = bound.step(np.full(9, -1.0), arm)
+    assert np.all(sent[ARM_XI] < 0.0)
+
+
+def test_what_the_controller_may_send_a_thousand_times_a_second_is_sent_on_unchanged() -> None:
+    """Half of the rated acceleration and jerk: the controller's shares."""
+    bound, arm = limiter(), (LOWER + UPPER) / 2
+    rng, sent, change = np.random.default_rng(0), np.zeros(9), np.zeros(7)
+    most, jerk = 0.5 * LIMITS.acceleration[ARM_XI] * DT, 0.5 * LIMITS.jerk[ARM_XI] * DT**2
+    for i in range(2000):
+        if i % 20 == 0:
+            ends = rng.choice([-1.0, 1.0], 7)
+        change = np.clip(change + ends * jerk, -most, most)
+        change = np.where(np.abs(sent[ARM_XI] + change) < 1.0, change, change - np.clip(change, -jerk, jerk))
+        sent[ARM_XI] += change
+        np.testing.assert_allclose(bound.step(sent, arm), sent, atol=1e-12)

@@ -1,0 +1,155 @@
+"""The base's driver against a base in its own process, over a real router."""
+
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from tests.support.live_robot import free_port
+
+pytest.importorskip("rosbags", reason="the extra `real` is not installed: pip install '.[real]'")
+
+from bridge.real import mp500  # noqa: E402
+from bridge.real.config import BaseConfig  # noqa: E402
+from bridge.real.mp500 import Mp500  # noqa: E402
+from rolling_panda.config import TransportConfig  # noqa: E402
+from rolling_panda.model.robot import RobotModel  # noqa: E402
+from rolling_panda.transport.zenoh import ForeignWire, Router  # noqa: E402
+from tests.support.device_process import DeviceProcess  # noqa: E402
+
+pytestmark = pytest.mark.alone
+
+DRIVE = RobotModel().drive
+REST = np.zeros(2)
+FORWARD = np.array(DRIVE.wheels(0.3, 0.0))
+LEFT = np.array(DRIVE.wheels(0.2, 0.4))
+
+
+@pytest.fixture(scope="module")
+def device() -> Iterator[tuple[str, DeviceProcess]]:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    router = Router(TransportConfig(mode="router", connect=(), listen=(endpoint,), plain_wire=True))
+    device = DeviceProcess("base", "--plain-wire", "--connect", endpoint)
+    yield endpoint, device
+    device.close()
+    router.close()
+
+
+@pytest.fixture
+def base(device: tuple[str, DeviceProcess]) -> Iterator[Mp500]:
+    endpoint, fake = device
+    fake.tell("free")
+    base = Mp500(ForeignWire(TransportConfig(connect=(endpoint,), plain_wire=True)), DRIVE, 13.5, BaseConfig())
+    base.release()
+    until(lambda: base.read().fault == "")
+    fake.tell("clear")
+    yield base
+    base.close()
+
+
+@pytest.fixture
+def fake(device: tuple[str, DeviceProcess]) -> DeviceProcess:
+    return device[1]
+
+
+def until(condition: Callable[[], bool], limit_s: float = 5.0) -> float:
+    began = time.monotonic()
+    while not condition():
+        assert time.monotonic() - began < limit_s, "waited in vain"
+        time.sleep(0.005)
+    return time.monotonic() - began
+
+
+def drive(base: Mp500, wheels: np.ndarray, seconds: float) -> None:
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        base.write(wheels)
+        time.sleep(0.005)
+
+
+def test_it_drives_and_knows_how_far_each_wheel_has_turned(base: Mp500, fake: DeviceProcess) -> None:
+    before, travelled = base.read().position, np.array(fake.tell()["travel"])
+    drive(base, LEFT, 1.5)
+    state, report = base.read(), fake.tell()
+    np.testing.assert_allclose(state.velocity, LEFT, atol=0.05)
+    np.testing.assert_allclose(report["command"], [0.2, 0.4], atol=1e-6)
+    drive(base, REST, 0.8)
+    turned = base.read().position - before
+    np.testing.assert_allclose(turned, np.array(fake.tell()["travel"]) - travelled, atol=0.1)
+    assert turned[1] > turned[0] > 0.5, "left is right"
+    assert fake.tell()["breaches"] == []
+    assert base.read().battery == pytest.approx(0.8)
+
+
+def test_a_target_that_is_not_renewed_ends_in_zeros_within_the_deadline(base: Mp500, fake: DeviceProcess) -> None:
+    drive(base, FORWARD, 0.8)
+    silent = time.monotonic()
+    until(lambda: fake.tell()["command"] == [0.0, 0.0], 1.0)
+    assert time.monotonic() - silent < 0.3
+    until(lambda: fake.tell()["still_s"] > 0.0)
+    assert time.monotonic() - silent < 0.7
+    assert fake.tell()["breaches"] == []
+
+
+def test_after_an_emergency_stop_it_begins_at_zero_by_a_ramp(base: Mp500, fake: DeviceProcess) -> None:
+    drive(base, FORWARD, 0.5)
+    fake.tell("press")
+    until(lambda: "button" in base.read().fault)
+    assert base.read().severe
+    drive(base, FORWARD, 0.3)
+    assert fake.tell()["command"] == [0.0, 0.0]
+    fake.tell("confirm")
+    until(lambda: "being confirmed" in base.read().fault)
+    fake.tell("free")
+    drive(base, FORWARD, 0.5)
+    report = fake.tell()
+    assert report["command"][0] == pytest.approx(0.3)
+    assert report["breaches"] == []
+
+
+def test_without_wheel_speeds_it_stops_and_says_which_topic_is_silent(base: Mp500, fake: DeviceProcess) -> None:
+    drive(base, FORWARD, 0.5)
+    fake.tell(f"mute {mp500.WHEELS}")
+    drive(base, FORWARD, 0.15)
+    assert fake.tell()["command"][0] < 0.28, "it slows down before it calls the silence a fault"
+    drive(base, FORWARD, 0.1)
+    assert mp500.WHEELS in base.read().fault, "within 0.25 s"
+    drive(base, FORWARD, 1.5)
+    state = base.read()
+    assert mp500.WHEELS in state.fault and not state.severe, "the last speed heard of is no runaway"
+    assert fake.tell()["command"] == [0.0, 0.0] and not fake.tell()["soft"]
+    fake.tell("free")
+    until(lambda: base.read().fault == "")
+
+
+def test_without_an_emergency_stop_state_it_does_not_move(base: Mp500, fake: DeviceProcess) -> None:
+    fake.tell(f"mute {mp500.EMERGENCY}")
+    until(lambda: mp500.EMERGENCY in base.read().fault)
+    drive(base, FORWARD, 0.3)
+    assert fake.tell()["command"] == [0.0, 0.0]
+
+
+def test_wheels_that_turn_against_the_command_are_stopped_by_the_relay_board(base: Mp500, fake: DeviceProcess) -> None:
+    drive(base, REST, 0.1)
+    fake.tell("stuck")
+    until(lambda: bool(fake.tell()["soft"]), 3.0)
+    until(lambda: base.read().severe)
+    assert "the wheels turn" in base.read().fault
+    until(lambda: fake.tell()["still_s"] > 0.0)
+    fake.tell("free")
+    assert base.read().severe, "only a person's word releases it"
+    base.release()
+    until(lambda: base.read().fault == "")
+
+
+def test_a_base_that_only_listens_sends_nothing(device: tuple[str, DeviceProcess]) -> None:
+    endpoint, fake = device
+    commands = fake.tell("free")["commands"]
+    base = Mp500(
+        ForeignWire(TransportConfig(connect=(endpoint,), plain_wire=True)), DRIVE, 13.5, BaseConfig(), moving=False
+    )
+    until(lambda: base.read().fault == "")
+    drive(base, FORWARD, 0.3)
+    base.close()
+    assert fake.tell()["commands"] == commands

@@ -1,0 +1,93 @@
+# ruff: noqa: E402
+"""The camera's driver with librealsense's own software device in place of the camera."""
+
+import io
+import time
+import zlib
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+from PIL import Image
+
+rs = pytest.importorskip("pyrealsense2", reason="the extra `real` is not installed: pip install '.[real]'")
+
+from bridge.core.picture import DEPTH_UNIT, Picture
+from bridge.real.config import CameraConfig
+from bridge.real.realsense import (
+    RealSense,
+    open_realsense,
+)
+from bridge.real.software_realsense import SoftwareDevice
+from rolling_panda.errors import InputError
+from rolling_panda.messages.robot import Intrinsics
+
+WIDTH, HEIGHT = 64, 48
+
+
+class SoftwareCamera(SoftwareDevice):
+    """Looks at a wall that a test puts up."""
+
+    def __init__(self) -> None:
+        super().__init__(Intrinsics(WIDTH, HEIGHT, 40.0, 41.0, 32.0, 24.0), 30, 0.001)
+
+    def wall(self, millimetres: int, red: int) -> None:
+        """One exposure of it."""
+        color = np.full((HEIGHT, WIDTH, 3), (red, 10, 20), np.uint8)
+        self.show(np.full((HEIGHT, WIDTH), millimetres, np.uint16), color, time.time())
+
+
+@pytest.fixture
+def device() -> SoftwareCamera:
+    return SoftwareCamera()
+
+
+@pytest.fixture
+def camera(device: SoftwareCamera) -> Iterator[RealSense]:
+    camera = RealSense(device, rs.align(rs.stream.color))
+    yield camera
+    camera.close()
+
+
+def until(show: Callable[[], None], camera: RealSense, limit_s: float = 5.0) -> Picture:
+    end = time.monotonic() + limit_s
+    while True:
+        show()
+        time.sleep(0.02)
+        picture = camera.capture(False)
+        if picture is not None:
+            return picture
+        assert time.monotonic() < end, "no picture"
+
+
+def test_a_picture_is_taken_when_asked_for_and_no_other(camera: RealSense, device: SoftwareCamera) -> None:
+    for _ in range(5):
+        device.wall(500, 200)
+        time.sleep(0.02)
+        assert camera.capture(False) is None
+    camera.capture(True)
+    picture = until(lambda: device.wall(800, 220), camera)
+    assert (picture.intrinsics.width, picture.intrinsics.height) == (WIDTH, HEIGHT)
+    assert (picture.intrinsics.fx, picture.intrinsics.fy) == pytest.approx((40.0, 41.0))
+    counts = np.frombuffer(zlib.decompress(picture.depth_zlib), "<u2").reshape(HEIGHT, WIDTH)
+    assert np.median(counts) * DEPTH_UNIT == pytest.approx(0.8, abs=0.001)
+    color = np.asarray(Image.open(io.BytesIO(picture.color_jpeg)))
+    assert color.shape == (HEIGHT, WIDTH, 3)
+    assert abs(int(color[20, 20, 0]) - 220) < 12, "red and blue are swapped"
+    assert picture.labels_zlib == b""
+    device.wall(800, 220)
+    time.sleep(0.1)
+    assert camera.capture(False) is None, "one picture for one request"
+
+
+def test_a_camera_that_falls_silent_says_so(camera: RealSense, device: SoftwareCamera) -> None:
+    device.wall(500, 200)
+    time.sleep(0.1)
+    assert camera.fault == ""
+    time.sleep(2.2)
+    assert "no frame for 2 s" in camera.fault
+
+
+def test_without_a_camera_it_says_what_to_check() -> None:
+    with pytest.raises(InputError, match="no RealSense camera 123.*cable"):
+        open_realsense(CameraConfig(serial="123"))

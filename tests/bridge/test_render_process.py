@@ -1,0 +1,45 @@
+import time
+
+import numpy as np
+import pytest
+
+from bridge.core.picture import Picture
+from bridge.sim.camera.config import CameraConfig
+from bridge.sim.camera.render_process import InlinePhotographer, Photographer, ProcessPhotographer
+from bridge.sim.vineyard.row import Rod, Row
+
+pytestmark = pytest.mark.alone
+
+LENS = CameraConfig(width=64, height=48)
+ROW = Row((Rod("post", np.array([0.0, 1.0, 0.0]), np.array([0.0, 1.0, 2.0]), 0.05, 0.05),))
+# From (0, 0, 1) along +y, upright.
+EYE = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 1], [0, 0, 0, 1]])
+
+
+def wait(photographer: Photographer) -> Picture:
+    end = time.monotonic() + 20
+    while time.monotonic() < end:
+        picture = photographer.ready()
+        if picture is not None:
+            return picture
+        time.sleep(0.005)
+    raise AssertionError("no picture came")
+
+
+def test_beside_the_physics_the_pictures_are_the_same_and_a_killed_renderer_comes_back() -> None:
+    inline, beside = InlinePhotographer(LENS, 7), ProcessPhotographer(LENS, 7)
+    try:
+        for row in (ROW, ROW, Row(())):
+            assert inline.expose(row, EYE)
+            assert beside.expose(row, EYE)
+            assert not beside.expose(row, EYE)
+            assert wait(beside) == inline.ready()
+            assert inline.ready() is None
+            assert beside.ready() is None
+        beside._process.kill()
+        assert beside.expose(ROW, EYE)
+        assert wait(beside).intrinsics == LENS.intrinsics()
+    finally:
+        beside.close()
+        beside.close()
+    assert not beside._process.is_alive()

@@ -1,0 +1,37 @@
+import pytest
+
+from bridge.core.robot_time import RealTime, RobotTime, SteppedTime
+
+
+def pass_time(time: RobotTime, clock: float, seconds: float) -> list[float]:
+    """Wake every 5 ms for a while; the times of all steps."""
+    times = []
+    for wake in range(1, round(seconds / 0.005) + 1):
+        times += [time.tick() for _ in range(time.due(clock + wake * 0.005))]
+    return times
+
+
+@pytest.mark.parametrize("kind", [SteppedTime, RealTime])
+def test_a_second_has_a_thousand_steps_and_each_is_later_than_the_last(kind: type[SteppedTime | RealTime]) -> None:
+    times = pass_time(kind(100.0, 0.001), 100.0, 1.0)
+    assert len(times) == pytest.approx(1000, abs=1)
+    assert all(b > a for a, b in zip(times, times[1:], strict=False))
+    assert times[-1] == pytest.approx(101.0, abs=0.002)
+
+
+def test_a_simulated_robot_loses_the_time_that_its_process_stood_still() -> None:
+    time = SteppedTime(0.0, 0.001)
+    pass_time(time, 0.0, 1.0)
+    assert time.due(6.0) <= 20
+    pass_time(time, 6.0, 1.0)
+    assert time.now == pytest.approx(2.0, abs=0.05)
+
+
+def test_a_real_robots_first_step_after_a_standstill_knows_how_long_it_was() -> None:
+    time = RealTime(0.0, 0.001)
+    pass_time(time, 0.0, 1.0)
+    due = time.due(6.0)
+    assert due <= 20
+    assert time.tick() >= 5.97
+    assert [time.tick() for _ in range(due - 1)][-1] == pytest.approx(6.0, abs=0.002)
+    assert len(pass_time(time, 6.0, 1.0)) == pytest.approx(1000, abs=1)

@@ -1,0 +1,144 @@
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from bridge.config import BridgeConfig
+from bridge.core.interface import Setpoint
+from bridge.core.picture import Picture
+from bridge.sim.robot.robot import SimulatedRobot
+from bridge.sim.robot.trace import TraceWriter, read
+from bridge.sim.vineyard.row import Array, Rod, Row
+from rolling_panda.config import load_section
+from rolling_panda.model.robot import RobotModel
+from rolling_panda.resources import resource
+
+CONFIG = load_section(resource("assets/config/sim.toml"), "bridge", BridgeConfig)
+DRIVE = RobotModel().drive
+
+
+class Blind:
+    """A photographer without a camera."""
+
+    def expose(self, row: Row, T_world_camera: Array) -> bool:
+        return False
+
+    def ready(self) -> Picture | None:
+        return None
+
+    def close(self) -> None:
+        pass
+
+
+def robot(row: Row | None = None, trace: TraceWriter | None = None) -> SimulatedRobot:
+    return SimulatedRobot(CONFIG, row or Row(()), Blind(), trace)
+
+
+def setpoint(v: float = 0.0, omega: float = 0.0, arm: tuple[float, ...] = (0.0,) * 7, blades: bool = True) -> Setpoint:
+    return Setpoint(np.array([*DRIVE.wheels(v, omega), *arm]), blades, 1, 1, 0.0)
+
+
+@pytest.mark.parametrize(("v", "omega"), [(0.3, 0.0), (-0.3, 0.0), (0.0, 0.6), (0.25, -0.4)])
+def test_odometry_from_the_wheels_stays_with_the_true_base(v: float, omega: float) -> None:
+    sim, pose, last = robot(), np.zeros(3), np.zeros(2)
+    for tick in range(3000):
+        ramp = min(1.0, tick / 200) if tick < 2500 else max(0.0, 1 - (tick - 2500) / 200)
+        sim.write(setpoint(v * ramp, omega * ramp, (0.3 * ramp, 0.0, 0.0, 0.0, 0.2 * ramp, 0.0, 0.0)))
+        wheels = sim.read().position[:2].copy()
+        pose, last = DRIVE.integrate(pose, *(wheels - last)), wheels
+    true = sim.true_base().pose
+    metres, turn = 2.5 * abs(v), 2.5 * abs(omega)
+    assert abs(true[2] - 2.5 * omega) < 0.02
+    assert np.linalg.norm(true[:2] - pose[:2]) < 0.0005 + 0.002 * metres
+    assert abs(true[2] - pose[2]) < np.radians(0.02 + 0.2 * turn / (np.pi / 2))
+
+
+def test_the_arm_holds_against_gravity_and_the_base_stays() -> None:
+    sim = robot()
+    before = sim.read().position.copy()
+    for _ in range(5000):
+        sim.write(setpoint())
+    assert np.abs(sim.read().position - before).max() < 1e-4
+    assert np.abs(sim.true_base().pose).max() < 1e-4
+
+
+def test_the_tool_is_where_kinematics_on_the_true_base_has_it() -> None:
+    sim, model = robot(), RobotModel()
+    for _ in range(800):
+        sim.write(setpoint(0.2, 0.2, (0.2, -0.1, 0.1, 0.2, -0.2, 0.1, 0.3)))
+    q = np.concatenate([sim.true_base().pose, sim.read().position])
+    assert model.pose(q, model.tool_id).translation == pytest.approx(sim.true_tool()[:3, 3], abs=2e-3)
+
+
+def test_driving_into_a_post_is_a_contact_and_stops_the_base() -> None:
+    sim = robot(Row((Rod("post", np.array([0.4, 0.1, 0.0]), np.array([0.4, 0.1, 1.9]), 0.04, 0.04),)))
+    touched = 0
+    for _ in range(1500):
+        sim.write(setpoint(0.3))
+        touched += sim.contacts
+        assert np.abs(sim.read().velocity[:2]).max() < 3.0
+    assert touched > 0
+    assert sim.true_base().pose[0] < 0.25
+
+
+@pytest.mark.parametrize(
+    "arm",
+    [
+        pytest.param((2.8, 1.0, 0.0, -2.16, 0.0, 2.5, 0.0), id="tool onto the base"),
+        pytest.param((0.0, 0.0, 0.0, -3.0, 0.0, 0.1, 0.0), id="tool into the upper arm"),
+    ],
+)
+def test_the_robot_meeting_itself_is_a_contact(arm: tuple[float, ...]) -> None:
+    sim, touched = robot(), 0
+    for _ in range(7000):
+        away = np.array(arm) - sim.read().position[2:]
+        sim.write(setpoint(arm=tuple(np.clip(2.0 * away, -0.8, 0.8).tolist())))
+        touched += sim.self_contacts
+    assert touched > 0
+    assert sim.contacts == 0
+
+
+def test_a_wire_is_met_by_the_arm() -> None:
+    height = robot().true_tool()[2, 3] - 0.1
+    ahead = robot().true_tool()[1, 3] - 0.1
+    wire = Rod("wire", np.array([-1.0, ahead, height]), np.array([1.0, ahead, height]), 0.00125, 0.00125)
+    sim, touched = robot(Row((wire,))), 0
+    for _ in range(2000):
+        sim.write(setpoint(arm=(0.0, 0.4, 0.0, 0.0, 0.0, 0.0, 0.0)))
+        touched += sim.contacts
+    assert touched > 0
+
+
+def test_a_cut_severs_what_is_between_the_blades_and_the_trace_says_so(tmp_path: Path) -> None:
+    tool = robot().true_tool()
+    at, across = tool[:3, 3], tool[:3, 1]
+    cane = Rod("cane", at - 0.1 * across, at + 0.4 * across, 0.004, 0.003, vine=1, spur=2, cane=0)
+    sim = robot(Row((cane,)), TraceWriter(tmp_path / "t"))
+    sim.cut("c1", "p1")
+    for _ in range(700):
+        sim.write(setpoint())
+    measured = sim.read()
+    assert (measured.cutter, measured.cut_id, measured.outcome) == ("open", "c1", "DONE")
+    assert sim.scenery()[0] == 1
+    sim.close()
+    loaded = read(tmp_path / "t")
+    assert len(loaded.rows) == 700
+    (event,) = loaded.events
+    assert (event["cut_id"], event["point_id"], event["outcome"]) == ("c1", "p1", "DONE")
+    assert event["severed"][0]["point"] == pytest.approx(at.tolist(), abs=1e-3)
+    assert (event["severed"][0]["vine"], event["severed"][0]["spur"]) == (1, 2)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_servos_stay_calm_in_any_posture(seed: int) -> None:
+    low, high = [-2.0, -1.0, -2.0, -2.6, -2.5, 0.8, -2.5], [2.0, 0.6, 2.0, -0.8, 2.5, 3.0, 2.5]
+    start = tuple(float(v) for v in np.random.default_rng(seed).uniform(low, high))
+    sim = SimulatedRobot(msgspec.structs.replace(CONFIG, start_arm=start), Row(()), Blind())
+    arm = (0.3, -0.2, 0.3, 0.2, -0.3, 0.3, 0.3)
+    for _ in range(300):
+        sim.write(setpoint(arm=arm))
+    assert sim.read().velocity[2:] == pytest.approx(arm, abs=0.03)
+    for _ in range(300):
+        sim.write(setpoint())
+    assert np.abs(sim.read().velocity).max() < 0.01

@@ -1,0 +1,162 @@
+"""The row that the simulation grows."""
+
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bridge.sim.vineyard.config import VineyardConfig
+from bridge.sim.vineyard.grow import grow
+from bridge.sim.vineyard.row import Rod, Row
+from rolling_panda.config import load_section
+from rolling_panda.errors import ConfigError
+from rolling_panda.resources import resource
+
+CONFIG = VineyardConfig()
+seeds = st.integers(0, 2**31)
+some = settings(max_examples=12, deadline=None)
+Chain = list[tuple[int, Rod]]
+
+
+def ends(row: Row) -> list[tuple[str, list[float], list[float]]]:
+    return [(rod.kind, rod.start.tolist(), rod.end.tolist()) for _, rod in row.standing()]
+
+
+def canes(row: Row) -> dict[tuple[int, int, int], Chain]:
+    found: dict[tuple[int, int, int], Chain] = {}
+    for index, rod in row.standing():
+        if rod.cane >= 0:
+            found.setdefault((rod.vine, rod.spur, rod.cane), []).append((index, rod))
+    return found
+
+
+def test_the_same_seed_gives_the_same_row_and_another_seed_another():
+    assert ends(grow(CONFIG, 7)) == ends(grow(CONFIG, 7))
+    assert ends(grow(CONFIG, 7)) != ends(grow(CONFIG, 8))
+
+
+def test_a_longer_row_begins_like_a_shorter_one():
+    short, long = grow(msgspec.structs.replace(CONFIG, vines=1), 3), grow(CONFIG, 3)
+    first = [rod.end.tolist() for _, rod in long.standing() if rod.vine == 0]
+    assert first == [rod.end.tolist() for _, rod in short.standing() if rod.vine == 0]
+
+
+def test_the_shipped_configuration_grows_a_row_of_everything():
+    config = load_section(Path(resource("assets/config/sim.toml")), "vineyard", VineyardConfig)
+    row = grow(config, 0)
+    wood = {"trunk", "cordon", "spur", "cane", "node", "old cut"}
+    assert {rod.kind for _, rod in row.standing()} == wood | {"post", "wire", "hose"}
+    assert len(row.rods) < 5000
+
+
+@given(seeds)
+@some
+def test_every_rod_hangs_on_its_parent_which_comes_first(seed):
+    row = grow(CONFIG, seed)
+    for index, rod in row.standing():
+        assert rod.parent < index
+        if rod.parent < 0:
+            assert rod.kind in ("post", "wire", "trunk", "hose")
+            continue
+        parent = row.rods[rod.parent]
+        assert parent is not None
+        axis = parent.end - parent.start
+        fraction = float((rod.start - parent.start) @ axis / (axis @ axis))
+        assert -1e-6 <= fraction <= 1.0 + 1e-6
+        assert np.linalg.norm(parent.start + fraction * axis - rod.start) < 1e-6
+
+
+@given(seeds)
+@some
+def test_canes_are_chains_with_the_published_numbers(seed):
+    row = grow(CONFIG, seed)
+    for chain in canes(row).values():
+        for (before, _), (_, rod) in zip(chain, chain[1:], strict=False):
+            assert rod.parent == before
+        stub = row.rods[chain[0][1].parent]
+        assert stub is not None and stub.kind == "spur"
+        lengths = np.array([np.linalg.norm(rod.end - rod.start) for _, rod in chain])
+        starts = np.concatenate([[0.0], np.cumsum(lengths)])
+        nodes = [k for k, (_, rod) in enumerate(chain) if rod.kind == "node"]
+        middles = np.array([starts[k] + lengths[k] / 2 for k in nodes])
+        assert np.all((np.diff(middles) >= 0.0599) & (np.diff(middles) <= 0.1001))
+        # The basal bud is measured from the bark of the stub; the cane's axis starts inside of it.
+        assert 0.0099 <= middles[0] <= 0.04 + 0.009 / np.sin(0.6) + 1e-6
+        assert 0.9 <= starts[-1] <= 1.5 + 0.02
+        assert 0.0025 <= chain[0][1].start_radius <= 0.0065
+        for k in nodes:
+            assert 1.34 <= chain[k][1].start_radius / chain[k - 1][1].end_radius <= 1.51
+            assert 0.0099 <= lengths[k] <= 0.0141
+        assert chain[-1][1].end[2] - chain[0][1].start[2] > 0.7, "canes are mostly upright"
+
+
+@given(seeds)
+@some
+def test_spurs_stand_along_the_cordon_at_their_spacing(seed):
+    row = grow(CONFIG, seed)
+    places = list(canes(row))
+    for vine in range(CONFIG.vines):
+        trunk = CONFIG.first_vine_x + vine * CONFIG.vine_spacing
+        spurs = [rod for _, rod in row.standing() if rod.kind == "spur" and rod.vine == vine]
+        x = np.array([rod.start[0] for rod in spurs])
+        assert [rod.spur for rod in spurs] == list(range(len(spurs)))
+        for arm in (x[x < trunk], x[x > trunk]):
+            # Measured along the arm, which is not quite straight.
+            assert 5 <= len(arm) <= 7
+            assert np.all((np.diff(arm) >= 0.0895) & (np.diff(arm) <= 0.1505))
+        for rod in spurs:
+            assert abs(rod.start[2] - 0.9) < 0.07 and abs(rod.start[1] - CONFIG.row_distance) < 0.04
+            assert rod.end[2] > rod.start[2]
+            assert 1 <= sum(place[:2] == (vine, rod.spur) for place in places) <= 3
+
+
+def test_most_spurs_have_two_canes_of_about_eight_millimetres():
+    counts, radii = [], []
+    for seed in range(8):
+        found = canes(grow(CONFIG, seed))
+        spurs = [(vine, spur) for vine, spur, _ in found]
+        counts += [spurs.count(place) for place in set(spurs)]
+        radii += [chain[0][1].start_radius for chain in found.values()]
+    assert 0.6 < np.mean(np.array(counts) == 2) < 0.8
+    assert abs(2 * np.mean(radii) - 0.008) < 0.0003
+
+
+@given(seeds, st.integers(0, 10**6), st.floats(0.0, 0.99))
+@some
+def test_a_cut_takes_off_what_is_beyond_it_and_nothing_else(seed, pick, fraction):
+    row = grow(CONFIG, seed)
+    chains = list(canes(row).values())
+    chain = chains[pick % len(chains)]
+    k = pick % len(chain)
+    index = chain[k][0]
+    after = row.sever(index, fraction)
+    assert {i for i, _ in row.standing()} - {i for i, _ in after.standing()} == {i for i, _ in chain[k + 1 :]}
+    shorter = after.rods[index]
+    assert shorter is not None
+    assert np.allclose(shorter.end, chain[k][1].at(fraction)[0])
+    assert after.revision == row.revision + 1
+
+
+def test_a_cut_near_the_tip_of_the_stub_takes_off_the_last_cane_only():
+    row = grow(CONFIG, 0)
+    place = next((v, s) for v, s, cane in canes(row) if cane == 1)
+    chains = {key[2]: chain for key, chain in canes(row).items() if key[:2] == place}
+    after = row.sever(chains[0][0][1].parent, 0.98)
+    left = {rod.cane for _, rod in after.standing() if (rod.vine, rod.spur) == place and rod.cane >= 0}
+    assert left == set(chains) - {max(chains)}
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"internode": (0.1, 0.06)}, "backwards"),
+        ({"cane_shares": (0.5, 0.5, 0.5)}, "add up"),
+        ({"basal": (0.001, 0.04)}, "overlap"),
+    ],
+)
+def test_a_row_that_no_vine_could_be_is_refused(change, says):
+    with pytest.raises(ConfigError, match=says):
+        grow(msgspec.structs.replace(CONFIG, **change), 0)

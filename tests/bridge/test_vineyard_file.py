@@ -1,0 +1,71 @@
+"""A row as a file, and the command that writes it."""
+
+import msgspec
+import numpy as np
+import pytest
+from PIL import Image
+
+from bridge.sim.camera.config import CameraConfig
+from bridge.sim.camera.renderer import Camera
+from bridge.sim.vineyard.command import main
+from bridge.sim.vineyard.config import VineyardConfig
+from bridge.sim.vineyard.file import Vineyard, load, right_places, save
+from bridge.sim.vineyard.grow import grow
+from bridge.sim.vineyard.truth import judge
+from rolling_panda.errors import InputError
+
+
+@pytest.mark.parametrize("training", ["cordon", "guyot"])
+def test_a_row_comes_back_as_it_was_and_looks_the_same(tmp_path, training):
+    config = VineyardConfig(training=training)
+    written = Vineyard(7, config, grow(config, 7))
+    save(tmp_path / "row.json", written)
+    read = load(tmp_path / "row.json")
+    assert read.seed == 7 and read.config == config
+    place = np.eye(4)
+    place[:3, :3] = np.column_stack([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
+    place[:3, 3] = [0.5, 0.0, 1.0]
+    first, second = (Camera(CameraConfig(width=212, height=120), 1).render(v.row, place) for v in (written, read))
+    assert np.array_equal(first.color, second.color) and np.array_equal(first.rods, second.rods)
+    assert np.array_equal(right_places(written), right_places(read))
+
+
+def test_a_row_that_was_cut_comes_back_cut_and_without_truth(tmp_path):
+    row = grow(VineyardConfig(), 3)
+    cut = next(truth.cut for truth in judge(row) if truth.cut is not None)
+    after = row.sever(cut.rod, 0.5)
+    save(tmp_path / "row.json", Vineyard(3, VineyardConfig(), after))
+    read = load(tmp_path / "row.json").row
+    assert read.revision == 1 and [rod is None for rod in read.rods] == [rod is None for rod in after.rods]
+    assert msgspec.json.decode((tmp_path / "row.json").read_bytes())["truth"] == []
+
+
+@pytest.mark.parametrize("text", ["", "{}", '{"format": "x"}', "[1, 2"])
+def test_another_file_is_refused_in_words(tmp_path, text):
+    path = tmp_path / "row.json"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match="not a vineyard file"):
+        load(path)
+
+
+def test_a_file_of_another_format_or_with_orphans_is_refused(tmp_path):
+    path = tmp_path / "row.json"
+    save(path, Vineyard(1, VineyardConfig(), grow(VineyardConfig(), 1)))
+    document = msgspec.json.decode(path.read_bytes())
+    path.write_bytes(msgspec.json.encode({**document, "format": "rolling-panda vineyard 9"}))
+    with pytest.raises(InputError, match="vineyard 9"):
+        load(path)
+    document["rods"][3][5] = 900
+    path.write_bytes(msgspec.json.encode(document))
+    with pytest.raises(InputError, match="parents stand before"):
+        load(path)
+
+
+def test_the_command_writes_row_and_picture(tmp_path, capsys):
+    assert main(["--seed", "4", "--vines", "1", "--training", "guyot", "--out", str(tmp_path / "a.json")]) == 0
+    assert load(tmp_path / "a.json").config.training == "guyot"
+    pixels = np.asarray(Image.open(tmp_path / "a.png").convert("RGB")).astype(int)
+    assert np.count_nonzero((pixels[..., 0] > 200) & (pixels[..., 1] < 60)) > 50, "the right cuts are ringed"
+    assert "3 cuts" in capsys.readouterr().out
+    assert main(["--out", str(tmp_path / "nowhere" / "a.json")]) == 1
+    assert "folder that exists" in capsys.readouterr().err

@@ -1,0 +1,90 @@
+"""The record of a robot is checked and written out from the command line."""
+
+import csv
+import json
+import sqlite3
+from pathlib import Path
+
+import pytest
+
+from controller.ledger.audit import main
+from controller.ledger.store import FILE, Entry, Ledger
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    with Ledger(tmp_path) as ledger:
+        ledger.append([Entry("2026-02-03T04:05:06Z", "request", "Ada, jr.", '{"ok":false,"reason":"IDLE"}')])
+        ledger.append([Entry("2026-02-03T04:05:07Z", "event", "bridge", '{"text":"schneidet «p1»"}')])
+    return tmp_path
+
+
+def run(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]:
+    code = main(words)
+    told = capsys.readouterr()
+    return code, told.out, told.err
+
+
+def test_a_whole_ledger_is_said_to_be_whole_and_its_hash_can_be_asked_for_again(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, out, _ = run(capsys, "verify", "--state", str(folder))
+    assert code == 0 and "2 rows are as written; newest hash " in out
+    head = out.split("newest hash ")[1].split()[0]
+    assert run(capsys, "verify", "--state", str(folder), "--expect", head)[0] == 0
+    code, out, err = run(capsys, "verify", "--state", str(folder), "--expect", "0" * 63 + "1")
+    assert code == 1 and "NOT as it was written: no row has the hash" in err
+
+
+def test_a_changed_ledger_fails(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = folder / FILE
+    path.write_bytes(path.read_bytes().replace(b"IDLE", b"AUTO"))
+    code, out, err = run(capsys, "verify", "--state", str(folder))
+    assert (code, out) == (1, "") and "row 1 is not as it was written" in err
+
+
+@pytest.mark.parametrize("command", ["verify", "export"])
+def test_a_ledger_of_a_newer_version_is_not_called_changed(
+    folder: Path, capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    database = sqlite3.connect(folder / FILE, isolation_level=None)
+    database.execute("ALTER TABLE audit ADD COLUMN signed_by TEXT")
+    database.execute("PRAGMA user_version = 2")
+    database.close()
+    code, out, err = run(capsys, command, "--state", str(folder))
+    assert (code, out) == (1, "")
+    assert "newer version" in err and "Use that version" in err and "NOT as it was written" not in err
+
+
+def test_json_has_every_row_with_its_body(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = run(capsys, "export", "--state", str(folder))
+    rows = json.loads(out)
+    assert code == 0 and [row["number"] for row in rows] == [1, 2]
+    assert rows[0]["name"] == "Ada, jr." and rows[0]["body"] == {"ok": False, "reason": "IDLE"}
+    assert rows[1]["body"]["text"] == "schneidet «p1»" and len(rows[1]["hash"]) == 64
+
+
+def test_csv_has_the_same(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = run(capsys, "export", "--csv", "--state", str(folder))
+    rows = list(csv.DictReader(out.splitlines()))
+    assert [(row["number"], row["kind"], row["name"]) for row in rows] == [
+        ("1", "request", "Ada, jr."),
+        ("2", "event", "bridge"),
+    ]
+    assert json.loads(rows[0]["body"])["reason"] == "IDLE"
+
+
+def test_an_empty_ledger_is_an_empty_list(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Ledger(tmp_path).close()
+    assert json.loads(run(capsys, "export", "--state", str(tmp_path))[1]) == []
+    assert run(capsys, "verify", "--state", str(tmp_path))[0] == 0
+
+
+def test_what_is_asked_wrongly_is_told_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, _, err = run(capsys, "verify", "--state", str(tmp_path / "no"))
+    assert code == 1 and "there is no ledger" in err and len(err.splitlines()) == 1
+    (tmp_path / FILE).write_bytes(b"no database" * 50)
+    assert run(capsys, "export", "--state", str(tmp_path))[0] == 1
+    with pytest.raises(SystemExit):
+        main(["verify", "--expect", "12"])
+    assert "64 hexadecimal digits" in capsys.readouterr().err

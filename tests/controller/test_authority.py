@@ -1,0 +1,110 @@
+from controller.identity import Client
+from controller.inputs import Sample
+from controller.supervision.authority import Authority
+from rolling_panda.messages import commands as intents
+from rolling_panda.messages.supervision import NEVER_SEEN_S, Person, Presence
+
+ADA, BOB = Client("a", "Ada"), Client("b", "Bob")
+
+
+def authority():
+    out = Authority(lambda: "00", 2.0)
+    out.begin(0)
+    return out
+
+
+def presence(number, at, *people):
+    return Sample(Presence(sequence=number, people=people), at)
+
+
+def ada(age=0.0, role="operator", heard=0.0):
+    return Person("a", "Ada", role, heard, age)
+
+
+def test_rights_follow_role_and_lease():
+    it = authority()
+    assert it.rights(ADA, "viewer") == {"anyone"}
+    assert it.rights(ADA, "operator") == {"anyone", "operator", "holder"}
+    assert it.rights(ADA, "supervisor") == {"anyone", "operator", "holder", "supervisor"}
+    it.claim(ADA, 0.0)
+    assert it.rights(ADA, "operator") >= {"holder"}
+    assert it.rights(BOB, "supervisor") == {"anyone", "operator", "supervisor"}
+
+
+def test_the_servers_word_renews_the_lease_and_its_silence_ends_it():
+    it = authority()
+    it.claim(ADA, 0.0)
+    for number in range(1, 20):
+        assert it.review(presence(number, number * 0.2, ada()), False, number * 0.2) == ""
+    assert it.held
+    assert "Ada" in it.review(None, False, 19 * 0.2 + 1.0)
+    assert not it.held
+
+
+def test_a_server_that_still_lists_somebody_does_not_renew_control_without_a_word_of_theirs():
+    it = authority()
+    it.claim(ADA, 0.0)
+    lost = ""
+    for number in range(1, 9):
+        now = number * 0.2
+        # Ada said something last at 0.2 s, and the server lists her for a second more.
+        people = (ada(heard=now - 0.2),) if now <= 1.2 else ()
+        lost = lost or it.review(presence(number, now, *people), False, now)
+        assert bool(lost) == (now >= 1.2)
+    assert "nothing was heard" in lost
+
+
+def test_a_repeated_or_older_word_renews_nothing():
+    it = authority()
+    it.claim(ADA, 0.0)
+    it.review(presence(5, 0.1, ada()), False, 0.1)
+    it.review(presence(5, 0.6, ada()), False, 0.6)
+    it.review(presence(4, 0.9, ada()), False, 0.9)
+    assert it.review(None, False, 1.1)
+
+
+def test_a_server_that_has_started_again_counts_from_one():
+    it = authority()
+    it.review(presence(900, 0.0, ada()), True, 0.0)
+    it.claim(ADA, 5.0)
+    it.review(presence(1, 5.1, ada()), True, 5.1)
+    assert it.review(presence(2, 5.9, ada()), True, 6.05) == ""
+
+
+def test_work_is_watched_by_who_may_operate_and_sees_the_robot():
+    it = authority()
+    assert "yet" in it.unwatched(0.0)
+    it.review(presence(1, 1.0, ada(role="viewer")), True, 1.0)
+    assert it.unwatched(1.0)
+    it.review(presence(2, 2.0, ada(age=0.3)), True, 2.0)
+    assert it.unwatched(3.6) == ""
+    assert "for 2.1 s" in it.unwatched(3.8)
+    # Heard, but nothing that is new has been drawn.
+    it.review(presence(3, 3.8, ada(age=2.1)), True, 3.8)
+    assert it.unwatched(3.8)
+
+
+def test_a_viewer_has_no_say_in_control():
+    it = authority()
+    assert "viewer" in it.ask(intents.TakeControl(user="eve", role="viewer", confirmed=True), 0.0)
+    assert not it.held
+
+
+def test_the_old_holder_is_told_before_and_after_control_goes_over():
+    it = authority()
+    it.claim(ADA, 0.0)
+    before = it.message(0.0)
+    assert it.ask(intents.TakeControl(user="Bob", client="b", confirmed=True), 0.1) == ""
+    assert it.message(0.1).coming == "Bob" and it.message(0.1).holder == "a"
+    assert it.review(None, False, 0.1) == "Bob takes control"
+    it.review(None, True, 0.2)
+    after = it.message(0.2)
+    assert (after.holder, after.user, after.coming) == ("b", "Bob", "")
+    assert after.told_number > before.told_number and "Bob" in after.told
+    assert after.epoch > before.epoch
+
+
+def test_somebody_who_has_seen_nothing_yet_is_told_so():
+    it = authority()
+    it.review(presence(1, 5.0, ada(age=NEVER_SEEN_S)), True, 5.0)
+    assert "yet" in it.unwatched(5.2)

@@ -1,0 +1,172 @@
+"""Camera checks before and after a cut."""
+
+import msgspec
+import pytest
+
+from controller.work.close_up import CloseUpClient
+from controller.work.cut_checks import PostCutCheck, not_as_accepted
+from controller.work.point_queue import PointQueue, Ticket
+from rolling_panda import messages as m
+from rolling_panda.messages.perception import CloseLook, Finding
+from tests.support.controller_at_work import CONFIG, entry, finish, point, run_until, working
+
+
+class Work:
+    """A queue with one accepted point that has been cut."""
+
+    def __init__(self) -> None:
+        self.queue, self.eye = PointQueue(CONFIG), CloseUpClient(2.0, 1)
+        self.verification = PostCutCheck(self.queue, self.eye, True)
+        self.queue.update(m.PruningPoints(header=m.Header(), segmenter="", frames=1, points=(point("a", (0, 0, 1)),)))
+        assert self.queue.accept("a", 1, "ada") == ""
+        self.now, self.number = 0.0, 0
+
+    def cut(self, outcome: m.Outcome, finding: Finding | None) -> str:
+        """One try; the state afterwards."""
+        self.queue.intend("a", "c")
+        self.verification.begin("a", outcome, f"says {outcome}", self.now)
+        assert self.state in ("INTENT", outcome)
+        self.now += 0.5
+        if finding is not None:
+            self.verification.look("a", self.now)
+            due = self.eye.due(self.now)
+            if due is not None:
+                look = CloseLook(header=m.Header(), point_id="a", number=due[0], finding=finding, reason="it is hidden")
+                self.eye.take(look, self.now)
+        else:
+            self.now += 5.0
+        self.verification.step(self.now)
+        return self.state
+
+    @property
+    def ticket(self):
+        found = self.queue.get("a")
+        assert found is not None
+        return found
+
+    @property
+    def state(self) -> str:
+        return self.ticket.state
+
+
+@pytest.mark.parametrize(
+    ("outcome", "finding", "state"),
+    [
+        ("DONE", "severed", "DONE"),
+        ("DONE", "unseen", "DONE"),
+        ("DONE", None, "DONE"),
+        ("FAILED_NOT_CUT", "severed", "UNKNOWN"),
+        ("FAILED_NOT_CUT", "unseen", "FAILED_NOT_CUT"),
+        ("FAILED_NOT_CUT", None, "FAILED_NOT_CUT"),
+        ("UNKNOWN", "severed", "UNKNOWN"),
+        ("DONE", "seen", "ACCEPTED"),
+        ("FAILED_NOT_CUT", "seen", "ACCEPTED"),
+    ],
+)
+def test_what_one_try_comes_to(outcome: m.Outcome, finding: Finding | None, state: str) -> None:
+    assert Work().cut(outcome, finding) == state
+
+
+def test_it_says_whether_the_result_was_seen() -> None:
+    seen, told = Work(), Work()
+    seen.cut("DONE", "severed")
+    told.cut("DONE", "unseen")
+    assert "seen to be off" in seen.ticket.reason
+    assert "not seen afterwards: it is hidden" in told.ticket.reason
+
+
+@pytest.mark.parametrize(("second", "state"), [("FAILED_NOT_CUT", "FAILED_NOT_CUT"), ("DONE", "UNKNOWN")])
+def test_what_stands_is_cut_once_more_and_no_third_time(second: m.Outcome, state: str) -> None:
+    work = Work()
+    accepted = work.ticket.accepted
+    assert work.cut("FAILED_NOT_CUT", "seen") == "ACCEPTED"
+    assert work.ticket.accepted is accepted and "once more" in work.ticket.reason
+    assert work.cut(second, "seen") == state and "twice" in work.ticket.reason
+
+
+def test_an_unknown_outcome_is_never_tried_again_and_not_even_looked_at() -> None:
+    work = Work()
+    work.cut("UNKNOWN", "seen")
+    assert work.state == "UNKNOWN" and not work.verification.pending
+
+
+def test_after_a_new_acceptance_there_is_a_second_try_again() -> None:
+    work = Work()
+    work.cut("FAILED_NOT_CUT", "seen")
+    assert work.cut("FAILED_NOT_CUT", "seen") == "FAILED_NOT_CUT"
+    assert work.queue.accept("a", 1, "ada") == ""
+    # The same point as before is the same object; a person's new word still gives it one more try.
+    assert work.cut("FAILED_NOT_CUT", "seen") == "ACCEPTED"
+
+
+ACCEPTED = point("a", (0.5, 0.75, 1.0))
+TICKET = Ticket(ACCEPTED, "ACCEPTED", accepted=ACCEPTED)
+
+
+def look(finding="seen", dx=0.0, reason=""):
+    position = (0.5 + dx, 0.75, 1.0) if finding == "seen" else None
+    return CloseLook(
+        header=m.Header(), point_id="a", number=1, finding=finding, reason=reason, position=position, tangent=(0, 0, 1)
+    )
+
+
+@pytest.mark.parametrize(
+    ("seen", "words"),
+    [
+        (look(dx=0.0049), ""),
+        (look(dx=0.007), "moved 7 mm on a closer look: accept it again"),
+        (look("changed", reason="a node is seen 3 mm from the cut"), "a node is seen 3 mm from the cut"),
+        (look("severed"), "off already"),
+        (look("unseen", reason="its cane is hidden"), "its cane is hidden"),
+    ],
+)
+def test_only_what_is_seen_where_it_was_accepted_is_cut(seen, words):
+    why = not_as_accepted(seen, TICKET, 0.005)
+    assert words in why and bool(why) == bool(words)
+
+
+def test_without_an_acceptance_nothing_is_cut():
+    assert not_as_accepted(look(), Ticket(ACCEPTED), 0.005)
+    assert not_as_accepted(look(), None, 0.005)
+
+
+def looking(r, *, dx=0.0, finding="seen", point_id="a"):
+    """Let the robot's camera show one point otherwise than the others."""
+    usual = r._looked
+
+    def looked(request):
+        sample = usual(request)
+        if request.point_id != point_id or sample.message.finding != "seen":
+            return sample
+        x, y, z = sample.message.position
+        changed = {"position": (x + dx, y, z)} if finding == "seen" else {"finding": finding, "position": None}
+        return type(sample)(msgspec.structs.replace(sample.message, **changed), sample.at)
+
+    r._looked = looked
+    return r
+
+
+def test_a_point_that_moved_is_not_cut_says_why_and_the_work_goes_on():
+    r = looking(working((point("a", (0.5, 0.75, 1.0)), point("b", (0.8, 0.75, 1.05)))), dx=0.007)
+    finish(r, 60.0)
+    assert [cut[0] for cut in r.cuts] == ["b"]
+    assert entry(r, "a").state == "PROPOSED" and "moved 7 mm on a closer look" in entry(r, "a").reason
+    assert entry(r, "b").state == "DONE"
+
+
+def test_within_five_millimetres_the_place_of_the_closer_look_is_cut():
+    r = looking(working((point("a", (0.5, 0.75, 1.0)),)), dx=0.004)
+    finish(r, 30.0)
+    assert entry(r, "a").state == "DONE"
+    assert abs(r.cuts[0][1][0, 3] - 0.504) < 0.0015
+
+
+def test_the_phase_is_told_while_the_robot_looks_and_the_blades_stay_out_of_the_canes():
+    r = working((point("a", (0.5, 0.75, 1.0)),))
+    r._looked = lambda request: None
+    run_until(r, lambda s: s is not None and s.phase == "LOOK", 20.0)
+    for _ in range(150):
+        r.step()
+    assert r.state.phase == "LOOK" and r.state.T_odom_tool.position[1] < 0.75 - 0.19
+    finish(r, 40.0)
+    assert not r.cuts and "no picture of it came" in entry(r, "a").reason

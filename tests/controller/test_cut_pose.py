@@ -1,0 +1,62 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from controller.work.cut_pose import cut_poses, escape_pose
+from rolling_panda.errors import InputError
+
+LEFT = np.array([0.0, 1.0, 0.0])
+POINT = np.array([1.0, 0.85, 1.0])
+leans, turns = st.floats(0, 0.44), st.floats(0, 6.28)
+
+
+def cane(lean, turn):
+    return np.array([np.sin(lean) * np.cos(turn), np.sin(lean) * np.sin(turn), np.cos(lean)])
+
+
+@given(leans, turns, st.floats(-0.7, 0.7), st.booleans())
+def test_blades_are_square_to_the_cane_and_come_from_the_robots_side(lean, turn, azimuth, upside):
+    tangent = cane(lean, turn) * (1 if upside else -1)
+    poses = cut_poses(POINT, tangent, LEFT, 0.15, 0.25, azimuth)
+    R = poses.cut.rotation
+    np.testing.assert_allclose(R.T @ R, np.eye(3), atol=1e-9)
+    assert np.linalg.det(R) == pytest.approx(1.0)
+    assert abs(R[:, 1] @ tangent) == pytest.approx(1.0)
+    assert R[2, 1] < 0, "the tool's y points down, so that the camera is above the blades"
+    assert R[:, 2] @ LEFT > 0.5
+    np.testing.assert_allclose(poses.cut.translation, POINT)
+
+
+@given(leans, turns)
+def test_stand_off_and_clearance_are_straight_back(lean, turn):
+    poses = cut_poses(POINT, cane(lean, turn), LEFT, 0.15, 0.25, 0.2, 0.2)
+    for pose, distance in ((poses.stand_off, 0.15), (poses.clear, 0.25)):
+        np.testing.assert_allclose(POINT - pose.translation, distance * poses.cut.rotation[:, 2], atol=1e-9)
+        np.testing.assert_allclose(pose.rotation, poses.cut.rotation)
+
+
+def test_a_tilt_comes_from_below_and_leans_the_cut_by_as_much():
+    poses = cut_poses(POINT, np.array([0.0, 0.0, 1.0]), LEFT, 0.15, 0.25, 0.0, 0.2)
+    assert poses.stand_off.translation[2] < POINT[2] - 0.02
+    assert np.arccos(-poses.cut.rotation[2, 1]) == pytest.approx(0.2)
+
+
+def test_a_cane_that_points_at_the_robot_is_refused():
+    with pytest.raises(InputError, match="straight at the robot"):
+        cut_poses(POINT, LEFT, LEFT, 0.15, 0.25)
+
+
+@given(st.floats(-0.9, 0.9), st.floats(0.01, 0.3))
+def test_escape_leads_out_by_the_depth_without_turning(azimuth, depth):
+    pose = cut_poses(POINT, np.array([0.0, 0.0, 1.0]), LEFT, 0.15, 0.25, azimuth).cut
+    out = escape_pose(pose, LEFT, depth)
+    assert (pose.translation - out.translation) @ LEFT == pytest.approx(depth)
+    np.testing.assert_array_equal(out.rotation, pose.rotation)
+
+
+def test_escape_of_a_tool_that_points_elsewhere_is_square_to_the_row():
+    pose = cut_poses(POINT, np.array([0.0, 0.0, 1.0]), LEFT, 0.15, 0.25, 0.0).cut
+    pose.rotation = pose.rotation @ np.array([[0, 0, -1.0], [0, 1, 0], [1, 0, 0]])
+    out = escape_pose(pose, LEFT, 0.1)
+    np.testing.assert_allclose(out.translation, pose.translation - 0.1 * LEFT)

@@ -1,0 +1,52 @@
+"""Bringing the arm home keeps clear of what stands around, and says when it cannot get there."""
+
+import numpy as np
+
+from benchmarks.common.kinematic_robot import KinematicRobot
+from controller.config import ControllerConfig
+from controller.core import Controller
+from controller.inputs import Sample
+from controller.motion.surroundings import Surroundings
+from controller.whole_body.collision import CollisionModel
+from rolling_panda import messages as m
+from rolling_panda.config import RobotConfig
+from rolling_panda.messages import commands as intents
+from rolling_panda.messages.perception import Capsule, Obstacles
+from rolling_panda.model.robot import ARM_Q, RobotModel
+
+CONFIG = ControllerConfig()
+#: Turned away from the row, with the tool to the right of the base.
+ASIDE = (-2.2, -0.1128, -0.0354, -2.0055, 1.6759, 1.2124, -0.269)
+
+
+def homing(*obstacles: Capsule) -> KinematicRobot:
+    robot = KinematicRobot(Controller(CONFIG, RobotConfig()), ASIDE)
+    robot.obstacles = obstacles
+    robot.run(0.1)
+    assert robot.ask(intents.Arm(user="ada")).ok
+    assert robot.ask(intents.Home(user="ada")).ok
+    return robot
+
+
+def test_it_gets_home_when_nothing_is_in_the_way() -> None:
+    robot = homing()
+    robot.run(12.0)
+    np.testing.assert_allclose(robot.q[ARM_Q], CONFIG.home, atol=0.012)
+    assert any("the arm is home" in event for event in robot.events)
+
+
+def test_a_post_in_the_way_stops_it_before_it_is_met_and_is_named() -> None:
+    """Halfway round, where the tool would pass."""
+    at = KinematicRobot(Controller(CONFIG, RobotConfig()), (-1.2, *ASIDE[1:]))
+    x, y, _ = at.model.kinematics(at.q).T_odom_tool.translation
+    post = Capsule("post", (float(x), float(y), 0.0), (float(x), float(y), 1.9), 0.04, 0.04)
+    judge = Surroundings(CollisionModel(RobotModel()))
+    judge.take(Sample(Obstacles(header=m.Header(0.0, "odom"), capsules=(post,)), 0.0))
+    robot, least = homing(post), 1.0
+    for _ in range(1200):
+        robot.step()
+        least = min(least, judge.model.least(robot.q).distance)
+    assert least > 0.0
+    assert any("home was stopped" in event and "post" in event for event in robot.events), robot.events
+    assert np.abs(robot.xi).max() < 1e-3
+    assert robot.controller.mode == "READY"

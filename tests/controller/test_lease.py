@@ -1,0 +1,181 @@
+import itertools
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from controller.identity import Client
+from controller.supervision.lease import LIFE_S, Lease, first_epoch
+
+ADA, BOB, EVE = Client("a", "Ada"), Client("b", "Bob"), Client("e", "Eve")
+
+
+def lease(epoch=10):
+    numbers = itertools.count()
+    out = Lease(lambda: f"{next(numbers):04x}")
+    out.begin(epoch)
+    return out
+
+
+def held():
+    out = lease()
+    out.claim(ADA, 0.0)
+    return out
+
+
+def test_who_comes_first_holds_control_under_a_new_token():
+    it = lease()
+    before = it.token
+    it.claim(ADA, 0.0)
+    assert it.held_by(ADA) and not it.held_by(BOB)
+    assert it.token.epoch == before.epoch + 1 and it.token.nonce != before.nonce
+    it.claim(BOB, 0.1)
+    assert it.held_by(ADA)
+    assert it.refusal(ADA) == ""
+    assert it.refusal(BOB) == "Ada holds control of this robot; ask for it, or take it"
+
+
+def test_a_lease_lives_one_second_without_being_renewed():
+    it = held()
+    for tick in range(1, 10):
+        it.renew({"a": tick / 3, "b": tick / 3})
+        assert it.review(False, tick / 3) == ""
+    assert it.review(False, 3.0 + 0.99) == ""
+    lost = it.review(False, 3.0 + LIFE_S)
+    assert "Ada" in lost and "1 s" in lost
+    assert it.holder is None
+    # Who comes back has to take it again: nothing resumes by itself.
+    it.renew({"a": 4.1})
+    assert not it.held_by(ADA)
+
+
+def test_it_lives_from_the_last_word_not_from_when_that_is_told():
+    it = held()
+    it.renew({"a": 0.4})
+    it.renew({"a": 0.2})
+    assert it.left(1.0) == pytest.approx(0.4)
+    assert it.review(False, 1.41)
+
+
+def test_others_do_not_renew_it():
+    it = held()
+    it.renew({"b": 0.9})
+    assert it.review(True, 1.0)
+
+
+def test_taking_over_needs_a_confirmation_and_a_robot_at_rest():
+    it = held()
+    assert "confirm" in it.take(BOB, False, 0.1)
+    assert it.held_by(ADA)
+    token = it.token
+    assert it.take(BOB, True, 0.1) == ""
+    # From here on nobody moves it.
+    assert not it.held_by(ADA) and not it.held_by(BOB)
+    assert "wait" in it.refusal(ADA) and "wait" in it.refusal(BOB)
+    it.renew({"a": 0.2, "b": 0.2})
+    it.review(False, 0.2)
+    assert it.token == token and not it.held_by(BOB)
+    it.review(True, 0.3)
+    assert it.held_by(BOB) and it.token.epoch == token.epoch + 1
+    assert it.told == "Bob holds control, before Ada"
+
+
+def test_of_two_who_take_at_once_the_first_gets_it():
+    it = held()
+    assert it.take(BOB, True, 0.1) == ""
+    assert "taking control already" in it.take(EVE, True, 0.1)
+    it.review(True, 0.2)
+    assert it.held_by(BOB)
+
+
+def test_a_request_is_granted_by_the_holder_alone():
+    it = held()
+    assert "nobody asks" in it.grant(ADA)
+    assert it.request(BOB, 0.1) == ""
+    assert "asked already" in it.request(EVE, 0.1)
+    assert "hold control already" in it.request(ADA, 0.1)
+    assert "only who holds" in it.grant(BOB)
+    assert it.grant(ADA) == ""
+    it.review(True, 0.2)
+    assert it.held_by(BOB) and it.requested is None
+
+
+def test_a_request_is_forgotten_in_time():
+    it = held()
+    it.request(BOB, 0.0)
+    for tick in range(400):
+        it.renew({"a": tick / 10})
+        it.review(True, tick / 10)
+    assert it.requested is None and it.held_by(ADA)
+
+
+def test_control_is_given_back_by_its_holder():
+    it = held()
+    assert "do not hold" in it.give_back(BOB)
+    assert it.give_back(ADA) == ""
+    assert it.holder is None
+    assert "take it" in it.request(BOB, 0.1)
+
+
+def test_epochs_grow_over_restarts_whatever_was_lost():
+    assert first_epoch(1, 0) < first_epoch(2, 0)
+    given_out = first_epoch(1, 0) + 5
+    assert first_epoch(2, given_out) > given_out
+    # The count of starts was lost, but the bridge remembers.
+    assert first_epoch(1, first_epoch(7, 0) + 3) > first_epoch(7, 0) + 3
+
+
+@settings(max_examples=200)
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from(["claim", "take", "seize", "request", "grant", "return", "renew", "review"]),
+            st.sampled_from([ADA, BOB, EVE]),
+            st.floats(0.0, 0.7),
+            st.booleans(),
+        ),
+        max_size=80,
+    )
+)
+def test_there_is_never_more_than_one_holder_and_tokens_only_grow(script):
+    it, now, renewed = lease(), 0.0, 0.0
+    for act, client, wait, at_rest in script:
+        now += wait
+        before, token = it.holder, it.token
+        match act:
+            case "claim":
+                it.claim(client, now)
+            case "take":
+                it.take(client, False, now)
+            case "seize":
+                it.take(client, True, now)
+            case "request":
+                it.request(client, now)
+            case "grant":
+                it.grant(client)
+            case "return":
+                it.give_back(client)
+            case "renew":
+                # The server tells of a word that may be up to a second old.
+                it.renew({client.key: now - wait})
+                if it.holder == client:
+                    renewed = max(renewed, now - wait)
+            case "review":
+                it.review(at_rest, now)
+                if it.holder is not None and it.holder == before:
+                    assert now - renewed < LIFE_S
+        if it.holder is not None and it.holder != before:
+            renewed = now
+            assert it.token.epoch > token.epoch
+            assert before is None or (act == "review" and at_rest)
+        assert it.token.epoch >= token.epoch
+        assert sum(it.held_by(each) for each in (ADA, BOB, EVE)) <= 1
+
+
+@pytest.mark.parametrize("pair", [(ADA, BOB), (BOB, ADA)])
+def test_a_thousand_times_two_operators_take_at_once_and_one_has_it(pair):
+    for _ in range(1000):
+        it = lease()
+        answers = [it.take(client, True, 0.0) for client in pair]
+        it.review(True, 0.0)
+        assert answers.count("") == 1 and it.held_by(pair[0]) and not it.held_by(pair[1])

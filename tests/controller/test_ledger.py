@@ -1,0 +1,250 @@
+"""What the ledger has acknowledged is there for good, in a chain that shows every change."""
+
+import os
+import random
+import resource
+import signal
+import sqlite3
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from controller.ledger.check import reading, verify
+from controller.ledger.start import restored
+from controller.ledger.store import FILE, HEAD, Entry, Ledger, read
+from rolling_panda.errors import LedgerError
+from rolling_panda.runtime.launch import child_environment
+
+
+def entry(number: int, kind: str = "event", name: str = "bridge") -> Entry:
+    return Entry(f"2026-02-03T04:05:{number % 60:02}.000000+00:00", kind, name, f'{{"text":"row {number} ü"}}')
+
+
+def written(folder: Path, count: int = 12) -> Path:
+    with Ledger(folder) as ledger:
+        for number in range(1, count + 1):
+            assert ledger.append([entry(number)]) == number
+    return folder / FILE
+
+
+def newer(folder: Path) -> None:
+    """The ledger as a version to come might leave it: with one more column, and the number of its tables' form."""
+    with Ledger(folder) as ledger:
+        ledger.append([Entry("t", "start", "controller", '{"program": {"version": "7.1.0"}, "robots": 2}')])
+    database = sqlite3.connect(folder / FILE, isolation_level=None)
+    database.execute("ALTER TABLE audit ADD COLUMN signed_by TEXT")
+    database.execute("PRAGMA user_version = 2")
+    database.close()
+
+
+def problem_of(folder: Path) -> str:
+    try:
+        return verify(folder).problem
+    except LedgerError as error:
+        return str(error)
+
+
+def rows(folder: Path) -> list[object]:
+    with reading(folder) as database:
+        return list(read(database))
+
+
+def test_rows_are_there_after_reopening_and_numbers_go_on(tmp_path: Path) -> None:
+    written(tmp_path)
+    with Ledger(tmp_path) as ledger:
+        assert ledger.append([entry(13), entry(14)]) == 14
+    verdict = verify(tmp_path)
+    assert (verdict.rows, verdict.problem) == (14, "")
+    assert verify(tmp_path, verdict.head).problem == ""
+    assert "no row has the hash" in verify(tmp_path, bytes(31) + b"\1").problem
+
+
+def test_the_newest_row_of_each_name_is_told(tmp_path: Path) -> None:
+    with Ledger(tmp_path) as ledger:
+        ledger.append([Entry("t", "ticket", name, body) for name, body in (("b", "1"), ("a", "2"), ("b", "3"))])
+        ledger.append([Entry("t", "event", "c", "4")])
+        assert list(ledger.newest("ticket")) == [("a", "2"), ("b", "3")]
+
+
+def test_it_can_be_read_and_checked_while_it_is_written(tmp_path: Path) -> None:
+    with Ledger(tmp_path) as ledger:
+        ledger.append([entry(1)])
+        with reading(tmp_path) as database:
+            before = list(read(database))
+            ledger.append([entry(2)])
+        assert len(before) == 1 and verify(tmp_path).rows == 2
+
+
+def test_every_changed_byte_is_found_or_changes_nothing(tmp_path: Path) -> None:
+    path = written(tmp_path)
+    whole, original = path.read_bytes(), rows(tmp_path)
+    at = whole.index("row 7 ü".encode())
+    # The whole of one row with its hash, and places everywhere else.
+    places = sorted({*range(at - 60, at + 60), *range(0, len(whole), 41), *range(0, 200)})
+    found = 0
+    for place in places:
+        changed = bytearray(whole)
+        changed[place] ^= 1 << place % 8
+        path.write_bytes(changed)
+        problem = problem_of(tmp_path)
+        found += bool(problem)
+        assert problem or rows(tmp_path) == original, f"byte {place}"
+    assert found > 100
+    path.write_bytes(whole)
+    assert verify(tmp_path).problem == ""
+
+
+def test_what_was_changed_by_hand_is_found(tmp_path: Path) -> None:
+    path = written(tmp_path)
+    whole = path.read_bytes()
+
+    def after(*statements: str) -> str:
+        path.write_bytes(whole)
+        database = sqlite3.connect(path, isolation_level=None)
+        for statement in ("DROP TRIGGER no_update", "DROP TRIGGER no_delete", *statements):
+            database.execute(statement)
+        triggers = ("CREATE TRIGGER no_update BEFORE UPDATE ON audit BEGIN SELECT RAISE(ABORT, "
+                    "'rows are never changed'); END", "CREATE TRIGGER no_delete BEFORE DELETE ON audit BEGIN SELECT "
+                    "RAISE(ABORT, 'rows are never deleted'); END")  # fmt: skip
+        for trigger in triggers:
+            database.execute(trigger)
+        database.close()
+        return verify(tmp_path).problem
+
+    assert after() == ""
+    assert "row 5 is not as it was written" in after("UPDATE audit SET body = '{}' WHERE number = 5")
+    assert "after row 4 comes row 6" in after("DELETE FROM audit WHERE number = 5")
+    assert "12 rows were written, 11 are there" in after("DELETE FROM audit WHERE number = 12")
+    cut = ("DELETE FROM audit WHERE number = 12", "UPDATE sqlite_sequence SET seq = 11")
+    assert "row 12, which ledger.head names as the newest, is not in it" in after(*cut)
+    with pytest.raises(LedgerError, match="changed from outside.*keep the folder as evidence"):
+        Ledger(tmp_path)
+
+
+def test_a_ledger_of_a_newer_version_is_called_newer_and_left_alone(tmp_path: Path) -> None:
+    path = written(tmp_path)
+    newer(tmp_path)
+    as_it_was = path.read_bytes()
+    for attempt in (Ledger, verify):
+        with pytest.raises(LedgerError, match="is of a newer version.*its schema is 2.*Use that version") as refused:
+            attempt(tmp_path)
+        assert "changed" not in str(refused.value)
+    assert path.read_bytes() == as_it_was
+
+
+def test_a_ledger_from_before_its_tables_had_a_number_is_whole_and_goes_on(tmp_path: Path) -> None:
+    database = sqlite3.connect(written(tmp_path), isolation_level=None)
+    database.execute("PRAGMA user_version = 0")
+    database.close()
+    assert verify(tmp_path).problem == ""
+    with Ledger(tmp_path) as ledger:
+        assert ledger.append([entry(13)]) == 13
+
+
+def test_rows_of_a_newer_version_are_refused_by_naming_the_version(tmp_path: Path) -> None:
+    with Ledger(tmp_path) as ledger:
+        ledger.append([Entry("t", "start", "controller", '{"program": {"version": "7.1.0"}, "robots": 2}')])
+        ledger.append([Entry("t", "order", "order", '{"of_next_year": true}')])
+    with pytest.raises(LedgerError, match=r"tells of order.*last written by version 7\.1\.0: use that version"):
+        restored(tmp_path)
+
+
+def test_rows_refuse_to_be_changed(tmp_path: Path) -> None:
+    path = written(tmp_path)
+    database = sqlite3.connect(path)
+    with pytest.raises(sqlite3.IntegrityError, match="never changed"):
+        database.execute("UPDATE audit SET body = ''")
+    with pytest.raises(sqlite3.IntegrityError, match="never deleted"):
+        database.execute("DELETE FROM audit")
+    database.close()
+
+
+def test_a_lost_end_of_the_write_ahead_log_is_found(tmp_path: Path) -> None:
+    here, there = tmp_path / "here", tmp_path / "there"
+    here.mkdir()
+    there.mkdir()
+    with Ledger(here) as ledger:
+        for number in range(1, 5):
+            ledger.append([entry(number)])
+        # As a killed process leaves it: the rows are in the log, not in the file.
+        for name in (FILE, f"{FILE}-wal", HEAD):
+            (there / name).write_bytes((here / name).read_bytes())
+    assert verify(there).rows == 4 and verify(there).problem == ""
+    log = there / f"{FILE}-wal"
+    content = bytearray(log.read_bytes())
+    content[content.rindex(b"row 4")] ^= 1
+    (there / f"{FILE}-shm").unlink(missing_ok=True)
+    log.write_bytes(content)
+    assert "row 4, which ledger.head names" in verify(there).problem
+
+
+def test_a_full_disk_leaves_what_was_there_and_writing_goes_on_when_there_is_room(tmp_path: Path) -> None:
+    with Ledger(tmp_path) as ledger:
+        ledger.append([entry(1)])
+        size = max(path.stat().st_size for path in tmp_path.iterdir())
+        before = resource.getrlimit(resource.RLIMIT_FSIZE)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size + 4096, before[1]))
+        try:
+            with pytest.raises(LedgerError, match="cannot write the ledger"):
+                for _ in range(50):
+                    ledger.append([Entry("t", "event", "x", "y" * 4000)])
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        count = verify(tmp_path).rows
+        assert verify(tmp_path).problem == "" and count >= 1
+        assert ledger.append([entry(2)]) == count + 1
+    assert verify(tmp_path).rows == count + 1 and verify(tmp_path).problem == ""
+
+
+def test_what_is_no_ledger_is_refused_in_words(tmp_path: Path) -> None:
+    with pytest.raises(LedgerError, match="there is no ledger.*--state"):
+        verify(tmp_path)
+    (tmp_path / FILE).write_bytes(b"something else" * 100)
+    with pytest.raises(LedgerError, match="cannot open the ledger"):
+        Ledger(tmp_path)
+    assert "not a database" in verify(tmp_path).problem
+
+
+WRITER = """
+import sys
+from pathlib import Path
+from controller.ledger.store import Entry, Ledger
+with Ledger(Path(sys.argv[1])) as ledger:
+    while True:
+        print(ledger.append([Entry("t", "event", "x", "y" * 500)]), flush=True)
+"""
+
+
+def killed_while_writing(folder: Path, after: int) -> int:
+    """Kill -9 a process that writes rows and says each number when it has it. Returns the last one said."""
+    child = subprocess.Popen(
+        [sys.executable, "-c", WRITER, str(folder)], stdout=subprocess.PIPE, text=True, env=child_environment()
+    )
+    assert child.stdout is not None
+    said = 0
+    for line in child.stdout:
+        said = int(line)
+        if after == 0:
+            break
+        after -= 1
+    os.kill(child.pid, signal.SIGKILL)
+    for line in child.stdout:
+        if line.endswith("\n"):
+            said = int(line)
+    child.stdout.close()
+    child.wait()
+    return said
+
+
+@pytest.mark.parametrize("kills", [20, pytest.param(500, marks=pytest.mark.slow)])
+def test_no_acknowledged_row_is_lost_when_the_writer_is_killed(tmp_path: Path, kills: int) -> None:
+    chance = random.Random(5)
+    lost = 0
+    for _ in range(kills):
+        said = killed_while_writing(tmp_path, chance.randrange(8))
+        verdict = verify(tmp_path)
+        assert verdict.problem == ""
+        lost += verdict.rows < said
+    assert lost == 0

@@ -1,0 +1,174 @@
+"""The controller is killed at random moments of its work; what it has acknowledged is there when it starts again."""
+
+import random
+import socket
+import subprocess
+import sys
+import time
+
+import pytest
+
+from controller.ledger.check import verify
+from controller.ledger.start import restored
+from rolling_panda import messages as m
+from rolling_panda.config import TransportConfig
+from rolling_panda.errors import ServiceError
+from rolling_panda.messages import commands as intents
+from rolling_panda.runtime.launch import child_environment
+from rolling_panda.topics import CONTROLLER, INTENT, POINTS
+from rolling_panda.transport.zenoh import Router, Transport
+
+pytestmark = pytest.mark.alone
+
+#: A controller process as it is, but for the model of the robot, whose start would take most of the test's time: queue,
+#: ledger, loop and wire are the product's.
+CHILD = """
+import sys, threading
+from pathlib import Path
+from controller.interface import Outputs
+from controller.config import ControllerConfig
+from controller.ledger.journal import Journal, RequestRow
+from controller.ledger.store import Ledger
+from controller.ledger.start import restored
+from controller.ledger.writer import LedgerWriter
+from controller.loop import Loop
+from controller.work.queue_requests import Operator
+from controller.work.point_queue import PointQueue
+from rolling_panda import messages as m
+from rolling_panda.config import TransportConfig
+from rolling_panda.transport.zenoh import Transport
+
+class Desk:
+    def __init__(self, rows):
+        self.journal = Journal()
+        self.queue = PointQueue(ControllerConfig(), self.journal)
+        self.queue.restore(rows)
+        self.operator = Operator(self.queue)
+        self.cuts = 0
+        self.intent = None
+
+    @property
+    def recorded(self):
+        return self.journal.number
+
+    def answer(self, intent, now):
+        refused = self.operator.points(intent)
+        self.journal.add("request", intent.user, RequestRow(asked=intent, ok=not refused, reason=refused, mode="READY"))
+        return m.Answer(ok=not refused, reason=refused)
+
+    def step(self, inputs, now):
+        self.journal.observe(inputs.ledger, now)
+        if inputs.points is not None:
+            self.queue.update(inputs.points.message)
+        ticket = self.queue.next()
+        if self.intent is not None and self.journal.holds(self.intent[1]):
+            self.queue.resolve(self.intent[0], "DONE", "cut")
+            self.intent = None
+        elif self.intent is None and ticket is not None:
+            self.cuts += 1
+            name = ticket.point.point_id
+            self.intent = name, self.queue.intend(name, f"{sys.argv[3]}-{self.cuts}")
+        state = m.ControllerState(header=m.Header(), mode="READY", phase="", reason="", allowed=(), active_point_id="",
+            method="test", T_odom_tool=None, T_odom_tool_desired=None, position_error=0.0, rotation_error=0.0,
+            manipulability=0.0, joint_margin=0.0, tick_s=0.0, ticks=0, late_ticks=0, queue=self.queue.entries())
+        return Outputs(state=state, records=self.journal.take())
+
+folder = Path(sys.argv[1])
+desk = Desk(restored(folder).tickets)
+with Transport(TransportConfig(connect=(sys.argv[2],), plain_wire=True), "controller", "rp1") as transport:
+    Loop(desk, transport, 100.0, LedgerWriter(lambda: Ledger(folder))).run(threading.Event())
+"""
+
+
+#: Kills of one ledger, and places to cut: more than can be accepted between so many kills.
+ROUND, PLACES = 25, 500
+
+
+def points(count):
+    made = tuple(
+        m.PruningPoint(
+            point_id=f"p{n}", revision=1, position=(0.1 * n, 0.75, 1.0), tangent=(0.0, 0.0, 1.0), radius=0.004,
+            confidence=0.9, nodes_seen=5, nodes_kept=2, vine=0, spur=0, reason="test",
+        )
+        for n in range(count)
+    )  # fmt: skip
+    return m.PruningPoints(header=m.Header(), segmenter="test", frames=1, points=made)
+
+
+class Operator:
+    """Accepts points one after the other and notes what was acknowledged to it."""
+
+    def __init__(self, endpoint):
+        self.wire = Transport(TransportConfig(connect=(endpoint,), plain_wire=True), "server", "rp1")
+        self.show = self.wire.publisher(POINTS)
+        self.state = self.wire.slot(CONTROLLER)
+        self.accepted, self.done, self.next, self.all, self.shown_at = set(), set(), 0, points(PLACES), 0.0
+
+    def work(self, until):
+        while time.monotonic() < until:
+            if time.monotonic() - self.shown_at > 0.1:
+                self.shown_at = time.monotonic()
+                self.show.put(self.all)
+            name = f"p{self.next}"
+            try:
+                answer = self.wire.call(INTENT, intents.AcceptPoint(user="ada", point_id=name, revision=1))
+            except ServiceError:
+                time.sleep(0.05)
+                continue
+            if answer.ok:
+                self.accepted.add(name)
+            if answer.ok or "is " in answer.reason:
+                self.next += 1
+            self.look()
+
+    def look(self):
+        newest = self.state.take()
+        if newest is not None:
+            self.done |= {entry.point_id for entry in newest.message.queue if entry.state == "DONE"}
+
+
+def lost(folder, operator):
+    """What was acknowledged and is not in the ledger as that or as something later."""
+    states = {row.point.point_id: row.state for row in restored(folder).tickets}
+    kept = ("ACCEPTED", "UNREACHABLE", "INTENT", "DONE", "UNKNOWN")
+    gone = {name for name in operator.accepted if states.get(name) not in kept}
+    return gone | {name for name in operator.done if states.get(name) != "DONE"}
+
+
+@pytest.mark.parametrize("kills", [4, pytest.param(500, marks=pytest.mark.slow)])
+def test_no_acknowledged_decision_is_lost(tmp_path, kills):
+    chance = random.Random(3)
+    for begin in range(0, kills, ROUND):
+        folder = tmp_path / str(begin)
+        folder.mkdir()
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+        # Each round has its own: what a router keeps for clients that were killed goes with it.
+        router = Router(TransportConfig(mode="router", connect=(), listen=(endpoint,), plain_wire=True))
+        operator = Operator(endpoint)
+        try:
+            for kill in range(begin, min(kills, begin + ROUND)):
+                killed(folder, endpoint, operator, chance)
+                assert verify(folder).problem == ""
+                assert lost(folder, operator) == set(), f"after kill {kill + 1}"
+            assert operator.done
+        finally:
+            operator.wire.close()
+            router.close()
+
+
+def killed(folder, endpoint, operator, chance):
+    """One life of the controller: it comes up, does some work, and is killed in the middle of more."""
+    child = subprocess.Popen([sys.executable, "-c", CHILD, str(folder), endpoint, f"run{chance.random()}"],
+                             env=child_environment())  # fmt: skip
+    try:
+        before = len(operator.accepted)
+        while len(operator.accepted) == before:
+            operator.work(time.monotonic() + 0.02)
+            assert child.poll() is None and operator.next < PLACES
+        operator.work(time.monotonic() + chance.uniform(0.0, 0.1))
+    finally:
+        child.kill()
+        child.wait()
+    operator.look()

@@ -1,0 +1,85 @@
+"""A motion is waited for as long as there is a prospect of its end, and not longer."""
+
+import numpy as np
+import pytest
+
+from controller.motion.follower import Tracking
+from controller.work.motion_timeout import MotionTimeout, missed
+from rolling_panda.messages.perception import Capsule
+from tests.support.controller_at_work import entry, point, run_until, working
+
+TIMEOUT, DT = 6.0, 0.01
+
+
+def tracking(scale=1.0, reason="", done=False, error=0.0, turn=0.0):
+    return Tracking(np.zeros(9), None, error, turn, 0.05, not reason, reason, done, scale)
+
+
+def noted(patience, seconds, **how):
+    for _ in range(round(seconds / DT)):
+        patience.note(tracking(**how))
+
+
+@pytest.fixture
+def patience():
+    out = MotionTimeout(TIMEOUT, DT)
+    out.begin(2.0)
+    return out
+
+
+def test_over_is_what_has_run_out_and_is_in_place(patience):
+    assert patience.over(tracking(done=True, error=0.001), 0.0, 0.0015)
+    assert not patience.over(tracking(done=True, error=0.002), 0.0, 0.0015)
+    assert not patience.over(tracking(done=True, turn=0.3), 0.0, 0.0015)
+    assert not patience.over(tracking(error=0.001), 0.0, 0.0015)
+
+
+def test_late_is_what_takes_much_longer_than_planned(patience):
+    patience.over(tracking(), 10.0, 0.0)
+    assert not patience.late(10.0 + 2.5 * 2.0 + TIMEOUT)
+    assert patience.late(10.1 + 2.5 * 2.0 + TIMEOUT)
+    patience.begin(4.0)
+    patience.over(tracking(), 30.0, 0.0)
+    assert not patience.late(40.0)
+
+
+def test_what_is_held_back_without_a_pause_is_late_soon(patience):
+    held = {"scale": 0.0, "reason": "the distance of blades to post 0 holds the tool back"}
+    noted(patience, 2.9, **held)
+    assert not patience.late(2.9)
+    noted(patience, 0.2, **held)
+    assert patience.late(3.1)
+    # It went on: counting begins anew.
+    noted(patience, 0.01, scale=0.5, reason=held["reason"])
+    noted(patience, 2.9, **held)
+    assert not patience.late(6.0)
+    patience.again()
+    noted(patience, 2.9, **held)
+    assert not patience.late(9.0)
+
+
+@pytest.mark.parametrize("how", [{"scale": 0.0}, {"scale": 0.0, "reason": "near", "done": True}])
+def test_a_clock_that_stands_for_no_reason_or_has_run_out_is_not_held(patience, how):
+    noted(patience, 20.0, **how)
+    assert not patience.late(20.0)
+
+
+def test_what_is_missing_is_said_with_the_reason():
+    said = missed("the cut", tracking(error=0.0102, turn=0.02, reason="joint 3 holds the tool back"))
+    assert said == "the cut was not reached in time: 10.2 mm and 1.1° are missing: joint 3 holds the tool back"
+    assert missed("the cut", tracking()).endswith("are missing")
+
+
+def test_a_post_beside_the_way_is_told_as_the_reason_within_seconds():
+    r = working(
+        (point("a", (1.4, 0.75, 1.1)),), obstacles=(Capsule("post", (0.8, 0.35, 0.0), (0.8, 0.35, 1.9), 0.04, 0.04),)
+    )
+    run_until(r, lambda s: s is not None and s.mode == "AUTO", 2.0)
+    held = None
+    while entry(r, "a").state == "ACCEPTED":
+        r.step()
+        if held is None and r.controller.tracking is not None and r.controller.tracking.reason:
+            held = r.now
+        assert r.now < 20.0
+    assert entry(r, "a").state == "FAILED_NOT_CUT" and "post 0" in entry(r, "a").reason
+    assert held is not None and r.now - held < 4.0

@@ -1,0 +1,97 @@
+"""The planner's own process: it answers as the planner does, steps back, and never outlives who started it."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import psutil
+import pytest
+
+from controller.planner_process import PlannerProcess
+from controller.planning.preview_plan import PreviewRequest
+from controller.planning.rollout import Rollout
+from rolling_panda.config import RobotConfig
+from rolling_panda.generate.__main__ import ROOT
+from tests.controller.test_cut_planner import CONFIG, PLANNER, POST, point, request
+
+pytestmark = pytest.mark.alone
+
+_STARTS_S = 60.0
+
+
+@pytest.fixture
+def worker():
+    worker = PlannerProcess(CONFIG, RobotConfig())
+    yield worker
+    worker.close()
+    assert worker.pid is None or not psutil.pid_exists(worker.pid)
+
+
+def eventually(condition, limit_s=_STARTS_S):
+    end = time.monotonic() + limit_s
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def answered(worker, asked):
+    worker.ask(asked)
+    eventually(lambda: worker.newest is not None and worker.newest.request.number == asked.number)
+    return worker.newest
+
+
+def test_it_answers_as_the_planner_in_this_process_does_and_at_low_priority(worker) -> None:
+    asked = request(point("a", 0.3), point("in", 0.5), point("b", 1.4), obstacles=(POST,))
+    made = answered(worker, asked)
+    here = PLANNER.plan(asked)
+    assert made.digest == here.digest and made.refused == here.refused
+    np.testing.assert_array_equal(made.cuts[0].way.q, here.cuts[0].way.q)
+    np.testing.assert_array_equal(made.cuts[0].cut.poses.clear.homogeneous, here.cuts[0].cut.poses.clear.homogeneous)
+    assert os.sched_getscheduler(worker.pid) == os.SCHED_OTHER
+    assert psutil.Process(worker.pid).nice() >= 5
+
+
+def test_what_cannot_be_planned_from_is_answered_with_a_failure_and_a_dead_process_is_replaced(worker) -> None:
+    broken = request(point("a", 0.3), number=2)
+    broken.q[0] = np.nan
+    assert "every coordinate must be finite" in answered(worker, broken).failure
+    first = worker.pid
+    os.kill(first, signal.SIGKILL)
+    eventually(lambda: not psutil.pid_exists(first) or psutil.Process(first).status() == psutil.STATUS_ZOMBIE)
+    assert "process ended" in answered(worker, request(point("a", 0.3), number=3)).failure
+    assert len(answered(worker, request(point("a", 0.3), number=4)).cuts) == 1
+    assert worker.pid != first
+
+
+def test_it_ends_with_a_parent_that_is_killed() -> None:
+    program = (
+        "import time\n"
+        "from controller.config import ControllerConfig\n"
+        "from controller.planner_process import PlannerProcess\n"
+        "from rolling_panda.config import RobotConfig\n"
+        "if __name__ == '__main__':\n"
+        "    worker = PlannerProcess(ControllerConfig(), RobotConfig())\n"
+        "    while worker.pid is None:\n"
+        "        time.sleep(0.02)\n"
+        "    print(worker.pid, flush=True)\n"
+        "    time.sleep(60)\n"
+    )
+    parent = subprocess.Popen([sys.executable, "-c", program], cwd=ROOT, stdout=subprocess.PIPE, text=True)
+    with parent:
+        assert parent.stdout is not None
+        child = int(parent.stdout.readline())
+        parent.kill()
+    eventually(lambda: not psutil.pid_exists(child))
+
+
+def test_a_preview_is_answered_as_the_rollout_in_this_process_does_before_a_plan_that_waits(worker) -> None:
+    asked = request(point("a", 0.3), number=7)
+    wanted = PreviewRequest(1, asked.q, asked.points)
+    worker.ask(asked)
+    worker.ask(wanted)
+    eventually(lambda: worker.newest_preview is not None)
+    assert worker.newest_preview.digest == Rollout(CONFIG, RobotConfig()).roll(wanted).digest
+    eventually(lambda: worker.newest is not None and worker.newest.request.number == 7)

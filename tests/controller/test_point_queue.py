@@ -1,0 +1,270 @@
+import msgspec
+from hypothesis import given
+from hypothesis import strategies as st
+
+from controller.config import ControllerConfig
+from controller.work.point_queue import PointQueue
+from rolling_panda import messages as m
+
+POINT = m.PruningPoint(
+    point_id="a",
+    revision=3,
+    position=(1.0, 0.85, 1.0),
+    tangent=(0.0, 0.0, 1.0),
+    radius=0.004,
+    confidence=0.8,
+    nodes_seen=5,
+    nodes_kept=2,
+    vine=0,
+    spur=0,
+    reason="test",
+)
+
+
+def point(point_id="a", **changes):
+    return msgspec.structs.replace(POINT, point_id=point_id, **changes)
+
+
+def shown(*points):
+    return m.PruningPoints(header=m.Header(), segmenter="none", frames=1, points=points)
+
+
+def queue(*points):
+    q = PointQueue(ControllerConfig())
+    q.update(shown(*points))
+    return q
+
+
+def state(q, point_id="a"):
+    return q.get(point_id).state
+
+
+def test_acceptance_binds_what_the_operator_saw():
+    q = queue(point())
+    assert q.accept("a", 3, "ada") == ""
+    q.update(shown(point(revision=4, position=(1.0, 0.853, 1.0))))
+    assert state(q) == "ACCEPTED"
+    assert q.next().accepted.position == (1.0, 0.85, 1.0)
+    assert q.entries()[0].accepted_position == (1.0, 0.85, 1.0)
+    assert q.entries()[0].user == "ada"
+
+
+def test_accepting_an_old_view_is_refused():
+    q = queue(point())
+    assert "revision 2 was seen, it is 3 now" in q.accept("a", 2, "ada")
+    assert state(q) == "PROPOSED"
+
+
+def test_a_point_that_moved_or_turned_is_not_accepted_any_more():
+    for changes in ({"position": (1.0, 0.85, 1.006)}, {"tangent": (0.0, 0.5, 0.866)}):
+        q = queue(point())
+        q.accept("a", 3, "ada")
+        voided = q.update(shown(point(revision=4, **changes)))
+        assert len(voided) == 1 and "acceptance void" in voided[0]
+        assert state(q) == "PROPOSED" and q.next() is None
+        assert "accepted" in q.get("a").reason
+
+
+def test_a_point_that_vanished_is_not_cut_and_a_new_look_is_needed():
+    q = queue(point())
+    q.accept("a", 3, "ada")
+    assert "does not see it" in q.update(shown())[0]
+    assert q.next() is None
+    assert "does not see" in q.accept("a", 3, "ada")
+    q.update(shown(point()))
+    assert q.accept("a", 3, "ada") == ""
+
+
+def test_a_point_behind_the_blades_may_vanish():
+    q = queue(point())
+    q.accept("a", 3, "ada")
+    assert q.update(shown(), keep="a") == []
+    assert state(q) == "ACCEPTED"
+
+
+def test_a_proposal_that_vanished_leaves_the_queue():
+    q = queue(point(), point("b"))
+    q.update(shown(point("b")))
+    assert [e.point_id for e in q.entries()] == ["b"]
+
+
+def test_a_thick_cane_is_refused():
+    q = queue(point(radius=0.009))
+    assert "18 mm thick, the limit is 15 mm" in q.accept("a", 3, "ada")
+
+
+def test_order_of_work_is_along_the_row():
+    q = queue(point("far", position=(2.0, 0.8, 1.0)), point("near", position=(-0.5, 0.9, 1.0)), point("mid"))
+    assert [e.point_id for e in q.entries()] == ["near", "mid", "far"]
+    q.accept("far", 3, "ada")
+    assert q.next().point.point_id == "far"
+    q.accept("mid", 3, "ada")
+    assert q.next().point.point_id == "mid"
+
+
+def test_life_of_a_cut_point():
+    q = queue(point())
+    q.accept("a", 3, "ada")
+    q.intend("a", "cut-1")
+    assert (state(q), q.entries()[0].cut_id) == ("INTENT", "cut-1")
+    assert "INTENT" in q.reject("a", "ada", "no")
+    q.resolve("a", "DONE", "cut")
+    assert "is DONE" in q.accept("a", 3, "ada")
+    q.update(shown())
+    assert state(q) == "DONE"
+
+
+def test_an_unknown_or_failed_cut_waits_for_a_person():
+    for outcome in ("UNKNOWN", "FAILED_NOT_CUT"):
+        q = queue(point())
+        q.accept("a", 3, "ada")
+        q.intend("a", "cut-1")
+        q.resolve("a", outcome, "why")
+        assert q.next() is None
+        if outcome == "UNKNOWN":
+            assert "look, and say so first" in q.accept("a", 3, "eve")
+            assert "UNKNOWN" in q.reject("a", "eve", "no")
+            assert q.proposed(0.0) == []
+            assert q.decide("a", "FAILED_NOT_CUT", "eve", "the cane stands") == ""
+            assert q.get("a").reason == "eve looked: the cane stands"
+        assert q.accept("a", 3, "eve") == ""
+
+
+def test_what_a_person_saw_ends_an_unknown_cut_and_nothing_else():
+    q = queue(point())
+    assert "no question: it is PROPOSED" in q.decide("a", "DONE", "eve", "cut")
+    assert "there is no point" in q.decide("z", "DONE", "eve", "cut")
+    q.accept("a", 3, "ada")
+    q.intend("a", "cut-1")
+    assert "it is INTENT" in q.decide("a", "DONE", "eve", "cut")
+    q.resolve("a", "UNKNOWN", "why")
+    assert q.decide("a", "DONE", "eve", "the cane is off") == ""
+    assert (state(q), q.get("a").cut_id) == ("DONE", "cut-1")
+    assert "is DONE" in q.accept("a", 3, "eve")
+
+
+def test_rejected_points_are_not_proposed_and_unknown_ones_are_named():
+    q = queue(point(), point("b", confidence=0.4))
+    assert q.reject("a", "ada", "keep this one") == ""
+    assert (q.entries()[0].state, q.entries()[0].reason) == ("REJECTED", "keep this one")
+    assert [p.point_id for p in q.proposed(0.0)] == ["b"]
+    assert q.proposed(0.5) == []
+    assert "'zz'" in q.accept("zz", 1, "ada")
+    assert "'zz'" in q.reject("zz", "ada", "")
+
+
+def test_accepted_points_follow_an_order_asked_for_and_the_others_keep_their_places():
+    places = {"a": 0.1, "b": 0.3, "c": 0.5, "d": 0.7}
+    q = queue(*(point(i, position=(x, 0.75, 1.0)) for i, x in places.items()))
+    for point_id in ("a", "c", "d"):
+        assert q.accept(point_id, q.get(point_id).point.revision, "ada") == ""
+    q.arrange(("d", "a", "c"))
+    assert [e.point_id for e in q.entries()] == ["d", "b", "a", "c"]
+    assert q.next().point.point_id == "d"
+    q.intend("d", "cut-1")
+    q.resolve("d", "DONE", "cut")
+    assert q.next().point.point_id == "a"
+    q.arrange(())
+    assert [e.point_id for e in q.entries()] == ["a", "b", "c", "d"]
+
+
+def test_another_content_than_was_seen_is_refused():
+    queue = PointQueue(ControllerConfig())
+    point = msgspec.structs.replace(POINT, digest="ab" * 16)
+    queue.update(m.PruningPoints(header=m.Header(), segmenter="s", frames=1, points=(point,)))
+    assert "not what was seen" in queue.accept(point.point_id, point.revision, "Ada", "cd" * 16)
+    assert queue.entries()[0].digest == ""
+    assert queue.accept(point.point_id, point.revision, "Ada", point.digest) == ""
+    assert queue.entries()[0].digest == point.digest
+
+
+def test_a_decision_is_taken_back_until_the_cut_begins():
+    queue = PointQueue(ControllerConfig())
+    queue.update(m.PruningPoints(header=m.Header(), segmenter="s", frames=1, points=(POINT,)))
+    assert "nothing to take back" in queue.reconsider("a", "Ada")
+    assert queue.accept("a", POINT.revision, "Ada") == "" and queue.reconsider("a", "Ada") == ""
+    assert queue.entries()[0].state == "PROPOSED" and queue.next() is None
+    assert queue.reject("a", "Ada", "wrong cane") == "" and queue.reconsider("a", "Ada") == ""
+    assert queue.entries()[0].state == "PROPOSED" and queue.entries()[0].reason == ""
+    assert queue.accept("a", POINT.revision, "Ada") == ""
+    queue.intend("a", "c1")
+    assert "nothing to take back" in queue.reconsider("a", "Ada")
+
+
+REFUSED = {"a": "no posture reaches it"}
+
+
+def beyond(*others):
+    """A queue whose accepted point `a` no plan reaches."""
+    q = queue(point(), *others)
+    q.accept("a", 3, "ada")
+    assert q.reach(q.accepted(), REFUSED)
+    return q
+
+
+def test_what_the_plan_refuses_is_neither_accepted_nor_worked_on_and_says_why():
+    q = beyond(point("b", position=(2.0, 0.85, 1.0)))
+    assert (state(q), q.get("a").reason) == ("UNREACHABLE", "no posture reaches it")
+    assert q.next() is None and q.waits == "the accepted point cannot be reached"
+    assert q.accepted() == (point(),), "the next plan is asked about it again"
+    assert q.count("ACCEPTED") == 0 and q.count("UNREACHABLE") == 1
+    assert not q.reach(q.accepted(), REFUSED), "the same again is nothing new"
+    assert "is accepted, and cannot be reached: no posture" in q.accept("a", 3, "eve")
+    q.accept("b", 3, "ada")
+    assert q.next().point.point_id == "b" and q.waits == ""
+    assert "a cannot be reached, so it has no place" in q.move("a", "b", 0, "ada")
+
+
+def test_it_is_accepted_again_when_a_plan_reaches_it_or_somebody_turns_its_approach():
+    q = beyond()
+    q.reach(q.accepted(), {})
+    assert (state(q), q.get("a").reason, q.get("a").user) == ("ACCEPTED", "", "ada")
+    q = beyond()
+    assert q.turn("a", 0.5, "ada") == "" and state(q) == "ACCEPTED"
+
+
+def test_a_plan_says_nothing_of_what_was_accepted_otherwise_or_is_worked_on():
+    q = queue(point())
+    q.accept("a", 3, "ada")
+    assert not q.reach((point(revision=2),), REFUSED)
+    assert not q.reach(q.accepted(), REFUSED, busy="a")
+    assert state(q) == "ACCEPTED"
+
+
+def test_an_acceptance_out_of_reach_is_void_like_any_other_and_can_be_taken_back():
+    q = beyond()
+    assert "acceptance void" in q.update(shown(point(revision=4, position=(1.0, 0.85, 1.006))))[0]
+    assert state(q) == "PROPOSED"
+    q = beyond()
+    assert "does not see it" in q.update(shown())[0]
+    q = beyond()
+    assert q.reconsider("a", "ada") == "" and state(q) == "PROPOSED" and q.waits == "no point is accepted"
+
+
+STEPS = st.lists(st.sampled_from(["refuse", "reach", "accept", "back", "reject", "move", "gone", "seen"]), max_size=30)
+
+
+@given(STEPS)
+def test_whatever_happens_only_what_somebody_accepted_is_out_of_reach_and_what_is_is_never_next(steps):
+    q = queue(point())
+    revision = 3
+    for step in steps:
+        if step in ("refuse", "reach"):
+            q.reach(q.accepted(), REFUSED if step == "refuse" else {})
+        elif step == "accept":
+            q.accept("a", revision, "ada")
+        elif step == "back":
+            q.reconsider("a", "ada")
+        elif step == "reject":
+            q.reject("a", "ada", "")
+        elif step == "move":
+            revision += 1
+            q.update(shown(point(revision=revision, position=(1.0 + 0.006 * (revision % 2), 0.85, 1.0))))
+        else:
+            q.update(shown(*([point(revision=revision)] if step == "seen" else [])))
+        ticket = q.get("a")
+        if ticket is None:
+            continue
+        if ticket.state == "UNREACHABLE":
+            assert ticket.accepted is not None and ticket.user == "ada" and ticket.reason and q.next() is None
+        assert (ticket.accepted is None) == (ticket.state not in ("ACCEPTED", "UNREACHABLE"))

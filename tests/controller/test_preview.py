@@ -1,0 +1,203 @@
+"""When a preview may be followed: what an approval holds for, and each way in which it expires."""
+
+from dataclasses import replace
+
+import pytest
+from msgspec import structs
+
+from controller.core import Controller
+from controller.ledger.journal import PreviewRow
+from controller.planning import preview as preview_module
+from controller.planning.preview_plan import PreviewRequest
+from rolling_panda.config import RobotConfig
+from rolling_panda.messages import commands as intents
+from rolling_panda.messages.perception import Capsule
+from tests.support.controller_at_work import CONFIG, entry, point
+from tests.support.previewed import ROLLOUT, Previewed
+
+POINTS = (point("a", (0.45, 0.75, 1.05)), point("b", (0.75, 0.75, 1.1)))
+
+
+@pytest.fixture(autouse=True)
+def no_planner(monkeypatch):
+    monkeypatch.setattr(preview_module, "_PLAN_S", 0.0)
+
+
+@pytest.fixture(scope="module")
+def rolled():
+    """Previews that were made once are not made again."""
+    made = {}
+
+    def roll(request):
+        key = tuple(each.point_id for each in request.points), request.obstacles, request.q.round(6).tobytes()
+        before = made.get(key) or ROLLOUT.roll(request)
+        made[key] = before
+        return replace(before, request=request)
+
+    return roll
+
+
+@pytest.fixture
+def p(rolled):
+    return Previewed(POINTS, roll=rolled)
+
+
+def required(p):
+    assert p.ask(intents.RequirePreview, required=True) == ""
+    return p
+
+
+def test_who_wants_no_previews_starts_without(p):
+    assert p.ask(intents.AcceptPoint, point_id="a", revision=1) == ""
+    assert p.ask(intents.Start) == ""
+
+
+def test_with_previews_required_nothing_starts_before_one_is_approved(p):
+    required(p)
+    assert p.ask(intents.AcceptAll) == ""
+    assert "ask for one and approve it" in p.ask(intents.Start)
+    assert "Start" not in p.robot.state.allowed and "Survey" in p.robot.state.allowed
+    shown = p.again()
+    assert "approve it first" in p.ask(intents.Start)
+    assert "another one now" in p.ask(intents.ApprovePreview, preview_hash="0" * 64)
+    assert p.ask(intents.ApprovePreview, preview_hash=shown.preview_hash) == ""
+    assert (p.state.phase, p.state.approved_by) == ("approved", "ada")
+    assert "Start" in p.robot.state.allowed
+
+
+def test_a_preview_of_one_cut_allows_that_one_alone(p):
+    required(p)
+    p.ask(intents.AcceptAll)
+    shown = p.again("a")
+    assert [cut.point_id for cut in shown.cuts] == ["a"] and shown.left == 1
+    assert p.ask(intents.ApprovePreview, preview_hash=shown.preview_hash) == ""
+    p.worked()
+    assert [name for name, _ in p.robot.cuts] == ["a"]
+    p.robot.run(0.2)
+    assert p.robot.state.mode == "READY" and "b is not in the approved preview" in p.robot.state.reason
+    assert p.state.phase == "expired"
+    assert "expired" in p.ask(intents.Start)
+    assert [name for name, _ in p.robot.cuts] == ["a"]
+
+
+def test_what_comes_later_is_not_approved_before_what_comes_first(p):
+    p.ask(intents.AcceptAll)
+    shown = p.again("b")
+    assert "a comes before b" in p.ask(intents.ApprovePreview, preview_hash=shown.preview_hash)
+    assert p.ask(intents.MoveInQueue, point_id="b", before="a", revision=0) == ""
+    assert p.ask(intents.ApprovePreview, preview_hash=shown.preview_hash) == ""
+
+
+def test_what_the_preview_does_not_cut_is_not_cut_under_its_approval(rolled):
+    def not_b(request):
+        made = rolled(request)
+        cuts = tuple(
+            cut if cut.point_id == "a" else structs.replace(cut, cut_s=None, result="not cut: a wire is too near")
+            for cut in made.cuts
+        )
+        return replace(made, cuts=cuts)
+
+    p = required(Previewed(POINTS, roll=not_b))
+    shown = p.previewed()
+    assert p.ask(intents.ApprovePreview, preview_hash=shown.preview_hash) == ""
+    p.worked()
+    assert [name for name, _ in p.robot.cuts] == ["a"]
+    assert "the approved preview shows b as not cut: a wire is too near" in p.robot.state.reason
+
+
+def test_a_base_that_was_moved_ends_the_approval_and_is_told(p):
+    required(p)
+    shown = p.previewed("a")
+    assert p.ask(intents.ApprovePreview, preview_hash=shown.preview_hash) == ""
+    p.robot.q[0] += 0.31
+    p.robot.run(0.3)
+    assert p.state.phase == "expired" and "0.31 m" in p.state.reason
+    assert "0.31 m" in p.ask(intents.Start)
+    assert "0.31 m" in p.ask(intents.ApprovePreview, preview_hash=shown.preview_hash)
+
+
+def test_a_point_accepted_anew_or_not_any_more_ends_it(p):
+    shown = p.previewed("a")
+    assert p.ask(intents.ApprovePreview, preview_hash=shown.preview_hash) == ""
+    p.robot.show((point("a", (0.452, 0.75, 1.05), revision=2), POINTS[1]))
+    p.robot.run(0.2)
+    assert p.state.phase == "approved"
+    p.ask(intents.ReconsiderPoint, point_id="a")
+    assert p.state.phase == "expired" and "a is no longer accepted" in p.state.reason
+    p.ask(intents.AcceptPoint, point_id="a", revision=2)
+    assert p.state.phase == "expired"
+
+
+def post_at(x, y):
+    return Capsule("post", (x, y, 0.0), (x, y, 2.0), 0.04, 0.04)
+
+
+def test_what_comes_into_the_way_ends_it_and_what_leaves_it_room_does_not(p):
+    shown = p.previewed("a")
+    assert p.ask(intents.ApprovePreview, preview_hash=shown.preview_hash) == ""
+    beside = (post_at(8.0, 0.75), post_at(0.9, 0.75), Capsule("wire", (-2, 0.75, 1.75), (2, 0.75, 1.75), 0.004, 0.004))
+    p.robot.obstacles = beside
+    p.robot.run(0.3)
+    assert p.state.phase == "approved"
+    halfway = p.motion.rows[len(p.motion.rows) // 3].tool
+    p.robot.obstacles = (*beside, post_at(*halfway[:2]))
+    p.robot.run(0.3)
+    assert p.state.phase == "expired" and "a post is seen" in p.state.reason and "to a" in p.state.reason
+
+
+def test_what_is_planned_or_accepted_meanwhile_leaves_the_order_that_was_shown(p):
+    p.robot.show((*POINTS, point("c", (0.1, 0.75, 1.0))))
+    shown = p.previewed("a", "b")
+    assert p.ask(intents.ApprovePreview, preview_hash=shown.preview_hash) == ""
+    p.robot.controller._queue.arrange(("b", "a"))
+    assert p.ask(intents.AcceptPoint, point_id="c", revision=1) == ""
+    p.worked()
+    assert [name for name, _ in p.robot.cuts][:2] == ["a", "b"]
+
+
+def test_another_order_ends_it(p):
+    shown = p.previewed()
+    assert p.ask(intents.ApprovePreview, preview_hash=shown.preview_hash) == ""
+    assert p.ask(intents.MoveInQueue, point_id="b", before="a", revision=0) == ""
+    assert p.state.phase == "expired" and "b comes before a" in p.state.reason
+
+
+def test_an_approval_that_expires_under_way_keeps_the_blades_from_closing(p):
+    required(p)
+    shown = p.previewed("a")
+    assert p.ask(intents.ApprovePreview, preview_hash=shown.preview_hash) == ""
+    assert p.ask(intents.Start) == ""
+    p.robot.run(1.5)
+    assert p.robot.state.active_point_id == "a"
+    x, y, _ = next(row.tool for row in p.motion.rows if row.time > shown.cuts[0].cut_s)
+    p.robot.obstacles = (post_at(x, y),)
+    p.robot.run(10.0)
+    assert p.robot.cuts == []
+    assert entry(p.robot, "a").state == "ACCEPTED"
+    assert any("left: the approved preview has expired: a post is seen" in text for text in p.robot.events)
+
+
+def test_there_is_nothing_to_preview_without_an_accepted_point(p):
+    assert "no point is accepted" in p.ask(intents.AskPreview)
+    assert "accept it first" in p.ask(intents.AskPreview, point_id="a")
+    assert "no preview to approve" in p.ask(intents.ApprovePreview, preview_hash="")
+
+
+def test_what_was_required_is_required_after_a_restart(rolled):
+    controller = Controller(CONFIG, RobotConfig())
+    controller.restore((), preview=PreviewRow(required=True))
+    p = Previewed(POINTS, controller, roll=rolled)
+    p.ask(intents.AcceptAll)
+    assert p.state.required
+    assert "preview" in p.ask(intents.Start)
+
+
+def test_a_preview_that_failed_says_why():
+    def fail(request: PreviewRequest):
+        return preview_module.Preview(request, failure="the planning process ended")
+
+    p = Previewed(POINTS, roll=fail)
+    p.ask(intents.AcceptAll)
+    p.ask(intents.AskPreview)
+    p.robot.run(0.3)
+    assert p.state.phase == "none" and "the planning process ended" in p.state.reason

@@ -1,0 +1,28 @@
+"""What the controller's log says of what operators ask."""
+
+from rolling_panda.messages import commands as intents
+from tests.controller.test_controller_work import point, robot
+
+
+def test_each_request_is_one_line_of_the_log():
+    r = robot()
+    r.step()
+    r.show((point("p1", (0.3, 0.75, 1.0)),))
+    r.step()
+    before = len(r.events)
+    for intent, words in [
+        (intents.Start(user="ada"), "Start refused"),
+        (intents.Arm(user="ada"), "IDLE → READY: arm by ada"),
+        (intents.AcceptAll(user="ada"), "ada: accepted 1 point of confidence 0.80 and more"),
+        (intents.RejectPoint(user="ada", point_id="p1", reason="rotten"), "ada: rejected p1: rotten"),
+        (intents.AcceptPoint(user="ada", point_id="p1", revision=1), "ada: accepted p1, revision 1"),
+        (intents.Start(user="ada"), "READY → AUTO: start by ada"),
+        (intents.Pause(user="ada"), "AUTO → PAUSED: pause by ada"),
+        (intents.Resume(user="ada"), "PAUSED → READY: resume by ada"),
+        (intents.Home(user="ada"), "ada: home"),
+    ]:
+        r.ask(intent)
+        r.step()
+        lines = [line for line in r.events[before:] if "ada" in line]
+        before = len(r.events)
+        assert len(lines) == 1 and words in lines[0], (intent, lines)

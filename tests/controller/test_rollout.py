@@ -1,0 +1,90 @@
+"""The preview against what is then done."""
+
+import numpy as np
+import pytest
+
+from controller.planning import preview as preview_module
+from controller.planning.preview_plan import PreviewRequest
+from controller.planning.rollout import Rollout
+from rolling_panda.config import RobotConfig
+from rolling_panda.errors import ControlError
+from rolling_panda.messages import commands as intents
+from rolling_panda.messages.perception import Capsule
+from rolling_panda.model.robot import ARM_Q
+from tests.support.controller_at_work import CONFIG, entry, point
+from tests.support.previewed import ROLLOUT, Previewed
+
+POINTS = (point("a", (0.45, 0.75, 1.05)), point("b", (0.75, 0.75, 1.1), (0.1, 0.0, 0.995)))
+START = np.zeros(12)
+START[ARM_Q] = CONFIG.home
+
+
+@pytest.fixture(autouse=True)
+def no_planner(monkeypatch):
+    monkeypatch.setattr(preview_module, "_PLAN_S", 0.0)
+
+
+def test_what_is_done_is_what_was_shown():
+    """On a robot that is half as late again as the preview reckons with."""
+    p = Previewed(POINTS, lag=1.5 * CONFIG.arm_lag_s)
+    shown = p.previewed()
+    rows = np.array([row.tool for row in p.motion.rows])
+    assert p.ask(intents.ApprovePreview, preview_hash=shown.preview_hash) == ""
+    took = p.worked()
+    assert [entry(p.robot, name).state for name in "ab"] == ["DONE", "DONE"]
+    done = np.array(p.path)
+    apart = np.array([np.linalg.norm(done - row, axis=1).min() for row in rows])
+    assert apart.max() < 0.01
+    assert took == pytest.approx(shown.duration_s, rel=0.2)
+    cuts = {name: pose[:3, 3] for name, pose in p.robot.cuts}
+    for cut in shown.cuts:
+        assert cut.result == "cut"
+        at = rows[np.argmin([abs(row.time - cut.cut_s) for row in p.motion.rows])]
+        assert np.linalg.norm(at - cuts[cut.point_id]) < 0.01
+
+
+def test_each_cut_says_when_and_how_near():
+    made = ROLLOUT.roll(PreviewRequest(1, START, POINTS))
+    a, b = made.cuts
+    assert a.begins_s == 0.0 < a.cut_s < a.ends_s == b.begins_s < b.cut_s < b.ends_s == made.duration
+    for cut in made.cuts:
+        assert 0.0 < cut.clearance < 1.0 and all(cut.between)
+        assert 0.0 < cut.manipulability < 0.2 and 0.0 < cut.joint_margin < 1.6
+    assert set(made.plans) == {"a", "b"}
+    times = [row.time for row in made.rows]
+    assert times[0] == 0.0 and np.diff(times).max() <= 0.1 + 1e-9
+
+
+def test_one_request_has_one_hash_and_another_one_has_another():
+    one = ROLLOUT.roll(PreviewRequest(1, START, POINTS[:1]))
+    assert Rollout(CONFIG, RobotConfig()).roll(PreviewRequest(2, START, POINTS[:1])).digest == one.digest
+    moved = START.copy()
+    moved[0] += 0.01
+    assert ROLLOUT.roll(PreviewRequest(3, moved, POINTS[:1])).digest != one.digest
+
+
+def test_what_cannot_be_reached_is_shown_as_not_cut_with_the_reason():
+    made = ROLLOUT.roll(PreviewRequest(1, START, (point("high", (0.5, 0.75, 2.6)), POINTS[1])))
+    assert made.cuts[0].cut_s is None
+    assert "not reachable" in made.cuts[0].result
+    assert made.cuts[1].result == "cut"
+
+
+def test_what_stands_around_comes_into_the_clearance():
+    free = ROLLOUT.roll(PreviewRequest(1, START, POINTS[:1])).cuts[0]
+    post = Capsule("post", (0.9, 0.72, 0.0), (0.9, 0.72, 2.0), 0.04, 0.04)
+    beside = ROLLOUT.roll(PreviewRequest(1, START, POINTS[:1], (post,))).cuts[0]
+    assert beside.clearance <= free.clearance
+    assert beside.result == "cut"
+
+
+def test_a_robot_that_is_nowhere_has_no_preview():
+    with pytest.raises(ControlError, match="finite"):
+        ROLLOUT.roll(PreviewRequest(1, np.full(12, np.nan), POINTS))
+
+
+def test_where_pictures_take_long_a_look_back_does_not_keep_the_next_one_from_being_answered():
+    """The cut before is still being looked at when the tool is at the next place."""
+    near = (POINTS[0], point("b", (0.4, 0.77, 1.1)))
+    made = ROLLOUT.roll(PreviewRequest(1, START, near, look_s=1.2))
+    assert [cut.result for cut in made.cuts] == ["cut", "cut"]

@@ -1,0 +1,140 @@
+"""The session's report, from rows as the ledger has them."""
+
+from datetime import UTC, datetime
+
+from msgspec.structs import replace
+
+from controller.ledger.journal import RequestRow, TicketRow
+from controller.ledger.session_report import SessionReportBuilder
+from rolling_panda.messages import commands as intents
+from rolling_panda.messages.supervision import SessionReport
+from rolling_panda.messages.types import Answer
+from rolling_panda.transport.codec import StrictDecoder, encode
+from tests.support.fake_wire import pruning_point
+
+BEGAN = datetime(2026, 1, 31, 9, 0, tzinfo=UTC).timestamp()
+
+
+def at(seconds):
+    return datetime.fromtimestamp(BEGAN + seconds, UTC).isoformat(timespec="microseconds")
+
+
+def ticket(name, state, vine=1, **changes):
+    return TicketRow(point=replace(pruning_point(name), vine=vine), state=state, cut_id=f"c-{name}", **changes)
+
+
+def asked(intent, reason=""):
+    return RequestRow(asked=intent, ok=not reason, reason=reason, mode="READY")
+
+
+def report(*rows):
+    account = SessionReportBuilder()
+    for seconds, row in rows:
+        account.take(at(seconds), row)
+    # As it comes to the server.
+    return StrictDecoder(SessionReport).decode(encode(account.report()))
+
+
+def test_a_cut_takes_from_the_one_before_or_from_the_start_of_work():
+    told = report(
+        (0.0, asked(intents.Arm(user="ada"))),
+        (10.0, asked(intents.Start(user="ada"))),
+        (13.0, ticket("a", "INTENT", user="ada")),
+        (14.0, ticket("a", "DONE")),
+        (17.0, ticket("b", "INTENT", vine=2, user="ada")),
+        (17.5, ticket("b", "FAILED_NOT_CUT", vine=2, reason="the wood stands")),
+        (60.0, asked(intents.Start(user="ada"))),
+        (63.0, ticket("c", "INTENT", vine=2, user="ada")),
+    )
+    assert told.began_at == BEGAN
+    assert [(cut.point_id, cut.outcome, round(cut.seconds, 3)) for cut in told.cuts] == [
+        ("a", "DONE", 4.0),
+        ("b", "FAILED_NOT_CUT", 3.5),
+        ("c", "", 0.0),
+    ]
+    assert told.cuts[1].reason == "the wood stands" and told.cuts[1].ended_at == BEGAN + 17.5
+    assert [(vine.vine, vine.done, vine.not_cut, round(vine.seconds, 3)) for vine in told.vines] == [
+        (1, 1, 0, 4.0),
+        (2, 0, 1, 3.5),
+    ]
+
+
+def test_a_point_that_is_given_up_before_the_blades_close_is_told_each_time_it_was_tried():
+    given_up = replace(ticket("a", "FAILED_NOT_CUT", user="ada", reason="not reached in time"), cut_id="")
+    accepted = replace(ticket("a", "ACCEPTED", user="ada"), cut_id="")
+    told = report(
+        (0.0, accepted),
+        (1.0, asked(intents.Start(user="ada"))),
+        (6.0, given_up),
+        # Seen anew it is recorded again, and was tried once all the same.
+        (7.0, given_up),
+        (20.0, accepted),
+        (21.0, asked(intents.Start(user="ada"))),
+        (24.0, given_up),
+    )
+    assert [(cut.cut_id, cut.point_id, cut.outcome, cut.reason, cut.user, cut.seconds) for cut in told.cuts] == [
+        ("", "a", "FAILED_NOT_CUT", "not reached in time", "ada", 5.0),
+        ("", "a", "FAILED_NOT_CUT", "not reached in time", "ada", 3.0),
+    ]
+    assert told.vines[0].not_cut == 2
+
+
+def test_a_point_that_is_given_up_at_its_second_try_leaves_the_first_cut_as_it_was():
+    failed = ticket("a", "FAILED_NOT_CUT", user="ada", reason="the wood stands")
+    missed = ticket("a", "FAILED_NOT_CUT", user="ada", reason="not reached in time")
+    told = report(
+        (0.0, ticket("a", "ACCEPTED", user="ada")),
+        (1.0, asked(intents.Start(user="ada"))),
+        (2.0, ticket("a", "INTENT", user="ada")),
+        (3.0, failed),
+        (10.0, ticket("a", "ACCEPTED", user="ada")),
+        (11.0, asked(intents.Start(user="ada"))),
+        (15.0, missed),
+        (16.0, missed),
+    )
+    assert [(cut.cut_id, cut.reason, cut.seconds) for cut in told.cuts] == [
+        ("c-a", "the wood stands", 2.0),
+        ("", "not reached in time", 4.0),
+    ]
+
+
+def test_who_says_later_how_a_cut_ended_takes_the_robot_no_time():
+    told = report(
+        (0.0, asked(intents.Start(user="ada"))),
+        (3.0, ticket("a", "INTENT", user="ada")),
+        (5.0, ticket("a", "UNKNOWN", user="ada")),
+        (500.0, ticket("a", "DONE", user="bob", reason="seen by eye")),
+    )
+    (cut,) = told.cuts
+    assert (cut.outcome, cut.user, cut.seconds) == ("DONE", "bob", 5.0)
+    assert told.vines[0].unknown == 0 and told.vines[0].done == 1
+
+
+def test_refusals_and_changes_of_control_are_told_and_the_newest_go_over_the_wire():
+    rows = [(1.0, asked(intents.TakeControl(user="bob", confirmed=True)))]
+    rows += [(2.0 + n, asked(intents.Start(user="bob"), f"no point is accepted {n}")) for n in range(150)]
+    told = report(*rows)
+    assert [(change.user, change.what) for change in told.control] == [("bob", "took control")]
+    assert told.refusal_count == 150 and len(told.refusals) == 100
+    assert (told.refusals[-1].asked, told.refusals[-1].reason) == ("Start", "no point is accepted 149")
+
+
+def test_points_without_a_cut_and_lines_of_the_log_are_not_in_it():
+    account = SessionReportBuilder()
+    assert account.take(at(0.0), Answer(ok=True)), "it began then"
+    accepted = replace(ticket("a", "ACCEPTED", user="ada"), cut_id="")
+    assert not account.take(at(1.0), accepted) and not account.take(at(2.0), Answer(ok=True))
+    assert account.report().cuts == () and account.report().began_at == BEGAN
+
+
+def test_points_out_of_reach_are_counted_by_vine_until_they_are_in_reach_or_taken_off():
+    def row(name, state, vine):
+        return replace(ticket(name, state, vine), cut_id="")
+
+    rows = [(1.0, row(name, "UNREACHABLE", vine)) for name, vine in (("a", 1), ("b", 2), ("c", 2), ("d", 3))]
+    rows += [(2.0, row("b", "ACCEPTED", 2)), (3.0, row("d", "REJECTED", 3)), (4.0, ticket("e", "INTENT", 2))]
+    told = report((0.5, asked(intents.Start(user="ada"))), *rows, (5.0, ticket("e", "DONE", 2)))
+    assert [(vine.vine, vine.done, vine.unreachable) for vine in told.vines] == [(1, 0, 1), (2, 1, 1)]
+    assert told.cut_count == 1, "nothing was tried where nothing can be reached"
+    account = SessionReportBuilder()
+    assert account.take(at(1.0), row("a", "UNREACHABLE", 1)) and account.take(at(2.0), row("a", "ACCEPTED", 1))

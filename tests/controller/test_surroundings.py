@@ -1,0 +1,122 @@
+import msgspec
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from benchmarks.common.kinematic_robot import KinematicRobot
+from controller.config import ControllerConfig
+from controller.core import Controller
+from controller.inputs import Sample
+from controller.motion.surroundings import Surroundings
+from controller.whole_body.collision import CollisionModel
+from rolling_panda import messages as m
+from rolling_panda.config import RobotConfig
+from rolling_panda.messages import commands as intents
+from rolling_panda.messages.perception import Capsule, Obstacles
+from rolling_panda.messages.supervision import TeleopTarget
+from rolling_panda.model.robot import RobotModel, pose_message
+
+CONFIG = ControllerConfig()
+HOME = np.concatenate([np.zeros(5), CONFIG.home])
+
+
+def told(*capsules: Capsule) -> Sample[Obstacles]:
+    return Sample(Obstacles(header=m.Header(0.0, "odom"), capsules=capsules), 0.0)
+
+
+def post(x: float, y: float, radius: float = 0.04) -> Capsule:
+    return Capsule("post", (x, y, 0.0), (x, y, 1.9), radius, radius)
+
+
+def test_what_perception_tells_is_what_distances_are_kept_to() -> None:
+    around = Surroundings(CollisionModel(RobotModel()))
+    free = around.model.least(HOME).distance
+    around.take(told(post(0.5, 0.25)))
+    near = around.model.least(HOME)
+    assert near.distance < free and any("post" in side for side in near.pair)
+    around.take(told())
+    assert around.model.least(HOME).distance == free
+
+
+def cane(x: float, vine: int = 1, spur: int = 2, low: float = 0.9, high: float = 1.2) -> Capsule:
+    return Capsule("cane", (x, 0.0, low), (x, 0.0, high), 0.004, 0.004, vine, spur)
+
+
+def parts_near(around: Surroundings, q: np.ndarray, name: str) -> set[str]:
+    return {a for a, b in around.model.distances(q, 2.0).pairs if b == name}
+
+
+def test_the_blades_may_touch_the_spur_that_is_cut_and_nothing_else_may() -> None:
+    around = Surroundings(CollisionModel(RobotModel()))
+    first, second = "cane 0 of vine 1, spur 2", "cane 2 of vine 1, spur 3"
+    around.take(told(cane(1.0), post(1.0, 0.5), cane(1.04, spur=3), cane(1.0, low=1.2, high=1.3)))
+    everything = parts_near(around, HOME, first)
+    assert {"blades", "cutter", "camera", "link5", "base"} <= everything
+    around.work_at((np.array([1.0, 0.0, 1.22]),))
+    assert parts_near(around, HOME, first) == everything - {"blades"}
+    assert parts_near(around, HOME, "cane 3 of vine 1, spur 2") == everything - {"blades"}, "all of the spur"
+    assert "blades" in parts_near(around, HOME, second) and "blades" in parts_near(around, HOME, "post 1")
+    around.work_at((np.array([1.0, 0.0, 1.22]), np.array([1.04, 0.0, 1.22])))
+    assert "blades" not in parts_near(around, HOME, first) | parts_near(around, HOME, second)
+    around.work_at(())
+    assert "blades" in parts_near(around, HOME, first)
+
+
+def test_what_is_cut_stays_known_when_canes_are_told_anew_under_other_numbers() -> None:
+    around = Surroundings(CollisionModel(RobotModel()))
+    around.work_at((np.array([1.0, 0.0, 1.22]),))
+    around.take(told(cane(1.0)))
+    assert "blades" not in parts_near(around, HOME, "cane 0 of vine 1, spur 2")
+    around.take(told(cane(2.0, spur=5), cane(1.0)))
+    assert "blades" in parts_near(around, HOME, "cane 0 of vine 1, spur 5")
+    assert "blades" not in parts_near(around, HOME, "cane 1 of vine 1, spur 2")
+
+
+def test_beside_a_cut_the_blades_may_push_aside_what_may_yet_be_cut_off() -> None:
+    around = Surroundings(CollisionModel(RobotModel()))
+    open_choice = [msgspec.structs.replace(cane(x, spur=spur), undecided=True) for x, spur in ((1.02, 3), (1.08, 4))]
+    around.take(told(cane(1.0), *open_choice))
+    beside, away = "cane 1 of vine 1, spur 3", "cane 2 of vine 1, spur 4"
+    assert "blades" in parts_near(around, HOME, beside)
+    around.work_at((np.array([1.0, 0.0, 1.22]),))
+    assert "blades" not in parts_near(around, HOME, beside) and "cutter" in parts_near(around, HOME, beside)
+    assert "blades" in parts_near(around, HOME, away)
+
+
+def test_a_cut_far_from_every_cane_exempts_none() -> None:
+    around = Surroundings(CollisionModel(RobotModel()))
+    around.take(told(cane(1.0)))
+    around.work_at((np.array([1.06, 0.0, 1.0]),))
+    assert "blades" in parts_near(around, HOME, "cane 0 of vine 1, spur 2")
+
+
+@pytest.mark.parametrize("method", ["hierarchy", "nullspace", "decoupled"])
+def test_a_post_in_the_way_of_the_held_tool_is_not_met(method: str) -> None:
+    """The tool is led straight through a post; it stops before it, and the reason names it."""
+    robot = KinematicRobot(Controller(msgspec.structs.replace(CONFIG, method=method), RobotConfig()), CONFIG.home)
+    tool = robot.model.kinematics(robot.q).T_odom_tool
+    ahead = tool.translation + 0.25 * tool.rotation[:, 2]
+    robot.obstacles = told(post(float(ahead[0]), float(ahead[1]))).message.capsules
+    robot.run(0.3)
+    assert robot.ask(intents.Arm(user="ada")).ok
+    robot.run(0.05)
+    behind = tool.translation + 0.5 * tool.rotation[:, 2]
+    target = pose_message(pin.SE3(tool.rotation, behind))
+    robot.teleop = TeleopTarget(sequence=1, hold=True, user="ada", target=target)
+    judge = Surroundings(CollisionModel(RobotModel()))
+    judge.take(told(*robot.obstacles))
+    least, said = 1.0, set()
+    for _ in range(500):
+        robot.step()
+        said.add(robot.state.reason)
+        least = min(least, judge.model.least(robot.q).distance)
+    assert robot.state is not None and robot.state.mode == "TELEOP", robot.events
+    moved = robot.model.kinematics(robot.q).T_odom_tool.translation - tool.translation
+    assert np.linalg.norm(moved) > 0.1
+    assert least > 0.0, "it came near, and touched nothing"
+    assert "post" in robot.state.reason and "holds the" in robot.state.reason, said
+    # Taken back, nothing holds it, and nothing says so.
+    robot.teleop = TeleopTarget(sequence=2, hold=True, user="ada", target=pose_message(tool))
+    for _ in range(100):
+        robot.step()
+    assert robot.state.mode == "TELEOP" and "holds" not in robot.state.reason

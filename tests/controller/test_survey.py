@@ -1,0 +1,160 @@
+"""A survey is motion like any work: it drives along the row, cuts nothing, and says what perception found."""
+
+import numpy as np
+import pytest
+
+from controller.inputs import Sample
+from controller.work.survey import looked_again
+from rolling_panda import messages as m
+from rolling_panda.messages import commands as intents
+from rolling_panda.messages.perception import Capsule
+from rolling_panda.model.robot import ARM_Q, RobotModel
+from tests.support.controller_at_work import CONFIG, finish, point, robot, run_until
+
+UNCLEAR = m.Abstention("its base is hidden", "another look", 1, 2)
+ROBOT = RobotModel()
+ASKING = m.Abstention("two canes are alike", "operator", 1, 3)
+
+
+def surveying(distance, *abstained, **changes):
+    r = robot(**changes)
+    r.step()
+    tell(r, *abstained)
+    r.step()
+    assert r.ask(intents.Arm(user="ada")).ok
+    assert r.ask(intents.Survey(user="ada", distance=distance)).ok
+    return r
+
+
+def tell(r, *abstained):
+    """What perception says of the row from now on: one point, and what it left open."""
+    shown = (point("a", (0.5, 0.75, 1.0), vine=1, spur=1),)
+    told = m.PruningPoints(header=m.Header(), segmenter="none", frames=1, points=shown, abstained=abstained)
+    r._points = Sample(told, r.now)
+
+
+def test_it_drives_the_whole_way_with_the_arm_in_its_looking_posture_and_tells_what_was_found():
+    r = surveying(1.0, ASKING)
+    r.q[ARM_Q] = np.array(CONFIG.home) + 0.2
+    places = []
+    run_until(r, lambda s: s is not None and s.mode == "AUTO", 1.0)
+    while r.state.mode == "AUTO":
+        assert r.state.phase == "SURVEY" and r.now < 40.0
+        places.append(r.q[:3].copy())
+        if r.q[0] > 0.05:
+            assert np.abs(r.q[ARM_Q] - CONFIG.home).max() < 0.02
+        r.step()
+    assert r.state.mode == "READY"
+    assert r.state.reason == "surveyed: 1 vine, 2 spurs, 1 point; 0 places still unclear, 1 place for you to decide"
+    assert max(place[0] for place in places) == max(r.q[0], 0.0) or abs(r.q[0] - 1.0) < 0.02
+    speed = np.abs(np.diff([place[0] for place in places])) / r.dt
+    assert 0.1 < speed.max() < CONFIG.survey_speed * 1.05
+    assert max(abs(place[1]) for place in places) < 0.01 and not r.cuts
+
+
+def test_where_places_need_another_look_it_goes_back_over_its_way_once():
+    r = surveying(0.6, UNCLEAR)
+    finish(r, 40.0)
+    assert abs(r.q[0]) < 0.03 and any("1 place to be looked at again" in text for text in r.events)
+    assert "1 place still unclear" in r.state.reason
+
+
+def test_it_comes_back_to_its_line_when_it_begins_askew():
+    r = robot()
+    r.q[2] = 0.08
+    r.step()
+    tell(r)
+    r.step()
+    r.ask(intents.Arm(user="ada"))
+    assert r.ask(intents.Survey(user="ada", distance=1.5)).ok
+    finish(r, 40.0)
+    assert abs(r.q[1]) < 0.02 and abs(r.q[2]) < 0.02
+
+
+def test_it_needs_what_automatic_work_needs_and_no_accepted_point():
+    r = robot()
+    r.step()
+    refused = r.ask(intents.Survey(user="ada"))
+    assert not refused.ok and "arm" in refused.reason
+    r.ask(intents.Arm(user="ada"))
+    r.perception = False
+    r.step()
+    refused = r.ask(intents.Survey(user="ada"))
+    assert not refused.ok and "perception" in refused.reason
+
+
+def test_a_pause_ends_it_and_resuming_does_not_begin_it_again():
+    r = surveying(2.0)
+    run_until(r, lambda s: s is not None and r.q[0] > 0.2, 30.0)
+    assert r.ask(intents.Pause(user="ada")).ok
+    r.run(1.0)
+    at = r.q[0]
+    assert r.ask(intents.Resume(user="ada")).ok
+    r.run(2.0)
+    assert r.state.mode == "READY" and abs(r.q[0] - at) < 0.005
+
+
+def test_the_stop_stops_it():
+    r = surveying(2.0)
+    run_until(r, lambda s: s is not None and r.q[0] > 0.2, 30.0)
+    at = r.q[0]
+    r.stop()
+    r.run(1.5)
+    assert r.state.mode == "ESTOP_LATCHED" and r.q[0] - at < 0.1
+
+
+def test_what_holds_the_base_back_pauses_it_with_the_reason():
+    post = Capsule("post", (1.0, 0.0, 0.0), (1.0, 0.0, 2.0), 0.05, 0.05)
+    r = surveying(3.0, obstacles=(post,))
+    finish(r, 60.0)
+    assert r.state.mode == "PAUSED" and "post" in r.state.reason
+    assert r.q[0] < 0.9
+
+
+def test_a_place_left_open_is_looked_at_from_both_sides_and_from_before_it():
+    place = m.Abstention("its base is hidden", "another look", 1, 2, position=(1.9, 0.8, 0.95))
+    r = robot()
+    r.step()
+    tell(r, place)
+    r.step()
+    assert r.ask(intents.Arm(user="ada")).ok
+    unknown = r.ask(intents.Survey(user="ada", vine=1, spur=7))
+    assert not unknown.ok and "nothing is left open at vine 1, spur 7" in unknown.reason
+    assert r.ask(intents.Survey(user="ada", vine=1, spur=2)).ok
+    stood = []
+    run_until(r, lambda s: s is not None and s.mode == "AUTO", 2.0)
+    while r.state.mode == "AUTO":
+        assert r.now < 60.0
+        before = r.q[0]
+        r.step()
+        if abs(r.q[0] - before) < 1e-5 * r.dt and (not stood or abs(stood[-1][0] - r.q[0]) > 0.05):
+            stood.append((float(r.q[0]), 1.9 - tool_ahead(r)))
+    assert not r.cuts
+    places = [x for x, _ in stood if x > 0.1]
+    assert len(places) == 3, stood
+    np.testing.assert_allclose(np.diff(places), 0.22, atol=0.02)
+    assert abs(places[1] - stood[-1][1]) < 0.03, "the camera is before the place once"
+    assert r.state.reason == "looked again at vine 1, spur 2: still unclear: its base is hidden"
+
+
+def tool_ahead(r):
+    """How far ahead of the base the tool is (m)."""
+    q = r.q.copy()
+    q[:3] = 0.0
+    return float(ROBOT.pose(q, ROBOT.tool_id).translation[0])
+
+
+@pytest.mark.parametrize(
+    ("abstained", "points", "says"),
+    [
+        ((), ("p7",), "looked again at vine 1, spur 2: p7 shown"),
+        (("two canes are alike",), (), "looked again at vine 1, spur 2: for you to decide: two canes are alike"),
+        ((), (), "looked again at vine 1, spur 2: nothing is left open"),
+    ],
+)
+def test_what_came_of_the_look_is_told(abstained, points, says):
+    left = tuple(m.Abstention(why, "operator", 1, 2, position=(0.4, 0.8, 0.95)) for why in abstained)
+    shown = tuple(point(name, (0.4, 0.75, 1.0), vine=1, spur=2) for name in points)
+    told = m.PruningPoints(header=m.Header(), segmenter="none", frames=1, points=shown, abstained=left)
+    place = m.Abstention("hidden", "another look", 1, 2, position=(0.4, 0.8, 0.95))
+    assert looked_again(told, place) == says

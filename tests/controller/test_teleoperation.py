@@ -1,0 +1,294 @@
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from benchmarks.common.kinematic_robot import KinematicRobot
+from controller.config import ControllerConfig
+from controller.core import Controller
+from controller.inputs import Sample
+from controller.motion.teleoperation import Teleoperation, latency_speed_scale
+from rolling_panda.config import RobotConfig
+from rolling_panda.messages import commands as intents
+from rolling_panda.messages.perception import Capsule
+from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
+from rolling_panda.model.robot import pose_message
+
+CONFIG = ControllerConfig()
+
+
+def robot(armed=True, method=CONFIG.method):
+    config = msgspec.structs.replace(CONFIG, method=method)
+    r = KinematicRobot(Controller(config, RobotConfig()), CONFIG.home)
+    r.run(0.05)
+    if armed:
+        assert r.ask(intents.Arm(user="ada")).ok
+        r.run(0.05)
+    return r
+
+
+def tool(r):
+    return r.model.kinematics(r.q).T_odom_tool
+
+
+def hold(r, target, held=True):
+    r.teleop = TeleopTarget(sequence=1, hold=held, user="ada", target=pose_message(target))
+
+
+def moved(T, x, y, z, turn=0.0):
+    return pin.SE3(T.rotation @ pin.exp3(np.array([0, turn, 0])), T.translation + np.array([x, y, z]))
+
+
+def test_tool_follows_the_gizmo_within_its_speed():
+    r = robot()
+    target = moved(tool(r), 0.3, 0.1, 0.1, 0.3)
+    hold(r, target)
+    fastest, before = 0.0, tool(r).translation
+    for _ in range(800):
+        r.step()
+        after = tool(r).translation
+        fastest, before = max(fastest, float(np.linalg.norm(after - before)) / r.dt), after
+    assert r.state.mode == "TELEOP"
+    assert np.linalg.norm(tool(r).translation - target.translation) < 0.002
+    assert np.linalg.norm(pin.log3(tool(r).rotation.T @ target.rotation)) < 0.01
+    # This base lags by less than the controller reckons with, so that the arm makes good too much for a moment.
+    assert 0.1 < fastest <= 1.08 * CONFIG.teleop_speed
+
+
+@pytest.mark.parametrize("about", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)])
+def test_tool_turns_with_the_gizmo_about_each_axis_and_stays_where_it_is(about):
+    r = robot()
+    start = tool(r)
+    target = pin.SE3(start.rotation @ pin.exp3(0.35 * np.array(about)), start.translation)
+    hold(r, target)
+    r.run(6.0)
+    assert np.linalg.norm(pin.log3(tool(r).rotation.T @ target.rotation)) < 0.01
+    assert np.linalg.norm(tool(r).translation - target.translation) < 0.003
+
+
+@pytest.mark.parametrize("share", [1.0, 0.3])
+def test_the_tool_keeps_to_its_share_of_the_speed(share):
+    r = robot()
+    hold(r, moved(tool(r), 0.6, 0.0, 0.0))
+    r.teleop = msgspec.structs.replace(r.teleop, share=share)
+    before = tool(r).translation
+    r.run(1.5)
+    way = float(np.linalg.norm(tool(r).translation - before))
+    assert 0.6 * share * 1.5 * CONFIG.teleop_speed < way <= 1.08 * share * 1.5 * CONFIG.teleop_speed
+
+
+def test_a_hand_is_told_how_near_it_is_to_what_and_what_holds_it():
+    r = robot()
+    here = tool(r).translation
+    hold(r, moved(tool(r), 0.0, 0.0, 0.0))
+    r.run(0.2)
+    assert r.state.near is None or r.state.near.distance > 0.03
+    assert r.state.held_by == ""
+    ahead = here + tool(r).rotation @ np.array([0.0, 0.0, 0.25])
+    bottom, top = ahead - [0.0, 0.0, 0.4], ahead + [0.0, 0.0, 0.4]
+    r.obstacles = (Capsule("post", tuple(bottom.tolist()), tuple(top.tolist()), 0.04, 0.04),)
+    target = pin.SE3(tool(r).rotation, tool(r).translation + tool(r).rotation @ np.array([0.0, 0.0, 0.3]))
+    r.run(0.2)
+    r.teleop = TeleopTarget(sequence=2, hold=True, user="ada", target=pose_message(target))
+    r.run(3.0)
+    assert r.state.mode == "TELEOP"
+    assert "post 0" in r.state.near.what and 0.0 < r.state.near.distance < 0.05
+    assert "post 0" in r.state.held_by
+    r.teleop = TeleopTarget(sequence=3, hold=False, user="ada")
+    r.run(0.2)
+    assert (r.state.near, r.state.held_by) == (None, ""), "nothing is said of what nobody moves"
+
+
+def test_base_comes_along_when_the_gizmo_goes_far_and_stays_parallel_to_the_row():
+    r = robot()
+    target = moved(tool(r), 1.2, 0.1, 0.05)
+    hold(r, target)
+    r.run(15.0)
+    assert np.linalg.norm(tool(r).translation - target.translation) < 0.005
+    assert r.q[0] > 0.5
+    assert abs(r.q[2]) < 0.1
+
+
+def test_letting_go_stops_at_once_and_a_new_hold_goes_on():
+    r = robot()
+    target = moved(tool(r), 0.5, 0, 0)
+    hold(r, target)
+    r.run(1.0)
+    assert np.abs(r.xi).max() > 0.1
+    hold(r, target, held=False)
+    r.run(0.06)
+    assert r.state.mode == "READY"
+    r.run(0.29)
+    assert np.abs(r.xi).max() < 1e-2
+    hold(r, target)
+    r.run(0.2)
+    assert r.state.mode == "TELEOP"
+
+
+def test_silence_ends_the_hold(monkeypatch):
+    r = robot()
+    hold(r, moved(tool(r), 0.5, 0, 0))
+    r.run(1.0)
+    # The newest target stays what it is; only its age grows.
+    inputs, at = r.inputs, r.now
+    held = r.teleop
+
+    def silent():
+        return replace(inputs(), teleop=Sample(held, at))
+
+    monkeypatch.setattr(r, "inputs", silent)
+    r.run(0.5)
+    assert r.state.mode == "READY"
+    assert np.abs(r.xi).max() < 1e-3
+
+
+def test_a_demand_that_comes_late_or_twice_counts_for_nothing():
+    teleoperation, age = Teleoperation(CONFIG, None, None), CONFIG.hold_max_age_s
+
+    def holding(sequence, at, hold=True, now=None):
+        message = TeleopTarget(sequence=sequence, hold=hold, user="ada", base=BaseVelocity(0.1, 0.0))
+        return teleoperation.holding(Sample(message, at), at if now is None else now)
+
+    assert holding(5, 1.0)
+    assert not holding(6, 1.0 + 0.2 * age, hold=False)
+    assert not holding(5, 1.0 + 0.3 * age), "older than the release"
+    assert not holding(6, 1.0 + 0.4 * age), "of the same number as the release"
+    assert holding(7, 2.0)
+    assert holding(7, 2.0 + 0.9 * age)
+    assert not holding(7, 2.0 + 0.9 * age, now=2.0 + 1.1 * age), "a repetition keeps nothing alive"
+    assert holding(1, 3.0), "the server has started again"
+
+
+def test_a_hold_from_before_arming_moves_nothing():
+    r = robot(armed=False)
+    hold(r, moved(tool(r), 0.5, 0, 0))
+    r.run(0.2)
+    assert r.ask(intents.Arm(user="ada")).ok
+    r.run(0.5)
+    assert r.state.mode == "READY"
+    assert not np.any(r.record)
+
+
+def test_without_the_server_there_is_no_teleoperation():
+    r = robot()
+    hold(r, moved(tool(r), 0.5, 0, 0))
+    r.run(1.0)
+    r.server = False
+    r.run(0.4)
+    assert r.state.mode == "PAUSED" and "server" in r.state.reason
+    assert np.abs(r.xi).max() < 1e-2
+
+
+def test_joint_limits_hold_when_the_gizmo_is_out_of_reach():
+    r = robot()
+    hold(r, moved(tool(r), 0.0, 0.9, 1.5))
+    r.run(12.0)
+    arm = r.q[5:]
+    limits = r.model.limits
+    assert (arm > limits.lower[5:]).all() and (arm < limits.upper[5:]).all()
+    xi, every = np.array(r.record), CONFIG.base_every
+    assert (np.abs(np.diff(xi, axis=0))[:, 2:] <= limits.acceleration[2:] * r.dt + 1e-9).all()
+    # The base is told something new once in its own period.
+    assert (np.abs(xi[every:, :2] - xi[:-every, :2]) <= limits.acceleration[:2] * r.dt * every + 1e-9).all()
+
+
+def held(r, **wanted):
+    r.teleop = TeleopTarget(sequence=1, hold=True, user="ada", **wanted)
+
+
+@pytest.mark.parametrize("method", ["hierarchy", "nullspace"])
+def test_joints_are_turned_alone_and_stop_before_their_limits(method):
+    r = robot(method=method)
+    before = r.q.copy()
+    held(r, joints=(0.0, 0.0, 0.0, 0.0, 0.0, 0.3, 0.0))
+    r.run(1.0)
+    turned = r.q - before
+    assert 0.2 < turned[10] < 0.3
+    assert np.abs(np.delete(turned, 10)).max() < 1e-6
+    r.run(20.0)
+    assert r.q[10] < r.model.limits.upper[10]
+    assert r.state.mode == "TELEOP"
+
+
+def test_a_joint_velocity_beyond_the_limits_is_slowed_not_refused():
+    r = robot()
+    held(r, joints=(0.0, 0.0, 0.0, 0.0, 9.0, 0.0, 9.0))
+    r.run(0.5)
+    fastest = np.abs(np.array(r.record)).max(axis=0)
+    assert (fastest <= r.model.limits.velocity + 1e-9).all()
+    assert fastest[8] > 0.5 and np.isclose(fastest[6], fastest[8], rtol=0.05), "both slowed alike"
+
+
+def test_the_base_is_driven_with_the_arm_still():
+    r = robot()
+    arm = r.q[5:].copy()
+    held(r, base=BaseVelocity(0.2, 0.0))
+    r.run(2.0)
+    assert 0.25 < r.q[0] < 0.42
+    assert np.abs(r.q[5:] - arm).max() < 1e-6
+    held(r, base=BaseVelocity(0.0, 0.15))
+    r.run(2.0)
+    assert 0.15 < r.q[2] < 0.31
+
+
+def test_the_base_moves_under_a_tool_that_stays():
+    r = robot()
+    start = tool(r)
+    held(r, target=pose_message(start), base=BaseVelocity(-0.1, 0.0))
+    r.run(1.5)
+    assert r.q[0] < -0.08
+    assert np.linalg.norm(tool(r).translation - start.translation) < 0.003
+    assert np.linalg.norm(pin.log3(tool(r).rotation.T @ start.rotation)) < 0.01
+    # As far as the arm allows: the tool comes first.
+    r.run(20.0)
+    assert np.linalg.norm(tool(r).translation - start.translation) < 0.01
+
+
+def test_a_demand_for_nothing_or_for_two_things_moves_nothing():
+    for wanted in ({}, {"joints": (0.2,) * 7, "base": BaseVelocity(0.1, 0.0)}):
+        r = robot()
+        held(r, **wanted)
+        r.run(0.3)
+        assert r.state.mode == "READY" and not np.any(r.record)
+
+
+def test_who_sees_the_robot_late_moves_it_slowly():
+    assert [latency_speed_scale(late) for late in (0.0, 0.25, 0.5, 9.0)] == [1.0, 1.0, 0.25, 0.25]
+    assert latency_speed_scale(0.375) == pytest.approx(0.625)
+    speeds = []
+    for late in (0.1, 0.6):
+        r = robot()
+        goal = pose_message(moved(tool(r), 0.5, 0, 0))
+        r.teleop = TeleopTarget(sequence=1, hold=True, user="ada", target=goal, round_trip_s=late)
+        before = tool(r).translation.copy()
+        r.run(1.5)
+        speeds.append(np.linalg.norm(tool(r).translation - before) / 1.5)
+        r.teleop = TeleopTarget(sequence=1, hold=True, user="ada", base=BaseVelocity(0.14, 0.0), round_trip_s=late)
+        r.run(1.0)
+        speeds.append(abs(r.xi[0]) * r.model.drive.wheel_radius)
+    assert speeds[2] < 0.35 * speeds[0]
+    assert speeds[1] == pytest.approx(0.14, rel=0.05) and speeds[3] == pytest.approx(0.035, rel=0.05)
+
+
+def test_the_base_is_driven_no_faster_than_it_comes_to_rest_from_in_time():
+    for base in (BaseVelocity(0.3, 0.0), BaseVelocity(-2.0, 0.0), BaseVelocity(0.2, 0.2)):
+        r = robot()
+        held(r, base=base)
+        r.run(1.5)
+        wheels = np.abs(r.xi[:2]) * r.model.drive.wheel_radius
+        assert wheels.max() == pytest.approx(CONFIG.teleop_base_speed, rel=0.02)
+        v, omega = r.model.drive.twist(*r.xi[:2])
+        assert v * base.angular == pytest.approx(omega * base.linear, abs=1e-3), "slowed alike"
+
+
+def test_a_tool_that_is_led_along_the_row_takes_the_base_no_faster_than_that():
+    r = robot()
+    held(r, target=pose_message(moved(tool(r), 2.0, 0, 0)))
+    fastest = 0.0
+    for _ in range(400):
+        r.step()
+        fastest = max(fastest, np.abs(r.xi[:2]).max() * r.model.drive.wheel_radius)
+    assert fastest == pytest.approx(CONFIG.teleop_base_speed, rel=0.02)
+    assert r.q[0] > 0.3, "and it does take it along"

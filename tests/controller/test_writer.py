@@ -1,0 +1,125 @@
+"""Records become durable off the control loop; what cannot be written is told, kept and written later."""
+
+import json
+import threading
+import time
+
+import pytest
+
+from controller.ledger.check import reading, verify
+from controller.ledger.journal import Record
+from controller.ledger.store import Ledger, read
+from controller.ledger.writer import LedgerWriter
+from rolling_panda import messages as m
+from rolling_panda.errors import LedgerError
+
+
+def record(number, text="x"):
+    return Record(number, "event", "test", m.Header(frame_id=text))
+
+
+def line(text, process="server"):
+    return m.LogEvent(header=m.Header(), process=process, severity="info", text=text)
+
+
+def eventually(condition):
+    end = time.monotonic() + 20.0
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.002)
+
+
+@pytest.fixture
+def writers():
+    made = []
+
+    def make(*args, **changes):
+        made.append(LedgerWriter(*args, **changes))
+        return made[-1]
+
+    yield make
+    for writer in made:
+        writer.close()
+
+
+class Disk:
+    """A ledger whose disk can be full or slow."""
+
+    def __init__(self):
+        self.rows, self.full, self.go, self.closed = [], False, threading.Event(), False
+        self.go.set()
+
+    def append(self, entries):
+        new = list(entries)
+        self.go.wait(10.0)
+        if self.full:
+            raise LedgerError("cannot write: database or disk is full")
+        self.rows += new
+
+    def close(self):
+        self.closed = True
+
+
+def test_what_is_handed_over_is_in_the_ledger_when_the_state_says_so(tmp_path, writers):
+    writer = writers(lambda: Ledger(tmp_path))
+    writer.write([record(1, "a"), record(2, "b")])
+    eventually(lambda: writer.state.durable == 2)
+    with reading(tmp_path) as database:
+        rows = list(read(database))
+    assert [json.loads(row.entry.body)["frame_id"] for row in rows] == ["a", "b"]
+    assert rows[0].entry.at.endswith("+00:00") and verify(tmp_path).problem == ""
+
+
+def test_handing_over_never_waits_for_a_slow_disk(writers):
+    disk = Disk()
+    writer = writers(lambda: disk)
+    disk.go.clear()
+    began = time.monotonic()
+    for number in range(1, 1001):
+        writer.write([record(number)])
+    assert time.monotonic() - began < 0.5 and writer.state.durable == 0
+    disk.go.set()
+    eventually(lambda: writer.state.durable == 1000)
+    assert len(disk.rows) == 1000
+
+
+def test_a_full_disk_is_told_and_nothing_is_lost_when_there_is_room_again(writers):
+    disk = Disk()
+    disk.full = True
+    writer = writers(lambda: disk)
+    writer.write([record(1)])
+    eventually(lambda: writer.state.failure)
+    assert "disk is full" in writer.state.failure and writer.state.durable == 0
+    writer.write([record(2)])
+    disk.full = False
+    eventually(lambda: writer.state.durable == 2)
+    assert writer.state.failure == "" and len(disk.rows) == 2
+
+
+def test_a_ledger_that_cannot_be_opened_is_told_and_tried_again(tmp_path, writers):
+    folder = tmp_path / "later"
+    writer = writers(lambda: Ledger(folder))
+    writer.write([record(1)])
+    eventually(lambda: writer.state.failure)
+    folder.mkdir()
+    eventually(lambda: writer.state.durable == 1)
+
+
+def test_the_end_writes_what_waits_and_closes(writers):
+    disk = Disk()
+    writer = writers(lambda: disk)
+    writer.write([record(number) for number in range(1, 3001)])
+    writer.close()
+    assert len(disk.rows) == 3000 and disk.closed
+
+
+def test_a_flood_of_lines_is_counted_instead_of_recorded(writers):
+    disk, now = Disk(), [0.0]
+    writer = writers(lambda: disk, clock=lambda: now[0])
+    for number in range(1000):
+        writer.note(line(f"refused {number}"))
+    now[0] += 1.0
+    writer.note(line("after"))
+    eventually(lambda: len(disk.rows) == 202)
+    assert "refused 199" in disk.rows[199].body
+    assert json.loads(disk.rows[200].body)["lines"] == 800 and "after" in disk.rows[201].body

@@ -1,0 +1,79 @@
+import zlib
+
+import msgspec
+import numpy as np
+import pytest
+
+from perception.segmentation.frame import decode_frame
+from perception.segmentation.segmenter import LabelImageSegmenter
+from rolling_panda import messages as m
+from rolling_panda.errors import InputError, MessageError
+from rolling_panda.messages.robot import CameraFrame, Intrinsics
+from rolling_panda.model.robot import RobotModel
+
+WIDTH, HEIGHT = 32, 24
+
+
+@pytest.fixture(scope="module")
+def model():
+    return RobotModel()
+
+
+def good_frame(**changes):
+    depth = np.full((HEIGHT, WIDTH), 800, dtype="<u2")
+    frame = CameraFrame(
+        header=m.Header(1.0, "camera"),
+        sequence=1,
+        intrinsics=Intrinsics(WIDTH, HEIGHT, 20.0, 20.0, 15.5, 11.5),
+        base=m.PlanarPose(0.3, 0.0, 0.1),
+        position=(0.0, 0.0, 0.0, -0.3, 0.0, -2.2, 1.7, 1.4, 0.0),
+        color_jpeg=b"",
+        depth_zlib=zlib.compress(depth.tobytes()),
+        depth_unit=0.001,
+        labels_zlib=zlib.compress(np.zeros((HEIGHT, WIDTH), dtype=np.uint8).tobytes()),
+    )
+    return msgspec.structs.replace(frame, **changes)
+
+
+def test_points_and_pixels_are_inverse(model):
+    view = decode_frame(good_frame(), model)
+    assert view.depth[0, 0] == pytest.approx(0.8)
+    points = view.points([3.0, 11.5], [5.0, 15.5], np.array([0.5, 0.8]))
+    np.testing.assert_allclose(view.pixels(points), [[5.0, 3.0, 0.5], [15.5, 11.5, 0.8]], atol=1e-9)
+    # The middle of the image lies straight ahead of the camera.
+    np.testing.assert_allclose(points[1], view.t + 0.8 * view.R[:, 2], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"depth_zlib": b"rubbish"}, "corrupt"),
+        ({"depth_zlib": b""}, "bytes of"),
+        ({"depth_zlib": zlib.compress(b"\0" * 7)}, "bytes of"),
+        ({"depth_zlib": zlib.compress(b"\0" * (WIDTH * HEIGHT * 2 + 1))}, "bytes of"),
+        ({"depth_zlib": zlib.compress(bytes(1 << 26))}, "bytes of"),
+        ({"labels_zlib": zlib.compress(b"\0" * 5)}, "label image"),
+        ({"labels_zlib": zlib.compress(b"\xff" * (WIDTH * HEIGHT))}, "class 255"),
+        ({"position": (float("nan"),) * 9}, "finite"),
+        ({"position": (0.0,) * 8}, "posture"),
+        ({"base": m.PlanarPose(float("inf"), 0.0, 0.0)}, "finite"),
+        ({"intrinsics": Intrinsics(WIDTH, HEIGHT, 0.0, 20.0, 15.5, 11.5)}, "focal"),
+        ({"depth_unit": float("nan")}, "depth_unit"),
+    ],
+)
+def test_a_bad_frame_is_refused(model, changes, says):
+    with pytest.raises(MessageError, match=says):
+        decode_frame(good_frame(**changes), model)
+
+
+def test_a_colour_image_that_is_none_is_refused(model):
+    with pytest.raises(MessageError, match="not a JPEG"):
+        decode_frame(good_frame(color_jpeg=b"no picture"), model).color()
+
+
+def test_without_labels_the_label_segmenter_says_why(model):
+    segmenter = LabelImageSegmenter()
+    assert segmenter.name == "simulator labels"
+    with pytest.raises(InputError, match="no label image"):
+        segmenter.segment(decode_frame(good_frame(labels_zlib=b""), model))
+    assert segmenter.segment(decode_frame(good_frame(), model)).shape == (HEIGHT, WIDTH)

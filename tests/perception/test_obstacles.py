@@ -1,0 +1,135 @@
+import math
+
+import numpy as np
+import pytest
+
+from benchmarks.perception.points import camera_frame, survey_arm
+from bridge.sim.camera.config import CameraConfig
+from bridge.sim.camera.renderer import Camera
+from bridge.sim.vineyard.config import VineyardConfig
+from bridge.sim.vineyard.grow import grow
+from perception.config import ObstacleConfig, PerceptionConfig
+from perception.obstacles.obstacle_map import ObstacleMap
+from perception.pipeline import Perception
+from perception.segmentation.frame import decode_frame
+from perception.segmentation.segmenter import LabelImageSegmenter
+from perception.segmentation.segmenter_choice import choose_segmenter
+from rolling_panda import messages as m
+from rolling_panda.messages.perception import Capsule
+from rolling_panda.model.robot import RobotModel, configuration
+
+
+def distance(point, start, end):
+    """From a point to a segment (m)."""
+    span = end - start
+    share = np.clip((point - start) @ span / (span @ span), 0.0, 1.0)
+    return float(np.linalg.norm(point - start - share * span))
+
+
+@pytest.fixture(scope="module", params=[1, 104])
+def seen(request):
+    """The row's own rods, and what was made of four frames each from two places."""
+    model, row = RobotModel(), grow(VineyardConfig(), request.param)
+    camera, known = Camera(CameraConfig(), request.param), ObstacleMap(ObstacleConfig())
+    capsules: tuple[Capsule, ...] = ()
+    for x in (-0.4, 0.4):
+        base, position = m.PlanarPose(x), (0.0, 0.0, *survey_arm())
+        place = model.pose(configuration(base, position), model.camera_id).homogeneous
+        for k in range(4):
+            frame = camera_frame(camera.render(row, place, k), camera, base, position, k)
+            view = decode_frame(frame, model)
+            capsules = known.update(view, LabelImageSegmenter().segment(view))
+    return row, capsules
+
+
+def test_every_rod_found_lies_on_one_of_its_kind(seen):
+    row, capsules = seen
+    assert {"wire", "cordon", "trunk"} <= {capsule.kind for capsule in capsules}
+    for capsule in capsules:
+        same = [rod for _, rod in row.standing() if rod.kind == capsule.kind]
+        for share in np.linspace(0.0, 1.0, 7):
+            point = np.array(capsule.start) + share * (np.array(capsule.end) - np.array(capsule.start))
+            gap = min(distance(point, rod.start, rod.end) for rod in same)
+            # The ends of two arms that nearly meet may become one rod.
+            assert gap < 0.032, (capsule, gap)
+
+
+def test_the_wires_before_the_robot_are_all_there(seen):
+    row, capsules = seen
+    wires = [capsule for capsule in capsules if capsule.kind == "wire"]
+    config = VineyardConfig()
+    # The one 0.3 m above the cordon is the one that the arm works under.
+    height = config.cordon_height + config.wires[0]
+    near = [wire for wire in wires if abs(wire.start[2] - height) < 0.03]
+    assert sum(math.dist(wire.start, wire.end) for wire in near) > 1.0
+
+
+def elbow(angle):
+    """The arm beside a cut, its fourth joint at this angle (7, rad)."""
+    return (-0.046, -1.034, 0.504, angle, 1.96, 1.944, 0.392)
+
+
+# As it comes to rest after the cut; and jogged up from there, near the post, rolled, and turned over.
+@pytest.mark.parametrize("after", [elbow(-2.213), elbow(-1.471), elbow(-1.021), elbow(-0.098)])
+def test_what_the_network_takes_for_wood_near_by_or_turned_over_is_nothing_in_the_way(after):
+    model, row, camera = RobotModel(), grow(VineyardConfig(), 0), Camera(CameraConfig(), 0)
+    seen, number = Perception(PerceptionConfig(), choose_segmenter("network", threads=1), model), 0
+    for base, arm, frames in ((m.PlanarPose(), survey_arm(), 5), (m.PlanarPose(0.0615), after, 8)):
+        position = (0.0, 0.0, *arm)
+        place = model.pose(configuration(base, position), model.camera_id).homogeneous
+        for _ in range(frames):
+            seen.process(camera_frame(camera.render(row, place, number), camera, base, position, number))
+            number += 1
+        if frames == 5:
+            points = {point.point_id for point in seen.points().points}
+    # What is behind the row is in nobody's way.
+    thick = [each for each in seen.obstacles if each.kind in ("post", "trunk", "cordon") and each.start[1] < 1.2]
+    assert thick and points
+    for capsule in thick:
+        same = [rod for _, rod in row.standing() if rod.kind == capsule.kind]
+        for end in (capsule.start, capsule.end):
+            assert min(distance(np.array(end), rod.start, rod.end) for rod in same) < 0.05, capsule
+        assert capsule.start_radius < 0.06, capsule
+    assert points <= {point.point_id for point in seen.points().points}, "nothing was cut"
+
+
+def test_while_a_joint_is_jogged_nothing_is_taken_for_cut_or_left_open():
+    model, row, camera = RobotModel(), grow(VineyardConfig(), 5), Camera(CameraConfig(), 5)
+    seen = Perception(PerceptionConfig(), choose_segmenter("network", threads=1), model)
+    told = []
+    for number, turned in enumerate([0.0] * 6 + [0.9, 1.0, 1.1, 1.2, 1.2, 1.2, 1.2, 1.2]):
+        arm = np.array(survey_arm()) + [0.0, 0.0, 0.0, turned, 0.0, 0.0, 0.0]
+        base, position = m.PlanarPose(0.2), (0.0, 0.0, *arm.tolist())
+        place = model.pose(configuration(base, position), model.camera_id).homogeneous
+        points = seen.process(camera_frame(camera.render(row, place, number), camera, base, position, number))
+        told.append(({point.point_id for point in points.points}, len(points.abstained)))
+    assert told[5][0] and all(each == told[5] for each in told[6:])
+
+
+def test_nothing_seen_is_nothing_known():
+    assert ObstacleMap(ObstacleConfig()).update(blank_view(), np.zeros((48, 64), dtype=np.uint8)) == ()
+
+
+def blank_view():
+    camera = Camera(CameraConfig(width=64, height=48), 0)
+    model, base, position = RobotModel(), m.PlanarPose(), (0.0, 0.0, *survey_arm())
+    place = model.pose(configuration(base, position), model.camera_id).homogeneous
+    empty = grow(VineyardConfig(first_vine_x=500.0), 0)
+    return decode_frame(camera_frame(camera.render(empty, place, 0), camera, base, position, 0), model)
+
+
+def test_of_too_many_rods_the_nearest_are_told():
+    camera, model = Camera(CameraConfig(), 1), RobotModel()
+    row, base, position = grow(VineyardConfig(), 1), m.PlanarPose(), (0.0, 0.0, *survey_arm())
+    place = model.pose(configuration(base, position), model.camera_id).homogeneous
+    every, few = ObstacleMap(ObstacleConfig()), ObstacleMap(ObstacleConfig(most=8))
+    for k in range(4):
+        view = decode_frame(camera_frame(camera.render(row, place, k), camera, base, position, k), model)
+        labels = LabelImageSegmenter().segment(view)
+        known, told = every.update(view, labels), few.update(view, labels)
+    assert len(told) == 6 < len(known) and set(told) <= set(known)
+
+    def away(capsule):
+        return distance(view.t, np.array(capsule.start), np.array(capsule.end)) - capsule.start_radius
+
+    assert max(map(away, told)) <= min(away(capsule) for capsule in known if capsule not in told)

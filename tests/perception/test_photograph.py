@@ -1,0 +1,88 @@
+"""Photographs, depth and intrinsics from files."""
+
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from perception.segmentation.photograph import load_photograph
+from rolling_panda.errors import InputError
+
+
+@pytest.fixture
+def image(tmp_path):
+    path = tmp_path / "vine.png"
+    Image.fromarray(np.random.default_rng(0).integers(0, 255, (120, 200, 3), dtype=np.uint8)).save(path)
+    return path
+
+
+def depth_png(path, counts):
+    Image.fromarray(counts.astype(np.uint16)).save(path)
+    return path
+
+
+def test_depth_comes_as_counts_or_as_metres(tmp_path, image):
+    counts = np.full((120, 200), 800)
+    as_counts = load_photograph(image, depth_png(tmp_path / "d.png", counts))
+    np.save(tmp_path / "d.npy", counts / 1000.0)
+    as_metres = load_photograph(image, tmp_path / "d.npy")
+    np.save(tmp_path / "tenth.npy", (counts * 10).astype(np.uint16))
+    as_tenths = load_photograph(image, tmp_path / "tenth.npy", depth_unit=0.0001)
+    for photograph in (as_counts, as_metres, as_tenths):
+        assert np.allclose(photograph.depth, 0.8)
+
+
+def test_values_that_are_no_depth_become_none(tmp_path, image):
+    values = np.full((120, 200), 0.8)
+    values[0, :4] = [np.nan, np.inf, -1.0, 0.0]
+    np.save(tmp_path / "d.npy", values)
+    depth = load_photograph(image, tmp_path / "d.npy").depth
+    assert np.all(depth[0, :4] == 0.0) and np.all(depth[1] == np.float32(0.8))
+
+
+def test_a_wide_photograph_is_made_smaller_with_depth_and_intrinsics(tmp_path):
+    Image.fromarray(np.zeros((900, 1696, 3), np.uint8)).save(tmp_path / "a.jpg")
+    counts = np.tile(np.arange(1696) + 500, (900, 1))
+    k = {"width": 1696, "height": 900, "fx": 1000.0, "fy": 1000.0, "cx": 847.5, "cy": 449.5}
+    (tmp_path / "k.json").write_text(json.dumps(k), encoding="utf-8")
+    got = load_photograph(tmp_path / "a.jpg", depth_png(tmp_path / "d.png", counts), tmp_path / "k.json")
+    assert got.color.shape == (450, 848, 3) and got.size == (1696, 900) and not got.assumed
+    assert (got.intrinsics.fx, got.intrinsics.cx) == (500.0, 423.5)
+    # A pixel looks the same way before and after.
+    assert abs(got.depth[0, 100] - (201 + 500) / 1000) < 0.0011
+
+
+def test_intrinsics_that_nobody_gave_are_called_a_guess(image):
+    assert load_photograph(image).assumed
+
+
+@pytest.mark.parametrize(
+    ("counts", "unit", "says"),
+    [
+        (np.full((120, 200), 800), 1.0, "--depth-unit"),
+        (np.full((120, 200), 800), 0.00001, "--depth-unit"),
+        (np.zeros((120, 200)), 0.001, "no depth at all"),
+        (np.full((100, 200), 800), 0.001, "one value a pixel"),
+    ],
+)
+def test_a_depth_that_cannot_be_is_refused(tmp_path, image, counts, unit, says):
+    with pytest.raises(InputError, match=says):
+        load_photograph(image, depth_png(tmp_path / "d.png", counts), depth_unit=unit)
+
+
+def test_files_that_are_something_else_are_refused(tmp_path, image):
+    text = tmp_path / "x.png"
+    text.write_text("hello", encoding="utf-8")
+    with pytest.raises(InputError, match="cannot read the image"):
+        load_photograph(text)
+    with pytest.raises(InputError, match="cannot read the depth"):
+        load_photograph(image, text)
+    with pytest.raises(InputError, match="cannot read the intrinsics"):
+        load_photograph(image, None, text)
+    (tmp_path / "k.json").write_text('{"width":2,"height":2,"fx":1,"fy":1,"cx":0,"cy":0}', encoding="utf-8")
+    with pytest.raises(InputError, match="is for 2×2"):
+        load_photograph(image, None, tmp_path / "k.json")
+    Image.fromarray(np.zeros((20, 20, 3), np.uint8)).save(tmp_path / "small.png")
+    with pytest.raises(InputError, match="at least"):
+        load_photograph(tmp_path / "small.png")

@@ -1,0 +1,331 @@
+import zlib
+
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from benchmarks.perception.points import camera_frame, evaluate, survey_arm
+from bridge.sim.camera.config import CameraConfig
+from bridge.sim.camera.renderer import Camera
+from bridge.sim.vineyard.config import VineyardConfig
+from bridge.sim.vineyard.grow import grow
+from perception.config import PerceptionConfig
+from perception.pipeline import Perception, perceive, with_widening
+from perception.segmentation.frame import decode_frame
+from perception.segmentation.segmenter import LabelImageSegmenter
+from perception.tracking.tracker import Tracked
+from rolling_panda import messages as m
+from rolling_panda.errors import MessageError
+from rolling_panda.messages.commands import AddPoint, AddPointInImage, MovePoint, SetRule, TakeRuleBack, TryRule
+from rolling_panda.messages.perception import point_digest
+from rolling_panda.model.robot import RobotModel, configuration
+from rolling_panda.transport.codec import StrictDecoder, encode
+
+
+@pytest.fixture(scope="module")
+def model():
+    return RobotModel()
+
+
+@pytest.fixture(scope="module")
+def frames(model):
+    row = grow(VineyardConfig(), 1)
+    camera = Camera(CameraConfig(), 1)
+    base = m.PlanarPose()
+    position = msgspec.convert((0.0, 0.0, *survey_arm()), m.Actuated)
+    place = model.pose(configuration(base, position), model.camera_id).homogeneous
+    return [camera_frame(camera.render(row, place, k), camera, base, position, k) for k in range(4)]
+
+
+def perception(model):
+    return Perception(PerceptionConfig(), LabelImageSegmenter(), model)
+
+
+@pytest.mark.parametrize("seed", [3, 101])
+def test_points_of_a_rendered_row_are_where_a_grower_would_cut(model, seed):
+    score = evaluate(seed, model=model)
+    assert score.points >= 4
+    assert score.right_place >= 0.8 * score.points
+    assert np.median(np.abs(score.along)) < 0.003
+    assert np.median(score.off_axis) < 0.003
+
+
+def test_points_show_after_they_were_seen_often_enough_and_keep_their_names(model, frames):
+    seen = perception(model)
+    results = [seen.process(frame) for frame in frames]
+    assert not results[0].points and not results[1].points
+    assert results[2].points
+    after = {point.point_id: point for point in results[3].points}
+    for point in results[2].points:
+        assert after[point.point_id].revision == point.revision
+        assert after[point.point_id].position == point.position
+    assert results[3].frames == 4 and results[3].segmenter == "simulator labels" and results[3].canes
+
+
+def test_the_same_frames_give_the_same_points_and_they_fit_the_wire(model, frames):
+    first, second = ([p.process(frame) for frame in frames][-1] for p in (perception(model), perception(model)))
+    assert encode(first) == encode(second)
+    assert StrictDecoder(m.PruningPoints).decode(encode(first)) == first
+
+
+def test_a_corrupt_frame_changes_nothing(model, frames):
+    seen, undisturbed = perception(model), perception(model)
+    for frame in frames[:3]:
+        seen.process(frame)
+        undisturbed.process(frame)
+    with pytest.raises(MessageError):
+        seen.process(msgspec.structs.replace(frames[3], depth_zlib=frames[3].depth_zlib[:-9]))
+    assert seen.process(frames[3]) == undisturbed.process(frames[3])
+
+
+def test_without_labels_it_abstains_with_the_reason(model, frames):
+    result = perception(model).process(msgspec.structs.replace(frames[0], labels_zlib=b""))
+    assert not result.points
+    assert "label image" in result.abstained[0].reason
+
+
+def test_an_empty_view_gives_no_points(model, frames):
+    k = frames[0].intrinsics
+    blank = zlib.compress(bytes(k.width * k.height))
+    result = perception(model).process(msgspec.structs.replace(frames[0], labels_zlib=blank))
+    assert result.points == () and result.canes == ()
+
+
+def shown(model, frames):
+    seen = perception(model)
+    for frame in frames:
+        result = seen.process(frame)
+    assert result.points
+    return seen, result.points
+
+
+def test_another_rule_changes_the_points_at_once_and_back_again(model, frames):
+    seen, before = shown(model, frames)
+    answer = seen.answer(SetRule(user="Ada", rule=m.PruningRule(nodes_kept=1)))
+    assert answer.ok and "points by the new rule" in answer.reason
+    fewer = seen.points().points
+    assert fewer and all(point.nodes_kept == 1 for point in fewer)
+    # One node lower on the same canes.
+    low = {(point.vine, point.spur): point.position[2] for point in fewer}
+    for point in before:
+        if (point.vine, point.spur) in low and "Spur cut" in point.reason:
+            assert point.position[2] - low[point.vine, point.spur] > 0.04
+    assert seen.answer(SetRule(user="Ada")).ok
+    after = np.array([point.position for point in seen.points().points])
+    for point in before:
+        assert np.linalg.norm(after - point.position, axis=1).min() < 0.006
+
+
+def test_frames_after_another_rule_follow_it(model, frames):
+    seen, _ = shown(model, frames)
+    seen.answer(SetRule(user="Ada", rule=m.PruningRule(nodes_kept=1)))
+    for frame in frames:
+        result = seen.process(frame)
+    assert result.points and all(point.nodes_kept == 1 for point in result.points)
+
+
+def test_a_click_into_the_picture_adds_a_point_that_stays(model, frames):
+    seen, before = shown(model, frames)
+    view = decode_frame(frames[-1], model)
+    k = view.intrinsics
+    u, v, _ = view.pixels(np.array(before[0].position) + 0.02 * np.array(before[0].tangent))[0]
+    click = AddPointInImage(
+        user="Ada", sequence=frames[-1].sequence, u=float((u + 0.5) / k.width), v=float((v + 0.5) / k.height)
+    )
+    answer = seen.answer(click)
+    assert answer.ok, answer.reason
+    added = {point.point_id: point for point in seen.process(frames[0]).points}[answer.reason]
+    beyond = np.array(before[0].position) + 0.02 * np.array(before[0].tangent)
+    assert np.linalg.norm(np.array(added.position) - beyond) < 0.006
+    again = seen.answer(click)
+    assert not again.ok and f"{answer.reason} is there already" in again.reason
+    assert added.reason.startswith("Placed by Ada") and added.radius == pytest.approx(before[0].radius, abs=0.001)
+    assert seen.answer(SetRule(user="Ada", rule=m.PruningRule(nodes_kept=1))).ok
+    assert answer.reason in {point.point_id for point in seen.points().points}, "another rule does not take it away"
+
+
+def test_clicks_that_mean_no_cane_are_refused(model, frames):
+    seen, before = shown(model, frames)
+    sky = seen.answer(AddPointInImage(user="Ada", sequence=frames[-1].sequence, u=0.5, v=0.99))
+    old = seen.answer(AddPointInImage(user="Ada", sequence=999, u=0.5, v=0.5))
+    away = seen.answer(AddPoint(user="Ada", origin=(0.0, 0.0, 1.0), direction=(0.0, -1.0, 0.0)))
+    assert not (sky.ok or old.ok or away.ok)
+    assert "click on a blue line" in sky.reason and "newest" in old.reason
+    assert seen.points().points == before
+
+
+def test_canes_drawn_too_wide_are_measured_as_thick_as_they_are(model, frames):
+    view = decode_frame(frames[0], model)
+    cane, node = (m.WOOD_CLASSES.index(kind) for kind in ("cane", "node"))
+    wide = view.labels.copy()
+    wide[:, 1:][(view.labels[:, :-1] == cane) & (view.labels[:, 1:] <= 1)] = cane
+
+    def radius(labels, widening):
+        plant = perceive(view, labels, with_widening(PerceptionConfig(), widening))
+        return np.median([cane.radius for spur in plant.spurs for cane in spur.canes if cane.length > 0.3])
+
+    true = radius(view.labels, 0.0)
+    assert radius(wide, 0.0) - true > 0.0004
+    assert abs(radius(wide, 1.0) - true) < 0.0003
+
+
+def test_a_point_says_how_sure_it_is_and_what_is_near(model, frames):
+    seen, points = shown(model, frames)
+    for point in points:
+        rows = np.zeros((3, 3))
+        rows[np.triu_indices(3)] = point.position_covariance
+        covariance = rows + np.triu(rows, 1).T
+        assert 0.001 < np.sqrt(np.linalg.eigvalsh(covariance)).min() <= np.sqrt(np.trace(covariance)) < 0.01
+        assert 100.0 < point.force < 2000.0
+        assert point.node_distance > 0.005
+        assert point.digest == point_digest(point)
+        assert point.cordon_distance is None or point.cordon_distance > -0.02
+        if point.kind == "spur cut":
+            assert 0.01 < point.offset <= 0.021 and f"{1000 * point.offset:.0f} mm" in point.reason
+    assert any(point.cordon_distance is not None for point in points)
+    assert seen.points().rule == m.PruningRule()
+
+
+def test_every_point_has_a_picture_that_is_renewed_with_its_revision(model, frames):
+    seen, points = shown(model, frames)
+    crops = {crop.point_id: crop for crop in seen.crops}
+    assert crops.keys() == {point.point_id for point in points}
+    assert {crop.sequence for crop in crops.values()} <= {frame.sequence for frame in frames}
+    seen.answer(SetRule(user="Ada", rule=m.PruningRule(offset=0.03)))
+    now = {point.point_id: point for point in seen.points().points}
+    again = {crop.point_id: crop for crop in seen.crops}
+    moved = [name for name in crops if name in now and now[name].revision > crops[name].revision]
+    assert moved and all(again[name].revision == now[name].revision for name in moved)
+    assert all(again[name].jpeg != crops[name].jpeg for name in moved)
+
+
+def test_another_rule_keeps_the_names_of_the_spurs_cuts(model, frames):
+    seen, before = shown(model, frames)
+    seen.answer(SetRule(user="Ada", rule=m.PruningRule(offset=0.03)))
+    now = {(point.vine, point.spur, point.kind): point for point in seen.points().points}
+    assert seen.points().rule.offset == 0.03
+    kept = [(old, now[key]) for old in before if (key := (old.vine, old.spur, old.kind)) in now]
+    assert kept
+    for old, new in kept:
+        moved = np.linalg.norm(np.subtract(old.position, new.position))
+        assert new.point_id == old.point_id
+        assert (new.revision > old.revision) is bool(moved > PerceptionConfig().tracker.moved)
+
+
+def test_a_point_that_a_person_moves_stays_there_and_its_spur_gets_no_other(model, frames):
+    seen, before = shown(model, frames)
+    point = next(each for each in before if each.kind == "spur cut")
+    refused = seen.answer(MovePoint(user="Ada", point_id="p999", along=0.005))
+    assert not refused.ok and "p999" in refused.reason
+    answer = seen.answer(MovePoint(user="Ada", point_id=point.point_id, along=0.005))
+    assert answer.ok, answer.reason
+    moved = {each.point_id: each for each in seen.points().points}[point.point_id]
+    assert moved.revision == point.revision + 1 and moved.digest == point_digest(moved) != point.digest
+    step = np.subtract(moved.position, point.position)
+    assert step @ np.array(point.tangent) == pytest.approx(0.005, abs=0.002)
+    for frame in frames:
+        points = seen.process(frame).points
+    there = [each for each in points if (each.vine, each.spur) == (point.vine, point.spur)]
+    assert [each.position for each in there if each.point_id == point.point_id] == [moved.position]
+    assert not [each for each in there if each.kind == "spur cut"]
+    seen.answer(SetRule(user="Ada", rule=m.PruningRule(offset=0.03)))
+    there = [each for each in seen.points().points if (each.vine, each.spur) == (point.vine, point.spur)]
+    assert [each.kind for each in there if each.kind in ("spur cut", "by hand")] == ["by hand"]
+
+
+@pytest.fixture(scope="module")
+def surveyed(model, frames):
+    return shown(model, frames)[0]
+
+
+def held(seen):
+    """Everything that perception tells."""
+    return encode(seen.points()), seen.obstacles
+
+
+RULES = st.builds(
+    m.PruningRule,
+    system=st.sampled_from(["spur", "guyot"]),
+    nodes_kept=st.integers(1, 5),
+    fruiting_nodes=st.integers(3, 20),
+    keeper_diameter=st.sampled_from([0.003, 0.006, 0.009, 0.015]),
+    offset=st.sampled_from([0.005, 0.012, 0.02, 0.024, 0.05]),
+)
+
+
+@settings(max_examples=25)
+@given(st.lists(RULES, min_size=1, max_size=3))
+def test_what_a_rule_would_change_is_what_it_changes_and_taken_back_all_is_as_it_was(surveyed, rules):
+    begun, stages = held(surveyed), []
+    for rule in rules:
+        before = {point.point_id: point.digest for point in surveyed.points().points}
+        told = surveyed.answer(TryRule(user="Ada", rule=rule)).effect
+        assert held(surveyed) == (stages[-1][1] if stages else begun), "to ask changes nothing"
+        former = surveyed.points().rule
+        assert surveyed.answer(SetRule(user="Ada", rule=rule)).ok
+        after = {point.point_id: point.digest for point in surveyed.points().points}
+        assert set(told.gone) == before.keys() - after.keys()
+        assert set(told.moved) == {name for name in before.keys() & after.keys() if before[name] != after[name]}
+        assert told.added == len(after.keys() - before.keys())
+        if rule != former:
+            stages.append((rule, held(surveyed)))
+    while stages:
+        rule, there = stages.pop()
+        assert held(surveyed) == there
+        assert surveyed.answer(TakeRuleBack(user="Ada", rule=rule)).ok
+    assert held(surveyed) == begun
+
+
+def test_a_revision_never_has_two_contents_though_a_rule_is_taken_back(model, frames):
+    seen, _ = shown(model, frames)
+    contents = {}
+    for kept in (1, 3, 1, 2, 4):
+        rule = m.PruningRule(nodes_kept=kept)
+        seen.answer(SetRule(user="Ada", rule=rule))
+        for point in seen.points().points:
+            assert contents.setdefault((point.point_id, point.revision), point.digest) == point.digest
+        if kept != 2:
+            assert seen.answer(TakeRuleBack(user="Ada", rule=rule)).ok
+
+
+def test_a_rule_that_was_changed_since_or_never_cannot_be_taken_back(model, frames):
+    seen, _ = shown(model, frames)
+    assert "knows of no rule before" in seen.answer(TakeRuleBack(user="Ada", rule=m.PruningRule())).reason
+    seen.answer(SetRule(user="Ada", rule=m.PruningRule(nodes_kept=1)))
+    before = held(seen)
+    assert "changed since" in seen.answer(TakeRuleBack(user="Ada", rule=m.PruningRule(nodes_kept=3))).reason
+    assert held(seen) == before
+
+
+def test_frames_come_on_after_a_rule_was_taken_back_and_what_a_person_placed_stays(model, frames):
+    seen, before = shown(model, frames)
+    rule = m.PruningRule(nodes_kept=1)
+    seen.answer(SetRule(user="Ada", rule=rule))
+    moved = next(point for point in seen.points().points if point.kind == "spur cut")
+    assert seen.answer(MovePoint(user="Ada", point_id=moved.point_id, along=0.005)).ok
+    seen.process(frames[0])
+    assert seen.answer(TakeRuleBack(user="Ada", rule=rule)).ok
+    back = {point.point_id: point for point in seen.points().points}
+    assert back[moved.point_id].kind == "by hand"
+    others = [point for point in before if point.point_id != moved.point_id and point.spur != moved.spur]
+    assert others and all(back[point.point_id].digest == point.digest for point in others)
+    for frame in frames:
+        later = {point.point_id: point for point in seen.process(frame).points}
+    assert all(name in later for name in back)
+
+
+def test_what_was_cut_meanwhile_does_not_come_back_with_the_rule(model, frames):
+    seen, before = shown(model, frames)
+    rule = m.PruningRule(nodes_kept=1)
+    seen.answer(SetRule(user="Ada", rule=rule))
+    cut = next(point for point in seen.points().points if point.kind == "spur cut")
+    # As `process` does where it sees the wood beyond a point gone.
+    seen._take(Tracked((), (), (np.array(cut.position),)))
+    seen.withdrawn = ("told with the frame",)
+    seen.answer(TakeRuleBack(user="Ada", rule=rule))
+    assert seen.withdrawn == (), "what a frame took away is told once"
+    back = {point.point_id for point in seen.points().points}
+    # One node higher on the same cane there is no wood any more; all other cuts are asked for as before.
+    assert {point.point_id for point in before} - back == {cut.point_id}

@@ -1,0 +1,110 @@
+"""The vines as known from all frames, and as graphs."""
+
+from dataclasses import replace
+
+import networkx as nx
+import numpy as np
+import pytest
+
+from perception.plant.map import PlantMap
+from perception.plant.model import Cane, Node, Plant, Span, Spur
+from perception.plant.numbering import SpurNumber
+from perception.plant.plant_graph import vine_graphs
+
+NUMBER = SpurNumber(1, 4)
+TRUNK = np.array([[0.1, 0.0, 0.5]])
+
+
+def cane(nodes=(0.02, 0.10, 0.18, 0.26), x=0.0, radius=0.004, length=0.5, **changes):
+    arc = np.linspace(0.0, length, 101)
+    axis = np.array([x, 0.0, 0.95]) + arc[:, None] * np.array([0.0, 0.0, 1.0])
+    values = {"hidden": (), "end": "image border", "base_gap": 0.0, **changes}
+    return Cane(axis, arc, radius, tuple(Node(node, 30) for node in nodes), **values)
+
+
+def plant(*canes, doubt=""):
+    stub = np.array([[0.0, 0.0, 0.91], [0.0, 0.0, 0.97]])
+    return Plant((Spur(np.array([0.0, 0.0, 0.94]), stub, 0.007, tuple(canes), doubt),), TRUNK, ())
+
+
+def known(*plants) -> PlantMap:
+    out = PlantMap()
+    for one in plants:
+        out.update(one, (NUMBER,))
+    return out
+
+
+def test_a_cane_seen_again_is_one_cane_and_its_measures_are_means():
+    looks = [plant(cane(radius=0.004 + d, x=d)) for d in (-0.0004, 0.0, 0.0004)]
+    (spur,) = known(*looks).spurs
+    (only,) = spur.canes
+    assert only.base.looks == 3
+    assert only.radius.mean[0] == pytest.approx(0.004) and only.radius.covariance[0, 0] > 0.0
+
+
+def test_a_look_is_as_thick_as_most_looks_say():
+    map_, looks = PlantMap(), [0.004, 0.0041, 0.0065, 0.0039]
+    told = [map_.update(plant(cane(radius=radius)), (NUMBER,))[0].canes[0] for radius in looks]
+    assert [only.looks for only in told] == [1, 2, 3, 4]
+    assert told[0].radius == 0.004 and told[2].radius == pytest.approx(0.0041)
+    assert told[3].radius == pytest.approx(0.00405) and told[3].nodes == cane().nodes
+
+
+def test_canes_side_by_side_stay_two():
+    (spur,) = known(*[plant(cane(), cane(x=0.03))] * 3).spurs
+    assert len(spur.canes) == 2 and len(spur.as_spur().canes) == 2
+
+
+def test_a_node_that_one_look_in_three_invents_is_not_believed_and_one_that_it_misses_is():
+    right, invented, missed = cane(), cane(nodes=(0.02, 0.10, 0.14, 0.18, 0.26)), cane(nodes=(0.02, 0.18, 0.26))
+    (spur,) = known(plant(right), plant(invented), plant(missed)).spurs
+    (fused,) = spur.as_spur().canes
+    assert [round(node.arc, 3) for node in fused.nodes] == [0.02, 0.10, 0.18, 0.26]
+
+
+def test_a_cane_that_one_look_in_three_invents_is_not_believed():
+    looks = [plant(cane()), plant(cane(), cane(x=0.04)), plant(cane())]
+    (spur,) = known(*looks).spurs
+    assert len(spur.as_spur().canes) == 1
+
+
+def test_the_look_that_hid_less_gives_the_shape():
+    hidden = cane(hidden=(Span(0.05, 0.15),), base_gap=0.02)
+    (spur,) = known(plant(hidden), plant(cane())).spurs
+    (fused,) = spur.as_spur().canes
+    assert fused.hidden == () and fused.base_gap == 0.0
+
+
+def test_after_a_cut_what_lay_beyond_is_gone():
+    map_ = known(*[plant(cane())] * 3)
+    assert map_.sever(np.array([0.001, 0.0, 0.95 + 0.20]))
+    (fused,) = map_.spurs[0].as_spur().canes
+    assert fused.length == pytest.approx(0.2, abs=0.006) and fused.end == "free"
+    assert [round(node.arc, 2) for node in fused.nodes] == [0.02, 0.10, 0.18]
+    assert not map_.sever(np.array([0.5, 0.0, 1.0])), "there is no cane"
+
+
+def test_a_doubtful_look_does_not_stand_for_a_clear_one():
+    (spur,) = known(plant(cane(), doubt="edge"), plant(cane())).spurs
+    assert spur.as_spur().doubt == ""
+    (spur,) = known(plant(cane()), plant(cane(), doubt="edge")).spurs
+    assert spur.as_spur().doubt == ""
+
+
+def test_a_vine_is_a_tree_from_trunk_to_nodes_with_places_and_radii():
+    graph = vine_graphs(known(*[plant(cane(), cane(x=0.03))] * 4))[1]
+    assert nx.is_arborescence(graph)
+    kinds = [graph.nodes[name]["kind"] for name in nx.dfs_preorder_nodes(graph, "trunk")]
+    assert kinds[:3] == ["trunk", "cordon", "spur"] and kinds.count("cane") == 2 and kinds.count("node") == 8
+    for name, data in graph.nodes(data=True):
+        assert data["position"].shape == (3,) and np.all(np.linalg.eigvalsh(data["covariance"]) >= -1e-15), name
+        if data["kind"] == "cane":
+            assert data["radius"] == pytest.approx(0.004)
+    last = [data for _, data in graph.nodes(data=True) if data["kind"] == "node"][3]
+    np.testing.assert_allclose(last["position"], [0.0, 0.0, 0.95 + 0.26], atol=1e-6)
+
+
+def test_without_a_trunk_in_view_the_tree_begins_at_the_cordon():
+    unseen = replace(plant(cane()), trunks=np.zeros((0, 3)))
+    graph = vine_graphs(known(unseen, unseen))[1]
+    assert nx.is_arborescence(graph) and "trunk" not in graph

@@ -1,0 +1,202 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from perception.config import RuleConfig
+from perception.plant.model import Cane, Node, Span, Spur
+from perception.rules.keep_out import KeepOut
+from perception.rules.spur import choose_keeper, count_nodes, cut_arc, decide
+
+RULE = RuleConfig()
+
+
+def cane(nodes=(0.02, 0.10, 0.18, 0.26), length=0.5, radius=0.004, base=(0.0, 0.0, 1.0), **changes):
+    arc = np.linspace(0.0, length, 101)
+    axis = np.array(base) + arc[:, None] * np.array([0.0, 0.0, 1.0])
+    values = {"hidden": (), "end": "image border", "base_gap": 0.0, **changes}
+    return Cane(axis, arc, radius, tuple(Node(node, 30) for node in nodes), **values)
+
+
+def spur(*canes):
+    stub = np.array([[0.0, 0.0, 0.92], [0.0, 0.0, 0.99]])
+    return Spur(np.array([0.0, 0.0, 0.95]), stub, 0.007, tuple(canes))
+
+
+def test_a_single_cane_is_cut_two_centimetres_past_the_second_count_node():
+    decision = decide(spur(cane()), RULE)
+    (cut,) = decision.cuts
+    assert cut.kind == "spur cut" and not decision.abstained
+    np.testing.assert_allclose(cut.position, [0.0, 0.0, 1.20], atol=1e-9)
+    np.testing.assert_allclose(cut.tangent, [0.0, 0.0, 1.0], atol=1e-9)
+    assert (cut.nodes_seen, cut.nodes_kept) == (3, 2)
+    assert "node 2" in cut.reason
+
+
+def test_a_short_internode_is_halved():
+    assert cut_arc(cane(nodes=(0.02, 0.10, 0.18, 0.214)), RULE) == pytest.approx(0.197)
+
+
+def test_an_unseen_basal_bud_changes_nothing():
+    assert cut_arc(cane(nodes=(0.10, 0.18, 0.26)), RULE) == cut_arc(cane(), RULE)
+
+
+def test_it_abstains_where_it_has_not_seen_enough():
+    assert "only 1 of 2" in str(cut_arc(cane(nodes=(0.02, 0.1)), RULE))
+    assert "not in view" in str(cut_arc(cane(nodes=(0.02, 0.1, 0.18), length=0.19), RULE))
+    assert "pruned already" in str(cut_arc(cane(nodes=(0.02, 0.1, 0.18), length=0.2, end="free"), RULE))
+    assert "another node may be" in str(cut_arc(cane(nodes=(0.02, 0.1, 0.22), hidden=(Span(0.15, 0.17),)), RULE))
+    assert "cut is hidden" in str(cut_arc(cane(hidden=(Span(0.195, 0.205),)), RULE))
+    assert "side by side" in str(cut_arc(cane(nodes=(0.02, 0.1, 0.12, 0.2)), RULE))
+    assert "base" in str(cut_arc(cane(base_gap=0.03), RULE))
+    assert decide(spur(), RULE).abstained and not decide(spur(), RULE).cuts
+    assert decide(replace(spur(cane()), doubt="edge"), RULE).abstained == ("edge",)
+    assert "thick" in decide(spur(cane(radius=0.009)), RULE).abstained[0]
+
+
+def test_nodes_too_near_or_too_far_apart_are_not_counted():
+    """One of them may be another cane's where they cross; or one between them was taken for something else."""
+    assert "side by side" in str(cut_arc(cane(nodes=(0.02, 0.1, 0.145, 0.2)), RULE))
+    assert "far apart" in str(cut_arc(cane(nodes=(0.02, 0.1, 0.26)), RULE))
+    assert "far apart" in str(cut_arc(cane(nodes=(0.02, 0.18, 0.26)), RULE))
+    assert "far apart" in str(cut_arc(cane(nodes=(0.19, 0.26)), RULE))
+    near_the_cut = cut_arc(cane(nodes=(0.02, 0.1, 0.18, 0.225)), RULE)
+    assert near_the_cut == cut_arc(cane(nodes=(0.02, 0.1, 0.18, 0.32)), RULE) == pytest.approx(0.2)
+
+
+def test_a_hidden_stretch_too_short_for_a_node_is_no_reason():
+    assert cut_arc(cane(hidden=(Span(0.12, 0.13),)), RULE) == cut_arc(cane(), RULE)
+
+
+def test_the_keeper_is_the_lowest_thick_cane_else_the_thickest():
+    low, high = cane(base=(0.02, 0.0, 0.93)), cane(radius=0.006, base=(0.0, 0.0, 0.99))
+    assert choose_keeper(spur(high, low), RULE).cane is low
+    thin = cane(radius=0.0026, base=(0.02, 0.0, 0.93))
+    assert choose_keeper(spur(high, thin), RULE).cane is high
+    thinner = cane(radius=0.0022, base=(0.0, 0.0, 0.99))
+    assert choose_keeper(spur(thin, thinner), RULE).cane is thin
+
+
+def test_a_choice_within_the_noise_is_no_choice():
+    doubtful = cane(radius=0.00305, base=(0.02, 0.0, 0.93))
+    assert "too near" in choose_keeper(spur(doubtful, cane(base=(0.0, 0.0, 0.99))), RULE)
+    twins = cane(base=(0.02, 0.0, 0.97)), cane(base=(-0.02, 0.0, 0.972))
+    assert "same height" in choose_keeper(spur(*twins), RULE)
+
+
+def test_the_old_stub_goes_in_one_cut_beyond_the_keeper():
+    low = cane(base=(0.025, 0.0, 0.93))
+    decision = decide(spur(low, cane(base=(0.0, 0.0, 0.99))), RULE)
+    assert [cut.kind for cut in decision.cuts] == ["spur cut", "renewal cut"]
+    position = decision.cuts[1].position
+    assert 0.93 < position[2] < 0.99 and abs(position[0]) < 1e-9
+
+
+def test_a_cut_where_another_cane_crosses_is_left_alone():
+    crossing = np.array([[0.1 * k - 0.5, 0.008, 1.2] for k in range(11)])
+    assert "another cane" in decide(spur(cane()), RULE, crossing).abstained[0]
+    assert decide(spur(cane()), RULE, crossing + [0.0, 0.03, 0.0]).cuts
+    assert decide(spur(cane()), RULE, np.zeros((0, 3))).cuts
+
+
+def test_a_cut_gives_way_to_a_cane_or_a_wire_that_crosses_a_little_off_and_stays_on_its_internode():
+    for side in (-1, 1):
+        crossing = np.array([[0.1 * k - 0.5, 0.008, 1.2 + side * 0.010] for k in range(11)])
+        (cut,) = decide(spur(cane()), RULE, crossing).cuts
+        assert 0.0 < (1.2 - cut.position[2]) * side <= RULE.shift + 1e-9
+        assert np.linalg.norm(crossing - cut.position, axis=1).min() >= RULE.crossing
+    (cut,) = decide(spur(cane()), RULE, None, wire_from(1.196, 1.214)).cuts
+    assert cut.position[2] == pytest.approx(1.2 - RULE.shift / 2) and "16 mm past node 2" in cut.reason
+    assert decide(spur(cane()), RULE, None, wire_from(0.0, 9.0)).abstained == ("a wire is there",)
+
+
+@pytest.mark.parametrize(("tight", "best"), [((1.19, 1.203), 1.20425), ((1.197, 1.21), 1.19575), ((1.1, 1.3), 1.2)])
+def test_where_the_blades_only_just_have_room_a_better_place_nearby_is_taken(tight, best):
+    beside = KeepOut(lambda place: "", lambda place, tangent: not tight[0] < place[2] < tight[1])
+    (cut,) = decide(spur(cane()), RULE, None, beside).cuts
+    assert cut.position[2] == pytest.approx(best)
+
+
+def wire_from(low, high):
+    return KeepOut(lambda place: "a wire is there" if low < place[2] < high else "", lambda place, tangent: True)
+
+
+def test_blades_keep_10_mm_from_the_nodes():
+    # Midway between nodes 30 mm apart; a cane crosses there, and to either side a node is too near.
+    tight = cane(nodes=(0.02, 0.10, 0.18, 0.212))
+    crossing = np.array([[0.0, 0.0145, 1.196]])
+    assert decide(spur(tight), RULE).cuts
+    assert all(cut.node_distance >= RULE.node_distance for cut in decide(spur(tight), RULE, crossing).cuts)
+    nearer = replace(tight, nodes=(*tight.nodes[:3], Node(0.198, 30)))
+    assert not decide(spur(nearer), RULE).cuts
+
+
+def test_a_diameter_seen_often_leaves_less_in_doubt():
+    near = [cane(radius=0.00311, base=(0.02, 0.0, 0.93)), cane(base=(0.0, 0.0, 0.99))]
+    assert "too near" in choose_keeper(spur(*near), RULE)
+    often = [replace(each, looks=9) for each in near]
+    assert choose_keeper(spur(*often), RULE).cane is often[0]
+    assert "too near" in choose_keeper(spur(often[0], near[1]), RULE), "one of them was seen once only"
+
+
+def test_a_cane_that_runs_into_another_is_cut_where_enough_of_it_is_seen_and_a_pruned_one_never_again():
+    going_on = cane(nodes=(0.02, 0.10, 0.18), length=0.212, end="hidden")
+    assert cut_arc(going_on, RULE) == pytest.approx(0.20)
+    assert "pruned already" in cut_arc(replace(going_on, end="free"), RULE)
+    assert "not in view" in cut_arc(cane(nodes=(0.02, 0.10, 0.18), length=0.205, end="hidden"), RULE)
+
+
+def test_a_stub_is_not_cut_where_the_blades_must_not_go():
+    low, high = cane(base=(0.025, 0.0, 0.93)), cane(base=(0.0, 0.0, 0.99))
+    cordon = KeepOut(lambda place: "the cordon is near" if place[2] < 1.0 else "", lambda place, tangent: True)
+    decision = decide(spur(low, high), RULE, None, cordon)
+    assert [cut.kind for cut in decision.cuts] == ["spur cut"] and "cordon" in decision.abstained[0]
+
+
+def test_a_cane_below_the_keeper_is_left_for_a_person():
+    thin = cane(radius=0.0025, base=(0.02, 0.0, 0.93))
+    decision = decide(spur(thin, cane(base=(0.0, 0.0, 0.99))), RULE)
+    assert len(decision.cuts) == 1
+    assert "below the cane that stays" in decision.abstained[0]
+
+
+internodes = st.lists(st.floats(0.012, 0.12), min_size=0, max_size=8)
+
+
+@settings(max_examples=60, deadline=None)
+@given(basal=st.floats(0.01, 0.04), gaps=internodes, length=st.floats(0.05, 1.0), at=st.floats(0.0, 0.6))
+def test_a_cut_lies_between_its_nodes_and_never_past_what_was_seen(basal, gaps, length, at):
+    arcs = [arc for arc in np.cumsum([basal, *gaps]) if arc < length]
+    hidden = (Span(at, at + 0.02),) if at + 0.02 < length else ()
+    seen = cane(nodes=arcs, length=length, hidden=hidden)
+    arc = cut_arc(seen, RULE)
+    if isinstance(arc, str):
+        assert arc
+        return
+    counted = count_nodes(seen, RULE)
+    assert counted[1].arc < arc < length
+    assert arc - counted[1].arc <= RULE.offset + 1e-12
+    if len(counted) > 2:
+        assert arc < counted[2].arc
+    assert not any(span.meets(arc - 0.005, arc + 0.005) for span in hidden)
+
+
+@settings(max_examples=40, deadline=None)
+@given(radii=st.lists(st.floats(0.002, 0.0074), min_size=1, max_size=4), shift=st.floats(-5.0, 5.0))
+def test_a_decision_does_not_depend_on_order_or_place(radii, shift):
+    def row(x):
+        return [cane(radius=radius, base=(x, 0.0, 0.93 + 0.02 * k)) for k, radius in enumerate(radii)]
+
+    def moved(x):
+        stub = np.array([[x, 0.0, 0.92], [x, 0.0, 1.02]])
+        return row(x), stub
+
+    here, there = moved(0.0), moved(shift)
+    first = decide(Spur(here[1][0], here[1], 0.006, tuple(here[0])), RULE)
+    second = decide(Spur(there[1][0], there[1], 0.006, tuple(reversed(there[0]))), RULE)
+    assert [cut.kind for cut in first.cuts] == [cut.kind for cut in second.cuts]
+    for a, b in zip(first.cuts, second.cuts, strict=True):
+        np.testing.assert_allclose(a.position + [shift, 0.0, 0.0], b.position, atol=1e-9)
+        assert a.reason == b.reason and 0.0 <= a.confidence <= 1.0

@@ -1,0 +1,243 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from perception.config import TrackerConfig
+from perception.plant.model import Plant, Spur
+from perception.plant.numbering import RowNumbers, SpurNumber
+from perception.rules.spur import Cut
+from perception.segmentation.frame import View
+from perception.skeleton.fragments import CANE
+from perception.tracking.tracker import Proposal, Tracker
+from rolling_panda.messages.robot import Intrinsics
+
+CONFIG = TrackerConfig()
+UP = np.array([0.0, -1.0, 0.0])
+
+
+def view(cane=True, depth=0.8):
+    """A camera at the origin of odom that looks along z at one upright cane in the middle of the image."""
+    labels = np.zeros((120, 160), dtype=np.uint8)
+    image = np.full((120, 160), 3.0, dtype=np.float32)
+    if cane:
+        labels[:, 78:83] = CANE
+        image[:, 78:83] = depth
+    intrinsics = Intrinsics(160, 120, 200.0, 200.0, 79.5, 59.5)
+    return View(0, 0.0, intrinsics, image, labels, b"", np.eye(3), np.zeros(3))
+
+
+def proposal(x=0.0, y=0.0, z=0.8, spur=1, tangent=UP):
+    cut = Cut("spur cut", np.array([x, y, z]), tangent, 0.004, 0.9, 4, 2, "Because.")
+    return Proposal(cut, SpurNumber(1, spur))
+
+
+def feed(tracker, image, *proposals):
+    return tracker.update(image, image.labels, list(proposals))
+
+
+def test_a_point_shows_after_enough_frames_agree():
+    tracker = Tracker(CONFIG)
+    shown = [len(feed(tracker, view(), proposal()).points) for _ in range(CONFIG.hits)]
+    assert shown == [0] * (CONFIG.hits - 1) + [1]
+
+
+def test_where_most_looks_cut_an_internode_is_taken_whole_not_half_way_to_where_others_did():
+    def look(offset, noise=0.0):
+        one = proposal(y=0.1 - offset + noise)
+        return replace(one, cut=replace(one.cut, offset=offset, reason=f"{1000 * offset:.0f} mm"))
+
+    tracker, noise = Tracker(CONFIG), (0.001, -0.001, 0.001, -0.001, 0.0)
+    for each in noise[:3]:
+        (point,) = feed(tracker, view(), look(0.02, each)).points or (None,)
+    assert point.offset == 0.02 and point.position[1] == pytest.approx(0.08, abs=1e-3)
+    # A wire comes into view, and the blades give way to it.
+    for each in noise:
+        (point,) = feed(tracker, view(), look(0.0105, each)).points
+    assert point.offset == 0.0105 and point.reason == "10 mm" and point.revision == 2
+    assert point.position[1] == pytest.approx(0.0895, abs=1e-3)
+    # One look that does not see it changes nothing.
+    (point,) = feed(tracker, view(), look(0.02)).points
+    assert point.offset == 0.0105 and point.revision == 2
+    assert point.position[1] == pytest.approx(0.0895, abs=1e-3)
+
+
+def test_a_point_is_where_it_says_it_is_also_after_a_small_step_along_its_internode():
+    def look(offset):
+        one = proposal(y=0.1 - offset)
+        return replace(one, cut=replace(one.cut, offset=offset))
+
+    tracker = Tracker(CONFIG)
+    for _ in range(3):
+        feed(tracker, view(), look(0.02))
+    for _ in range(6):
+        # Less than what a point may move by before it is called another one.
+        (point,) = feed(tracker, view(), look(0.0165)).points
+    assert point.offset == 0.0165 and point.revision == 2
+    assert point.position[1] == pytest.approx(0.1 - 0.0165, abs=1e-4)
+
+
+def test_after_many_looks_two_that_agree_are_enough_where_none_disagrees():
+    def survey(*others):
+        tracker, number = Tracker(CONFIG), SpurNumber(1, 1)
+        for look, said in enumerate((proposal(), None, *others, None, None, proposal(), None), 1):
+            cuts = [] if said is None else [said]
+            points = tracker.update(view(), view().labels, cuts, {number: look}).points
+        return look, points
+
+    looks, points = survey(None, None)
+    assert looks >= CONFIG.sparse_looks and len(points) == CONFIG.sparse_hits - 1 == 1
+    assert survey()[1] and survey()[0] >= CONFIG.sparse_looks
+    assert not survey(proposal(y=0.06), None)[1], "another look put the cut elsewhere"
+    tracker = Tracker(CONFIG)
+    for _ in range(2):
+        early = feed(tracker, view(), proposal()).points
+    assert not early, "two looks are not many"
+
+
+def test_looks_that_say_nothing_do_not_make_it_forget_what_few_have_said():
+    tracker = Tracker(CONFIG)
+    for said in (True, *[False] * 6, True, *[False] * 6, True):
+        points = feed(tracker, view(), *([proposal()] if said else [])).points
+    assert len(points) == 1
+
+
+def test_noise_is_averaged_and_changes_neither_name_nor_revision():
+    tracker, rng = Tracker(CONFIG), np.random.default_rng(0)
+    names = set()
+    for _ in range(60):
+        x, y = rng.normal(0.0, 0.002, 2)
+        for point in feed(tracker, view(), proposal(x, y)).points:
+            names.add((point.point_id, point.revision))
+    assert len(names) == 1
+    (point,) = tracker.points()
+    assert np.linalg.norm(np.array(point.position) - [0.0, 0.0, 0.8]) < 0.004
+
+
+def test_a_point_that_moves_gets_a_new_revision():
+    tracker = Tracker(CONFIG)
+    for _ in range(5):
+        feed(tracker, view(), proposal())
+    for _ in range(40):
+        feed(tracker, view(), proposal(y=0.012))
+    (point,) = tracker.points()
+    assert point.revision > 1
+    assert point.position[1] == pytest.approx(0.012, abs=CONFIG.moved)
+
+
+def test_points_out_of_view_stay():
+    tracker = Tracker(CONFIG)
+    for _ in range(4):
+        feed(tracker, view(), proposal(x=0.0))
+    away = view()
+    for _ in range(20):
+        moved = View(0, 0.0, away.intrinsics, away.depth, away.labels, b"", away.R, np.array([5.0, 0.0, 0.0]))
+        feed(tracker, moved)
+    assert len(tracker.points()) == 1
+
+
+def test_a_point_hidden_by_something_nearer_stays():
+    tracker = Tracker(CONFIG)
+    for _ in range(4):
+        feed(tracker, view(), proposal())
+    hidden = view(cane=False)
+    hidden.depth[:] = 0.4
+    for _ in range(20):
+        feed(tracker, hidden)
+    assert len(tracker.points()) == 1
+
+
+def test_a_standing_cane_keeps_its_point_through_frames_without_proposal():
+    tracker = Tracker(CONFIG)
+    for _ in range(4):
+        feed(tracker, view(), proposal())
+    for _ in range(20):
+        feed(tracker, view())
+    assert len(tracker.points()) == 1
+
+
+def test_a_cut_cane_takes_its_point_away_and_says_so():
+    tracker = Tracker(CONFIG)
+    for _ in range(4):
+        feed(tracker, view(), proposal())
+    results = [feed(tracker, view(cane=False)) for _ in range(CONFIG.gone)]
+    assert [len(result.points) for result in results] == [1] * (CONFIG.gone - 1) + [0]
+    assert "has been cut" in results[-1].withdrawn[0]
+
+
+def test_a_spur_has_one_cut_of_a_kind_and_the_better_supported_one_wins():
+    tracker = Tracker(CONFIG)
+    for _ in range(4):
+        feed(tracker, view(), proposal(y=0.02))
+    (old,) = tracker.points()
+    withdrawn = []
+    for _ in range(12):
+        result = feed(tracker, view(), proposal(y=-0.07))
+        assert len(result.points) <= 1
+        withdrawn += result.withdrawn
+    (new,) = tracker.points()
+    assert new.point_id != old.point_id and new.position[1] == pytest.approx(-0.07)
+    assert len(withdrawn) == 1 and "elsewhere" in withdrawn[0]
+
+
+def test_a_point_gives_way_as_soon_as_more_looks_put_the_cut_elsewhere():
+    tracker = Tracker(CONFIG)
+    for _ in range(CONFIG.hits):
+        shown = feed(tracker, view(), proposal(y=0.06)).points
+    (first,) = shown
+    elsewhere = [feed(tracker, view(), proposal()) for _ in range(CONFIG.hits + 1)]
+    assert [told.points[0].point_id for told in elsewhere[:-1]] == [first.point_id] * CONFIG.hits
+    (second,) = elsewhere[-1].points
+    assert second.point_id != first.point_id
+    assert "elsewhere on this spur" in elsewhere[-1].withdrawn[0]
+
+
+def test_spurs_keep_their_numbers_while_the_robot_drives_on():
+    along = np.array([1.0, 0.0, 0.0])
+    rng = np.random.default_rng(1)
+
+    def plant(*xs):
+        spurs = tuple(Spur(np.array([x, 0.85, 0.95]) + rng.normal(0.0, 0.003, 3), None, 0.0, ()) for x in xs)
+        return Plant(spurs, np.array([[0.45, 0.85, 0.7]]), ())
+
+    numbers = RowNumbers(CONFIG.spur_separation, CONFIG.vine_spacing)
+    first = numbers.number(plant(0.2, 0.32, 0.44), along)
+    assert first == (SpurNumber(1, 1), SpurNumber(1, 2), SpurNumber(1, 3))
+    for _ in range(10):
+        assert numbers.number(plant(0.32, 0.44, 0.6), along) == (*first[1:], SpurNumber(1, 4))
+    assert numbers.number(plant(2.2), along) == (SpurNumber(2, 1),)
+
+
+@pytest.mark.parametrize("distance", [0.12, 0.16, 0.20])
+def test_a_cane_too_near_to_be_measured_keeps_its_point(distance):
+    tracker = Tracker(CONFIG)
+    for _ in range(5):
+        feed(tracker, view(), proposal())
+    near = view(depth=0.0)
+    near.t[2] = 0.8 - distance
+    for _ in range(10):
+        result = feed(tracker, near)
+    assert len(result.points) == 1
+
+
+def test_one_revision_has_one_hash_and_another_count_of_nodes_is_another_revision():
+    tracker, rng, seen = Tracker(CONFIG), np.random.default_rng(0), set()
+    for _ in range(30):
+        x, y = rng.normal(0.0, 0.002, 2)
+        seen |= {(point.revision, point.digest) for point in feed(tracker, view(), proposal(x, y)).points}
+    assert len(seen) == 1
+    other = proposal()
+    other = replace(other, cut=replace(other.cut, nodes_kept=3))
+    (point,) = feed(tracker, view(), other).points
+    assert (point.revision, point.nodes_kept) == (2, 3) and (1, point.digest) not in seen
+
+
+def test_the_place_is_as_uncertain_as_the_looks_differ():
+    def spread(noise):
+        tracker, rng = Tracker(CONFIG), np.random.default_rng(0)
+        for _ in range(20):
+            x, y = rng.normal(0.0, noise, 2)
+            feed(tracker, view(), proposal(x, y))
+        return np.sqrt(tracker.points()[0].position_covariance[0])
+
+    assert 0.0015 <= spread(0.0) < spread(0.005) < 0.004

@@ -1,0 +1,48 @@
+"""What a frame says of a place where wood was known to stand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from perception.segmentation.frame import View
+from perception.skeleton.fragments import CANE
+from perception.tracking.wood_check import glance
+from rolling_panda.messages.robot import Intrinsics
+
+AT = np.array([0.0, 0.0, 0.8])
+
+
+def view(behind=3.0, cane_depth=0.8, cols=slice(78, 83)):
+    """A camera at the origin of odom, looking along z at one upright cane before something."""
+    labels, depth = np.zeros((120, 160), np.uint8), np.full((120, 160), behind, np.float32)
+    labels[:, cols], depth[:, cols] = CANE, cane_depth
+    return View(0, 0.0, Intrinsics(160, 120, 200.0, 200.0, 79.5, 59.5), depth, labels, b"", np.eye(3), np.zeros(3))
+
+
+@pytest.mark.parametrize(
+    ("seen", "place", "said"),
+    [
+        (view(), AT, "standing"),
+        (view(), AT + [0.006, 0.0, 0.01], "standing"),
+        (view(), AT + [0.05, 0.0, 0.0], "gone"),
+        (view(cane_depth=0.9), AT, "gone"),
+        (view(behind=0.5), AT + [0.05, 0.0, 0.0], "unseen"),
+        (view(cane_depth=0.0), AT, "unseen"),
+        (view(cane_depth=6.5535), AT, "unseen"),
+        (view(), AT + [0.5, 0.0, 0.0], "unseen"),
+        (view(), np.array([0.0, 0.0, 0.2]), "unseen"),
+        (view(), -AT, "unseen"),
+    ],
+)
+def test_wood_is_there_or_not_or_the_place_cannot_be_seen(seen, place, said):
+    assert glance(seen, seen.labels, place) == said
+
+
+@given(x=st.floats(-2, 2), y=st.floats(-2, 2), z=st.floats(-2, 3))
+def test_where_nothing_is_wood_nothing_stands(x, y, z):
+    seen = view()
+    bare = replace(seen, labels=np.zeros_like(seen.labels))
+    assert glance(bare, bare.labels, np.array([x, y, z])) != "standing"

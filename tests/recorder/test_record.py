@@ -1,0 +1,68 @@
+"""`rolling-panda record` as a process: what a killed one has on disk."""
+
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from recorder.tape import read_tape
+from rolling_panda import messages as m
+from rolling_panda import topics
+from rolling_panda.config import TransportConfig
+from rolling_panda.runtime.launch import child_environment, python_command
+from rolling_panda.transport.zenoh import Router, Transport
+from tests.support.live_robot import free_port
+
+pytestmark = pytest.mark.alone
+
+
+@pytest.fixture(scope="module")
+def endpoint() -> Iterator[str]:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    router = Router(TransportConfig(mode="router", connect=(), listen=(endpoint,), plain_wire=True))
+    yield endpoint
+    router.close()
+
+
+def publish(transport: Transport, seconds: float, recorder: subprocess.Popen[str] | None = None) -> float:
+    """Joint states a hundred times a second; when the last was sent before the recorder was killed (s since 1970)."""
+    publisher, sent = transport.publisher(topics.JOINTS), 0.0
+    for k in range(round(100 * seconds)):
+        rest = (0.0,) * 9
+        publisher.put(m.JointState(header=m.Header(k * 0.01), sequence=k, position=rest, velocity=rest))
+        sent = time.time()
+        time.sleep(0.01)
+    if recorder is not None:
+        recorder.send_signal(signal.SIGKILL)
+    return sent
+
+
+@pytest.mark.parametrize("killed", [True, False])
+def test_a_killed_recorder_loses_less_than_a_second_and_one_that_is_ended_nothing(
+    endpoint: str, tmp_path: Path, killed: bool
+) -> None:
+    path = tmp_path / "a.mcap"
+    words = ["--out", str(path), "--plain-wire", "--connect", endpoint]
+    recorder = subprocess.Popen(
+        python_command("recorder.record", words), stdout=subprocess.PIPE, text=True, env=child_environment()
+    )
+    assert recorder.stdout is not None and "recording" in recorder.stdout.readline()
+    with Transport(TransportConfig(connect=(endpoint,), plain_wire=True), "bridge", "rp1") as transport:
+        time.sleep(0.5)
+        last = publish(transport, 2.7, recorder if killed else None)
+        time.sleep(0.2)
+    recorder.send_signal(signal.SIGINT)
+    code = recorder.wait(20)
+    recorder.stdout.close()
+    tape = read_tape(path)
+    numbers = [row.message().sequence for row in tape.rows if row.topic is topics.JOINTS]  # type: ignore[attr-defined]
+    assert numbers == list(range(numbers[0], numbers[0] + len(numbers))), "none is missing in between"
+    if killed:
+        assert code == -signal.SIGKILL and not tape.whole
+        assert last - tape.rows[-1].at < 1.0
+    else:
+        assert code == 0 and tape.whole
+        assert numbers == list(range(270))

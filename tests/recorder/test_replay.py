@@ -1,0 +1,64 @@
+"""A recording on a real wire: those who were recorded seem to be there, and nothing can be asked of them."""
+
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from recorder.player import Player
+from recorder.replay import Stage
+from rolling_panda import topics
+from rolling_panda.config import TransportConfig
+from rolling_panda.messages import commands as intents
+from rolling_panda.messages.commands import SeekReplay
+from rolling_panda.transport.zenoh import Router, Transport
+from tests.recorder.test_player import event, joints, tape
+from tests.support.live_robot import free_port
+
+pytestmark = pytest.mark.alone
+
+
+@pytest.fixture
+def server() -> Iterator[tuple[Stage, Transport]]:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    router = Router(TransportConfig(mode="router", connect=(), listen=(endpoint,), plain_wire=True))
+    server = Transport(TransportConfig(connect=(endpoint,), plain_wire=True), "server", "rp1")
+    stage = Stage(
+        TransportConfig(connect=(endpoint,), plain_wire=True),
+        Player(tape(event(0.35, "it begins")), "a.mcap", time.monotonic()),
+    )
+    end = time.monotonic() + 5.0
+    while not {"bridge", "controller", "perception"} <= server.present() and time.monotonic() < end:
+        time.sleep(0.02)
+    yield stage, server
+    stage.__exit__()
+    server.close()
+    router.close()
+
+
+def test_a_server_sees_the_robot_of_the_recording_and_moves_in_it(server: tuple[Stage, Transport]) -> None:
+    stage, wire = server
+    slot, state, events = wire.slot(topics.JOINTS), wire.slot(topics.REPLAY), wire.feed(topics.EVENT, 10)
+    end = time.monotonic() + 1.0
+    while time.monotonic() < end:
+        stage.step(time.monotonic())
+        time.sleep(0.01)
+    assert {"bridge", "controller", "perception"} <= wire.present()
+    newest = slot.peek()
+    assert newest is not None and 5 <= newest.message.sequence <= 15
+    assert [received.message.text for received in events.drain()] == ["it begins"]
+    assert wire.call(topics.SEEK, SeekReplay(position_s=7.0, playing=False)).ok
+    stage.step(time.monotonic())
+    time.sleep(0.3)
+    newest = slot.peek()
+    assert newest is not None and newest.message == joints(70).message()
+    stage.step(time.monotonic())
+    time.sleep(0.2)
+    told = state.peek()
+    assert told is not None and (told.message.position_s, told.message.playing) == (7.0, False)
+
+
+def test_nothing_can_be_asked_of_a_recorded_robot(server: tuple[Stage, Transport]) -> None:
+    _, wire = server
+    answer = wire.call(topics.INTENT, intents.Arm(user="ada"))
+    assert not answer.ok and "recording" in answer.reason

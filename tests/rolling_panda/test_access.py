@@ -1,0 +1,279 @@
+"""On a wire with certificates each process may say what is its own to say, and an intruder nothing at all."""
+
+import socket
+import subprocess
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+
+from bridge.sim.robot.trace import read
+from rolling_panda import messages as m
+from rolling_panda.config import TransportConfig
+from rolling_panda.errors import InputError, ServiceError, TransportError
+from rolling_panda.messages import commands as intents
+from rolling_panda.runtime.launch import child_environment, python_command
+from rolling_panda.topics import BRIDGE, INTENT, JOINTS, MOTION, RELEASE, SERVICES, STOP, TOPICS, key
+from rolling_panda.transport.access import BEARERS, CALLERS, access_control
+from rolling_panda.transport.certificates import APART, NAMES, main, make
+from rolling_panda.transport.codec import encode
+from rolling_panda.transport.zenoh import Onlooker, Router, Transport
+
+pytestmark = pytest.mark.alone
+
+ROBOTS = ("rp1", "rp2")
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@pytest.fixture(scope="module")
+def certificates(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("wire") / "certificates"
+    make(folder, ("127.0.0.1",), 2)
+    return folder
+
+
+def config(endpoint: str, folder: Path | str) -> TransportConfig:
+    return TransportConfig(connect=(endpoint,), connect_timeout_s=2.0, certificates=str(folder))
+
+
+@pytest.fixture(scope="module")
+def endpoint(certificates: Path):
+    endpoint = f"tls/127.0.0.1:{free_port()}"
+    router = Router(TransportConfig(mode="router", connect=(), listen=(endpoint,), certificates=str(certificates)))
+    yield endpoint
+    router.close()
+
+
+def test_each_topic_is_said_by_its_senders_and_carried_to_its_readers_alone(certificates: Path, endpoint: str) -> None:
+    """Everybody with a certificate says something on every topic, and asks to be told every topic, also by wildcard."""
+    settings = config(endpoint, certificates)
+    got: set[tuple[str, str, str]] = set()
+    with ExitStack() as stack:
+        bearers = {name: stack.enter_context(Onlooker(settings, "rp1", name)) for name in BEARERS}
+        wanted = [key("rp1", topic.name) for topic in TOPICS]
+
+        def listen(reader: str) -> Callable[[Any], None]:
+            return lambda sample: got.add((sample.payload.to_string(), str(sample.key_expr), reader))
+
+        for reader, wire in bearers.items():
+            for where in (*wanted, key("rp1", "**"), "**"):
+                wire._session.declare_subscriber(where, listen(reader))
+        expected = {
+            (sender, key("rp1", topic.name), reader)
+            for topic in TOPICS
+            for sender in m.PROCESSES
+            for reader in BEARERS
+            if topic.said_by(sender) and topic.read_by(reader)
+        }
+
+        def everybody_says_everything() -> None:
+            for sender, wire in bearers.items():
+                for where in wanted:
+                    wire._session.put(where, sender)
+            time.sleep(0.2)
+
+        end = time.monotonic() + 20.0
+        while not got >= expected and time.monotonic() < end:
+            everybody_says_everything()
+        # Once more: what should not come would have come with it.
+        everybody_says_everything()
+    # What a session says itself is delivered within it, without any router.
+    assert {row for row in got if row[0] != row[2]} == {row for row in expected if row[0] != row[2]}
+
+
+def test_a_service_is_asked_by_its_callers_and_answered_by_its_process(certificates: Path, endpoint: str) -> None:
+    settings = config(endpoint, certificates)
+    release = m.ReleaseStop(stop_id="s", user="ada", reason="test")
+    with (
+        Transport(settings, "bridge", "rp1") as bridge,
+        Transport(settings, "controller", "rp1") as controller,
+        Transport(settings, "server", "rp1") as server,
+    ):
+        bridge.serve(RELEASE, lambda request: m.Answer(ok=True, reason="the bridge"))
+        controller.serve(INTENT, lambda request: m.Answer(ok=True, reason="the controller"))
+        time.sleep(0.3)
+        assert controller.call(RELEASE, release).reason == "the bridge"
+        with pytest.raises(ServiceError):
+            server.call(RELEASE, release)
+        assert server.present() == {"bridge", "controller", "server"}
+        with Transport(settings, "perception", "rp1") as perception:
+            # What it declares to answer does not count, and what it asks is not answered.
+            perception.serve(RELEASE, lambda request: m.Answer(ok=True, reason="not the bridge"))
+            time.sleep(0.3)
+            assert {controller.call(RELEASE, release).reason for _ in range(10)} == {"the bridge"}
+            with pytest.raises(ServiceError):
+                perception.call(INTENT, intents.Arm(user="eve"))
+        assert server.call(INTENT, intents.Arm(user="ada")).reason == "the controller"
+
+
+def test_the_table_names_the_callers_of_every_service() -> None:
+    assert set(CALLERS) == {service.name for service in SERVICES}
+    assert INTENT.name in CALLERS
+    told = access_control()
+    assert told["default_permission"] == "deny"
+    names = {subject["cert_common_names"][0] for subject in told["subjects"]}
+    assert names == {f"{name}.rp1" for name in BEARERS}
+
+
+def test_every_rule_is_for_one_robot() -> None:
+    told = access_control(ROBOTS)
+    for rule in told["rules"]:
+        robot = rule["id"].split(":")[0]
+        assert all(expression.startswith(f"rp/{robot}/") for expression in rule["key_exprs"]), rule
+    for policy in told["policies"]:
+        robot = policy["subjects"][0].rsplit(".", 1)[1]
+        assert policy["rules"] and all(rule.startswith(f"{robot}:") for rule in policy["rules"])
+
+
+def test_one_robots_certificates_say_nothing_to_another_robot(tmp_path: Path) -> None:
+    """Two robots at one router: a process is heard on its own robot's keys."""
+    endpoint, folder = f"tls/127.0.0.1:{free_port()}", tmp_path / "two"
+    make(folder, ("127.0.0.1",), 2, ["rp2"])
+    settings = config(endpoint, folder)
+    router = Router(msgspec.structs.replace(settings, mode="router", connect=(), listen=(endpoint,), robots=ROBOTS))
+    got: set[str] = set()
+    # The router's own session hears whatever the router lets in.
+    router._session.declare_subscriber("rp/**", lambda sample: got.add(str(sample.key_expr)))
+    try:
+        with Transport(settings, "controller", "rp2") as controller:
+            end = time.monotonic() + 10.0
+            while key("rp2", MOTION.name) not in got and time.monotonic() < end:
+                for robot in ROBOTS:
+                    controller._session.put(key(robot, MOTION.name), b"")
+                time.sleep(0.05)
+        assert got == {key("rp2", MOTION.name)}
+    finally:
+        router.close()
+
+
+def test_without_a_certificate_of_this_authority_nobody_comes_in(
+    certificates: Path, endpoint: str, tmp_path: Path
+) -> None:
+    with pytest.raises(TransportError):
+        Transport(
+            TransportConfig(connect=(endpoint.replace("tls", "tcp"),), connect_timeout_s=1.0, plain_wire=True),
+            "controller",
+            "rp1",
+        )
+    make(tmp_path / "own", ("127.0.0.1",), 2)
+    with pytest.raises(TransportError):
+        Transport(config(endpoint, tmp_path / "own"), "controller", "rp1")
+    mixed = tmp_path / "mixed"
+    mixed.mkdir()
+    (mixed / "ca.pem").write_bytes((certificates / "ca.pem").read_bytes())
+    for name in ("controller.pem", "controller.key"):
+        (mixed / name).write_bytes((tmp_path / "own" / name).read_bytes())
+    with Onlooker(config(endpoint, certificates), "rp1") as listener:
+        got = listener.slot(STOP)
+        time.sleep(0.3)
+        with pytest.raises(TransportError):
+            intruder = Transport(config(endpoint, mixed), "controller", "rp1")
+            stop = m.StopRequest(stop_id="a", source="x", user="eve", reason="r")
+            intruder._session.put(key("rp1", STOP.name), stop)
+        time.sleep(0.3)
+        assert got.peek() is None
+
+
+def test_what_does_not_fit_is_one_clear_line(certificates: Path, tmp_path: Path, capsys) -> None:
+    with pytest.raises(TransportError, match="no certificate file .*bridge.pem.*rolling-panda certificates"):
+        folder = tmp_path / "some"
+        folder.mkdir()
+        (folder / "ca.pem").write_text("")
+        Transport(config("tls/127.0.0.1:1", folder), "bridge", "rp1")
+    with pytest.raises(TransportError, match="every endpoint is tls/HOST:PORT; got tcp/127.0.0.1:1"):
+        Transport(config("tcp/127.0.0.1:1", certificates), "bridge", "rp1")
+    with pytest.raises(InputError, match="give --out a new folder"):
+        make(certificates, ("127.0.0.1",), 2)
+    assert main(["--out", str(tmp_path / "new"), "--days", "0"]) == 1
+    assert "1 to 3650" in capsys.readouterr().err
+    assert main(["--out", str(tmp_path / "new")]) == 0
+    assert all((tmp_path / "new" / f"{name}.key").stat().st_mode & 0o077 == 0 for name in NAMES)
+
+
+def test_apart_each_has_its_own_and_they_are_kept_until_they_are_too_old(tmp_path: Path, capsys) -> None:
+    out = tmp_path / "volumes"
+
+    def made(days: int) -> dict[str, bytes]:
+        assert main(["--apart", "--out", str(out), "--days", str(days)]) == 0
+        return {str(path.relative_to(out)): path.read_bytes() for path in out.rglob("*.*")}
+
+    first = made(6)
+    for name in APART:
+        held = {Path(path).stem for path in first if path.startswith(f"{name}/")} - {"ca"}
+        assert held == {name, "onlooker"} if name in m.PROCESSES else {name}
+        assert (out / name).stat().st_mode & 0o777 == 0o700
+    assert len({first[f"{name}/ca.pem"] for name in APART}) == 1
+    # Good for less than a week: anew, all of them.
+    second = made(30)
+    assert set(second) == set(first) and not set(second.values()) & set(first.values())
+    assert made(30) == second and "kept what was there" in capsys.readouterr().out
+    # An interrupted start leaves some of two authorities: anew.
+    (out / "server/ca.pem").write_bytes(first["server/ca.pem"])
+    assert not set(made(30).values()) & set(second.values())
+    assert main(["--apart", "--out", str(out), "--robot", "a", "--robot", "b"]) == 1
+    assert "--apart is for one robot; got a, b" in capsys.readouterr().err
+
+
+def commands(wire: Onlooker, epoch: int, seconds: float) -> None:
+    """Drive forward by motion commands that answer the newest joint state, as a controller does."""
+    joints = wire.slot(JOINTS)
+    end, sequence = time.monotonic() + seconds, 0
+    while time.monotonic() < end:
+        newest = joints.peek()
+        if newest is not None:
+            sequence += 1
+            xi = (0.0 if sequence < 20 else 1.0,) * 2 + (0.0,) * 7
+            command = m.MotionCommand(epoch=epoch, sequence=sequence, echo=newest.message.sequence, xi=xi)
+            wire._session.put(key("rp1", MOTION.name), encode(command))
+        time.sleep(0.01)
+
+
+def test_only_the_controller_moves_the_robot(certificates: Path, tmp_path: Path) -> None:
+    port, trace = free_port(), tmp_path / "trace"
+    endpoint = f"tls/127.0.0.1:{port}"
+    shared = ["--certificates", str(certificates)]
+    lines = {
+        "router": ("rolling_panda", ["router", "--listen", endpoint, *shared]),
+        "bridge": (
+            "bridge",
+            ["sim", "--trace", str(trace), "--connect", endpoint, "--state", str(tmp_path / "state"), *shared],
+        ),
+    }
+    running: list[subprocess.Popen[bytes]] = []
+    settings = TransportConfig(connect=(endpoint,), connect_timeout_s=20.0, certificates=str(certificates))
+
+    def driven() -> float:
+        return float(np.abs(read(trace).rows["base_velocity"][:, 0]).max())
+
+    try:
+        for module, words in lines.values():
+            running.append(subprocess.Popen(python_command(module, words), env=child_environment()))
+        with Onlooker(settings, "rp1") as onlooker:
+            state = onlooker.slot(BRIDGE)
+            end = time.monotonic() + 60.0
+            while state.peek() is None:
+                assert time.monotonic() < end and all(child.poll() is None for child in running)
+                time.sleep(0.05)
+        for intruder in ("server", "perception"):
+            with Transport(settings, intruder, "rp1") as wire:
+                commands(wire, 7, 1.0)
+        assert driven() < 1e-3
+        with Transport(settings, "controller", "rp1") as wire:
+            commands(wire, 8, 1.5)
+        time.sleep(0.3)
+        assert driven() > 0.02
+    finally:
+        for child in reversed(running):
+            child.terminate()
+        for child in running:
+            child.wait(10)

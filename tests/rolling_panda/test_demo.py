@@ -1,0 +1,189 @@
+"""The demo with its real processes: up, one link that works once, and nothing left however it ends."""
+
+import contextlib
+import os
+import re
+import signal
+import socket
+import stat
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import psutil
+import pytest
+
+from rolling_panda.cli import main as cli
+from rolling_panda.cli.demo import choose_router_port, write_secret
+from rolling_panda.runtime.launch import child_environment, python_command
+
+pytestmark = pytest.mark.alone
+
+STARTUP_S = 60.0
+CHILDREN = {"router", "bridge", "controller", "perception", "server"}
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+class Demo:
+    """A running demo under test; leaves nothing behind."""
+
+    def __init__(self, folder: Path, *more: str) -> None:
+        self.port = free_port()
+        self.trace = folder / "trace"
+        self.words: list[str] = []
+        self._popen = subprocess.Popen(
+            python_command("rolling_panda", ["demo", "--port", str(self.port), "--trace", str(self.trace), *more]),
+            # The demo's own temporary folder lies in this one, to be removed with it.
+            env=child_environment() | {"TMPDIR": str(folder)},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        self.pid = self._popen.pid
+        self.children: list[psutil.Process] = []
+
+    def wait_until_up(self, limit_s: float = STARTUP_S) -> None:
+        assert self._popen.stdout is not None
+        began = time.monotonic()
+        for line in self._popen.stdout:
+            self.words.append(line)
+            if "Ctrl-C ends everything" in line:
+                break
+        assert time.monotonic() - began < limit_s, self.text()
+        self.children = psutil.Process(self.pid).children(recursive=True)
+        for name in CHILDREN:
+            assert all(child.is_running() for child in self.named(name)), self.text()
+
+    def close(self) -> None:
+        if self._popen.poll() is None:
+            self._popen.terminate()
+        self._popen.communicate()
+        for child in self.children:
+            if child.is_running():
+                child.kill()
+
+    def text(self) -> str:
+        return "".join(self.words)
+
+    def child(self, name: str) -> psutil.Process:
+        (found,) = self.named(name)
+        return found
+
+    def named(self, name: str) -> list[psutil.Process]:
+        """Its processes of this name: one, or one a robot."""
+        module = ["rolling_panda", "router"] if name == "router" else [name]
+        found = [child for child in self.children if child.cmdline()[3 : 3 + len(module)] == module]
+        assert found, f"no {name}:\n{self.text()}"
+        return found
+
+    def ends(self, limit_s: float = 5.0) -> int:
+        """Exit code, once the demo and all that it started are gone within the limit."""
+        began = time.monotonic()
+        code = self._popen.wait(limit_s)
+        psutil.wait_procs(self.children, timeout=max(0.0, limit_s - (time.monotonic() - began)))
+        assert not [child.cmdline() for child in self.children if child.is_running()]
+        assert self._popen.stdout is not None
+        self.words.append(self._popen.stdout.read())
+        return code
+
+
+@contextlib.contextmanager
+def running_demo(folder: Path, *more: str, limit_s: float = STARTUP_S) -> Iterator[Demo]:
+    demo = Demo(folder, *more)
+    try:
+        demo.wait_until_up(limit_s)
+        yield demo
+    finally:
+        demo.close()
+
+
+def test_it_comes_up_with_a_link_that_works_once_and_ctrl_c_ends_it(tmp_path: Path) -> None:
+    with running_demo(tmp_path) as demo:
+        for name in CHILDREN:
+            assert re.search(rf"^  {name} +up +\d+\.\d s$", demo.text(), re.MULTILINE)
+        (link,) = re.findall(r"http://\S+", demo.text())
+        page, token = link.split("/sign-in?token=")
+        assert page == f"http://127.0.0.1:{demo.port}"
+        assert not [child for child in demo.children if token in " ".join(child.cmdline())]
+        assert not list(tmp_path.rglob("sign-in-token")), "the server deletes the token once read"
+        statuses = [sign_in(page, token) for _ in range(2)]
+        assert statuses[0] < 300 and statuses[1] == 401
+        (words,) = re.findall(r"rolling-panda (status --connect .*)$", demo.text(), re.MULTILINE)
+        assert cli.main(words.split()) == 0
+        os.kill(demo.pid, signal.SIGINT)
+        assert demo.ends() == 0
+        assert "every process has ended" in demo.text()
+        assert not list(tmp_path.glob("rolling-panda-*")), "what went well leaves nothing behind"
+        assert demo.trace.stat().st_size > 0
+
+
+def sign_in(page: str, token: str) -> int:
+    return httpx.post(
+        f"{page}/api/sign-in", json={"token": token}, headers={"Origin": page}, trust_env=False
+    ).status_code
+
+
+# One more start of everything; what it is made of is tested in `test_demo_supervisor.py`.
+@pytest.mark.slow
+def test_when_a_process_is_killed_it_says_which_and_ends_the_rest(tmp_path: Path) -> None:
+    with running_demo(tmp_path) as demo:
+        # The bridge has a process of its own for pictures, which must not be left either.
+        demo.child("bridge").kill()
+        assert demo.ends() == 1
+        assert "bridge ended by signal 9 (SIGKILL)" in demo.text()
+        assert "Traceback" not in demo.text()
+        (folder,) = tmp_path.glob("rolling-panda-*")
+        assert f"The logs of all processes are kept in {folder}" in demo.text()
+        assert (folder / "bridge.log").exists()
+
+
+# Children that watch their parent are tested in test_demo_supervisor.py, which takes less time.
+@pytest.mark.slow
+def test_when_the_demo_itself_is_killed_nothing_outlives_it(tmp_path: Path) -> None:
+    with running_demo(tmp_path) as demo:
+        os.kill(demo.pid, signal.SIGKILL)
+        assert demo.ends() == -signal.SIGKILL
+
+
+def test_a_process_that_cannot_start_is_told_with_its_reason(tmp_path: Path) -> None:
+    config = tmp_path / "robot.toml"
+    config.write_text("[bridge]\nwatchdogs = 1\n")
+    done = subprocess.run(
+        python_command("rolling_panda", ["demo", "--port", str(free_port()), "--config", str(config)]),
+        env=child_environment() | {"TMPDIR": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        timeout=STARTUP_S,
+    )
+    assert done.returncode == 1
+    assert "bridge ended with exit code 1" in done.stdout
+    assert "[bridge] has no key 'watchdogs'" in done.stdout
+    assert list(tmp_path.glob("rolling-panda-*/*.log")), "the logs are kept"
+    assert not list(tmp_path.rglob("*.key")), "no key outlives its run"
+    assert "Traceback" not in done.stdout + done.stderr
+
+
+def test_the_router_is_where_other_commands_look_unless_that_port_is_taken() -> None:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        usual = int(probe.getsockname()[1])
+    endpoint = f"tcp/127.0.0.1:{usual}"
+    assert choose_router_port(endpoint) == usual
+    with socket.create_server(("127.0.0.1", usual)):
+        assert choose_router_port(endpoint) not in (usual, 0)
+
+
+def test_a_secret_is_for_this_user_alone_and_never_written_over(tmp_path: Path) -> None:
+    path = tmp_path / "secret"
+    write_secret(path, "abc")
+    assert path.read_text() == "abc"
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    with pytest.raises(FileExistsError):
+        write_secret(path, "def")

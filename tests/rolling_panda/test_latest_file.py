@@ -1,0 +1,38 @@
+import time
+
+from rolling_panda.runtime.latest_file import LatestFileWriter
+
+
+def test_the_newest_is_on_disk_after_closing(tmp_path):
+    keeper = LatestFileWriter(tmp_path / "it")
+    for number in range(200):
+        keeper.keep(str(number).encode())
+    keeper.close()
+    keeper.close()
+    assert (tmp_path / "it").read_bytes() == b"199"
+    assert keeper.failure == ""
+
+
+def test_a_disk_that_refuses_is_told_in_words(tmp_path):
+    keeper = LatestFileWriter(tmp_path / "gone" / "it")
+    keeper.keep(b"x")
+    keeper.close()
+    assert "cannot be written" in keeper.failure
+
+
+def test_what_the_disk_refuses_is_written_once_it_takes_it(tmp_path):
+    keeper = LatestFileWriter(tmp_path / "gone" / "it")
+    keeper.keep(b"stopped")
+    until(lambda: keeper.failure)
+    (tmp_path / "gone").mkdir()
+    until((tmp_path / "gone" / "it").exists)
+    assert (tmp_path / "gone" / "it").read_bytes() == b"stopped"
+    until(lambda: keeper.kept and keeper.failure == "")
+    keeper.close()
+
+
+def until(condition):
+    end = time.monotonic() + 20.0
+    while not condition():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.005)

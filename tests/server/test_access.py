@@ -1,0 +1,54 @@
+"""What the server's options let in: what does not fit is one clear line, before anything is served."""
+
+import argparse
+
+import pytest
+
+from rolling_panda.errors import InputError
+from server.__main__ import add_arguments
+from server.auth.access import access
+from server.auth.users import UserFile
+from tests.support.certificates import self_signed
+
+
+def told(*words):
+    parser = argparse.ArgumentParser()
+    add_arguments(parser)
+    return access(parser.parse_args([str(word) for word in words]))
+
+
+def test_on_this_machine_a_link_is_enough():
+    for host in ("127.0.0.1", "127.8.8.8", "::1", "localhost"):
+        assert told("--host", host).users is None
+    assert told().scheme == "http"
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.7", "panda.example.org"])
+def test_for_other_machines_it_is_not(host):
+    with pytest.raises(InputError, match=f"--host {host} is open to other machines.*--users"):
+        told("--host", host)
+
+
+def test_a_users_file_without_users_lets_nobody_in_and_says_so(tmp_path):
+    with pytest.raises(InputError, match="nobody could sign in.*rolling-panda user add NAME"):
+        told("--users", tmp_path / "none.json")
+
+
+def test_users_let_in_from_elsewhere_but_not_beside_a_link(tmp_path):
+    file = tmp_path / "users.json"
+    UserFile(file).add("ada", "operator", "long enough a one")
+    assert told("--host", "0.0.0.0", "--users", file).users.check("ada", "long enough a one")
+    with pytest.raises(InputError, match="exclude each other"):
+        told("--users", file, "--sign-in-token-file", tmp_path / "token")
+
+
+def test_a_certificate_needs_its_own_key(tmp_path):
+    certificate, key = self_signed(tmp_path)
+    assert told("--tls-cert", certificate, "--tls-key", key).scheme == "https"
+    with pytest.raises(InputError, match="belong together"):
+        told("--tls-cert", certificate)
+    (tmp_path / "other").mkdir()
+    _, other = self_signed(tmp_path / "other")
+    for wrong in (other, tmp_path / "none.pem"):
+        with pytest.raises(InputError, match="cannot use the certificate"):
+            told("--tls-cert", certificate, "--tls-key", wrong)

@@ -1,0 +1,173 @@
+"""What an operator asks of perception over REST."""
+
+import pytest
+
+from rolling_panda import messages as m
+from rolling_panda import topics
+from rolling_panda.errors import ServiceError
+from rolling_panda.messages.commands import (
+    AddPoint,
+    AddPointInImage,
+    MovePoint,
+    RestoreAccepted,
+    SetRule,
+    TakeRuleBack,
+    TryRule,
+)
+from rolling_panda.messages.perception import PointCrop
+from tests.support.fake_wire import FakeWire, controller_state, pruning_point, pruning_points
+from tests.support.running_server import eventually, running_server
+
+
+@pytest.fixture(scope="module")
+def running():
+    with running_server(FakeWire()) as server:
+        yield server
+
+
+@pytest.fixture
+def server(running):
+    running.wire.asked.clear()
+    running.wire.answer = lambda request: m.Answer(ok=True, reason="p9")
+    return running
+
+
+@pytest.mark.parametrize(
+    ("path", "body", "request_"),
+    [
+        ("rule", {}, SetRule(user="ann")),
+        (
+            "rule",
+            {"system": "guyot", "nodes_kept": 1, "fruiting_nodes": 10, "keeper_diameter": 0.007, "offset": 0.015},
+            SetRule(
+                user="ann",
+                rule=m.PruningRule(
+                    system="guyot", nodes_kept=1, fruiting_nodes=10, keeper_diameter=0.007, offset=0.015
+                ),
+            ),
+        ),
+        (
+            "points/by-hand",
+            {"origin": [0.0, -0.5, 1.0], "direction": [0.0, 1.0, 0.0]},
+            AddPoint(user="ann", origin=(0.0, -0.5, 1.0), direction=(0.0, 1.0, 0.0)),
+        ),
+        ("points/p4/move", {"along": -0.005}, MovePoint(user="ann", point_id="p4", along=-0.005)),
+        (
+            "points/by-hand-in-image",
+            {"sequence": 4, "u": 0.25, "v": 0.5},
+            AddPointInImage(user="ann", sequence=4, u=0.25, v=0.5),
+        ),
+    ],
+)
+def test_each_request_goes_to_perception(server, path, body, request_):
+    with server.client(user="ann") as client:
+        answer = client.post(f"/api/{path}", json=body)
+        assert (answer.status_code, answer.json()) == (200, {"ok": True, "reason": "p9"})
+        assert server.wire.asked == [request_]
+        events = client.get("/api/events").json()["events"]
+        assert events[-1]["text"] == f"{type(request_).__name__} by ann: p9"
+
+
+@pytest.mark.parametrize(
+    ("path", "body"),
+    [
+        ("rule", {"nodes_kept": 0}),
+        ("rule", {"nodes_kept": 2.5}),
+        ("rule", {"system": "pergola"}),
+        ("rule", {"offset": 0.5}),
+        ("rule", {"more": 1}),
+        ("rule/what-if", {"nodes_kept": 0}),
+        ("rule/undo", {"system": "pergola"}),
+        ("points/p4/move", {"along": 0.5}),
+        ("points/by-hand", {"origin": [0, 0], "direction": [0, 1, 0]}),
+        ("points/by-hand-in-image", {"sequence": 1, "u": 1.2, "v": 0.5}),
+    ],
+)
+def test_what_cannot_be_is_refused_before_it_is_asked(server, path, body):
+    with server.client(user="ann") as client:
+        assert client.post(f"/api/{path}", json=body).status_code == 422
+    assert server.wire.asked == []
+
+
+def test_a_viewer_may_not_ask_and_a_refusal_or_silence_is_told(server):
+    with server.client(role="viewer", user="bob") as client:
+        for path in ("rule", "rule/what-if", "rule/undo"):
+            assert client.post(f"/api/{path}", json={}).status_code == 403
+    assert server.wire.asked == []
+    with server.client(user="ann") as client:
+        server.wire.answer = lambda request: m.Answer(ok=False, reason="no known cane there")
+        answer = client.post("/api/points/by-hand", json={"origin": [0.0, 0.0, 1.0], "direction": [0.0, 1.0, 0.0]})
+        assert (answer.status_code, answer.json()["reason"]) == (409, "no known cane there")
+
+        def dead(request):
+            raise ServiceError("service/plant did not answer within 2.0 s")
+
+        server.wire.answer = dead
+        assert client.post("/api/rule", json={}).status_code == 503
+
+
+EFFECT = m.RuleEffect(moved=("r1", "r2", "r3"), gone=("r4",), added=2)
+
+
+def queue_of(server, **states):
+    server.wire.deliver(topics.POINTS, pruning_points(*(pruning_point(name) for name in states)))
+    queue = tuple(m.QueueEntry(name, state) for name, state in states.items())
+    server.wire.deliver(topics.CONTROLLER, controller_state(queue))
+
+
+def test_what_a_rule_would_change_is_told_with_the_acceptances_and_nothing_is_logged(server):
+    with server.client(user="ann") as client:
+        queue_of(server, r1="ACCEPTED", r2="UNREACHABLE", r3="PROPOSED", r4="ACCEPTED", r5="ACCEPTED")
+        eventually(lambda: len(client.get("/api/points").json()["points"]) == 5)
+        server.wire.answer = lambda request: m.Answer(ok=True, reason="7 points", effect=EFFECT)
+        events = len(client.get("/api/events").json()["events"])
+        answer = client.post("/api/rule/what-if", json={"nodes_kept": 3})
+        assert (answer.status_code, answer.json()) == (
+            200,
+            {
+                "ok": True,
+                "reason": "3 move, 1 goes, 2 come, 3 acceptances would be void",
+                "moved": 3,
+                "gone": 1,
+                "added": 2,
+                "voided": 3,
+            },
+        )
+        assert server.wire.asked == [TryRule(user="ann", rule=m.PruningRule(nodes_kept=3))]
+        assert len(client.get("/api/events").json()["events"]) == events
+        server.wire.answer = lambda request: m.Answer(ok=True, effect=m.RuleEffect())
+        assert client.post("/api/rule/what-if", json={}).json()["reason"] == "nothing would change"
+
+
+def test_a_rule_is_taken_back_by_perception_first_and_then_its_acceptances_by_the_controller(server):
+    rule = m.PruningRule(nodes_kept=3)
+    with server.client(user="ann") as client:
+        assert client.post("/api/rule/undo", json={"nodes_kept": 3}).status_code == 200
+        first, second = server.wire.asked
+        assert first == TakeRuleBack(user="ann", rule=rule)
+        assert isinstance(second, RestoreAccepted) and (second.user, second.rule) == ("ann", rule)
+        # Where perception cannot, nobody's acceptance is touched.
+        server.wire.asked.clear()
+        server.wire.answer = lambda request: m.Answer(ok=False, reason="the rule has been changed since; look again")
+        answer = client.post("/api/rule/undo", json={"nodes_kept": 3})
+        assert (answer.status_code, answer.json()["reason"]) == (409, "the rule has been changed since; look again")
+        assert [type(each) for each in server.wire.asked] == [TakeRuleBack]
+        server.wire.answer = lambda request: m.Answer(ok=isinstance(request, TakeRuleBack), reason="it began since")
+        answer = client.post("/api/rule/undo", json={"nodes_kept": 3})
+        assert answer.json()["reason"] == "the rule is back, its acceptances are not: it began since"
+
+
+def test_the_picture_of_a_point_is_given_for_its_revision(server):
+    with server.client(role="viewer", user="bob") as client:
+        unknown = client.get("/api/points/p1/crop")
+        assert (unknown.status_code, unknown.json()["reason"]) == (404, "there is no point 'p1'")
+        server.wire.deliver(topics.POINTS, pruning_points(pruning_point("p1")))
+        eventually(lambda: client.get("/api/points/p1/crop").status_code == 204)
+        server.wire.deliver(topics.CROPS, PointCrop(point_id="p1", revision=3, sequence=7, jpeg=b"picture"))
+        answer = client.get("/api/points/p1/crop?revision=3")
+        assert (answer.content, answer.headers["content-type"]) == (b"picture", "image/jpeg")
+        assert client.get("/api/points/p1/crop?revision=4").status_code == 204
+        server.wire.deliver(topics.CROPS, PointCrop(point_id="p1", revision=4, sequence=9, jpeg=b"newer"))
+        assert client.get("/api/points/p1/crop").content == b"newer"
+    with server.visitor() as stranger:
+        assert stranger.get("/api/points/p1/crop").status_code == 401

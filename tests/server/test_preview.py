@@ -1,0 +1,49 @@
+"""What the server checks of an approval before it passes it on."""
+
+import msgspec
+import pytest
+
+from rolling_panda import messages as m
+from rolling_panda.messages.supervision import PreviewState
+from server.api.preview import outdated
+from server.robots.link import Posture
+
+ARM = (0.0, -0.5, 0.0, -2.0, 0.0, 1.5, 0.8)
+STATE = PreviewState(
+    header=m.Header(),
+    required=True,
+    phase="ready",
+    preview_hash="ab" * 32,
+    start=m.PlanarPose(1.0, 0.0, 0.0),
+    position=(3.0, 3.0, *ARM),
+    duration_s=9.0,
+)
+
+
+def posture(x=1.0, phi=0.0, wheels=3.0, first=0.0):
+    return Posture(m.PlanarPose(x, 0.0, phi), (wheels, wheels, first, *ARM[1:]), 0.01)
+
+
+def test_what_is_as_it_was_passes_however_far_the_wheels_have_turned():
+    assert outdated(STATE, STATE.preview_hash, posture(x=1.04, phi=0.04, wheels=30.0, first=0.09)) == ""
+
+
+@pytest.mark.parametrize(
+    ("where", "words"),
+    [
+        (posture(x=1.31), "the base moved 0.31 m"),
+        (posture(phi=0.2), "the base turned by 11°"),
+        (posture(first=0.3), "a joint of the arm moved by 0.30 rad"),
+        (None, "where the robot stands is not known"),
+    ],
+)
+def test_a_robot_that_stands_elsewhere_is_told_how(where, words):
+    assert words in outdated(STATE, STATE.preview_hash, where)
+
+
+def test_another_hash_an_expired_one_and_none_are_refused():
+    assert "another one now: abababab, not cdcdcdcd" in outdated(STATE, "cd" * 32, posture())
+    gone = msgspec.structs.replace(STATE, phase="expired", reason="a was revised")
+    assert "expired: a was revised" in outdated(gone, STATE.preview_hash, posture())
+    none = msgspec.structs.replace(STATE, phase="rolling")
+    assert "no preview to approve" in outdated(none, STATE.preview_hash, posture())

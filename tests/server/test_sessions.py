@@ -1,0 +1,77 @@
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rolling_panda.errors import InputError
+from server.auth.sessions import Sessions, SignInError
+
+
+def test_a_link_signs_in_once():
+    sessions = Sessions(60.0)
+    token = sessions.invite("ann", "operator")
+    session = sessions.sign_in(token, 0.0)
+    assert (session.user, session.role) == ("ann", "operator")
+    with pytest.raises(SignInError, match="used"):
+        sessions.sign_in(token, 1.0)
+
+
+def test_secrets_are_long_and_differ():
+    sessions = Sessions(60.0)
+    tokens = {sessions.invite("ann", "viewer") for _ in range(20)}
+    assert len(tokens) == 20
+    assert min(len(token) for token in tokens) >= 43
+    with pytest.raises(InputError, match="128 bits"):
+        sessions.admit("short", "ann", "viewer")
+
+
+def test_an_invitation_expires():
+    sessions = Sessions(60.0)
+    token = sessions.invite("ann", "viewer", expires_at=10.0)
+    with pytest.raises(SignInError):
+        sessions.sign_in(token, 10.1)
+
+
+def test_bad_attempts_cost_more_and_more_time_and_a_good_one_ends_that():
+    sessions = Sessions(60.0)
+    good = sessions.invite("ann", "viewer")
+    for _ in range(5):
+        with pytest.raises(SignInError) as caught:
+            sessions.sign_in("wrong", 0.0)
+    assert caught.value.wait_s == 0.0
+    with pytest.raises(SignInError, match="too many") as caught:
+        sessions.sign_in("wrong", 0.5)
+    assert caught.value.wait_s == pytest.approx(0.5)
+    with pytest.raises(SignInError):
+        sessions.sign_in("wrong", 1.0)
+    with pytest.raises(SignInError, match="too many") as caught:
+        sessions.sign_in("wrong", 1.0)
+    assert caught.value.wait_s == pytest.approx(2.0)
+    sessions.sign_in(good, 3.0)
+    with pytest.raises(SignInError, match="used"):
+        sessions.sign_in("wrong", 3.0)
+
+
+def test_an_idle_session_ends_and_a_used_one_does_not():
+    sessions = Sessions(60.0)
+    session = sessions.sign_in(sessions.invite("ann", "viewer"), 0.0)
+    for now in (50.0, 100.0, 150.0):
+        assert sessions.find(session.session_id, now) is session
+    assert sessions.find(session.session_id, 211.0) is None
+    assert session.ended.is_set()
+
+
+def test_a_session_that_was_ended_is_gone():
+    sessions = Sessions(60.0)
+    session = sessions.sign_in(sessions.invite("ann", "viewer"), 0.0)
+    sessions.end(session)
+    sessions.end(session)
+    assert sessions.find(session.session_id, 0.0) is None
+    assert sessions.everyone() == ()
+
+
+@settings(max_examples=50)
+@given(st.text())
+def test_no_guess_is_a_session(guess):
+    sessions = Sessions(60.0)
+    sessions.sign_in(sessions.invite("ann", "viewer"), 0.0)
+    assert sessions.find(guess, 0.0) is None

@@ -1,0 +1,94 @@
+"""The users file lets in who knows the password, holds none, and is changed from the command line."""
+
+import io
+import stat
+
+import pytest
+
+from rolling_panda.errors import InputError
+from server.auth.user_command import main
+from server.auth.users import UserFile
+
+PASSWORD = "correct horse battery"
+
+
+@pytest.fixture
+def users(tmp_path):
+    file = UserFile(tmp_path / "state" / "users.json")
+    file.add("ada", "supervisor", PASSWORD)
+    return file
+
+
+def test_name_and_password_have_to_fit(users):
+    assert users.check("ada", PASSWORD).role == "supervisor"
+    assert users.check("ada", PASSWORD + " ") is None
+    assert users.check("eve", PASSWORD) is None
+    assert users.check("ada", "\ud800 no text") is None
+
+
+def test_the_file_holds_no_password_and_is_for_its_owner_alone(users):
+    content = users.path.read_text()
+    assert "correct" not in content and "$argon2id$" in content
+    assert stat.S_IMODE(users.path.stat().st_mode) == 0o600
+    users.add("bob", "viewer", PASSWORD)
+    hashes = {user.password for user in users.everyone()}
+    assert len(hashes) == 2
+
+
+def test_a_new_password_counts_at_once_and_the_old_one_no_more(users):
+    before = users.everyone()[0].fingerprint
+    users.set_password("ada", "another long one")
+    assert users.check("ada", PASSWORD) is None and users.check("ada", "another long one")
+    assert users.everyone()[0].fingerprint != before
+
+
+def test_who_is_removed_is_gone(users):
+    users.add("bob", "viewer", PASSWORD)
+    users.remove("ada")
+    assert users.check("ada", PASSWORD) is None
+    assert [user.name for user in users.everyone()] == ["bob"]
+
+
+def test_what_cannot_be_is_refused_in_words(users):
+    with pytest.raises(InputError, match="there is a user 'ada' already"):
+        users.add("ada", "viewer", PASSWORD)
+    with pytest.raises(InputError, match="10 to 200 characters; this one has 5"):
+        users.add("bob", "viewer", "short")
+    for name in ("", " bob", "b\nob", "<b>", "x" * 41):
+        with pytest.raises(InputError, match="is no name"):
+            users.add(name, "viewer", PASSWORD)
+    with pytest.raises(InputError, match="no user 'eve'.*there are ada"):
+        users.remove("eve")
+    users.path.write_text("{")
+    with pytest.raises(InputError, match="is no users file"):
+        users.everyone()
+
+
+def run(monkeypatch, capsys, *words, typed=""):
+    monkeypatch.setattr("sys.stdin", io.StringIO(typed))
+    code = main(words)
+    told = capsys.readouterr()
+    return code, told.out + told.err
+
+
+def test_the_command_adds_lists_changes_and_removes(tmp_path, monkeypatch, capsys):
+    state = ("--state", str(tmp_path))
+    code, told = run(monkeypatch, capsys, "add", "ada", "--role", "supervisor", "--password-stdin", *state,
+                     typed=PASSWORD + "\n")  # fmt: skip
+    assert code == 0 and "ada may sign in as supervisor" in told and PASSWORD not in told
+    file = UserFile(tmp_path / "users.json")
+    assert file.check("ada", PASSWORD)
+    assert run(monkeypatch, capsys, "list", *state) == (0, "supervisor  ada\n")
+    assert run(monkeypatch, capsys, "password", "ada", "--password-stdin", *state, typed="much longer one\n")[0] == 0
+    assert file.check("ada", "much longer one")
+    assert run(monkeypatch, capsys, "remove", "ada", *state)[0] == 0
+    assert run(monkeypatch, capsys, "list", *state) == (0, "nobody may sign in\n")
+    code, told = run(monkeypatch, capsys, "remove", "ada", *state)
+    assert code == 1 and "no user 'ada'" in told and len(told.splitlines()) == 1
+
+
+def test_a_password_is_asked_for_twice(tmp_path, monkeypatch, capsys):
+    typed = iter([PASSWORD, "something else"])
+    monkeypatch.setattr("getpass.getpass", lambda prompt: next(typed))
+    code, told = run(monkeypatch, capsys, "add", "ada", "--state", str(tmp_path))
+    assert code == 1 and "differ" in told and not (tmp_path / "users.json").exists()

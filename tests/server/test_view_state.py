@@ -1,0 +1,159 @@
+"""Cameras, layers and measures of the 3-D view, each for the session that asked, through the real viser."""
+
+import msgspec
+import numpy as np
+import pytest
+
+from rolling_panda import topics
+from tests.server.test_scene_sight import HEIGHT, WIDTH, frame
+from tests.server.test_viser_filter import CAMERA, CLICK, POINTER
+from tests.server.test_viser_proxy import enables_clicks, hear, hear_kind, open_socket, open_view, replayed, say
+from tests.support.fake_wire import FakeWire, joints, odometry, pruning_point, pruning_points, telling
+from tests.support.running_server import running_server
+
+
+@pytest.fixture(scope="module")
+def server():
+    wire = FakeWire()
+    with running_server(wire) as running:
+        wire.deliver(topics.JOINTS, joints())
+        wire.deliver(topics.ODOMETRY, odometry())
+        yield running
+
+
+def shows(name, visible):
+    return lambda message: (
+        (message["type"], message.get("name"), message.get("visible"))
+        == (
+            "SetSceneNodeVisibilityMessage",
+            name,
+            visible,
+        )
+    )
+
+
+def test_layers_are_those_of_one_session_and_stay_for_its_next_view(server):
+    with (
+        server.client(user="ann") as client,
+        server.client(user="bob") as other,
+        open_socket(server, client, "/ws") as page,
+        open_view(server, other) as other_view,
+    ):
+        hear(other_view, replayed)
+        say(other_view, CAMERA)
+        hear(other_view, shows("/row", True))
+        with open_view(server, client) as view:
+            hear(view, replayed)
+            say(view, CAMERA)
+            hear(view, shows("/row", True))
+            page.send('{"type":"ShowLayers","layers":["points"]}')
+            heard = hear(view, shows("/row", False))
+            assert any(map(shows("/plant", False), heard)) and any(map(shows("/points", True), heard))
+            with pytest.raises(TimeoutError):
+                hear(other_view, shows("/row", False), patience_s=0.4)
+        with open_view(server, client) as view:
+            hear(view, replayed)
+            say(view, CAMERA)
+            hear(view, shows("/row", False))
+
+
+def test_a_preset_moves_the_cameras_of_who_asked_alone_and_viewers_may_too(server):
+    def placed(message):
+        return message["type"] == "SetCameraPositionMessage"
+
+    with (
+        telling(server.wire),
+        server.client(role="viewer", user="vera") as client,
+        server.client(user="bob") as other,
+        open_socket(server, client, "/ws") as page,
+        open_view(server, client) as view,
+        open_view(server, other) as other_view,
+    ):
+        for each in (view, other_view):
+            hear(each, replayed)
+            say(each, CAMERA)
+        hear(view, shows("/row", True))
+        page.send('{"type":"PlaceCamera","preset":"top"}')
+        (put,) = [message for message in hear(view, placed) if placed(message)]
+        assert put["position"][2] > 3.0
+        with pytest.raises(TimeoutError):
+            hear(other_view, placed, patience_s=0.4)
+
+
+def test_a_chosen_point_brings_the_cameras_of_who_chose_it_alone(server):
+    def placed(message):
+        return message["type"] == "SetCameraPositionMessage"
+
+    def looks_at(x):
+        return lambda told: told["type"] == "SetCameraLookAtMessage" and np.allclose(told["look_at"], (x, 0.75, 1.0))
+
+    far = msgspec.structs.replace(pruning_point("far"), position=(1.0, 0.75, 1.0))
+    server.wire.deliver(topics.POINTS, pruning_points(far))
+    with (
+        telling(server.wire),
+        server.client(user="ann") as client,
+        server.client(user="bob") as other,
+        open_socket(server, client, "/ws") as page,
+        open_view(server, client) as view,
+        open_view(server, other) as other_view,
+    ):
+        for each in (view, other_view):
+            hear(each, replayed)
+            say(each, CAMERA)
+        hear(view, shows("/row", True))
+        page.send('{"type":"Select","point_id":"far"}')
+        hear(view, looks_at(1.0))
+        # Chosen before it is drawn, as where somebody has placed it: brought there once it is.
+        page.send('{"type":"Select","point_id":"new"}')
+        new = msgspec.structs.replace(pruning_point("new"), position=(2.0, 0.75, 1.0))
+        server.wire.deliver(topics.POINTS, pruning_points(far, new))
+        hear(view, looks_at(2.0))
+        # A click onto its marker does the same, and tells the page.
+        say(view, CLICK | {"name": "/points/far"})
+        assert hear_kind(page, "Selected")["point_id"] == "far"
+        with pytest.raises(TimeoutError):
+            hear(other_view, placed, patience_s=0.4)
+
+
+def test_two_clicks_are_measured_for_the_session_that_measures(server):
+    down = POINTER | {"ray_origin": [0.0, -3.0, 2.0], "ray_direction": [0.0, 0.0, -1.0]}
+    with (
+        telling(server.wire),
+        server.client() as client,
+        open_socket(server, client, "/ws") as page,
+        open_view(server, client) as view,
+    ):
+        hear(view, replayed)
+        say(view, CAMERA)
+        page.send('{"type":"Measure","active":true}')
+        hear(view, enables_clicks)
+        say(view, down)
+        say(view, down | {"ray_origin": [0.5, -3.0, 2.0]})
+        told = hear_kind(page, "Measured")
+        assert told["offset"] == pytest.approx([0.5, 0.0, 0.0]) and told["between"] == ["ground", "ground"]
+        hear(view, lambda message: message.get("name") == "/measure/words")
+        page.send('{"type":"Measure","active":false}')
+        hear(view, lambda message: message["type"] == "RemoveSceneNodeMessage" and message["name"] == "/measure/words")
+
+
+def test_a_picture_of_the_camera_is_drawn_for_who_wants_it(server):
+    with (
+        server.client(user="ann") as client,
+        server.client(user="bob") as other,
+        open_socket(server, client, "/ws") as page,
+        open_view(server, client) as view,
+        open_view(server, other) as other_view,
+    ):
+        for each in (view, other_view):
+            hear(each, replayed)
+            say(each, CAMERA)
+            hear(each, shows("/row", True))
+        page.send('{"type":"ShowLayers","layers":["camera","cloud"]}')
+        hear(view, shows("/plant", False))
+        server.wire.deliver(topics.CAMERA, frame(np.full((HEIGHT, WIDTH), 900)))
+        heard = hear(view, lambda message: message.get("name") == "/cloud")
+        assert "/camera" in {message.get("name") for message in heard}
+        with pytest.raises(TimeoutError):
+            hear(other_view, lambda message: message.get("name") in ("/camera", "/cloud"), patience_s=0.4)
+        page.send('{"type":"ShowLayers","layers":[]}')
+        hear(view, lambda message: message["type"] == "RemoveSceneNodeMessage" and message["name"] == "/cloud")

@@ -1,0 +1,375 @@
+import json
+import time
+
+import msgspec
+import psutil
+import pytest
+import zstandard
+from viser import _messages
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+
+from rolling_panda import topics
+from tests.server.test_viser_filter import CAMERA, CLICK, DRAG, FORGED, GRAB, LET_GO, POINTER
+from tests.support.fake_wire import FakeWire, joints, odometry, pruning_point, pruning_points, telling
+from tests.support.running_server import PATIENCE_S, eventually, running_server
+
+_PLACING = ("SetPositionMessage", "SetOrientationMessage")
+
+
+@pytest.fixture(scope="module")
+def server():
+    wire = FakeWire()
+    with running_server(wire) as running:
+        wire.deliver(topics.JOINTS, joints())
+        wire.deliver(topics.ODOMETRY, odometry())
+        wire.deliver(topics.POINTS, pruning_points(pruning_point("p1")))
+        with running.client() as client:
+            eventually(lambda: {"/robot/panda_joint1", "/points/p1"} <= drawn(running, client))
+        yield running
+
+
+def drawn(server, client):
+    """Names of what has been placed in the view."""
+    with open_view(server, client) as view:
+        return {message["name"] for message in hear(view, replayed) if message["type"] in _PLACING}
+
+
+def open_socket(server, client, path, **options):
+    return connect(
+        server.socket_address + path,
+        origin=server.address,
+        additional_headers={"cookie": server.cookie(client)},
+        proxy=None,
+        max_size=None,
+        **options,
+    )
+
+
+def open_view(server, client):
+    return open_socket(server, client, "/viser", subprotocols=["viser-v1.1.1"])
+
+
+def messages(frame):
+    """The messages in one frame from viser."""
+    size = int.from_bytes(frame[8:16], "little")
+    inner = zstandard.ZstdDecompressor().decompress(frame[16 : 16 + size], int.from_bytes(frame[:8], "little"))
+    return msgspec.msgpack.decode(inner)["messages"]
+
+
+def hear(view, condition, patience_s=PATIENCE_S):
+    """All messages until one fulfils `condition`."""
+    heard = []
+    deadline = time.monotonic() + patience_s
+    while not any(condition(message) for message in heard):
+        heard += messages(view.recv(timeout=deadline - time.monotonic()))
+    return heard
+
+
+def hear_selected(page):
+    while (message := json.loads(page.recv(timeout=PATIENCE_S)))["type"] != "Selected":
+        pass
+    return message["point_id"]
+
+
+def replayed(message):
+    return message["type"] == "ReplayDoneMessage"
+
+
+def say(view, message):
+    view.send(msgspec.msgpack.encode(message))
+
+
+def test_the_view_shows_the_robot_and_the_points(server):
+    with server.client() as client, open_view(server, client) as view:
+        assert view.subprotocol == "viser-v1.1.1"
+        names = {message.get("name") for message in hear(view, replayed)}
+        assert "/robot" in names
+        assert any("panda_joint7" in (name or "") for name in names)
+        assert "/points/p1" in names
+
+
+def test_every_movement_is_shown_and_nothing_is_sent_at_rest(server):
+    with server.client() as client, open_view(server, client) as view:
+        hear(view, replayed)
+        with pytest.raises(TimeoutError):
+            hear(view, lambda message: message["type"].startswith("Set"), patience_s=0.4)
+        for step in range(1, 11):
+            server.wire.deliver(topics.ODOMETRY, odometry(sequence=step, x=0.01 * step))
+            moved = [message for message in hear(view, places_robot) if message["type"].startswith("Set")]
+            assert {message["name"] for message in moved} - {"/trail/line"} == {"/robot"}
+            (robot,) = [message for message in moved if message["name"] == "/robot" and "position" in message]
+            assert robot["position"][0] == pytest.approx(0.01 * step)
+
+
+def places_robot(message):
+    return message["type"] == "SetPositionMessage" and message["name"] == "/robot"
+
+
+def test_a_click_on_a_point_selects_it_on_the_pages_of_that_session_alone(server):
+    with (
+        server.client() as client,
+        server.client() as other,
+        open_socket(server, client, "/ws") as page,
+        open_socket(server, other, "/ws") as other_page,
+        open_view(server, client) as view,
+    ):
+        hear(view, replayed)
+        say(view, CAMERA)
+        say(view, CLICK)
+        assert hear_selected(page) == "p1"
+        hear(view, lambda message: message.get("name") == "/selection")
+        kinds = [json.loads(other_page.recv(timeout=PATIENCE_S))["type"] for _ in range(5)]
+        assert "Selected" not in kinds
+
+
+def hear_kind(page, kind):
+    while True:
+        message = json.loads(page.recv(timeout=PATIENCE_S))
+        if message["type"] == kind:
+            return message
+
+
+def enables_clicks(message):
+    return message["type"] == "ScenePointerEnableMessage" and message["event_type"] == "click"
+
+
+def hear_clicks(view):
+    """With which keys held down the view takes clicks from now on; empty where it takes none."""
+    return [message for message in hear(view, enables_clicks) if enables_clicks(message)][-1]["modifiers"]
+
+
+def test_clicks_into_the_view_are_lines_of_sight_while_a_page_places_points(server):
+    with (
+        server.client() as client,
+        open_socket(server, client, "/ws") as page,
+        open_view(server, client) as view,
+    ):
+        hear(view, replayed)
+        say(view, CAMERA)
+        page.send(json.dumps({"type": "PlaceByHand", "active": True}))
+        assert hear_clicks(view)
+        say(view, POINTER)
+        line = hear_kind(page, "Sightline")
+        assert (line["origin"], line["direction"]) == ([0.0, 0.0, 1.5], [0.0, 1.0, 0.0])
+        page.send(json.dumps({"type": "PlaceByHand", "active": False}))
+        assert not hear_clicks(view)
+        page.send(json.dumps({"type": "PlaceByHand", "active": True}))
+        assert hear_clicks(view)
+        page.close()
+        assert not hear_clicks(view), "nobody is left who places"
+
+
+def test_a_viewer_takes_no_clicks(server):
+    with (
+        server.client(role="viewer") as client,
+        open_socket(server, client, "/ws") as page,
+        open_view(server, client) as view,
+    ):
+        hear(view, replayed)
+        page.send(json.dumps({"type": "PlaceByHand", "active": True}))
+        with pytest.raises(TimeoutError):
+            hear(view, enables_clicks, patience_s=0.4)
+
+
+def test_the_gizmo_is_on_the_holders_view_alone_and_its_drags_become_targets(server):
+    sent = server.wire.sent[topics.TELEOP.name]
+    with (
+        telling(server.wire),
+        server.client(user="ann") as client,
+        server.client(user="bob") as other,
+        open_socket(server, client, "/ws") as page,
+        open_view(server, client) as view,
+        open_view(server, other) as other_view,
+    ):
+        for each in (view, other_view):
+            hear(each, replayed)
+            say(each, CAMERA)
+        page.send('{"type":"ShowGizmo","visible":true}')
+        (gizmo,) = [each for each in hear(view, is_gizmo) if is_gizmo(each)]
+        with pytest.raises(TimeoutError):
+            hear(other_view, is_gizmo, patience_s=0.4)
+        say(view, GRAB | {"owner": gizmo["owner"]})
+        sequence = 0
+
+        def hold():
+            nonlocal sequence
+            message = json.loads(page.recv(timeout=PATIENCE_S))
+            if message["type"] in ("PageState", "HoldEnded"):
+                sequence += 1
+                # Where a hold lapses, the gizmo goes back to the tool.
+                say(view, DRAG | {"owner": gizmo["owner"], "position": [0.31, 0.52, 0.93]})
+                page.send(json.dumps({"type": "Ping", "number": sequence, "rendered": message.get("number", 0)}))
+                # A hold that was refused, as its view was not current, is let go and pressed anew.
+                page.send(json.dumps({"type": "Hold", "sequence": sequence, "hold": message["type"] == "PageState"}))
+            return any(each.hold and each.target.position == (0.31, 0.52, 0.93) for each in sent)
+
+        eventually(hold)
+        page.send(json.dumps({"type": "Hold", "sequence": sequence + 1, "hold": False}))
+        say(view, LET_GO | {"owner": gizmo["owner"]})
+        assert hear_gizmo(view) != [0.31, 0.52, 0.93]
+
+
+def test_where_a_drag_ended_after_the_hold_leads_nobody(server):
+    with (
+        telling(server.wire),
+        server.client(user="liz") as client,
+        open_socket(server, client, "/ws") as page,
+        open_view(server, client) as view,
+    ):
+        hear(view, replayed)
+        say(view, CAMERA)
+        page.send('{"type":"ShowGizmo","visible":true}')
+        shown = hear(view, places_gizmo)
+        (owner,) = {each["owner"] for each in shown if is_gizmo(each)}
+        (tool,) = [each["position"] for each in shown if places_gizmo(each)]
+        # As the 3-D client does: it keeps back the last place for up to 50 ms, and tells it when the pointer is up.
+        for said in (DRAG | {"position": [0.4, 0.5, 0.9]}, LET_GO):
+            say(view, said | {"owner": owner})
+        assert hear_gizmo(view) == pytest.approx(tool, abs=1e-3)
+
+
+def test_a_page_holds_base_or_joints_at_a_share_of_the_speed(server):
+    sent = server.wire.sent[topics.TELEOP.name]
+    del sent[:]
+    with telling(server.wire), server.client(user="eve") as client, open_socket(server, client, "/ws") as page:
+        sequence = 0
+
+        def holds(**wanted):
+            def once():
+                nonlocal sequence
+                message = json.loads(page.recv(timeout=PATIENCE_S))
+                if message["type"] in ("PageState", "HoldEnded"):
+                    sequence += 1
+                    page.send(json.dumps({"type": "Ping", "number": sequence, "rendered": message.get("number", 0)}))
+                    held = {"hold": message["type"] == "PageState", **wanted, "share": 0.5}
+                    page.send(json.dumps({"type": "Hold", "sequence": sequence, **held}))
+                newest = [each for each in sent if each.hold and each.share == 0.5][-1:]
+                return bool(newest) and msgspec.to_builtins(newest[0]).items() >= wanted.items()
+
+            return once
+
+        drive = {"linear": 0.2, "angular": -0.1}
+        eventually(holds(base=drive))
+        eventually(holds(joints=(0.0, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0)))
+        both = {"type": "Hold", "sequence": sequence + 1, "hold": True, "base": drive, "joints": [0.0] * 7}
+        page.send(json.dumps(both))
+        with pytest.raises(ConnectionClosed):
+            while True:
+                page.recv(timeout=PATIENCE_S)
+
+
+def hear_gizmo(view):
+    """Where the view draws the gizmo from now on."""
+    return [each["position"] for each in hear(view, places_gizmo) if places_gizmo(each)][-1]
+
+
+def places_gizmo(message):
+    return message["type"] == "SetPositionMessage" and message["name"] == "/gizmo"
+
+
+def is_gizmo(message):
+    return message["type"] == "TransformControlsMessage"
+
+
+def test_a_forged_message_never_reaches_viser_and_is_logged(server, monkeypatch):
+    reached = []
+    deserialize = _messages.Message.deserialize.__func__
+
+    def spy(cls, data):
+        message = deserialize(cls, data)
+        reached.append(type(message).__name__)
+        return message
+
+    monkeypatch.setattr(_messages.Message, "deserialize", classmethod(spy))
+    with server.client() as client, open_view(server, client) as view:
+        say(view, FORGED)
+        say(view, {"type": "ShareUrlRequest"})
+        say(view, CAMERA)
+        eventually(lambda: "ViewerCameraMessage" in reached)
+        texts = [event["text"] for event in client.get("/api/events").json()["events"]]
+    assert set(reached) == {"ViewerCameraMessage"}
+    assert any("GuiUpdateMessage" in text for text in texts)
+    assert any("ShareUrlRequest" in text for text in texts)
+
+
+def test_a_viewer_cannot_click(server):
+    with (
+        server.client(role="viewer") as client,
+        open_socket(server, client, "/ws") as page,
+        open_view(server, client) as view,
+    ):
+        hear(view, replayed)
+        say(view, CAMERA)
+        say(view, CLICK)
+        kinds = [json.loads(page.recv(timeout=PATIENCE_S))["type"] for _ in range(6)]
+        assert "Selected" not in kinds
+
+
+def test_another_version_of_the_view_is_told_so(server):
+    with server.client() as client, pytest.raises(ConnectionClosed) as caught:
+        with open_socket(server, client, "/viser", subprotocols=["viser-v0.0.1"]) as view:
+            view.recv(timeout=PATIENCE_S)
+    assert caught.value.rcvd.code == 1002
+    assert "mismatch" in caught.value.rcvd.reason.lower()
+
+
+def test_signing_out_closes_the_view(server):
+    with server.client() as client, open_view(server, client) as view:
+        hear(view, replayed)
+        client.post("/api/sign-out")
+        with pytest.raises(ConnectionClosed):
+            hear(view, lambda message: False, patience_s=1.0)
+
+
+def test_who_goes_around_the_proxy_is_thrown_out(server, view_port):
+    with pytest.raises(ConnectionClosed) as caught:
+        with connect(f"ws://127.0.0.1:{view_port}/", subprotocols=["viser-v1.1.1"], proxy=None) as view:
+            while True:
+                view.recv(timeout=PATIENCE_S)
+    assert caught.value.rcvd.code == 1008
+    with server.client() as client:
+        texts = [event["text"] for event in client.get("/api/events").json()["events"]]
+    assert any("outside the page" in text for text in texts)
+
+
+def test_the_client_page_is_compressed_and_kept_by_the_browser(server):
+    with server.client() as client:
+        first = client.get("/viser/")
+        assert first.headers["content-encoding"] == "gzip"
+        again = client.get("/viser/", headers={"if-none-match": first.headers["etag"]})
+        assert again.status_code == 304
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("comes", [True, False])
+def test_the_client_waits_for_the_pages_own_file_and_does_without_it_where_it_does_not_come(server, browser, comes):
+    with server.client() as client:
+        context = browser.new_context(base_url=server.address)
+        context.add_cookies([{"name": n, "value": v, "url": server.address} for n, v in client.cookies.items()])
+    page = context.new_page()
+
+    def late(route):
+        time.sleep(1.0)
+        if comes:
+            route.continue_()
+        else:
+            route.abort()
+
+    page.route("**/view-behind.js", late)
+    page.add_init_script("""new MutationObserver((_, looking) => {
+      if (!document.querySelector("#root > *")) return;
+      window.beganWith = location.search;
+      looking.disconnect();
+    }).observe(document, { childList: true, subtree: true });""")
+    page.goto("/viser/")
+    page.wait_for_function("window.beganWith !== undefined", timeout=1000 * PATIENCE_S)
+    assert page.evaluate("beganWith").startswith("?fixedDpr=") == comes
+    context.close()
+
+
+@pytest.fixture
+def view_port(server):
+    ours = {c.laddr.port for c in psutil.Process().net_connections("tcp") if c.status == psutil.CONN_LISTEN}
+    (port,) = ours - {int(server.address.rsplit(":", 1)[1])}
+    return port

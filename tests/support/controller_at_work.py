@@ -1,0 +1,56 @@
+"""A controller with a robot that has no mass, put to work on points."""
+
+from benchmarks.common.kinematic_robot import KinematicRobot
+from controller.config import ControllerConfig
+from controller.core import Controller
+from rolling_panda import messages as m
+from rolling_panda.config import RobotConfig
+from rolling_panda.messages import commands as intents
+
+CONFIG = ControllerConfig()
+
+
+def point(point_id, position, tangent=(0.0, 0.0, 1.0), **changes):
+    values = {
+        "revision": 1,
+        "radius": 0.004,
+        "confidence": 0.9,
+        "nodes_seen": 5,
+        "nodes_kept": 2,
+        "vine": 0,
+        "spur": 0,
+        "reason": "test",
+    }
+    return m.PruningPoint(point_id=point_id, position=position, tangent=tangent, **(values | changes))
+
+
+def robot(config=CONFIG, **changes):
+    r = KinematicRobot(Controller(config, RobotConfig()), config.home, dt=1.0 / config.rate_hz, **changes)
+    r.every = config.base_every
+    return r
+
+
+def working(shown, **changes):
+    """A robot that has been shown points and told to cut them all."""
+    r = robot(**changes)
+    r.step()
+    r.show(shown)
+    r.step()
+    for intent in (intents.Arm(user="ada"), intents.AcceptAll(user="ada"), intents.Start(user="ada")):
+        assert r.ask(intent).ok
+    return r
+
+
+def run_until(r, condition, limit_s):
+    while not condition(r.state):
+        r.step()
+        assert r.now < limit_s, f"still {r.state.mode} {r.state.phase}: {r.state.reason}"
+
+
+def finish(r, limit_s):
+    run_until(r, lambda s: s is not None and s.mode == "AUTO", r.now + 1.0)
+    run_until(r, lambda s: s.mode != "AUTO", limit_s)
+
+
+def entry(r, point_id):
+    return next(e for e in r.state.queue if e.point_id == point_id)

@@ -1,0 +1,94 @@
+"""What states of the operator's page are made of: robots, queues, who holds control, and the way back from a state."""
+
+from typing import Any
+
+import msgspec
+from playwright.sync_api import Page, expect
+
+from rolling_panda import messages as m
+from rolling_panda.messages import page as p
+from rolling_panda.messages.supervision import ControlState, PointPlan, PreviewState
+from tests.support.played_server import PlayedServer, controller, point
+
+PLANNING = ("AskPreview", "ApprovePreview", "RequirePreview", "TurnApproach", "MoveInQueue", "PlannersOrder", "Survey")
+
+
+def ready(**changes: Any) -> m.ControllerState:
+    """A robot that is armed and takes everything that goes with accepted points."""
+    state = controller("READY", **changes)
+    return msgspec.structs.replace(state, allowed=(*state.allowed, *PLANNING))
+
+
+def planned(row: p.PagePoint, order: int, reason: str = "") -> p.PagePoint:
+    plan = PointPlan(
+        point_id=row.point.point_id,
+        revision=4,
+        order=order,
+        reason=reason,
+        duration_s=3.1 + 0.4 * order,
+        clearance=0.06,
+    )
+    return msgspec.structs.replace(row, plan=plan)
+
+
+def accepted(number: int, spur: int) -> p.PagePoint:
+    return planned(point(number, "ACCEPTED", spur=spur, user="Ada"), number)
+
+
+def queue() -> tuple[p.PagePoint, ...]:
+    """Two vines in the middle of the work."""
+    return (
+        accepted(1, 1),
+        accepted(2, 2),
+        point(3, "PROPOSED", spur=3),
+        point(4, "PROPOSED", vine=2),
+        point(5, "REJECTED", vine=2, spur=2, user="Ada", reason="rejected by Ada: too near a wire"),
+        point(6, "DONE", vine=2, spur=3, cut_id="c6", user="Ada", reason="cut"),
+    )
+
+
+def show(server: PlayedServer, *points: p.PagePoint) -> None:
+    server.points = points
+    server.tell(server.page_points())
+
+
+def show_mode(page: Page, server: PlayedServer, state: m.ControllerState) -> None:
+    server.controller = state
+    expect(page.locator("#mode")).to_have_attribute("data-mode", state.mode)
+
+
+def working(page: Page, server: PlayedServer) -> None:
+    """Where most states begin: armed, with a queue."""
+    show_mode(page, server, ready())
+    show(server, *queue())
+    expect(page.locator("rp-preview")).to_be_visible()
+
+
+def choose(page: Page, name: str) -> None:
+    page.locator(f'rp-point[data-point-id="{name}"]').click(position={"x": 60, "y": 12})
+    expect(page.locator("rp-point-details .crop.loaded")).to_be_visible()
+
+
+def leave(page: Page, server: PlayedServer) -> None:
+    """Back to where a page begins, as far as another state would be taken for this one; a stop stays pressed."""
+    lost = not server.online
+    new = PlayedServer()
+    for name in ("bridge", "abstained", "gone", "role", "control", "stopped", "replay", "rule", "online"):
+        setattr(server, name, getattr(new, name))
+    if lost:
+        expect(page.locator("rp-link-banner")).to_be_hidden(timeout=10_000)
+    server.tell(p.PagePreview(preview=PreviewState(header=m.Header(), required=False, phase="none")))
+    for opened in ("#close-drawer", '#teleop[aria-pressed="true"]'):
+        if page.locator(opened).is_visible():
+            page.locator(opened).click()
+    page.locator("details[open]").evaluate_all("all => all.forEach(each => { each.open = false; })")
+
+
+FREE = ControlState(
+    holder="", user="", epoch=7, expires_s=0.0, requested_by="", requested_key="", coming="", told="", told_number=0,
+    supervised=True,
+)  # fmt: skip
+
+
+def held(holder: str, user: str, **changes: object) -> ControlState:
+    return msgspec.structs.replace(FREE, holder=holder, user=user, expires_s=0.8, **changes)

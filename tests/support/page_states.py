@@ -1,0 +1,379 @@
+"""Every state that the operator's page has, and how a played server brings it there: for tests, and for pictures."""
+
+from collections.abc import Callable
+from typing import get_args
+
+import msgspec
+from playwright.sync_api import Page, expect
+
+from rolling_panda import messages as m
+from rolling_panda.messages import page as p
+from rolling_panda.messages.supervision import (
+    ControlReport,
+    CutReport,
+    PreviewedCut,
+    PreviewState,
+    RefusalReport,
+    ReplayState,
+    SessionReport,
+    StopRecord,
+    StopState,
+    VineReport,
+)
+from tests.support.page_parts import accepted, choose, held, planned, queue, ready, show, show_mode, working
+from tests.support.played_server import PlayedServer, bridge, controller, point
+
+State = Callable[[Page, PlayedServer], None]
+#: When the report's morning was (s since 1970).
+MORNING = 1_763_800_000.0
+
+
+# --- nothing yet, nothing there --------------------------------------------------------------------------------------
+
+
+def _starting(page: Page, server: PlayedServer) -> None:
+    server.controller = server.bridge = None
+    server.gone = {"bridge": 4.0, "controller": 4.0, "perception": 4.0}
+    server.rule, server.image = None, b""
+    show(server)
+    page.reload()
+    expect(page.locator("#mode")).to_have_text("No state yet")
+
+
+def _no_points(page: Page, server: PlayedServer) -> None:
+    show_mode(page, server, controller("IDLE", reason="the program has just started"))
+    server.abstained = ()
+    show(server)
+    expect(page.locator("rp-point")).to_have_count(0)
+
+
+def _process_lost(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    server.gone = {"controller": 6.0}
+    expect(page.locator("rp-queue .stale-note")).to_contain_text("controller gone")
+
+
+def _link_lost(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    server.online = False
+    server.sockets[-1].close()
+    expect(page.locator("rp-link-banner")).to_contain_text("No link to the server")
+    expect(page.locator("#alarms")).to_contain_text("no link")
+
+
+def _signed_out(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    server.answers["/api/me"] = (401, {"detail": "sign in first"})
+    server.sockets[-1].close(code=4401, reason="signed out")
+    expect(page.locator("rp-link-banner")).to_contain_text("You are not signed in")
+
+
+# --- points ----------------------------------------------------------------------------------------------------------
+
+
+def _points(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    choose(page, "p3")
+
+
+def _all_states(page: Page, server: PlayedServer) -> None:
+    states = enumerate(get_args(m.PointState), 1)
+    show_mode(page, server, ready())
+    show(server, *(point(number, state, spur=number) for number, state in states))
+    choose(page, "p1")
+
+
+def _refused_plan(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    reason = "the blades cannot come there: wire 2 is 4 mm from their way in"
+    refused = planned(point(2, "UNREACHABLE", spur=2, user="Ada", reason=reason), 0, reason)
+    show(server, queue()[0], refused, *queue()[2:])
+    choose(page, "p2")
+
+
+def _rule(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    server.rule = m.PruningRule(system="guyot")
+    server.tell(server.page_points())
+    said = "17 move, 3 go, 5 come, 4 acceptances would be void"
+    server.answers["/api/rule/what-if"] = (200, {"ok": True, "reason": said})
+    page.locator("rp-rule summary").click()
+    expect(page.locator("rp-rule input").first).to_be_visible()
+    if server.role != "viewer":
+        page.locator("#rule-offset").press("ArrowRight")
+        expect(page.locator("#rule-apply")).to_be_enabled()
+
+
+def _order(page: Page, server: PlayedServer) -> None:
+    show_mode(page, server, ready(order=m.QueueOrder(7, "Bob")))
+    show(server, *(accepted(number, number) for number in range(1, 6)))
+    page.locator("rp-order summary").click()
+    expect(page.locator(".order-row").first).to_be_visible()
+    page.locator(".order-row").nth(1).click()
+
+
+def _why_rejected(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    page.locator('rp-point[data-point-id="p3"] .reject').click()
+    expect(page.locator("#reject-reason")).to_be_focused()
+
+
+def _by_hand(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    page.locator("#add-by-hand").click()
+    expect(page.locator("rp-placing")).to_be_visible()
+
+
+def _places(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    where = (1.4, 0.8, 0.9)
+    server.abstained = (
+        m.Abstention("no node seen above the cordon", "another look", 3, 1, where),
+        m.Abstention("leaves hide the cane", "another look", 3, 2, where),
+        m.Abstention("a wire passes 3 mm from where the cut would be", "operator", 3, 4, where),
+    )
+    server.tell(server.page_points())
+    page.locator(".abstained summary").first.click()
+    expect(page.locator("button.look-again").first).to_be_visible()
+
+
+def _unknown_cut(page: Page, server: PlayedServer) -> None:
+    unknown = point(1, "UNKNOWN", cut_id="c1", user="Ada", reason="the bridge went silent while the blades closed")
+    show_mode(page, server, ready())
+    show(server, unknown, *queue()[1:])
+    choose(page, "p1")
+
+
+# --- the robot moves -------------------------------------------------------------------------------------------------
+
+
+def _running(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    state = controller("AUTO", phase="APPROACH", active_point_id="p1", reason="p1: drive and reach, 2.4 s to go")
+    show_mode(page, server, msgspec.structs.replace(state, joint_margin=0.05, position_error=0.02))
+
+
+def _survey(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    show_mode(page, server, controller("AUTO", phase="SURVEY", reason="survey: 1.8 m of 4.0 m"))
+
+
+def _paused(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    show_mode(page, server, controller("PAUSED", reason="nobody has looked at the robot for 2.0 s"))
+
+
+def _preview(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    cuts = tuple(
+        PreviewedCut(
+            point_id=f"p{number}", revision=4, begins_s=5.0 * number - 5.0, cut_s=5.0 * number - 2.0,
+            ends_s=5.0 * number, result="cut", clearance=0.08 - 0.009 * number, between=("link5", "camera"),
+            manipulability=0.067, joint_margin=0.6,
+        )
+        for number in (1, 2)
+    )  # fmt: skip
+    state = PreviewState(
+        header=m.Header(), required=True, phase="ready", preview_hash="ab" * 32, duration_s=10.0, cuts=cuts
+    )
+    server.tell(p.PagePreview(preview=state))
+    page.get_by_label("Moment of the preview").fill("6.2")
+    expect(page.locator(".preview-words")).to_contain_text("p2: cut")
+
+
+def _preview_expired(page: Page, server: PlayedServer) -> None:
+    _preview(page, server)
+    state = PreviewState(
+        header=m.Header(), required=True, phase="expired", preview_hash="ab" * 32, duration_s=10.0,
+        reason="p2 has moved by 7 mm since",
+    )  # fmt: skip
+    server.tell(p.PagePreview(preview=state))
+    expect(page.locator(".preview-words")).to_contain_text("Expired")
+
+
+def _by_hand_tool(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    page.locator("#teleop").click()
+    expect(page.get_by_role("group", name="Gizmo along")).to_be_visible()
+
+
+def _by_hand_base(page: Page, server: PlayedServer) -> None:
+    _by_hand_tool(page, server)
+    page.get_by_role("button", name="Base", exact=True).click()
+    expect(page.locator("rp-drive-pad")).to_be_visible()
+
+
+def _by_hand_joints(page: Page, server: PlayedServer) -> None:
+    _by_hand_tool(page, server)
+    page.get_by_role("button", name="Joints", exact=True).click()
+    expect(page.locator("rp-joints")).to_be_visible()
+
+
+def _held_back(page: Page, server: PlayedServer) -> None:
+    _by_hand_tool(page, server)
+    near = m.Nearness(0.021, "the blades and a wire")
+    server.controller = controller("TELEOP", held_by="link 6 is 20 mm from the cordon: it goes no further", near=near)
+    page.locator("#hold").dispatch_event("pointerdown", {"button": 0, "isPrimary": True, "pointerId": 1})
+    expect(page.locator("#hold")).to_contain_text("Moving")
+
+
+# --- stops and alarms ------------------------------------------------------------------------------------------------
+
+
+def _stop_pressed(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    page.locator("#stop").click()
+    expect(page.locator("rp-stop-banner")).to_contain_text("not confirmed yet")
+
+
+def _stopped(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    records = tuple(
+        StopRecord(
+            stop_id=f"s{number}", source="server", user=user, reason="stop button", wall_time=MORNING - 60 * number
+        )
+        for number, user in ((1, "Ada"), (2, "Bob"))
+    )
+    server.stopped = (StopState(process="bridge", stops=records), StopState(process="controller", stops=records))
+    server.bridge = bridge(stop_id="s1", stopped_by="Ada: stop button")
+    show_mode(page, server, controller("ESTOP_LATCHED", reason="stopped by Ada: stop button"))
+    expect(page.locator("rp-stop-banner")).to_be_visible()
+
+
+def _fault(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    state = controller("FAULT", reason="the ledger cannot be written: no space left on the disk")
+    show_mode(page, server, msgspec.structs.replace(state, allowed=("Acknowledge",)))
+
+
+def _alarms(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    show(server, point(1, "UNKNOWN"), *queue()[1:])
+    server.bridge = bridge(cutter="jammed", real_time_factor=0.5)
+    show_mode(page, server, controller("PROTECTIVE_STOP", reason="joint 4 follows 12° behind what it was sent"))
+    expect(page.locator("#alarms li")).to_have_count(4)
+
+
+# --- people ----------------------------------------------------------------------------------------------------------
+
+
+def _asked_for_control(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    server.control = held("me", "Ada", requested_by="Bob", requested_key="other")
+    expect(page.locator("rp-control")).to_contain_text("Bob asks for control")
+
+
+def _other_has_control(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    server.control = held("other", "Bob", requested_by="Ada", requested_key="me")
+    expect(page.locator("#request-control")).to_have_text("Asked")
+
+
+def _viewer(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    server.role = "viewer"
+    server.control = held("other", "Bob")
+    expect(page.locator("#arm")).to_have_attribute("title", "You are signed in as a viewer")
+
+
+def _invite(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    link = "http://127.0.0.1:8000/sign-in?token=1s0n1y-4n-3x4mp13"
+    server.answers["/api/invite"] = (200, {"ok": True, "reason": "", "link": link})
+    page.locator("#invite").click()
+    page.locator("#invite-user").fill("Bob")
+    page.locator("#invite-make").click()
+    expect(page.locator("#invite-link")).to_be_visible()
+
+
+def _refused(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    server.answers["/api/points/p3/accept"] = (409, {"ok": False, "reason": "p3 moved by 6 mm since you looked at it"})
+    page.locator('rp-point[data-point-id="p3"] .accept').click()
+    expect(page.locator(".toast")).to_be_visible()
+
+
+def _replay(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    server.replay = ReplayState(name="row.mcap", begins_at=1.8e9, duration_s=120.0, position_s=30.0, playing=True)
+    expect(page.locator("rp-replay")).to_be_visible()
+
+
+# --- sheets ----------------------------------------------------------------------------------------------------------
+
+
+def _charts(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    page.locator('[data-opens="charts"]').click()
+    expect(page.locator("rp-charts")).to_be_visible()
+
+
+def _empty_report(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    page.locator('[data-opens="report"]').click()
+    expect(page.locator("rp-report")).to_contain_text("Nothing has been cut yet.")
+
+
+def _report(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    outcomes: tuple[m.Outcome, ...] = ("DONE", "DONE", "FAILED_NOT_CUT", "DONE", "UNKNOWN")
+    cuts = tuple(
+        CutReport(
+            cut_id=f"c{number}", point_id=f"p{number}", vine=1 + number // 4, spur=1 + number % 4, outcome=outcome,
+            reason="", user="Ada", ended_at=MORNING + 60.0 + 5.0 * number, seconds=3.2 + 0.3 * number,
+        )
+        for number, outcome in enumerate(outcomes, 1)
+    )  # fmt: skip
+    server.report = SessionReport(
+        began_at=MORNING,
+        written_at=MORNING + 600.0,
+        cuts=cuts,
+        cut_count=len(cuts),
+        vines=(VineReport(vine=1, done=2, not_cut=1, seconds=11.4), VineReport(vine=2, done=1, unknown=1, seconds=9.1)),
+        refusals=(RefusalReport(at=MORNING + 70.0, user="Bob", asked="Start", reason="Ada holds control"),),
+        refusal_count=1,
+        control=(ControlReport(at=MORNING + 5.0, user="Ada", what="took control, which nobody held"),),
+    )
+    page.locator('[data-opens="report"]').click()
+    expect(page.locator("rp-report tbody tr").first).to_be_visible()
+
+
+#: By name, in the order of a morning's work.
+STATES: dict[str, State] = {
+    "starting": _starting,
+    "no-points": _no_points,
+    "points": _points,
+    "all-states": _all_states,
+    "refused-plan": _refused_plan,
+    "rule": _rule,
+    "order": _order,
+    "why-rejected": _why_rejected,
+    "by-hand": _by_hand,
+    "places": _places,
+    "preview": _preview,
+    "preview-expired": _preview_expired,
+    "running": _running,
+    "survey": _survey,
+    "paused": _paused,
+    "unknown-cut": _unknown_cut,
+    "teleoperate-tool": _by_hand_tool,
+    "teleoperate-base": _by_hand_base,
+    "teleoperate-joints": _by_hand_joints,
+    "held-back": _held_back,
+    "stop-pressed": _stop_pressed,
+    "stopped": _stopped,
+    "fault": _fault,
+    "alarms": _alarms,
+    "asked-for-control": _asked_for_control,
+    "other-has-control": _other_has_control,
+    "viewer": _viewer,
+    "invite": _invite,
+    "refused": _refused,
+    "process-lost": _process_lost,
+    "link-lost": _link_lost,
+    "signed-out": _signed_out,
+    "charts": _charts,
+    "report-empty": _empty_report,
+    "report": _report,
+    "replay": _replay,
+}

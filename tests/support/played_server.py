@@ -1,0 +1,264 @@
+"""A server that a test plays: the page's files, its socket and its requests, without a network."""
+
+import mimetypes
+import time
+from dataclasses import dataclass, field
+from io import BytesIO
+from typing import Any
+
+import msgspec
+from PIL import Image, ImageDraw
+from playwright.sync_api import Page, Route, WebSocketRoute
+
+from rolling_panda import messages as m
+from rolling_panda.messages import page as page_messages
+from rolling_panda.messages import types as types_messages
+from rolling_panda.messages.supervision import ControlState, ReplayState, SessionReport, StopState
+from rolling_panda.resources import resource
+
+ORIGIN = "http://panda.test"
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self' ws://panda.test; "
+    "frame-src 'self'; base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
+)
+VIEW = (
+    "<!doctype html><html data-view=drawn><title>view</title><script type=module src=/view.js></script>"
+    "<div id=root>3-D view</div><button>in the view</button>"
+)
+STILL = (
+    "<!doctype html><html data-view=drawn><title>view</title>"
+    "<style>body{margin:0}img{width:100vw;height:100vh;object-fit:cover}</style>"
+    "<img id=root src=/viser/still.jpg>"
+)
+ALLOWED = {
+    "IDLE": ("Arm",),
+    "READY": ("Start", "Home"),
+    "AUTO": ("Pause",),
+    "TELEOP": ("Pause",),
+    "PAUSED": ("Resume",),
+    "ESTOP_LATCHED": ("Reset",),
+}
+
+
+def controller(mode: m.Mode = "READY", **changes: Any) -> m.ControllerState:
+    points = ("AcceptPoint", "RejectPoint", "ReconsiderPoint", "ResolvePoint", "AcceptAll")
+    state = m.ControllerState(
+        header=m.Header(),
+        mode=mode,
+        phase="",
+        reason="armed by Ada",
+        allowed=(*ALLOWED.get(mode, ()), *points),
+        active_point_id="",
+        method="nullspace",
+        T_odom_tool=None,
+        T_odom_tool_desired=None,
+        position_error=0.0021,
+        rotation_error=0.012,
+        manipulability=0.083,
+        joint_margin=0.41,
+        tick_s=0.000142,
+        ticks=1000,
+        late_ticks=3,
+        queue=(),
+    )
+    return msgspec.structs.replace(state, **changes)
+
+
+def bridge(**changes: Any) -> m.BridgeState:
+    state = m.BridgeState(
+        header=m.Header(),
+        kind="sim",
+        epoch=1,
+        watchdog=False,
+        stop_id="",
+        stopped_by="",
+        cutter="open",
+        cut_id="",
+        outcome="",
+        real_time_factor=0.99,
+    )
+    return msgspec.structs.replace(state, **changes)
+
+
+def point(number: int, state: m.PointState, vine: int = 1, spur: int = 1, **changes: Any) -> page_messages.PagePoint:
+    name = f"p{number}"
+    found = m.PruningPoint(
+        point_id=name,
+        revision=4,
+        position=(0.2 * number, 0.8, 0.9),
+        tangent=(0.0, 0.0, 1.0),
+        radius=0.004,
+        confidence=0.87,
+        nodes_seen=9,
+        nodes_kept=2,
+        vine=vine,
+        spur=spur,
+        reason="lowest cane of the spur: keeps two buds, cut above the second",
+        position_covariance=(4e-6, 0.0, 0.0, 9e-6, 0.0, 4e-6),
+        tangent_covariance=(1e-3, 0.0, 0.0, 1e-3, 0.0, 0.0),
+        offset=0.02,
+        force=469.0,
+        wire_distance=0.141,
+        cordon_distance=0.062,
+        node_distance=0.0206,
+        digest=f"{number:08x}" * 4,
+    )
+    entry = m.QueueEntry(point_id=name, state=state, **changes)
+    return page_messages.PagePoint(point=found, entry=entry, pixel=(60.0 + 45.0 * number, 90.0 + 11.0 * number))
+
+
+@dataclass
+class PlayedServer:
+    """Answers the page: a state for each ping, canned REST answers; keeps what the page sent."""
+
+    controller: m.ControllerState | None = field(default_factory=controller)
+    bridge: m.BridgeState | None = field(default_factory=bridge)
+    points: tuple[page_messages.PagePoint, ...] = ()
+    abstained: tuple[m.Abstention, ...] = ()
+    gone: dict[str, float] = field(default_factory=dict)
+    role: types_messages.Role = "supervisor"
+    #: Path of its page, where there are several.
+    base: str = ""
+    control: ControlState | None = None
+    stopped: tuple[StopState, ...] = ()
+    replay: ReplayState | None = None
+    online: bool = True
+    silent: bool = False
+    #: How long ago it heard each process, where none is gone (s).
+    heard_s: float = 0.03
+    answers: dict[str, tuple[int, Any]] = field(default_factory=dict)
+    posted: list[tuple[str, Any]] = field(default_factory=list)
+    said: list[page_messages.FromPage] = field(default_factory=list)
+    sockets: list[WebSocketRoute] = field(default_factory=list)
+    crops_fetched: list[str] = field(default_factory=list)
+    frames_fetched: list[int] = field(default_factory=list)
+    report: SessionReport = field(default_factory=lambda: SessionReport(began_at=0.0, written_at=0.0))
+    rule: m.PruningRule | None = field(default_factory=m.PruningRule)
+    crop: bytes = field(default_factory=lambda: camera_image((240, 180)))
+    view: bytes = b""
+    number: int = 0
+    heres: int = 0
+    started: float = field(default_factory=time.time)
+    image: bytes = field(default_factory=lambda: camera_image())
+
+    def attach(self, page: Page) -> None:
+        page.route(f"{ORIGIN}{self.base}/**", self.serve)
+        page.route_web_socket(f"**{self.base}/ws", self.accept)
+
+    def serve(self, route: Route) -> None:
+        path = route.request.url.removeprefix(ORIGIN + self.base).split("?")[0]
+        if not self.online:
+            route.abort()
+        elif path == "/api/control/here":
+            self.heres += 1
+            route.fulfill(json={"ok": True, "reason": ""})
+        elif route.request.method == "POST":
+            self.posted.append((path, route.request.post_data_json))
+            status, body = self.answers.get(path, (200, {"ok": True, "reason": ""}))
+            route.fulfill(status=status, json=body)
+        elif path == "/api/me":
+            status, body = self.answers.get(path, (200, {"user": "Ada", "role": self.role}))
+            route.fulfill(status=status, json=body)
+        elif path == "/api/robot":
+            route.fulfill(json={"arm_limits": [(-2.9, 2.9)] * 7})
+        elif path == "/api/sign-in":
+            route.fulfill(json={"password": False})
+        elif path == "/api/report":
+            route.fulfill(body=msgspec.json.encode(self.report), content_type="application/json")
+        elif path == "/viser/":
+            route.fulfill(body=STILL if self.view else VIEW, content_type="text/html")
+        elif path == "/viser/still.jpg":
+            route.fulfill(body=self.view, content_type="image/jpeg")
+        elif path.startswith("/api/points/") and path.endswith("/crop"):
+            self.crops_fetched.append(route.request.url.removeprefix(ORIGIN))
+            if self.crop:
+                route.fulfill(body=self.crop, content_type="image/jpeg")
+            else:
+                route.fulfill(status=204)
+        elif path == "/camera/color.jpg":
+            self.frames_fetched.append(int(route.request.url.split("n=")[1]))
+            route.fulfill(body=self.image, content_type="image/jpeg")
+        else:
+            name = {"/": "index.html", "/sign-in": "sign-in.html"}.get(path, path.lstrip("/"))
+            file = resource(f"web/{name}")
+            kind = mimetypes.guess_type(name)[0] or "text/plain"
+            route.fulfill(body=file.read_bytes(), content_type=kind, headers={"content-security-policy": POLICY})
+
+    def accept(self, socket: WebSocketRoute) -> None:
+        if not self.online:
+            socket.close()
+            return
+        self.sockets.append(socket)
+        socket.on_message(lambda text: self.hear(socket, text))
+        self.send(socket, self.state())
+        self.send(socket, self.page_points())
+        self.send(socket, page_messages.PageEvents(events=(self.event(1, "info", "signed in"),)))
+
+    def hear(self, socket: WebSocketRoute, text: str | bytes) -> None:
+        message = msgspec.json.decode(text, type=page_messages.FromPage)
+        self.said.append(message)
+        if isinstance(message, page_messages.Ping) and self.online and not self.silent:
+            self.send(socket, page_messages.Pong(number=message.number))
+            self.send(socket, self.state())
+
+    def send(self, socket: WebSocketRoute, message: page_messages.FromServer) -> None:
+        socket.send(msgspec.json.encode(message).decode())
+
+    def tell(self, message: page_messages.FromServer) -> None:
+        self.send(self.sockets[-1], message)
+
+    def state(self) -> page_messages.PageState:
+        self.number += 1
+        ages = {name: self.gone.get(name, self.heard_s) for name in m.PROCESSES}
+        rows = tuple(page_messages.ProcessPresence(name, name not in self.gone, ages[name]) for name in m.PROCESSES)
+        return page_messages.PageState(
+            number=self.number,
+            user="Ada",
+            role=self.role,
+            viewers=1,
+            processes=rows,
+            controller=self.controller,
+            controller_age_s=None if self.controller is None else ages["controller"],
+            bridge=self.bridge,
+            bridge_age_s=None if self.bridge is None else ages["bridge"],
+            joints=m.JointState(
+                header=m.Header(stamp=0.1 * self.number), sequence=self.number, position=(0.0,) * 9, velocity=(0.0,) * 9
+            ),
+            base=m.PlanarPose(x=0.021 * self.number),
+            camera_frame=1 + self.number // 5,
+            client="me",
+            control=self.control,
+            stops=self.stopped,
+            speed_shares=(0.2, 0.1, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0),
+            replay=self.replay,
+        )
+
+    def page_points(self) -> page_messages.PagePoints:
+        return page_messages.PagePoints(
+            points=self.points,
+            abstained=self.abstained,
+            segmenter="simulated labels",
+            frames=12,
+            image_size=(480, 360),
+            rule=self.rule,
+        )
+
+    def event(self, number: int, severity: m.Severity, text: str) -> page_messages.PageEvent:
+        return page_messages.PageEvent(number, self.started + 0.001 * number, "server", severity, text)
+
+    def holds(self) -> list[bool]:
+        return [message.hold for message in self.said if isinstance(message, page_messages.Hold)]
+
+    def stops(self) -> list[Any]:
+        return [body for path, body in self.posted if path == "/api/stop"]
+
+
+def camera_image(size: tuple[int, int] = (480, 360)) -> bytes:
+    image = Image.new("RGB", (480, 360), (46, 58, 44))
+    draw = ImageDraw.Draw(image)
+    draw.rectangle((0, 250, 480, 275), fill=(92, 70, 50))
+    for x in range(60, 460, 55):
+        draw.line((x, 250, x + 18, 20), fill=(120, 88, 60), width=7)
+    out = BytesIO()
+    image.resize(size).save(out, "JPEG")
+    return out.getvalue()

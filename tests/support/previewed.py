@@ -1,0 +1,70 @@
+"""A controller with a robot that has no mass, whose preview requests are answered after some periods."""
+
+from dataclasses import replace
+
+from controller.planning.rollout import Rollout
+from rolling_panda.config import RobotConfig
+from rolling_panda.messages import commands as intents
+from tests.support.controller_at_work import CONFIG, robot
+
+ROLLOUT = Rollout(CONFIG, RobotConfig())
+
+
+class Previewed:
+    """`accepted` points, then `previewed`; the newest state and motion are kept."""
+
+    def __init__(self, shown, controller=None, roll=ROLLOUT.roll, **changes):
+        self.robot = robot(**changes)
+        if controller is not None:
+            self.robot.controller = controller
+        self.state = self.motion = self._answer = self._due = None
+        self.path = []
+        step = self.robot.controller.step
+
+        def with_rollout(inputs, now):
+            if self._due is not None:
+                self._answer, self._due = roll(self._due), None
+            out = step(inputs if self._answer is None else replace(inputs, preview=self._answer), now)
+            self._due = out.preview_request or self._due
+            self.state = out.preview or self.state
+            self.motion = out.preview_motion or self.motion
+            return out
+
+        self.robot.controller.step = with_rollout
+        self.robot.step()
+        self.robot.show(shown)
+        self.robot.step()
+        assert self.robot.ask(intents.Arm(user="ada")).ok
+
+    def ask(self, kind, **content):
+        answer = self.robot.ask(kind(user="ada", **content))
+        self.robot.run(0.1)
+        return answer.reason if not answer.ok else ""
+
+    def previewed(self, *point_ids):
+        """Accept these, all where none is named, and wait for the preview of all that is accepted."""
+        if point_ids:
+            for name in point_ids:
+                assert self.ask(intents.AcceptPoint, point_id=name, revision=1) == ""
+        else:
+            assert self.ask(intents.AcceptAll) == ""
+        return self.again()
+
+    def again(self, point_id=""):
+        assert self.ask(intents.AskPreview, point_id=point_id) == ""
+        for _ in range(200):
+            if self.state.phase == "ready":
+                return self.state
+            self.robot.run(0.05)
+        raise AssertionError(self.state)
+
+    def worked(self, limit_s=60.0):
+        """Start, and work until the work ends; the tool's path is kept."""
+        assert self.ask(intents.Start) == ""
+        began = self.robot.now
+        while self.robot.state.mode == "AUTO":
+            self.robot.step()
+            pose = self.robot.controller._movement.body.measured.kinematics.T_odom_tool
+            self.path.append(pose.translation.copy())
+            assert self.robot.now - began < limit_s
+        return self.robot.now - began

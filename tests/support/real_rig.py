@@ -1,0 +1,84 @@
+"""The real bridge on devices that are fakes in processes of their own, which the makers' client libraries talk to."""
+
+import os
+import time
+
+import numpy as np
+
+from bridge.config import BridgeConfig, OdometryConfig
+from bridge.core.bridge import TICK_S, BridgeCore
+from bridge.core.odometer import Odometer
+from bridge.core.picture import Picture
+from bridge.real.config import ArmConfig, BaseConfig, CutterConfig
+from bridge.real.cutter import Cutter
+from bridge.real.mp500 import Mp500
+from bridge.real.panda import Panda
+from bridge.real.robot import RealRobot
+from rolling_panda.config import TransportConfig
+from rolling_panda.model.differential_drive import Array
+from rolling_panda.transport.zenoh import ForeignWire, Router
+from tests.support.bridge_rig import MODEL, PICTURE
+from tests.support.device_process import DeviceProcess
+from tests.support.live_robot import free_port
+
+ADDRESS = f"127.0.{os.getpid() % 250 + 1}.8"
+SERVICE = "cutter/close"
+
+
+class OnePicture:
+    """A camera whose pictures nobody looks at."""
+
+    def __init__(self) -> None:
+        self._ready: Picture | None = None
+
+    def capture(self, expose: bool) -> Picture | None:
+        ready, self._ready = self._ready, PICTURE if expose else None
+        return ready
+
+    def close(self) -> None:
+        pass
+
+
+class RealPlant:
+    """Base, arm and blades; what they have been made to do is read from themselves."""
+
+    def __init__(self) -> None:
+        self.endpoint = f"tcp/127.0.0.1:{free_port()}"
+        self.router = Router(TransportConfig(mode="router", connect=(), listen=(self.endpoint,), plain_wire=True))
+        self.base = DeviceProcess("base", "--plain-wire", "--connect", self.endpoint)
+        self.arm = DeviceProcess("arm", "--arm", ADDRESS)
+        self.robot: RealRobot | None = None
+
+    @property
+    def transport(self) -> TransportConfig:
+        return TransportConfig(connect=(self.endpoint,), plain_wire=True)
+
+    def start(self) -> BridgeCore:
+        """A bridge on these devices, once they are there; the one before lets go."""
+        if self.robot is not None:
+            self.robot.close()
+        config = BridgeConfig()
+        acceleration = config.wheel_acceleration
+        base = Mp500(ForeignWire(self.transport), MODEL.drive, acceleration, BaseConfig())
+        arm = Panda(ArmConfig(address=ADDRESS, realtime="ignore"), MODEL.limits)
+        blades = Cutter(ForeignWire(self.transport), CutterConfig(service=SERVICE))
+        self.robot = RealRobot(base, arm, blades, OnePicture())
+        end = time.monotonic() + 15.0
+        while self.robot.read().fault or blades.read().state != "open":
+            assert time.monotonic() < end, self.robot.read().fault
+            time.sleep(0.02)
+        return BridgeCore(self.robot, config, MODEL.limits, Odometer(MODEL.drive, OdometryConfig(), TICK_S), "real")
+
+    def velocity(self) -> Array:
+        return np.array([*self.base.tell()["wheels"], *self.arm.tell()["dq"]])
+
+    def breaches(self) -> list[str]:
+        return [*self.base.tell()["breaches"], *self.arm.tell()["breaches"]]
+
+    def bites(self) -> int:
+        return int(self.base.tell_all("report")["cutter"]["bites"])
+
+    def close(self) -> None:
+        self.base.close()
+        self.arm.close()
+        self.router.close()

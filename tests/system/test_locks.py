@@ -1,0 +1,38 @@
+"""What is declared is locked, so that an install from the lock can run."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+ROOT = Path(__file__).resolve().parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+RUN = PROJECT["dependencies"]
+
+
+@pytest.mark.parametrize(
+    ("lock", "declared"),
+    [
+        ("requirements-run.lock", RUN),
+        ("requirements-real.lock", RUN + PROJECT["optional-dependencies"]["real"]),
+        ("requirements.lock", RUN + PROJECT["optional-dependencies"]["dev"]),
+    ],
+)
+def test_every_declared_dependency_is_locked_at_an_allowed_version(lock: str, declared: list[str]) -> None:
+    pinned = dict(re.findall(r"^([A-Za-z0-9_.-]+)==(\S+)", (ROOT / lock).read_text(), re.MULTILINE))
+    versions = {canonicalize_name(name): version for name, version in pinned.items()}
+    for line in declared:
+        wanted = Requirement(line)
+        version = versions.get(canonicalize_name(wanted.name))
+        assert version is not None, f"{wanted.name} is not in {lock}; run `make lock`"
+        assert wanted.specifier.contains(version), f"{lock} has {wanted.name} {version}; run `make lock`"
+
+
+@pytest.mark.parametrize("lock", ["requirements-run.lock", "requirements-real.lock", "requirements.lock"])
+def test_a_lock_has_hashes_and_no_index_address(lock: str) -> None:
+    text = (ROOT / lock).read_text()
+    assert text.count("--hash=sha256:") >= len(re.findall(r"^\S+==", text, re.MULTILINE))
+    assert "://" not in text

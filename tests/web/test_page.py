@@ -1,0 +1,384 @@
+"""The operator's page in a real browser, with a server that the test plays."""
+
+import json
+
+import msgspec
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from rolling_panda.messages import page as p
+from tests.support.played_page import box_of, until
+from tests.support.played_server import ORIGIN, PlayedServer, bridge, controller, point
+
+pytestmark = pytest.mark.browser
+
+
+def test_shows_the_queue_by_vine_and_spur_and_selects(page: Page, server: PlayedServer) -> None:
+    expect(page.locator(".group h3")).to_have_text(["Vine 1 · spur 1", "Vine 1 · spur 2"])
+    row = page.locator('[data-point-id="p2"]')
+    expect(row).to_have_attribute("data-state", "ACCEPTED")
+    expect(row).to_contain_text("2/9 nodes · 8.0 mm · 87 %")
+    row.click()
+    until(page, lambda: p.Select(point_id="p2") in server.said)
+    expect(page.locator(".mark.selected")).to_have_attribute("data-state", "ACCEPTED")
+    server.tell(p.Selected(point_id="p3"))
+    expect(page.locator('[data-point-id="p3"]')).to_have_attribute("aria-current", "true")
+    page.locator(".mark").first.click()
+    until(page, lambda: p.Select(point_id="p1") in server.said)
+
+
+def test_accepts_and_rejects_with_buttons_and_keys(page: Page, server: PlayedServer) -> None:
+    page.locator('[data-point-id="p1"] button.accept').click()
+    until(page, lambda: ("/api/points/p1/accept", {"revision": 4, "digest": "00000001" * 4}) in server.posted)
+    expect(page.locator('[data-point-id="p3"] button.accept')).to_be_disabled()
+    page.locator('[data-point-id="p1"]').focus()
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("r")
+    page.keyboard.press("Enter")
+    until(page, lambda: ("/api/points/p2/reject", {"reason": ""}) in server.posted)
+
+
+def test_all_are_accepted_only_from_a_confidence_on_and_the_button_says_which_and_how_many(
+    page: Page, server: PlayedServer
+) -> None:
+    shares = (0.99, 0.8, 0.7999, 0.5)
+    server.points = tuple(sure(number, share) for number, share in enumerate(shares, 1))
+    server.tell(server.page_points())
+    every = page.locator("#accept-all")
+    expect(every).to_have_text("Accept all 2 (≥ 80 % sure)")
+    expect(every).to_have_attribute(
+        "title", "Accept every proposed point that is ≥ 80 % sure; 2 less sure: decide one by one"
+    )
+    expect(page.locator(".facts")).to_contain_text(["· 99 %", "· 80 %", "· only 79 %", "· only 50 %"])
+    every.click()
+    until(page, lambda: bool(server.posted))
+    assert server.posted == [("/api/points/accept-all", {"confidence": 0.8})]
+    expect(page.locator("rp-queue select")).to_have_count(0)
+    server.points = server.points[2:]
+    server.tell(server.page_points())
+    expect(every).to_be_disabled()
+    expect(every).to_have_attribute("title", "No proposed point is ≥ 80 % sure: decide one by one")
+
+
+def sure(number: int, share: float) -> p.PagePoint:
+    row = point(number, "PROPOSED", spur=number)
+    return msgspec.structs.replace(row, point=msgspec.structs.replace(row.point, confidence=share))
+
+
+def test_how_an_unknown_cut_ended_is_said_by_who_has_looked(page: Page, server: PlayedServer) -> None:
+    server.points = (point(6, "UNKNOWN"),)
+    server.tell(server.page_points())
+    row = page.locator('[data-point-id="p6"]')
+    row.get_by_role("button", name="I have looked: it is not cut p6").click()
+    answer = {"outcome": "FAILED_NOT_CUT", "reason": "seen by eye"}
+    until(page, lambda: ("/api/points/p6/resolve", answer) in server.posted)
+
+
+def test_only_what_the_controller_allows_is_enabled_and_the_rest_says_why(page: Page, server: PlayedServer) -> None:
+    expect(page.locator("#start")).to_be_enabled()
+    pause = page.locator("#pause")
+    expect(pause).to_be_disabled()
+    expect(pause).to_have_attribute("aria-description", "There is nothing to pause; the mode is Ready")
+    server.role = "viewer"
+    expect(page.locator("#start")).to_have_attribute("title", "You are signed in as a viewer")
+    expect(page.locator("#stop")).to_be_enabled()
+
+
+def test_a_greyed_button_does_nothing_and_says_why_to_a_finger(page: Page, server: PlayedServer) -> None:
+    pause = page.locator("#pause")
+    pause.click(force=True)
+    expect(page.locator(".toast")).to_contain_text("There is nothing to pause; the mode is Ready")
+    page.locator('[data-point-id="p3"] button.accept').click(force=True)
+    expect(page.locator(".toast").last).to_contain_text("It is done")
+    server.controller = controller("ESTOP_LATCHED")
+    expect(page.locator("#reset")).to_have_attribute("aria-disabled", "true")
+    page.locator("#reset-reason").press("Enter")
+    expect(page.locator(".toast").last).to_contain_text("Write a reason first")
+    assert server.posted == []
+
+
+def test_it_says_that_it_is_a_simulation_and_what_tells_wood_from_wire(page: Page, server: PlayedServer) -> None:
+    expect(page.locator("rp-camera .panel-head")).to_contain_text("simulation")
+    expect(page.locator("rp-queue .panel-head")).to_contain_text("simulated labels")
+    server.bridge = bridge(kind="real")
+    expect(page.locator("rp-camera .panel-head")).not_to_contain_text("simulation")
+
+
+def test_the_log_has_the_words_of_the_page(page: Page, server: PlayedServer) -> None:
+    server.tell(p.PageEvents(events=(server.event(2, "info", "READY → AUTO: start by Ada; p1 is FAILED_NOT_CUT"),)))
+    expect(page.locator("#log li .text").last).to_have_text("Ready → Automatic: start by Ada; p1 is Not cut")
+
+
+def test_what_only_engineers_read_is_behind_a_disclosure_that_tells_its_warnings(
+    page: Page, server: PlayedServer
+) -> None:
+    gauge = page.locator('[data-gauge="manipulability"]')
+    expect(gauge).to_be_hidden()
+    expect(page.locator('[data-gauge="joint-margin"]')).to_be_visible()
+    server.controller = controller(manipulability=0.01)
+    summary = page.locator("rp-telemetry summary")
+    expect(summary).to_have_text("For engineers · 1 warning")
+    summary.click()
+    expect(gauge).to_be_visible()
+
+
+def test_a_supervisor_makes_a_link_for_somebody_else(page: Page, server: PlayedServer) -> None:
+    server.answers["/api/invite"] = (200, {"ok": True, "reason": "", "link": "http://127.0.0.1:8000/sign-in?token=abc"})
+    expect(page.locator("#invite-user")).to_be_hidden()
+    page.locator("#invite").click()
+    page.locator("#invite-user").fill("a script")
+    page.locator("#invite-role").select_option("operator")
+    page.locator("#invite-make").click()
+    expect(page.locator("#invite-link")).to_have_value(f"{ORIGIN}/sign-in?token=abc")
+    assert server.posted == [("/api/invite", {"user": "a script", "role": "operator"})]
+    expect(page.locator("#stop")).to_be_visible()
+    page.locator("#invite-user").press("Escape")
+    page.locator("#invite").click()
+    expect(page.locator("#invite-link")).to_have_value("")
+    server.answers["/api/invite"] = (503, {"ok": False, "reason": "no more today"})
+    page.locator("#invite-make").click()
+    expect(page.locator("#invitation")).to_contain_text("No link was made: no more today")
+    server.role = "operator"
+    expect(page.locator("#invite")).to_be_hidden()
+
+
+def test_a_refusal_is_a_notice_and_a_line_of_the_log(page: Page, server: PlayedServer) -> None:
+    server.answers["/api/start"] = (409, {"ok": False, "reason": "the base has not settled"})
+    page.locator("#start").click()
+    words = "Start refused: the base has not settled"
+    expect(page.locator(".toast")).to_contain_text(words)
+    # The server logs what the controller refuses; what never reached it is logged by the page.
+    server.tell(p.PageEvents(events=(server.event(2, "warning", "Start by Ada refused"),)))
+    expect(page.locator("#log li").last).to_contain_text("Start by Ada refused")
+    server.answers["/api/home"] = (403, {"ok": False, "reason": "a viewer may look and stop, not operate"})
+    page.locator("#home").click()
+    expect(page.locator("#log li").last).to_contain_text("Home refused: a viewer may look and stop")
+    server.tell(p.PageEvents(events=(server.event(3, "info", "nothing to worry about"),)))
+    expect(page.locator("#log li").last).to_be_visible()
+    page.locator("#log-filter").select_option("error")
+    expect(page.locator("#log li").last).to_be_hidden()
+
+
+def test_space_stops_even_on_a_focused_button_and_inside_the_view(page: Page, server: PlayedServer) -> None:
+    page.locator("#start").focus()
+    page.keyboard.press("Space")
+    until(page, lambda: len(server.stops()) == 1)
+    assert server.stops() == [{"reason": "space bar"}]
+    page.frame_locator("rp-scene iframe").locator("button").focus()
+    page.keyboard.press("Space")
+    until(page, lambda: len(server.stops()) == 2)
+    page.locator("#stop").click()
+    until(page, lambda: len(server.stops()) == 3)
+    assert [path for path, _ in server.posted] == ["/api/stop"] * 3
+
+
+def test_a_stop_says_who_and_who_latched_it_and_is_reset_with_a_reason(page: Page, server: PlayedServer) -> None:
+    banner = page.locator("rp-stop-banner")
+    expect(banner).to_be_hidden()
+    server.bridge = bridge(stop_id="s1", stopped_by="Ada: space bar")
+    expect(banner).to_contain_text("Pressed by Ada: space bar")
+    expect(banner.locator('[data-by="bridge"]')).to_have_attribute("data-acknowledged", "true")
+    expect(banner.locator('[data-by="controller"]')).to_have_attribute("data-acknowledged", "false")
+    server.controller = controller("ESTOP_LATCHED", reason="stopped by Ada")
+    expect(banner.locator('[data-by="controller"]')).to_have_attribute("data-acknowledged", "true")
+    expect(page.locator("#reset")).to_be_disabled()
+    page.locator("#reset-reason").press_sequentially("row is clear")
+    page.locator("#reset").click()
+    until(page, lambda: ("/api/reset", {"reason": "row is clear", "stop_id": "s1"}) in server.posted)
+    assert server.stops() == [], "a space in the reason is a character"
+
+
+def test_a_stop_that_does_not_get_through_says_so(page: Page, server: PlayedServer) -> None:
+    server.answers["/api/stop"] = (503, {"ok": False, "reason": "no wire"})
+    page.locator("#stop").click()
+    expect(page.locator(".toast")).to_contain_text("Use the emergency stop on the robot")
+    assert len(server.stops()) == 2
+    server.answers["/api/stop"] = (500, {"ok": False, "reason": "something broke"})
+    page.locator("#stop").click()
+    until(page, lambda: len(server.stops()) == 6)
+
+
+def test_the_tool_moves_only_while_held(page: Page, server: PlayedServer) -> None:
+    expect(page.locator("#hold")).to_be_disabled()
+    page.locator("#teleop").click()
+    until(page, lambda: p.ShowGizmo(visible=True) in server.said)
+    page.locator("#hold").hover()
+    page.mouse.down()
+    until(page, lambda: len(server.holds()) >= 5)
+    page.mouse.up()
+    until(page, lambda: not server.holds()[-1])
+    count = len(server.holds())
+    assert server.holds() == [True] * (count - 1) + [False]
+    page.wait_for_timeout(200)
+    assert len(server.holds()) == count
+    sequences = [message.sequence for message in server.said if isinstance(message, p.Hold)]
+    assert sequences == sorted(set(sequences))
+
+
+@pytest.mark.parametrize("end", ["blur", "hidden", "mode", "link"])
+def test_a_hold_ends_when_the_operator_can_no_longer_mean_it(page: Page, server: PlayedServer, end: str) -> None:
+    page.locator("#teleop").click()
+    page.locator("h1").click()
+    page.keyboard.down("h")
+    until(page, lambda: server.holds()[-1:] == [True])
+    if end == "blur":
+        page.evaluate("window.dispatchEvent(new Event('blur'))")
+    elif end == "hidden":
+        page.evaluate(
+            "Object.defineProperty(document, 'hidden', {value: true});"
+            "document.dispatchEvent(new Event('visibilitychange'))"
+        )
+    elif end == "mode":
+        server.controller = controller("PAUSED", reason="perception gone")
+    else:
+        server.sockets[-1].close()
+        expect(page.locator("#hold")).not_to_have_class("held")
+        expect(page.locator("#teleop")).to_have_attribute("aria-pressed", "false")
+        return
+    until(page, lambda: not server.holds()[-1])
+    expect(page.locator("#hold")).not_to_have_class("held")
+
+
+def test_a_hold_that_the_server_ended_goes_on_only_when_pressed_again(page: Page, server: PlayedServer) -> None:
+    page.locator("#teleop").click()
+    page.locator("h1").click()
+    page.keyboard.down("h")
+    until(page, lambda: server.holds()[-1:] == [True])
+    server.tell(p.HoldEnded(reason="The hold ended: too slow. Press again to go on."))
+    expect(page.locator(".toast")).to_contain_text("Press again")
+    until(page, lambda: not server.holds()[-1])
+    count = len(server.holds())
+    page.keyboard.down("h")
+    page.wait_for_timeout(300)
+    assert len(server.holds()) == count, "the key that is still down moves nothing"
+    expect(page.locator("#hold")).not_to_have_class("held")
+    page.keyboard.up("h")
+    page.keyboard.down("h")
+    until(page, lambda: server.holds()[-1])
+    page.keyboard.up("h")
+
+
+def test_dragging_in_the_view_counts_as_holding(page: Page, server: PlayedServer) -> None:
+    box = box_of(page.locator("rp-scene iframe"))
+    page.mouse.move(box["x"] + 100, box["y"] + 100)
+    page.mouse.down()
+    page.mouse.up()
+    assert server.holds() == [], "nothing is held while Teleoperate is off"
+    page.locator("#teleop").click()
+    page.mouse.move(box["x"] + 100, box["y"] + 100)
+    page.mouse.down()
+    until(page, lambda: server.holds()[-1:] == [True])
+    page.mouse.up()
+    until(page, lambda: not server.holds()[-1])
+
+
+@pytest.mark.parametrize(
+    ("renderer", "smooth", "ratio"),
+    [
+        ("ANGLE (Google, Vulkan 1.3.0 (SwiftShader Device (Subzero)), SwiftShader driver)", False, "1"),
+        ("ANGLE (Intel, Mesa Intel(R) UHD Graphics 620 (KBL GT2), OpenGL 4.6)", True, "1.5"),
+    ],
+)
+def test_the_view_costs_what_the_browser_can_draw(
+    browser: Browser, server: PlayedServer, renderer: str, smooth: bool, ratio: str
+) -> None:
+    context = browser.new_context(locale="en-US", device_scale_factor=2)
+    page = context.new_page()
+    page.add_init_script(
+        "const real = WebGL2RenderingContext.prototype.getParameter;"
+        "WebGL2RenderingContext.prototype.getParameter = function (name) {"
+        f"  return name === 0x9246 ? {json.dumps(renderer)} : real.call(this, name); }};"
+    )
+    server.attach(page)
+    page.goto(f"{ORIGIN}/")
+    expect(page.locator("rp-scene iframe")).to_have_class("loaded")
+    view = page.frames[1]
+    assert view.evaluate("new URLSearchParams(location.search).get('fixedDpr')") == ratio
+    drawn = "document.createElement('canvas').getContext('webgl2', {antialias: true}).getContextAttributes().antialias"
+    assert view.evaluate(drawn) is smooth
+    pause = view.evaluate(
+        "new Promise((done) => { const times = []; const draw = () => { times.push(performance.now());"
+        "  if (times.length <= 21) requestAnimationFrame(draw);"
+        "  else done(times.slice(1).map((time, i) => time - times[i]).sort((a, b) => a - b)[10]); };"
+        "  requestAnimationFrame(draw);"
+        "  cancelAnimationFrame(requestAnimationFrame(() => { done(Infinity); })); })"
+    )
+    assert (pause < 60.0) is smooth, f"{pause:.0f} ms between two pictures"
+    assert pause < 300.0
+    context.close()
+
+
+def test_a_gone_process_leaves_its_last_state_grey_and_aged(page: Page, server: PlayedServer) -> None:
+    server.gone = {"bridge": 3.2}
+    expect(page.locator('.presence[data-process="bridge"]')).to_have_attribute("data-present", "false")
+    note = page.locator("rp-telemetry .stale-note")
+    expect(note).to_contain_text("bridge gone — last state 3.")
+    expect(page.locator('[data-gauge="real-time-factor"] .value')).to_have_text("0.99")
+    server.gone = {}
+    expect(note).to_have_text("")
+
+
+def test_a_lost_link_is_said_and_mended_by_itself(page: Page, server: PlayedServer) -> None:
+    server.online = False
+    server.sockets[-1].close()
+    banner = page.locator("rp-link-banner")
+    expect(banner).to_contain_text("No link to the server")
+    expect(page.locator('[data-point-id="p1"]')).to_be_visible()
+    expect(page.locator("#start")).to_be_disabled()
+    server.online = True
+    expect(banner).to_be_hidden(timeout=10000)
+    expect(page.locator("#start")).to_be_enabled()
+    expect(page.locator("#log li")).to_have_count(1)
+
+
+def test_echoes_the_state_that_it_has_drawn(page: Page, server: PlayedServer) -> None:
+    until(page, lambda: any(isinstance(message, p.Ping) and message.rendered > 3 for message in server.said))
+
+
+def test_says_what_it_waits_for_before_there_is_anything(browser: Browser) -> None:
+    server = PlayedServer(controller=None, bridge=None, gone={"controller": 9.0, "bridge": 9.0, "perception": 9.0})
+    context = browser.new_context(locale="en-US")
+    page = context.new_page()
+    server.attach(page)
+    page.goto(f"{ORIGIN}/")
+    expect(page.locator("#mode")).to_have_text("No state yet")
+    expect(page.locator("rp-queue > .empty")).to_contain_text("No pruning point in 12 images so far")
+    expect(page.locator("#start")).to_be_disabled()
+    expect(page.locator("#stop")).to_be_enabled()
+    context.close()
+
+
+def test_the_sign_in_link_is_used_once_and_leaves_the_address(browser: Browser) -> None:
+    server = PlayedServer(answers={"/api/sign-in": (401, {"ok": False, "reason": "this token was used"})})
+    context = browser.new_context(locale="en-US")
+    page = context.new_page()
+    server.attach(page)
+    page.goto(f"{ORIGIN}/sign-in?token=secret")
+    expect(page.locator("#progress")).to_have_text("Not signed in: this token was used")
+    assert page.url == f"{ORIGIN}/sign-in"
+    assert server.posted == [("/api/sign-in", {"token": "secret"})]
+    del server.answers["/api/sign-in"]
+    page.locator("#token").fill("another")
+    page.get_by_role("button", name="Sign in").click()
+    expect(page.locator("#mode")).to_have_attribute("data-mode", "READY")
+    context.close()
+
+
+def test_a_busy_page_does_not_take_its_own_pause_for_a_lost_link(page: Page, server: PlayedServer) -> None:
+    page.evaluate("() => { const end = performance.now() + 3500; while (performance.now() < end); }")
+    page.wait_for_timeout(500)
+    assert len(server.sockets) == 1
+
+
+def test_a_silent_link_is_given_up_and_tried_again(page: Page, server: PlayedServer) -> None:
+    server.silent = True
+    until(page, lambda: len(server.sockets) > 1, seconds=10.0)
+
+
+def test_places_without_a_point_are_told_by_what_they_need(page: Page) -> None:
+    look, person = page.locator('[data-needs="another look"]'), page.locator('[data-needs="operator"]')
+    expect(look.locator("summary")).to_have_text("1 place needs another look")
+    expect(person.locator("summary")).to_have_text("1 place for you to decide")
+    person.locator("summary").click()
+    expect(person.locator("li")).to_have_text("Vine 1 · spur 4: a wire passes close to the cut")
+    expect(look.locator("li")).to_have_text("Vine 1 · spur 3: no node seen above the cordon")

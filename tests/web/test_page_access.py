@@ -1,0 +1,142 @@
+"""What assistive technology, a finger and a tired eye need of the page, in every state that it has."""
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from rolling_panda.messages import page as p
+from tests.support.axe import axe, grave
+from tests.support.page_parts import leave
+from tests.support.page_states import STATES
+from tests.support.played_page import box_of
+from tests.support.played_server import ORIGIN, PlayedServer
+
+__all__ = ["axe"]
+pytestmark = pytest.mark.browser
+#: Greyed controls that give no reason, or that no keyboard comes to: the reason is told to whoever hovers, presses, or
+#: comes there by keys. A row of the queue is reached by arrows, and its buttons by Tab from there.
+_UNEXPLAINED = """all => all.filter(each => each.matches(":disabled") || each.tabIndex < 0 ||
+    !each.title || each.getAttribute("aria-description") !== each.title).map(each => each.outerHTML.slice(0, 160))"""
+
+
+def unexplained(page: Page) -> list[str]:
+    greyed = page.locator(':is(button, input, select):is(:disabled, [aria-disabled="true"]):visible')
+    return [f"no reason: {each}" for each in greyed.evaluate_all(_UNEXPLAINED)]
+
+
+#: One after the other on one page, as a person would come to them.
+USUAL = (
+    "no-points", "rule", "all-states", "preview", "charts", "report-empty", "teleoperate-joints", "viewer", "stopped",
+    "link-lost",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_nothing_keeps_anybody_from_using_the_page(page: Page, server: PlayedServer, axe: str, scheme: str) -> None:
+    page.emulate_media(color_scheme="dark" if scheme == "dark" else "light", reduced_motion="reduce")
+    # Darkness changes colours and nothing else.
+    rules = ["color-contrast"] if scheme == "dark" else []
+    found: list[str] = []
+    for name in USUAL:
+        leave(page, server)
+        STATES[name](page, server)
+        found += [f"{name}: {problem}" for problem in grave(page, axe, *rules) + unexplained(page)]
+    assert not found, "\n".join(found)
+
+
+# A page of its own for each state takes a minute; these two have the most in the least room.
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=() if n in ("all-states", "teleoperate-base") else pytest.mark.slow) for n in STATES],
+)
+def test_every_state_fits_a_tablet_and_keeps_nobody_out(
+    browser: Browser, server: PlayedServer, axe: str, name: str
+) -> None:
+    context = browser.new_context(viewport={"width": 1024, "height": 768}, locale="en-US", has_touch=True)
+    page = context.new_page()
+    server.attach(page)
+    page.goto(f"{ORIGIN}/")
+    expect(page.locator("rp-scene iframe")).to_have_class("loaded")
+    STATES[name](page, server)
+    assert grave(page, axe) + unexplained(page) == []
+    cut = "all => all.filter(each => each.scrollWidth > each.clientWidth + 1).map(each => each.outerHTML)"
+    assert page.locator("button:visible").evaluate_all(cut) == []
+    overflow = page.evaluate("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]")
+    assert overflow[0] <= 1024 and overflow[1] <= 768
+    context.close()
+
+
+def test_a_greyed_control_does_nothing_and_says_why_to_keyboard_and_finger(page: Page, server: PlayedServer) -> None:
+    STATES["rule"](page, server)
+    server.posted.clear()
+    server.role = "viewer"
+    slider, why = page.locator("#rule-nodes_kept"), page.locator(".why")
+    expect(slider).to_be_disabled()
+    page.locator("#system-guyot").focus()
+    page.keyboard.press("Tab")
+    expect(slider).to_be_focused()
+    expect(why).to_have_text("You are signed in as a viewer")
+    before = slider.input_value()
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("End")
+    box = box_of(slider)
+    page.mouse.click(box["x"] + 0.9 * box["width"], box["y"] + box["height"] / 2)
+    expect(page.locator(".toast")).to_have_text("You are signed in as a viewer×")
+    page.keyboard.press("Tab")
+    page.keyboard.press("Shift+Tab")
+    expect(why).to_be_visible()
+    page.keyboard.press("Escape")
+    expect(why).to_be_hidden()
+    assert slider.input_value() == before
+    assert server.posted == []
+
+
+def test_signing_in_needs_no_eyes(browser: Browser, server: PlayedServer, axe: str) -> None:
+    context = browser.new_context(viewport={"width": 1024, "height": 768}, locale="en-US")
+    page = context.new_page()
+    server.attach(page)
+    page.goto(f"{ORIGIN}/sign-in")
+    expect(page.locator("h1")).to_be_visible()
+    assert grave(page, axe) == []
+    context.close()
+
+
+@pytest.mark.parametrize("size", [(1024, 768), (820, 1180)])
+def test_a_fingertip_hits_everything_that_can_be_pressed(
+    browser: Browser, server: PlayedServer, size: tuple[int, int]
+) -> None:
+    context = browser.new_context(viewport={"width": size[0], "height": size[1]}, locale="en-US", has_touch=True)
+    page = context.new_page()
+    server.attach(page)
+    page.goto(f"{ORIGIN}/")
+    expect(page.locator("#mode")).to_have_attribute("data-mode", "READY")
+    page.locator('[data-point-id="p1"]').click()
+    page.locator("rp-rule summary").click()
+    small = {}
+    for pressed in page.locator("button:visible, select:visible, summary:visible, input:visible, a:visible").all():
+        # A tick is pressed by its words too.
+        ticked = pressed.get_attribute("type") == "checkbox"
+        box = box_of(pressed.locator("xpath=ancestor::label") if ticked else pressed)
+        if min(box["width"], box["height"]) < 43.5:
+            small[pressed.evaluate("each => each.outerHTML.slice(0, 90)")] = (box["width"], box["height"])
+    assert not small
+    overflow = page.evaluate("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]")
+    assert overflow[0] <= size[0] and overflow[1] <= size[1]
+    context.close()
+
+
+def test_the_log_is_searched_by_severity_process_and_words(page: Page, server: PlayedServer) -> None:
+    lines = [("bridge", "error", "the cutter is jammed"), ("controller", "info", "READY: armed by Ada")]
+    lines.append(("controller", "warning", "p7 is refused: too near a wire"))
+    events = [p.PageEvent(number, server.started + number, *line) for number, line in enumerate(lines, 2)]
+    server.tell(p.PageEvents(events=tuple(events)))
+    shown = page.locator("#log li:visible .text")
+    expect(shown).to_have_count(4)
+    page.locator("#log-process").select_option("controller")
+    expect(shown).to_have_text(["Ready: armed by Ada", "p7 is refused: too near a wire"])
+    page.locator("#log-filter").select_option("warning")
+    expect(shown).to_have_text(["p7 is refused: too near a wire"])
+    page.locator("#log-filter").select_option("info")
+    page.locator("#log-words").fill("ready")
+    expect(shown).to_have_text(["Ready: armed by Ada"])
+    page.locator("#log-words").fill("no such thing")
+    expect(page.locator("#log .empty")).to_have_text("Nothing in the log is like that.")

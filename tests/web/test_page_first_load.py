@@ -1,0 +1,109 @@
+"""What somebody sees in the first seconds: no alarm before there can be one, and one where nothing comes for good."""
+
+from collections.abc import Iterator
+
+import pytest
+from playwright.sync_api import Browser, Page, WebSocketRoute, expect
+
+from tests.support.played_page import until
+from tests.support.played_server import ORIGIN, PlayedServer
+
+pytestmark = pytest.mark.browser
+
+#: Everything that looks like an alarm, as long as it is on the screen, is noted.
+WATCH = """
+  window.alarming = [];
+  const chips = ".presence[data-present=false], .link[data-quality=bad]";
+  const look = () => {
+    for (const part of document.querySelectorAll(`#alarms li strong, rp-link-banner, .stale-note, ${chips}`))
+      if (part.textContent && part.checkVisibility()) window.alarming.push(part.textContent);
+  };
+  new MutationObserver(look).observe(document, {subtree: true, childList: true, attributes: true, characterData: true});
+"""
+#: Nothing of the page runs for so long, as while a browser takes the 3-D view apart.
+BUSY = "seconds => { const end = performance.now() + 1000 * seconds; while (performance.now() < end); }"
+
+
+class LateServer(PlayedServer):
+    """It takes its sockets, and says nothing until it is told to."""
+
+    waits = True
+
+    def accept(self, socket: WebSocketRoute) -> None:
+        if self.waits:
+            self.sockets.append(socket)
+        else:
+            super().accept(socket)
+
+    def begin(self) -> None:
+        self.waits = False
+        super().accept(self.sockets[-1])
+
+
+@pytest.fixture
+def fresh(browser: Browser) -> Iterator[Page]:
+    context = browser.new_context(locale="en-US", viewport={"width": 1280, "height": 800})
+    page = context.new_page()
+    page.add_init_script(WATCH)
+    yield page
+    context.close()
+
+
+def test_a_server_that_takes_two_seconds_for_its_first_word_is_no_alarm(fresh: Page) -> None:
+    server = LateServer()
+    server.attach(fresh)
+    fresh.goto(f"{ORIGIN}/")
+    expect(fresh.locator("#link")).to_have_text("connecting…")
+    fresh.wait_for_timeout(2000)
+    server.begin()
+    expect(fresh.locator("#mode")).to_have_attribute("data-mode", "READY")
+    expect(fresh.locator("#link")).to_contain_text("ms")
+    assert fresh.evaluate("alarming") == []
+
+
+def test_a_first_try_that_fails_is_no_alarm(fresh: Page) -> None:
+    server = PlayedServer()
+    turned_away: list[WebSocketRoute] = []
+
+    def accept(socket: WebSocketRoute) -> None:
+        if turned_away:
+            server.accept(socket)
+        else:
+            turned_away.append(socket)
+            socket.close()
+
+    server.attach(fresh)
+    fresh.route_web_socket("**/ws", accept)
+    fresh.goto(f"{ORIGIN}/")
+    expect(fresh.locator("#mode")).to_have_attribute("data-mode", "READY")
+    assert turned_away and fresh.evaluate("alarming") == []
+
+
+def test_while_the_browser_itself_is_busy_the_server_is_not_said_to_be_silent(fresh: Page) -> None:
+    server = PlayedServer()
+    server.attach(fresh)
+    fresh.goto(f"{ORIGIN}/")
+    expect(fresh.locator("#mode")).to_have_attribute("data-mode", "READY")
+    for _ in range(4):
+        fresh.evaluate(BUSY, 1.4)
+        fresh.wait_for_timeout(300)
+    assert not [text for text in fresh.evaluate("alarming") if "server" in text]
+
+
+def test_a_server_that_never_says_anything_is_an_alarm(fresh: Page) -> None:
+    LateServer().attach(fresh)
+    fresh.goto(f"{ORIGIN}/")
+    expect(fresh.locator("#alarms strong")).to_have_text(["This page has no link to the server"], timeout=15_000)
+    expect(fresh.locator("rp-link-banner")).to_contain_text("No link to the server")
+    expect(fresh.locator('.presence[data-process="server"]')).to_have_attribute("data-present", "false")
+
+
+def test_a_link_that_was_had_and_lost_is_an_alarm_at_once(fresh: Page) -> None:
+    server = PlayedServer()
+    server.attach(fresh)
+    fresh.goto(f"{ORIGIN}/")
+    expect(fresh.locator("#mode")).to_have_attribute("data-mode", "READY")
+    server.online = False
+    server.sockets[-1].close()
+    until(fresh, lambda: bool(fresh.evaluate("alarming.includes('This page has no link to the server')")))
+    expect(fresh.locator("rp-link-banner")).to_be_visible()

@@ -1,0 +1,119 @@
+"""Choosing a point anywhere brings list, picture and 3-D view there; at work the page goes along with the robot."""
+
+from typing import Any
+
+import msgspec
+import pytest
+from playwright.sync_api import Locator, Page, expect
+
+from rolling_panda.messages import page as p
+from tests.support.played_page import box_of, until
+from tests.support.played_server import PlayedServer, controller, point
+
+pytestmark = pytest.mark.browser
+MANY = 60
+
+
+@pytest.fixture
+def server() -> PlayedServer:
+    rows = [point(1 + k, "ACCEPTED", vine=1 + k // 4, spur=1 + k % 4) for k in range(MANY)]
+    # All of them on the image, where they can be pressed.
+    return PlayedServer(
+        points=tuple(
+            msgspec.structs.replace(row, pixel=(30.0 + 42.0 * (k % 10), 40.0 + 50.0 * (k // 10)))
+            for k, row in enumerate(rows)
+        )
+    )
+
+
+def row(page: Page, name: str) -> Locator:
+    return page.locator(f'rp-point[data-point-id="{name}"]')
+
+
+def in_view(page: Page, name: str) -> bool:
+    """Whether all of a row that fits is to be seen in the list."""
+    item, frame = box_of(row(page, name)), box_of(page.locator("rp-queue .groups"))
+    above = item["y"] >= frame["y"] - 1
+    below = item["y"] + item["height"] <= frame["y"] + frame["height"] + 1
+    return above and (below or item["height"] > frame["height"] - 25)
+
+
+def is_shown(page: Page, name: str) -> None:
+    expect(row(page, name)).to_have_attribute("aria-current", "true")
+    expect(row(page, name).locator("rp-point-details .crop")).to_have_class("crop loaded")
+    until(page, lambda: in_view(page, name))
+
+
+def chosen(server: PlayedServer) -> list[tuple[str, bool]]:
+    return [(each.point_id, each.follow) for each in server.said if isinstance(each, p.Select)]
+
+
+def at_work(server: PlayedServer, name: str, **changes: Any) -> None:
+    server.controller = controller("AUTO", phase="APPROACH", active_point_id=name, **changes)
+
+
+def test_choosing_in_the_picture_or_the_3d_view_brings_the_list_there(page: Page, server: PlayedServer) -> None:
+    assert not in_view(page, "p50")
+    page.locator("rp-camera .mark").nth(49).locator(".target").click(force=True)
+    is_shown(page, "p50")
+    until(page, lambda: chosen(server) == [("p50", False)])
+    # The server has brought the view there already.
+    server.tell(p.Selected(point_id="p7"))
+    is_shown(page, "p7")
+    assert chosen(server) == [("p50", False)]
+    # Looked away from, and clicked again in the view: the list comes back.
+    page.locator("rp-queue .groups").evaluate("list => { list.scrollTop = list.scrollHeight; }")
+    until(page, lambda: not in_view(page, "p7"))
+    server.tell(p.Selected(point_id="p7"))
+    is_shown(page, "p7")
+
+
+def test_choosing_a_row_brings_the_view_and_pressing_it_again_once_more(page: Page, server: PlayedServer) -> None:
+    head = row(page, "p2").locator(".point-name")
+    head.click()
+    is_shown(page, "p2")
+    until(page, lambda: chosen(server) == [("p2", False)])
+    expect(page.locator("rp-camera .mark.selected")).to_have_count(1)
+    page.wait_for_function("at => performance.now() > at + 450", arg=page.evaluate("performance.now()"))
+    head.click()
+    until(page, lambda: chosen(server) == [("p2", False), ("p2", False)])
+    page.keyboard.press("End")
+    is_shown(page, f"p{MANY}")
+
+
+def test_choosing_in_the_order_of_work_brings_the_queue_and_the_other_way_round(
+    page: Page, server: PlayedServer
+) -> None:
+    page.locator("rp-order summary").click()
+    row(page, "p1").locator(".point-name").click()
+    page.keyboard.press("End")
+    expect(page.locator('.order-row[aria-selected="true"]')).to_have_attribute("data-point-id", f"p{MANY}")
+    page.locator(".order-row").first.click()
+    name = page.locator('.order-row[aria-selected="true"]').get_attribute("data-point-id")
+    assert name is not None
+    is_shown(page, name)
+
+
+def test_at_work_list_and_picture_go_along_but_not_from_under_somebodys_hand(page: Page, server: PlayedServer) -> None:
+    at_work(server, "p40")
+    is_shown(page, "p40")
+    at_work(server, "p41")
+    is_shown(page, "p41")
+    until(page, lambda: chosen(server) == [("p40", True), ("p41", True)])
+    # Somebody chooses another one: it stays theirs for a while, then the page goes along again.
+    server.tell(p.Selected(point_id="p5"))
+    is_shown(page, "p5")
+    at_work(server, "p42")
+    expect(row(page, "p42")).to_have_class("active")
+    expect(row(page, "p5")).to_have_attribute("aria-current", "true")
+    expect(row(page, "p42")).to_have_attribute("aria-current", "true", timeout=15_000)
+    is_shown(page, "p42")
+    assert chosen(server)[2:] == [("p42", True)]
+
+
+def test_nobody_is_taken_along_while_nothing_is_cut_or_a_point_is_placed(page: Page, server: PlayedServer) -> None:
+    server.controller = controller("READY", active_point_id="")
+    page.locator("#add-by-hand").click()
+    at_work(server, "p40")
+    expect(row(page, "p40")).to_have_class("active")
+    assert chosen(server) == []

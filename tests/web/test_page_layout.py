@@ -1,0 +1,240 @@
+"""Where things are on the page, on screens of every size."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from rolling_panda import messages as m
+from rolling_panda.messages import page as p
+from rolling_panda.resources import resource
+from server.api.page_files import as_sent
+from tests.support.page_parts import held
+from tests.support.played_page import box_of, until
+from tests.support.played_server import ORIGIN, PlayedServer, bridge, controller, point
+
+pytestmark = pytest.mark.browser
+
+
+@pytest.mark.parametrize("size", [(1280, 800), (1024, 768), (820, 1180)])
+def test_fits_the_screen_with_the_stop_on_top(page: Page, server: PlayedServer, size: tuple[int, int]) -> None:
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    server.bridge = bridge(stop_id="s1", stopped_by="Ada: stop button")
+    server.controller = controller("ESTOP_LATCHED")
+    expect(page.locator("rp-stop-banner")).to_be_visible()
+    leave, stop = box_of(page.locator("#sign-out")), box_of(page.locator("#stop"))
+    assert leave["x"] + leave["width"] <= stop["x"]
+    overflow = page.evaluate("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]")
+    assert overflow[0] <= size[0]
+    assert overflow[1] <= size[1]
+    view = box_of(page.locator("rp-scene"))
+    assert min(view["width"], view["height"]) >= 300, "there is room to see the robot"
+    banner = box_of(page.locator("rp-stop-banner"))
+    assert banner["y"] >= view["y"] + view["height"] / 2, "the tool stays in view"
+    assert banner["y"] + banner["height"] <= view["y"] + view["height"]
+    assert page.locator(".product").evaluate("each => each.scrollWidth <= each.clientWidth"), "its name is cut off"
+    for button in page.locator("button:visible").all():
+        assert button.evaluate("each => each.scrollWidth <= each.clientWidth"), f"{button} is cut off"
+    for selector in ("#stop", "#arm", "#start", "#pause", "#resume", "#home", "#acknowledge", "#teleop"):
+        box = box_of(page.locator(selector))
+        assert box["height"] >= 44
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= size[0]
+        middle = [box["x"] + box["width"] / 2, box["y"] + box["height"] / 2]
+        top = page.evaluate("([x, y]) => document.elementFromPoint(x, y)?.closest('button')?.id", middle)
+        assert f"#{top}" == selector, "nothing lies over it"
+
+
+#: What moved on the page since it was ready, other than by a press: its share of the screen and of what.
+SHIFTS = """() => { window.shifts = []; new PerformanceObserver((list) => {
+  for (const { value, sources } of list.getEntries())
+    window.shifts.push([value, ...sources.map(({ node }) => `${node?.nodeName} ${node?.className}`)]);
+}).observe({ type: "layout-shift" }); }"""
+
+
+def a_whole_job(page: Page, server: PlayedServer) -> None:
+    """Every point is worked off but one, which is refused; a pause and a stop come in between."""
+    states: list[m.PointState] = ["ACCEPTED"] * 3
+    told = 10
+
+    def tell(mode: m.Mode, reason: str, **more: Any) -> None:
+        nonlocal told
+        told += 1
+        server.controller = controller(mode, reason=reason, **more)
+        server.points = tuple(point(k + 1, state, spur=k + 1) for k, state in enumerate(states))
+        server.tell(p.PageEvents(events=(server.event(told, "warning", f"{mode}: {reason}"),)))
+        server.tell(server.page_points())
+        expect(page.locator("#mode")).to_have_attribute("data-mode", mode)
+
+    ends: tuple[tuple[int, m.PointState], ...] = ((1, "DONE"), (2, "FAILED_NOT_CUT"), (3, "UNKNOWN"))
+    for number, end in ends:
+        name = f"p{number}"
+        for phase in ("APPROACH", "ADVANCE", "CUT", "RETREAT"):
+            states[number - 1] = "INTENT" if phase == "CUT" else "ACCEPTED"
+            tell("AUTO", f"{phase.lower()} of {name}, vine 1, spur {number}", phase=phase, active_point_id=name)
+        states[number - 1] = end
+        tell("PAUSED", f"{name} is {end}; a person has to look at it before the work goes on")
+    server.bridge = bridge(stop_id="s1", stopped_by="Ada: stop button")
+    tell("ESTOP_LATCHED", "stopped by Ada: stop button")
+    expect(page.locator("rp-stop-banner")).to_be_visible()
+    server.bridge = bridge()
+    tell("IDLE", "the stop was released by Ada: all clear")
+    expect(page.locator("rp-stop-banner")).to_be_hidden()
+    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
+def test_what_is_accepted_who_comes_and_a_whole_job_move_nothing_on_the_page(
+    browser: Browser, server: PlayedServer
+) -> None:
+    """Neither a panel nor a button nor a row of the queue is elsewhere, so that no press meets another one."""
+    parts = (
+        "#stop",
+        "#mode",
+        "rp-controls button",
+        "main > *",
+        ".middle > .panel",
+        ".right > *",
+        ".bottom > *",
+        "rp-point",
+    )
+    boxes = f"""() => [...document.querySelectorAll({json.dumps(", ".join(parts))})].map(each => {{
+        const box = each.getBoundingClientRect();
+        const name = each.id || each.dataset.pointId || "";
+        return [each.localName, name, box.x, box.y, name === "mode" ? 0 : box.width];
+    }}).filter(([name]) => name !== "rp-link-banner")"""
+    server.points = tuple(point(number, "PROPOSED", spur=number) for number in range(1, 4))
+    context = browser.new_context(viewport={"width": 1280, "height": 800}, locale="en-US")
+    page = context.new_page()
+    server.attach(page)
+    page.goto(f"{ORIGIN}/")
+    expect(page.locator("#mode")).to_have_attribute("data-mode", "READY")
+    expect(page.locator("rp-point")).to_have_count(3)
+    expect(page.locator("rp-camera img")).to_be_visible()
+    before = page.evaluate(boxes)
+    page.evaluate(SHIFTS)
+    assert len(before) > 15
+    server.points = (point(1, "ACCEPTED"), point(2, "ACCEPTED", spur=2), point(3, "REJECTED", spur=3))
+    server.tell(server.page_points())
+    expect(page.locator("#preview")).to_be_visible()
+    expect(page.locator("rp-order summary")).to_be_visible()
+    assert page.evaluate(boxes) == before
+    server.control = held("other", "Bob")
+    expect(page.locator("#take-control")).to_be_visible()
+    assert page.evaluate(boxes) == before
+    a_whole_job(page, server)
+    shifts = page.evaluate("window.shifts")
+    assert sum(share for share, *_ in shifts) < 0.02, "words beside one that has changed, a line of the alarms, no more"
+    context.close()
+
+
+def test_the_queue_has_room_for_five_points_on_a_small_screen(page: Page, server: PlayedServer) -> None:
+    server.points = tuple(point(number, "PROPOSED", spur=number) for number in range(1, 12))
+    server.tell(server.page_points())
+    fifth, list_ = box_of(page.locator("rp-point").nth(4)), box_of(page.locator(".groups"))
+    assert fifth["y"] + fifth["height"] <= list_["y"] + list_["height"]
+
+
+def test_a_telephone_scrolls_one_column_and_keeps_the_stop(page: Page, server: PlayedServer) -> None:
+    page.set_viewport_size({"width": 390, "height": 844})
+    server.bridge = bridge(stop_id="s1", stopped_by="Ada: stop button")
+    for part in ("#start", "#reset", "#teleop", "#accept-all", "rp-gauge >> nth=0", "#log-filter"):
+        page.locator(part).scroll_into_view_if_needed()
+        box = box_of(page.locator(part))
+        assert box["x"] >= 0 and box["x"] + box["width"] <= 390, part
+        stop = box_of(page.locator("#stop"))
+        assert stop["y"] >= 0 and stop["y"] + stop["height"] <= 844
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    page.locator("#stop").click()
+    until(page, lambda: len(server.stops()) == 1)
+
+
+@pytest.mark.parametrize("size", [(820, 1180), (390, 844)])
+def test_on_small_screens_neither_banner_hides_the_view(
+    page: Page, server: PlayedServer, size: tuple[int, int]
+) -> None:
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    server.bridge = bridge(stop_id="s1", stopped_by="Ada: stop button")
+    expect(page.locator("rp-stop-banner")).to_be_visible()
+    server.online = False
+    server.sockets[-1].close()
+    expect(page.locator("rp-link-banner")).to_contain_text("No link to the server")
+    view, lost = box_of(page.locator("rp-scene")), box_of(page.locator("rp-link-banner"))
+    stopped = box_of(page.locator("rp-stop-banner"))
+    assert lost["y"] + lost["height"] <= view["y"]
+    assert stopped["height"] <= 0.3 * view["height"]
+    assert view["height"] >= 300
+
+
+def test_on_a_telephone_the_stop_lies_over_nothing(page: Page, server: PlayedServer) -> None:
+    page.set_viewport_size({"width": 390, "height": 844})
+    stop = box_of(page.locator("#stop"))
+    assert page.evaluate("document.body.getBoundingClientRect().bottom") <= stop["y"]
+    page.locator("#teleop").scroll_into_view_if_needed()
+    last = box_of(page.locator("#teleop"))
+    assert last["y"] + last["height"] <= stop["y"]
+
+
+def test_without_a_link_nothing_is_pushed_off_a_tablet(page: Page, server: PlayedServer) -> None:
+    page.set_viewport_size({"width": 820, "height": 1180})
+    server.bridge = bridge(stop_id="s1", stopped_by="Ada: stop button")
+    expect(page.locator("#reset")).to_be_visible()
+    expect(page.locator("#invite")).to_be_visible()
+    server.online = False
+    server.sockets[-1].close()
+    expect(page.locator("rp-link-banner")).to_contain_text("No link to the server")
+    leave, stop = box_of(page.locator("#sign-out")), box_of(page.locator("#stop"))
+    assert leave["x"] + leave["width"] <= stop["x"]
+    for useless in ("#reset", "#invite"):
+        expect(page.locator(useless)).to_be_hidden()
+
+
+def test_the_log_follows_its_newest_line_when_the_screen_is_turned(page: Page, server: PlayedServer) -> None:
+    def at_end() -> bool:
+        past = "each => each.scrollHeight - each.scrollTop - each.clientHeight"
+        return bool(page.locator("#log ol").evaluate(past) < 2)
+
+    long = "a line that is long enough to need a second one where there is little room for it, " * 2
+    server.tell(p.PageEvents(events=tuple(server.event(number, "info", long) for number in range(2, 42))))
+    expect(page.locator("#log li")).to_have_count(41)
+    for width, height in ((820, 1180), (1280, 800), (390, 844), (1024, 768)):
+        page.set_viewport_size({"width": width, "height": height})
+        until(page, at_end)
+    page.locator("#log ol").evaluate("each => { each.scrollTop = 0; }")
+    page.wait_for_timeout(100)
+    server.tell(p.PageEvents(events=(server.event(42, "info", "while somebody reads older ones"),)))
+    expect(page.locator("#log li")).to_have_count(42)
+    assert page.locator("#log ol").evaluate("each => each.scrollTop") == 0
+
+
+def test_the_page_is_small_and_keeps_to_its_own_files() -> None:
+    folder = resource("web/index.html").parent.resolve()
+    scripts = [*folder.glob("*.js"), *folder.glob("components/*.js")]
+    sent = {script: as_sent(script.read_text(encoding="utf-8")) for script in scripts}
+    first, waiting = set[Path](), [folder / "app.js"]
+    while waiting:
+        script = waiting.pop()
+        if script not in first:
+            first.add(script)
+            imported = re.findall(r'^(?:import|export) [^;]*?"(\.[^"]+)";', sent[script], re.MULTILINE)
+            waiting += [(script.parent / name).resolve() for name in imported]
+    assert sum(len(sent[script].encode()) for script in first) < 150_000, "what the page fetches before it is used"
+    later = {"rp-charts.js", "charts.js", "rp-report.js", "rp-order.js", "rp-preview.js", "preview.js"}
+    later |= {"rp-robots.js", "kept-history.js", "here-worker.js"}
+    elsewhere = {"sign-in.js", "view.js", "view-behind.js", "view-drawn.js"}
+    assert {script.name for script in set(scripts) - first} - elsewhere == later, "what it fetches when opened"
+    # Their indentation is not sent, so that none may lie within a text.
+    assert [line for script in sent.values() for line in script.splitlines() if line.count("`") % 2] == []
+    for file in [*scripts, *folder.glob("*.css"), *folder.glob("*.html")]:
+        text = file.read_text(encoding="utf-8")
+        assert len(text.splitlines()) <= 400, file.name
+        assert "innerHTML" not in text
+        assert "https://" not in text
+    for html in folder.glob("*.html"):
+        text = html.read_text(encoding="utf-8")
+        assert " style=" not in text
+        assert "<style" not in text
+        assert text.count("<script") == text.count(' src="')
+    assert json.loads((folder / "jsconfig.json").read_text(encoding="utf-8"))["compilerOptions"]["strict"] is True

@@ -1,0 +1,127 @@
+"""The preview on the page: asked for, played, approved, expired, and required."""
+
+import msgspec
+import pytest
+from playwright.sync_api import Page, expect
+
+from rolling_panda import messages as m
+from rolling_panda.messages import page as p
+from rolling_panda.messages.supervision import PreviewedCut, PreviewState
+from tests.support.played_page import until
+from tests.support.played_server import PlayedServer, controller, point
+
+pytestmark = pytest.mark.browser
+ALLOWED = ("AskPreview", "ApprovePreview", "RequirePreview", "MoveInQueue")
+
+
+def cut(name: str, begins: float) -> PreviewedCut:
+    return PreviewedCut(
+        point_id=name,
+        revision=4,
+        begins_s=begins,
+        cut_s=begins + 3.0,
+        ends_s=begins + 5.0,
+        result="cut",
+        clearance=0.072 - 0.01 * begins / 5.0,
+        between=("link5", "camera"),
+        manipulability=0.067,
+        joint_margin=0.6,
+    )
+
+
+STATE = PreviewState(
+    header=m.Header(),
+    required=False,
+    phase="ready",
+    preview_hash="ab" * 32,
+    duration_s=10.0,
+    cuts=(cut("p1", 0.0), cut("p2", 5.0)),
+    left=1,
+)
+
+
+@pytest.fixture
+def server() -> PlayedServer:
+    state = controller()
+    state = msgspec.structs.replace(state, allowed=(*state.allowed, *ALLOWED))
+    return PlayedServer(controller=state, points=(point(1, "ACCEPTED"), point(2, "ACCEPTED"), point(3, "PROPOSED")))
+
+
+def told(server: PlayedServer, **changes: object) -> None:
+    server.tell(p.PagePreview(preview=msgspec.structs.replace(STATE, **changes)))
+
+
+def moments(server: PlayedServer) -> list[float | None]:
+    return [message.time for message in server.said if isinstance(message, p.ShowPreview)]
+
+
+def test_a_preview_is_asked_for_of_all_or_of_the_chosen_point(page: Page, server: PlayedServer) -> None:
+    page.locator("#preview").click()
+    until(page, lambda: ("/api/preview", {"point_id": ""}) in server.posted)
+    expect(page.locator("#preview-one")).to_have_attribute("title", "Choose an accepted point first")
+    page.locator('rp-point[data-point-id="p2"]').click()
+    page.locator("#preview-one").click()
+    until(page, lambda: ("/api/preview", {"point_id": "p2"}) in server.posted)
+
+
+def test_it_says_how_long_and_how_near_and_the_scrubber_shows_moments(page: Page, server: PlayedServer) -> None:
+    expect(page.locator(".preview-player")).to_be_hidden()
+    told(server)
+    words = page.locator(".preview-words")
+    expect(words).to_have_text("2 of 3 cuts in 10.0 s · least 62 mm link5–camera · ω 0.067 · joints 34°")
+    slider = page.get_by_label("Moment of the preview")
+    slider.fill("2")
+    until(page, lambda: 2.0 in moments(server))
+    expect(words).to_contain_text("p1: cut · least 72 mm")
+    slider.fill("7")
+    expect(words).to_contain_text("p2: cut · least 62 mm")
+    page.locator("#preview-hide").click()
+    until(page, lambda: moments(server)[-1] is None)
+    # The ghost is out of the way of the work, too.
+    slider.fill("2")
+    until(page, lambda: moments(server)[-1] == 2.0)
+    server.controller = controller("AUTO")
+    until(page, lambda: moments(server)[-1] is None)
+
+
+def test_it_plays_to_its_end(page: Page, server: PlayedServer) -> None:
+    told(server, duration_s=0.6)
+    page.locator("#preview-play").click()
+    until(page, lambda: moments(server)[-1:] == [0.6])
+    shown = [moment for moment in moments(server) if moment is not None]
+    assert shown == sorted(shown)
+    expect(page.locator("#preview-play")).to_have_text("Play")
+
+
+def test_it_is_approved_by_its_hash_and_what_changed_is_said_when_it_expires(page: Page, server: PlayedServer) -> None:
+    told(server)
+    page.locator("#approve-preview").click()
+    until(page, lambda: ("/api/preview/approve", {"preview_hash": "ab" * 32}) in server.posted)
+    told(server, phase="approved", approved_by="Ada")
+    expect(page.locator(".preview-words")).to_contain_text("Approved by Ada")
+    told(server, phase="expired", reason="the robot stands 0.31 m from where it begins")
+    expect(page.locator(".preview-words")).to_have_text("Expired: the robot stands 0.31 m from where it begins")
+    expect(page.locator("#approve-preview")).to_have_attribute("aria-disabled", "true")
+
+
+def test_where_it_is_required_start_says_what_is_missing(page: Page, server: PlayedServer) -> None:
+    box = page.get_by_label("Before each cut")
+    box.click()
+    until(page, lambda: ("/api/preview/required", {"required": True}) in server.posted)
+    expect(box).not_to_be_checked()
+    assert server.controller is not None
+    kept = tuple(name for name in server.controller.allowed if name != "Start")
+    server.controller = msgspec.structs.replace(server.controller, allowed=kept)
+    told(server, required=True)
+    expect(box).to_be_checked()
+    expect(page.locator("#start")).to_have_attribute("title", "Approve the preview first")
+    told(server, required=True, phase="none", preview_hash="", cuts=())
+    expect(page.locator("#start")).to_have_attribute("title", "A preview is required before each cut: press Preview")
+
+
+def test_who_may_not_operate_may_not_ask_or_approve(page: Page, server: PlayedServer) -> None:
+    server.role = "viewer"
+    told(server)
+    for name in ("preview", "approve-preview"):
+        expect(page.locator(f"#{name}")).to_have_attribute("title", "You are signed in as a viewer")
+    expect(page.locator("#require-preview")).to_be_disabled()

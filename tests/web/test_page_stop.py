@@ -1,0 +1,70 @@
+"""On the page after a stop: who pressed, who has latched it since when, and what has to come before the reset."""
+
+import msgspec
+import pytest
+from playwright.sync_api import Page, expect
+
+from rolling_panda.messages import page as p
+from rolling_panda.messages.supervision import StopRecord, StopState
+from tests.support.played_page import box_of, until
+from tests.support.played_server import PlayedServer, bridge, controller
+
+pytestmark = pytest.mark.browser
+
+ADA = StopRecord("s1", "server", "Ada", "branch", 1_700_000_000.0)
+BOB = StopRecord("s2", "server", "Bob", "space bar", 1_700_000_100.0)
+
+
+def clock(page: Page, record: StopRecord) -> str:
+    """The record's time as this browser's page writes it."""
+    words: str = page.evaluate("(at) => new Date(at * 1000).toLocaleTimeString('en-GB')", record.wall_time)
+    return words
+
+
+def test_who_has_latched_it_is_told_with_the_time(page: Page, server: PlayedServer) -> None:
+    banner = page.locator("rp-stop-banner")
+    server.bridge = bridge(stop_id="s1", stopped_by="Ada: branch")
+    server.stopped = (StopState(process="bridge", stops=(ADA,)),)
+    expect(banner.locator('[data-by="bridge"]')).to_contain_text(f"latched at {clock(page, ADA)}")
+    expect(banner.locator('[data-by="controller"]')).to_contain_text("not confirmed yet")
+    late = msgspec.structs.replace(ADA, wall_time=ADA.wall_time + 2.0)
+    server.stopped += (StopState(process="controller", stops=(late,)),)
+    server.controller = controller("ESTOP_LATCHED", reason="stopped by Ada")
+    expect(banner.locator('[data-by="controller"]')).to_contain_text(f"latched at {clock(page, late)}")
+    expect(banner.locator(".earlier")).to_be_hidden()
+
+
+def test_a_second_stop_does_not_hide_the_first(page: Page, server: PlayedServer) -> None:
+    banner = page.locator("rp-stop-banner")
+    server.bridge = bridge(stop_id="s2", stopped_by="Bob: space bar")
+    server.controller = controller("ESTOP_LATCHED")
+    server.stopped = tuple(StopState(process=process, stops=(BOB, ADA)) for process in ("bridge", "controller"))
+    expect(banner.locator(".who")).to_contain_text("Pressed by Bob: space bar")
+    expect(banner.locator(".earlier")).to_have_text(f"Before that: Ada, {clock(page, ADA)}")
+
+
+def test_a_pressed_button_on_the_robot_comes_before_the_reset(page: Page, server: PlayedServer) -> None:
+    server.bridge = bridge(stop_id="s1", stopped_by="Ada: branch")
+    server.controller = controller("ESTOP_LATCHED")
+    server.stopped = (StopState(process="bridge", stops=(ADA,), hardware=True),)
+    page.locator("#reset-reason").fill("row is clear")
+    expect(page.locator("#reset")).to_be_disabled()
+    expect(page.locator("#reset")).to_have_attribute("title", "Release the emergency stop button on the robot first")
+    server.stopped = (StopState(process="bridge", stops=(ADA,)),)
+    expect(page.locator("#reset")).to_be_enabled()
+    page.locator("#reset").click()
+    until(page, lambda: ("/api/reset", {"reason": "row is clear", "stop_id": "s1"}) in server.posted)
+
+
+@pytest.mark.parametrize("size", [(1280, 800), (1024, 768)])
+def test_no_notice_lies_over_the_field_for_the_reason(page: Page, server: PlayedServer, size: tuple[int, int]) -> None:
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    page.locator("#teleop").click()
+    page.keyboard.down("h")
+    until(page, lambda: server.holds()[-1:] == [True])
+    server.tell(p.HoldEnded(reason="The robot was stopped."))
+    server.bridge = bridge(stop_id="s1", stopped_by="Ada: stop button")
+    server.controller = controller("ESTOP_LATCHED", reason="stopped by Ada")
+    field = box_of(page.locator("rp-stop-banner input"))
+    notice = box_of(page.locator(".toast").first)
+    assert notice["y"] + notice["height"] <= field["y"]

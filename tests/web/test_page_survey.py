@@ -1,0 +1,40 @@
+"""What the page asks for when the robot is to look: along the row, or at one place again."""
+
+import msgspec
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.support.played_page import until
+from tests.support.played_server import PlayedServer, controller
+
+pytestmark = pytest.mark.browser
+
+
+def test_a_survey_goes_as_far_as_was_chosen(page: Page, server: PlayedServer) -> None:
+    server.controller = controller("READY", allowed=("Survey",))
+    expect(page.locator("#survey")).to_be_enabled()
+    page.locator("#survey").click()
+    until(page, lambda: bool(server.posted))
+    page.locator("#survey-distance").select_option("15")
+    page.locator("#survey").click()
+    until(page, lambda: len(server.posted) == 2)
+    assert server.posted == [("/api/survey", {"distance": 4}), ("/api/survey", {"distance": 15})]
+
+
+def test_a_place_that_needs_another_look_has_a_button_for_it_and_one_for_a_person_has_none(
+    page: Page, server: PlayedServer
+) -> None:
+    server.controller = controller("READY", allowed=("Survey",))
+    unclear, deciding = server.abstained
+    server.abstained = (msgspec.structs.replace(unclear, position=(1.0, 0.8, 0.9)), deciding)
+    server.tell(server.page_points())
+    for box in page.locator("details.abstained").all():
+        box.locator("summary").click()
+    button = page.locator("button.look-again")
+    expect(button).to_have_count(1)
+    expect(page.locator("li", has=button)).to_contain_text("Vine 1 · spur 3")
+    button.click()
+    until(page, lambda: bool(server.posted))
+    assert server.posted == [("/api/look-again", {"vine": 1, "spur": 3})]
+    server.controller = controller("AUTO", allowed=("Pause",))
+    expect(button).to_be_disabled()
