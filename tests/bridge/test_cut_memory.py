@@ -92,6 +92,19 @@ def test_a_full_disk_means_no_cut_now_or_later(tmp_path: Path, monkeypatch: pyte
     memory.close()
 
 
+def test_a_disk_that_takes_half_a_line_means_no_cut(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    real, memory = os.write, CutFile(tmp_path)
+    orders = CutOrders(memory)
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "write", lambda descriptor, line: real(descriptor, line[: len(line) // 2]))
+        assert judged(orders, "run-1") == ("refuse", FORGETFUL)
+    assert judged(orders, "run-2") == ("cut", "")
+    memory.close()
+    again = CutFile(tmp_path)
+    assert "run-2" in again.known and "run-1" not in again.known
+    again.close()
+
+
 def test_a_half_written_line_spoils_no_other(tmp_path: Path) -> None:
     (tmp_path / FILE).write_bytes(b"\nrun-1\n\nrun-")
     memory = CutFile(tmp_path)

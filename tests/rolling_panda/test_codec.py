@@ -173,9 +173,18 @@ def test_a_damaged_message_is_refused_or_is_still_a_whole_one(message: Any, data
     assert decoder.decode(encode(decoded)) == decoded
 
 
-def test_nesting_without_end_is_refused() -> None:
+@pytest.mark.parametrize("start", [b"", b"\x82\xa1a", b"\x81\xa4type"])
+@pytest.mark.parametrize("nesting", [b"\x91", b"\x81\xa1a"])
+def test_nesting_without_end_is_refused(start: bytes, nesting: bytes) -> None:
+    """In place of a message, and in a value that is passed over on the way to the type."""
     with pytest.raises(MessageError):
-        DECODERS[m.Answer].decode(b"\x91" * 100_000)
+        DECODERS[m.Answer].decode(start + nesting * 100_000)
+
+
+@pytest.mark.parametrize("text", ["82a474797065a6416e73776572a6726561736f6ea2fffe", "81a474797065a2fffe"])
+def test_text_that_is_not_utf_8_is_refused(text: str) -> None:
+    with pytest.raises(MessageError):
+        DECODERS[m.Answer].decode(bytes.fromhex(text))
 
 
 def test_messages_cannot_be_changed() -> None:

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from rolling_panda import messages as m
@@ -16,7 +17,8 @@ from rolling_panda.config import TransportConfig
 from rolling_panda.errors import ServiceError, TransportError
 from rolling_panda.messages import commands as intents
 from rolling_panda.messages.robot import CameraFrame, Intrinsics
-from rolling_panda.topics import CAMERA, HEARTBEAT, INTENT, MOTION, Service, Topic
+from rolling_panda.topics import CAMERA, HEARTBEAT, INTENT, MOTION, Service, Topic, key
+from rolling_panda.transport.codec import StrictDecoder
 from rolling_panda.transport.zenoh import Feed, ForeignWire, Onlooker, Rejections, Router, Slot, Transport
 
 pytestmark = pytest.mark.alone
@@ -190,6 +192,24 @@ def test_a_request_that_is_none_is_answered_with_the_reason(controller: Transpor
     refused = bridge.call(INTENT, intents.AcceptAll(user="ada", confidence=math.nan))
     assert not refused.ok and "confidence" in refused.reason
     assert [row.topic for row in controller.rejections.counts()] == [INTENT.name]
+
+
+def test_a_request_without_end_is_refused_though_each_field_is_right(
+    endpoint: str, controller: Transport, bridge: Transport
+) -> None:
+    heard: list[intents.Intent] = []
+    controller.serve(INTENT, lambda intent: (heard.append(intent), m.Answer(ok=True))[1])
+    until(lambda: answered(bridge))
+    heard.clear()
+    foreign = ForeignWire(TransportConfig(connect=(endpoint,), plain_wire=True))
+    for times, allowed in ((1, True), (1 << 20, False)):
+        # A map may say the same field again and again.
+        fields = msgspec.msgpack.encode("type") + msgspec.msgpack.encode("Arm") + b"\xa4user\xa3ada" * times
+        request = b"\xdf" + (1 + times).to_bytes(4, "big") + fields
+        answer = StrictDecoder(m.Answer).decode(foreign.ask(key("rp1", INTENT.name), request, 20.0))
+        assert answer.ok is allowed and len(heard) == 1
+    assert "at most" in answer.reason
+    foreign.close()
 
 
 def test_a_service_takes_its_own_requests_only(bridge: Transport) -> None:

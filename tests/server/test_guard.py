@@ -33,6 +33,20 @@ def test_a_socket_from_elsewhere_is_refused_even_with_the_cookie(server, origin,
     assert caught.value.response.status_code == 403
 
 
+@pytest.mark.parametrize("first", ["page", "elsewhere"])
+def test_of_two_origins_neither_counts(server, first):
+    origins = [server.address, "http://evil.example"][:: 1 if first == "page" else -1]
+    with server.client() as client:
+        answer = client.post("/api/arm", json={}, headers=[("origin", origin) for origin in origins])
+        assert answer.status_code == 403 and "Origin" in answer.json()["reason"]
+        headers = [("cookie", server.cookie(client)), ("origin", origins[1])]
+        with pytest.raises(InvalidStatus) as caught:
+            connect(server.socket_address + "/ws", origin=origins[0], additional_headers=headers, proxy=None)
+        # The library that speaks the protocol may see it first.
+        assert caught.value.response.status_code in (400, 403)
+    assert server.wire.asked == []
+
+
 @pytest.mark.parametrize("path", ["/ws", "/viser"])
 def test_a_socket_without_a_session_is_refused(server, path):
     with pytest.raises(InvalidStatus) as caught:

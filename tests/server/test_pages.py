@@ -167,8 +167,16 @@ def test_a_page_that_breaks_the_rules_is_closed(page, text):
 
 
 def test_a_frame_that_is_too_long_closes_the_socket(page):
+    longest = ServerConfig().max_body_bytes
     with pytest.raises(ConnectionClosed) as caught:
-        page.socket.send("x" * 70_000)
+        page.socket.send("x" * (longest + 1))
+        page.hear("never")
+    assert caught.value.rcvd.code == 1009
+
+
+def test_a_frame_in_too_many_parts_closes_the_socket(page):
+    with pytest.raises(ConnectionClosed) as caught:
+        page.socket.send("x" * 30_000 for _ in range(3))
         page.hear("never")
     assert caught.value.rcvd.code == 1009
 
