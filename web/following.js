@@ -7,11 +7,11 @@ import { goAlong, touched, touchedAt } from "./teleoperation.js";
 
 /** Whoever has just chosen, or looked through a list, is left there so long (ms). */
 const HOLD_OFF_MS = 8000;
-/** Parts in which a press, a key or the wheel says that somebody looks for himself. */
+/** Parts in which the pointer, a key or the wheel shows that an operator is busy: no row moves from under a press. */
 const PARTS = "rp-queue, rp-order, rp-camera";
 
 export function followWork() {
-  for (const kind of ["pointerdown", "keydown", "wheel"]) {
+  for (const kind of ["pointerdown", "pointermove", "keydown", "wheel"]) {
     document.addEventListener(
       kind,
       (event) => {
