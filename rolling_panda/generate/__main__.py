@@ -18,8 +18,8 @@ def generated(root: Path = ROOT) -> dict[Path, str]:
     """What each generated file of a checkout should contain."""
     wire, safety = root / "docs" / "wire.md", root / "docs" / "safety.md"
     return {
-        root / "web" / "messages.js": messages_module(),
-        root / "web" / "messages.d.ts": messages_types(),
+        root / "web" / "js" / "link" / "messages.js": messages_module(),
+        root / "web" / "js" / "link" / "messages.d.ts": messages_types(),
         root / "assets" / "config" / "router.json5": router_config(),
         wire: fill(wire.read_text(encoding="utf-8")),
         safety: fill(safety.read_text(encoding="utf-8"), modes.BLOCKS | bounds.BLOCKS, "docs/safety.md"),

@@ -14,7 +14,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 #: A type for the type checker beside code; what it is about stands in parentheses after it.
 _TYPE = re.compile(r"/\*\* @type [^*`]*\*/ ?")
-_STYLESHEET = re.compile(r'^ *<link rel="stylesheet" href="([\w.-]+\.css)">\n', re.MULTILINE)
+_STYLESHEET = re.compile(r'^ *<link rel="stylesheet" href="([\w./-]+\.css)">\n', re.MULTILINE)
 _SCRIPT = re.compile(r'^( *)<script type="module" src="([\w./-]+\.js)"></script>\n', re.MULTILINE)
 #: What a script needs before it runs; what it imports later, with `import(…)`, is not among it.
 _IMPORT = re.compile(r'^(?:import|export) (?:[^"(]* from )?"(\.[\w./-]+\.js)";', re.MULTILINE)

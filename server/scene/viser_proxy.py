@@ -20,9 +20,9 @@ from server.scene.viser_filter import GizmoDragEnd, GizmoUpdate, admit, kind
 #: Viser's own panel and notices have nothing to say here, and would cover the view.
 _STYLE = b"<style>[data-floating-window],.mantine-Notifications-root{display:none!important}</style>"
 #: The page's own file on how the view is drawn; it has to run before the client's scripts.
-_SCRIPT = b'<script type="module" src="/view.js"></script>'
+_SCRIPT = b'<script type="module" src="/js/scene/frame.js"></script>'
 #: The client unpacks itself, and would run whether that file has come or not; without it, it does all the same.
-_UNPACKS, _WAITS = b"await init();", b'await Promise.all([init(),import("/view.js").catch(()=>{})]);'
+_UNPACKS, _WAITS = b"await init();", b'await Promise.all([init(),import("/js/scene/frame.js").catch(()=>{})]);'
 
 
 def viser_router(

@@ -26,7 +26,7 @@ def test_an_edited_file_is_noticed(tmp_path: Any) -> None:
         copy.parent.mkdir(parents=True, exist_ok=True)
         copy.write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
     assert stale(tmp_path) == []
-    (tmp_path / "web" / "messages.js").write_text("// edited\n", encoding="utf-8")
+    (tmp_path / "web" / "js" / "link" / "messages.js").write_text("// edited\n", encoding="utf-8")
     wire = tmp_path / "docs" / "wire.md"
     wire.write_text(wire.read_text(encoding="utf-8").replace("`command/motion`", "`command/other`"), encoding="utf-8")
     assert [path.name for path in stale(tmp_path)] == ["messages.js", "wire.md"]
@@ -62,9 +62,9 @@ def test_the_page_knows_every_message_of_its_socket() -> None:
 
 def test_a_browser_fetches_words_and_no_types() -> None:
     text = messages_module()
-    listed = re.search(r"MODES = Object.freeze\((\[.*\])\)", text)
+    listed = re.search(r"PROCESSES = Object.freeze\((\[.*\])\)", text)
     assert listed is not None
-    assert "ESTOP_LATCHED" in json.loads(listed[1])
+    assert "controller" in json.loads(listed[1])
     assert "typedef" not in text and "interface" not in text
     declared = set(re.findall(r"^export const (\w+)", messages_types(), re.MULTILINE))
     assert set(re.findall(r"^export const (\w+)", text, re.MULTILINE)) == declared

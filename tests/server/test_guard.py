@@ -84,7 +84,7 @@ def test_a_long_body_is_refused_however_it_is_sent(server):
 
 def test_every_answer_has_the_headers_that_keep_browsers_strict(server):
     with server.visitor() as visitor:
-        for path in ("/version", "/api/state", "/messages.js"):
+        for path in ("/version", "/api/state", "/js/link/messages.js"):
             headers = visitor.get(path).headers
             assert "frame-ancestors 'none'" in headers["content-security-policy"]
             assert "unsafe" not in headers["content-security-policy"]

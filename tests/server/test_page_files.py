@@ -61,8 +61,8 @@ def test_every_script_of_the_page_is_sent_and_nothing_outside_the_folder():
         assert answer.body == as_sent(script.read_text(encoding="utf-8")).encode()
         assert ask(files, name, if_none_match=answer.headers["etag"]).status_code == 304
         assert ask(files, name, if_none_match='"another"').status_code == 200
-    assert ask(files, "style.css").status_code == 200
-    for path in ("nothing.js", "../server/app.js", "components/../../server/app.js"):
+    assert ask(files, "css/base.css").status_code == 200
+    for path in ("nothing.js", "../server/app.js", "js/../../server/app.js"):
         with pytest.raises(HTTPException):
             ask(files, path)
 
@@ -78,7 +78,7 @@ def test_the_page_asks_for_one_stylesheet_in_the_order_of_its_several_and_for_ev
     assert joined.headers["content-type"].startswith("text/css")
     named = re.findall(r'"modulepreload" href="(.*?)"', sent)
     later = {"components/rp-charts.js", "components/rp-report.js", "components/rp-order.js", "components/rp-preview.js"}
-    assert "store.js" in named and "components/rp-queue.js" in named and len(named) == len(set(named))
+    assert "js/state/signals.js" in named and "components/rp-queue.js" in named and len(named) == len(set(named))
     assert not later & set(named), "what is fetched when it is wanted does not hold up what is seen first"
     without = re.sub(r' *<link rel="(stylesheet|modulepreload)".*\n', "", sent)
     assert without == re.sub(r' *<link rel="stylesheet".*\n', "", written), "and nothing else of it is changed"

@@ -77,10 +77,10 @@ def test_one_cookie_opens_every_robot_and_none_opens_without_it(robots, client):
     assert client.get("/").headers["location"] == "/robots/rp1/"
     for name in NAMES:
         page = client.get(f"/robots/{name}/")
-        assert page.status_code == 200 and "app.js" in page.text
+        assert page.status_code == 200 and "js/app.js" in page.text
         assert "unsafe-inline" not in page.headers["content-security-policy"]
         assert "unsafe-inline" in client.get(f"/robots/{name}/viser/").headers["content-security-policy"]
-        assert client.get(f"/robots/{name}/app.js").status_code == 200
+        assert client.get(f"/robots/{name}/js/app.js").status_code == 200
     with robots[0].visitor() as visitor:
         for path in ("api/state", "camera/color.jpg", "viser/", "api/robots"):
             assert visitor.get(f"/robots/rp2/{path}").status_code == 401

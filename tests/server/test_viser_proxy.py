@@ -356,7 +356,7 @@ def test_the_client_waits_for_the_pages_own_file_and_does_without_it_where_it_do
         else:
             route.abort()
 
-    page.route("**/view-behind.js", late)
+    page.route("**/offscreen-framebuffer.js", late)
     page.add_init_script("""new MutationObserver((_, looking) => {
       if (!document.querySelector("#root > *")) return;
       window.beganWith = location.search;

@@ -260,7 +260,7 @@ def _alarms(page: Page, server: PlayedServer) -> None:
 def _asked_for_control(page: Page, server: PlayedServer) -> None:
     working(page, server)
     server.control = held("me", "Ada", requested_by="Bob", requested_key="other")
-    expect(page.locator("rp-control")).to_contain_text("Bob asks for control")
+    expect(page.locator("rp-lease")).to_contain_text("Bob asks for control")
 
 
 def _other_has_control(page: Page, server: PlayedServer) -> None:

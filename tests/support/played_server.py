@@ -22,7 +22,7 @@ POLICY = (
     "frame-src 'self'; base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
 )
 VIEW = (
-    "<!doctype html><html data-view=drawn><title>view</title><script type=module src=/view.js></script>"
+    "<!doctype html><html data-view=drawn><title>view</title><script type=module src=/js/scene/frame.js></script>"
     "<div id=root>3-D view</div><button>in the view</button>"
 )
 STILL = (

@@ -325,7 +325,7 @@ def people(page: Page, robot: LiveRobot) -> None:
         other.goto(link)
         expect(other.locator("#request-control")).to_be_visible(timeout=LONG_MS)
         expect(other.locator(".control-words")).to_contain_text("holds control")
-        expect(page.locator("rp-control")).to_be_visible(timeout=LONG_MS)
+        expect(page.locator("rp-lease")).to_be_visible(timeout=LONG_MS)
         other.click("#request-control")
         expect(page.locator(".control-words")).to_have_text("bob asks for control", timeout=LONG_MS)
         page.click("#grant-control")

@@ -17,14 +17,14 @@ def test_alone_there_is_nothing_to_see_of_it(page: Page, server: PlayedServer) -
     server.control = held("me", "Ada")
     expect(page.locator("#mode")).to_be_visible()
     until(page, lambda: server.number > 5)
-    expect(page.locator("rp-control")).to_be_hidden()
+    expect(page.locator("rp-lease")).to_be_hidden()
     expect(page.locator("rp-robots")).to_be_hidden()
     expect(page.locator("#stop small")).to_have_text("space bar")
 
 
 def test_control_is_taken_from_somebody_only_by_a_second_press(page: Page, server: PlayedServer) -> None:
     server.control = held("other", "Bob")
-    control = page.locator("rp-control")
+    control = page.locator("rp-lease")
     expect(control).to_contain_text("Bob holds control")
     page.locator("#take-control").click()
     expect(page.locator("#take-control")).to_have_text("Really take it?")
@@ -38,7 +38,7 @@ def test_control_is_taken_from_somebody_only_by_a_second_press(page: Page, serve
 
 def test_a_request_is_shown_and_granted_and_who_gave_is_told(page: Page, server: PlayedServer) -> None:
     server.control = held("me", "Ada", requested_by="Bob", requested_key="other")
-    expect(page.locator("rp-control")).to_contain_text("Bob asks for control")
+    expect(page.locator("rp-lease")).to_contain_text("Bob asks for control")
     page.locator("#grant-control").click()
     until(page, lambda: any(path == "/api/control/grant" for path, _ in server.posted))
     server.control = held("other", "Bob", told="Bob holds control, before Ada", told_number=3)
@@ -53,7 +53,7 @@ def test_who_holds_control_is_there_while_the_page_is_busy_but_not_when_it_hangs
         return sum(isinstance(message, Ping) for message in server.said)
 
     server.control = held("other", "Bob")
-    expect(page.locator("rp-control")).to_contain_text("Bob holds control")
+    expect(page.locator("rp-lease")).to_contain_text("Bob holds control")
     assert server.heres == 0
     server.control = held("me", "Ada")
     until(page, lambda: server.heres > 0)

@@ -100,7 +100,7 @@ def test_what_is_accepted_who_comes_and_a_whole_job_move_nothing_on_the_page(
     parts = (
         "#stop",
         "#mode",
-        "rp-controls button",
+        "rp-commands button",
         "main > *",
         ".middle > .panel",
         ".right > *",
@@ -220,9 +220,9 @@ def test_the_log_follows_its_newest_line_when_the_screen_is_turned(page: Page, s
 
 def test_the_page_is_small_and_keeps_to_its_own_files() -> None:
     folder = resource("web/index.html").parent.resolve()
-    scripts = [*folder.glob("*.js"), *folder.glob("components/*.js")]
+    scripts = [*folder.rglob("*.js")]
     sent = {script: as_sent(script.read_text(encoding="utf-8")) for script in scripts}
-    first, waiting = set[Path](), [folder / "app.js"]
+    first, waiting = set[Path](), [folder / "js" / "app.js"]
     while waiting:
         script = waiting.pop()
         if script not in first:
@@ -230,13 +230,13 @@ def test_the_page_is_small_and_keeps_to_its_own_files() -> None:
             imported = re.findall(r'^(?:import|export) [^;]*?"(\.[^"]+)";', sent[script], re.MULTILINE)
             waiting += [(script.parent / name).resolve() for name in imported]
     assert sum(len(sent[script].encode()) for script in first) < 150_000, "what the page fetches before it is used"
-    later = {"rp-charts.js", "charts.js", "rp-report.js", "rp-order.js", "rp-preview.js", "preview.js"}
-    later |= {"rp-robots.js", "kept-history.js", "here-worker.js"}
-    elsewhere = {"sign-in.js", "view.js", "view-behind.js", "view-drawn.js"}
+    later = {"rp-charts.js", "rp-report.js", "rp-order.js", "rp-preview.js", "preview.js"}
+    later |= {"rp-robots.js", "lease-worker.js"}
+    elsewhere = {"sign-in.js", "frame.js", "offscreen-framebuffer.js"}
     assert {script.name for script in set(scripts) - first} - elsewhere == later, "what it fetches when opened"
     # Their indentation is not sent, so that none may lie within a text.
     assert [line for script in sent.values() for line in script.splitlines() if line.count("`") % 2] == []
-    for file in [*scripts, *folder.glob("*.css"), *folder.glob("*.html")]:
+    for file in [*scripts, *folder.rglob("*.css"), *folder.glob("*.html")]:
         text = file.read_text(encoding="utf-8")
         assert len(text.splitlines()) <= 400, file.name
         assert "innerHTML" not in text

@@ -40,7 +40,7 @@ class PlayedHall:
         elif path == "/api/stop":
             self.stops.append(route.request.post_data_json)
             route.fulfill(json={"ok": True, "reason": ""})
-        elif path in ("/view.js", "/view-behind.js", "/view-drawn.js"):
+        elif path.startswith("/js/scene/"):
             route.fulfill(body=resource(f"web{path}").read_bytes(), content_type="text/javascript")
         else:
             route.abort()
@@ -76,7 +76,7 @@ def pages(tab: Page, hall: PlayedHall) -> Iterator[Page]:
 def samples(page: Page) -> list[float]:
     """When the samples of the charts were taken (ms from when this page was loaded)."""
     at: list[float] = page.evaluate(
-        "() => import(`${location.pathname}history.js`).then(({ history }) => "
+        "() => import(`${location.pathname}js/views/history.js`).then(({ history }) => "
         "history.of(history.names[0]).map((sample) => sample.at))"
     )
     return at

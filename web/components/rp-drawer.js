@@ -1,7 +1,30 @@
 // A sheet over the view, with a way back: the queue, the log and the stop stay where they are.
 
-import { drawer } from "../drawer.js";
-import { element, setText } from "../element.js";
+import { drawOn, signal } from "../js/state/signals.js";
+import { element, setText } from "../js/views/dom.js";
+
+/** @typedef {"charts"|"report"} SheetName */
+
+/** What is open now; empty when nothing is. */
+const drawer = signal(/** @type {SheetName|""} */ (""));
+
+/**
+ * A button that opens a sheet and closes it again.
+ *
+ * @param {SheetName} sheet
+ * @param {string} words
+ */
+export function drawerButton(sheet, words) {
+  const button = element("button", {
+    class: "quiet opens",
+    text: words,
+    attributes: { type: "button", "aria-controls": "drawer" },
+    data: { opens: sheet },
+    onclick: () => drawer.set(drawer.get() === sheet ? "" : sheet),
+  });
+  drawOn([drawer], () => button.setAttribute("aria-expanded", String(drawer.get() === sheet)));
+  return button;
+}
 
 /** @typedef {HTMLElement & { tools: Node[], open: (open: boolean) => void }} Sheet */
 

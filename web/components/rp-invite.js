@@ -1,11 +1,11 @@
 // A supervisor makes a single-use sign-in link for somebody else, or for a script.
 
-import { post } from "../api.js";
-import { element, setText } from "../element.js";
-import { link as serverLink, pageState } from "../state.js";
-import { drawOn } from "../store.js";
+import { post } from "../js/link/api.js";
+import { link as serverLink, pageState } from "../js/state/page-state.js";
+import { drawOn } from "../js/state/signals.js";
+import { element, setText } from "../js/views/dom.js";
 
-/** @type {readonly (readonly [role: import("../messages.js").Role, may: string])[]} */
+/** @type {readonly (readonly [role: import("../js/link/messages.js").Role, may: string])[]} */
 const ROLES = Object.freeze([
   ["viewer", "looks, and may stop the robot"],
   ["operator", "moves the robot"],

@@ -1,14 +1,14 @@
 // What happened, and why something was refused; by severity, by process, and by words.
 
-import { drawerButton } from "../drawer.js";
-import { element, setText } from "../element.js";
-import { icon } from "../icons.js";
-import { PROCESSES } from "../messages.js";
-import { log } from "../state.js";
-import { drawOn } from "../store.js";
-import { clockWords, inWords } from "../words.js";
+import { PROCESSES } from "../js/link/messages.js";
+import { clockWords, inWords } from "../js/state/format.js";
+import { log } from "../js/state/page-state.js";
+import { drawOn } from "../js/state/signals.js";
+import { element, setText } from "../js/views/dom.js";
+import { icon } from "../js/views/icons.js";
+import { drawerButton } from "./rp-drawer.js";
 
-/** @typedef {import("../messages.js").PageEvent} PageEvent */
+/** @typedef {import("../js/link/messages.js").PageEvent} PageEvent */
 
 const LEAST = Object.freeze([
   ["info", "Everything"],

@@ -1,13 +1,13 @@
 // The order of work, to be changed by dragging or by keys. Only rows in view are there, so that thousands cost nothing.
 
-import { element, setAttribute, setEnabled, setText } from "../element.js";
-import { moveTo, orderWords, plannersOrder, whyNoMove, whyNoPlannersOrder, workOrder } from "../order.js";
-import { brought, link, now, pageState, points, selected } from "../state.js";
-import { drawOn } from "../store.js";
-import { bring, select } from "../teleoperation.js";
-import { inWords } from "../words.js";
+import { moveTo, orderWords, plannersOrder, whyNoMove, whyNoPlannersOrder, workOrder } from "../js/control/order.js";
+import { bring, select } from "../js/control/selection.js";
+import { inWords } from "../js/state/format.js";
+import { brought, link, now, pageState, points, selected } from "../js/state/page-state.js";
+import { drawOn } from "../js/state/signals.js";
+import { element, setAttribute, setEnabled, setText } from "../js/views/dom.js";
 
-/** @typedef {import("../messages.js").PagePoint} PagePoint */
+/** @typedef {import("../js/link/messages.js").PagePoint} PagePoint */
 
 /** Height of a row (px), as in order.css. */
 const ROW = 44;

@@ -1,12 +1,12 @@
 // What is known of the chosen point: the picture it was found in, and the figures behind the cut.
 
-import { move, whyNotMove } from "../decisions.js";
-import { element, setEnabled, setText } from "../element.js";
-import { turnApproach, whyNotTurn } from "../order.js";
-import { newtons, uncertainty } from "../words.js";
+import { move, whyNotMove } from "../js/control/decisions.js";
+import { element, setEnabled, setText } from "../js/views/dom.js";
+import { turnApproach, whyNotTurn } from "../js/control/order.js";
+import { newtons, uncertainty } from "../js/state/format.js";
 
-/** @typedef {import("../messages.js").PagePoint} PagePoint */
-/** @typedef {import("../messages.js").PruningPoint} PruningPoint */
+/** @typedef {import("../js/link/messages.js").PagePoint} PagePoint */
+/** @typedef {import("../js/link/messages.js").PruningPoint} PruningPoint */
 
 /** A picture that has not come yet is asked for again after so long (ms), so many times. */
 const AGAIN_MS = 1500;

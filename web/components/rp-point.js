@@ -1,12 +1,76 @@
 // One row of the queue: a pruning point, why it is where it is, and what may be done with it.
 
-import { accept, isUnknown, isUnsure, reject, whyNotAccept, whyNotReject } from "../decisions.js";
-import { element, setEnabled, setText } from "../element.js";
-import { icon, setIcon } from "../icons.js";
-import { bring, select } from "../teleoperation.js";
-import { POINT_WORDS, counted, inWords } from "../words.js";
+import { accept, isUnknown, isUnsure, reject, whyNotAccept, whyNotReject } from "../js/control/decisions.js";
+import { bring, select } from "../js/control/selection.js";
+import { TEXT_MAX_LENGTH } from "../js/link/messages.js";
+import { POINT_WORDS, counted, inWords } from "../js/state/format.js";
+import { element, setEnabled, setText } from "../js/views/dom.js";
+import { icon, setIcon } from "../js/views/icons.js";
 
-/** @typedef {import("../messages.js").PagePoint} PagePoint */
+const USUAL = Object.freeze(["wrong cane", "wrong place", "too near a wire", "leave it"]);
+
+export class RpReason extends HTMLElement {
+  constructor() {
+    super();
+    /** @type {PagePoint|null} */
+    this.row = null;
+    this.input = element("input", {
+      id: "reject-reason",
+      attributes: { placeholder: "Why? (may stay empty)", maxlength: String(TEXT_MAX_LENGTH), "aria-label": "Why it is rejected" },
+    });
+  }
+
+  connectedCallback() {
+    if (this.childElementCount > 0) return;
+    const send = element("button", { id: "reject-send", text: "Reject", attributes: { type: "submit" } });
+    const form = element("form", {}, this.input, send);
+    form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.send(this.input.value.trim());
+    });
+    const usual = element("div", { class: "usual" });
+    for (const words of USUAL) {
+      usual.append(element("button", { class: "quiet", text: words, attributes: { type: "button" }, onclick: () => this.send(words) }));
+    }
+    this.append(form, usual);
+    this.addEventListener("keydown", (event) => {
+      // The queue's own keys mean letters here.
+      event.stopPropagation();
+      if (event.key !== "Escape") return;
+      event.preventDefault();
+      this.close();
+    });
+  }
+
+  /**
+   * @param {PagePoint} row
+   * @param {HTMLElement} item Its row.
+   */
+  open(row, item) {
+    this.row = row;
+    this.input.value = "";
+    item.append(this);
+    this.input.focus();
+    this.scrollIntoView({ block: "nearest" });
+  }
+
+  close() {
+    const item = this.parentElement;
+    this.row = null;
+    this.remove();
+    item?.focus();
+  }
+
+  /** @param {string} reason */
+  send(reason) {
+    const row = this.row;
+    this.close();
+    if (row) void reject(row, reason);
+  }
+}
+customElements.define("rp-reason", RpReason);
+
+/** @typedef {import("../js/link/messages.js").PagePoint} PagePoint */
 /** @param {PagePoint} row */
 function planWords({ plan }) {
   if (!plan?.order) return "";

@@ -1,15 +1,14 @@
 // What the robot would do now, played as a ghost in the 3-D view, and a person's word that it may.
 
-import { element, setEnabled, setText } from "../element.js";
-import { workOrder } from "../order.js";
-import { approve, askPreview, cutAt, hide, isThere, moment, play, playing, require, show, whyNoApproval, whyNoPreview } from "../preview.js";
-import { preview } from "../preview-state.js";
-import { link, now, pageState, points, selected } from "../state.js";
-import { drawOn } from "../store.js";
-import { whyNot } from "../allowed.js";
-import { inWords } from "../words.js";
+import { whyNot } from "../js/control/allowed.js";
+import { workOrder } from "../js/control/order.js";
+import { approve, askPreview, cutAt, hide, isThere, moment, play, playing, require, show, whyNoApproval, whyNoPreview } from "../js/control/preview.js";
+import { inWords } from "../js/state/format.js";
+import { link, now, pageState, points, preview, selected } from "../js/state/page-state.js";
+import { drawOn } from "../js/state/signals.js";
+import { element, setEnabled, setText } from "../js/views/dom.js";
 
-/** @typedef {import("../messages.js").PreviewState} PreviewState */
+/** @typedef {import("../js/link/messages.js").PreviewState} PreviewState */
 
 /** Steps of the scrubber (s). */
 const STEP = 0.05;
@@ -91,7 +90,7 @@ function wordsOf(state, at) {
   return `${approved}${done}${left} ${done === 1 ? "cut" : "cuts"} in ${state.duration_s.toFixed(1)} s · ${least(state.cuts)}`;
 }
 
-/** @param {readonly import("../messages.js").PreviewedCut[]} cuts */
+/** @param {readonly import("../js/link/messages.js").PreviewedCut[]} cuts */
 function least(cuts) {
   const nearest = cuts.reduce((a, b) => (b.clearance < a.clearance ? b : a), cuts[0] ?? { clearance: 0, between: ["", ""] });
   const omega = Math.min(...cuts.map((cut) => cut.manipulability));

@@ -1,21 +1,20 @@
 // The queue of pruning points, by vine and spur; arrows, A, R, Z and N work from the keyboard.
 
-import { countOf, whyNot } from "../allowed.js";
-import { placing, setPlacing, whyNoPlacing } from "../by-hand.js";
-import { accept, acceptAll, decisions, sureOnes, undo, whyNoUndo, whyNotAccept, whyNotReject } from "../decisions.js";
-import { element, panelHead, setAttribute, setEnabled, setText } from "../element.js";
-import { icon } from "../icons.js";
-import { SURE } from "../messages.js";
-import { guardLookAgain, placeItem, placeWords } from "../look-again.js";
-import { brought, link, now, pageState, points, selected, staleWords } from "../state.js";
-import { drawOn } from "../store.js";
-import { select } from "../teleoperation.js";
-import { counted } from "../words.js";
+import { countOf, whyNot } from "../js/control/allowed.js";
+import { accept, acceptAll, decisions, sureOnes, undo, whyNoUndo, whyNotAccept, whyNotReject } from "../js/control/decisions.js";
+import { placing, setPlacing, whyNoPlacing } from "../js/control/placing.js";
+import { select } from "../js/control/selection.js";
+import { SURE } from "../js/link/messages.js";
+import { counted } from "../js/state/format.js";
+import { brought, link, now, pageState, points, selected, staleWords } from "../js/state/page-state.js";
+import { drawOn } from "../js/state/signals.js";
+import { element, panelHead, setAttribute, setEnabled, setText } from "../js/views/dom.js";
+import { icon } from "../js/views/icons.js";
+import { guardLookAgain, placeItem, placeWords } from "../js/views/look-again.js";
 import { RpPointDetails } from "./rp-point-details.js";
-import { RpPoint } from "./rp-point.js";
-import { RpReason } from "./rp-reason.js";
+import { RpPoint, RpReason } from "./rp-point.js";
 
-/** @typedef {import("../messages.js").PagePoint} PagePoint */
+/** @typedef {import("../js/link/messages.js").PagePoint} PagePoint */
 
 /** What a row's buttons depend on. */
 const MAY = Object.freeze(["AcceptPoint", "RejectPoint", "ResolvePoint"]);
@@ -53,7 +52,7 @@ class RpQueue extends HTMLElement {
     /** @type {Map<string, HTMLElement>} */
     const groups = new Map();
     let drawn = "";
-    /** @type {import("../messages.js").PagePoints|null} */
+    /** @type {import("../js/link/messages.js").PagePoints|null} */
     let drawnPage = null;
     drawOn([points, pageState, link, now], () => {
       const page = points.get();
@@ -264,7 +263,7 @@ function addByHand() {
 /**
  * The places without a point that need one thing.
  *
- * @param {import("../messages.js").Need} needs
+ * @param {import("../js/link/messages.js").Need} needs
  * @param {(count: number) => string} title
  */
 function abstainedList(needs, title) {
@@ -275,7 +274,7 @@ function abstainedList(needs, title) {
   let shown = "";
   return {
     box,
-    /** @param {readonly import("../messages.js").Abstention[]} all */
+    /** @param {readonly import("../js/link/messages.js").Abstention[]} all */
     show(all) {
       const places = all.filter((each) => each.needs === needs);
       const lines = places.map(placeWords);

@@ -1,9 +1,9 @@
 // The session's report: cuts by outcome, the time they took, by vine, what was refused, and who held control.
 
-import { element, setText } from "../element.js";
-import { POINT_WORDS, clockWords, inWords } from "../words.js";
+import { element, setText } from "../js/views/dom.js";
+import { POINT_WORDS, clockWords, inWords } from "../js/state/format.js";
 
-/** @typedef {import("../messages.js").SessionReport} SessionReport */
+/** @typedef {import("../js/link/messages.js").SessionReport} SessionReport */
 
 /** While it is open the report is asked for again after so long (ms); the controller says it every 5 s. */
 const AGAIN_MS = 5000;

@@ -1,13 +1,49 @@
 // Which robot this page shows, and how the others are. Another robot is another page, loaded whole: nothing of one robot
 // can stay on the page of another, and no press can reach the wrong one.
 
-import { fetchJson } from "../api.js";
-import { element, setText } from "../element.js";
-import { setIcon } from "../icons.js";
-import { keepHistoryOver } from "../kept-history.js";
-import { showToast } from "../state.js";
-import { hold } from "../teleoperation.js";
-import { MODE_WORDS, inWords } from "../words.js";
+import { hold } from "../js/control/teleoperation.js";
+import { fetchJson } from "../js/link/api.js";
+import { MODE_WORDS, inWords } from "../js/state/format.js";
+import { showToast } from "../js/state/page-state.js";
+import { element, setText } from "../js/views/dom.js";
+import { SPAN_MS, history } from "../js/views/history.js";
+import { setIcon } from "../js/views/icons.js";
+
+const KEY = `history of ${location.pathname}`;
+
+/** When samples were taken (ms since 1970), and what was read: one row a name, null where it was unknown. @typedef {{ at: number[], rows: (number|null)[][] }} Kept */
+
+function keepHistoryOver() {
+  takeBack();
+  window.addEventListener("pagehide", () => sessionStorage.setItem(KEY, JSON.stringify(kept())));
+}
+
+/** @returns {Kept} */
+function kept() {
+  const rows = history.names.map((name) => history.of(name));
+  const short = (/** @type {number} */ value) => (Number.isNaN(value) ? null : Number(value.toPrecision(5)));
+  return {
+    at: (rows[0] ?? []).map((sample) => Math.round(sample.at + performance.timeOrigin)),
+    rows: rows.map((samples) => samples.map((sample) => short(sample.value))),
+  };
+}
+
+function takeBack() {
+  const text = sessionStorage.getItem(KEY);
+  if (text === null) return;
+  /** @type {Kept} */
+  const { at, rows } = JSON.parse(text);
+  // Another version of this page may have kept other readings.
+  if (rows.length !== history.names.length) return;
+  const since = history.copy();
+  history.count = 0;
+  at.forEach((wall, index) => {
+    const sampled = wall - performance.timeOrigin;
+    if (performance.now() - sampled < SPAN_MS) history.take(sampled, rows.map((row) => row[index] ?? null));
+  });
+  const fresh = since.names.map((name) => since.of(name));
+  fresh[0]?.forEach((sample, index) => history.take(sample.at, fresh.map((samples) => samples[index]?.value ?? null)));
+}
 
 /**
  * A robot as `GET /api/robots` tells it.
@@ -15,7 +51,7 @@ import { MODE_WORDS, inWords } from "../words.js";
  * @typedef {object} Glance
  * @property {string} name
  * @property {string} path
- * @property {import("../messages.js").Mode|null} mode
+ * @property {import("../js/link/messages.js").Mode|null} mode
  * @property {""|"warning"|"error"} severity
  * @property {string} alarm
  * @property {string} holder

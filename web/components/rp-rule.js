@@ -1,12 +1,38 @@
 // The pruning rule. A slider only asks what another one would change; applied, it holds, and Undo takes it back.
 
-import { whyNothing } from "../allowed.js";
-import { element, setEnabled, setText } from "../element.js";
-import { isLive, link, now, pageState, points } from "../state.js";
-import { drawOn } from "../store.js";
-import { applyRule, ruleWords, tryRule } from "../what-if.js";
+import { whyNothing } from "../js/control/allowed.js";
+import { remember } from "../js/control/decisions.js";
+import { ask, post } from "../js/link/api.js";
+import { isLive, link, now, pageState, points } from "../js/state/page-state.js";
+import { drawOn } from "../js/state/signals.js";
+import { element, setEnabled, setText } from "../js/views/dom.js";
 
-/** @typedef {import("../messages.js").PruningRule} PruningRule */
+/**
+ * What a rule would change, in words; or why nobody knows.
+ *
+ * @param {PruningRule} rule
+ */
+function tryRule(rule) {
+  return post("api/rule/what-if", rule);
+}
+
+/** @param {PruningRule} rule */
+async function applyRule(rule) {
+  const done = await ask("The rule", "api/rule", rule);
+  // Taken back while it is still in force, or refused: somebody else's rule is not undone from here.
+  if (done) remember(`the rule ${ruleWords(rule)}`, () => ask("Taking the rule back", "api/rule/undo", rule));
+  return done;
+}
+
+/** @param {PruningRule} rule */
+function ruleWords(rule) {
+  const nodes = rule.system === "guyot" ? `${rule.nodes_kept} + ${rule.fruiting_nodes}` : `${rule.nodes_kept}`;
+  const word = rule.system === "guyot" ? "Guyot" : "Spur";
+  const thick = Number((1000 * rule.keeper_diameter).toFixed(1));
+  return `${word} · ${nodes} nodes · ≥ ${thick} mm · ${Math.round(1000 * rule.offset)} mm past`;
+}
+
+/** @typedef {import("../js/link/messages.js").PruningRule} PruningRule */
 /** @typedef {"nodes_kept"|"fruiting_nodes"|"keeper_diameter"|"offset"} Quantity */
 
 /** A dragged slider asks when it has rested for so long (ms); points that change meanwhile, after so long. */
@@ -48,7 +74,7 @@ class RpRule extends HTMLElement {
     this.known = false;
     this.asking = false;
     this.timer = 0;
-    /** @type {import("../messages.js").PagePoints|null} */
+    /** @type {import("../js/link/messages.js").PagePoints|null} */
     this.page = null;
   }
 

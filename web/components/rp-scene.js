@@ -1,11 +1,11 @@
 // The 3-D view, in a frame of the same origin. Its keys and drags are watched, because they do not reach this page.
 
-import { listenForDriveKeys } from "../driving.js";
-import { element } from "../element.js";
-import { listenForViewKeys } from "../looking.js";
-import { link } from "../state.js";
-import { listenForSpace } from "../stop.js";
-import { listenForDrag, listenForHoldKey } from "../teleoperation.js";
+import { listenForDriveKeys } from "../js/control/driving.js";
+import { element } from "../js/views/dom.js";
+import { listenForViewKeys } from "../js/control/view-tools.js";
+import { link } from "../js/state/page-state.js";
+import { listenForSpace } from "../js/control/stop.js";
+import { listenForDrag, listenForHoldKey } from "../js/control/teleoperation.js";
 
 /** Below this width (px) the 3-D client lays its own panel over the view, as on a telephone. */
 const LEAST_WIDTH = 600;

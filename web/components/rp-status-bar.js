@@ -1,12 +1,12 @@
 // Who is signed in, which process is there, and how good the link is.
 
-import { post } from "../api.js";
-import { element, setText } from "../element.js";
-import { icon, setIcon } from "../icons.js";
-import { PROCESSES } from "../messages.js";
-import { isLive, isOpening, link, now, pageState, processAge, roundTrip, say, stateAge } from "../state.js";
-import { drawOn } from "../store.js";
-import { ageWords } from "../words.js";
+import { post } from "../js/link/api.js";
+import { element, setText } from "../js/views/dom.js";
+import { icon, setIcon } from "../js/views/icons.js";
+import { PROCESSES } from "../js/link/messages.js";
+import { isLive, isOpening, link, now, pageState, processAge, roundTrip, say, stateAge } from "../js/state/page-state.js";
+import { drawOn } from "../js/state/signals.js";
+import { ageWords } from "../js/state/format.js";
 
 class RpStatusBar extends HTMLElement {
   connectedCallback() {
@@ -17,7 +17,7 @@ class RpStatusBar extends HTMLElement {
         element("img", { attributes: { src: "icon.svg", alt: "" } }),
         element("span", { class: "product-name", text: "Rolling Panda" }),
       ),
-      document.createElement("rp-control"),
+      document.createElement("rp-lease"),
       this.presence(),
       this.linkChip(),
       this.person(),

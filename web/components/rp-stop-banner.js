@@ -1,14 +1,13 @@
 // After a stop: who pressed it and why, who has latched it, and the way out with a reason.
 
-import { whyNot } from "../allowed.js";
-import { ask } from "../api.js";
-import { element, setEnabled, setText } from "../element.js";
-import { icon, setIcon } from "../icons.js";
-import { TEXT_MAX_LENGTH } from "../messages.js";
-import { isLive, link, now, pageState, staleWords } from "../state.js";
-import { drawOn } from "../store.js";
-import { stopProgress } from "../stop.js";
-import { buttonPressed, earlierWords, sinceWords } from "../stops.js";
+import { whyNot } from "../js/control/allowed.js";
+import { buttonPressed, earlierWords, sinceWords, stopProgress } from "../js/control/stop.js";
+import { ask } from "../js/link/api.js";
+import { TEXT_MAX_LENGTH } from "../js/link/messages.js";
+import { isLive, link, now, pageState, staleWords } from "../js/state/page-state.js";
+import { drawOn } from "../js/state/signals.js";
+import { element, setEnabled, setText } from "../js/views/dom.js";
+import { icon, setIcon } from "../js/views/icons.js";
 
 class RpStopBanner extends HTMLElement {
   connectedCallback() {

@@ -1,11 +1,11 @@
 // The software stop: always there, always on top, pressed with a finger, the mouse or the space bar.
 
-import { element, setText } from "../element.js";
-import { icon } from "../icons.js";
-import { drawOn } from "../store.js";
-import { several, stopProgress, stopRobot } from "../stop.js";
+import { element, setText } from "../js/views/dom.js";
+import { icon } from "../js/views/icons.js";
+import { drawOn } from "../js/state/signals.js";
+import { several, stopProgress, stopRobot } from "../js/control/stop.js";
 
-/** @type {Readonly<Record<import("../stop.js").StopProgress, string>>} */
+/** @type {Readonly<Record<import("../js/control/stop.js").StopProgress, string>>} */
 const WORDS = Object.freeze({
   idle: "Software stop",
   sending: "Stopping…",

@@ -1,15 +1,133 @@
 // Moving the robot by hand: the switch, what is moved, how fast, and what is in the way.
 
-import { whyNoTeleoperation } from "../allowed.js";
-import { element, setEnabled, setText } from "../element.js";
-import { holdButton } from "../hold-button.js";
-import { icon } from "../icons.js";
-import { link, now, pageState } from "../state.js";
-import { drawOn } from "../store.js";
-import { axes, hold, moving, setTeleoperating, showAxes, showMoving, teleoperating } from "../teleoperation.js";
-import { nearWords } from "../words.js";
-import "./rp-drive-pad.js";
-import "./rp-joints.js";
+import { whyNoTeleoperation } from "../js/control/allowed.js";
+import { drive, gamepad, whyNoDriving } from "../js/control/driving.js";
+import { axes, hold, moving, setTeleoperating, showAxes, showMoving, teleoperating } from "../js/control/teleoperation.js";
+import { fetchJson } from "../js/link/api.js";
+import { nearWords } from "../js/state/format.js";
+import { link, now, pageState, showToast } from "../js/state/page-state.js";
+import { drawOn } from "../js/state/signals.js";
+import { element, setEnabled, setText } from "../js/views/dom.js";
+import { holdButton } from "../js/views/hold-button.js";
+import { icon } from "../js/views/icons.js";
+
+/** At the whole of the usual speed (rad/s). */
+const SPEED = 0.35;
+/** Nearer to a limit than this (rad) is told. */
+const NEAR_LIMIT = 0.15;
+/** θ_l and θ_r come before the arm's joints. */
+const WHEELS = 2;
+const DEGREE = 180 / Math.PI;
+
+class RpJoints extends HTMLElement {
+  connectedCallback() {
+    const limits = fetchJson("api/robot").then((robot) => /** @type {[number, number][]} */ (robot?.arm_limits ?? []));
+    for (let joint = 0; joint < 7; joint++) {
+      const turn = (/** @type {1|-1} */ way) => {
+        const word = way > 0 ? "up" : "down";
+        const button = element("button", {
+          text: way > 0 ? "+" : "−",
+          attributes: { type: "button", "aria-label": `Joint ${joint + 1} ${word}` },
+          data: { joint: String(joint + 1), way: word },
+        });
+        const joints = /** @type {import("../js/link/messages.js").ArmVelocities} */ (
+          Array.from({ length: 7 }, (_, each) => (each === joint ? way * SPEED : 0))
+        );
+        holdButton(button, () => hold.press("joint", () => ({ joints })), () => hold.release("joint"));
+        return button;
+      };
+      const [up, down] = [turn(1), turn(-1)];
+      const needle = element("span", { class: "needle" });
+      const unknown = `Joint ${joint + 1}: where it is between its limits is not known yet`;
+      const scale = element("div", { class: "scale", attributes: { role: "img", "aria-label": unknown } }, needle);
+      const angle = element("span", { class: "number" });
+      this.append(element("div", { class: "joint" }, up, scale, down, angle));
+      /** @type {[number, number]|null} */
+      let range = null;
+      void limits.then((all) => {
+        range = all[joint] ?? null;
+      });
+      drawOn([moving, teleoperating, pageState, link, now], () => {
+        if (this.hidden) return;
+        const why = hold.whyNot();
+        const at = pageState.get()?.joints?.position[WHEELS + joint] ?? null;
+        const [low, high] = range ?? [0, 0];
+        const left = at === null || !range ? Infinity : Math.min(at - low, high - at);
+        setEnabled(up, why, `Turn joint ${joint + 1} up while held`);
+        setEnabled(down, why, `Turn joint ${joint + 1} down while held`);
+        scale.classList.toggle("near", left < NEAR_LIMIT);
+        setText(angle, at === null ? "–" : `${(at * DEGREE).toFixed(0)}°`);
+        if (at === null || !range) return;
+        needle.style.bottom = `${(100 * (at - low)) / (high - low)}%`;
+        const ends = `${(low * DEGREE).toFixed(0)}° to ${(high * DEGREE).toFixed(0)}°`;
+        scale.ariaLabel = `Joint ${joint + 1}: ${(at * DEGREE).toFixed(0)}° of ${ends}`;
+        scale.title = `${ends}${left < NEAR_LIMIT ? `: ${(left * DEGREE).toFixed(0)}° to its limit` : ""}`;
+      });
+    }
+  }
+}
+customElements.define("rp-joints", RpJoints);
+
+class RpDrivePad extends HTMLElement {
+  connectedCallback() {
+    const knob = element("span", { class: "knob" });
+    const label = "Drive the base: ahead, back and around. W A S D and the arrow keys do the same.";
+    const pad = element("div", { id: "drive-pad", attributes: { role: "img", "aria-label": label } }, knob);
+    const words = element("p", { class: "hint" });
+    this.append(pad, words);
+    /** @type {number|null} */
+    let finger = null;
+    const way = { ahead: 0, left: 0 };
+
+    const end = () => {
+      finger = null;
+      way.ahead = way.left = 0;
+      knob.style.removeProperty("translate");
+      hold.release("pad");
+    };
+    const follow = (/** @type {PointerEvent} */ event) => {
+      const box = pad.getBoundingClientRect();
+      const reach = box.width / 2;
+      const x = event.clientX - box.left - reach;
+      const y = event.clientY - box.top - reach;
+      const shorten = Math.min(1, reach / Math.max(Math.hypot(x, y), 1));
+      way.left = (-x * shorten) / reach;
+      way.ahead = (-y * shorten) / reach;
+      knob.style.translate = `${x * shorten * 0.6}px ${y * shorten * 0.6}px`;
+    };
+    pad.addEventListener("pointerdown", (event) => {
+      if (event.button !== 0 || finger !== null) return;
+      const why = drive("pad", () => way);
+      if (why) {
+        showToast("warning", why);
+        return;
+      }
+      finger = event.pointerId;
+      pad.setPointerCapture(finger);
+      follow(event);
+    });
+    pad.addEventListener("pointermove", (event) => event.pointerId === finger && follow(event));
+    for (const name of ["pointerup", "pointercancel", "lostpointercapture"]) {
+      pad.addEventListener(name, (event) => /** @type {PointerEvent} */ (event).pointerId === finger && end());
+    }
+    pad.addEventListener("contextmenu", (event) => event.preventDefault());
+    document.addEventListener(
+      "pointerdown",
+      (event) => finger !== null && event.pointerId !== finger && end(),
+      { capture: true },
+    );
+    hold.holding.subscribe((holding) => !holding && finger !== null && end());
+
+    drawOn([moving, teleoperating, gamepad, pageState, link, now], () => {
+      const why = whyNoDriving();
+      pad.title = why || label;
+      pad.classList.toggle("greyed", why !== "");
+      const held = gamepad.get() ? "Gamepad: hold a trigger and steer with the left stick." : "A gamepad works too.";
+      setText(words, `Drag in the pad, or hold W A S D or the arrow keys. ${held}`);
+    });
+  }
+}
+customElements.define("rp-drive-pad", RpDrivePad);
 
 /** Nearer than this (m) is worth a warning. */
 const NEAR = 0.03;
@@ -86,7 +204,7 @@ class RpTeleoperation extends HTMLElement {
  *
  * @template {string} T
  * @param {string} label
- * @param {import("../store.js").Signal<T>} chosen
+ * @param {import("../js/state/signals.js").Signal<T>} chosen
  * @param {(value: T) => void} choose
  * @param {readonly (readonly [T, string, string])[]} values Each with its word and what it does.
  */
@@ -103,7 +221,7 @@ function choice(label, chosen, choose, values) {
 /**
  * @param {string} why
  * @param {boolean} holding
- * @param {import("../teleoperation.js").Part} part
+ * @param {import("../js/control/teleoperation.js").Part} part
  * @param {string} near
  */
 function explanation(why, holding, part, near) {

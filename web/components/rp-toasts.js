@@ -1,10 +1,10 @@
 // Short notices above the log. They are in the log as well.
 
-import { element } from "../element.js";
-import { icon } from "../icons.js";
-import { dismissToast, toasts } from "../state.js";
-import { drawOn } from "../store.js";
-import { inWords } from "../words.js";
+import { element } from "../js/views/dom.js";
+import { icon } from "../js/views/icons.js";
+import { dismissToast, toasts } from "../js/state/page-state.js";
+import { drawOn } from "../js/state/signals.js";
+import { inWords } from "../js/state/format.js";
 
 class RpToasts extends HTMLElement {
   connectedCallback() {

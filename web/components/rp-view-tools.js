@@ -1,10 +1,23 @@
-// Over the 3-D view: where its camera stands, what it shows, and a measure.
+// Over the 3-D view: where its camera stands, what it shows, a measure, and what to do while clicks place points.
 
-import { placing } from "../by-hand.js";
-import { element, setEnabled, setText } from "../element.js";
-import { LAYERS, PRESETS, layers, measured, measuring, placeCamera, setMeasuring, showLayer } from "../looking.js";
-import { link, now, pageState } from "../state.js";
-import { drawOn } from "../store.js";
+import { placing, setPlacing } from "../js/control/placing.js";
+import { LAYERS, PRESETS, layers, measured, measuring, placeCamera, setMeasuring, showLayer } from "../js/control/view-tools.js";
+import { link, now, pageState } from "../js/state/page-state.js";
+import { drawOn } from "../js/state/signals.js";
+import { element, setEnabled, setText } from "../js/views/dom.js";
+
+class RpPlacing extends HTMLElement {
+  connectedCallback() {
+    const done = element("button", { id: "placing-done", text: "Done", attributes: { type: "button", "aria-keyshortcuts": "Escape" } });
+    done.addEventListener("click", () => setPlacing(false));
+    this.append(element("p", { text: "Click a cane that has been seen: a blue line here, or a cane in the camera image.", attributes: { role: "status" } }), done);
+    drawOn([placing], () => {
+      this.hidden = !placing.get();
+      document.body.classList.toggle("placing", placing.get());
+    });
+  }
+}
+customElements.define("rp-placing", RpPlacing);
 
 class RpViewTools extends HTMLElement {
   connectedCallback() {

@@ -1,0 +1,91 @@
+// Who holds control of the robot's motion, and how it changes hands. Out of the way while there is nobody else.
+
+import { holder } from "../js/control/lease.js";
+import { ask } from "../js/link/api.js";
+import { pageState, showToast } from "../js/state/page-state.js";
+import { drawOn } from "../js/state/signals.js";
+import { element, setEnabled, setText } from "../js/views/dom.js";
+
+/** How long a second press confirms that control is to be taken from somebody (ms). */
+const CONFIRM_MS = 4000;
+
+class RpLease extends HTMLElement {
+  give = button("grant-control", () => void ask("Granting control", "api/control/grant"));
+  request = button("request-control", () => void ask("Asking for control", "api/control/request"));
+  take = button("take-control", () => this.taken());
+  /** Until when the second press counts (ms). */
+  armed = 0;
+  /** @type {number | null} */
+  told = null;
+  mine = false;
+
+  connectedCallback() {
+    this.setAttribute("role", "group");
+    this.setAttribute("aria-label", "Control of the robot");
+    const words = element("span", { class: "control-words", attributes: { role: "status" } });
+    this.append(words, this.give, this.request, this.take);
+    drawOn([pageState], () => this.draw(words));
+  }
+
+  /** @param {HTMLElement} words */
+  draw(words) {
+    const state = pageState.get();
+    const control = state?.control ?? null;
+    const operates = state !== null && state.role !== "viewer";
+    const { held, mine, user } = holder();
+    const asked = control?.requested_by ?? "";
+    const mineAsked = asked !== "" && control?.requested_key === state?.client;
+    const coming = control?.coming ?? "";
+    this.hidden = control === null || !((held && !mine) || asked || coming || (state?.viewers ?? 0) > 1);
+    const who = mine ? "You hold control" : held ? `${user} holds control` : "Nobody holds control";
+    setText(words, coming ? `Control goes to ${coming}` : mine && asked ? `${asked} asks for control` : who);
+    words.title = words.textContent ?? "";
+    this.give.hidden = !(mine && asked !== "" && !coming);
+    setText(this.give, `Give to ${asked}`);
+    this.give.title = `${asked} moves the robot then; it stops first`;
+    this.request.hidden = !(operates && held && !mine && !coming);
+    setText(this.request, mineAsked ? "Asked" : "Ask");
+    const waits = mineAsked ? `You have asked: ${user} can give it to you` : asked && `${asked} has asked already`;
+    setEnabled(this.request, waits, `Ask ${user} for control; nothing stops meanwhile`);
+    this.take.hidden = !operates || mine || coming !== "";
+    const sure = performance.now() < this.armed;
+    setText(this.take, !held ? "Take control" : sure ? "Really take it?" : "Take");
+    this.take.title = held ? `Takes control from ${user}: the robot stops first, and they are told` : "";
+    this.tell(mine, control?.told_number ?? 0, control?.told ?? "");
+  }
+
+  /** The first press on somebody else's control asks whether it is meant. */
+  taken() {
+    const { held } = holder();
+    if (held && performance.now() >= this.armed) {
+      this.armed = performance.now() + CONFIRM_MS;
+      setText(this.take, "Really take it?");
+      return;
+    }
+    this.armed = 0;
+    void ask("Taking control", "api/control/take", { confirm: held });
+  }
+
+  /**
+   * Who had control is told when they have it no longer.
+   *
+   * @param {boolean} mine
+   * @param {number} number
+   * @param {string} told
+   */
+  tell(mine, number, told) {
+    if (this.told !== null && number !== this.told && this.mine && !mine) showToast("warning", `You no longer hold control: ${told}`);
+    this.told = number;
+    this.mine = mine;
+  }
+}
+
+/**
+ * @param {string} id
+ * @param {() => void} press
+ */
+function button(id, press) {
+  return element("button", { id, attributes: { type: "button" }, onclick: press });
+}
+
+customElements.define("rp-lease", RpLease);

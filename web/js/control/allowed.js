@@ -1,0 +1,93 @@
+// What the operator may ask for now, and why not.
+
+import { INTENTS, OF_HOLDER } from "../link/messages.js";
+import { MODE_WORDS } from "../state/format.js";
+import { isLive, link, pageState, points, preview, staleWords } from "../state/page-state.js";
+import { holder } from "./lease.js";
+
+/** Where each request belongs, in words. @type {Readonly<Record<string, string>>} */
+const NEEDS = Object.freeze({
+  Arm: "Arming starts from Idle",
+  Start: "Starting needs Ready",
+  Survey: "A survey needs Ready",
+  Pause: "There is nothing to pause",
+  Resume: "Resuming needs Paused",
+  Home: "Going home needs Ready",
+  Acknowledge: "There is nothing to acknowledge",
+  Reset: "There is no stop to reset",
+  AcceptPoint: "Points cannot be accepted",
+  AcceptAll: "Points cannot be accepted",
+  AskPreview: "There can be no preview",
+  ApprovePreview: "Nothing can be approved",
+  RequirePreview: "It cannot be changed",
+  TurnApproach: "The approach cannot be turned",
+  MoveInQueue: "The order cannot be changed",
+  PlannersOrder: "The order cannot be changed",
+  RejectPoint: "Points cannot be rejected",
+  ReconsiderPoint: "Decisions cannot be taken back",
+  RestoreAccepted: "Acceptances cannot be restored",
+  ResolvePoint: "How a cut ended cannot be said",
+});
+
+/** Why this page can ask for nothing now; empty when it can. */
+export function whyNothing() {
+  const { status } = link.get();
+  if (status === "signed-out") return "You are not signed in";
+  if (status !== "open") return "There is no link to the server";
+  const state = pageState.get();
+  if (state === null) return "Waiting for the first state";
+  if (state.role === "viewer") return "You are signed in as a viewer";
+  return "";
+}
+
+/**
+ * Why a request would be refused now; empty when the controller would take it.
+ *
+ * @param {string} intent Name of the intent, as in `ControllerState.allowed`.
+ */
+export function whyNot(intent) {
+  const nothing = whyNothing();
+  if (nothing) return nothing;
+  const controller = pageState.get()?.controller ?? null;
+  if (controller === null || !isLive("controller")) return staleWords("controller") || "The controller is not there";
+  // After a fault nobody moves anything by acknowledging it.
+  const ofHolder = OF_HOLDER.includes(intent) && controller.mode !== "FAULT";
+  if (controller.allowed.includes(intent)) return ofHolder ? whyNotHolder() : "";
+  if (!INTENTS.includes(/** @type {any} */ (intent))) return `There is no ${intent}`;
+  if (intent === "Start" && controller.mode === "READY" && countOf("ACCEPTED") === 0) {
+    return countOf("UNREACHABLE") > 0 ? "No accepted point can be reached" : "Accept a point first";
+  }
+  if (intent === "Start" && controller.mode === "READY" && whyNoStart()) return whyNoStart();
+  return `${NEEDS[intent]}; the mode is ${MODE_WORDS[controller.mode]}`;
+}
+
+/** Why work waits for a preview; empty while it does not. */
+function whyNoStart() {
+  const state = preview.get();
+  if (!state?.required || state.phase === "approved") return "";
+  if (state.phase === "ready") return "Approve the preview first";
+  if (state.phase === "expired") return `The preview has expired: ${state.reason}`;
+  return "A preview is required before each cut: press Preview";
+}
+
+/** Whose robot it is while somebody else moves it; empty for who holds control, and where nobody does. */
+function whyNotHolder() {
+  const { held, mine, user } = holder();
+  return held && !mine ? `${user} holds control: ask for it, or take it` : "";
+}
+
+/** Why the tool cannot be moved by hand now; empty when it can. */
+export function whyNoTeleoperation() {
+  const nothing = whyNothing();
+  if (nothing) return nothing;
+  const controller = pageState.get()?.controller ?? null;
+  if (controller === null || !isLive("controller")) return staleWords("controller") || "The controller is not there";
+  if (!isLive("bridge")) return staleWords("bridge") || "The bridge is not there";
+  if (controller.mode === "READY" || controller.mode === "TELEOP") return whyNotHolder();
+  return `Teleoperation needs Ready; the mode is ${MODE_WORDS[controller.mode]}`;
+}
+
+/** @param {import("../link/messages.js").PointState} state */
+export function countOf(state) {
+  return (points.get()?.points ?? []).filter((row) => row.entry.state === state).length;
+}

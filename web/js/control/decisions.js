@@ -1,0 +1,185 @@
+// What a person decides about points, and how it is taken back.
+
+import { whyNot, whyNothing } from "./allowed.js";
+import { ask } from "../link/api.js";
+import { SURE } from "../link/messages.js";
+import { isLive, points, say } from "../state/page-state.js";
+import { signal } from "../state/signals.js";
+import { POINT_WORDS, counted } from "../state/format.js";
+
+/** @typedef {import("../link/messages.js").PagePoint} PagePoint */
+/** @typedef {import("../link/messages.js").PointState} PointState */
+/** @typedef {{ words: string, undo: () => Promise<boolean> }} Decision */
+
+/** @type {ReadonlySet<PointState>} */
+const CAN_ACCEPT = new Set(/** @type {PointState[]} */ (["PROPOSED", "REJECTED", "FAILED_NOT_CUT"]));
+/** @type {ReadonlySet<PointState>} */
+const CAN_REJECT = new Set(/** @type {PointState[]} */ (["PROPOSED", "ACCEPTED", "UNREACHABLE", "FAILED_NOT_CUT"]));
+/** So many decisions can be taken back, the last one first. */
+const MOST = 100;
+
+/** What was decided on this page, oldest first. @type {import("../state/signals.js").Signal<readonly Decision[]>} */
+export const decisions = signal(/** @type {readonly Decision[]} */ ([]));
+
+/**
+ * Nobody but the person who looks knows how an unknown cut ended; the two buttons are their two answers then.
+ *
+ * @param {PagePoint} row
+ */
+export function isUnknown(row) {
+  return row.entry.state === "UNKNOWN";
+}
+
+/**
+ * Has somebody accepted it, whether or not the robot can come there?
+ *
+ * @param {PagePoint|undefined} row
+ */
+export function isBound(row) {
+  return row?.entry.state === "ACCEPTED" || row?.entry.state === "UNREACHABLE";
+}
+
+/** @param {PagePoint} row */
+export function whyNotAccept(row) {
+  if (isUnknown(row)) return whyNot("ResolvePoint");
+  if (row.entry.state === "UNREACHABLE") return "It is accepted, and cannot be reached";
+  if (!CAN_ACCEPT.has(row.entry.state)) return `It is ${POINT_WORDS[row.entry.state].toLowerCase()}`;
+  return whyNot("AcceptPoint");
+}
+
+/** @param {PagePoint} row */
+export function whyNotReject(row) {
+  if (isUnknown(row)) return whyNot("ResolvePoint");
+  if (!CAN_REJECT.has(row.entry.state)) return `It is ${POINT_WORDS[row.entry.state].toLowerCase()}`;
+  return whyNot("RejectPoint");
+}
+
+/** @param {PagePoint} row */
+export async function accept(row) {
+  if (isUnknown(row)) return resolve(row, "DONE", "seen by eye");
+  const done = await send(row, "Accepting", "accept", { revision: row.point.revision, digest: row.point.digest });
+  if (done) remember(`accepted ${row.point.point_id}`, () => goBack(row));
+  return done;
+}
+
+/**
+ * @param {PagePoint} row
+ * @param {string} reason
+ */
+export async function reject(row, reason) {
+  if (isUnknown(row)) return resolve(row, "FAILED_NOT_CUT", reason || "seen by eye");
+  const done = await send(row, "Rejecting", "reject", { reason });
+  if (done) remember(`rejected ${row.point.point_id}`, () => goBack(row));
+  return done;
+}
+
+/**
+ * Is it a proposal that has to be looked at by itself?
+ *
+ * @param {PagePoint} row
+ */
+export function isUnsure(row) {
+  return row.entry.state === "PROPOSED" && row.point.confidence < SURE;
+}
+
+/** Proposed points that may be accepted all at once. */
+export function sureOnes() {
+  return (points.get()?.points ?? []).filter((row) => row.entry.state === "PROPOSED" && !isUnsure(row));
+}
+
+/** Accept all of those; the less sure ones are decided one by one. */
+export async function acceptAll() {
+  const open = sureOnes();
+  const done = await ask("Accepting all", "api/points/accept-all", { confidence: SURE });
+  if (done) {
+    remember(`accepted ${counted(open.length, "point")}`, async () => {
+      // Those that have been cut meanwhile, or were decided anew, stay as they are.
+      const accepted = open.map((row) => now(row)).filter(isBound);
+      const back = await Promise.all(accepted.map((row) => row && send(row, "Taking back", "reconsider", {})));
+      return back.every(Boolean);
+    });
+  }
+  return done;
+}
+
+/**
+ * Why a point cannot be moved now; empty when it can. What is accepted stays as it was accepted.
+ *
+ * @param {PagePoint} row
+ */
+export function whyNotMove(row) {
+  if (isBound(row)) return "It is accepted; take that back first";
+  if (!CAN_ACCEPT.has(row.entry.state)) return `It is ${POINT_WORDS[row.entry.state].toLowerCase()}`;
+  return whyNothing() || (isLive("perception") ? "" : "Perception is not there");
+}
+
+/**
+ * @param {PagePoint} row
+ * @param {number} millimetres Along the cane, away from the cordon.
+ */
+export async function move(row, millimetres) {
+  const done = await send(row, "Moving", "move", { along: millimetres / 1000 });
+  const words = `moved ${row.point.point_id} by ${millimetres} mm`;
+  if (done) remember(words, () => send(row, "Moving back", "move", { along: -millimetres / 1000 }));
+  return done;
+}
+
+/** Take the last decision back. */
+export async function undo() {
+  const last = decisions.get().at(-1);
+  if (!last) return;
+  decisions.set(decisions.get().slice(0, -1));
+  if (await last.undo()) say("info", `Taken back: ${last.words}.`);
+}
+
+/** Why nothing can be taken back now; empty when something can. */
+export function whyNoUndo() {
+  return decisions.get().length === 0 ? "Nothing has been decided on this page" : whyNot("ReconsiderPoint");
+}
+
+/**
+ * @param {string} words
+ * @param {() => Promise<boolean>} back
+ */
+export function remember(words, back) {
+  decisions.set([...decisions.get(), { words, undo: back }].slice(-MOST));
+}
+
+/**
+ * As it was before: proposed, accepted as it was seen then, or rejected for the same reason.
+ *
+ * @param {PagePoint} before
+ */
+async function goBack(before) {
+  const { state, reason } = before.entry;
+  if (isBound(before)) {
+    return send(before, "Accepting", "accept", { revision: before.point.revision, digest: before.point.digest });
+  }
+  if (state === "REJECTED") return send(before, "Rejecting", "reject", { reason });
+  return send(before, "Taking back", "reconsider", {});
+}
+
+/**
+ * @param {PagePoint} row
+ * @param {"DONE"|"FAILED_NOT_CUT"} outcome
+ * @param {string} reason
+ */
+function resolve(row, outcome, reason) {
+  return send(row, "Saying the end of", "resolve", { outcome, reason });
+}
+
+/**
+ * @param {PagePoint} row
+ * @param {string} what
+ * @param {string} action
+ * @param {object} body
+ */
+function send(row, what, action, body) {
+  const name = row.point.point_id;
+  return ask(`${what} ${name}`, `api/points/${encodeURIComponent(name)}/${action}`, body);
+}
+
+/** @param {PagePoint} row */
+function now(row) {
+  return points.get()?.points.find((other) => other.point.point_id === row.point.point_id);
+}

@@ -1,0 +1,124 @@
+// The base by hand: which way it shall go, from keys, from the pad on the page, or from a gamepad.
+
+import { isTyping } from "./stop.js";
+import { showToast } from "../state/page-state.js";
+import { signal } from "../state/signals.js";
+import { hold, moving, teleoperating } from "./teleoperation.js";
+
+/** At the whole of the usual speed (m/s, rad/s). */
+const LINEAR = 0.4;
+const ANGULAR = 0.6;
+/** Sticks do not come to rest at zero. */
+const DEAD = 0.15;
+const POLL_MS = 50;
+/** @type {Readonly<Record<string, readonly [ahead: number, left: number]>>} */
+const KEYS = Object.freeze({
+  KeyW: [1, 0], ArrowUp: [1, 0], KeyS: [-1, 0], ArrowDown: [-1, 0],
+  KeyA: [0, 1], ArrowLeft: [0, 1], KeyD: [0, -1], ArrowRight: [0, -1],
+});
+
+/** Name of the gamepad in use; empty without one. */
+export const gamepad = signal("");
+
+/** @typedef {{ ahead: number, left: number }} Way Shares of the whole speed, −1…1. */
+
+/** @returns {string} Why the base cannot be driven now. */
+export function whyNoDriving() {
+  return hold.whyNot() || (moving.get() === "base" ? "" : "Choose Base first");
+}
+
+/**
+ * Hold the base to a way for as long as `source` is not released.
+ *
+ * @param {"drive"|"pad"|"gamepad"} source
+ * @param {() => Way} way
+ */
+export function drive(source, way) {
+  const wanted = () => {
+    const { ahead, left } = way();
+    return { base: { linear: LINEAR * within(ahead), angular: ANGULAR * within(left) } };
+  };
+  return whyNoDriving() || hold.press(source, wanted);
+}
+
+/** @param {number} share */
+function within(share) {
+  return Math.max(-1, Math.min(1, share));
+}
+
+/** @type {Set<string>} */
+const down = new Set();
+
+/**
+ * Drive with the keys of a window, while the base is what is moved.
+ *
+ * @param {Window} target
+ */
+export function listenForDriveKeys(target) {
+  target.addEventListener(
+    "keydown",
+    (event) => {
+      if (!(event.code in KEYS) || event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)) return;
+      const elsewhere = /** @type {Partial<Element>} */ (event.target).closest?.("input, select, rp-queue");
+      if (!teleoperating.get() || moving.get() !== "base" || elsewhere) return;
+      // Otherwise the 3-D view would move its camera, and the page scroll.
+      event.preventDefault();
+      event.stopImmediatePropagation();
+      if (event.repeat) return;
+      const first = down.size === 0;
+      down.add(event.code);
+      const why = first ? drive("drive", () => sum([...down].map((code) => KEYS[code] ?? [0, 0]))) : "";
+      if (why) showToast("warning", why);
+    },
+    { capture: true },
+  );
+  target.addEventListener("keyup", (event) => {
+    if (down.delete(event.code) && down.size === 0) hold.release("drive");
+  });
+  // The release of a key goes to whatever has the focus by then.
+  target.addEventListener("blur", () => {
+    down.clear();
+    hold.release("drive");
+  });
+}
+
+/**
+ * @param {(readonly [number, number])[]} ways
+ * @returns {Way}
+ */
+function sum(ways) {
+  return { ahead: ways.reduce((all, [each]) => all + each, 0), left: ways.reduce((all, [, each]) => all + each, 0) };
+}
+
+/** Look after a gamepad: its sticks drive while one of its triggers is held. A trigger that is held already counts not. */
+export function watchGamepad() {
+  let index = -1;
+  let held = true;
+  const look = () => {
+    const pads = teleoperating.get() ? [...(navigator.getGamepads?.() ?? [])] : [];
+    const pad = pads.find((each) => each?.connected && each.buttons.length > 7) ?? null;
+    gamepad.set(pad?.id ?? "");
+    const same = pad !== null && pad.index === index;
+    index = pad?.index ?? -1;
+    const pulled = pad !== null && [6, 7].some((button) => (pad.buttons[button]?.value ?? 0) > 0.5);
+    const begins = same && pulled && !held;
+    held = pulled;
+    if (!same || !pulled || !document.hasFocus()) hold.release("gamepad");
+    else if (begins) {
+      const why = drive("gamepad", () => read(index));
+      if (why) showToast("warning", why);
+    }
+  };
+  window.setInterval(look, POLL_MS);
+  window.addEventListener("gamepaddisconnected", look);
+}
+
+/**
+ * @param {number} index
+ * @returns {Way}
+ */
+function read(index) {
+  const axes = navigator.getGamepads()[index]?.axes ?? [];
+  const [left = 0, ahead = 0, right = 0] = axes.map((each) => (Math.abs(each) < DEAD ? 0 : each));
+  return { ahead: -ahead, left: -(left || right) };
+}

@@ -1,0 +1,83 @@
+// The order of work: which accepted point comes when, whose order it is, and how it is changed.
+
+import { countOf, whyNot } from "./allowed.js";
+import { ask } from "../link/api.js";
+import { pageState, points } from "../state/page-state.js";
+import { counted } from "../state/format.js";
+
+/** @typedef {import("../link/messages.js").PagePoint} PagePoint */
+
+/** Accepted points in the order in which they are worked off. @returns {PagePoint[]} */
+export function workOrder() {
+  return (points.get()?.points ?? []).filter((row) => row.entry.state === "ACCEPTED");
+}
+
+/** Who has ordered them; empty where the plan has. */
+function orderedBy() {
+  return pageState.get()?.controller?.order.user ?? "";
+}
+
+/** How many there are, whose order it is, and how long the work takes, in words. */
+export function orderWords() {
+  const rows = workOrder();
+  const beyond = countOf("UNREACHABLE");
+  const more = beyond > 0 ? ` · ${beyond} cannot be reached` : "";
+  if (rows.length === 0) return `Order of work: nothing ${beyond > 0 ? "to work on" : "accepted"}${more}`;
+  const plan = points.get()?.plan;
+  const long = plan?.state === "valid" ? `, ${durationWords(plan.duration_s)}` : "";
+  const whose = orderedBy() ? `by ${orderedBy()}` : "by the plan";
+  return `Order of work: ${counted(rows.length, "point")}, ${whose}${long}${more}`;
+}
+
+/** @param {number} seconds */
+function durationWords(seconds) {
+  if (seconds < 120) return `${Math.round(seconds)} s`;
+  return `${Math.floor(seconds / 60)} min ${Math.round(seconds % 60)} s`;
+}
+
+/** Why the order cannot be changed; empty when it can. */
+export function whyNoMove() {
+  return whyNot("MoveInQueue");
+}
+
+/** Why the order cannot be the plan's; empty when it can. */
+export function whyNoPlannersOrder() {
+  return whyNot("PlannersOrder") || (orderedBy() ? "" : "It is the plan's order already");
+}
+
+/**
+ * Work on a point as number `to` of the list, counted from 0.
+ *
+ * @param {string} pointId
+ * @param {number} to
+ */
+export async function moveTo(pointId, to) {
+  const rest = workOrder().filter((row) => row.point.point_id !== pointId);
+  const before = rest[to]?.point.point_id ?? "";
+  const revision = pageState.get()?.controller?.order.revision ?? 0;
+  return ask(`Moving ${pointId}`, `api/points/${encodeURIComponent(pointId)}/work-before`, { before, revision });
+}
+
+export async function plannersOrder() {
+  const revision = pageState.get()?.controller?.order.revision ?? 0;
+  return ask("The plan's order", "api/order/planners", { revision });
+}
+
+/**
+ * Why the approach to a point cannot be turned; empty when it can.
+ *
+ * @param {PagePoint} row
+ */
+export function whyNotTurn(row) {
+  if (["INTENT", "DONE", "UNKNOWN"].includes(row.entry.state)) return "It is cut, or may be";
+  return whyNot("TurnApproach");
+}
+
+/**
+ * @param {PagePoint} row
+ * @param {number|null} azimuth About the cane (rad); null leaves it to the search.
+ */
+export function turnApproach(row, azimuth) {
+  const name = row.point.point_id;
+  return ask(`Turning the approach to ${name}`, `api/points/${encodeURIComponent(name)}/approach`, { azimuth });
+}

@@ -1,0 +1,68 @@
+// The selected point: list, picture and 3-D view show the same one.
+
+import { socket } from "../link/socket.js";
+import { brought, selected } from "../state/page-state.js";
+
+/** When somebody has last chosen, or looked for something, himself (ms). */
+let lookedAt = -Infinity;
+/** When the last choice was told (ms). */
+let toldAt = -Infinity;
+/** A press that gives a row the focus and chooses it is one choice (ms). */
+const ONE_PRESS_MS = 400;
+
+/** Somebody looks for himself. */
+export function touched() {
+  lookedAt = performance.now();
+}
+
+export function touchedAt() {
+  return lookedAt;
+}
+
+/**
+ * Somebody chooses a point: list, picture and 3-D view are brought there.
+ *
+ * @param {string} pointId Empty = none.
+ */
+export function select(pointId) {
+  touched();
+  if (pointId !== selected.get()) tell(pointId);
+}
+
+/**
+ * The same by a press, which brings them there again where the point is chosen already.
+ *
+ * @param {string} pointId
+ */
+export function bring(pointId) {
+  touched();
+  if (pointId !== selected.get() || performance.now() - toldAt > ONE_PRESS_MS) tell(pointId);
+}
+
+/**
+ * Nobody has chosen: the robot is at this point.
+ *
+ * @param {string} pointId
+ */
+export function goAlong(pointId) {
+  selected.set(pointId);
+  socket.send({ type: "Select", point_id: pointId, follow: true });
+}
+
+socket.onselected = (/** @type {string} */ pointId) => {
+  touched();
+  show(pointId);
+};
+
+/** @param {string} pointId */
+function tell(pointId) {
+  toldAt = performance.now();
+  show(pointId);
+  socket.send({ type: "Select", point_id: pointId });
+}
+
+/** @param {string} pointId */
+function show(pointId) {
+  if (pointId === selected.get()) brought.set(brought.get() + 1);
+  else selected.set(pointId);
+}

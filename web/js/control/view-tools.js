@@ -1,0 +1,96 @@
+// How this page looks at the robot: where the camera stands, what is shown, and what is measured.
+
+import { socket } from "../link/socket.js";
+import { link } from "../state/page-state.js";
+import { signal } from "../state/signals.js";
+import { placing, setPlacing } from "./placing.js";
+import { isTyping } from "./stop.js";
+
+/** @typedef {import("../link/messages.js").CameraPreset} CameraPreset */
+/** @typedef {import("../link/messages.js").Layer} Layer */
+
+/** Each with its word and what it does; the keys 1 to 4 do the same. @type {readonly (readonly [CameraPreset, string, string])[]} */
+export const PRESETS = Object.freeze([
+  ["follow", "Follow", "Look over the robot along the row, and go along"],
+  ["row", "Row", "Stand back and see some vines"],
+  ["tool", "Tool", "Look at the tool from near"],
+  ["top", "Top", "Look down on robot and row"],
+]);
+/** @type {readonly (readonly [Layer, string])[]} */
+export const LAYERS = Object.freeze([
+  ["plant", "Vines as perceived"],
+  ["points", "Pruning points"],
+  ["trail", "Trail of the tool"],
+  ["camera", "Camera and its image"],
+  ["cloud", "Point cloud of the camera"],
+  ["simulated", "Simulated row, seen or not"],
+]);
+const KEPT = "layers";
+
+/** @type {import("../state/signals.js").Signal<ReadonlySet<Layer>>} */
+export const layers = signal(remembered());
+export const measuring = signal(false);
+/** The last that was measured. */
+export const measured = signal(/** @type {import("../link/messages.js").Measured|null} */ (null));
+
+/** @returns {ReadonlySet<Layer>} */
+function remembered() {
+  const known = new Set(LAYERS.map(([layer]) => layer));
+  const kept = /** @type {Layer[]} */ ((localStorage.getItem(KEPT) ?? "plant,points,trail,simulated").split(","));
+  return new Set(kept.filter((layer) => known.has(layer)));
+}
+
+/**
+ * @param {Layer} layer
+ * @param {boolean} shown
+ */
+export function showLayer(layer, shown) {
+  const chosen = new Set(layers.get());
+  if (shown) chosen.add(layer);
+  else chosen.delete(layer);
+  layers.set(chosen);
+  localStorage.setItem(KEPT, [...chosen].join(","));
+  tellLayers();
+}
+
+function tellLayers() {
+  socket.send({ type: "ShowLayers", layers: [...layers.get()] });
+}
+
+/** @param {CameraPreset} preset */
+export function placeCamera(preset) {
+  socket.send({ type: "PlaceCamera", preset });
+}
+
+/** @param {boolean} on */
+export function setMeasuring(on) {
+  if (on === measuring.get()) return;
+  if (on) setPlacing(false);
+  measuring.set(on);
+  measured.set(null);
+  socket.send({ type: "Measure", active: on });
+}
+
+/** Tell each new link what is shown, and take what was measured. */
+export function guardLooking() {
+  socket.onmeasured = (message) => measured.set(message);
+  link.subscribe(({ status }) => {
+    if (status === "open") tellLayers();
+    else measuring.set(false);
+  });
+  placing.subscribe((on) => on && setMeasuring(false));
+  listenForViewKeys(window);
+}
+
+/**
+ * @param {Window} target
+ */
+export function listenForViewKeys(target) {
+  target.addEventListener("keydown", (event) => {
+    if (event.repeat || event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)) return;
+    const preset = PRESETS[Number(event.key) - 1];
+    if (preset) placeCamera(preset[0]);
+    else if (event.code === "KeyM") setMeasuring(!measuring.get());
+    else if (event.key === "Escape") setMeasuring(false);
+  });
+}

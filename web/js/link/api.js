@@ -1,0 +1,114 @@
+// Requests to the server. Whatever is refused is shown and logged; nothing fails in silence.
+
+import { link, say, showToast } from "../state/page-state.js";
+
+/**
+ * `status` 0: the server was not reached. `link` is what an invitation is answered with.
+ *
+ * @typedef {{ ok: boolean, reason: string, status: number, link?: string }} Answer
+ */
+
+/**
+ * @param {string} path
+ * @param {object} [body]
+ * @param {number} [timeoutMs]
+ * @returns {Promise<Answer>}
+ */
+export async function post(path, body = {}, timeoutMs = 4000) {
+  /** @type {Response} */
+  let response;
+  try {
+    response = await fetch(path, {
+      method: "POST",
+      headers: { "Content-Type": "application/json" },
+      body: JSON.stringify(body),
+      credentials: "same-origin",
+      signal: AbortSignal.timeout(timeoutMs),
+    });
+  } catch {
+    return { ok: false, reason: "the server cannot be reached", status: 0 };
+  }
+  if (response.status === 401) link.set({ status: "signed-out", attempts: 0 });
+  return { ...(await answerOf(response)), status: response.status };
+}
+
+/**
+ * Ask for something and tell the operator when it is refused.
+ *
+ * @param {string} what Name of the request, for the message.
+ * @param {string} path
+ * @param {object} [body]
+ * @returns {Promise<boolean>} Was it taken?
+ */
+export async function ask(what, path, body) {
+  const answer = await post(path, body);
+  if (answer.ok) return true;
+  const words = `${what} refused: ${answer.reason}`;
+  // What the controller refused or did not answer is in the server's log, and comes from there; the rest never got so far.
+  if (answer.status === 409) showToast("warning", words);
+  else if (answer.status === 503) showToast("error", words);
+  else say("error", words);
+  return false;
+}
+
+/**
+ * @param {string} path
+ * @returns {Promise<any>} Null where there is no answer.
+ */
+export async function fetchJson(path) {
+  try {
+    const response = await fetch(path, { credentials: "same-origin", signal: AbortSignal.timeout(4000) });
+    return response.ok ? await response.json() : null;
+  } catch {
+    return null;
+  }
+}
+
+/** Is this browser signed in? Null when the server cannot be reached. */
+export async function isSignedIn() {
+  try {
+    const response = await fetch("api/me", { credentials: "same-origin", signal: AbortSignal.timeout(4000) });
+    if (response.status === 401) return false;
+    return response.ok ? true : null;
+  } catch {
+    return null;
+  }
+}
+
+/**
+ * @param {Response} response
+ * @returns {Promise<{ ok: boolean, reason: string, link?: string }>}
+ */
+async function answerOf(response) {
+  /** @type {any} */
+  let body = null;
+  try {
+    body = await response.json();
+  } catch {
+    // An answer without JSON still has its status to tell.
+  }
+  const reason = typeof body?.reason === "string" ? body.reason : detailOf(body);
+  if (response.ok) return { ok: body?.ok !== false, reason, link: typeof body?.link === "string" ? body.link : "" };
+  return { ok: false, reason: reason || STATUS_WORDS[response.status] || `the server answered ${response.status}` };
+}
+
+/**
+ * Words of a validation error.
+ *
+ * @param {any} body
+ * @returns {string}
+ */
+function detailOf(body) {
+  if (typeof body?.detail === "string") return body.detail;
+  if (Array.isArray(body?.detail)) return body.detail.map((/** @type {any} */ each) => each?.msg ?? "").join("; ");
+  return "";
+}
+
+/** @type {Readonly<Record<number, string>>} */
+const STATUS_WORDS = Object.freeze({
+  401: "you are not signed in",
+  403: "you may not do this",
+  409: "not possible now",
+  422: "the request is invalid",
+  503: "the controller does not answer",
+});

@@ -1,0 +1,162 @@
+// The page's own link: state in, intents out, a ping ten times a second, and a new try whenever it breaks.
+
+import { link, points, preview, roundTrip, say, takeEvents, takeState } from "../state/page-state.js";
+import { isSignedIn } from "./api.js";
+
+/** @typedef {import("./messages.js").FromServer} FromServer */
+/** @typedef {import("./messages.js").FromPage} FromPage */
+/** @typedef {import("./messages.js").Sightline} Sightline */
+
+const PING_MS = 100;
+/**
+ * A link on which nothing has come for this many turns is dead, even when nobody said so. Turns, not milliseconds: while
+ * the 3-D view keeps this thread busy, messages wait unread and that is no silence.
+ */
+const SILENT_TURNS = 25;
+const RETRY_MS = [250, 500, 1000, 2000, 3000];
+
+class Link {
+  /** @param {string} url */
+  constructor(url) {
+    this.url = url;
+    /** @type {WebSocket|null} */
+    this.socket = null;
+    /** Called when the link has gone; whatever was held must be let go. */
+    this.onclose = () => {};
+    /** Called when the server has ended or refused what is held here. @type {(reason: string) => void} */
+    this.onholdended = () => {};
+    /** Called when this session has clicked into the 3-D view to place a point. @type {(line: Sightline) => void} */
+    this.onsightline = () => {};
+    /** Called with the distance of two places that were clicked. @type {(told: import("./messages.js").Measured) => void} */
+    this.onmeasured = () => {};
+    /** Called when a point was clicked in this session's 3-D view. @type {(pointId: string) => void} */
+    this.onselected = () => {};
+    this.attempts = 0;
+    this.silentTurns = 0;
+    this.number = 0;
+    /** Number of the last state that is really on screen. */
+    this.rendered = 0;
+    this.firstEvents = true;
+    /** @type {Map<number, number>} */
+    this.pings = new Map();
+    window.setInterval(() => this.turn(), PING_MS);
+  }
+
+  open() {
+    const socket = new WebSocket(this.url);
+    this.socket = socket;
+    this.silentTurns = 0;
+    this.firstEvents = true;
+    this.pings.clear();
+    socket.addEventListener("open", () => {
+      this.attempts = 0;
+      this.silentTurns = 0;
+      link.set({ status: "open", attempts: 0 });
+    });
+    socket.addEventListener("message", (event) => {
+      if (socket === this.socket) this.receive(event.data);
+    });
+    socket.addEventListener("close", () => {
+      if (socket === this.socket) void this.lost();
+    });
+  }
+
+  /**
+   * Send when the link is open; a message for a closed link is dropped, never kept for later.
+   *
+   * @param {FromPage} message
+   */
+  send(message) {
+    if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message));
+  }
+
+  turn() {
+    this.silentTurns += 1;
+    if (this.socket !== null && this.silentTurns > SILENT_TURNS) {
+      const silent = this.socket;
+      void this.lost();
+      silent.close();
+      return;
+    }
+    if (this.socket?.readyState !== WebSocket.OPEN) return;
+    this.number += 1;
+    this.pings.set(this.number, performance.now());
+    if (this.pings.size > 50) this.pings.delete(this.number - 50);
+    this.send({ type: "Ping", number: this.number, rendered: this.rendered });
+  }
+
+  async lost() {
+    this.socket = null;
+    this.attempts += 1;
+    link.set({ status: "closed", attempts: this.attempts });
+    roundTrip.set(null);
+    this.onclose();
+    const wait = RETRY_MS[Math.min(this.attempts - 1, RETRY_MS.length - 1)];
+    // A refused socket does not say why; a session that has ended needs a person.
+    if ((await isSignedIn()) === false) link.set({ status: "signed-out", attempts: this.attempts });
+    window.setTimeout(() => this.open(), link.get().status === "signed-out" ? 3000 : wait);
+  }
+
+  /** @param {string} text */
+  receive(text) {
+    this.silentTurns = 0;
+    /** @type {FromServer} */
+    let message;
+    try {
+      message = JSON.parse(text);
+    } catch {
+      say("error", "The server sent something that is not JSON; it was ignored.");
+      return;
+    }
+    switch (message.type) {
+      case "PageState": {
+        const { number } = message;
+        takeState(message);
+        // Registered after the draws that this state has asked for, so it runs when they are done. A hidden tab draws
+        // nothing and therefore does not echo.
+        requestAnimationFrame(() => {
+          this.rendered = number;
+        });
+        break;
+      }
+      case "PagePoints":
+        points.set(message);
+        break;
+      case "PagePreview":
+        preview.set(message.preview);
+        break;
+      case "PageEvents":
+        takeEvents(message.events, this.firstEvents);
+        this.firstEvents = false;
+        break;
+      case "Selected":
+        this.onselected(message.point_id);
+        break;
+      case "Sightline":
+        this.onsightline(message);
+        break;
+      case "Measured":
+        this.onmeasured(message);
+        break;
+      case "HoldEnded":
+        this.onholdended(message.reason);
+        break;
+      case "Pong":
+        this.measure(message.number);
+        break;
+    }
+  }
+
+  /** @param {number} number */
+  measure(number) {
+    const sent = this.pings.get(number);
+    if (sent === undefined) return;
+    this.pings.delete(number);
+    const last = performance.now() - sent;
+    const smooth = roundTrip.get();
+    roundTrip.set(smooth === null ? last : smooth + 0.2 * (last - smooth));
+  }
+}
+
+// Beside the page: with several robots each has a page and a socket of its own.
+export const socket = new Link(new URL("ws", location.href.replace(/^http/, "ws")).href);

@@ -1,0 +1,126 @@
+// Runs in the frame of the 3-D view, before its client: how many pixels are drawn, and how.
+
+import { Behind } from "./offscreen-framebuffer.js";
+
+/** The robot alone has some twenty thousand; the axes and the ground, which come first, a thousand. */
+const FEWEST_TRIANGLES = 4000;
+
+/**
+ * Marks the document `data-view="loading"`, and `data-view="drawn"` once the robot is on the screen.
+ *
+ * @param {(callback: () => void) => void} nextFrame Calls at the browser's next frame.
+ * @param {() => boolean} shown Has all that was drawn come to the screen?
+ */
+const tellWhenDrawn = (nextFrame, shown) => {
+  document.documentElement.dataset.view ??= "loading";
+  const { prototype } = WebGL2RenderingContext;
+  const { drawElements } = prototype;
+  let triangles = 0;
+  prototype.drawElements = function (mode, count, type, offset) {
+    triangles += count / 3;
+    drawElements.call(this, mode, count, type, offset);
+  };
+  const tell = () => {
+    if (shown()) document.documentElement.dataset.view = "drawn";
+    else nextFrame(tell);
+  };
+  const look = () => {
+    if (triangles < FEWEST_TRIANGLES) {
+      triangles = 0;
+      nextFrame(look);
+      return;
+    }
+    prototype.drawElements = drawElements;
+    tell();
+  };
+  nextFrame(look);
+};
+
+/** More pixels a way than this cost more than they show. */
+const LARGEST_RATIO = 1.5;
+/** Without a graphics card every pixel is work. With fewer than this the canes become dashes. */
+const LARGEST_RATIO_IN_SOFTWARE = 1;
+/** Time between two pictures drawn in software (ms). The page's buttons share the thread that waits for them. */
+const PACE_IN_SOFTWARE = 80;
+
+const plainContext = HTMLCanvasElement.prototype.getContext;
+const plainRequest = window.requestAnimationFrame.bind(window);
+
+/** Is WebGL drawn by the processor? The names are those of the drivers of Chromium, Mesa and Windows. */
+const drawnInSoftware = () => {
+  const probe = plainContext.call(document.createElement("canvas"), "webgl2");
+  if (!(probe instanceof WebGL2RenderingContext)) return false;
+  const named = probe.getExtension("WEBGL_debug_renderer_info")?.UNMASKED_RENDERER_WEBGL ?? probe.RENDERER;
+  const renderer = String(probe.getParameter(named));
+  probe.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|softpipe|basic render|software/i.test(renderer);
+};
+
+const inSoftware = drawnInSoftware();
+/** Of each canvas: the client makes one to see whether it can, before the one that it draws in. @type {Behind[]} */
+const behind = [];
+// At a fixed resolution: changing it with the load, as the client does by itself, stalls a slow machine for seconds,
+// and a stalled view ends a hold.
+const ratio = Math.min(window.devicePixelRatio, inSoftware ? LARGEST_RATIO_IN_SOFTWARE : LARGEST_RATIO);
+history.replaceState(null, "", `?fixedDpr=${ratio}`);
+tellWhenDrawn(plainRequest, () => behind.every((each) => !each.busy && !each.drawn));
+
+if (inSoftware) {
+  /**
+   * Smoothed edges cost a graphics card next to nothing, and the processor half of its time.
+   *
+   * @this {HTMLCanvasElement}
+   * @param {string} kind
+   * @param {any} [options]
+   */
+  const getContext = function (kind, options) {
+    if (!kind.startsWith("webgl")) return plainContext.call(this, kind, options);
+    const gl = plainContext.call(this, kind, { ...options, antialias: false });
+    if (gl instanceof WebGL2RenderingContext && !behind.some((each) => each.gl === gl)) behind.push(new Behind(gl));
+    return gl;
+  };
+  HTMLCanvasElement.prototype.getContext = /** @type {any} */ (getContext);
+  paceFrames(PACE_IN_SOFTWARE);
+}
+
+/**
+ * Let pictures be drawn no more often than this and one after the other, so that a press is handled between two.
+ *
+ * @param {number} pace In ms.
+ */
+function paceFrames(pace) {
+  /** @type {Map<number, FrameRequestCallback>} */
+  const waiting = new Map();
+  let issued = 0;
+  let planned = false;
+  let drawn = -pace;
+  const plan = () => {
+    if (planned || behind.some((each) => each.busy) || waiting.size === 0) return;
+    planned = true;
+    window.setTimeout(() => plainRequest(draw), Math.max(0, drawn + pace - performance.now()));
+  };
+  /** @param {number} now */
+  const draw = (now) => {
+    drawn = performance.now();
+    for (const number of [...waiting.keys()]) {
+      const callback = waiting.get(number);
+      waiting.delete(number);
+      try {
+        callback?.(now);
+      } catch (error) {
+        window.reportError(error);
+      }
+    }
+    for (const each of behind) each.finish(plainRequest, plan);
+    // Not before: what is asked for meanwhile waits until this picture is shown.
+    planned = false;
+    plan();
+  };
+  window.requestAnimationFrame = (callback) => {
+    issued += 1;
+    waiting.set(issued, callback);
+    plan();
+    return issued;
+  };
+  window.cancelAnimationFrame = (number) => void waiting.delete(number);
+}

@@ -1,0 +1,69 @@
+// Signing in: with name and password, or with the token of the printed link, which leaves the address at once.
+
+import { post } from "./link/api.js";
+
+const progress = /** @type {HTMLElement} */ (document.getElementById("progress"));
+const hint = /** @type {HTMLElement} */ (document.getElementById("token-hint"));
+const tokenForm = /** @type {HTMLFormElement} */ (document.getElementById("token-form"));
+const tokenField = /** @type {HTMLInputElement} */ (document.getElementById("token"));
+const passwordForm = /** @type {HTMLFormElement} */ (document.getElementById("password-form"));
+const userField = /** @type {HTMLInputElement} */ (document.getElementById("user"));
+const passwordField = /** @type {HTMLInputElement} */ (document.getElementById("password"));
+
+/** @returns {Promise<boolean>} Do people sign in with a password here? */
+async function withPassword() {
+  try {
+    const response = await fetch("api/sign-in", { signal: AbortSignal.timeout(4000) });
+    return response.ok && (await response.json()).password === true;
+  } catch {
+    return false;
+  }
+}
+
+/** @param {object} body */
+async function signIn(body) {
+  progress.textContent = "Signing in…";
+  progress.className = "";
+  const answer = await post("api/sign-in", body);
+  if (answer.ok) {
+    location.replace(location.pathname.replace(/sign-in$/, ""));
+    return;
+  }
+  const unsaid = answer.status === 401 && !answer.reason;
+  progress.textContent = `Not signed in: ${unsaid ? "the token is not valid" : answer.reason}`;
+  progress.className = "problem";
+  ask(passwordFirst);
+}
+
+/** @param {boolean} password */
+function ask(password) {
+  passwordForm.hidden = !password;
+  tokenForm.hidden = hint.hidden = password;
+  if (!password) {
+    tokenField.focus();
+  } else if (userField.value) {
+    passwordField.select();
+    passwordField.focus();
+  } else {
+    userField.focus();
+  }
+}
+
+tokenForm.addEventListener("submit", (event) => {
+  event.preventDefault();
+  void signIn({ token: tokenField.value.trim() });
+});
+passwordForm.addEventListener("submit", (event) => {
+  event.preventDefault();
+  void signIn({ user: userField.value.trim(), password: passwordField.value });
+});
+
+const token = new URLSearchParams(location.search).get("token") ?? "";
+history.replaceState(null, "", location.pathname);
+const passwordFirst = await withPassword();
+if (token) {
+  await signIn({ token });
+} else {
+  progress.textContent = passwordFirst ? "" : "Open the link that the program printed, or enter its token.";
+  ask(passwordFirst);
+}

@@ -1,0 +1,111 @@
+// Words and numbers for people.
+
+/** @type {Readonly<Record<import("../link/messages.js").PointState, string>>} */
+export const POINT_WORDS = Object.freeze({
+  PROPOSED: "Proposed",
+  ACCEPTED: "Accepted",
+  UNREACHABLE: "Cannot reach",
+  INTENT: "Cutting",
+  DONE: "Done",
+  FAILED_NOT_CUT: "Not cut",
+  UNKNOWN: "Unknown",
+  REJECTED: "Rejected",
+});
+
+/** @type {Readonly<Record<import("../link/messages.js").Mode, string>>} */
+export const MODE_WORDS = Object.freeze({
+  IDLE: "Idle",
+  READY: "Ready",
+  TELEOP: "Teleoperation",
+  AUTO: "Automatic",
+  PAUSED: "Paused",
+  PROTECTIVE_STOP: "Protective stop",
+  FAULT: "Fault",
+  ESTOP_LATCHED: "Stopped",
+});
+
+/** @type {Readonly<Record<import("../link/messages.js").Phase, string>>} */
+export const PHASE_WORDS = Object.freeze({
+  "": "",
+  APPROACH: "approach",
+  LOOK: "closer look",
+  ADVANCE: "advance",
+  CUT: "cut",
+  RETREAT: "retreat",
+  SURVEY: "survey",
+});
+
+/** @type {Readonly<Record<string, string>>} */
+const RAW_WORDS = Object.freeze({ ...MODE_WORDS, ...POINT_WORDS });
+const RAW = new RegExp(`\\b(${Object.keys(RAW_WORDS).join("|")})\\b`, "g");
+
+/**
+ * A text of the robot's with the page's own words for modes and states.
+ *
+ * @param {string} text
+ */
+export function inWords(text) {
+  return text.replace(RAW, (name) => RAW_WORDS[name] ?? name);
+}
+
+/**
+ * What the robot is nearest to touching; empty where nothing is near.
+ *
+ * @param {import("../link/messages.js").ControllerState|null} controller
+ */
+export function nearWords(controller) {
+  const near = controller?.near ?? null;
+  return near === null ? "" : `${(near.distance * 1000).toFixed(0)} mm between ${near.what}.`;
+}
+
+/** @param {number} seconds */
+export function ageWords(seconds) {
+  if (seconds < 99.5) return `${seconds.toFixed(1)} s`;
+  if (seconds < 3600) return `${Math.floor(seconds / 60)} min`;
+  return `${Math.floor(seconds / 3600)} h`;
+}
+
+/** @param {number} metres */
+export function millimetres(metres) {
+  const value = metres * 1000;
+  return value.toFixed(Math.abs(value) < 99.95 ? 1 : 0);
+}
+
+/** @param {number} radians */
+export function degrees(radians) {
+  return (radians * (180 / Math.PI)).toFixed(1);
+}
+
+/**
+ * @param {number} count
+ * @param {string} one
+ * @param {string} [many]
+ */
+export function counted(count, one, many = `${one}s`) {
+  return `${count} ${count === 1 ? one : many}`;
+}
+
+const CLOCK = new Intl.DateTimeFormat("en-GB", { hour: "2-digit", minute: "2-digit", second: "2-digit" });
+
+/** @param {number} wallTime Seconds since 1970. */
+export function clockWords(wallTime) {
+  return CLOCK.format(new Date(wallTime * 1000));
+}
+
+/**
+ * A force in N to two digits: it is an estimate.
+ *
+ * @param {number} force
+ */
+export function newtons(force) {
+  return `${Number(force.toPrecision(2))} N`;
+}
+
+/**
+ * Standard deviation of a vector's worst coordinate, from the upper triangle of its covariance.
+ *
+ * @param {import("../link/messages.js").Covariance} covariance
+ */
+export function uncertainty([xx, , , yy, , zz]) {
+  return Math.sqrt(Math.max(xx, yy, zz, 0));
+}

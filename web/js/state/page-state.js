@@ -1,0 +1,187 @@
+// Everything the page knows. The last known state is kept, with its age, however long a link or a process is gone.
+
+import { signal } from "./signals.js";
+import { ageWords } from "./format.js";
+
+/** @typedef {import("../link/messages.js").PageState} PageState */
+/** @typedef {import("../link/messages.js").PagePoints} PagePoints */
+/** @typedef {import("../link/messages.js").PageEvent} PageEvent */
+/** @typedef {import("../link/messages.js").Process} Process */
+/** @typedef {import("../link/messages.js").Severity} Severity */
+
+/**
+ * @typedef {object} Link
+ * @property {"connecting"|"open"|"closed"|"signed-out"} status
+ * @property {number} attempts Tries since it was last open.
+ */
+
+/** @typedef {{ id: number, severity: Severity, text: string }} Toast */
+
+const MAX_LINES = 500;
+/** Seconds after which the last word of a process is shown as old. */
+const OLD_AFTER_S = { bridge: 1, controller: 1, perception: 2, server: 1 };
+
+export const link = signal(/** @type {Link} */ ({ status: "connecting", attempts: 0 }));
+export const pageState = signal(/** @type {PageState|null} */ (null));
+export const points = signal(/** @type {PagePoints|null} */ (null));
+/** The newest state of the preview; null before the first. */
+export const preview = signal(/** @type {import("../link/messages.js").PreviewState|null} */ (null));
+export const log = signal(/** @type {readonly PageEvent[]} */ ([]));
+export const toasts = signal(/** @type {readonly Toast[]} */ ([]));
+/** Identifier of the chosen point, empty when none. */
+export const selected = signal("");
+/** Counts how often the point that is chosen already was chosen again. */
+export const brought = signal(0);
+/** Round trip page → server → page in ms; null before the first. */
+export const roundTrip = signal(/** @type {number|null} */ (null));
+/** The page's clock (ms), moved on four times a second so that ages grow on screen. */
+export const now = signal(performance.now());
+/** When the newest `PageState` came in (page's clock, ms). */
+let stateAt = 0;
+/** How often the page's clock has moved on since it came, or since the page was opened. */
+let turns = 0;
+now.subscribe(() => {
+  turns += 1;
+});
+/**
+ * After so many turns (1 s) without a state the server is silent. Turns and not milliseconds alone: while the browser
+ * loads the 3-D view nothing of this page runs, what has come waits unread, and that is no silence.
+ */
+const SILENT_TURNS = 4;
+/** So many turns (5 s) a page that has just been opened waits for its first word before that is an alarm. */
+const FIRST_TURNS = 20;
+let nextToast = 1;
+let nextLocalLine = -1;
+
+/** @param {PageState} message */
+export function takeState(message) {
+  stateAt = performance.now();
+  turns = 0;
+  pageState.set(message);
+}
+
+/** Has this page only just been opened, so that nothing can be said yet of what it has not heard? */
+export function isOpening() {
+  return pageState.get() === null && link.get().status !== "signed-out" && turns < FIRST_TURNS;
+}
+
+/**
+ * New lines of the server's log. After a reconnection the server sends its last lines again, and a restarted server
+ * counts from the start: what the page already has from before them stays.
+ *
+ * @param {readonly PageEvent[]} events
+ * @param {boolean} first Is this the first batch of a connection?
+ */
+export function takeEvents(events, first) {
+  const oldest = events[0];
+  if (!oldest) return;
+  const kept = first ? log.get().filter((line) => line.number < 0 || line.wall_time < oldest.wall_time) : log.get();
+  const lines = first ? [...kept, ...events].sort((a, b) => a.wall_time - b.wall_time) : [...kept, ...events];
+  log.set(lines.slice(-MAX_LINES));
+}
+
+/**
+ * Tell the operator something at once, and keep it in the log.
+ *
+ * @param {Severity} severity
+ * @param {string} text
+ */
+export function say(severity, text) {
+  const line = { number: nextLocalLine--, wall_time: Date.now() / 1000, process: "page", severity, text };
+  log.set([...log.get(), line].slice(-MAX_LINES));
+  showToast(severity, text);
+}
+
+/**
+ * @param {Severity} severity
+ * @param {string} text
+ */
+export function showToast(severity, text) {
+  const toast = { id: nextToast++, severity, text };
+  toasts.set([...toasts.get().filter((each) => each.text !== text), toast].slice(-3));
+  setTimeout(() => dismissToast(toast.id), severity === "error" ? 10000 : 6000);
+}
+
+/** @param {number} id */
+export function dismissToast(id) {
+  toasts.set(toasts.get().filter((toast) => toast.id !== id));
+}
+
+/** Age of the newest `PageState` (s); null before the first. */
+export function stateAge() {
+  return pageState.get() === null ? null : Math.max(0, (performance.now() - stateAt) / 1000);
+}
+
+/**
+ * Age of the last word of a process (s): as the server measured it, and what has passed since.
+ *
+ * @param {Process} process
+ * @returns {number|null}
+ */
+export function processAge(process) {
+  const passed = stateAge();
+  if (process === "server" || passed === null) return passed;
+  const age = toldAge(process);
+  return age === null ? null : age + passed;
+}
+
+/**
+ * Age of the last word of a process (s) as the server measured it.
+ *
+ * @param {Process} process
+ * @returns {number|null}
+ */
+function toldAge(process) {
+  const state = pageState.get();
+  if (state === null) return null;
+  let age = state.processes.find((row) => row.process === process)?.age_s ?? null;
+  if (process === "bridge" && state.bridge_age_s !== null) age = state.bridge_age_s;
+  if (process === "controller" && state.controller_age_s !== null) age = state.controller_age_s;
+  return age;
+}
+
+/**
+ * Has the server said that a process is gone? What this page has not heard in time says nothing of it.
+ *
+ * @param {Process} process
+ */
+export function isGone(process) {
+  const row = pageState.get()?.processes.find((each) => each.process === process);
+  return !row?.present || (toldAge(process) ?? Infinity) >= OLD_AFTER_S[process];
+}
+
+/**
+ * Is a process known to be there, with a recent last word?
+ *
+ * @param {Process} process
+ */
+export function isLive(process) {
+  const state = pageState.get();
+  const age = processAge(process);
+  if (state === null || link.get().status !== "open") return false;
+  if (process === "server") return turns < SILENT_TURNS || (age ?? 0) < OLD_AFTER_S.server;
+  return !isGone(process) && age !== null && age < OLD_AFTER_S[process];
+}
+
+/**
+ * Why what is shown of these processes is old, with its age; empty while it is not.
+ *
+ * @param {...Process} processes
+ */
+export function staleWords(...processes) {
+  if (link.get().status !== "open") {
+    const age = stateAge();
+    return age === null ? "" : `no link — last state ${ageWords(age)} old`;
+  }
+  if (pageState.get() === null) return "";
+  // Nothing is known of the others while the server says nothing.
+  const silence = stateAge() ?? 0;
+  if (!isLive("server")) return `server silent — last state ${ageWords(silence)} old`;
+  for (const process of processes) {
+    if (isLive(process)) continue;
+    const age = processAge(process);
+    if (age === null) return `${process} not seen yet`;
+    return `${process} ${isGone(process) ? "gone" : "not heard in time"} — last state ${ageWords(age)} old`;
+  }
+  return "";
+}

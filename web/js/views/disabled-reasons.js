@@ -1,0 +1,73 @@
+// A greyed control says why, when it is pressed and when the keyboard comes to it: a finger cannot hover for the reason.
+
+import { element } from "./dom.js";
+import { showToast } from "../state/page-state.js";
+
+const GREYED = ':is(button, input)[aria-disabled="true"]';
+/** Between the control and its reason, and to the edges of the screen (px). */
+const GAP = 6;
+
+/**
+ * Keep greyed controls from doing anything, and show their reasons instead.
+ *
+ * @param {Document} page
+ */
+export function explainGreyed(page) {
+  const listen = (/** @type {string} */ name, /** @type {(event: Event, control: Element) => void} */ found) => {
+    const look = (/** @type {Event} */ event) => {
+      const control = event.target instanceof Element ? event.target.closest(GREYED) : null;
+      if (control) found(event, control);
+    };
+    page.addEventListener(name, look, { capture: true, passive: false });
+  };
+  listen("click", (event, control) => {
+    event.preventDefault();
+    event.stopImmediatePropagation();
+    showToast("info", whyOf(control));
+  });
+  // A slider moves before there is a click, and by keys without one.
+  for (const name of ["mousedown", "touchstart"]) listen(name, (event, control) => isInput(control) && event.preventDefault());
+  for (const name of ["input", "change"]) listen(name, (event) => event.stopImmediatePropagation());
+  listen("keydown", (event, control) => {
+    const { key } = /** @type {KeyboardEvent} */ (event);
+    if (isInput(control) && key !== "Tab" && key !== "Escape") event.preventDefault();
+  });
+  tellOnFocus(page, listen);
+}
+
+/**
+ * @param {Document} page
+ * @param {(name: string, found: (event: Event, control: Element) => void) => void} listen
+ */
+function tellOnFocus(page, listen) {
+  // Read out as the control's own description already.
+  const words = element("div", { class: "why", attributes: { "aria-hidden": "true" } });
+  words.hidden = true;
+  page.body.append(words);
+  const hide = () => {
+    words.hidden = true;
+  };
+  listen("focusin", (_, control) => {
+    if (!control.matches(":focus-visible")) return;
+    words.textContent = whyOf(control);
+    words.hidden = false;
+    const box = control.getBoundingClientRect();
+    const left = Math.min(box.left, innerWidth - words.offsetWidth - GAP);
+    const below = box.bottom + GAP;
+    const top = below + words.offsetHeight < innerHeight ? below : box.top - GAP - words.offsetHeight;
+    words.style.setProperty("left", `${Math.max(GAP, left)}px`);
+    words.style.setProperty("top", `${top}px`);
+  });
+  page.addEventListener("focusout", hide);
+  page.addEventListener("keydown", (event) => event.key === "Escape" && hide());
+}
+
+/** @param {Element} control */
+function isInput(control) {
+  return control instanceof HTMLInputElement;
+}
+
+/** @param {Element} control */
+function whyOf(control) {
+  return control.getAttribute("aria-description") ?? "This is not possible now";
+}

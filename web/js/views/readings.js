@@ -1,0 +1,205 @@
+// The numbers that tell how well the robot does: where each comes from, its unit, and when it is worth a warning.
+
+import { degrees, millimetres } from "../state/format.js";
+import { roundTrip } from "../state/page-state.js";
+
+/** Shortest time (s) to measure over: shorter is noise, longer is late. */
+const SPAN_S = 0.4;
+
+class BaseSpeed {
+  constructor() {
+    /** @type {{ stamp: number, x: number, y: number }[]} */
+    this.track = [];
+  }
+
+  /**
+   * @param {import("../link/messages.js").PlanarPose|null} base
+   * @param {import("../link/messages.js").JointState|null} joints Its stamp is the bridge's clock.
+   * @returns {number|null} m/s; null before there are two poses.
+   */
+  take(base, joints) {
+    if (base === null || joints === null) return null;
+    const stamp = joints.header.stamp;
+    const newest = this.track.at(-1);
+    // A bridge that started again counts from elsewhere.
+    if (newest && stamp < newest.stamp) this.track = [];
+    if (!newest || stamp > newest.stamp) this.track.push({ stamp, x: base.x, y: base.y });
+    while (this.track.length > 2 && stamp - (this.track[1]?.stamp ?? stamp) >= SPAN_S) this.track.shift();
+    const first = this.track[0];
+    if (!first || stamp <= first.stamp) return null;
+    return Math.hypot(base.x - first.x, base.y - first.y) / (stamp - first.stamp);
+  }
+}
+
+/** @typedef {import("../link/messages.js").PageState} PageState */
+/**
+ * @typedef {object} Reading
+ * @property {string} id
+ * @property {string} label
+ * @property {string} unit
+ * @property {string} about
+ * @property {number} full Value of a full bar, in the unit shown.
+ * @property {number} [warnAbove]
+ * @property {number} [warnBelow]
+ * @property {(value: number) => string} write
+ * @property {(state: PageState) => number|null} read In the unit shown; null when unknown.
+ * @property {"gauge"|"engineer"|"chart"} [place] Where it is shown besides its chart; a gauge when not said.
+ */
+
+const DEGREE = 180 / Math.PI;
+const speed = new BaseSpeed();
+
+/** @type {readonly Reading[]} */
+export const READINGS = Object.freeze([
+  {
+    id: "position-error",
+    label: "Tool error",
+    unit: "mm",
+    about: "Distance of the tool from where its trajectory has it now",
+    full: 20,
+    warnAbove: 10,
+    write: (/** @type {number} */ value) => millimetres(value / 1000),
+    read: (/** @type {PageState} */ state) => scaled(state.controller?.position_error, 1000),
+  },
+  {
+    id: "rotation-error",
+    label: "Tool angle",
+    unit: "°",
+    about: "Angle of the tool from where its trajectory has it now",
+    full: 10,
+    warnAbove: 5,
+    write: (/** @type {number} */ value) => degrees(value / DEGREE),
+    read: (/** @type {PageState} */ state) => scaled(state.controller?.rotation_error, DEGREE),
+  },
+  {
+    id: "manipulability",
+    place: "engineer",
+    label: "Manipulability",
+    unit: "ω",
+    about: "How freely the arm can move the tool; 0 is a singular posture",
+    full: 0.15,
+    warnBelow: 0.02,
+    write: (/** @type {number} */ value) => value.toFixed(3),
+    read: (/** @type {PageState} */ state) => state.controller?.manipulability ?? null,
+  },
+  {
+    id: "joint-margin",
+    label: "Joint margin",
+    unit: "°",
+    about: "Least distance of an arm joint to its limit",
+    full: 60,
+    warnBelow: 5,
+    write: (/** @type {number} */ value) => value.toFixed(1),
+    read: (/** @type {PageState} */ state) => scaled(state.controller?.joint_margin, DEGREE),
+  },
+  {
+    id: "base-speed",
+    label: "Base speed",
+    unit: "m/s",
+    about: "Speed of the base over the ground, from its wheels",
+    full: 0.5,
+    write: (/** @type {number} */ value) => value.toFixed(2),
+    read: (/** @type {PageState} */ state) => speed.take(state.base, state.joints),
+  },
+  {
+    id: "battery",
+    label: "Battery",
+    unit: "%",
+    about: "Charge of the base's battery",
+    full: 100,
+    warnBelow: 20,
+    write: (/** @type {number} */ value) => value.toFixed(0),
+    read: (/** @type {PageState} */ state) => scaled(state.bridge?.battery ?? undefined, 100),
+  },
+  {
+    id: "real-time-factor",
+    label: "Real time",
+    unit: "×",
+    about: "Simulated seconds a second; below 0.9 the computer is too slow and everything happens later",
+    full: 1.2,
+    warnBelow: 0.9,
+    write: (/** @type {number} */ value) => value.toFixed(2),
+    read: (/** @type {PageState} */ state) => state.bridge?.real_time_factor ?? null,
+  },
+  {
+    id: "tick",
+    place: "engineer",
+    label: "Control step",
+    unit: "µs",
+    about: "Median time of one control step over the last second",
+    full: 1000,
+    warnAbove: 1000,
+    write: (/** @type {number} */ value) => value.toFixed(0),
+    read: (/** @type {PageState} */ state) => scaled(state.controller?.tick_s, 1e6),
+  },
+  {
+    id: "late-ticks",
+    place: "engineer",
+    label: "Late steps",
+    unit: "",
+    about: "Control periods that came too late since the controller started",
+    full: 100,
+    write: (/** @type {number} */ value) => value.toFixed(0),
+    read: (/** @type {PageState} */ state) => state.controller?.late_ticks ?? null,
+  },
+  {
+    id: "wheel-speed",
+    place: "chart",
+    label: "Wheel speed",
+    unit: "%",
+    about: "Speed of the faster wheel in parts of its limit",
+    full: 100,
+    warnAbove: 95,
+    write: (/** @type {number} */ value) => value.toFixed(0),
+    read: (/** @type {PageState} */ state) => largest(state.speed_shares.slice(0, 2), 100),
+  },
+  {
+    id: "arm-speed",
+    place: "chart",
+    label: "Arm speed",
+    unit: "%",
+    about: "Speed of the fastest joint of the arm in parts of its limit",
+    full: 100,
+    warnAbove: 95,
+    write: (/** @type {number} */ value) => value.toFixed(0),
+    read: (/** @type {PageState} */ state) => largest(state.speed_shares.slice(2), 100),
+  },
+  {
+    id: "command-round-trip",
+    place: "chart",
+    label: "Command round trip",
+    unit: "ms",
+    about: "From a joint state of the robot to the command that answers it, median of the last second",
+    full: 50,
+    warnAbove: 50,
+    write: (/** @type {number} */ value) => value.toFixed(1),
+    read: (/** @type {PageState} */ state) => scaled(state.bridge?.round_trip_s, 1000),
+  },
+  {
+    id: "page-round-trip",
+    place: "chart",
+    label: "Page round trip",
+    unit: "ms",
+    about: "From this page to the server and back",
+    full: 200,
+    warnAbove: 200,
+    write: (/** @type {number} */ value) => value.toFixed(0),
+    read: () => roundTrip.get(),
+  },
+]);
+
+/**
+ * @param {number|undefined} value
+ * @param {number} factor
+ */
+function scaled(value, factor) {
+  return value === undefined ? null : value * factor;
+}
+
+/**
+ * @param {readonly number[]} values
+ * @param {number} factor
+ */
+function largest(values, factor) {
+  return values.length === 0 ? null : factor * Math.max(...values);
+}
