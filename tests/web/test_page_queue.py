@@ -36,7 +36,7 @@ def test_a_rejection_has_a_reason_or_none(page: Page, server: PlayedServer) -> N
     until(page, lambda: ("/api/points/p2/reject", {"reason": "wrong cane"}) in server.posted)
     page.keyboard.press("r")
     page.keyboard.press("Escape")
-    expect(page.locator("rp-reason")).to_have_count(0)
+    expect(page.locator("rp-reject-form")).to_have_count(0)
     expect(page.locator('[data-point-id="p2"]')).to_be_focused()
     assert len(server.posted) == 2
     assert server.stops() == [], "a space in the reason is a character"

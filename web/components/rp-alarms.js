@@ -1,11 +1,11 @@
 // What needs somebody now, the worst first, each with what to do about it.
 
+import { clockWords, counted } from "../js/state/format.js";
+import { link, now, pageState, points } from "../js/state/page-state.js";
+import { drawOn } from "../js/state/signals.js";
 import { alarms } from "../js/views/alarms.js";
 import { element, setText } from "../js/views/dom.js";
 import { icon } from "../js/views/icons.js";
-import { link, now, pageState, points } from "../js/state/page-state.js";
-import { drawOn } from "../js/state/signals.js";
-import { clockWords, counted } from "../js/state/format.js";
 
 /** One that has gone stays for so long (ms), so that it can be read and the list does not flicker. */
 const LINGER_MS = 2000;

@@ -1,7 +1,7 @@
 // What the eye-in-hand camera sees, with the pruning points drawn on it; it can be held still, and clicked to add a point.
 
-import { place, placing } from "../js/control/placing.js";
-import { bring } from "../js/control/selection.js";
+import { placePoint, placing } from "../js/control/placing.js";
+import { selectAndReveal } from "../js/control/selection.js";
 import { POINT_WORDS, ageWords } from "../js/state/format.js";
 import { link, now, pageState, points, selected, staleWords } from "../js/state/page-state.js";
 import { drawOn, signal } from "../js/state/signals.js";
@@ -70,7 +70,7 @@ class CameraMarks {
         svg("path", { class: "sign" }),
         svg("title"),
       );
-      mark.addEventListener("click", () => bring(point.point_id));
+      mark.addEventListener("click", () => selectAndReveal(point.point_id));
       this.marks.set(point.point_id, mark);
       this.overlay.append(mark);
     }
@@ -200,7 +200,7 @@ class RpCamera extends HTMLElement {
     const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(toScreen.inverse());
     const [u, v] = [at.x / width, at.y / height];
     if (u < 0 || u > 1 || v < 0 || v > 1) return;
-    const name = await place("api/points/by-hand-in-image", { sequence: this.shownFrame, u, v });
+    const name = await placePoint("api/points/by-hand-in-image", { sequence: this.shownFrame, u, v });
     const held = this.held.get();
     // In an image that is held still the new point is where it was clicked.
     if (name && held !== null) this.held.set(new Map(held).set(name, [at.x, at.y]));

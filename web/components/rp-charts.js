@@ -12,7 +12,7 @@ import { READINGS } from "../js/views/readings.js";
  * @typedef {object} Plot
  * @property {readonly Sample[]} samples Oldest first; NaN where unknown.
  * @property {number} newest Time at the right edge (ms).
- * @property {number} full Least value of the upper edge.
+ * @property {number} fullScale Least value of the upper edge.
  * @property {readonly number[]} limits Drawn as broken lines.
  * @property {number|null} pointed Time that is pointed at (ms).
  */
@@ -26,7 +26,7 @@ const MINUTE_MS = 60_000;
  *
  * @param {HTMLCanvasElement} canvas
  */
-function prepared(canvas) {
+function prepareCanvas(canvas) {
   const scale = window.devicePixelRatio || 1;
   const [width, height] = [canvas.clientWidth, canvas.clientHeight];
   if (canvas.width !== Math.round(width * scale)) canvas.width = Math.round(width * scale);
@@ -41,18 +41,18 @@ function prepared(canvas) {
   return { pen, width, height, colour };
 }
 
-/** @typedef {NonNullable<ReturnType<typeof prepared>>} Sheet */
+/** @typedef {NonNullable<ReturnType<typeof prepareCanvas>>} Sheet */
 
 /**
  * @param {Sheet} sheet
  * @param {number} newest
  */
-function minutes({ pen, width, height, colour }, newest) {
+function drawMinutes({ pen, width, height, colour }, newest) {
   pen.strokeStyle = colour("line");
   pen.lineWidth = 1;
   pen.beginPath();
   for (let back = MINUTE_MS; back < SPAN_MS; back += MINUTE_MS) {
-    const x = Math.round(across(newest - back, newest, width)) + 0.5;
+    const x = Math.round(xAt(newest - back, newest, width)) + 0.5;
     pen.moveTo(x, 0);
     pen.lineTo(x, height);
   }
@@ -66,7 +66,7 @@ function minutes({ pen, width, height, colour }, newest) {
  * @param {number} newest
  * @param {number} width
  */
-function across(at, newest, width) {
+function xAt(at, newest, width) {
   return width * (1 - (newest - at) / SPAN_MS);
 }
 
@@ -75,9 +75,9 @@ function across(at, newest, width) {
  * @param {number|null} pointed
  * @param {number} newest
  */
-function pointer({ pen, width, height, colour }, pointed, newest) {
+function drawCursor({ pen, width, height, colour }, pointed, newest) {
   if (pointed === null) return;
-  const x = Math.round(across(pointed, newest, width)) + 0.5;
+  const x = Math.round(xAt(pointed, newest, width)) + 0.5;
   pen.strokeStyle = colour("ink");
   pen.setLineDash([]);
   pen.beginPath();
@@ -91,8 +91,8 @@ function pointer({ pen, width, height, colour }, pointed, newest) {
  *
  * @param {Plot} plot
  */
-function ceiling({ samples, full, limits }) {
-  let most = Math.max(full, ...limits.map((limit) => 1.1 * limit));
+function upperBound({ samples, fullScale, limits }) {
+  let most = Math.max(fullScale, ...limits.map((limit) => 1.1 * limit));
   for (const { value } of samples) if (value > most) most = 1.05 * value;
   return most;
 }
@@ -102,13 +102,13 @@ function ceiling({ samples, full, limits }) {
  * @param {Plot} plot
  */
 function drawLine(canvas, plot) {
-  const sheet = prepared(canvas);
+  const sheet = prepareCanvas(canvas);
   if (!sheet) return;
   const { pen, width, height, colour } = sheet;
-  const top = ceiling(plot);
+  const top = upperBound(plot);
   /** @param {number} value */
   const up = (value) => height - 2 - (height - 4) * Math.max(0, value / top);
-  minutes(sheet, plot.newest);
+  drawMinutes(sheet, plot.newest);
   pen.strokeStyle = colour("warn");
   pen.setLineDash([4, 3]);
   for (const limit of plot.limits) {
@@ -124,7 +124,7 @@ function drawLine(canvas, plot) {
   let before = /** @type {Sample|null} */ (null);
   for (const sample of plot.samples) {
     if (!Number.isNaN(sample.value)) {
-      const x = across(sample.at, plot.newest, width);
+      const x = xAt(sample.at, plot.newest, width);
       if (before && sample.at - before.at <= GAP_MS) pen.lineTo(x, up(sample.value));
       else pen.moveTo(x, up(sample.value));
     }
@@ -132,7 +132,7 @@ function drawLine(canvas, plot) {
   }
   pen.stroke();
   pen.lineWidth = 1;
-  pointer(sheet, plot.pointed, plot.newest);
+  drawCursor(sheet, plot.pointed, plot.newest);
 }
 
 /**
@@ -144,7 +144,7 @@ function drawLine(canvas, plot) {
  * @param {number|null} pointed
  */
 function drawBands(canvas, rows, newest, pointed) {
-  const sheet = prepared(canvas);
+  const sheet = prepareCanvas(canvas);
   if (!sheet) return;
   const { pen, width, height, colour } = sheet;
   const step = height / rows.length;
@@ -152,15 +152,15 @@ function drawBands(canvas, rows, newest, pointed) {
     const y = row * step + 2;
     for (const [index, sample] of samples.entries()) {
       const next = samples[index + 1]?.at ?? newest;
-      const x = across(sample.at, newest, width);
-      const wide = across(Math.min(next, sample.at + GAP_MS), newest, width) - x + 0.5;
+      const x = xAt(sample.at, newest, width);
+      const wide = xAt(Math.min(next, sample.at + GAP_MS), newest, width) - x + 0.5;
       pen.fillStyle = colour(sample.value > 0 ? "accent" : "bad");
       if (sample.value > 0) pen.fillRect(x, y, wide, step - 4);
       else pen.fillRect(x, y + step / 2 - 3, wide, 2);
     }
   });
-  minutes(sheet, newest);
-  pointer(sheet, pointed, newest);
+  drawMinutes(sheet, newest);
+  drawCursor(sheet, pointed, newest);
 }
 
 /**
@@ -190,7 +190,7 @@ export class RpCharts extends HTMLElement {
     this.pause = element("button", { id: "pause-charts", class: "quiet", text: "Pause", attributes: { type: "button" } });
     /** @type {Node[]} */
     this.tools = [this.when, this.pause];
-    this.figures = READINGS.map((reading) => figure(reading.id, reading.label, reading.about));
+    this.figures = READINGS.map((reading) => figure(reading.id, reading.label, reading.description));
     this.presence = figure("presence", "Processes", PROCESSES.join(", "));
   }
 
@@ -248,9 +248,9 @@ export class RpCharts extends HTMLElement {
       if (!each) return;
       const samples = shown.of(reading.id);
       const limits = [reading.warnAbove, reading.warnBelow].filter((limit) => limit !== undefined);
-      drawLine(each.canvas, { samples, newest, full: reading.full, limits, pointed });
+      drawLine(each.canvas, { samples, newest, fullScale: reading.fullScale, limits, pointed });
       const found = sampleAt(samples, pointed ?? newest);
-      const words = found ? `${reading.write(found.value)} ${reading.unit}`.trim() : "–";
+      const words = found ? `${reading.format(found.value)} ${reading.unit}`.trim() : "–";
       setText(each.value, words);
       const over = found !== null && (found.value > (reading.warnAbove ?? Infinity) || found.value < (reading.warnBelow ?? -Infinity));
       each.box.classList.toggle("warned", over);

@@ -2,11 +2,11 @@
 
 import { whyNot } from "../js/control/allowed.js";
 import { ask } from "../js/link/api.js";
-import { element, setEnabled } from "../js/views/dom.js";
 import { link, now, pageState, points } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
+import { element, setEnabled } from "../js/views/dom.js";
 
-/** @type {readonly (readonly [id: string, intent: string, word: string, hint: string])[]} */
+/** @type {readonly (readonly [id: string, intent: import("../js/control/allowed.js").Intent, word: string, hint: string])[]} */
 const BUTTONS = Object.freeze([
   ["arm", "Arm", "Arm", "Switch the drives on; nothing moves yet"],
   ["survey", "Survey", "Survey", "Drive along the row and look at every vine; nothing is cut"],

@@ -12,7 +12,7 @@ const CONFIRM_MS = 4000;
 class RpLease extends HTMLElement {
   give = button("grant-control", () => void ask("Granting control", "api/control/grant"));
   request = button("request-control", () => void ask("Asking for control", "api/control/request"));
-  take = button("take-control", () => this.taken());
+  take = button("take-control", () => this.confirmTake());
   /** Until when the second press counts (ms). */
   armed = 0;
   /** @type {number | null} */
@@ -51,11 +51,11 @@ class RpLease extends HTMLElement {
     const sure = performance.now() < this.armed;
     setText(this.take, !held ? "Take control" : sure ? "Really take it?" : "Take");
     this.take.title = held ? `Takes control from ${user}: the robot stops first, and they are told` : "";
-    this.tell(mine, control?.told_number ?? 0, control?.told ?? "");
+    this.announceLoss(mine, control?.told_number ?? 0, control?.told ?? "");
   }
 
   /** The first press on somebody else's control asks whether it is meant. */
-  taken() {
+  confirmTake() {
     const { held } = holder();
     if (held && performance.now() >= this.armed) {
       this.armed = performance.now() + CONFIRM_MS;
@@ -73,7 +73,7 @@ class RpLease extends HTMLElement {
    * @param {number} number
    * @param {string} told
    */
-  tell(mine, number, told) {
+  announceLoss(mine, number, told) {
     if (this.told !== null && number !== this.told && this.mine && !mine) showToast("warning", `You no longer hold control: ${told}`);
     this.told = number;
     this.mine = mine;

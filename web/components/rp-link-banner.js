@@ -1,10 +1,10 @@
 // The page has no link: what is shown is the last known state. It tries again by itself.
 
-import { element, setText } from "../js/views/dom.js";
-import { icon } from "../js/views/icons.js";
+import { ageWords, counted } from "../js/state/format.js";
 import { isOpening, link, now, stateAge } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
-import { ageWords, counted } from "../js/state/format.js";
+import { element, setText } from "../js/views/dom.js";
+import { icon } from "../js/views/icons.js";
 
 class RpLinkBanner extends HTMLElement {
   connectedCallback() {

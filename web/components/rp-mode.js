@@ -1,10 +1,10 @@
 // What the robot is doing, and why.
 
-import { element, setText } from "../js/views/dom.js";
-import { setIcon } from "../js/views/icons.js";
+import { MODE_WORDS, PHASE_WORDS, inWords } from "../js/state/format.js";
 import { isLive, link, now, pageState } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
-import { MODE_WORDS, PHASE_WORDS, inWords } from "../js/state/format.js";
+import { element, setText } from "../js/views/dom.js";
+import { setIcon } from "../js/views/icons.js";
 
 class RpMode extends HTMLElement {
   connectedCallback() {

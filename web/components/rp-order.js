@@ -1,9 +1,9 @@
 // The order of work, to be changed by dragging or by keys. Only rows in view are there, so that thousands cost nothing.
 
 import { moveTo, orderWords, plannersOrder, whyNoMove, whyNoPlannersOrder, workOrder } from "../js/control/order.js";
-import { bring, select } from "../js/control/selection.js";
+import { select, selectAndReveal } from "../js/control/selection.js";
 import { inWords } from "../js/state/format.js";
-import { brought, link, now, pageState, points, selected } from "../js/state/page-state.js";
+import { link, now, pageState, points, revealCount, selected } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
 import { element, setAttribute, setEnabled, setText } from "../js/views/dom.js";
 
@@ -53,7 +53,7 @@ class RpOrder extends HTMLElement {
       this.reveal(this.place(selected.get()));
       this.draw();
     });
-    drawOn([selected, brought], () => this.reveal(this.place(selected.get())));
+    drawOn([selected, revealCount], () => this.reveal(this.place(selected.get())));
     drawOn([points, pageState, link, now, selected], () => {
       setText(words, orderWords());
       setEnabled(back, whyNoPlannersOrder(), "Work in the order that the plan finds the quickest");
@@ -109,7 +109,7 @@ class RpOrder extends HTMLElement {
   /** @param {MouseEvent} event */
   choose(event) {
     const row = /** @type {Element} */ (event.target).closest(".order-row");
-    if (row instanceof HTMLElement) bring(row.dataset.pointId ?? "");
+    if (row instanceof HTMLElement) selectAndReveal(row.dataset.pointId ?? "");
   }
 
   /** @param {KeyboardEvent} event */

@@ -1,9 +1,9 @@
 // What is known of the chosen point: the picture it was found in, and the figures behind the cut.
 
 import { move, whyNotMove } from "../js/control/decisions.js";
-import { element, setEnabled, setText } from "../js/views/dom.js";
 import { turnApproach, whyNotTurn } from "../js/control/order.js";
 import { newtons, uncertainty } from "../js/state/format.js";
+import { element, setEnabled, setText } from "../js/views/dom.js";
 
 /** @typedef {import("../js/link/messages.js").PagePoint} PagePoint */
 /** @typedef {import("../js/link/messages.js").PruningPoint} PruningPoint */

@@ -1,7 +1,7 @@
 // One row of the queue: a pruning point, why it is where it is, and what may be done with it.
 
-import { accept, isUnknown, isUnsure, reject, whyNotAccept, whyNotReject } from "../js/control/decisions.js";
-import { bring, select } from "../js/control/selection.js";
+import { accept, isUncertain, isUnknown, reject, whyNotAccept, whyNotReject } from "../js/control/decisions.js";
+import { select, selectAndReveal } from "../js/control/selection.js";
 import { TEXT_MAX_LENGTH } from "../js/link/messages.js";
 import { POINT_WORDS, counted, inWords } from "../js/state/format.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
@@ -9,7 +9,7 @@ import { icon, setIcon } from "../js/views/icons.js";
 
 const USUAL = Object.freeze(["wrong cane", "wrong place", "too near a wire", "leave it"]);
 
-export class RpReason extends HTMLElement {
+export class RpRejectForm extends HTMLElement {
   constructor() {
     super();
     /** @type {PagePoint|null} */
@@ -68,7 +68,7 @@ export class RpReason extends HTMLElement {
     if (row) void reject(row, reason);
   }
 }
-customElements.define("rp-reason", RpReason);
+customElements.define("rp-reject-form", RpRejectForm);
 
 /** @typedef {import("../js/link/messages.js").PagePoint} PagePoint */
 /** @param {PagePoint} row */
@@ -116,7 +116,7 @@ export class RpPoint extends HTMLElement {
       this.reason,
     );
     this.addEventListener("click", (event) => {
-      if (this.row && !(/** @type {Element} */ (event.target).closest("button"))) bring(this.row.point.point_id);
+      if (this.row && !(/** @type {Element} */ (event.target).closest("button"))) selectAndReveal(this.row.point.point_id);
     });
     this.addEventListener("focus", () => this.choose());
   }
@@ -161,7 +161,7 @@ export class RpPoint extends HTMLElement {
     // Rounded down: what reads like enough to be accepted with all others is enough.
     const sure = `${Math.floor(100 * point.confidence + 1e-9)} %`;
     const planned = row.plan?.order ? `no. ${row.plan.order}, way ${row.plan.duration_s.toFixed(1)} s` : "";
-    setText(this.facts, `${point.nodes_kept}/${point.nodes_seen} nodes · ${thick} · ${isUnsure(row) ? "only " : ""}${sure}`);
+    setText(this.facts, `${point.nodes_kept}/${point.nodes_seen} nodes · ${thick} · ${isUncertain(row) ? "only " : ""}${sure}`);
     const kept = `Keeps ${point.nodes_kept} of ${counted(point.nodes_seen, "node")}`;
     this.facts.title = `${kept}; the cane is ${thick} thick; confidence ${sure}${planWords(row)}`;
     setText(this.reason, inWords([planned, entry.reason, point.reason].filter(Boolean).join(" · ")));

@@ -2,7 +2,7 @@
 
 import { whyNot } from "../js/control/allowed.js";
 import { workOrder } from "../js/control/order.js";
-import { approve, askPreview, cutAt, hide, isThere, moment, play, playing, require, show, whyNoApproval, whyNoPreview } from "../js/control/preview.js";
+import { approve, askPreview, cutAt, hasPreview, hide, moment, play, playing, require, show, whyNoApproval, whyNoPreview } from "../js/control/preview.js";
 import { inWords } from "../js/state/format.js";
 import { link, now, pageState, points, preview, selected } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
@@ -59,7 +59,7 @@ class RpPreview extends HTMLElement {
       required.checked = state?.required ?? false;
       setEnabled(required, whyNot("RequirePreview"), "No cut begins before its preview has been approved");
       label.title = required.title;
-      player.hidden = !isThere();
+      player.hidden = !hasPreview();
       this.dataset.phase = state?.phase ?? "none";
       const at = moment.get() ?? 0;
       slider.max = String(state?.duration_s ?? 0);

@@ -1,23 +1,23 @@
 // The queue of pruning points, by vine and spur; arrows, A, R, Z and N work from the keyboard.
 
 import { countOf, whyNot } from "../js/control/allowed.js";
-import { accept, acceptAll, decisions, sureOnes, undo, whyNoUndo, whyNotAccept, whyNotReject } from "../js/control/decisions.js";
+import { accept, acceptAll, confidentPoints, decisions, undo, whyNoUndo, whyNotAccept, whyNotReject } from "../js/control/decisions.js";
 import { placing, setPlacing, whyNoPlacing } from "../js/control/placing.js";
 import { select } from "../js/control/selection.js";
 import { SURE } from "../js/link/messages.js";
 import { counted } from "../js/state/format.js";
-import { brought, link, now, pageState, points, selected, staleWords } from "../js/state/page-state.js";
+import { link, now, pageState, points, revealCount, selected, staleWords } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
 import { element, panelHead, setAttribute, setEnabled, setText } from "../js/views/dom.js";
 import { icon } from "../js/views/icons.js";
-import { guardLookAgain, placeItem, placeWords } from "../js/views/look-again.js";
+import { undecidedList } from "../js/views/undecided-sites.js";
 import { RpPointDetails } from "./rp-point-details.js";
-import { RpPoint, RpReason } from "./rp-point.js";
+import { RpPoint, RpRejectForm } from "./rp-point.js";
 
 /** @typedef {import("../js/link/messages.js").PagePoint} PagePoint */
 
 /** What a row's buttons depend on. */
-const MAY = Object.freeze(["AcceptPoint", "RejectPoint", "ResolvePoint"]);
+const MAY = /** @type {const} */ (["AcceptPoint", "RejectPoint", "ResolvePoint"]);
 /** How long a process has been gone is in the reasons too, and grows all the time. */
 const AGE = /[\d.]+ (s|min|h)\b/g;
 /** Height of a group's heading, which stays at the top of the list (px). */
@@ -42,11 +42,11 @@ class RpQueue extends HTMLElement {
     const list = element("div", { class: "groups", attributes: { role: "group", "aria-label": "Pruning points" } });
     const empty = element("div", { class: "empty", attributes: { role: "status" } });
     const open = [
-      abstainedList("another look", (count) => `${counted(count, "place")} ${count === 1 ? "needs" : "need"} another look`),
-      abstainedList("operator", (count) => `${counted(count, "place")} for you to decide`),
+      undecidedList("another look", (count) => `${counted(count, "place")} ${count === 1 ? "needs" : "need"} another look`),
+      undecidedList("operator", (count) => `${counted(count, "place")} for you to decide`),
     ];
     list.addEventListener("keydown", (event) => this.key(event));
-    list.addEventListener("reject", (event) => this.askWhy(/** @type {RpPoint} */ (event.target)));
+    list.addEventListener("reject", (event) => this.openRejectForm(/** @type {RpPoint} */ (event.target)));
     this.append(head, document.createElement("rp-rule"), orderOfWork(), element("div", { class: "queue-tools" }, summary, acceptEvery(), addByHand()), list, empty, element("div", { class: "open-places" }, ...open.map((each) => each.box)));
 
     /** @type {Map<string, HTMLElement>} */
@@ -62,7 +62,7 @@ class RpQueue extends HTMLElement {
       setText(source, page?.segmenter ?? "");
       setText(empty, emptyWords());
       // States come ten times a second; the rows change with the points, and with what may be done with them.
-      this.follow(pageState.get()?.controller?.active_point_id ?? "");
+      this.markActive(pageState.get()?.controller?.active_point_id ?? "");
       const may = MAY.map(whyNot).join("\n").replace(AGE, "");
       if (page === drawnPage && may === drawn) return;
       drawnPage = page;
@@ -71,12 +71,12 @@ class RpQueue extends HTMLElement {
       setText(summary, summaryWords(this.order));
       empty.hidden = this.order.length > 0;
       for (const each of open) each.show(page?.abstained ?? []);
-      this.place(list, groups, may);
+      this.placeRows(list, groups, may);
       this.rows.get(this.active)?.mark(true);
       this.choose();
     });
     drawOn([selected], () => this.choose());
-    drawOn([brought], () => this.reveal());
+    drawOn([revealCount], () => this.reveal());
     this.list = list;
   }
 
@@ -90,10 +90,10 @@ class RpQueue extends HTMLElement {
   list;
   /** The point that the robot is at. */
   active = "";
-  reason = new RpReason();
+  reason = new RpRejectForm();
 
   /** @param {string} pointId */
-  follow(pointId) {
+  markActive(pointId) {
     if (pointId === this.active) return;
     this.rows.get(this.active)?.mark(false);
     this.rows.get(pointId)?.mark(true);
@@ -112,20 +112,20 @@ class RpQueue extends HTMLElement {
     }
     this.chosen = pointId;
     this.reachable = reachable;
-    this.explain(this.order.find((row) => row.point.point_id === pointId));
+    this.showDetails(this.order.find((row) => row.point.point_id === pointId));
   }
 
   reachable = "";
 
   /** @param {RpPoint} item */
-  askWhy(item) {
+  openRejectForm(item) {
     if (item.row) this.reason.open(item.row, item);
   }
 
   details = new RpPointDetails();
 
   /** @param {PagePoint|undefined} row The chosen one. */
-  explain(row) {
+  showDetails(row) {
     const item = row && this.rows.get(row.point.point_id);
     if (!item) {
       this.details.remove();
@@ -160,7 +160,7 @@ class RpQueue extends HTMLElement {
    * @param {Map<string, HTMLElement>} groups
    * @param {string} may What may be done with points now.
    */
-  place(list, groups, may) {
+  placeRows(list, groups, may) {
     const rows = this.order;
     const wantedRows = new Set(rows.map((row) => row.point.point_id));
     const wantedGroups = new Set(rows.map(groupOf));
@@ -239,7 +239,7 @@ function acceptEvery() {
   const button = element("button", { id: "accept-all", attributes: { type: "button" } });
   button.addEventListener("click", () => void acceptAll());
   drawOn([points, pageState, link, now], () => {
-    const sure = sureOnes().length;
+    const sure = confidentPoints().length;
     const unsure = countOf("PROPOSED") - sure;
     const words = `≥ ${Math.round(100 * SURE)} % sure`;
     setText(button, `Accept all ${sure} (${words})`);
@@ -258,34 +258,6 @@ function addByHand() {
     button.setAttribute("aria-pressed", String(placing.get()));
   });
   return button;
-}
-
-/**
- * The places without a point that need one thing.
- *
- * @param {import("../js/link/messages.js").Need} needs
- * @param {(count: number) => string} title
- */
-function abstainedList(needs, title) {
-  const summary = element("summary");
-  const list = element("ul");
-  const box = element("details", { class: "abstained", attributes: { "data-needs": needs } }, summary, list);
-  guardLookAgain(list);
-  let shown = "";
-  return {
-    box,
-    /** @param {readonly import("../js/link/messages.js").Abstention[]} all */
-    show(all) {
-      const places = all.filter((each) => each.needs === needs);
-      const lines = places.map(placeWords);
-      box.hidden = lines.length === 0;
-      const key = places.map((each, k) => `${lines[k]} ${each.position !== null}`).join("\n");
-      if (key === shown) return;
-      shown = key;
-      setText(summary, title(lines.length));
-      list.replaceChildren(...places.map(placeItem));
-    },
-  };
 }
 
 /** @param {readonly PagePoint[]} rows */

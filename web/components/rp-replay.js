@@ -1,9 +1,9 @@
 // A recording that is played in the robot's place: where it stands, its scrubber, and who accepted which point.
 
 import { ask } from "../js/link/api.js";
-import { element, setText } from "../js/views/dom.js";
 import { pageState, points } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
+import { element, setText } from "../js/views/dom.js";
 
 class RpReplay extends HTMLElement {
   toggle = element("button", { id: "replay-toggle", attributes: { type: "button" } });

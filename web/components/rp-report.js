@@ -1,7 +1,7 @@
 // The session's report: cuts by outcome, the time they took, by vine, what was refused, and who held control.
 
-import { element, setText } from "../js/views/dom.js";
 import { POINT_WORDS, clockWords, inWords } from "../js/state/format.js";
+import { element, setText } from "../js/views/dom.js";
 
 /** @typedef {import("../js/link/messages.js").SessionReport} SessionReport */
 

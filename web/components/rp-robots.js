@@ -11,15 +11,15 @@ import { setIcon } from "../js/views/icons.js";
 
 const KEY = `history of ${location.pathname}`;
 
-/** When samples were taken (ms since 1970), and what was read: one row a name, null where it was unknown. @typedef {{ at: number[], rows: (number|null)[][] }} Kept */
+/** When samples were taken (ms since 1970), and what was read: one row a name, null where it was unknown. @typedef {{ at: number[], rows: (number|null)[][] }} StoredHistory */
 
-function keepHistoryOver() {
-  takeBack();
-  window.addEventListener("pagehide", () => sessionStorage.setItem(KEY, JSON.stringify(kept())));
+function persistHistory() {
+  restoreHistory();
+  window.addEventListener("pagehide", () => sessionStorage.setItem(KEY, JSON.stringify(snapshot())));
 }
 
-/** @returns {Kept} */
-function kept() {
+/** @returns {StoredHistory} */
+function snapshot() {
   const rows = history.names.map((name) => history.of(name));
   const short = (/** @type {number} */ value) => (Number.isNaN(value) ? null : Number(value.toPrecision(5)));
   return {
@@ -28,10 +28,10 @@ function kept() {
   };
 }
 
-function takeBack() {
+function restoreHistory() {
   const text = sessionStorage.getItem(KEY);
   if (text === null) return;
-  /** @type {Kept} */
+  /** @type {StoredHistory} */
   const { at, rows } = JSON.parse(text);
   // Another version of this page may have kept other readings.
   if (rows.length !== history.names.length) return;
@@ -39,10 +39,10 @@ function takeBack() {
   history.count = 0;
   at.forEach((wall, index) => {
     const sampled = wall - performance.timeOrigin;
-    if (performance.now() - sampled < SPAN_MS) history.take(sampled, rows.map((row) => row[index] ?? null));
+    if (performance.now() - sampled < SPAN_MS) history.add(sampled, rows.map((row) => row[index] ?? null));
   });
   const fresh = since.names.map((name) => since.of(name));
-  fresh[0]?.forEach((sample, index) => history.take(sample.at, fresh.map((samples) => samples[index]?.value ?? null)));
+  fresh[0]?.forEach((sample, index) => history.add(sample.at, fresh.map((samples) => samples[index]?.value ?? null)));
 }
 
 /**
@@ -72,7 +72,7 @@ class RpRobots extends HTMLElement {
     this.setAttribute("role", "navigation");
     this.setAttribute("aria-label", "Robots");
     this.append(this.list);
-    keepHistoryOver();
+    persistHistory();
     void this.ask();
   }
 

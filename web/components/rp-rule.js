@@ -1,7 +1,7 @@
 // The pruning rule. A slider only asks what another one would change; applied, it holds, and Undo takes it back.
 
 import { whyNothing } from "../js/control/allowed.js";
-import { remember } from "../js/control/decisions.js";
+import { pushUndo } from "../js/control/decisions.js";
 import { ask, post } from "../js/link/api.js";
 import { isLive, link, now, pageState, points } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
@@ -20,7 +20,7 @@ function tryRule(rule) {
 async function applyRule(rule) {
   const done = await ask("The rule", "api/rule", rule);
   // Taken back while it is still in force, or refused: somebody else's rule is not undone from here.
-  if (done) remember(`the rule ${ruleWords(rule)}`, () => ask("Taking the rule back", "api/rule/undo", rule));
+  if (done) pushUndo(`the rule ${ruleWords(rule)}`, () => ask("Taking the rule back", "api/rule/undo", rule));
   return done;
 }
 
@@ -39,7 +39,7 @@ function ruleWords(rule) {
 const SETTLE_MS = 150;
 const AGAIN_MS = 1000;
 /** So long (ms) an applied rule is shown before perception has said that it holds. */
-const PATIENCE_MS = 2500;
+const APPLIED_TIMEOUT_MS = 2500;
 
 /** @type {readonly { name: Quantity, label: string, unit: string, scale: number, range: [number, number, number] }[]} */
 const QUANTITIES = Object.freeze([
@@ -178,7 +178,7 @@ class RpRule extends HTMLElement {
     window.setTimeout(() => {
       if (this.applied === rule) this.applied = null;
       this.draw();
-    }, PATIENCE_MS);
+    }, APPLIED_TIMEOUT_MS);
     this.draw();
   }
 

@@ -1,16 +1,16 @@
 // The 3-D view, in a frame of the same origin. Its keys and drags are watched, because they do not reach this page.
 
 import { listenForDriveKeys } from "../js/control/driving.js";
-import { element } from "../js/views/dom.js";
-import { listenForViewKeys } from "../js/control/view-tools.js";
-import { link } from "../js/state/page-state.js";
 import { listenForSpace } from "../js/control/stop.js";
 import { listenForDrag, listenForHoldKey } from "../js/control/teleoperation.js";
+import { listenForViewKeys } from "../js/control/view-tools.js";
+import { link } from "../js/state/page-state.js";
+import { element } from "../js/views/dom.js";
 
 /** Below this width (px) the 3-D client lays its own panel over the view, as on a telephone. */
 const LEAST_WIDTH = 600;
 /** Whoever has seen nothing for so long (ms) is told what may be the matter. */
-const LONG_MS = 20_000;
+const LOAD_TIMEOUT_MS = 20_000;
 
 class RpScene extends HTMLElement {
   connectedCallback() {
@@ -21,7 +21,7 @@ class RpScene extends HTMLElement {
     const waiting = element("div", { class: "empty", attributes: { role: "status" } }, words, retry);
     this.append(waiting, frame);
 
-    let patience = 0;
+    let timeout = 0;
     /** @param {string} text */
     const fail = (text) => {
       words.textContent = text;
@@ -31,10 +31,10 @@ class RpScene extends HTMLElement {
       words.textContent = "Loading the 3-D view…";
       retry.hidden = true;
       waiting.hidden = false;
-      window.clearTimeout(patience);
-      patience = window.setTimeout(
+      window.clearTimeout(timeout);
+      timeout = window.setTimeout(
         () => fail("The 3-D view shows nothing yet; this browser may lack WebGL. Everything else works without it."),
-        LONG_MS,
+        LOAD_TIMEOUT_MS,
       );
       frame.classList.remove("loaded");
       frame.src = "viser/";
@@ -44,7 +44,7 @@ class RpScene extends HTMLElement {
       if (!view || !frame.getAttribute("src")) return;
       const there = frame.contentDocument?.querySelector("#root, canvas") ?? null;
       if (there === null) {
-        window.clearTimeout(patience);
+        window.clearTimeout(timeout);
         fail("The 3-D view did not load. Everything else works without it.");
         return;
       }
@@ -59,7 +59,7 @@ class RpScene extends HTMLElement {
       if (!root.dataset.view) root.dataset.view = "untold";
       const look = () => {
         if (root.dataset.view === "loading") return;
-        window.clearTimeout(patience);
+        window.clearTimeout(timeout);
         waiting.hidden = true;
       };
       new MutationObserver(look).observe(root, { attributeFilter: ["data-view"] });

@@ -1,12 +1,12 @@
 // Who is signed in, which process is there, and how good the link is.
 
 import { post } from "../js/link/api.js";
-import { element, setText } from "../js/views/dom.js";
-import { icon, setIcon } from "../js/views/icons.js";
 import { PROCESSES } from "../js/link/messages.js";
+import { ageWords } from "../js/state/format.js";
 import { isLive, isOpening, link, now, pageState, processAge, roundTrip, say, stateAge } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
-import { ageWords } from "../js/state/format.js";
+import { element, setText } from "../js/views/dom.js";
+import { icon, setIcon } from "../js/views/icons.js";
 
 class RpStatusBar extends HTMLElement {
   connectedCallback() {

@@ -1,7 +1,7 @@
 // After a stop: who pressed it and why, who has latched it, and the way out with a reason.
 
 import { whyNot } from "../js/control/allowed.js";
-import { buttonPressed, earlierWords, sinceWords, stopProgress } from "../js/control/stop.js";
+import { earlierWords, hardwareStopPressed, sinceWords, stopProgress } from "../js/control/stop.js";
 import { ask } from "../js/link/api.js";
 import { TEXT_MAX_LENGTH } from "../js/link/messages.js";
 import { isLive, link, now, pageState, staleWords } from "../js/state/page-state.js";
@@ -63,7 +63,7 @@ class RpStopBanner extends HTMLElement {
       const before = earlierWords(state);
       earlier.hidden = before === "";
       setText(earlier, before);
-      const pressed = buttonPressed(state) ? "Release the emergency stop button on the robot first" : "";
+      const pressed = hardwareStopPressed(state) ? "Release the emergency stop button on the robot first" : "";
       const why = pressed || whyNot("Reset") || (reason.value.trim() === "" ? "Write a reason first" : "");
       setEnabled(reset, why, "Release the latched stop; nothing moves");
     };

@@ -1,9 +1,9 @@
 // The software stop: always there, always on top, pressed with a finger, the mouse or the space bar.
 
+import { multiRobot, stopProgress, stopRobot } from "../js/control/stop.js";
+import { drawOn } from "../js/state/signals.js";
 import { element, setText } from "../js/views/dom.js";
 import { icon } from "../js/views/icons.js";
-import { drawOn } from "../js/state/signals.js";
-import { several, stopProgress, stopRobot } from "../js/control/stop.js";
 
 /** @type {Readonly<Record<import("../js/control/stop.js").StopProgress, string>>} */
 const WORDS = Object.freeze({
@@ -23,11 +23,11 @@ class RpStop extends HTMLElement {
         attributes: {
           type: "button",
           "aria-keyshortcuts": "Space",
-          title: `Stops base and arm${several ? " of every robot" : ""}. Space bar does the same.`,
+          title: `Stops base and arm${multiRobot ? " of every robot" : ""}. Space bar does the same.`,
         },
       },
       icon("ESTOP_LATCHED"),
-      element("span", { class: "stop-words" }, label, element("small", { text: several ? "all robots · space bar" : "space bar" })),
+      element("span", { class: "stop-words" }, label, element("small", { text: multiRobot ? "all robots · space bar" : "space bar" })),
     );
     // On pressing down, not on letting go: a finger that slides off has still stopped the robot.
     button.addEventListener("pointerdown", (event) => {

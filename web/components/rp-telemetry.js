@@ -24,14 +24,14 @@ class RpGauge extends HTMLElement {
   warning = element("span", { class: "gauge-warning" });
 
   /** @param {Reading} kind */
-  begin(kind) {
+  init(kind) {
     this.kind = kind;
     this.dataset.gauge = kind.id;
-    this.title = kind.about;
+    this.title = kind.description;
     this.setAttribute("role", "meter");
     this.setAttribute("aria-label", kind.label);
     this.setAttribute("aria-valuemin", "0");
-    this.setAttribute("aria-valuemax", String(kind.full));
+    this.setAttribute("aria-valuemax", String(kind.fullScale));
     const trend = svg("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, class: "trend-box", "aria-hidden": "true" }, this.line);
     this.append(
       element("span", { class: "label", text: kind.label }),
@@ -45,19 +45,19 @@ class RpGauge extends HTMLElement {
   show(value) {
     const kind = this.kind;
     if (!kind) return;
-    setText(this.value, value === null ? "–" : kind.write(value));
-    const share = value === null ? 0 : Math.min(1, Math.max(0, value / kind.full));
+    setText(this.value, value === null ? "–" : kind.format(value));
+    const share = value === null ? 0 : Math.min(1, Math.max(0, value / kind.fullScale));
     this.fill.style.setProperty("width", `${(100 * share).toFixed(1)}%`);
     const low = value !== null && kind.warnBelow !== undefined && value < kind.warnBelow;
     const high = value !== null && kind.warnAbove !== undefined && value > kind.warnAbove;
     this.dataset.warning = low ? "low" : high ? "high" : "";
     setText(this.warning, low ? "▾ low" : high ? "▴ high" : "");
-    this.setAttribute("aria-valuetext", value === null ? "unknown" : `${kind.write(value)} ${kind.unit}`);
-    this.setAttribute("aria-valuenow", value === null ? "0" : String(Math.min(kind.full, Math.max(0, value))));
+    this.setAttribute("aria-valuetext", value === null ? "unknown" : `${kind.format(value)} ${kind.unit}`);
+    this.setAttribute("aria-valuenow", value === null ? "0" : String(Math.min(kind.fullScale, Math.max(0, value))));
   }
 
   /** Take the value into the trend. @param {number|null} value */
-  remember(value) {
+  addSample(value) {
     const kind = this.kind;
     if (!kind) return;
     this.samples.push(value);
@@ -66,7 +66,7 @@ class RpGauge extends HTMLElement {
     const corners = this.samples.flatMap((sample, index) => {
       if (sample === null) return [];
       const x = ((first + index) / (SAMPLES - 1)) * WIDTH;
-      const y = HEIGHT - 1 - Math.min(1, Math.max(0, sample / kind.full)) * (HEIGHT - 2);
+      const y = HEIGHT - 1 - Math.min(1, Math.max(0, sample / kind.fullScale)) * (HEIGHT - 2);
       return [`${x.toFixed(1)},${y.toFixed(1)}`];
     });
     this.line.setAttribute("points", corners.join(" "));
@@ -85,7 +85,7 @@ class RpTelemetry extends HTMLElement {
     this.append(head);
     const gauges = SHOWN.map((reading) => {
       const gauge = new RpGauge();
-      gauge.begin(reading);
+      gauge.init(reading);
       (reading.place === "engineer" ? engineers : this).append(gauge);
       return gauge;
     });
@@ -108,7 +108,7 @@ class RpTelemetry extends HTMLElement {
       setText(note, words);
       this.classList.toggle("stale", words !== "");
       const live = isLive("bridge") && isLive("controller");
-      gauges.forEach((gauge, index) => gauge.remember(live ? (values[index] ?? null) : null));
+      gauges.forEach((gauge, index) => gauge.addSample(live ? (values[index] ?? null) : null));
     });
     gauges.forEach((gauge) => gauge.show(null));
     setText(title, "For engineers");

@@ -156,7 +156,7 @@ class RpTeleoperation extends HTMLElement {
       attributes: { type: "range", min: "10", max: "100", step: "10", value: "100", "aria-label": "Speed by hand in per cent" },
     });
     const percent = element("span", { class: "number", text: "100 %" });
-    speed.addEventListener("input", () => hold.share.set(Number(speed.value) / 100));
+    speed.addEventListener("input", () => hold.speedScale.set(Number(speed.value) / 100));
     const pace = element("label", { class: "pace" }, "Speed", speed, percent);
 
     const holdWords = element("span", { text: "Hold to move" });
@@ -173,7 +173,7 @@ class RpTeleoperation extends HTMLElement {
     const words = element("p", { class: "hint", attributes: { role: "status" } });
     this.append(toggle, what, pace, frame, button, pad, joints, words);
 
-    drawOn([teleoperating, moving, axes, hold.holding, hold.share, pageState, link, now], () => {
+    drawOn([teleoperating, moving, axes, hold.holding, hold.speedScale, pageState, link, now], () => {
       const on = teleoperating.get();
       const why = whyNoTeleoperation();
       const holding = hold.holding.get();
@@ -190,7 +190,7 @@ class RpTeleoperation extends HTMLElement {
       pad.hidden = !on || part !== "base";
       joints.hidden = !on || part !== "joints";
       setText(holdWords, holding ? "Moving…" : "Hold to move");
-      setText(percent, `${Math.round(100 * hold.share.get())} %`);
+      setText(percent, `${Math.round(100 * hold.speedScale.get())} %`);
       const controller = pageState.get()?.controller ?? null;
       const held = (holding && controller?.held_by) || "";
       setText(words, held ? `${held[0]?.toUpperCase()}${held.slice(1)}.` : explanation(why, holding, part, nearWords(controller)));

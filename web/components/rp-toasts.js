@@ -1,10 +1,10 @@
 // Short notices above the log. They are in the log as well.
 
-import { element } from "../js/views/dom.js";
-import { icon } from "../js/views/icons.js";
+import { inWords } from "../js/state/format.js";
 import { dismissToast, toasts } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
-import { inWords } from "../js/state/format.js";
+import { element } from "../js/views/dom.js";
+import { icon } from "../js/views/icons.js";
 
 class RpToasts extends HTMLElement {
   connectedCallback() {

@@ -20,35 +20,35 @@ import "../components/rp-telemetry.js";
 import "../components/rp-teleoperation.js";
 import "../components/rp-toasts.js";
 import "../components/rp-view-tools.js";
-import { isBound } from "./control/decisions.js";
+import { isAccepted } from "./control/decisions.js";
 import { listenForDriveKeys, watchGamepad } from "./control/driving.js";
 import { followWork } from "./control/follow-work.js";
-import { keepControl } from "./control/lease.js";
-import { guardPlacing } from "./control/placing.js";
-import { listenForSpace, several } from "./control/stop.js";
-import { guardHold } from "./control/teleoperation.js";
-import { guardLooking } from "./control/view-tools.js";
+import { renewLease } from "./control/lease.js";
+import { initPlacing } from "./control/placing.js";
+import { listenForSpace, multiRobot } from "./control/stop.js";
+import { initTeleoperation } from "./control/teleoperation.js";
+import { initViewTools } from "./control/view-tools.js";
 import { socket } from "./link/socket.js";
 import { now, points } from "./state/page-state.js";
-import { explainGreyed } from "./views/disabled-reasons.js";
-import { keepHistory } from "./views/history.js";
+import { explainDisabled } from "./views/disabled-reasons.js";
+import { recordHistory } from "./views/history.js";
 
-explainGreyed(document);
+explainDisabled(document);
 listenForSpace(window);
-guardHold();
+initTeleoperation();
 listenForDriveKeys(window);
 watchGamepad();
-guardPlacing();
-keepHistory();
-keepControl();
-guardLooking();
+initPlacing();
+recordHistory();
+renewLease();
+initViewTools();
 followWork();
 window.setInterval(() => now.set(performance.now()), 250);
 socket.open();
 // What is about accepted points comes with the first of them, or later where the link was lost just then.
 let coming = false;
 const wait = points.subscribe(async (page) => {
-  if (coming || !page?.points.some((row) => isBound(row))) return;
+  if (coming || !page?.points.some((row) => isAccepted(row))) return;
   coming = true;
   try {
     await Promise.all([import("../components/rp-order.js"), import("../components/rp-preview.js")]);
@@ -57,7 +57,7 @@ const wait = points.subscribe(async (page) => {
     coming = false;
   }
 });
-if (several) {
+if (multiRobot) {
   // The room is there from the first picture on.
   document.querySelector("rp-robots")?.removeAttribute("hidden");
   void import("../components/rp-robots.js");

@@ -1,11 +1,11 @@
 // What the operator may ask for now, and why not.
 
-import { INTENTS, OF_HOLDER } from "../link/messages.js";
+import { OF_HOLDER } from "../link/messages.js";
 import { MODE_WORDS } from "../state/format.js";
 import { isLive, link, pageState, points, preview, staleWords } from "../state/page-state.js";
 import { holder } from "./lease.js";
 
-/** Where each request belongs, in words. @type {Readonly<Record<string, string>>} */
+/** Where each request belongs, in words. */
 const NEEDS = Object.freeze({
   Arm: "Arming starts from Idle",
   Start: "Starting needs Ready",
@@ -29,6 +29,8 @@ const NEEDS = Object.freeze({
   ResolvePoint: "How a cut ended cannot be said",
 });
 
+/** @typedef {keyof typeof NEEDS} Intent */
+
 /** Why this page can ask for nothing now; empty when it can. */
 export function whyNothing() {
   const { status } = link.get();
@@ -43,7 +45,7 @@ export function whyNothing() {
 /**
  * Why a request would be refused now; empty when the controller would take it.
  *
- * @param {string} intent Name of the intent, as in `ControllerState.allowed`.
+ * @param {Intent} intent Name of the intent, as in `ControllerState.allowed`.
  */
 export function whyNot(intent) {
   const nothing = whyNothing();
@@ -53,7 +55,6 @@ export function whyNot(intent) {
   // After a fault nobody moves anything by acknowledging it.
   const ofHolder = OF_HOLDER.includes(intent) && controller.mode !== "FAULT";
   if (controller.allowed.includes(intent)) return ofHolder ? whyNotHolder() : "";
-  if (!INTENTS.includes(/** @type {any} */ (intent))) return `There is no ${intent}`;
   if (intent === "Start" && controller.mode === "READY" && countOf("ACCEPTED") === 0) {
     return countOf("UNREACHABLE") > 0 ? "No accepted point can be reached" : "Accept a point first";
   }

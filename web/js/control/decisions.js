@@ -1,11 +1,11 @@
 // What a person decides about points, and how it is taken back.
 
-import { whyNot, whyNothing } from "./allowed.js";
 import { ask } from "../link/api.js";
 import { SURE } from "../link/messages.js";
+import { POINT_WORDS, counted } from "../state/format.js";
 import { isLive, points, say } from "../state/page-state.js";
 import { signal } from "../state/signals.js";
-import { POINT_WORDS, counted } from "../state/format.js";
+import { whyNot, whyNothing } from "./allowed.js";
 
 /** @typedef {import("../link/messages.js").PagePoint} PagePoint */
 /** @typedef {import("../link/messages.js").PointState} PointState */
@@ -35,7 +35,7 @@ export function isUnknown(row) {
  *
  * @param {PagePoint|undefined} row
  */
-export function isBound(row) {
+export function isAccepted(row) {
   return row?.entry.state === "ACCEPTED" || row?.entry.state === "UNREACHABLE";
 }
 
@@ -58,7 +58,7 @@ export function whyNotReject(row) {
 export async function accept(row) {
   if (isUnknown(row)) return resolve(row, "DONE", "seen by eye");
   const done = await send(row, "Accepting", "accept", { revision: row.point.revision, digest: row.point.digest });
-  if (done) remember(`accepted ${row.point.point_id}`, () => goBack(row));
+  if (done) pushUndo(`accepted ${row.point.point_id}`, () => restore(row));
   return done;
 }
 
@@ -69,7 +69,7 @@ export async function accept(row) {
 export async function reject(row, reason) {
   if (isUnknown(row)) return resolve(row, "FAILED_NOT_CUT", reason || "seen by eye");
   const done = await send(row, "Rejecting", "reject", { reason });
-  if (done) remember(`rejected ${row.point.point_id}`, () => goBack(row));
+  if (done) pushUndo(`rejected ${row.point.point_id}`, () => restore(row));
   return done;
 }
 
@@ -78,23 +78,23 @@ export async function reject(row, reason) {
  *
  * @param {PagePoint} row
  */
-export function isUnsure(row) {
+export function isUncertain(row) {
   return row.entry.state === "PROPOSED" && row.point.confidence < SURE;
 }
 
 /** Proposed points that may be accepted all at once. */
-export function sureOnes() {
-  return (points.get()?.points ?? []).filter((row) => row.entry.state === "PROPOSED" && !isUnsure(row));
+export function confidentPoints() {
+  return (points.get()?.points ?? []).filter((row) => row.entry.state === "PROPOSED" && !isUncertain(row));
 }
 
 /** Accept all of those; the less sure ones are decided one by one. */
 export async function acceptAll() {
-  const open = sureOnes();
+  const open = confidentPoints();
   const done = await ask("Accepting all", "api/points/accept-all", { confidence: SURE });
   if (done) {
-    remember(`accepted ${counted(open.length, "point")}`, async () => {
+    pushUndo(`accepted ${counted(open.length, "point")}`, async () => {
       // Those that have been cut meanwhile, or were decided anew, stay as they are.
-      const accepted = open.map((row) => now(row)).filter(isBound);
+      const accepted = open.map((row) => now(row)).filter(isAccepted);
       const back = await Promise.all(accepted.map((row) => row && send(row, "Taking back", "reconsider", {})));
       return back.every(Boolean);
     });
@@ -108,7 +108,7 @@ export async function acceptAll() {
  * @param {PagePoint} row
  */
 export function whyNotMove(row) {
-  if (isBound(row)) return "It is accepted; take that back first";
+  if (isAccepted(row)) return "It is accepted; take that back first";
   if (!CAN_ACCEPT.has(row.entry.state)) return `It is ${POINT_WORDS[row.entry.state].toLowerCase()}`;
   return whyNothing() || (isLive("perception") ? "" : "Perception is not there");
 }
@@ -120,7 +120,7 @@ export function whyNotMove(row) {
 export async function move(row, millimetres) {
   const done = await send(row, "Moving", "move", { along: millimetres / 1000 });
   const words = `moved ${row.point.point_id} by ${millimetres} mm`;
-  if (done) remember(words, () => send(row, "Moving back", "move", { along: -millimetres / 1000 }));
+  if (done) pushUndo(words, () => send(row, "Moving back", "move", { along: -millimetres / 1000 }));
   return done;
 }
 
@@ -141,7 +141,7 @@ export function whyNoUndo() {
  * @param {string} words
  * @param {() => Promise<boolean>} back
  */
-export function remember(words, back) {
+export function pushUndo(words, back) {
   decisions.set([...decisions.get(), { words, undo: back }].slice(-MOST));
 }
 
@@ -150,9 +150,9 @@ export function remember(words, back) {
  *
  * @param {PagePoint} before
  */
-async function goBack(before) {
+async function restore(before) {
   const { state, reason } = before.entry;
-  if (isBound(before)) {
+  if (isAccepted(before)) {
     return send(before, "Accepting", "accept", { revision: before.point.revision, digest: before.point.digest });
   }
   if (state === "REJECTED") return send(before, "Rejecting", "reject", { reason });

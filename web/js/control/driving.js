@@ -1,15 +1,15 @@
 // The base by hand: which way it shall go, from keys, from the pad on the page, or from a gamepad.
 
-import { isTyping } from "./stop.js";
 import { showToast } from "../state/page-state.js";
 import { signal } from "../state/signals.js";
+import { isTyping } from "./stop.js";
 import { hold, moving, teleoperating } from "./teleoperation.js";
 
 /** At the whole of the usual speed (m/s, rad/s). */
 const LINEAR = 0.4;
 const ANGULAR = 0.6;
 /** Sticks do not come to rest at zero. */
-const DEAD = 0.15;
+const DEAD_ZONE = 0.15;
 const POLL_MS = 50;
 /** @type {Readonly<Record<string, readonly [ahead: number, left: number]>>} */
 const KEYS = Object.freeze({
@@ -20,7 +20,7 @@ const KEYS = Object.freeze({
 /** Name of the gamepad in use; empty without one. */
 export const gamepad = signal("");
 
-/** @typedef {{ ahead: number, left: number }} Way Shares of the whole speed, −1…1. */
+/** @typedef {{ ahead: number, left: number }} DriveInput Shares of the whole speed, −1…1. */
 
 /** @returns {string} Why the base cannot be driven now. */
 export function whyNoDriving() {
@@ -31,18 +31,18 @@ export function whyNoDriving() {
  * Hold the base to a way for as long as `source` is not released.
  *
  * @param {"drive"|"pad"|"gamepad"} source
- * @param {() => Way} way
+ * @param {() => DriveInput} way
  */
 export function drive(source, way) {
   const wanted = () => {
     const { ahead, left } = way();
-    return { base: { linear: LINEAR * within(ahead), angular: ANGULAR * within(left) } };
+    return { base: { linear: LINEAR * clamp(ahead), angular: ANGULAR * clamp(left) } };
   };
   return whyNoDriving() || hold.press(source, wanted);
 }
 
 /** @param {number} share */
-function within(share) {
+function clamp(share) {
   return Math.max(-1, Math.min(1, share));
 }
 
@@ -84,7 +84,7 @@ export function listenForDriveKeys(target) {
 
 /**
  * @param {(readonly [number, number])[]} ways
- * @returns {Way}
+ * @returns {DriveInput}
  */
 function sum(ways) {
   return { ahead: ways.reduce((all, [each]) => all + each, 0), left: ways.reduce((all, [, each]) => all + each, 0) };
@@ -94,7 +94,7 @@ function sum(ways) {
 export function watchGamepad() {
   let index = -1;
   let held = true;
-  const look = () => {
+  const poll = () => {
     const pads = teleoperating.get() ? [...(navigator.getGamepads?.() ?? [])] : [];
     const pad = pads.find((each) => each?.connected && each.buttons.length > 7) ?? null;
     gamepad.set(pad?.id ?? "");
@@ -109,16 +109,16 @@ export function watchGamepad() {
       if (why) showToast("warning", why);
     }
   };
-  window.setInterval(look, POLL_MS);
-  window.addEventListener("gamepaddisconnected", look);
+  window.setInterval(poll, POLL_MS);
+  window.addEventListener("gamepaddisconnected", poll);
 }
 
 /**
  * @param {number} index
- * @returns {Way}
+ * @returns {DriveInput}
  */
 function read(index) {
   const axes = navigator.getGamepads()[index]?.axes ?? [];
-  const [left = 0, ahead = 0, right = 0] = axes.map((each) => (Math.abs(each) < DEAD ? 0 : each));
+  const [left = 0, ahead = 0, right = 0] = axes.map((each) => (Math.abs(each) < DEAD_ZONE ? 0 : each));
   return { ahead: -ahead, left: -(left || right) };
 }

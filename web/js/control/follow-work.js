@@ -2,7 +2,7 @@
 
 import { now, pageState, points, selected } from "../state/page-state.js";
 import { placing } from "./placing.js";
-import { goAlong, touched, touchedAt } from "./selection.js";
+import { followPoint, lastInteraction, noteInteraction } from "./selection.js";
 import { measuring } from "./view-tools.js";
 
 /** Whoever has just chosen, or looked through a list, is left there so long (ms). */
@@ -15,7 +15,7 @@ export function followWork() {
     document.addEventListener(
       kind,
       (event) => {
-        if (event.target instanceof Element && event.target.closest(PARTS)) touched();
+        if (event.target instanceof Element && event.target.closest(PARTS)) noteInteraction();
       },
       { capture: true, passive: true },
     );
@@ -23,10 +23,10 @@ export function followWork() {
   const follow = () => {
     const controller = pageState.get()?.controller;
     const active = controller?.mode === "AUTO" ? controller.active_point_id : "";
-    if (!active || active === selected.get() || performance.now() - touchedAt() < HOLD_OFF_MS) return;
+    if (!active || active === selected.get() || performance.now() - lastInteraction() < HOLD_OFF_MS) return;
     // Who places a point or measures clicks on in the view as it is.
     if (placing.get() || measuring.get()) return;
-    if (points.get()?.points.some((row) => row.point.point_id === active)) goAlong(active);
+    if (points.get()?.points.some((row) => row.point.point_id === active)) followPoint(active);
   };
   for (const signal of [pageState, points, now]) signal.subscribe(follow);
 }

@@ -20,7 +20,7 @@ export function holder() {
 const EVERY_MS = 250;
 
 /** Has it said, by a thread of its own, that the page that holds control is there. */
-export function keepControl() {
+export function renewLease() {
   const worker = new Worker("js/control/lease-worker.js");
   window.setInterval(() => {
     worker.postMessage(link.get().status === "open" && holder().mine);

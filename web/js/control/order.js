@@ -1,9 +1,9 @@
 // The order of work: which accepted point comes when, whose order it is, and how it is changed.
 
-import { countOf, whyNot } from "./allowed.js";
 import { ask } from "../link/api.js";
-import { pageState, points } from "../state/page-state.js";
 import { counted } from "../state/format.js";
+import { pageState, points } from "../state/page-state.js";
+import { countOf, whyNot } from "./allowed.js";
 
 /** @typedef {import("../link/messages.js").PagePoint} PagePoint */
 

@@ -29,7 +29,7 @@ export function setPlacing(on) {
  * @param {object} body
  * @returns {Promise<string>} Its name, empty when there is none.
  */
-export async function place(path, body) {
+export async function placePoint(path, body) {
   const answer = await post(path, body);
   if (answer.ok) {
     select(answer.reason);
@@ -43,9 +43,9 @@ export async function place(path, body) {
 }
 
 /** Listen for clicks into the 3-D view, and stop placing when the link goes or nobody may place any more. */
-export function guardPlacing() {
+export function initPlacing() {
   socket.onsightline = ({ origin, direction }) => {
-    if (placing.get()) void place("api/points/by-hand", { origin, direction });
+    if (placing.get()) void placePoint("api/points/by-hand", { origin, direction });
   };
   link.subscribe(({ status }) => {
     if (status !== "open") placing.set(false);

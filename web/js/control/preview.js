@@ -18,7 +18,7 @@ let startedAt = 0;
 let toldAt = 0;
 
 /** Is there one to look at? */
-export function isThere() {
+export function hasPreview() {
   return preview.get()?.preview_hash ? true : false;
 }
 
@@ -30,7 +30,7 @@ export function whyNoPreview(accepted) {
 /** Why it cannot be approved; empty when it can. */
 export function whyNoApproval() {
   const state = preview.get();
-  if (!state || !isThere()) return whyNothing() || "There is no preview yet";
+  if (!state || !hasPreview()) return whyNothing() || "There is no preview yet";
   if (state.phase === "approved") return `Approved by ${state.approved_by}`;
   if (state.phase === "expired") return `It has expired: ${state.reason}`;
   return whyNot("ApprovePreview");

@@ -1,7 +1,7 @@
 // The selected point: list, picture and 3-D view show the same one.
 
 import { socket } from "../link/socket.js";
-import { brought, selected } from "../state/page-state.js";
+import { revealCount, selected } from "../state/page-state.js";
 
 /** When somebody has last chosen, or looked for something, himself (ms). */
 let lookedAt = -Infinity;
@@ -11,21 +11,21 @@ let toldAt = -Infinity;
 const ONE_PRESS_MS = 400;
 
 /** Somebody looks for himself. */
-export function touched() {
+export function noteInteraction() {
   lookedAt = performance.now();
 }
 
-export function touchedAt() {
+export function lastInteraction() {
   return lookedAt;
 }
 
 /**
- * Somebody chooses a point: list, picture and 3-D view are brought there.
+ * Somebody chooses a point: list, picture and 3-D view go there.
  *
  * @param {string} pointId Empty = none.
  */
 export function select(pointId) {
-  touched();
+  noteInteraction();
   if (pointId !== selected.get()) tell(pointId);
 }
 
@@ -34,8 +34,8 @@ export function select(pointId) {
  *
  * @param {string} pointId
  */
-export function bring(pointId) {
-  touched();
+export function selectAndReveal(pointId) {
+  noteInteraction();
   if (pointId !== selected.get() || performance.now() - toldAt > ONE_PRESS_MS) tell(pointId);
 }
 
@@ -44,13 +44,13 @@ export function bring(pointId) {
  *
  * @param {string} pointId
  */
-export function goAlong(pointId) {
+export function followPoint(pointId) {
   selected.set(pointId);
   socket.send({ type: "Select", point_id: pointId, follow: true });
 }
 
 socket.onselected = (/** @type {string} */ pointId) => {
-  touched();
+  noteInteraction();
   show(pointId);
 };
 
@@ -63,6 +63,6 @@ function tell(pointId) {
 
 /** @param {string} pointId */
 function show(pointId) {
-  if (pointId === selected.get()) brought.set(brought.get() + 1);
+  if (pointId === selected.get()) revealCount.set(revealCount.get() + 1);
   else selected.set(pointId);
 }

@@ -11,7 +11,7 @@ import { signal } from "../state/signals.js";
 export const stopProgress = signal(/** @type {StopProgress} */ ("idle"));
 
 /** Does this server have several robots? Then each has its page under a path of its own. */
-export const several = location.pathname.startsWith("/robots/");
+export const multiRobot = location.pathname.startsWith("/robots/");
 const TRIES = 4;
 /** The server has sent the stop, but the bridge has not confirmed it. */
 const UNCONFIRMED = 503;
@@ -119,6 +119,6 @@ export function earlierWords(state) {
  *
  * @param {PageState|null} state
  */
-export function buttonPressed(state) {
+export function hardwareStopPressed(state) {
   return state?.stops.some((told) => told.hardware) ?? false;
 }

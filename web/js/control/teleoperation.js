@@ -24,8 +24,8 @@ class HoldToMove {
     this.whyNot = whyNot;
     /** Is somebody holding now? */
     this.holding = signal(false);
-    /** Share of the usual speed. */
-    this.share = signal(1);
+    /** Speed by hand as a factor of the usual speed. */
+    this.speedScale = signal(1);
     /** @type {Set<HoldSource>} */
     this.sources = new Set();
     /** @type {() => Wanted} */
@@ -84,7 +84,7 @@ class HoldToMove {
   tell(hold) {
     this.sequence += 1;
     const { base = null, joints = null } = hold ? this.wanted() : {};
-    this.send({ type: "Hold", sequence: this.sequence, hold, base, joints, share: this.share.get() });
+    this.send({ type: "Hold", sequence: this.sequence, hold, base, joints, share: this.speedScale.get() });
   }
 }
 
@@ -130,7 +130,7 @@ export function showAxes(along) {
 }
 
 /** Let go whenever the operator can no longer be holding on purpose. */
-export function guardHold() {
+export function initTeleoperation() {
   socket.onclose = () => {
     hold.releaseAll();
     teleoperating.set(false);

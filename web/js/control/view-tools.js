@@ -25,18 +25,18 @@ export const LAYERS = Object.freeze([
   ["cloud", "Point cloud of the camera"],
   ["simulated", "Simulated row, seen or not"],
 ]);
-const KEPT = "layers";
+const STORAGE_KEY = "layers";
 
 /** @type {import("../state/signals.js").Signal<ReadonlySet<Layer>>} */
-export const layers = signal(remembered());
+export const layers = signal(storedLayers());
 export const measuring = signal(false);
 /** The last that was measured. */
 export const measured = signal(/** @type {import("../link/messages.js").Measured|null} */ (null));
 
 /** @returns {ReadonlySet<Layer>} */
-function remembered() {
+function storedLayers() {
   const known = new Set(LAYERS.map(([layer]) => layer));
-  const kept = /** @type {Layer[]} */ ((localStorage.getItem(KEPT) ?? "plant,points,trail,simulated").split(","));
+  const kept = /** @type {Layer[]} */ ((localStorage.getItem(STORAGE_KEY) ?? "plant,points,trail,simulated").split(","));
   return new Set(kept.filter((layer) => known.has(layer)));
 }
 
@@ -49,11 +49,11 @@ export function showLayer(layer, shown) {
   if (shown) chosen.add(layer);
   else chosen.delete(layer);
   layers.set(chosen);
-  localStorage.setItem(KEPT, [...chosen].join(","));
-  tellLayers();
+  localStorage.setItem(STORAGE_KEY, [...chosen].join(","));
+  sendLayers();
 }
 
-function tellLayers() {
+function sendLayers() {
   socket.send({ type: "ShowLayers", layers: [...layers.get()] });
 }
 
@@ -72,10 +72,10 @@ export function setMeasuring(on) {
 }
 
 /** Tell each new link what is shown, and take what was measured. */
-export function guardLooking() {
+export function initViewTools() {
   socket.onmeasured = (message) => measured.set(message);
   link.subscribe(({ status }) => {
-    if (status === "open") tellLayers();
+    if (status === "open") sendLayers();
     else measuring.set(false);
   });
   placing.subscribe((on) => on && setMeasuring(false));

@@ -1,6 +1,6 @@
 // The page's own link: state in, intents out, a ping ten times a second, and a new try whenever it breaks.
 
-import { link, points, preview, roundTrip, say, takeEvents, takeState } from "../state/page-state.js";
+import { link, points, preview, receiveEvents, receiveState, roundTrip, say } from "../state/page-state.js";
 import { isSignedIn } from "./api.js";
 
 /** @typedef {import("./messages.js").FromServer} FromServer */
@@ -15,7 +15,7 @@ const PING_MS = 100;
 const SILENT_TURNS = 25;
 const RETRY_MS = [250, 500, 1000, 2000, 3000];
 
-class Link {
+class PageSocket {
   /** @param {string} url */
   constructor(url) {
     this.url = url;
@@ -111,7 +111,7 @@ class Link {
     switch (message.type) {
       case "PageState": {
         const { number } = message;
-        takeState(message);
+        receiveState(message);
         // Registered after the draws that this state has asked for, so it runs when they are done. A hidden tab draws
         // nothing and therefore does not echo.
         requestAnimationFrame(() => {
@@ -126,7 +126,7 @@ class Link {
         preview.set(message.preview);
         break;
       case "PageEvents":
-        takeEvents(message.events, this.firstEvents);
+        receiveEvents(message.events, this.firstEvents);
         this.firstEvents = false;
         break;
       case "Selected":
@@ -159,4 +159,4 @@ class Link {
 }
 
 // Beside the page: with several robots each has a page and a socket of its own.
-export const socket = new Link(new URL("ws", location.href.replace(/^http/, "ws")).href);
+export const socket = new PageSocket(new URL("ws", location.href.replace(/^http/, "ws")).href);

@@ -1,6 +1,6 @@
 // Runs in the frame of the 3-D view, before its client: how many pixels are drawn, and how.
 
-import { Behind } from "./offscreen-framebuffer.js";
+import { OffscreenFramebuffer } from "./offscreen-framebuffer.js";
 
 /** The robot alone has some twenty thousand; the axes and the ground, which come first, a thousand. */
 const FEWEST_TRIANGLES = 4000;
@@ -11,7 +11,7 @@ const FEWEST_TRIANGLES = 4000;
  * @param {(callback: () => void) => void} nextFrame Calls at the browser's next frame.
  * @param {() => boolean} shown Has all that was drawn come to the screen?
  */
-const tellWhenDrawn = (nextFrame, shown) => {
+const reportWhenDrawn = (nextFrame, shown) => {
   document.documentElement.dataset.view ??= "loading";
   const { prototype } = WebGL2RenderingContext;
   const { drawElements } = prototype;
@@ -57,13 +57,13 @@ const drawnInSoftware = () => {
 };
 
 const inSoftware = drawnInSoftware();
-/** Of each canvas: the client makes one to see whether it can, before the one that it draws in. @type {Behind[]} */
+/** Of each canvas: the client makes one to see whether it can, before the one that it draws in. @type {OffscreenFramebuffer[]} */
 const behind = [];
 // At a fixed resolution: changing it with the load, as the client does by itself, stalls a slow machine for seconds,
 // and a stalled view ends a hold.
 const ratio = Math.min(window.devicePixelRatio, inSoftware ? LARGEST_RATIO_IN_SOFTWARE : LARGEST_RATIO);
 history.replaceState(null, "", `?fixedDpr=${ratio}`);
-tellWhenDrawn(plainRequest, () => behind.every((each) => !each.busy && !each.drawn));
+reportWhenDrawn(plainRequest, () => behind.every((each) => !each.busy && !each.drawn));
 
 if (inSoftware) {
   /**
@@ -76,7 +76,7 @@ if (inSoftware) {
   const getContext = function (kind, options) {
     if (!kind.startsWith("webgl")) return plainContext.call(this, kind, options);
     const gl = plainContext.call(this, kind, { ...options, antialias: false });
-    if (gl instanceof WebGL2RenderingContext && !behind.some((each) => each.gl === gl)) behind.push(new Behind(gl));
+    if (gl instanceof WebGL2RenderingContext && !behind.some((each) => each.gl === gl)) behind.push(new OffscreenFramebuffer(gl));
     return gl;
   };
   HTMLCanvasElement.prototype.getContext = /** @type {any} */ (getContext);

@@ -9,7 +9,7 @@ const ASK_MS = 4;
 /** A picture that says for so long that it is not done is shown all the same (ms). */
 const LONGEST_MS = 1000;
 
-export class Behind {
+export class OffscreenFramebuffer {
   /** Is something drawn that is not shown yet? */
   busy = false;
   drawn = false;
@@ -31,11 +31,11 @@ export class Behind {
     this.fit();
     gl.framebufferRenderbuffer(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.RENDERBUFFER, this.color);
     gl.framebufferRenderbuffer(gl.FRAMEBUFFER, gl.DEPTH_STENCIL_ATTACHMENT, gl.RENDERBUFFER, this.depth);
-    this.stepIn();
+    this.interceptCanvas();
   }
 
   /** Take the place of what the client asks of the canvas. */
-  stepIn() {
+  interceptCanvas() {
     const { gl } = this;
     gl.bindFramebuffer = (target, framebuffer) => {
       if (target !== gl.READ_FRAMEBUFFER) this.forDrawing = framebuffer;

@@ -1,7 +1,7 @@
 // Everything the page knows. The last known state is kept, with its age, however long a link or a process is gone.
 
-import { signal } from "./signals.js";
 import { ageWords } from "./format.js";
+import { signal } from "./signals.js";
 
 /** @typedef {import("../link/messages.js").PageState} PageState */
 /** @typedef {import("../link/messages.js").PagePoints} PagePoints */
@@ -31,7 +31,7 @@ export const toasts = signal(/** @type {readonly Toast[]} */ ([]));
 /** Identifier of the chosen point, empty when none. */
 export const selected = signal("");
 /** Counts how often the point that is chosen already was chosen again. */
-export const brought = signal(0);
+export const revealCount = signal(0);
 /** Round trip page → server → page in ms; null before the first. */
 export const roundTrip = signal(/** @type {number|null} */ (null));
 /** The page's clock (ms), moved on four times a second so that ages grow on screen. */
@@ -54,7 +54,7 @@ let nextToast = 1;
 let nextLocalLine = -1;
 
 /** @param {PageState} message */
-export function takeState(message) {
+export function receiveState(message) {
   stateAt = performance.now();
   turns = 0;
   pageState.set(message);
@@ -72,7 +72,7 @@ export function isOpening() {
  * @param {readonly PageEvent[]} events
  * @param {boolean} first Is this the first batch of a connection?
  */
-export function takeEvents(events, first) {
+export function receiveEvents(events, first) {
   const oldest = events[0];
   if (!oldest) return;
   const kept = first ? log.get().filter((line) => line.number < 0 || line.wall_time < oldest.wall_time) : log.get();

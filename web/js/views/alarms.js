@@ -2,7 +2,7 @@
 
 import { countOf } from "../control/allowed.js";
 import { holder } from "../control/lease.js";
-import { buttonPressed } from "../control/stop.js";
+import { hardwareStopPressed } from "../control/stop.js";
 import { counted, inWords } from "../state/format.js";
 import { isGone, isLive, isOpening, link, pageState, points, preview, staleWords } from "../state/page-state.js";
 import { history } from "./history.js";
@@ -29,7 +29,7 @@ function afterFault({ allowed }) {
 }
 
 function afterStop() {
-  if (buttonPressed(pageState.get())) return "Release the robot's own emergency stop first, once the row is clear.";
+  if (hardwareStopPressed(pageState.get())) return "Release the robot's own emergency stop first, once the row is clear.";
   return `See that the row is clear and write why it is safe to go on; ${ofSupervisor("Reset")}, then Arm.`;
 }
 

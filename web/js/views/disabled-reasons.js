@@ -1,9 +1,9 @@
 // A greyed control says why, when it is pressed and when the keyboard comes to it: a finger cannot hover for the reason.
 
-import { element } from "./dom.js";
 import { showToast } from "../state/page-state.js";
+import { element } from "./dom.js";
 
-const GREYED = ':is(button, input)[aria-disabled="true"]';
+const DISABLED = ':is(button, input)[aria-disabled="true"]';
 /** Between the control and its reason, and to the edges of the screen (px). */
 const GAP = 6;
 
@@ -12,10 +12,10 @@ const GAP = 6;
  *
  * @param {Document} page
  */
-export function explainGreyed(page) {
+export function explainDisabled(page) {
   const listen = (/** @type {string} */ name, /** @type {(event: Event, control: Element) => void} */ found) => {
     const look = (/** @type {Event} */ event) => {
-      const control = event.target instanceof Element ? event.target.closest(GREYED) : null;
+      const control = event.target instanceof Element ? event.target.closest(DISABLED) : null;
       if (control) found(event, control);
     };
     page.addEventListener(name, look, { capture: true, passive: false });

@@ -1,9 +1,9 @@
 // The last five minutes of every reading and of every process, four samples a second.
 
 import { PROCESSES } from "../link/messages.js";
-import { READINGS } from "./readings.js";
 import { isLive, now, pageState } from "../state/page-state.js";
 import { signal } from "../state/signals.js";
+import { READINGS } from "./readings.js";
 
 export const SPAN_MS = 300_000;
 const LENGTH = 1200;
@@ -22,7 +22,7 @@ class History {
    * @param {number} at Page's clock (ms).
    * @param {readonly (number|null)[]} values In the order of the names; null when unknown.
    */
-  take(at, values) {
+  add(at, values) {
     const index = this.count % LENGTH;
     this.times[index] = at;
     this.rings.forEach((ring, row) => {
@@ -68,7 +68,7 @@ export const history = new History([...READINGS.map((reading) => reading.id), ..
 export const sampled = signal(0);
 
 /** Take a sample whenever the page's clock moves on, whether or not anybody looks. */
-export function keepHistory() {
+export function recordHistory() {
   now.subscribe((at) => {
     const state = pageState.get();
     const live = isLive("bridge") && isLive("controller");
@@ -76,7 +76,7 @@ export function keepHistory() {
       if (state === null || (!live && reading.id !== "page-round-trip")) return null;
       return reading.read(state);
     });
-    history.take(at, [...values, ...PROCESSES.map((process) => Number(isLive(process))), state?.controller?.ticks ?? null]);
+    history.add(at, [...values, ...PROCESSES.map((process) => Number(isLive(process))), state?.controller?.ticks ?? null]);
     sampled.set(sampled.get() + 1);
   });
 }

@@ -17,7 +17,7 @@ class BaseSpeed {
    * @param {import("../link/messages.js").JointState|null} joints Its stamp is the bridge's clock.
    * @returns {number|null} m/s; null before there are two poses.
    */
-  take(base, joints) {
+  update(base, joints) {
     if (base === null || joints === null) return null;
     const stamp = joints.header.stamp;
     const newest = this.track.at(-1);
@@ -37,11 +37,11 @@ class BaseSpeed {
  * @property {string} id
  * @property {string} label
  * @property {string} unit
- * @property {string} about
- * @property {number} full Value of a full bar, in the unit shown.
+ * @property {string} description
+ * @property {number} fullScale Value of a full bar, in the unit shown.
  * @property {number} [warnAbove]
  * @property {number} [warnBelow]
- * @property {(value: number) => string} write
+ * @property {(value: number) => string} format
  * @property {(state: PageState) => number|null} read In the unit shown; null when unknown.
  * @property {"gauge"|"engineer"|"chart"} [place] Where it is shown besides its chart; a gauge when not said.
  */
@@ -55,20 +55,20 @@ export const READINGS = Object.freeze([
     id: "position-error",
     label: "Tool error",
     unit: "mm",
-    about: "Distance of the tool from where its trajectory has it now",
-    full: 20,
+    description: "Distance of the tool from where its trajectory has it now",
+    fullScale: 20,
     warnAbove: 10,
-    write: (/** @type {number} */ value) => millimetres(value / 1000),
+    format: (/** @type {number} */ value) => millimetres(value / 1000),
     read: (/** @type {PageState} */ state) => scaled(state.controller?.position_error, 1000),
   },
   {
     id: "rotation-error",
     label: "Tool angle",
     unit: "°",
-    about: "Angle of the tool from where its trajectory has it now",
-    full: 10,
+    description: "Angle of the tool from where its trajectory has it now",
+    fullScale: 10,
     warnAbove: 5,
-    write: (/** @type {number} */ value) => degrees(value / DEGREE),
+    format: (/** @type {number} */ value) => degrees(value / DEGREE),
     read: (/** @type {PageState} */ state) => scaled(state.controller?.rotation_error, DEGREE),
   },
   {
@@ -76,49 +76,49 @@ export const READINGS = Object.freeze([
     place: "engineer",
     label: "Manipulability",
     unit: "ω",
-    about: "How freely the arm can move the tool; 0 is a singular posture",
-    full: 0.15,
+    description: "How freely the arm can move the tool; 0 is a singular posture",
+    fullScale: 0.15,
     warnBelow: 0.02,
-    write: (/** @type {number} */ value) => value.toFixed(3),
+    format: (/** @type {number} */ value) => value.toFixed(3),
     read: (/** @type {PageState} */ state) => state.controller?.manipulability ?? null,
   },
   {
     id: "joint-margin",
     label: "Joint margin",
     unit: "°",
-    about: "Least distance of an arm joint to its limit",
-    full: 60,
+    description: "Least distance of an arm joint to its limit",
+    fullScale: 60,
     warnBelow: 5,
-    write: (/** @type {number} */ value) => value.toFixed(1),
+    format: (/** @type {number} */ value) => value.toFixed(1),
     read: (/** @type {PageState} */ state) => scaled(state.controller?.joint_margin, DEGREE),
   },
   {
     id: "base-speed",
     label: "Base speed",
     unit: "m/s",
-    about: "Speed of the base over the ground, from its wheels",
-    full: 0.5,
-    write: (/** @type {number} */ value) => value.toFixed(2),
-    read: (/** @type {PageState} */ state) => speed.take(state.base, state.joints),
+    description: "Speed of the base over the ground, from its wheels",
+    fullScale: 0.5,
+    format: (/** @type {number} */ value) => value.toFixed(2),
+    read: (/** @type {PageState} */ state) => speed.update(state.base, state.joints),
   },
   {
     id: "battery",
     label: "Battery",
     unit: "%",
-    about: "Charge of the base's battery",
-    full: 100,
+    description: "Charge of the base's battery",
+    fullScale: 100,
     warnBelow: 20,
-    write: (/** @type {number} */ value) => value.toFixed(0),
+    format: (/** @type {number} */ value) => value.toFixed(0),
     read: (/** @type {PageState} */ state) => scaled(state.bridge?.battery ?? undefined, 100),
   },
   {
     id: "real-time-factor",
     label: "Real time",
     unit: "×",
-    about: "Simulated seconds a second; below 0.9 the computer is too slow and everything happens later",
-    full: 1.2,
+    description: "Simulated seconds a second; below 0.9 the computer is too slow and everything happens later",
+    fullScale: 1.2,
     warnBelow: 0.9,
-    write: (/** @type {number} */ value) => value.toFixed(2),
+    format: (/** @type {number} */ value) => value.toFixed(2),
     read: (/** @type {PageState} */ state) => state.bridge?.real_time_factor ?? null,
   },
   {
@@ -126,10 +126,10 @@ export const READINGS = Object.freeze([
     place: "engineer",
     label: "Control step",
     unit: "µs",
-    about: "Median time of one control step over the last second",
-    full: 1000,
+    description: "Median time of one control step over the last second",
+    fullScale: 1000,
     warnAbove: 1000,
-    write: (/** @type {number} */ value) => value.toFixed(0),
+    format: (/** @type {number} */ value) => value.toFixed(0),
     read: (/** @type {PageState} */ state) => scaled(state.controller?.tick_s, 1e6),
   },
   {
@@ -137,9 +137,9 @@ export const READINGS = Object.freeze([
     place: "engineer",
     label: "Late steps",
     unit: "",
-    about: "Control periods that came too late since the controller started",
-    full: 100,
-    write: (/** @type {number} */ value) => value.toFixed(0),
+    description: "Control periods that came too late since the controller started",
+    fullScale: 100,
+    format: (/** @type {number} */ value) => value.toFixed(0),
     read: (/** @type {PageState} */ state) => state.controller?.late_ticks ?? null,
   },
   {
@@ -147,10 +147,10 @@ export const READINGS = Object.freeze([
     place: "chart",
     label: "Wheel speed",
     unit: "%",
-    about: "Speed of the faster wheel in parts of its limit",
-    full: 100,
+    description: "Speed of the faster wheel in parts of its limit",
+    fullScale: 100,
     warnAbove: 95,
-    write: (/** @type {number} */ value) => value.toFixed(0),
+    format: (/** @type {number} */ value) => value.toFixed(0),
     read: (/** @type {PageState} */ state) => largest(state.speed_shares.slice(0, 2), 100),
   },
   {
@@ -158,10 +158,10 @@ export const READINGS = Object.freeze([
     place: "chart",
     label: "Arm speed",
     unit: "%",
-    about: "Speed of the fastest joint of the arm in parts of its limit",
-    full: 100,
+    description: "Speed of the fastest joint of the arm in parts of its limit",
+    fullScale: 100,
     warnAbove: 95,
-    write: (/** @type {number} */ value) => value.toFixed(0),
+    format: (/** @type {number} */ value) => value.toFixed(0),
     read: (/** @type {PageState} */ state) => largest(state.speed_shares.slice(2), 100),
   },
   {
@@ -169,10 +169,10 @@ export const READINGS = Object.freeze([
     place: "chart",
     label: "Command round trip",
     unit: "ms",
-    about: "From a joint state of the robot to the command that answers it, median of the last second",
-    full: 50,
+    description: "From a joint state of the robot to the command that answers it, median of the last second",
+    fullScale: 50,
     warnAbove: 50,
-    write: (/** @type {number} */ value) => value.toFixed(1),
+    format: (/** @type {number} */ value) => value.toFixed(1),
     read: (/** @type {PageState} */ state) => scaled(state.bridge?.round_trip_s, 1000),
   },
   {
@@ -180,10 +180,10 @@ export const READINGS = Object.freeze([
     place: "chart",
     label: "Page round trip",
     unit: "ms",
-    about: "From this page to the server and back",
-    full: 200,
+    description: "From this page to the server and back",
+    fullScale: 200,
     warnAbove: 200,
-    write: (/** @type {number} */ value) => value.toFixed(0),
+    format: (/** @type {number} */ value) => value.toFixed(0),
     read: () => roundTrip.get(),
   },
 ]);

@@ -1,0 +1,64 @@
+// Undecided sites below the queue: spurs without a pruning point, why, and a button that sends the robot to look again.
+
+import { whyNot } from "../control/allowed.js";
+import { ask } from "../link/api.js";
+import { link, now, pageState } from "../state/page-state.js";
+import { drawOn } from "../state/signals.js";
+import { element, setEnabled, setText } from "./dom.js";
+
+/** @typedef {import("../link/messages.js").Abstention} Abstention */
+
+const HINT = "Drive there and look at it from both its sides; nothing is cut";
+
+/**
+ * The undecided sites that need one thing.
+ *
+ * @param {import("../link/messages.js").Need} needs
+ * @param {(count: number) => string} title
+ */
+export function undecidedList(needs, title) {
+  const summary = element("summary");
+  const list = element("ul");
+  const box = element("details", { class: "abstained", attributes: { "data-needs": needs } }, summary, list);
+  drawOn([pageState, link, now], () => {
+    const buttons = /** @type {NodeListOf<HTMLButtonElement>} */ (list.querySelectorAll("button.look-again"));
+    if (buttons.length === 0) return;
+    const why = whyNot("Survey");
+    for (const button of buttons) setEnabled(button, why, HINT);
+  });
+  let shown = "";
+  return {
+    box,
+    /** @param {readonly Abstention[]} all */
+    show(all) {
+      const sites = all.filter((each) => each.needs === needs);
+      const lines = sites.map(siteWords);
+      box.hidden = lines.length === 0;
+      const key = sites.map((each, k) => `${lines[k]} ${each.position !== null}`).join("\n");
+      if (key === shown) return;
+      shown = key;
+      setText(summary, title(lines.length));
+      list.replaceChildren(...sites.map(siteItem));
+    },
+  };
+}
+
+/** @param {Abstention} site */
+function siteWords(site) {
+  return site.vine === 0 ? site.reason : `Vine ${site.vine} · spur ${site.spur}: ${site.reason}`;
+}
+
+/**
+ * @param {Abstention} site
+ * @returns {HTMLElement}
+ */
+function siteItem(site) {
+  const item = element("li", {}, element("span", { text: siteWords(site) }));
+  if (site.needs !== "another look" || site.position === null) return item;
+  const button = element("button", { class: "quiet look-again", text: "Look again", attributes: { type: "button" } });
+  const { vine, spur } = site;
+  button.addEventListener("click", () => void ask("Look again", "api/look-again", { vine, spur }));
+  setEnabled(button, whyNot("Survey"), HINT);
+  item.append(button);
+  return item;
+}
