@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 TYPESCRIPT := typescript@5.9.3
 
-.PHONY: help demo test check bench clean lock materials browser
+.PHONY: help demo test check bench mutation clean lock materials browser
 .DEFAULT_GOAL := help
 
 help:
@@ -13,6 +13,7 @@ help:
 	@echo "make test    make check, then every test"
 	@echo "make check   formatting, types, import contracts, generated files"
 	@echo "make bench   measurements                                                     (ARGS='tick --json tick.json')"
+	@echo "make mutation   small changes of what safety rests on: a test has to fail for each   (ARGS='codec --sample 20')"
 	@echo "make lock    bring the lock files up to date with pyproject.toml"
 	@echo "make materials  the bill of materials, CycloneDX, as build/materials.cdx.json"
 	@echo "make clean   remove the virtual environment and caches"
@@ -46,6 +47,17 @@ check: $(VENV)/.project
 
 bench: $(VENV)/.project
 	@exec $(BIN)/rolling-panda bench $(ARGS)
+
+# mutmut lives apart, beside the project's packages, as nothing but this needs it.
+build/mutation/.installed: $(VENV)/.project
+	$(PYTHON) -m venv build/mutation
+	build/mutation/bin/pip install --quiet --disable-pip-version-check 'mutmut==3.8.1'
+	@echo "import site; site.addsitedir('$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')')" \
+		> "$$(build/mutation/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/project.pth"
+	@touch $@
+
+mutation: build/mutation/.installed
+	@exec $(BIN)/rolling-panda bench mutation $(ARGS)
 
 # The browser tests drive the system's Chromium, or else Playwright's own (Ubuntu has no package that works in a
 # container); without one, and without the right to install it, they fail and say how.

@@ -1,0 +1,74 @@
+"""What is mutated, and which tests have to notice."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Target:
+    """Files that belong together.
+
+    Attributes:
+        files: Patterns of the files that are mutated, from the checkout's root.
+        tests: The tests that mirror them, below `tests/`.
+    """
+
+    files: tuple[str, ...]
+    tests: tuple[str, ...]
+
+
+def _tests(folder: str, names: str) -> tuple[str, ...]:
+    return tuple(f"{folder}/test_{name}.py" for name in names.split())
+
+
+#: By name, what is done soonest first. Of `bridge/` the simulation (`sim/`) and the fakes of makers' devices (`fakes/`)
+#: are left out: tests measure against them, and they move no robot.
+TARGETS = {
+    "codec": Target(("rolling_panda/transport/codec.py",), _tests("rolling_panda", "codec")),
+    "server.auth": Target(("server/auth/*",), _tests("server", "access users sessions throttle sign_in")),
+    "controller.ledger": Target(
+        ("controller/ledger/*",),
+        _tests(
+            "controller",
+            "ledger writer journal audit session_report start unwritable_ledger queue_restored controller_session",
+        ),
+    ),
+    "controller.supervision": Target(
+        ("controller/supervision/*",),
+        _tests(
+            "controller",
+            "authority modes permission supervisor health stale_messages stop_latch lease controller_control "
+            "two_operators controller_interruptions queue_requests",
+        ),
+    ),
+    "bridge.core": Target(
+        ("bridge/core/*",),
+        _tests(
+            "bridge",
+            "validator latch limiter watchdog cut_memory cut_orders bridge_core bridge_memory odometer picture "
+            "camera_trigger refusals robot_faults robot_time round_trip time_ratio",
+        ),
+    ),
+    "bridge": Target(
+        ("bridge/*.py", "bridge/real/*"),
+        _tests(
+            "bridge",
+            "bridge_loop bridge_process arm_follower cutter mp500 panda real_robot realsense picture_link ros_messages "
+            "bridge_contract",
+        )
+        + _tests("system", "real_config"),
+    ),
+    "controller.work": Target(
+        ("controller/work/point_queue.py", "controller/work/blades.py"),
+        _tests("controller", "point_queue queue_restored queue_requests rule_taken_back blades"),
+    ),
+    "teleoperation": Target(
+        (
+            "controller/motion/teleoperation.py",
+            "server/robots/teleop.py",
+            "server/robots/motion_rate.py",
+            "server/scene/viser_filter.py",
+        ),
+        _tests("controller", "teleoperation") + _tests("server", "teleop motion_rate viser_filter"),
+    ),
+    "server.guard": Target(("server/api/guard.py",), _tests("server", "guard sign_in")),
+}
