@@ -12,6 +12,7 @@ BENCHMARKS = {
     "reach": ("benchmarks.control.reach", "tool poses anywhere around the robot: reached, limits, manipulability"),
     "arm": ("benchmarks.control.arm", "the arm alone between random poses, beside published figures"),
     "page": ("benchmarks.page.latency", "the page in a real browser: hand to robot, robot to screen, with viewers"),
+    "attacks": ("benchmarks.page.attacks", "the software stop while slow and flooding clients attack the server"),
     "load": ("benchmarks.page.load", "processor, memory and traffic of the demo"),
     "ledger": ("benchmarks.control.ledger", "what recording costs the control step, on a slow disk too"),
     "record": ("benchmarks.control.record", "what a recorder beside the demo costs the control"),

@@ -91,6 +91,9 @@ def robot_app(reception: AppState, desk: RobotContext, origins: frozenset[str], 
     def dropped(session: Session, kind: str) -> None:
         desk.note("warning", f"a view of {session.user} sent {kind!r} to the 3-D view; dropped", session.client)
 
+    def ended(session: Session, reason: str) -> None:
+        desk.note("warning", f"a view of {session.user} was closed: {reason}", session.client)
+
     files = PageFiles(web := resource("web"))
     routers = (
         page_router(web, files),
@@ -105,7 +108,7 @@ def robot_app(reception: AppState, desk: RobotContext, origins: frozenset[str], 
         replay_router(desk),
         report_router(desk),
         pages_router(desk),
-        viser_router(desk.scene, desk.may_move, desk.dragged, dropped),
+        viser_router(desk.scene, desk.may_move, desk.dragged, dropped, ended),
     )
     return _guarded(routers, files, reception, origins, desk.note, path)
 

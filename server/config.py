@@ -24,6 +24,15 @@ class ServerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         session_idle_s: A session unused for this long has ended.
         invite_s: Life of a sign-in link that a supervisor makes for somebody else.
         log_lines: Log lines kept in memory.
+        head_s: A TLS handshake may take so long, the first byte of a request may be awaited so long, and so long may
+            pass from it to the end of the request's head.
+        body_s: A request's body has to come within this long of its head.
+        connections: Open connections in all; the longest idle one makes room for a new one.
+        connections_per_address: Open connections of one address; two thirds of them may be WebSockets, of which a page
+            has two.
+        socket_messages_hz: Messages a second through one WebSocket, twice as many at once; more closes it.
+        socket_bytes_hz: Bytes a second through one WebSocket; more closes it.
+        session_messages_hz: Messages a second of one session through all of its WebSockets.
         max_body_bytes: Longest request body, and longest WebSocket frame from a client.
         origins: Further origins that the page may be served under, as `https://HOST`, beside the loopback ones.
     """
@@ -40,5 +49,12 @@ class ServerConfig(Struct, frozen=True, forbid_unknown_fields=True):
     session_idle_s: Annotated[float, at_most(86400.0)] = 12 * 3600.0
     invite_s: Annotated[float, at_most(3600.0)] = 600.0
     log_lines: Annotated[int, Meta(ge=200, le=100_000)] = 1000
+    head_s: Annotated[float, at_most(10.0)] = 5.0
+    body_s: Annotated[float, at_most(30.0)] = 10.0
+    connections: Annotated[int, at_most(2048, 16)] = 512
+    connections_per_address: Annotated[int, at_most(1024, 8)] = 384
+    socket_messages_hz: Annotated[float, at_most(200.0)] = 200.0
+    socket_bytes_hz: Annotated[float, at_most(1 << 20)] = 128 << 10
+    session_messages_hz: Annotated[float, at_most(1000.0)] = 600.0
     max_body_bytes: Annotated[int, at_most(1 << 20, 1024)] = 64 << 10
     origins: tuple[str, ...] = ()

@@ -4,6 +4,7 @@ import argparse
 import asyncio
 import contextlib
 import re
+import resource
 import secrets
 import socket
 import threading
@@ -21,12 +22,14 @@ from rolling_panda.runtime.garbage import keep_what_is_there
 from rolling_panda.runtime.process import ProcessContext, wire_config
 from rolling_panda.transport.settings import PLAIN_WARNING
 from rolling_panda.transport.zenoh import Transport
-from server.api.reading_socket import ReadingSocket
 from server.app import create_app
 from server.auth.access import Access, Tls, access
 from server.auth.passwords import Passwords
 from server.auth.sessions import Sessions
 from server.config import ServerConfig
+from server.connections.http_protocol import SiteConfig
+from server.connections.listener import Connections, Listener
+from server.connections.websocket_protocol import LimitedSocket
 from server.loop import Loop, watch_accounts
 from server.robots.app_state import AppState
 from server.robots.context import RobotContext
@@ -39,6 +42,8 @@ from server.scene.robot_meshes import Part, robot_parts
 from server.scene.scene import Scene
 
 _POLL_S = 0.05
+#: Each connection is a file, and each 3-D view three.
+_FILES_EACH = 4
 
 
 def check(arguments: argparse.Namespace) -> Access:
@@ -63,6 +68,7 @@ def run(context: ProcessContext) -> None:
         InputError: The port is taken, or a file cannot be used.
     """
     config = load_section(context.config_path, "server", ServerConfig)
+    _may_open(_FILES_EACH * config.connections)
     arguments = context.arguments
     allowed = check(arguments)
     with listen(arguments.host, arguments.port) as door:
@@ -83,13 +89,13 @@ def run(context: ProcessContext) -> None:
             asyncio.run(serve(config, wires, sessions, door, address, context.stopping, allowed, keep_what_is_there))
 
 
-def listen(host: str, port: int) -> socket.socket:
+def listen(host: str, port: int) -> Listener:
     """The page's socket, bound before anything else starts.
 
     Raises:
         InputError: The port is taken or may not be used.
     """
-    door = socket.socket()
+    door = Listener()
     door.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     # Each connection has it from here. Without it the second part of an answer waits until the first is acknowledged,
     # which takes the other side 40 ms; asyncio sets it only on sockets that name their protocol.
@@ -109,7 +115,7 @@ async def serve(
     config: ServerConfig,
     wires: Mapping[str, Transport],
     sessions: Sessions,
-    door: socket.socket,
+    door: Listener,
     address: str,
     stopping: threading.Event,
     allowed: Access | None = None,
@@ -148,7 +154,9 @@ async def serve(
     built()
     work = [watch_accounts(reception), *(job for desk in reception.desks.values() for job in Loop(desk).jobs())]
     jobs = [asyncio.create_task(job) for job in work]
-    site = asyncio.create_task(_site(app, config, door, stopping, allowed.tls))
+    connections = Connections(config, lambda text, by: reception.note("warning", text, f"connections of {by}"))
+    door.count(connections, allowed.tls is not None)
+    site = asyncio.create_task(_site(app, connections, door, stopping, allowed.tls))
     try:
         # A job that fails ends the server: a page that shows half the truth is worse than none.
         await asyncio.wait([*jobs, site], return_when=asyncio.FIRST_COMPLETED)
@@ -214,11 +222,13 @@ class _Site(uvicorn.Server):
 
 
 async def _site(
-    app: ASGIApp, config: ServerConfig, door: socket.socket, stopping: threading.Event, tls: Tls | None
+    app: ASGIApp, connections: Connections, door: Listener, stopping: threading.Event, tls: Tls | None
 ) -> None:
+    config = connections.limits
     site = _Site(
-        uvicorn.Config(
+        SiteConfig(
             app,
+            connections,
             log_level="error",
             access_log=False,
             lifespan="off",
@@ -227,7 +237,7 @@ async def _site(
             proxy_headers=False,
             ws_max_size=config.max_body_bytes,
             ws_per_message_deflate=False,
-            ws=ReadingSocket,
+            ws=LimitedSocket,
             ws_ping_interval=config.unread_s / 2,
             ws_ping_timeout=config.unread_s,
             timeout_graceful_shutdown=1,
@@ -240,6 +250,14 @@ async def _site(
         await asyncio.sleep(_POLL_S)
     site.should_exit = True
     await serving
+
+
+def _may_open(files: int) -> None:
+    """Let this process open so many files at once, as far as its user may."""
+    usual, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if usual != resource.RLIM_INFINITY and usual < files:
+        may = files if most == resource.RLIM_INFINITY else min(files, most)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (may, most))
 
 
 def _check_certificates(folder: Path, robots: list[str]) -> None:

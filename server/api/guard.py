@@ -4,19 +4,22 @@ Default-deny: whatever lies under `/api/`, `/camera/`, `/viser`, `/robots` (of a
 needs a session, except the few listed.
 """
 
+import asyncio
 import time
 from collections.abc import Callable
 from http.cookies import CookieError, SimpleCookie
 
 import msgspec
 from starlette.datastructures import MutableHeaders
+from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from server.auth.sessions import Session, Sessions
 
 _PUBLIC = frozenset({"/api/sign-in", "/api/health", "/api/openapi.json"})
-#: Requests whose body only labels them: one that is too long is left out, and the request goes on.
+#: Requests whose body only labels them: one that is too long or too late (s) is left out, and the request goes on.
 _LABELLED = frozenset({"/api/stop"})
+_LABEL_S = 0.25
 _PROTECTED = ("/api", "/camera", "/viser", "/ws", "/robots")
 _SAFE_METHODS = frozenset({"GET", "HEAD"})
 
@@ -77,7 +80,13 @@ class Guard:
         if session is None and not is_open(path):
             await _refuse(with_headers, 401, "sign in first: open the sign-in link of this server")
             return
-        body = await _read_body(receive, self._max_body)
+        try:
+            async with asyncio.timeout(_LABEL_S if path in _LABELLED else None):
+                body = await _read_body(receive, self._max_body)
+        except (TimeoutError, ClientDisconnect):
+            if path not in _LABELLED:
+                return
+            body = None
         if body is None and path in _LABELLED:
             body = b""
         if body is None:
@@ -145,7 +154,7 @@ async def _read_body(receive: Receive, limit: int) -> bytes | None:
     while True:
         message = await receive()
         if message["type"] != "http.request":
-            return body
+            raise ClientDisconnect
         chunk: bytes = message.get("body", b"")
         body += chunk
         if len(body) > limit:

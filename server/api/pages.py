@@ -32,10 +32,9 @@ from rolling_panda.messages.page import (
 )
 from rolling_panda.messages.supervision import PreviewState
 from rolling_panda.messages.types import Pose
-from server.api.frame_rate import FRAMES_HZ, Frames
 from server.api.page_pace import PagePace
-from server.api.reading_socket import was_unread
 from server.auth.sessions import Session
+from server.connections.websocket_protocol import why_ended
 from server.robots.context import RobotContext
 from server.robots.page_view import addressed
 from server.robots.teleop import Aim
@@ -70,7 +69,6 @@ class OpenPage:
         self._holding = False
         #: The button is still pressed, but its hold is over: only a new press starts another.
         self._spent = False
-        self._frames = Frames()
         #: Tells this page from others of the same session.
         self.view = f"page {secrets.token_hex(8)}"
 
@@ -95,8 +93,8 @@ class OpenPage:
             await asyncio.gather(*legs, return_exceptions=True)
         if self.session.ended.is_set():
             await self._close("signed out")
-        elif was_unread(self._websocket.scope):
-            self._closed_for("it did not read what it was sent")
+        elif reason := why_ended(self._websocket.scope):
+            self._closed_for(reason)
 
     def selected(self, point_id: str) -> None:
         """A point was clicked in the 3-D view of this session."""
@@ -169,10 +167,6 @@ class OpenPage:
         try:
             while True:
                 text = await self._websocket.receive_text()
-                if not self._frames.admits(time.monotonic()):
-                    self._closed_for("it said too much")
-                    await self._close(f"a page may say {FRAMES_HZ:.0f} things a second")
-                    return
                 try:
                     message = _DECODER.decode(text)
                 except (msgspec.MsgspecError, UnicodeEncodeError, RecursionError) as error:

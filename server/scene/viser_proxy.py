@@ -14,6 +14,7 @@ from websockets.typing import Subprotocol
 
 from rolling_panda.errors import RollingPandaError
 from server.auth.sessions import Session
+from server.connections.websocket_protocol import why_ended
 from server.scene.scene import VIEW_VERSION, Scene, view_page
 from server.scene.viser_filter import GizmoDragEnd, GizmoUpdate, admit, kind
 
@@ -30,6 +31,7 @@ def viser_router(
     may_move: Callable[[Session], bool],
     on_gizmo: Callable[[Session, GizmoUpdate | GizmoDragEnd], object],
     on_drop: Callable[[Session, str], None],
+    on_end: Callable[[Session, str], None],
 ) -> APIRouter:
     """Routes `/viser/` and the WebSocket `/viser`.
 
@@ -39,6 +41,7 @@ def viser_router(
         on_gizmo: Hears at once where a session that may has dragged its gizmo, and when anybody has let go of theirs;
             viser would tell it two threads later.
         on_drop: Hears of refused frames: whose, and what they said they were.
+        on_end: Hears whose view the server has ended, and why.
     """
     router = APIRouter(include_in_schema=False)
     page = _view_page()
@@ -91,6 +94,8 @@ def viser_router(
                 await websocket.close(1013, "the 3-D view is not running")
             finally:
                 scene.door.forget(port)
+                if reason := why_ended(websocket.scope):
+                    on_end(session, reason)
 
     return router
 

@@ -1,0 +1,1 @@
+"""Who is connected: how many, how long they may take, and how much they may say."""
