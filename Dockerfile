@@ -19,7 +19,6 @@ COPY controller controller
 COPY perception perception
 COPY recorder recorder
 COPY server server
-COPY benchmarks benchmarks
 RUN /tools/bin/pip wheel --no-cache-dir --no-deps --no-build-isolation --wheel-dir /wheel .
 
 # What runs: locked dependencies first, as they change seldom. LOCK=requirements-real.lock brings the real robot's drivers.

@@ -5,12 +5,14 @@ VENV := .venv
 BIN := $(VENV)/bin
 TYPESCRIPT := typescript@5.9.3
 
-.PHONY: help demo test check bench mutation clean lock materials browser
+.PHONY: help demo test fast check format bench mutation clean lock materials browser
 .DEFAULT_GOAL := help
 
 help:
 	@echo "make demo    start everything in simulation; prints a link to sign in with   (ARGS='--port 8001 --seed 3')"
 	@echo "make test    make check, then every test"
+	@echo "make fast    tests that only compute: no browser, no processes"
+	@echo "make format  format the code, write the generated files anew"
 	@echo "make check   formatting, types, import contracts, generated files"
 	@echo "make bench   measurements                                                     (ARGS='tick --json tick.json')"
 	@echo "make mutation   small changes of what safety rests on: a test has to fail for each   (ARGS='codec --sample 20')"
@@ -29,6 +31,16 @@ else
 	$(BIN)/pytest -n auto -m "not alone and not slow"
 	$(BIN)/pytest -m "alone and not slow"
 endif
+
+# Fewer random examples than `make test` has.
+fast: $(VENV)/.project
+	HYPOTHESIS_PROFILE=fast $(BIN)/pytest -n auto -m "not alone and not slow and not browser" \
+		tests/bridge tests/controller tests/perception tests/recorder tests/rolling_panda tests/server
+
+format: $(VENV)/.project
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+	$(BIN)/python -m rolling_panda.generate --write
 
 check: $(VENV)/.project
 	$(BIN)/ruff check .

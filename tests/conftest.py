@@ -14,9 +14,10 @@ from tests.support.played_page import browser, page, server, tab
 __all__ = ["browser", "page", "server", "tab"]
 
 # A time limit for each example would judge how busy the machine is, not the code. The same examples each time, so that
-# a change fails for what it changed; `HYPOTHESIS_PROFILE=explore make test` looks for new ones.
+# a change fails for what it changed; `HYPOTHESIS_PROFILE=explore make test` looks for new ones; `make fast` uses few.
 settings.register_profile("same", deadline=None, derandomize=True, max_examples=40)
 settings.register_profile("explore", deadline=None, max_examples=500)
+settings.register_profile("fast", deadline=None, derandomize=True, max_examples=8)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
 
 

@@ -7,6 +7,7 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
+from importlib.util import find_spec
 from typing import Any
 
 from rolling_panda import __version__
@@ -59,6 +60,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if argv is None else argv)
     if words and words[0] in FORWARDED:
         module = FORWARDED[words[0]][0]
+        if module == "benchmarks" and find_spec(module) is None:
+            print("rolling-panda bench: needs a checkout; the installed package has no benchmarks", file=sys.stderr)
+            return 1
         command = python_command(module, words[1:])
         sys.stdout.flush()
         os.execve(command[0], command, child_environment())

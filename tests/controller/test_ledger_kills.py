@@ -32,7 +32,7 @@ from controller.ledger.store import Ledger
 from controller.ledger.start import restored
 from controller.ledger.writer import LedgerWriter
 from controller.loop import Loop
-from controller.work.queue_requests import Operator
+from controller.work.queue_requests import QueueRequests
 from controller.work.point_queue import PointQueue
 from rolling_panda import messages as m
 from rolling_panda.config import TransportConfig
@@ -43,7 +43,7 @@ class Desk:
         self.journal = Journal()
         self.queue = PointQueue(ControllerConfig(), self.journal)
         self.queue.restore(rows)
-        self.operator = Operator(self.queue)
+        self.operator = QueueRequests(self.queue)
         self.cuts = 0
         self.intent = None
 

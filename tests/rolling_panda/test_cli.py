@@ -125,3 +125,10 @@ def test_router_refuses_a_port_in_use(capsys: pytest.CaptureFixture[str], busy_p
 
 def test_router_refuses_what_is_no_endpoint(capsys: pytest.CaptureFixture[str]) -> None:
     assert_one_clear_line(capsys, ["router", "--plain-wire", "--listen", "localhost"], "localhost")
+
+
+def test_an_installed_package_says_that_it_has_no_benchmarks(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cli, "find_spec", lambda name: None)
+    assert_one_clear_line(capsys, ["bench", "tick"], "checkout")

@@ -79,7 +79,7 @@ def test_children_that_watch_their_parent_end_when_it_is_killed(tmp_path: Path) 
         "from rolling_panda.cli.demo_supervisor import Supervisor\n"
         "from rolling_panda.runtime.launch import python_command\n"
         f"supervisor = Supervisor(pathlib.Path({str(tmp_path)!r}))\n"
-        "words = ['router', '--listen', 'tcp/127.0.0.1:0', '--exit-with-parent']\n"
+        "words = ['router', '--listen', 'tcp/127.0.0.1:0', '--plain-wire', '--exit-with-parent']\n"
         "supervisor.start('router', python_command('rolling_panda', words))\n"
         "print(supervisor.pids()['router'], flush=True)\n"
         "signal.pause()\n"
