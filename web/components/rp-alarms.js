@@ -1,4 +1,4 @@
-// What needs somebody now, the worst first, each with what to do about it.
+// Panel with the alarms, errors first, each with what to do.
 
 import { clockWords, counted } from "../js/state/format.js";
 import { link, now, pageState, points } from "../js/state/page-state.js";
@@ -7,7 +7,7 @@ import { alarms } from "../js/views/alarms.js";
 import { element, setText } from "../js/views/dom.js";
 import { icon } from "../js/views/icons.js";
 
-/** One that has gone stays for so long (ms), so that it can be read and the list does not flicker. */
+/** A cleared alarm stays for this time (ms), so that it can be read and the list does not flicker. */
 const LINGER_MS = 2000;
 
 class RpAlarms extends HTMLElement {
@@ -31,7 +31,7 @@ class RpAlarms extends HTMLElement {
         setText(known.act, each.act);
       }
       for (const [id, { row, seen }] of rows) {
-        // What was to be done about it is no advice any more.
+        // Its advice is hidden.
         row.classList.toggle("gone", seen < at);
         if (at - seen < LINGER_MS) continue;
         row.remove();

@@ -1,4 +1,4 @@
-// What the eye-in-hand camera sees, with the pruning points drawn on it; it can be held still, and clicked to add a point.
+// Panel with the eye-in-hand camera's image and the points on it. Freeze holds the image; a click can place a point.
 
 import { placePoint, placing } from "../js/control/placing.js";
 import { selectAndReveal } from "../js/control/selection.js";
@@ -22,7 +22,7 @@ const SIGNS = Object.freeze({
   REJECTED: "M-3 -3l6 6M3 -3l-6 6",
 });
 
-/** Where the blades close, square to a cane that runs to the right. */
+/** Line of the blades, for a cane along x. */
 const BLADES = "M0 -14V-7M0 7V14";
 
 class CameraMarks {
@@ -89,13 +89,13 @@ class CameraMarks {
 }
 
 
-/** What is said of where the image comes from, and why, by the bridge's kind. */
+/** Label and title of the image's source, by kind of bridge. */
 const SOURCES = {
   sim: ["simulation", "The robot and its camera are simulated"],
   fakes: ["fakes", "The real robot's drivers run on fakes of its devices; nothing real moves"],
   real: ["", ""],
 };
-/** Frames come at 2 Hz; one that is this old (ms) is called old. */
+/** Age from which an image is stale (ms); images arrive at 2 Hz. */
 const OLD_MS = 2500;
 
 class RpCamera extends HTMLElement {
@@ -108,7 +108,7 @@ class RpCamera extends HTMLElement {
     this.shownFrame = 0;
     this.frameAt = 0;
     this.loading = false;
-    /** Where points are in the image that is held still; null while it is not. */
+    /** Pixels of the points in the frozen image; null while it is live. */
     this.held = signal(/** @type {Map<string, Pixel>|null} */ (null));
   }
 
@@ -170,7 +170,7 @@ class RpCamera extends HTMLElement {
     return out;
   }
 
-  /** Decoded aside first: the picture never flashes empty between two frames. */
+  /** Decode before showing, so that the image never flashes empty. */
   fetchNewest() {
     const frame = pageState.get()?.camera_frame ?? 0;
     if (this.loading || frame === this.shownFrame || frame === 0 || this.held.get() !== null) return;
@@ -202,7 +202,7 @@ class RpCamera extends HTMLElement {
     if (u < 0 || u > 1 || v < 0 || v > 1) return;
     const name = await placePoint("api/points/by-hand-in-image", { sequence: this.shownFrame, u, v });
     const held = this.held.get();
-    // In an image that is held still the new point is where it was clicked.
+    // A frozen image gets no new pixels: the point is where it was clicked.
     if (name && held !== null) this.held.set(new Map(held).set(name, [at.x, at.y]));
   }
 }

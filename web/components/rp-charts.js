@@ -1,4 +1,4 @@
-// Every reading over the last five minutes, and which process was there: point at a moment to read all of them then.
+// Charts of all readings and processes over the last five minutes. Pointing at a moment shows the values then.
 
 import { PROCESSES } from "../js/link/messages.js";
 import { ageWords } from "../js/state/format.js";
@@ -12,17 +12,17 @@ import { READINGS } from "../js/views/readings.js";
  * @typedef {object} Plot
  * @property {readonly Sample[]} samples Oldest first; NaN where unknown.
  * @property {number} newest Time at the right edge (ms).
- * @property {number} fullScale Least value of the upper edge.
- * @property {readonly number[]} limits Drawn as broken lines.
- * @property {number|null} pointed Time that is pointed at (ms).
+ * @property {number} fullScale Minimum of the upper edge.
+ * @property {readonly number[]} limits Drawn as dashed lines.
+ * @property {number|null} pointed Time under the cursor (ms).
  */
 
-/** Samples further apart than this (ms) are not joined. */
+/** Samples further apart than this (ms) are not connected. */
 const GAP_MS = 1500;
 const MINUTE_MS = 60_000;
 
 /**
- * The canvas in the screen's own pixels, cleared, with the page's colours.
+ * Clear the canvas and set its resolution to device pixels.
  *
  * @param {HTMLCanvasElement} canvas
  */
@@ -87,7 +87,7 @@ function drawCursor({ pen, width, height, colour }, pointed, newest) {
 }
 
 /**
- * Upper edge of a chart: as much as is needed, and at least what is usual.
+ * Upper edge of a chart.
  *
  * @param {Plot} plot
  */
@@ -136,7 +136,7 @@ function drawLine(canvas, plot) {
 }
 
 /**
- * A band for each of several: full where it was there, an outline where it was not, empty where nothing is known.
+ * One band for each row: filled while present, a thin line while gone, empty if unknown.
  *
  * @param {HTMLCanvasElement} canvas
  * @param {readonly (readonly Sample[])[]} rows
@@ -164,7 +164,7 @@ function drawBands(canvas, rows, newest, pointed) {
 }
 
 /**
- * The sample nearest to a time; null where none is near.
+ * The sample nearest to a time; null if none is within GAP_MS.
  *
  * @param {readonly Sample[]} samples
  * @param {number} at
@@ -175,15 +175,15 @@ function sampleAt(samples, at) {
   return best && Math.abs(best.at - at) <= GAP_MS && !Number.isNaN(best.value) ? best : null;
 }
 
-/** An arrow key moves the moment that is pointed at by so much (ms). */
+/** Step of the arrow keys (ms). */
 const STEP_MS = 5000;
 
 export class RpCharts extends HTMLElement {
   constructor() {
     super();
-    /** How long ago the moment is that is pointed at (ms); null when none is. */
+    /** Age of the moment under the cursor (ms); null without one. */
     this.back = signal(/** @type {number|null} */ (null));
-    /** What is looked at: the history as it grows, or as it was. */
+    /** The live history, or a frozen copy. */
     this.shown = signal(history);
     this.isOpen = false;
     this.when = element("span", { class: "hint number", attributes: { role: "status" } });

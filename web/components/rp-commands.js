@@ -1,4 +1,4 @@
-// What the operator may ask of the whole robot. Only what the controller would take is enabled.
+// Buttons for the robot's commands. Only those that the controller would accept are enabled.
 
 import { whyNot } from "../js/control/allowed.js";
 import { ask } from "../js/link/api.js";
@@ -17,7 +17,7 @@ const BUTTONS = Object.freeze([
   ["acknowledge", "Acknowledge", "Acknowledge", "The cause has been seen to"],
 ]);
 
-/** How far a survey may go (m). */
+/** Lengths of a survey (m). */
 const DISTANCES = Object.freeze([1, 2, 4, 8, 15, 30, 60, 120]);
 const USUAL_DISTANCE = 4;
 

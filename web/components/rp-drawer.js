@@ -1,15 +1,15 @@
-// A sheet over the view, with a way back: the queue, the log and the stop stay where they are.
+// The drawer over the 3-D view, with the charts or the report. Queue, log and stop stay in view.
 
 import { drawOn, signal } from "../js/state/signals.js";
 import { element, setText } from "../js/views/dom.js";
 
 /** @typedef {"charts"|"report"} SheetName */
 
-/** What is open now; empty when nothing is. */
+/** The open sheet; empty if none. */
 const drawer = signal(/** @type {SheetName|""} */ (""));
 
 /**
- * A button that opens a sheet and closes it again.
+ * A button that toggles a sheet.
  *
  * @param {SheetName} sheet
  * @param {string} words
@@ -28,7 +28,7 @@ export function drawerButton(sheet, words) {
 
 /** @typedef {HTMLElement & { tools: Node[], open: (open: boolean) => void }} Sheet */
 
-/** What few need at once is fetched when it is first opened. @type {Readonly<Record<string, () => Promise<Sheet>>>} */
+/** Fetched when first opened. @type {Readonly<Record<string, () => Promise<Sheet>>>} */
 const SHEETS = Object.freeze({
   charts: async () => new (await import("./rp-charts.js")).RpCharts(),
   report: async () => new (await import("./rp-report.js")).RpReport(),
@@ -44,7 +44,7 @@ class RpDrawer extends HTMLElement {
     this.waiting = element("p", { class: "empty", attributes: { role: "status" } });
     /** @type {Map<string, Sheet>} */
     this.sheets = new Map();
-    /** Where the focus goes back to. @type {Element|null} */
+    /** Gets the focus back. @type {Element|null} */
     this.opener = null;
   }
 
@@ -86,11 +86,11 @@ class RpDrawer extends HTMLElement {
     } catch {
       setText(this.waiting, "This could not be loaded. Close it, and open it again when the server is there.");
     }
-    // Something else may have been opened meanwhile.
+    // Another sheet may have been opened meanwhile.
     if (drawer.get() === name) this.lay(name);
   }
 
-  /** Show one sheet and no other. @param {string} name */
+  /** Show this sheet only. @param {string} name */
   lay(name) {
     this.tools.replaceChildren(...(this.sheets.get(name)?.tools ?? []));
     for (const [each, sheet] of this.sheets) {

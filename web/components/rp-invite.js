@@ -1,4 +1,4 @@
-// A supervisor makes a single-use sign-in link for somebody else, or for a script.
+// A supervisor creates a single-use sign-in link for another person or a script.
 
 import { post } from "../js/link/api.js";
 import { link as serverLink, pageState } from "../js/state/page-state.js";
@@ -47,7 +47,7 @@ class RpInvite extends HTMLElement {
     const show = (/** @type {boolean} */ open) => {
       form.hidden = !open;
       toggle.setAttribute("aria-expanded", String(open));
-      // A link that was shown once is not left on the screen.
+      // A link must not stay on the screen.
       link.value = "";
       made.hidden = true;
       setText(words, "A person or a script signs in with it once, within ten minutes.");
@@ -69,7 +69,7 @@ class RpInvite extends HTMLElement {
         setText(words, `No link was made: ${answer.reason}`);
         return;
       }
-      // The server knows its address on its own machine; this page knows the one that people use.
+      // The server knows its local address; this page knows the one in use.
       const path = new URL(answer.link);
       link.value = `${location.origin}${path.pathname}${path.search}`;
       made.hidden = false;

@@ -1,4 +1,4 @@
-// Who holds control of the robot's motion, and how it changes hands. Out of the way while there is nobody else.
+// Who holds control, and asking for, granting and taking it. Hidden while nobody else is there.
 
 import { holder } from "../js/control/lease.js";
 import { ask } from "../js/link/api.js";
@@ -6,14 +6,14 @@ import { pageState, showToast } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
 
-/** How long a second press confirms that control is to be taken from somebody (ms). */
+/** A second press within this time confirms taking control from another person (ms). */
 const CONFIRM_MS = 4000;
 
 class RpLease extends HTMLElement {
   give = button("grant-control", () => void ask("Granting control", "api/control/grant"));
   request = button("request-control", () => void ask("Asking for control", "api/control/request"));
   take = button("take-control", () => this.confirmTake());
-  /** Until when the second press counts (ms). */
+  /** End of that time (ms). */
   armed = 0;
   /** @type {number | null} */
   told = null;
@@ -54,7 +54,7 @@ class RpLease extends HTMLElement {
     this.announceLoss(mine, control?.told_number ?? 0, control?.told ?? "");
   }
 
-  /** The first press on somebody else's control asks whether it is meant. */
+  /** Taking control from another person needs a second press. */
   confirmTake() {
     const { held } = holder();
     if (held && performance.now() >= this.armed) {
@@ -67,7 +67,7 @@ class RpLease extends HTMLElement {
   }
 
   /**
-   * Who had control is told when they have it no longer.
+   * Notify a person who has lost control.
    *
    * @param {boolean} mine
    * @param {number} number

@@ -1,4 +1,4 @@
-// The page has no link: what is shown is the last known state. It tries again by itself.
+// Banner while the page has no link and shows the last known state.
 
 import { ageWords, counted } from "../js/state/format.js";
 import { isOpening, link, now, stateAge } from "../js/state/page-state.js";

@@ -1,4 +1,4 @@
-// What happened, and why something was refused; by severity, by process, and by words.
+// The log, with filters by severity, process and text.
 
 import { PROCESSES } from "../js/link/messages.js";
 import { clockWords, inWords } from "../js/state/format.js";
@@ -15,7 +15,7 @@ const LEAST = Object.freeze([
   ["warning", "Warnings and errors"],
   ["error", "Errors"],
 ]);
-/** The page's own lines too. */
+/** With the page's own lines. */
 const FROM = Object.freeze([["", "All processes"], ...[...PROCESSES, "page"].map((name) => [name, name])]);
 
 class RpLog extends HTMLElement {
@@ -33,14 +33,14 @@ class RpLog extends HTMLElement {
     const tools = element("div", { class: "log-tools" }, words, from, least, drawerButton("report", "Report"));
     this.append(element("div", { class: "panel-head" }, element("h2", { text: "Log" }), tools), live, empty);
 
-    // Follow the newest line until somebody scrolls away from it; turning the screen is no such wish.
+    // Follow the newest line until the operator scrolls up; a resize does not count.
     let following = true;
     const toEnd = () => {
       list.scrollTop = list.scrollHeight;
     };
     let width = 0;
     list.addEventListener("scroll", () => {
-      // A list that was just made narrower scrolls by itself.
+      // A list that becomes narrower scrolls by itself.
       if (width === list.clientWidth) following = list.scrollHeight - list.scrollTop - list.clientHeight < 24;
     });
     new ResizeObserver(() => {

@@ -1,4 +1,4 @@
-// What the robot is doing, and why.
+// The mode, its phase and its reason.
 
 import { MODE_WORDS, PHASE_WORDS, inWords } from "../js/state/format.js";
 import { isLive, link, now, pageState } from "../js/state/page-state.js";

@@ -1,4 +1,4 @@
-// The order of work, to be changed by dragging or by keys. Only rows in view are there, so that thousands cost nothing.
+// The order of work, changed by dragging or keys. Only rows in view exist, so that thousands are possible.
 
 import { moveTo, orderWords, plannersOrder, whyNoMove, whyNoPlannersOrder, workOrder } from "../js/control/order.js";
 import { select, selectAndReveal } from "../js/control/selection.js";
@@ -9,16 +9,16 @@ import { element, setAttribute, setEnabled, setText } from "../js/views/dom.js";
 
 /** @typedef {import("../js/link/messages.js").PagePoint} PagePoint */
 
-/** Height of a row (px), as in order.css. */
+/** Height of a row (px), as in rule.css. */
 const ROW = 44;
-/** Rows above and below those in view. */
+/** Extra rows above and below the view. */
 const SPARE = 4;
-/** Near an end of the list a drag scrolls it: within so much of it, by so much a frame (px). */
+/** A drag within EDGE of an end scrolls the list by SCROLL for each move (px). */
 const EDGE = 30;
 const SCROLL = 8;
 const HINT = "Arrows choose; Alt and an arrow move the chosen point, Alt and Home or End to the first or last place";
 
-/** Keys that move the chosen row, with Alt, or else the choice: from one place, of so many. @type {Readonly<Record<string, (at: number, last: number) => number>>} */
+/** Keys that move the selection, or with Alt the selected row: (index, last index) → index. @type {Readonly<Record<string, (at: number, last: number) => number>>} */
 const STEPS = Object.freeze({
   ArrowDown: (at, last) => Math.min(at + 1, last),
   ArrowUp: (at) => Math.max(at - 1, 0),
@@ -29,9 +29,9 @@ const STEPS = Object.freeze({
 class RpOrder extends HTMLElement {
   /** @type {readonly PagePoint[]} */
   order = [];
-  /** Rows that are there, by their place. @type {Map<number, HTMLElement>} */
+  /** Existing rows by index. @type {Map<number, HTMLElement>} */
   rows = new Map();
-  /** Where the dragged point comes, counted without itself; -1 while nothing is dragged. */
+  /** Index to drop the dragged point at, not counting itself; -1 without a drag. */
   target = -1;
   dragged = "";
 

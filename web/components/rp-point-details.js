@@ -1,4 +1,4 @@
-// What is known of the chosen point: the picture it was found in, and the figures behind the cut.
+// Details of the selected point: its image crop, figures, and adjustment of cut and approach.
 
 import { move, whyNotMove } from "../js/control/decisions.js";
 import { turnApproach, whyNotTurn } from "../js/control/order.js";
@@ -8,12 +8,12 @@ import { element, setEnabled, setText } from "../js/views/dom.js";
 /** @typedef {import("../js/link/messages.js").PagePoint} PagePoint */
 /** @typedef {import("../js/link/messages.js").PruningPoint} PruningPoint */
 
-/** A picture that has not come yet is asked for again after so long (ms), so many times. */
+/** A missing crop is requested again after this time (ms), this many times. */
 const AGAIN_MS = 1500;
 const TRIES = 20;
-/** A dragged slider asks when it has rested for so long (ms). */
+/** Debounce of the slider (ms). */
 const SETTLE_MS = 150;
-/** How far a press moves the cut along its cane (mm). */
+/** Steps along the cane (mm). */
 const STEPS = Object.freeze([-5, -1, 1, 5]);
 
 /** @type {readonly (readonly [word: string, hint: string, value: (point: PruningPoint) => string])[]} */
@@ -103,7 +103,7 @@ export class RpPointDetails extends HTMLElement {
     if (this.row) void move(this.row, step);
   }
 
-  /** While the slider is dragged, no more than a few requests a second. @param {number} degrees */
+  /** Debounced while the slider is dragged. @param {number} degrees */
   turnTo(degrees) {
     setText(this.turned, `${degrees}°`);
     window.clearTimeout(this.turning);
@@ -141,7 +141,7 @@ export class RpPointDetails extends HTMLElement {
       const node = this.values[at];
       if (node) setText(node, value(point));
     });
-    // The hash tells points of the same name apart that perception has found before and after it was started anew.
+    // A restarted perception reuses ids: the hash distinguishes the points.
     const path = `api/points/${encodeURIComponent(point.point_id)}/crop?revision=${point.revision}&of=${point.digest}`;
     if (path === this.shown) return;
     this.shown = path;

@@ -1,4 +1,4 @@
-// One row of the queue: a pruning point, why it is where it is, and what may be done with it.
+// One row of the queue, with the form for the reason of a rejection.
 
 import { accept, isUncertain, isUnknown, reject, whyNotAccept, whyNotReject } from "../js/control/decisions.js";
 import { select, selectAndReveal } from "../js/control/selection.js";
@@ -6,6 +6,8 @@ import { TEXT_MAX_LENGTH } from "../js/link/messages.js";
 import { POINT_WORDS, counted, inWords } from "../js/state/format.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
 import { icon, setIcon } from "../js/views/icons.js";
+
+/** @typedef {import("../js/link/messages.js").PagePoint} PagePoint */
 
 const USUAL = Object.freeze(["wrong cane", "wrong place", "too near a wire", "leave it"]);
 
@@ -34,7 +36,7 @@ export class RpRejectForm extends HTMLElement {
     }
     this.append(form, usual);
     this.addEventListener("keydown", (event) => {
-      // The queue's own keys mean letters here.
+      // Letters are text here, not the queue's keys.
       event.stopPropagation();
       if (event.key !== "Escape") return;
       event.preventDefault();
@@ -70,7 +72,6 @@ export class RpRejectForm extends HTMLElement {
 }
 customElements.define("rp-reject-form", RpRejectForm);
 
-/** @typedef {import("../js/link/messages.js").PagePoint} PagePoint */
 /** @param {PagePoint} row */
 function planWords({ plan }) {
   if (!plan?.order) return "";
@@ -121,7 +122,7 @@ export class RpPoint extends HTMLElement {
     this.addEventListener("focus", () => this.choose());
   }
 
-  /** An unknown cut is answered at once; a rejection may have a reason, which the queue asks for. */
+  /** An unknown cut is resolved at once; a rejection may have a reason, which the queue asks for. */
   reject() {
     if (!this.row) return;
     if (isUnknown(this.row)) void reject(this.row, "");
@@ -132,19 +133,19 @@ export class RpPoint extends HTMLElement {
     if (this.row) select(this.row.point.point_id);
   }
 
-  /** What is shown, in one string. */
+  /** Key of what is drawn. */
   drawn = "";
 
-  /** @param {boolean} active Is the robot at it now? */
+  /** @param {boolean} active Is the robot at this point? */
   mark(active) {
     this.classList.toggle("active", active);
   }
 
   /**
-   * Nothing is done where nothing has changed: of thousands of points that come anew, one has.
+   * Skipped if nothing has changed: of thousands of points that arrive, one has.
    *
    * @param {PagePoint} row
-   * @param {string} may What may be done with points now.
+   * @param {string} may Key of what is allowed now.
    */
   show(row, may) {
     this.row = row;
@@ -158,7 +159,7 @@ export class RpPoint extends HTMLElement {
     setText(this.word, POINT_WORDS[entry.state]);
     setText(this.place, point.point_id);
     const thick = `${(2000 * point.radius).toFixed(1)} mm`;
-    // Rounded down: what reads like enough to be accepted with all others is enough.
+    // Rounded down, so that a value shown as enough for "Accept all" is enough.
     const sure = `${Math.floor(100 * point.confidence + 1e-9)} %`;
     const planned = row.plan?.order ? `no. ${row.plan.order}, way ${row.plan.duration_s.toFixed(1)} s` : "";
     setText(this.facts, `${point.nodes_kept}/${point.nodes_seen} nodes · ${thick} · ${isUncertain(row) ? "only " : ""}${sure}`);

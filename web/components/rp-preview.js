@@ -1,8 +1,8 @@
-// What the robot would do now, played as a ghost in the 3-D view, and a person's word that it may.
+// The preview: played as a ghost in the 3-D view, and approved.
 
 import { whyNot } from "../js/control/allowed.js";
 import { workOrder } from "../js/control/order.js";
-import { approve, askPreview, cutAt, hasPreview, hide, moment, play, playing, require, show, whyNoApproval, whyNoPreview } from "../js/control/preview.js";
+import { approvePreview, askPreview, cutAt, hasPreview, hidePreview, moment, playing, requirePreview, showMoment, togglePlayback, whyNoApproval, whyNoPreview } from "../js/control/preview.js";
 import { inWords } from "../js/state/format.js";
 import { link, now, pageState, points, preview, selected } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
@@ -10,7 +10,7 @@ import { element, setEnabled, setText } from "../js/views/dom.js";
 
 /** @typedef {import("../js/link/messages.js").PreviewState} PreviewState */
 
-/** Steps of the scrubber (s). */
+/** Step of the slider (s). */
 const STEP = 0.05;
 
 class RpPreview extends HTMLElement {
@@ -18,9 +18,9 @@ class RpPreview extends HTMLElement {
     const button = (/** @type {string} */ id, /** @type {string} */ text, /** @type {() => void} */ onclick) => element("button", { id, text, attributes: { type: "button" }, onclick });
     const all = button("preview", "Preview", () => void askPreview(""));
     const one = button("preview-one", "Chosen", () => void askPreview(selected.get()));
-    const run = button("preview-play", "Play", play);
-    const close = button("preview-hide", "Hide", hide);
-    const yes = button("approve-preview", "Approve", () => void approve());
+    const run = button("preview-play", "Play", togglePlayback);
+    const close = button("preview-hide", "Hide", hidePreview);
+    const yes = button("approve-preview", "Approve", () => void approvePreview());
     const slider = element("input", { id: "preview-time", attributes: { type: "range", min: "0", step: String(STEP), "aria-label": "Moment of the preview" } });
     const time = element("span", { class: "number preview-time" });
     const words = element("p", { class: "preview-words number", attributes: { role: "status" } });
@@ -30,12 +30,12 @@ class RpPreview extends HTMLElement {
     this.replaceChildren(element("div", { class: "preview-tools" }, all, one, label, words), player);
     slider.addEventListener("input", () => {
       playing.set(false);
-      show(Number(slider.value));
+      showMoment(Number(slider.value));
     });
     required.addEventListener("change", () => {
       const wanted = required.checked;
       required.checked = preview.get()?.required ?? false;
-      if (!whyNot("RequirePreview")) void require(wanted);
+      if (!whyNot("RequirePreview")) void requirePreview(wanted);
     });
     let hash = "";
     let working = false;
@@ -43,11 +43,11 @@ class RpPreview extends HTMLElement {
       const state = preview.get();
       if ((state?.preview_hash ?? "") !== hash) {
         hash = state?.preview_hash ?? "";
-        hide();
+        hidePreview();
       }
-      // What the robot does now is the robot's to show, not the ghost's.
+      // At work the ghost would hide the robot.
       const works = pageState.get()?.controller?.mode === "AUTO";
-      if (works && !working) hide();
+      if (works && !working) hidePreview();
       working = works;
       const accepted = workOrder();
       const chosen = accepted.some((row) => row.point.point_id === selected.get());

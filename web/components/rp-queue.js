@@ -1,4 +1,4 @@
-// The queue of pruning points, by vine and spur; arrows, A, R, Z and N work from the keyboard.
+// The queue of pruning points by vine and spur. Keys: arrows, A accept, R reject, Z undo, N new.
 
 import { countOf, whyNot } from "../js/control/allowed.js";
 import { accept, acceptAll, confidentPoints, decisions, undo, whyNoUndo, whyNotAccept, whyNotReject } from "../js/control/decisions.js";
@@ -16,15 +16,15 @@ import { RpPoint, RpRejectForm } from "./rp-point.js";
 
 /** @typedef {import("../js/link/messages.js").PagePoint} PagePoint */
 
-/** What a row's buttons depend on. */
+/** Intents that a row's buttons depend on. */
 const MAY = /** @type {const} */ (["AcceptPoint", "RejectPoint", "ResolvePoint"]);
-/** How long a process has been gone is in the reasons too, and grows all the time. */
+/** Reasons contain the age of a lost process, which grows all the time. */
 const AGE = /[\d.]+ (s|min|h)\b/g;
-/** Height of a group's heading, which stays at the top of the list (px). */
+/** Height of a group's sticky heading (px). */
 const HEADING = 20;
-/** How many rows a page of the list is. */
+/** Rows of Page up and Page down. */
 const PAGE = 6;
-/** Keys that go to another row: from one, of so many. @type {Readonly<Record<string, (at: number, last: number) => number>>} */
+/** Keys that move the selection: (index, last index) → index. @type {Readonly<Record<string, (at: number, last: number) => number>>} */
 const STEPS = Object.freeze({
   ArrowDown: (at, last) => Math.min(at + 1, last),
   ArrowUp: (at) => Math.max(at - 1, 0),
@@ -61,7 +61,7 @@ class RpQueue extends HTMLElement {
       this.classList.toggle("stale", words !== "");
       setText(source, page?.segmenter ?? "");
       setText(empty, emptyWords());
-      // States come ten times a second; the rows change with the points, and with what may be done with them.
+      // States arrive ten times a second; rows depend on the points and on what is allowed.
       this.markActive(pageState.get()?.controller?.active_point_id ?? "");
       const may = MAY.map(whyNot).join("\n").replace(AGE, "");
       if (page === drawnPage && may === drawn) return;
@@ -82,13 +82,13 @@ class RpQueue extends HTMLElement {
 
   /** @type {Map<string, RpPoint>} */
   rows = new Map();
-  /** The points as they are listed. @type {readonly PagePoint[]} */
+  /** The points as listed. @type {readonly PagePoint[]} */
   order = [];
-  /** The row that is marked as chosen. */
+  /** The row marked as selected. */
   chosen = "";
   /** @type {HTMLElement|undefined} */
   list;
-  /** The point that the robot is at. */
+  /** The point at which the robot is. */
   active = "";
   reason = new RpRejectForm();
 
@@ -100,7 +100,7 @@ class RpQueue extends HTMLElement {
     this.active = pointId;
   }
 
-  /** Mark the chosen row alone, and let the Tab key come to it, or else to the first. */
+  /** Mark the selected row; the Tab key reaches it, or else the first (roving tabindex). */
   choose() {
     const pointId = selected.get();
     const reachable = this.rows.has(pointId) ? pointId : (this.order[0]?.point.point_id ?? "");
@@ -124,7 +124,7 @@ class RpQueue extends HTMLElement {
 
   details = new RpPointDetails();
 
-  /** @param {PagePoint|undefined} row The chosen one. */
+  /** @param {PagePoint|undefined} row The selected one. */
   showDetails(row) {
     const item = row && this.rows.get(row.point.point_id);
     if (!item) {
@@ -137,7 +137,7 @@ class RpQueue extends HTMLElement {
     this.reveal();
   }
 
-  /** Scroll the list, and nothing else of the page, to the chosen row. */
+  /** Scroll only the list to the selected row. */
   reveal() {
     const item = this.rows.get(selected.get());
     const list = this.list;
@@ -149,16 +149,16 @@ class RpQueue extends HTMLElement {
       else if (box.bottom > frame.bottom) list.scrollTop += box.bottom - frame.bottom;
     };
     scroll();
-    // Rows that were out of sight have their heights only now.
+    // Rows out of view get their heights in the next frame.
     window.requestAnimationFrame(scroll);
   }
 
   /**
-   * Put the rows where they belong, moving only what has to move, so that focus and scroll stay.
+   * Place the rows, moving as few as possible, to keep focus and scroll position.
    *
    * @param {HTMLElement} list
    * @param {Map<string, HTMLElement>} groups
-   * @param {string} may What may be done with points now.
+   * @param {string} may Key of what is allowed now.
    */
   placeRows(list, groups, may) {
     const rows = this.order;
@@ -172,7 +172,7 @@ class RpQueue extends HTMLElement {
       const name = groupOf(row);
       let group = groups.get(name);
       if (!group) {
-        // The list has its name already; a heading inside it would be no item of it.
+        // The list is labelled; a heading inside would not be a list item.
         const heading = element("h3", { text: name, attributes: { role: "presentation" } });
         group = element("div", { class: "group", attributes: { role: "list", "aria-label": name } }, heading);
         groups.set(name, group);
@@ -219,7 +219,7 @@ class RpQueue extends HTMLElement {
   }
 }
 
-/** Until there is an order to be fetched its place is kept, so that the first acceptance moves no row. */
+/** A placeholder until the order is fetched, so that the first acceptance shifts no row. */
 function orderOfWork() {
   const order = document.createElement("rp-order");
   order.append(element("p", { class: "rule order-none", text: "Order of work: nothing accepted" }));

@@ -1,4 +1,4 @@
-// A recording that is played in the robot's place: where it stands, its scrubber, and who accepted which point.
+// Playback of a recording: position, play and pause, and who accepted which point.
 
 import { ask } from "../js/link/api.js";
 import { pageState, points } from "../js/state/page-state.js";
@@ -14,7 +14,7 @@ class RpReplay extends HTMLElement {
   time = element("span", { class: "number", attributes: { role: "status" } });
   words = element("strong");
   list = element("ul", { id: "replay-accepted" });
-  /** While it is dragged it is the hand that moves it. */
+  /** While dragged the slider is not updated. */
   dragged = false;
 
   connectedCallback() {

@@ -1,11 +1,11 @@
-// The session's report: cuts by outcome, the time they took, by vine, what was refused, and who held control.
+// The session report: cuts by outcome and vine, durations, refusals, and who held control.
 
 import { POINT_WORDS, clockWords, inWords } from "../js/state/format.js";
 import { element, setText } from "../js/views/dom.js";
 
 /** @typedef {import("../js/link/messages.js").SessionReport} SessionReport */
 
-/** While it is open the report is asked for again after so long (ms); the controller says it every 5 s. */
+/** Refresh period while open (ms); the controller publishes it every 5 s. */
 const AGAIN_MS = 5000;
 
 export class RpReport extends HTMLElement {
@@ -107,7 +107,7 @@ function table(title, columns) {
     box,
     /**
      * @param {readonly (readonly (string|number)[])[]} rows
-     * @param {string} nothing What is said when there are none.
+     * @param {string} nothing Text without rows.
      */
     show(rows, nothing) {
       grid.hidden = rows.length === 0;

@@ -1,5 +1,5 @@
-// Which robot this page shows, and how the others are. Another robot is another page, loaded whole: nothing of one robot
-// can stay on the page of another, and no press can reach the wrong one.
+// The robots of this server and their states. Each robot has its own page, loaded completely, so that no press can reach the
+// wrong robot. The history of the charts is stored in the tab for the way back.
 
 import { hold } from "../js/control/teleoperation.js";
 import { fetchJson } from "../js/link/api.js";
@@ -11,7 +11,7 @@ import { setIcon } from "../js/views/icons.js";
 
 const KEY = `history of ${location.pathname}`;
 
-/** When samples were taken (ms since 1970), and what was read: one row a name, null where it was unknown. @typedef {{ at: number[], rows: (number|null)[][] }} StoredHistory */
+/** Times of the samples (ms since 1970) and a row of values for each name; null is unknown. @typedef {{ at: number[], rows: (number|null)[][] }} StoredHistory */
 
 function persistHistory() {
   restoreHistory();
@@ -33,7 +33,7 @@ function restoreHistory() {
   if (text === null) return;
   /** @type {StoredHistory} */
   const { at, rows } = JSON.parse(text);
-  // Another version of this page may have kept other readings.
+  // Another version of this page may have stored other readings.
   if (rows.length !== history.names.length) return;
   const since = history.copy();
   history.count = 0;
@@ -46,7 +46,7 @@ function restoreHistory() {
 }
 
 /**
- * A robot as `GET /api/robots` tells it.
+ * A robot in the answer of `GET /api/robots`.
  *
  * @typedef {object} Glance
  * @property {string} name
@@ -65,7 +65,7 @@ class RpRobots extends HTMLElement {
   list = element("ul");
   /** @type {Map<string, (robot: Glance) => void>} */
   rows = new Map();
-  /** Alarms of the other robots that have been told. @type {Map<string, string>} */
+  /** Alarms of other robots that were shown. @type {Map<string, string>} */
   told = new Map();
 
   connectedCallback() {
@@ -100,14 +100,14 @@ class RpRobots extends HTMLElement {
       link.setAttribute("aria-current", "page");
       document.title = `${name} · Rolling Panda`;
     }
-    // Leaving ends a hold in any case; here it ends before the page does.
+    // End a hold before the page is left.
     link.addEventListener("click", () => hold.releaseAll());
     this.list.append(element("li", {}, link));
     const draw = (/** @type {Glance} */ robot) => {
       link.dataset.severity = robot.severity;
       setIcon(shape, robot.severity || robot.mode || "UNKNOWN");
       const word = robot.mode === null ? "No state yet" : MODE_WORDS[robot.mode];
-      // An alarm that begins with the mode says it already.
+      // No mode where the alarm already begins with it.
       setText(mode, inWords(robot.alarm).startsWith(word) ? "" : word);
       setText(alarm, inWords(robot.alarm));
       setText(holder, robot.yours ? "You hold control" : robot.holder ? `${robot.holder} holds control` : "");
@@ -120,7 +120,7 @@ class RpRobots extends HTMLElement {
   }
 
   /**
-   * What is wrong with a robot that this page does not show is told once.
+   * Notify once of an alarm of another robot.
    *
    * @param {Glance} robot
    */

@@ -1,4 +1,4 @@
-// The pruning rule. A slider only asks what another one would change; applied, it holds, and Undo takes it back.
+// The pruning rule. A slider asks for a what-if; Apply puts the rule in force, and Undo reverts it.
 
 import { whyNothing } from "../js/control/allowed.js";
 import { pushUndo } from "../js/control/decisions.js";
@@ -7,8 +7,10 @@ import { isLive, link, now, pageState, points } from "../js/state/page-state.js"
 import { drawOn } from "../js/state/signals.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
 
+/** @typedef {import("../js/link/messages.js").PruningRule} PruningRule */
+
 /**
- * What a rule would change, in words; or why nobody knows.
+ * Ask what a rule would change.
  *
  * @param {PruningRule} rule
  */
@@ -19,7 +21,7 @@ function tryRule(rule) {
 /** @param {PruningRule} rule */
 async function applyRule(rule) {
   const done = await ask("The rule", "api/rule", rule);
-  // Taken back while it is still in force, or refused: somebody else's rule is not undone from here.
+  // Refused unless it is still in force: another person's rule cannot be undone from here.
   if (done) pushUndo(`the rule ${ruleWords(rule)}`, () => ask("Taking the rule back", "api/rule/undo", rule));
   return done;
 }
@@ -32,13 +34,12 @@ function ruleWords(rule) {
   return `${word} · ${nodes} nodes · ≥ ${thick} mm · ${Math.round(1000 * rule.offset)} mm past`;
 }
 
-/** @typedef {import("../js/link/messages.js").PruningRule} PruningRule */
 /** @typedef {"nodes_kept"|"fruiting_nodes"|"keeper_diameter"|"offset"} Quantity */
 
-/** A dragged slider asks when it has rested for so long (ms); points that change meanwhile, after so long. */
+/** Debounce of the sliders, and of changed points (ms). */
 const SETTLE_MS = 150;
 const AGAIN_MS = 1000;
-/** So long (ms) an applied rule is shown before perception has said that it holds. */
+/** An applied rule is shown for this time (ms) until perception confirms it. */
 const APPLIED_TIMEOUT_MS = 2500;
 
 /** @type {readonly { name: Quantity, label: string, unit: string, scale: number, range: [number, number, number] }[]} */
@@ -66,11 +67,11 @@ class RpRule extends HTMLElement {
     this.sliders = new Map();
     /** @type {HTMLInputElement[]} */
     this.systems = [];
-    /** What the sliders say where that is not the rule in force; null where it is. @type {PruningRule|null} */
+    /** Rule of the sliders; null if it is the rule in force. @type {PruningRule|null} */
     this.draft = null;
-    /** The rule that was applied last, until perception prunes by it. @type {PruningRule|null} */
+    /** The rule applied last, until perception confirms it. @type {PruningRule|null} */
     this.applied = null;
-    /** Is it known what the draft would change? */
+    /** Is the effect of the draft known? */
     this.known = false;
     this.asking = false;
     this.timer = 0;
@@ -127,7 +128,7 @@ class RpRule extends HTMLElement {
     if (rule) this.want({ ...rule, ...part });
   }
 
-  /** @param {PruningRule|null} rule What the sliders say. */
+  /** @param {PruningRule|null} rule Rule of the sliders. */
   want(rule) {
     const held = this.applied ?? points.get()?.rule ?? null;
     this.draft = rule && held && !same(rule, held) ? rule : null;
@@ -144,7 +145,7 @@ class RpRule extends HTMLElement {
     if (this.draft) this.timer = window.setTimeout(() => void this.ask(), delay);
   }
 
-  /** What the draft would change. */
+  /** Ask what the draft would change. */
   async ask() {
     this.timer = 0;
     const asked = this.draft;
@@ -162,7 +163,7 @@ class RpRule extends HTMLElement {
     this.draw();
   }
 
-  /** From now on points are by the draft. */
+  /** Put the draft in force. */
   async hold() {
     const rule = this.draft;
     if (rule === null) return;
@@ -187,7 +188,7 @@ class RpRule extends HTMLElement {
     const held = page?.rule ?? null;
     if (this.applied && held && same(this.applied, held)) this.applied = null;
     if (this.draft && held && same(this.draft, held)) this.want(held);
-    // What it would change may be something else with every new picture.
+    // New images may change the effect.
     if (page !== this.page && this.draft && !this.timer && !this.asking) this.askIn(AGAIN_MS);
     this.page = page;
     const rule = this.draft ?? this.applied ?? held;

@@ -1,4 +1,4 @@
-// The 3-D view, in a frame of the same origin. Its keys and drags are watched, because they do not reach this page.
+// The 3-D view in an iframe of the same origin. Its key and pointer events are observed, since they do not reach this page.
 
 import { listenForDriveKeys } from "../js/control/driving.js";
 import { listenForSpace } from "../js/control/stop.js";
@@ -7,9 +7,9 @@ import { listenForViewKeys } from "../js/control/view-tools.js";
 import { link } from "../js/state/page-state.js";
 import { element } from "../js/views/dom.js";
 
-/** Below this width (px) the 3-D client lays its own panel over the view, as on a telephone. */
+/** Below this width (px) the 3-D client puts its own panel over the view. */
 const LEAST_WIDTH = 600;
-/** Whoever has seen nothing for so long (ms) is told what may be the matter. */
+/** After this time without a picture the probable cause is shown (ms). */
 const LOAD_TIMEOUT_MS = 20_000;
 
 class RpScene extends HTMLElement {
@@ -55,7 +55,7 @@ class RpScene extends HTMLElement {
       listenForDrag(view);
       frame.classList.add("loaded");
       const root = view.document.documentElement;
-      // Where the view's own file has not come, nobody tells.
+      // frame.js did not load: nothing will report the first drawing.
       if (!root.dataset.view) root.dataset.view = "untold";
       const look = () => {
         if (root.dataset.view === "loading") return;
@@ -66,14 +66,14 @@ class RpScene extends HTMLElement {
       look();
     });
     retry.addEventListener("click", load);
-    // In a narrow place the view is laid out at that width and shown smaller.
+    // In less space the view is laid out at LEAST_WIDTH and scaled down.
     new ResizeObserver(() => {
       const shrink = Math.min(1, Math.max(0.2, this.clientWidth / LEAST_WIDTH));
       frame.style.setProperty("width", `${100 / shrink}%`);
       frame.style.setProperty("height", `${100 / shrink}%`);
       frame.style.setProperty("transform", `scale(${shrink})`);
     }).observe(this);
-    // The frame's own link tries again only while it has the focus, so each new link of the page loads it anew.
+    // The 3-D client reconnects only while focused, so each new link of the page reloads it.
     let open = false;
     const follow = () => {
       const isOpen = link.get().status === "open";

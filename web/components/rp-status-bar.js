@@ -1,4 +1,4 @@
-// Who is signed in, which process is there, and how good the link is.
+// The status bar: processes, quality of the link, the person signed in.
 
 import { post } from "../js/link/api.js";
 import { PROCESSES } from "../js/link/messages.js";
@@ -39,7 +39,7 @@ class RpStatusBar extends HTMLElement {
       box.append(chip);
       drawOn([pageState, link, now], () => {
         const live = isLive(process);
-        // Without the server nothing is known of the others.
+        // A silent server says nothing about the others.
         const unknown = process === "server" ? isOpening() : !isLive("server");
         const seconds = processAge(process);
         const since = seconds === null ? "not seen" : `gone ${ageWords(seconds)}`;

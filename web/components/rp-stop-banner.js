@@ -1,4 +1,4 @@
-// After a stop: who pressed it and why, who has latched it, and the way out with a reason.
+// Banner after a stop: who pressed it, which processes have latched it, and Reset with a reason.
 
 import { whyNot } from "../js/control/allowed.js";
 import { earlierWords, hardwareStopPressed, sinceWords, stopProgress } from "../js/control/stop.js";
@@ -31,7 +31,7 @@ class RpStopBanner extends HTMLElement {
     const hint = element("p", { class: "hint", text: "The reset moves nothing: arm and start again afterwards." });
     form.addEventListener("submit", async (event) => {
       event.preventDefault();
-      // With the stop that is shown: one that was pressed since is not reset unseen.
+      // With the id of the stop shown: a newer one must not be reset unseen.
       const body = { reason: reason.value.trim(), stop_id: pageState.get()?.bridge?.stop_id ?? "" };
       if (await ask("Reset", "api/reset", body)) reason.value = "";
     });
@@ -53,7 +53,7 @@ class RpStopBanner extends HTMLElement {
         this.setAttribute("role", shown ? "alert" : "none");
       }
       if (!shown) return;
-      // Without a link nobody can reset from here, and the view has little room under both banners.
+      // Without a link no reset is possible, and two banners leave little of the view.
       form.hidden = hint.hidden = link.get().status !== "open";
       const told = state?.bridge?.stopped_by || (byController ? state?.controller?.reason : "") || "";
       setText(who, told ? `Pressed by ${told}` : "Pressed on this page; waiting for the robot to say so");
@@ -69,7 +69,7 @@ class RpStopBanner extends HTMLElement {
     };
     reason.addEventListener("input", draw);
     drawOn([pageState, link, now, stopProgress], draw);
-    // "Sent" has served its purpose once the robot itself says that it is stopped.
+    // The robot's own state takes over from "sent".
     pageState.subscribe((state) => {
       const latched = state?.controller?.mode === "ESTOP_LATCHED" || (state?.bridge?.stop_id ?? "") !== "";
       if (latched && stopProgress.get() !== "idle") stopProgress.set("idle");

@@ -1,4 +1,4 @@
-// The software stop: always there, always on top, pressed with a finger, the mouse or the space bar.
+// The software stop button, always visible and on top.
 
 import { multiRobot, stopProgress, stopRobot } from "../js/control/stop.js";
 import { drawOn } from "../js/state/signals.js";
@@ -29,11 +29,11 @@ class RpStop extends HTMLElement {
       icon("ESTOP_LATCHED"),
       element("span", { class: "stop-words" }, label, element("small", { text: multiRobot ? "all robots · space bar" : "space bar" })),
     );
-    // On pressing down, not on letting go: a finger that slides off has still stopped the robot.
+    // On pointerdown, so that a finger that slides off has still stopped the robot.
     button.addEventListener("pointerdown", (event) => {
       if (event.button === 0) void stopRobot("stop button");
     });
-    // A click without a pointer: Enter, or an assistive tool.
+    // A click without a pointer: Enter, or assistive technology.
     button.addEventListener("click", (event) => {
       if (event.detail === 0) void stopRobot("stop button");
     });

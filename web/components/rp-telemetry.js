@@ -1,4 +1,4 @@
-// How well the robot does: tracking, distance to its limits, and whether the computer keeps up.
+// Telemetry gauges: tracking error, margins to limits, timing.
 
 import { counted } from "../js/state/format.js";
 import { isLive, link, now, pageState, staleWords } from "../js/state/page-state.js";
@@ -56,7 +56,7 @@ class RpGauge extends HTMLElement {
     this.setAttribute("aria-valuenow", value === null ? "0" : String(Math.min(kind.fullScale, Math.max(0, value))));
   }
 
-  /** Take the value into the trend. @param {number|null} value */
+  /** Add a value to the trend. @param {number|null} value */
   addSample(value) {
     const kind = this.kind;
     if (!kind) return;
@@ -74,7 +74,7 @@ class RpGauge extends HTMLElement {
 }
 customElements.define("rp-gauge", RpGauge);
 
-/** What has a place here; the rest has charts alone. */
+/** The others have only charts. */
 const SHOWN = READINGS.filter((reading) => reading.place !== "chart");
 
 class RpTelemetry extends HTMLElement {
@@ -97,7 +97,7 @@ class RpTelemetry extends HTMLElement {
       if (state === null) return;
       values = SHOWN.map((reading) => reading.read(state));
       values.forEach((value, index) => gauges[index]?.show(value));
-      // A simulated base has none.
+      // A simulated base has no battery.
       const battery = gauges[SHOWN.findIndex((reading) => reading.id === "battery")];
       if (battery) battery.hidden = state.bridge?.kind === "sim";
       const warnings = gauges.filter((gauge) => gauge.parentElement === engineers && gauge.dataset.warning).length;

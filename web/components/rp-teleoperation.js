@@ -1,4 +1,4 @@
-// Moving the robot by hand: the switch, what is moved, how fast, and what is in the way.
+// The teleoperation panel: switch, part, speed, hold button; the pad for the base and buttons for single joints.
 
 import { whyNoTeleoperation } from "../js/control/allowed.js";
 import { drive, gamepad, whyNoDriving } from "../js/control/driving.js";
@@ -11,11 +11,11 @@ import { element, setEnabled, setText } from "../js/views/dom.js";
 import { holdButton } from "../js/views/hold-button.js";
 import { icon } from "../js/views/icons.js";
 
-/** At the whole of the usual speed (rad/s). */
+/** Full speed (rad/s). */
 const SPEED = 0.35;
-/** Nearer to a limit than this (rad) is told. */
+/** Margin to a limit that is shown as near (rad). */
 const NEAR_LIMIT = 0.15;
-/** θ_l and θ_r come before the arm's joints. */
+/** θ_l and θ_r precede the arm's joints. */
 const WHEELS = 2;
 const DEGREE = 180 / Math.PI;
 
@@ -129,7 +129,7 @@ class RpDrivePad extends HTMLElement {
 }
 customElements.define("rp-drive-pad", RpDrivePad);
 
-/** Nearer than this (m) is worth a warning. */
+/** Distance to an obstacle for a warning (m). */
 const NEAR = 0.03;
 
 class RpTeleoperation extends HTMLElement {
@@ -200,13 +200,13 @@ class RpTeleoperation extends HTMLElement {
 }
 
 /**
- * Buttons of which one is pressed.
+ * A group of toggle buttons, one of which is pressed.
  *
  * @template {string} T
  * @param {string} label
  * @param {import("../js/state/signals.js").Signal<T>} chosen
  * @param {(value: T) => void} choose
- * @param {readonly (readonly [T, string, string])[]} values Each with its word and what it does.
+ * @param {readonly (readonly [T, string, string])[]} values Each with its label and title.
  */
 function choice(label, chosen, choose, values) {
   const buttons = values.map(([value, text, title]) => {

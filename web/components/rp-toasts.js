@@ -1,4 +1,4 @@
-// Short notices above the log. They are in the log as well.
+// Toasts above the log, which contains them too.
 
 import { inWords } from "../js/state/format.js";
 import { dismissToast, toasts } from "../js/state/page-state.js";

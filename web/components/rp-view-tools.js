@@ -1,4 +1,4 @@
-// Over the 3-D view: where its camera stands, what it shows, a measure, and what to do while clicks place points.
+// Over the 3-D view: camera presets, layers, measuring; and the hint while clicks place points.
 
 import { placing, setPlacing } from "../js/control/placing.js";
 import { LAYERS, PRESETS, layers, measured, measuring, placeCamera, setMeasuring, showLayer } from "../js/control/view-tools.js";

@@ -1,4 +1,4 @@
-// Starts the page: components, link, clock, keys.
+// Entry point: defines the components, opens the link, starts clock and keys.
 
 import "../components/rp-alarms.js";
 import "../components/rp-camera.js";
@@ -45,7 +45,7 @@ initViewTools();
 followWork();
 window.setInterval(() => now.set(performance.now()), 250);
 socket.open();
-// What is about accepted points comes with the first of them, or later where the link was lost just then.
+// Order of work and preview are fetched with the first accepted point, and again if that fails.
 let coming = false;
 const wait = points.subscribe(async (page) => {
   if (coming || !page?.points.some((row) => isAccepted(row))) return;
@@ -58,7 +58,7 @@ const wait = points.subscribe(async (page) => {
   }
 });
 if (multiRobot) {
-  // The room is there from the first picture on.
+  // Shown before it is fetched, so that nothing shifts.
   document.querySelector("rp-robots")?.removeAttribute("hidden");
   void import("../components/rp-robots.js");
 }

@@ -1,4 +1,4 @@
-// Signing in: with name and password, or with the token of the printed link, which leaves the address at once.
+// Entry point of the sign-in page: name and password, or the token of a link, which is removed from the address at once.
 
 import { post } from "./link/api.js";
 
@@ -10,7 +10,7 @@ const passwordForm = /** @type {HTMLFormElement} */ (document.getElementById("pa
 const userField = /** @type {HTMLInputElement} */ (document.getElementById("user"));
 const passwordField = /** @type {HTMLInputElement} */ (document.getElementById("password"));
 
-/** @returns {Promise<boolean>} Do people sign in with a password here? */
+/** @returns {Promise<boolean>} Does this server use passwords? */
 async function withPassword() {
   try {
     const response = await fetch("api/sign-in", { signal: AbortSignal.timeout(4000) });

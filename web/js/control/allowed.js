@@ -1,11 +1,11 @@
-// What the operator may ask for now, and why not.
+// Which intents are possible now, and otherwise why not. `whyNot…` functions return an empty string if nothing is in the way.
 
 import { OF_HOLDER } from "../link/messages.js";
 import { MODE_WORDS } from "../state/format.js";
 import { isLive, link, pageState, points, preview, staleWords } from "../state/page-state.js";
 import { holder } from "./lease.js";
 
-/** Where each request belongs, in words. */
+/** Reason for an intent that the mode does not allow. */
 const NEEDS = Object.freeze({
   Arm: "Arming starts from Idle",
   Start: "Starting needs Ready",
@@ -31,7 +31,7 @@ const NEEDS = Object.freeze({
 
 /** @typedef {keyof typeof NEEDS} Intent */
 
-/** Why this page can ask for nothing now; empty when it can. */
+/** Why nothing can be asked for: no link, no state, or a viewer. */
 export function whyNothing() {
   const { status } = link.get();
   if (status === "signed-out") return "You are not signed in";
@@ -43,7 +43,7 @@ export function whyNothing() {
 }
 
 /**
- * Why a request would be refused now; empty when the controller would take it.
+ * Why the controller would refuse an intent now.
  *
  * @param {Intent} intent Name of the intent, as in `ControllerState.allowed`.
  */
@@ -52,7 +52,7 @@ export function whyNot(intent) {
   if (nothing) return nothing;
   const controller = pageState.get()?.controller ?? null;
   if (controller === null || !isLive("controller")) return staleWords("controller") || "The controller is not there";
-  // After a fault nobody moves anything by acknowledging it.
+  // Acknowledging a fault moves nothing and needs no control.
   const ofHolder = OF_HOLDER.includes(intent) && controller.mode !== "FAULT";
   if (controller.allowed.includes(intent)) return ofHolder ? whyNotHolder() : "";
   if (intent === "Start" && controller.mode === "READY" && countOf("ACCEPTED") === 0) {
@@ -62,7 +62,7 @@ export function whyNot(intent) {
   return `${NEEDS[intent]}; the mode is ${MODE_WORDS[controller.mode]}`;
 }
 
-/** Why work waits for a preview; empty while it does not. */
+/** Why work waits for a preview. */
 function whyNoStart() {
   const state = preview.get();
   if (!state?.required || state.phase === "approved") return "";
@@ -71,13 +71,13 @@ function whyNoStart() {
   return "A preview is required before each cut: press Preview";
 }
 
-/** Whose robot it is while somebody else moves it; empty for who holds control, and where nobody does. */
+/** Names the person who holds control, unless it is this page or nobody. */
 function whyNotHolder() {
   const { held, mine, user } = holder();
   return held && !mine ? `${user} holds control: ask for it, or take it` : "";
 }
 
-/** Why the tool cannot be moved by hand now; empty when it can. */
+/** Why teleoperation is not possible now. */
 export function whyNoTeleoperation() {
   const nothing = whyNothing();
   if (nothing) return nothing;

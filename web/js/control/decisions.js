@@ -1,4 +1,4 @@
-// What a person decides about points, and how it is taken back.
+// Decisions about points: accept, reject, resolve, move; each with its undo.
 
 import { ask } from "../link/api.js";
 import { SURE } from "../link/messages.js";
@@ -15,14 +15,14 @@ import { whyNot, whyNothing } from "./allowed.js";
 const CAN_ACCEPT = new Set(/** @type {PointState[]} */ (["PROPOSED", "REJECTED", "FAILED_NOT_CUT"]));
 /** @type {ReadonlySet<PointState>} */
 const CAN_REJECT = new Set(/** @type {PointState[]} */ (["PROPOSED", "ACCEPTED", "UNREACHABLE", "FAILED_NOT_CUT"]));
-/** So many decisions can be taken back, the last one first. */
+/** Depth of the undo stack. */
 const MOST = 100;
 
-/** What was decided on this page, oldest first. @type {import("../state/signals.js").Signal<readonly Decision[]>} */
+/** Undo stack of this page, oldest first. @type {import("../state/signals.js").Signal<readonly Decision[]>} */
 export const decisions = signal(/** @type {readonly Decision[]} */ ([]));
 
 /**
- * Nobody but the person who looks knows how an unknown cut ended; the two buttons are their two answers then.
+ * The outcome of such a cut is known only by looking; Accept and Reject then answer "cut" and "not cut".
  *
  * @param {PagePoint} row
  */
@@ -31,7 +31,7 @@ export function isUnknown(row) {
 }
 
 /**
- * Has somebody accepted it, whether or not the robot can come there?
+ * Accepted, reachable or not.
  *
  * @param {PagePoint|undefined} row
  */
@@ -74,7 +74,7 @@ export async function reject(row, reason) {
 }
 
 /**
- * Is it a proposal that has to be looked at by itself?
+ * A proposal below the confidence for accepting all at once.
  *
  * @param {PagePoint} row
  */
@@ -82,18 +82,18 @@ export function isUncertain(row) {
   return row.entry.state === "PROPOSED" && row.point.confidence < SURE;
 }
 
-/** Proposed points that may be accepted all at once. */
+/** Proposed points that "Accept all" covers. */
 export function confidentPoints() {
   return (points.get()?.points ?? []).filter((row) => row.entry.state === "PROPOSED" && !isUncertain(row));
 }
 
-/** Accept all of those; the less sure ones are decided one by one. */
+/** Accept all confident points. */
 export async function acceptAll() {
   const open = confidentPoints();
   const done = await ask("Accepting all", "api/points/accept-all", { confidence: SURE });
   if (done) {
     pushUndo(`accepted ${counted(open.length, "point")}`, async () => {
-      // Those that have been cut meanwhile, or were decided anew, stay as they are.
+      // Points that were cut or decided again since are left alone.
       const accepted = open.map((row) => now(row)).filter(isAccepted);
       const back = await Promise.all(accepted.map((row) => row && send(row, "Taking back", "reconsider", {})));
       return back.every(Boolean);
@@ -103,7 +103,7 @@ export async function acceptAll() {
 }
 
 /**
- * Why a point cannot be moved now; empty when it can. What is accepted stays as it was accepted.
+ * Why a point cannot be moved now. An accepted point keeps its content.
  *
  * @param {PagePoint} row
  */
@@ -124,7 +124,7 @@ export async function move(row, millimetres) {
   return done;
 }
 
-/** Take the last decision back. */
+/** Undo the last decision. */
 export async function undo() {
   const last = decisions.get().at(-1);
   if (!last) return;
@@ -132,7 +132,7 @@ export async function undo() {
   if (await last.undo()) say("info", `Taken back: ${last.words}.`);
 }
 
-/** Why nothing can be taken back now; empty when something can. */
+/** Why there is nothing to undo. */
 export function whyNoUndo() {
   return decisions.get().length === 0 ? "Nothing has been decided on this page" : whyNot("ReconsiderPoint");
 }
@@ -146,7 +146,7 @@ export function pushUndo(words, back) {
 }
 
 /**
- * As it was before: proposed, accepted as it was seen then, or rejected for the same reason.
+ * Restore the former state: proposed, accepted with the former content, or rejected with the former reason.
  *
  * @param {PagePoint} before
  */

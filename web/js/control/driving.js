@@ -1,14 +1,14 @@
-// The base by hand: which way it shall go, from keys, from the pad on the page, or from a gamepad.
+// Driving the base by hand with keys, the pad on the page, or a gamepad.
 
 import { showToast } from "../state/page-state.js";
 import { signal } from "../state/signals.js";
 import { isTyping } from "./stop.js";
 import { hold, moving, teleoperating } from "./teleoperation.js";
 
-/** At the whole of the usual speed (m/s, rad/s). */
+/** Full speed (m/s, rad/s). */
 const LINEAR = 0.4;
 const ANGULAR = 0.6;
-/** Sticks do not come to rest at zero. */
+/** Sticks do not rest at exactly zero. */
 const DEAD_ZONE = 0.15;
 const POLL_MS = 50;
 /** @type {Readonly<Record<string, readonly [ahead: number, left: number]>>} */
@@ -20,15 +20,15 @@ const KEYS = Object.freeze({
 /** Name of the gamepad in use; empty without one. */
 export const gamepad = signal("");
 
-/** @typedef {{ ahead: number, left: number }} DriveInput Shares of the whole speed, −1…1. */
+/** @typedef {{ ahead: number, left: number }} DriveInput Fractions of full speed, −1…1. */
 
-/** @returns {string} Why the base cannot be driven now. */
+/** Why the base cannot be driven now. */
 export function whyNoDriving() {
   return hold.whyNot() || (moving.get() === "base" ? "" : "Choose Base first");
 }
 
 /**
- * Hold the base to a way for as long as `source` is not released.
+ * Drive while `source` is held.
  *
  * @param {"drive"|"pad"|"gamepad"} source
  * @param {() => DriveInput} way
@@ -50,7 +50,7 @@ function clamp(share) {
 const down = new Set();
 
 /**
- * Drive with the keys of a window, while the base is what is moved.
+ * Drive with the keys of a window while the base is selected.
  *
  * @param {Window} target
  */
@@ -61,7 +61,7 @@ export function listenForDriveKeys(target) {
       if (!(event.code in KEYS) || event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)) return;
       const elsewhere = /** @type {Partial<Element>} */ (event.target).closest?.("input, select, rp-queue");
       if (!teleoperating.get() || moving.get() !== "base" || elsewhere) return;
-      // Otherwise the 3-D view would move its camera, and the page scroll.
+      // Keeps the 3-D camera and the page's scroll where they are.
       event.preventDefault();
       event.stopImmediatePropagation();
       if (event.repeat) return;
@@ -75,7 +75,7 @@ export function listenForDriveKeys(target) {
   target.addEventListener("keyup", (event) => {
     if (down.delete(event.code) && down.size === 0) hold.release("drive");
   });
-  // The release of a key goes to whatever has the focus by then.
+  // After a loss of focus no keyup arrives.
   target.addEventListener("blur", () => {
     down.clear();
     hold.release("drive");
@@ -90,7 +90,7 @@ function sum(ways) {
   return { ahead: ways.reduce((all, [each]) => all + each, 0), left: ways.reduce((all, [, each]) => all + each, 0) };
 }
 
-/** Look after a gamepad: its sticks drive while one of its triggers is held. A trigger that is held already counts not. */
+/** Poll gamepads: sticks drive while a trigger is held. A trigger already held when the pad appears does not count. */
 export function watchGamepad() {
   let index = -1;
   let held = true;

@@ -1,13 +1,13 @@
-// The page goes along with the work: the point that the robot is at is chosen, unless somebody has just chosen himself.
+// At work the page selects the point that the robot is at, unless the operator has just selected or looked for another one.
 
 import { now, pageState, points, selected } from "../state/page-state.js";
 import { placing } from "./placing.js";
 import { followPoint, lastInteraction, noteInteraction } from "./selection.js";
 import { measuring } from "./view-tools.js";
 
-/** Whoever has just chosen, or looked through a list, is left there so long (ms). */
+/** No following for this time after an interaction (ms). */
 const HOLD_OFF_MS = 8000;
-/** Parts in which the pointer, a key or the wheel shows that an operator is busy: no row moves from under a press. */
+/** Where pointer, keys or wheel count as an interaction, so that no row moves from under a press. */
 const PARTS = "rp-queue, rp-order, rp-camera";
 
 export function followWork() {
@@ -24,7 +24,7 @@ export function followWork() {
     const controller = pageState.get()?.controller;
     const active = controller?.mode === "AUTO" ? controller.active_point_id : "";
     if (!active || active === selected.get() || performance.now() - lastInteraction() < HOLD_OFF_MS) return;
-    // Who places a point or measures clicks on in the view as it is.
+    // Placing and measuring need the view to stay.
     if (placing.get() || measuring.get()) return;
     if (points.get()?.points.some((row) => row.point.point_id === active)) followPoint(active);
   };

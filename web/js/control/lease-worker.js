@@ -1,5 +1,5 @@
-// The thread beside the page's. It says that the page is there as long as the page has turned lately: a page that hangs for
-// longer has lost control. Whether anybody sees the robot, and holds, is not told here but by what the page draws.
+// Renews the control lease from a worker, since loading the 3-D view blocks the page's thread for a second or two. A page
+// that hangs longer than HANGS_MS loses control. Hold to move does not depend on this: it needs states that are drawn.
 
 const EVERY_MS = 300;
 const HANGS_MS = 2000;
@@ -18,7 +18,7 @@ self.setInterval(async () => {
   try {
     await fetch("../../api/control/here", { method: "POST" });
   } catch {
-    // Without a link nobody can be told; the page itself says so and tries again.
+    // The page itself reports the lost link.
   }
   asking = false;
 }, EVERY_MS);

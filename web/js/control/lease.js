@@ -1,4 +1,4 @@
-// Who holds control of the robot's motion, and keeping the lease while this page lives.
+// The control lease: who holds it, and its renewal while this page lives.
 
 import { link, pageState } from "../state/page-state.js";
 
@@ -19,7 +19,7 @@ export function holder() {
 
 const EVERY_MS = 250;
 
-/** Has it said, by a thread of its own, that the page that holds control is there. */
+/** Renew the lease from a worker while this page holds it. */
 export function renewLease() {
   const worker = new Worker("js/control/lease-worker.js");
   window.setInterval(() => {

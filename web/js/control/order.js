@@ -1,4 +1,4 @@
-// The order of work: which accepted point comes when, whose order it is, and how it is changed.
+// The order of work: its points, who set it, and changing it.
 
 import { ask } from "../link/api.js";
 import { counted } from "../state/format.js";
@@ -7,17 +7,17 @@ import { countOf, whyNot } from "./allowed.js";
 
 /** @typedef {import("../link/messages.js").PagePoint} PagePoint */
 
-/** Accepted points in the order in which they are worked off. @returns {PagePoint[]} */
+/** Accepted points in the order of work. @returns {PagePoint[]} */
 export function workOrder() {
   return (points.get()?.points ?? []).filter((row) => row.entry.state === "ACCEPTED");
 }
 
-/** Who has ordered them; empty where the plan has. */
+/** Who set the order; empty for the plan's. */
 function orderedBy() {
   return pageState.get()?.controller?.order.user ?? "";
 }
 
-/** How many there are, whose order it is, and how long the work takes, in words. */
+/** Summary: number of points, who set the order, duration. */
 export function orderWords() {
   const rows = workOrder();
   const beyond = countOf("UNREACHABLE");
@@ -35,18 +35,18 @@ function durationWords(seconds) {
   return `${Math.floor(seconds / 60)} min ${Math.round(seconds % 60)} s`;
 }
 
-/** Why the order cannot be changed; empty when it can. */
+/** Why the order cannot be changed. */
 export function whyNoMove() {
   return whyNot("MoveInQueue");
 }
 
-/** Why the order cannot be the plan's; empty when it can. */
+/** Why the order cannot be reset to the plan's. */
 export function whyNoPlannersOrder() {
   return whyNot("PlannersOrder") || (orderedBy() ? "" : "It is the plan's order already");
 }
 
 /**
- * Work on a point as number `to` of the list, counted from 0.
+ * Move a point to index `to`.
  *
  * @param {string} pointId
  * @param {number} to
@@ -64,7 +64,7 @@ export async function plannersOrder() {
 }
 
 /**
- * Why the approach to a point cannot be turned; empty when it can.
+ * Why the approach to a point cannot be turned.
  *
  * @param {PagePoint} row
  */

@@ -1,4 +1,4 @@
-// Points that a person places: a click into the 3-D view or into the camera's image, put on the nearest known cane.
+// Placing a point by hand: a click in the 3-D view or the camera image goes to the nearest known cane.
 
 import { post } from "../link/api.js";
 import { socket } from "../link/socket.js";
@@ -7,10 +7,10 @@ import { signal } from "../state/signals.js";
 import { whyNothing } from "./allowed.js";
 import { select } from "./selection.js";
 
-/** Are clicks meant for new points? */
+/** Do clicks place points? */
 export const placing = signal(false);
 
-/** Why no point can be placed now; empty when one can. */
+/** Why no point can be placed now. */
 export function whyNoPlacing() {
   return whyNothing() || (isLive("perception") ? "" : "Perception is not there");
 }
@@ -23,11 +23,11 @@ export function setPlacing(on) {
 }
 
 /**
- * Ask for a point, and tell what came of it.
+ * Request a point and report the outcome.
  *
  * @param {string} path
  * @param {object} body
- * @returns {Promise<string>} Its name, empty when there is none.
+ * @returns {Promise<string>} Its id; empty if refused.
  */
 export async function placePoint(path, body) {
   const answer = await post(path, body);
@@ -42,7 +42,7 @@ export async function placePoint(path, body) {
   return "";
 }
 
-/** Listen for clicks into the 3-D view, and stop placing when the link goes or nobody may place any more. */
+/** Handle clicks in the 3-D view; stop placing without a link or permission. */
 export function initPlacing() {
   socket.onsightline = ({ origin, direction }) => {
     if (placing.get()) void placePoint("api/points/by-hand", { origin, direction });

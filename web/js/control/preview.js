@@ -1,4 +1,4 @@
-// The preview: asking for it, playing it, approving it.
+// The preview: request, playback, approval.
 
 import { ask } from "../link/api.js";
 import { socket } from "../link/socket.js";
@@ -8,26 +8,25 @@ import { whyNot, whyNothing } from "./allowed.js";
 
 /** @typedef {import("../link/messages.js").PreviewedCut} PreviewedCut */
 
-/** The view is told of a new moment so often at most (ms). */
+/** Rate limit of moments sent to the view (ms). */
 const TELL_MS = 66;
 
-/** The moment that is shown (s); null while the ghost is hidden. */
+/** Moment of the playback (s); null while the ghost is hidden. */
 export const moment = signal(/** @type {number|null} */ (null));
 export const playing = signal(false);
 let startedAt = 0;
 let toldAt = 0;
 
-/** Is there one to look at? */
 export function hasPreview() {
   return preview.get()?.preview_hash ? true : false;
 }
 
-/** Why none can be asked for; empty when it can. @param {number} accepted How many points are accepted. */
+/** Why no preview can be requested. @param {number} accepted Number of accepted points. */
 export function whyNoPreview(accepted) {
   return whyNot("AskPreview") || (accepted === 0 ? "Accept a point first" : "");
 }
 
-/** Why it cannot be approved; empty when it can. */
+/** Why the preview cannot be approved. */
 export function whyNoApproval() {
   const state = preview.get();
   if (!state || !hasPreview()) return whyNothing() || "There is no preview yet";
@@ -38,21 +37,21 @@ export function whyNoApproval() {
 
 /** @param {string} pointId Empty for all of the work. */
 export function askPreview(pointId) {
-  hide();
+  hidePreview();
   return ask("Preview", "api/preview", { point_id: pointId });
 }
 
-export function approve() {
+export function approvePreview() {
   return ask("Approving the preview", "api/preview/approve", { preview_hash: preview.get()?.preview_hash ?? "" });
 }
 
 /** @param {boolean} required */
-export function require(required) {
+export function requirePreview(required) {
   return ask("Previews", "api/preview/required", { required });
 }
 
 /** Show a moment in the 3-D view. @param {number} time */
-export function show(time) {
+export function showMoment(time) {
   const end = preview.get()?.duration_s ?? 0;
   moment.set(Math.max(0, Math.min(time, end)));
   const at = performance.now();
@@ -61,15 +60,15 @@ export function show(time) {
   socket.send({ type: "ShowPreview", time: moment.get() });
 }
 
-export function hide() {
+export function hidePreview() {
   playing.set(false);
   if (moment.get() === null) return;
   moment.set(null);
   socket.send({ type: "ShowPreview", time: null });
 }
 
-/** Play from the moment shown, or from the start; or stop playing. */
-export function play() {
+/** Play on from the moment shown, or stop. */
+export function togglePlayback() {
   if (playing.get()) {
     playing.set(false);
     return;
@@ -85,12 +84,12 @@ function frame() {
   if (!playing.get()) return;
   const end = preview.get()?.duration_s ?? 0;
   const time = (performance.now() - startedAt) / 1000;
-  show(time);
+  showMoment(time);
   if (time >= end) playing.set(false);
   else requestAnimationFrame(frame);
 }
 
-/** The cut that a moment belongs to. @param {number} time @returns {PreviewedCut|undefined} */
+/** The cut at a moment. @param {number} time @returns {PreviewedCut|undefined} */
 export function cutAt(time) {
   const cuts = preview.get()?.cuts ?? [];
   return cuts.find((cut) => time < cut.ends_s) ?? cuts.at(-1);

@@ -1,46 +1,45 @@
-// The selected point: list, picture and 3-D view show the same one.
+// Selecting a point: list, camera image and 3-D view show the same one.
 
 import { socket } from "../link/socket.js";
 import { revealCount, selected } from "../state/page-state.js";
 
-/** When somebody has last chosen, or looked for something, himself (ms). */
-let lookedAt = -Infinity;
-/** When the last choice was told (ms). */
-let toldAt = -Infinity;
-/** A press that gives a row the focus and chooses it is one choice (ms). */
+/** Time of the operator's last interaction (ms). */
+let interactedAt = -Infinity;
+/** Time of the last selection sent (ms). */
+let sentAt = -Infinity;
+/** A press both focuses a row and clicks it: within this time it is one selection (ms). */
 const ONE_PRESS_MS = 400;
 
-/** Somebody looks for himself. */
 export function noteInteraction() {
-  lookedAt = performance.now();
+  interactedAt = performance.now();
 }
 
 export function lastInteraction() {
-  return lookedAt;
+  return interactedAt;
 }
 
 /**
- * Somebody chooses a point: list, picture and 3-D view go there.
+ * The operator selects a point.
  *
  * @param {string} pointId Empty = none.
  */
 export function select(pointId) {
   noteInteraction();
-  if (pointId !== selected.get()) tell(pointId);
+  if (pointId !== selected.get()) send(pointId);
 }
 
 /**
- * The same by a press, which brings them there again where the point is chosen already.
+ * The operator presses a point. Pressing the selected one again reveals it again.
  *
  * @param {string} pointId
  */
 export function selectAndReveal(pointId) {
   noteInteraction();
-  if (pointId !== selected.get() || performance.now() - toldAt > ONE_PRESS_MS) tell(pointId);
+  if (pointId !== selected.get() || performance.now() - sentAt > ONE_PRESS_MS) send(pointId);
 }
 
 /**
- * Nobody has chosen: the robot is at this point.
+ * Select the point that the robot is at; counts as no interaction.
  *
  * @param {string} pointId
  */
@@ -55,8 +54,8 @@ socket.onselected = (/** @type {string} */ pointId) => {
 };
 
 /** @param {string} pointId */
-function tell(pointId) {
-  toldAt = performance.now();
+function send(pointId) {
+  sentAt = performance.now();
   show(pointId);
   socket.send({ type: "Select", point_id: pointId });
 }

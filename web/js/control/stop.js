@@ -1,19 +1,21 @@
-// The software stop: asking for it until the server has it, and who holds it latched since when.
+// The software stop: the request, repeated until the server has it, and the stops that are latched.
 
 import { post } from "../link/api.js";
 import { clockWords } from "../state/format.js";
 import { say } from "../state/page-state.js";
 import { signal } from "../state/signals.js";
 
+/** @typedef {import("../link/messages.js").PageState} PageState */
+/** @typedef {import("../link/messages.js").StopRecord} StopRecord */
 /** @typedef {"idle"|"sending"|"sent"|"failed"} StopProgress */
 
 /** @type {import("../state/signals.js").Signal<StopProgress>} */
 export const stopProgress = signal(/** @type {StopProgress} */ ("idle"));
 
-/** Does this server have several robots? Then each has its page under a path of its own. */
+/** Does this server have several robots? Then each has its own path. */
 export const multiRobot = location.pathname.startsWith("/robots/");
 const TRIES = 4;
-/** The server has sent the stop, but the bridge has not confirmed it. */
+/** Status of a stop that was sent and that the bridge has not confirmed. */
 const UNCONFIRMED = 503;
 
 /** @param {string} reason */
@@ -22,7 +24,7 @@ export async function stopRobot(reason) {
   let refusal = "";
   let unconfirmed = 0;
   for (let attempt = 0; attempt < TRIES; attempt++) {
-    // At the root: it stops every robot of this server, whichever this page shows.
+    // At the root path: stops every robot of this server.
     const answer = await post("/api/stop", { reason }, 1000);
     if (answer.ok) {
       stopProgress.set("sent");
@@ -38,7 +40,7 @@ export async function stopRobot(reason) {
 }
 
 /**
- * Make the space bar of a window stop the robot, even when a button there has the focus.
+ * The space bar stops the robot, whatever has the focus in this window.
  *
  * @param {Window} target
  */
@@ -56,14 +58,14 @@ export function listenForSpace(target) {
     },
     { capture: true },
   );
-  // A button is pressed when the space bar comes up again.
+  // A focused button would be clicked on keyup.
   target.addEventListener("keyup", swallow, { capture: true });
 }
 
 const TEXT_INPUTS = new Set(["text", "search", "email", "url", "password", "tel"]);
 
 /**
- * Is this a place where a space is a character? Works across frames, where `instanceof` does not.
+ * Is this a text field? `instanceof` does not work across frames.
  *
  * @param {EventTarget|null} target
  */
@@ -74,11 +76,8 @@ export function isTyping(target) {
   return name === "input" && TEXT_INPUTS.has(node?.type ?? "text") && !node?.readOnly && !node?.disabled;
 }
 
-/** @typedef {import("../link/messages.js").PageState} PageState */
-/** @typedef {import("../link/messages.js").StopRecord} StopRecord */
-
 /**
- * What a process holds latched, the newest first.
+ * Stops that a process has latched, newest first.
  *
  * @param {PageState|null} state
  * @param {"bridge"|"controller"} process
@@ -89,7 +88,7 @@ function latchedBy(state, process) {
 }
 
 /**
- * When a process latched a stop, in words to be read after "latched"; empty where it does not say.
+ * Time at which a process latched a stop, as words after "latched"; empty if unknown.
  *
  * @param {PageState|null} state
  * @param {"bridge"|"controller"} process
@@ -102,7 +101,7 @@ export function sinceWords(state, process, stopId) {
 }
 
 /**
- * Who else pressed before the newest stop, each with the time; what is long is cut.
+ * Earlier stops with their times, three at most.
  *
  * @param {PageState|null} state
  */
@@ -115,7 +114,7 @@ export function earlierWords(state) {
 }
 
 /**
- * Is the robot's own emergency stop button pressed?
+ * Is the emergency stop on the robot pressed?
  *
  * @param {PageState|null} state
  */

@@ -1,4 +1,4 @@
-// Moving the robot by hand: what moves, whether the gizmo is shown, and holding to move.
+// Teleoperation: what moves, the gizmo, and hold to move (a dead man's switch).
 
 import { socket } from "../link/socket.js";
 import { pageState, showToast } from "../state/page-state.js";
@@ -10,19 +10,18 @@ import { isTyping } from "./stop.js";
 /** @typedef {{ base?: import("../link/messages.js").BaseVelocity, joints?: import("../link/messages.js").ArmVelocities }} Wanted */
 
 const PERIOD_MS = 50;
-/** What leads the tool to its gizmo. Any other source moves the robot in its own way, and alone. */
+/** Sources that lead the tool to the gizmo and may be held together. Any other source has to be the only one. */
 const TOOL = new Set(["button", "key", "gizmo"]);
 const TWO_AT_ONCE = "Two at once: it stopped. Let go, then hold one of them";
 
 class HoldToMove {
   /**
    * @param {(hold: import("../link/messages.js").Hold) => void} send
-   * @param {() => string} whyNot Why holding is not possible now; empty when it is.
+   * @param {() => string} whyNot Why holding is not possible now.
    */
   constructor(send, whyNot) {
     this.send = send;
     this.whyNot = whyNot;
-    /** Is somebody holding now? */
     this.holding = signal(false);
     /** Speed by hand as a factor of the usual speed. */
     this.speedScale = signal(1);
@@ -35,12 +34,11 @@ class HoldToMove {
   }
 
   /**
-   * Somebody begins to hold. Where holding is not possible this does nothing, so that a hold that began too early never
-   * starts to move the robot later.
+   * Start holding. A refused press stays without effect, so that the robot never starts moving later.
    *
    * @param {HoldSource} source
-   * @param {() => Wanted} [wanted] What the base or the joints shall do; without it the tool follows the gizmo.
-   * @returns {string} Why it was refused; empty when it was taken.
+   * @param {() => Wanted} [wanted] Velocities of base or joints; by default the tool follows the gizmo.
+   * @returns {string} Why it was refused; empty if accepted.
    */
   press(source, wanted = () => ({})) {
     const why = this.whyNot();
@@ -90,11 +88,9 @@ class HoldToMove {
 
 /** @typedef {"tool"|"base"|"joints"} Part */
 
-/** Is the robot moved by hand? */
 export const teleoperating = signal(false);
-/** What of it. */
 export const moving = signal(/** @type {Part} */ ("tool"));
-/** Along what the gizmo's arrows lie. */
+/** Frame of the gizmo's arrows. */
 export const axes = signal(/** @type {import("../link/messages.js").GizmoAxes} */ ("tool"));
 
 export const hold = new HoldToMove(
@@ -129,19 +125,19 @@ export function showAxes(along) {
   showGizmo();
 }
 
-/** Let go whenever the operator can no longer be holding on purpose. */
+/** Release whenever a hold can no longer be deliberate. */
 export function initTeleoperation() {
   socket.onclose = () => {
     hold.releaseAll();
     teleoperating.set(false);
   };
-  // Whoever still holds must press again: the tool never sets out by itself once it has been stopped.
+  // A hold that the server ended needs a new press.
   socket.onholdended = (reason) => {
     if (!hold.holding.get()) return;
     hold.releaseAll();
     showToast("warning", reason);
   };
-  // The robot has left the modes in which a hand may move it: start over from the switch, not from a held button.
+  // After a mode without teleoperation the switch has to be pressed again.
   pageState.subscribe(() => {
     if (teleoperating.get() && whyNoTeleoperation()) setTeleoperating(false);
   });
@@ -158,7 +154,7 @@ export function initTeleoperation() {
 }
 
 /**
- * Hold with the H key of a window.
+ * The H key of a window holds.
  *
  * @param {Window} target
  */
@@ -175,7 +171,7 @@ export function listenForHoldKey(target) {
 }
 
 /**
- * Dragging in the 3-D view counts as holding for as long as the pointer is down there, once there is something to see.
+ * Dragging in the 3-D view holds while the pointer is down, once the view is drawn.
  *
  * @param {Window} view
  */
@@ -192,7 +188,7 @@ export function listenForDrag(view) {
   );
   view.addEventListener("pointerup", release, options);
   view.addEventListener("pointercancel", release, options);
-  // A release outside the window is never reported; the next move tells.
+  // A release outside the window is not reported; the next move shows it.
   view.addEventListener("pointermove", (event) => event.buttons === 0 && release(), options);
   view.addEventListener("blur", () => {
     hold.release("gizmo");

@@ -1,4 +1,4 @@
-// How this page looks at the robot: where the camera stands, what is shown, and what is measured.
+// The 3-D view of this page: camera presets, layers, measuring.
 
 import { socket } from "../link/socket.js";
 import { link } from "../state/page-state.js";
@@ -30,7 +30,7 @@ const STORAGE_KEY = "layers";
 /** @type {import("../state/signals.js").Signal<ReadonlySet<Layer>>} */
 export const layers = signal(storedLayers());
 export const measuring = signal(false);
-/** The last that was measured. */
+/** The last measurement. */
 export const measured = signal(/** @type {import("../link/messages.js").Measured|null} */ (null));
 
 /** @returns {ReadonlySet<Layer>} */
@@ -71,7 +71,7 @@ export function setMeasuring(on) {
   socket.send({ type: "Measure", active: on });
 }
 
-/** Tell each new link what is shown, and take what was measured. */
+/** Send the layers on each new link; receive measurements. */
 export function initViewTools() {
   socket.onmeasured = (message) => measured.set(message);
   link.subscribe(({ status }) => {

@@ -1,9 +1,9 @@
-// Requests to the server. Whatever is refused is shown and logged; nothing fails in silence.
+// REST requests. Every refusal is shown and logged.
 
 import { link, say, showToast } from "../state/page-state.js";
 
 /**
- * `status` 0: the server was not reached. `link` is what an invitation is answered with.
+ * `status` is 0 if the server was not reached; `link` answers an invitation.
  *
  * @typedef {{ ok: boolean, reason: string, status: number, link?: string }} Answer
  */
@@ -33,18 +33,18 @@ export async function post(path, body = {}, timeoutMs = 4000) {
 }
 
 /**
- * Ask for something and tell the operator when it is refused.
+ * Post a request and show a refusal.
  *
  * @param {string} what Name of the request, for the message.
  * @param {string} path
  * @param {object} [body]
- * @returns {Promise<boolean>} Was it taken?
+ * @returns {Promise<boolean>} Was it accepted?
  */
 export async function ask(what, path, body) {
   const answer = await post(path, body);
   if (answer.ok) return true;
   const words = `${what} refused: ${answer.reason}`;
-  // What the controller refused or did not answer is in the server's log, and comes from there; the rest never got so far.
+  // Refusals (409) and timeouts (503) of the controller reach the log through the server; others are logged here.
   if (answer.status === 409) showToast("warning", words);
   else if (answer.status === 503) showToast("error", words);
   else say("error", words);
@@ -53,7 +53,7 @@ export async function ask(what, path, body) {
 
 /**
  * @param {string} path
- * @returns {Promise<any>} Null where there is no answer.
+ * @returns {Promise<any>} Null without an answer.
  */
 export async function fetchJson(path) {
   try {
@@ -85,7 +85,7 @@ async function answerOf(response) {
   try {
     body = await response.json();
   } catch {
-    // An answer without JSON still has its status to tell.
+    // Not JSON: the status has to do.
   }
   const reason = typeof body?.reason === "string" ? body.reason : detailOf(body);
   if (response.ok) return { ok: body?.ok !== false, reason, link: typeof body?.link === "string" ? body.link : "" };
@@ -93,7 +93,7 @@ async function answerOf(response) {
 }
 
 /**
- * Words of a validation error.
+ * Text of a validation error.
  *
  * @param {any} body
  * @returns {string}

@@ -1,16 +1,16 @@
-// The page's own link: state in, intents out, a ping ten times a second, and a new try whenever it breaks.
+// The page's WebSocket: states in, messages out, a ping ten times a second, reconnection.
 
 import { link, points, preview, receiveEvents, receiveState, roundTrip, say } from "../state/page-state.js";
 import { isSignedIn } from "./api.js";
 
-/** @typedef {import("./messages.js").FromServer} FromServer */
 /** @typedef {import("./messages.js").FromPage} FromPage */
+/** @typedef {import("./messages.js").FromServer} FromServer */
 /** @typedef {import("./messages.js").Sightline} Sightline */
 
 const PING_MS = 100;
 /**
- * A link on which nothing has come for this many turns is dead, even when nobody said so. Turns, not milliseconds: while
- * the 3-D view keeps this thread busy, messages wait unread and that is no silence.
+ * Without a message for this many timer turns the link is dead. Turns instead of milliseconds: while the 3-D view blocks
+ * this thread, messages wait unread.
  */
 const SILENT_TURNS = 25;
 const RETRY_MS = [250, 500, 1000, 2000, 3000];
@@ -21,20 +21,20 @@ class PageSocket {
     this.url = url;
     /** @type {WebSocket|null} */
     this.socket = null;
-    /** Called when the link has gone; whatever was held must be let go. */
+    /** The link is lost; holds have to end. */
     this.onclose = () => {};
-    /** Called when the server has ended or refused what is held here. @type {(reason: string) => void} */
+    /** The server has ended or refused a hold. @type {(reason: string) => void} */
     this.onholdended = () => {};
-    /** Called when this session has clicked into the 3-D view to place a point. @type {(line: Sightline) => void} */
+    /** A click in the 3-D view, to place a point. @type {(line: Sightline) => void} */
     this.onsightline = () => {};
-    /** Called with the distance of two places that were clicked. @type {(told: import("./messages.js").Measured) => void} */
+    /** The distance of two clicked places. @type {(told: import("./messages.js").Measured) => void} */
     this.onmeasured = () => {};
-    /** Called when a point was clicked in this session's 3-D view. @type {(pointId: string) => void} */
+    /** A point was clicked in the 3-D view. @type {(pointId: string) => void} */
     this.onselected = () => {};
     this.attempts = 0;
     this.silentTurns = 0;
     this.number = 0;
-    /** Number of the last state that is really on screen. */
+    /** Number of the last state that was drawn. */
     this.rendered = 0;
     this.firstEvents = true;
     /** @type {Map<number, number>} */
@@ -62,7 +62,7 @@ class PageSocket {
   }
 
   /**
-   * Send when the link is open; a message for a closed link is dropped, never kept for later.
+   * Send if the link is open; otherwise the message is dropped, never queued.
    *
    * @param {FromPage} message
    */
@@ -92,7 +92,7 @@ class PageSocket {
     roundTrip.set(null);
     this.onclose();
     const wait = RETRY_MS[Math.min(this.attempts - 1, RETRY_MS.length - 1)];
-    // A refused socket does not say why; a session that has ended needs a person.
+    // A refused socket gives no reason. An ended session needs a new sign-in.
     if ((await isSignedIn()) === false) link.set({ status: "signed-out", attempts: this.attempts });
     window.setTimeout(() => this.open(), link.get().status === "signed-out" ? 3000 : wait);
   }
@@ -112,8 +112,7 @@ class PageSocket {
       case "PageState": {
         const { number } = message;
         receiveState(message);
-        // Registered after the draws that this state has asked for, so it runs when they are done. A hidden tab draws
-        // nothing and therefore does not echo.
+        // Runs after the draws that this state has requested. A hidden tab draws nothing and reports nothing.
         requestAnimationFrame(() => {
           this.rendered = number;
         });
@@ -158,5 +157,5 @@ class PageSocket {
   }
 }
 
-// Beside the page: with several robots each has a page and a socket of its own.
+// Relative to the page, since each of several robots has its own.
 export const socket = new PageSocket(new URL("ws", location.href.replace(/^http/, "ws")).href);

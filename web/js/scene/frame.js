@@ -1,15 +1,15 @@
-// Runs in the frame of the 3-D view, before its client: how many pixels are drawn, and how.
+// Runs in the iframe of the 3-D view, before its client: limits resolution and frame rate, reports the first drawing.
 
 import { OffscreenFramebuffer } from "./offscreen-framebuffer.js";
 
-/** The robot alone has some twenty thousand; the axes and the ground, which come first, a thousand. */
+/** The robot has about 20 000; axes and ground, which come first, 1 000. */
 const FEWEST_TRIANGLES = 4000;
 
 /**
  * Marks the document `data-view="loading"`, and `data-view="drawn"` once the robot is on the screen.
  *
  * @param {(callback: () => void) => void} nextFrame Calls at the browser's next frame.
- * @param {() => boolean} shown Has all that was drawn come to the screen?
+ * @param {() => boolean} shown Is everything drawn on the screen?
  */
 const reportWhenDrawn = (nextFrame, shown) => {
   document.documentElement.dataset.view ??= "loading";
@@ -36,17 +36,17 @@ const reportWhenDrawn = (nextFrame, shown) => {
   nextFrame(look);
 };
 
-/** More pixels a way than this cost more than they show. */
+/** Higher device pixel ratios cost more than they show. */
 const LARGEST_RATIO = 1.5;
-/** Without a graphics card every pixel is work. With fewer than this the canes become dashes. */
+/** The same without a graphics card. Below this the canes become dashes. */
 const LARGEST_RATIO_IN_SOFTWARE = 1;
-/** Time between two pictures drawn in software (ms). The page's buttons share the thread that waits for them. */
+/** Frame period in software (ms). The page's buttons share the thread. */
 const PACE_IN_SOFTWARE = 80;
 
 const plainContext = HTMLCanvasElement.prototype.getContext;
 const plainRequest = window.requestAnimationFrame.bind(window);
 
-/** Is WebGL drawn by the processor? The names are those of the drivers of Chromium, Mesa and Windows. */
+/** Is WebGL rendered in software? By the driver names of Chromium, Mesa and Windows. */
 const drawnInSoftware = () => {
   const probe = plainContext.call(document.createElement("canvas"), "webgl2");
   if (!(probe instanceof WebGL2RenderingContext)) return false;
@@ -59,15 +59,14 @@ const drawnInSoftware = () => {
 const inSoftware = drawnInSoftware();
 /** Of each canvas: the client makes one to see whether it can, before the one that it draws in. @type {OffscreenFramebuffer[]} */
 const behind = [];
-// At a fixed resolution: changing it with the load, as the client does by itself, stalls a slow machine for seconds,
-// and a stalled view ends a hold.
+// A fixed resolution: the client's adaptive one stalls a slow machine for seconds, and a stalled view ends a hold.
 const ratio = Math.min(window.devicePixelRatio, inSoftware ? LARGEST_RATIO_IN_SOFTWARE : LARGEST_RATIO);
 history.replaceState(null, "", `?fixedDpr=${ratio}`);
 reportWhenDrawn(plainRequest, () => behind.every((each) => !each.busy && !each.drawn));
 
 if (inSoftware) {
   /**
-   * Smoothed edges cost a graphics card next to nothing, and the processor half of its time.
+   * Without antialiasing, which takes half of the processor's time.
    *
    * @this {HTMLCanvasElement}
    * @param {string} kind
@@ -84,7 +83,7 @@ if (inSoftware) {
 }
 
 /**
- * Let pictures be drawn no more often than this and one after the other, so that a press is handled between two.
+ * Limit the frame rate and never overlap frames, so that presses are handled in between.
  *
  * @param {number} pace In ms.
  */
@@ -112,7 +111,7 @@ function paceFrames(pace) {
       }
     }
     for (const each of behind) each.finish(plainRequest, plan);
-    // Not before: what is asked for meanwhile waits until this picture is shown.
+    // Frames requested meanwhile wait until this one is shown.
     planned = false;
     plan();
   };

@@ -1,22 +1,22 @@
-// Where the processor draws the 3-D view: its pictures are drawn behind the canvas, and shown when they are done.
+// Offscreen rendering of the 3-D view in software.
 //
-// A browser without a graphics card copies what was drawn into a canvas at the end of the same frame, and the page's
-// thread waits for it: for all of the drawing, a tenth of a second and more, in which no button is heard. So the client
-// draws into a picture of its own, and only a finished one is copied into the canvas.
+// A browser without a graphics card copies a canvas at the end of the frame and blocks the page's thread until all of it is
+// rendered, 0.1 s and more, in which no button reacts. So the client renders into an offscreen framebuffer, and only a
+// finished frame is copied into the canvas.
 
-/** How often it is asked whether a picture is done (ms). */
+/** Period of polling for a finished frame (ms). */
 const ASK_MS = 4;
-/** A picture that says for so long that it is not done is shown all the same (ms). */
+/** After this time a frame is shown although it does not report to be finished (ms). */
 const LONGEST_MS = 1000;
 
 export class OffscreenFramebuffer {
-  /** Is something drawn that is not shown yet? */
+  /** Is a frame rendered but not shown? */
   busy = false;
   drawn = false;
   width = 0;
   height = 0;
 
-  /** @param {WebGL2RenderingContext} gl From now on what is drawn "into the canvas" is drawn behind it. */
+  /** @param {WebGL2RenderingContext} gl Draws into the framebuffer from now on. */
   constructor(gl) {
     this.gl = gl;
     this.picture = gl.createFramebuffer();
@@ -34,7 +34,7 @@ export class OffscreenFramebuffer {
     this.interceptCanvas();
   }
 
-  /** Take the place of what the client asks of the canvas. */
+  /** Redirect the client's calls for the canvas. */
   interceptCanvas() {
     const { gl } = this;
     gl.bindFramebuffer = (target, framebuffer) => {
@@ -48,7 +48,7 @@ export class OffscreenFramebuffer {
     gl.readBuffer = (buffer) => readBuffer(this.forReading === null ? gl.COLOR_ATTACHMENT0 : buffer);
     const viewport = gl.viewport.bind(gl);
     gl.viewport = (x, y, width, height) => {
-      // The client sets it anew whenever it has changed the canvas's size.
+      // The client calls this after each change of the canvas's size.
       this.fit();
       viewport(x, y, width, height);
     };
@@ -74,7 +74,7 @@ export class OffscreenFramebuffer {
   }
 
   /**
-   * After the client's turn: show what it has drawn as soon as that is done.
+   * After the client has drawn: show the frame as soon as it is finished.
    *
    * @param {(shown: () => void) => void} nextFrame Calls at the browser's next frame.
    * @param {() => void} shown
@@ -104,7 +104,7 @@ export class OffscreenFramebuffer {
     window.setTimeout(ask, ASK_MS);
   }
 
-  /** Copy the picture into the canvas. */
+  /** Copy the frame into the canvas. */
   show() {
     const { gl, width, height } = this;
     const cut = gl.isEnabled(gl.SCISSOR_TEST);

@@ -1,4 +1,4 @@
-// Words and numbers for people.
+// Text for modes, states, ages, units and numbers.
 
 /** @type {Readonly<Record<import("../link/messages.js").PointState, string>>} */
 export const POINT_WORDS = Object.freeze({
@@ -40,7 +40,7 @@ const RAW_WORDS = Object.freeze({ ...MODE_WORDS, ...POINT_WORDS });
 const RAW = new RegExp(`\\b(${Object.keys(RAW_WORDS).join("|")})\\b`, "g");
 
 /**
- * A text of the robot's with the page's own words for modes and states.
+ * Replace names of modes and states in a text by their labels.
  *
  * @param {string} text
  */
@@ -49,7 +49,7 @@ export function inWords(text) {
 }
 
 /**
- * What the robot is nearest to touching; empty where nothing is near.
+ * The nearest obstacle; empty if nothing is near.
  *
  * @param {import("../link/messages.js").ControllerState|null} controller
  */
@@ -93,7 +93,7 @@ export function clockWords(wallTime) {
 }
 
 /**
- * A force in N to two digits: it is an estimate.
+ * A force (N) to two digits, since it is an estimate.
  *
  * @param {number} force
  */
@@ -102,7 +102,7 @@ export function newtons(force) {
 }
 
 /**
- * Standard deviation of a vector's worst coordinate, from the upper triangle of its covariance.
+ * Largest standard deviation among a vector's coordinates, from the upper triangle of its covariance.
  *
  * @param {import("../link/messages.js").Covariance} covariance
  */

@@ -1,24 +1,24 @@
-// Everything the page knows. The last known state is kept, with its age, however long a link or a process is gone.
+// Everything the page knows. The last known state is kept with its age while a link or process is gone.
 
 import { ageWords } from "./format.js";
 import { signal } from "./signals.js";
 
-/** @typedef {import("../link/messages.js").PageState} PageState */
-/** @typedef {import("../link/messages.js").PagePoints} PagePoints */
 /** @typedef {import("../link/messages.js").PageEvent} PageEvent */
+/** @typedef {import("../link/messages.js").PagePoints} PagePoints */
+/** @typedef {import("../link/messages.js").PageState} PageState */
 /** @typedef {import("../link/messages.js").Process} Process */
 /** @typedef {import("../link/messages.js").Severity} Severity */
 
 /**
  * @typedef {object} Link
  * @property {"connecting"|"open"|"closed"|"signed-out"} status
- * @property {number} attempts Tries since it was last open.
+ * @property {number} attempts Attempts since it was last open.
  */
 
 /** @typedef {{ id: number, severity: Severity, text: string }} Toast */
 
 const MAX_LINES = 500;
-/** Seconds after which the last word of a process is shown as old. */
+/** Age from which the state of a process is stale (s). */
 const OLD_AFTER_S = { bridge: 1, controller: 1, perception: 2, server: 1 };
 
 export const link = signal(/** @type {Link} */ ({ status: "connecting", attempts: 0 }));
@@ -28,27 +28,27 @@ export const points = signal(/** @type {PagePoints|null} */ (null));
 export const preview = signal(/** @type {import("../link/messages.js").PreviewState|null} */ (null));
 export const log = signal(/** @type {readonly PageEvent[]} */ ([]));
 export const toasts = signal(/** @type {readonly Toast[]} */ ([]));
-/** Identifier of the chosen point, empty when none. */
+/** Id of the selected point; empty if none. */
 export const selected = signal("");
-/** Counts how often the point that is chosen already was chosen again. */
+/** Grows when the selected point is selected again. */
 export const revealCount = signal(0);
 /** Round trip page → server → page in ms; null before the first. */
 export const roundTrip = signal(/** @type {number|null} */ (null));
-/** The page's clock (ms), moved on four times a second so that ages grow on screen. */
+/** The page's clock (ms), updated four times a second so that ages grow on screen. */
 export const now = signal(performance.now());
-/** When the newest `PageState` came in (page's clock, ms). */
+/** Time of the newest `PageState` (page's clock, ms). */
 let stateAt = 0;
-/** How often the page's clock has moved on since it came, or since the page was opened. */
+/** Clock updates since then, or since the page was opened. */
 let turns = 0;
 now.subscribe(() => {
   turns += 1;
 });
 /**
- * After so many turns (1 s) without a state the server is silent. Turns and not milliseconds alone: while the browser
- * loads the 3-D view nothing of this page runs, what has come waits unread, and that is no silence.
+ * After this many updates (1 s) without a state the server is silent. Not milliseconds alone: while the browser loads the
+ * 3-D view, this page does not run and messages wait unread.
  */
 const SILENT_TURNS = 4;
-/** So many turns (5 s) a page that has just been opened waits for its first word before that is an alarm. */
+/** A page that has just been opened waits this many updates (5 s) before silence is an alarm. */
 const FIRST_TURNS = 20;
 let nextToast = 1;
 let nextLocalLine = -1;
@@ -60,14 +60,14 @@ export function receiveState(message) {
   pageState.set(message);
 }
 
-/** Has this page only just been opened, so that nothing can be said yet of what it has not heard? */
+/** Is the page waiting for its first state, too early for an alarm? */
 export function isOpening() {
   return pageState.get() === null && link.get().status !== "signed-out" && turns < FIRST_TURNS;
 }
 
 /**
- * New lines of the server's log. After a reconnection the server sends its last lines again, and a restarted server
- * counts from the start: what the page already has from before them stays.
+ * New lines of the server's log. After a reconnection the server repeats its last lines, and a restarted server counts from
+ * the start; older lines that the page has are kept.
  *
  * @param {readonly PageEvent[]} events
  * @param {boolean} first Is this the first batch of a connection?
@@ -81,7 +81,7 @@ export function receiveEvents(events, first) {
 }
 
 /**
- * Tell the operator something at once, and keep it in the log.
+ * Show a toast and add it to the log.
  *
  * @param {Severity} severity
  * @param {string} text
@@ -113,7 +113,7 @@ export function stateAge() {
 }
 
 /**
- * Age of the last word of a process (s): as the server measured it, and what has passed since.
+ * Age of a process's last message (s): as the server measured it, plus the time since.
  *
  * @param {Process} process
  * @returns {number|null}
@@ -126,7 +126,7 @@ export function processAge(process) {
 }
 
 /**
- * Age of the last word of a process (s) as the server measured it.
+ * Age of a process's last message (s) as the server measured it.
  *
  * @param {Process} process
  * @returns {number|null}
@@ -141,7 +141,7 @@ function toldAge(process) {
 }
 
 /**
- * Has the server said that a process is gone? What this page has not heard in time says nothing of it.
+ * Does the server report that a process is gone? Silence on this page's own link does not count.
  *
  * @param {Process} process
  */
@@ -151,7 +151,7 @@ export function isGone(process) {
 }
 
 /**
- * Is a process known to be there, with a recent last word?
+ * Is a process known to be running, with a fresh last message?
  *
  * @param {Process} process
  */
@@ -164,7 +164,7 @@ export function isLive(process) {
 }
 
 /**
- * Why what is shown of these processes is old, with its age; empty while it is not.
+ * Why the state of these processes is stale, with its age; empty while it is fresh.
  *
  * @param {...Process} processes
  */
@@ -174,7 +174,7 @@ export function staleWords(...processes) {
     return age === null ? "" : `no link — last state ${ageWords(age)} old`;
   }
   if (pageState.get() === null) return "";
-  // Nothing is known of the others while the server says nothing.
+  // A silent server says nothing about the others.
   const silence = stateAge() ?? 0;
   if (!isLive("server")) return `server silent — last state ${ageWords(silence)} old`;
   for (const process of processes) {

@@ -1,10 +1,10 @@
-// Signals: values that tell who depends on them, and drawing once a frame however often they change.
+// Signals: observable values, and drawing at most once a frame.
 
 /**
  * @template T
  * @typedef {object} Signal
  * @property {() => T} get The value now.
- * @property {(value: T) => void} set Replace the value and tell everyone at once.
+ * @property {(value: T) => void} set Replaces the value and notifies all listeners synchronously.
  * @property {(listener: (value: T) => void) => () => void} subscribe Returns a function that ends the subscription.
  */
 

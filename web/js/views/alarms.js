@@ -1,4 +1,4 @@
-// Alarms: what needs somebody now, how bad it is, and what to do about it.
+// Alarms: severity, text, and what to do. Advice names only buttons that can be pressed.
 
 import { countOf } from "../control/allowed.js";
 import { holder } from "../control/lease.js";
@@ -8,6 +8,7 @@ import { isGone, isLive, isOpening, link, pageState, points, preview, staleWords
 import { history } from "./history.js";
 
 /** @typedef {import("../link/messages.js").ControllerState} ControllerState */
+/** @typedef {import("../link/messages.js").PageState} PageState */
 
 const NOT_MENDED = "Mend the cause. A second after it has gone";
 
@@ -34,7 +35,7 @@ function afterStop() {
 }
 
 /**
- * What goes on with the work that a pause has ended, once it has been resumed; empty where none waits.
+ * Advice for work that was interrupted, after Resume; empty if none waits.
  *
  * @param {ControllerState} controller
  */
@@ -61,7 +62,7 @@ function awayFromLimit({ mode }) {
   }
 }
 
-/** What comes first where somebody else holds control. */
+/** First step while another person holds control. */
 function control() {
   const { held, mine, user } = holder();
   return held && !mine && !viewing() ? `${user} holds control: press Ask or Take. ` : "";
@@ -78,7 +79,7 @@ function ofSupervisor(button) {
 }
 
 /**
- * What begins again what was interrupted.
+ * How to continue what was interrupted.
  *
  * @param {import("../link/messages.js").Interrupted} what
  */
@@ -105,15 +106,14 @@ function capital(words) {
   return words.charAt(0).toUpperCase() + words.slice(1);
 }
 
-/** @typedef {import("../link/messages.js").PageState} PageState */
 /** @typedef {{ id: string, severity: "error"|"warning", text: string, act: string }} Alarm */
 
 const DEGREE = 180 / Math.PI;
-/** Pages whose round trip (ms) is longer may not lead the tool. */
+/** Longest round trip for teleoperation (ms). */
 const SLOW_MS = 200;
-/** So many samples of the history (3 s) one after the other: a browser that loads the 3-D view is slow for a moment. */
+/** Consecutive samples (3 s), since loading the 3-D view is slow for a moment. */
 const SLOW_SAMPLES = 12;
-/** Share of late control periods, and over how many samples of the history it is counted (10 s). */
+/** Ratio of late control periods, over this many samples (10 s). */
 const LATE_SHARE = 0.02;
 const LATE_SAMPLES = 40;
 
@@ -125,7 +125,7 @@ const GONE = Object.freeze({
 });
 
 /**
- * Every alarm of this moment, the worst first.
+ * All alarms now, errors first.
  *
  * @returns {Alarm[]}
  */
@@ -184,7 +184,7 @@ function ofModes({ controller, bridge, stops }) {
       found.push(alarm("fault", "error", `Fault${reason}`, afterFault(controller)));
       break;
     case "READY":
-      // In the place of the pause: a resume alone begins nothing.
+      // Takes the place of "Paused": Resume alone starts nothing.
       if (waitingWork(controller)) found.push(alarm("paused", "warning", "The work waits to be begun again", waitingWork(controller)));
       break;
   }
@@ -235,7 +235,7 @@ function ofWork({ controller, bridge, wider, plain_wire }) {
   return found;
 }
 
-/** Share of the control periods of the last seconds that were late. */
+/** Ratio of late control periods in the last seconds. */
 function lateShare() {
   const late = history.of("late-ticks").slice(-LATE_SAMPLES);
   const ticks = history.of("ticks").slice(-LATE_SAMPLES);

@@ -1,14 +1,14 @@
-// A greyed control says why, when it is pressed and when the keyboard comes to it: a finger cannot hover for the reason.
+// A disabled control shows its reason when pressed or focused, since touch has no hover.
 
 import { showToast } from "../state/page-state.js";
 import { element } from "./dom.js";
 
 const DISABLED = ':is(button, input)[aria-disabled="true"]';
-/** Between the control and its reason, and to the edges of the screen (px). */
+/** Margin to the control and to the edges of the screen (px). */
 const GAP = 6;
 
 /**
- * Keep greyed controls from doing anything, and show their reasons instead.
+ * Suppress the actions of disabled controls and show their reasons.
  *
  * @param {Document} page
  */
@@ -25,7 +25,7 @@ export function explainDisabled(page) {
     event.stopImmediatePropagation();
     showToast("info", whyOf(control));
   });
-  // A slider moves before there is a click, and by keys without one.
+  // A slider moves before the click, and by keys.
   for (const name of ["mousedown", "touchstart"]) listen(name, (event, control) => isInput(control) && event.preventDefault());
   for (const name of ["input", "change"]) listen(name, (event) => event.stopImmediatePropagation());
   listen("keydown", (event, control) => {
@@ -40,7 +40,7 @@ export function explainDisabled(page) {
  * @param {(name: string, found: (event: Event, control: Element) => void) => void} listen
  */
 function tellOnFocus(page, listen) {
-  // Read out as the control's own description already.
+  // Screen readers have the control's description already.
   const words = element("div", { class: "why", attributes: { "aria-hidden": "true" } });
   words.hidden = true;
   page.body.append(words);

@@ -1,4 +1,4 @@
-// Building the page's elements without markup in strings, so that no text can become markup.
+// Building DOM elements without markup strings, so that no text can become markup.
 
 const SVG = "http://www.w3.org/2000/svg";
 
@@ -46,7 +46,7 @@ export function svg(tag, attributes = {}, ...children) {
 }
 
 /**
- * Change the text only when it differs, so that selections and screen readers are not disturbed.
+ * Set the text only if it differs, to keep selections and screen readers undisturbed.
  *
  * @param {Element} node
  * @param {string} text
@@ -56,12 +56,12 @@ export function setText(node, text) {
 }
 
 /**
- * Enable a control, or grey it and say why. Not the `disabled` attribute: a control that has it swallows the press and
- * takes no focus, so that neither a finger nor a keyboard would learn the reason (`disabled-reasons.js`).
+ * Enable a control, or disable it with a reason. Uses `aria-disabled`: a control with the `disabled` attribute takes neither
+ * press nor focus and could not show its reason (`disabled-reasons.js`).
  *
  * @param {HTMLButtonElement|HTMLInputElement} button
- * @param {string} why Empty when it may be pressed.
- * @param {string} [hint] What it does, shown while it may be pressed.
+ * @param {string} why Reason; empty to enable.
+ * @param {string} [hint] What it does; shown while enabled.
  */
 export function setEnabled(button, why, hint = "") {
   const words = why || hint;
@@ -71,7 +71,7 @@ export function setEnabled(button, why, hint = "") {
 }
 
 /**
- * Change an attribute only when it differs: states come twenty times a second, and each change is work for the browser.
+ * Set an attribute only if it differs, since states arrive many times a second.
  *
  * @param {Element} node
  * @param {string} name
@@ -84,7 +84,7 @@ export function setAttribute(node, name, value) {
 }
 
 /**
- * A heading bar of a panel, with a place for the note that its content is old.
+ * Head of a panel, with a place for the stale note.
  *
  * @param {string} title
  * @param {...Node} extra

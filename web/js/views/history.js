@@ -1,4 +1,4 @@
-// The last five minutes of every reading and of every process, four samples a second.
+// Ring buffers with the last five minutes of readings and process presence, four samples a second.
 
 import { PROCESSES } from "../link/messages.js";
 import { isLive, now, pageState } from "../state/page-state.js";
@@ -14,7 +14,7 @@ class History {
     this.names = names;
     this.count = 0;
     this.times = new Float64Array(LENGTH);
-    /** One row a name, each a ring. */
+    /** A ring buffer for each name. */
     this.rings = names.map(() => new Float32Array(LENGTH));
   }
 
@@ -32,7 +32,7 @@ class History {
   }
 
   /**
-   * A name's samples, oldest first, as long as they are no older than the span.
+   * Samples of a name within the span, oldest first.
    *
    * @param {string} name
    * @returns {{ at: number, value: number }[]} `value` is NaN where it is unknown.
@@ -48,12 +48,12 @@ class History {
     return out;
   }
 
-  /** When the newest sample was taken (ms). */
+  /** Time of the newest sample (ms). */
   newest() {
     return this.count === 0 ? 0 : (this.times[(this.count - 1) % LENGTH] ?? 0);
   }
 
-  /** As it is now, for who wants to look at it at leisure. */
+  /** A frozen copy. */
   copy() {
     const other = new History(this.names);
     other.count = this.count;
@@ -67,7 +67,7 @@ export const history = new History([...READINGS.map((reading) => reading.id), ..
 /** Grows with each sample. */
 export const sampled = signal(0);
 
-/** Take a sample whenever the page's clock moves on, whether or not anybody looks. */
+/** Add a sample at every update of the page's clock. */
 export function recordHistory() {
   now.subscribe((at) => {
     const state = pageState.get();

@@ -1,4 +1,4 @@
-// A button that means something only while it is held: by a finger, the mouse, or Enter.
+// A button that acts while it is held with a finger, the mouse, or Enter.
 
 import { showToast } from "../state/page-state.js";
 
@@ -14,7 +14,7 @@ export function holdButton(button, press, release) {
     held = !why;
     if (why) showToast("warning", why);
   };
-  // Of this button alone: it loses the focus only when the next one has been pressed already.
+  // Only if this button is held: blur arrives after the next one has been pressed.
   const end = () => {
     if (held) release();
     held = false;
@@ -25,7 +25,7 @@ export function holdButton(button, press, release) {
     begin();
   });
   for (const name of ["pointerup", "pointercancel", "lostpointercapture", "blur"]) button.addEventListener(name, end);
-  // A long touch must not become a menu that swallows the release.
+  // The context menu of a long touch would swallow the release.
   button.addEventListener("contextmenu", (event) => event.preventDefault());
   button.addEventListener("keydown", (event) => {
     if (event.code === "Enter" && !event.repeat) begin();

@@ -1,4 +1,4 @@
-// Shapes that go with each word, so that nothing is told by colour alone. All on a 16 × 16 grid, drawn in strokes.
+// Icons on a 16 × 16 grid, one for each state, so that nothing is shown by colour alone.
 
 import { svg } from "./dom.js";
 
@@ -6,7 +6,7 @@ const RING = "M8 1.8a6.2 6.2 0 1 0 0 12.4a6.2 6.2 0 1 0 0-12.4z";
 
 /** @type {Record<string, string>} */
 const PATHS = {
-  // life of a point
+  // point states
   PROPOSED: RING,
   ACCEPTED: `${RING}M5 8.2l2.2 2.2L11 6`,
   UNREACHABLE: `${RING}M4.4 8h7.2`,
@@ -44,7 +44,7 @@ export function icon(name) {
 }
 
 /**
- * Swap the icon in `holder` when the name has changed.
+ * Replace the icon in `holder` if the name differs.
  *
  * @param {HTMLElement} holder
  * @param {string} name

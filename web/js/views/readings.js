@@ -1,9 +1,11 @@
-// The numbers that tell how well the robot does: where each comes from, its unit, and when it is worth a warning.
+// Readings of telemetry and charts: source, unit, format, warning limits.
 
 import { degrees, millimetres } from "../state/format.js";
 import { roundTrip } from "../state/page-state.js";
 
-/** Shortest time (s) to measure over: shorter is noise, longer is late. */
+/** @typedef {import("../link/messages.js").PageState} PageState */
+
+/** Window of the speed estimate (s): shorter is noisy, longer is late. */
 const SPAN_S = 0.4;
 
 class BaseSpeed {
@@ -21,7 +23,7 @@ class BaseSpeed {
     if (base === null || joints === null) return null;
     const stamp = joints.header.stamp;
     const newest = this.track.at(-1);
-    // A bridge that started again counts from elsewhere.
+    // The clock of a restarted bridge begins again.
     if (newest && stamp < newest.stamp) this.track = [];
     if (!newest || stamp > newest.stamp) this.track.push({ stamp, x: base.x, y: base.y });
     while (this.track.length > 2 && stamp - (this.track[1]?.stamp ?? stamp) >= SPAN_S) this.track.shift();
@@ -31,19 +33,18 @@ class BaseSpeed {
   }
 }
 
-/** @typedef {import("../link/messages.js").PageState} PageState */
 /**
  * @typedef {object} Reading
  * @property {string} id
  * @property {string} label
  * @property {string} unit
  * @property {string} description
- * @property {number} fullScale Value of a full bar, in the unit shown.
+ * @property {number} fullScale Upper end of the bar, in the unit shown.
  * @property {number} [warnAbove]
  * @property {number} [warnBelow]
  * @property {(value: number) => string} format
  * @property {(state: PageState) => number|null} read In the unit shown; null when unknown.
- * @property {"gauge"|"engineer"|"chart"} [place] Where it is shown besides its chart; a gauge when not said.
+ * @property {"gauge"|"engineer"|"chart"} [place] Where it is shown besides its chart; a gauge by default.
  */
 
 const DEGREE = 180 / Math.PI;

@@ -1,4 +1,4 @@
-// Undecided sites below the queue: spurs without a pruning point, why, and a button that sends the robot to look again.
+// Undecided sites below the queue: spurs without a pruning point, the reason, and Look again.
 
 import { whyNot } from "../control/allowed.js";
 import { ask } from "../link/api.js";
