@@ -8,6 +8,8 @@ from mutmut.mutation import mutators
 
 _NEVER = cst.Name("False")
 _ALWAYS = cst.Name("True")
+#: Arguments that say how something is called or written down, which decides nothing.
+_LABELS = frozenset({"metavar", "help", "prog", "description", "dest", "encoding", "daemon"})
 
 
 def extend() -> None:
@@ -34,6 +36,10 @@ def _words(node: cst.CSTNode) -> bool:
     return False
 
 
+def _label(argument: cst.Arg) -> bool:
+    return argument.keyword is not None and argument.keyword.value in _LABELS
+
+
 def _strings(node: cst.BaseString) -> Iterable[cst.CSTNode]:
     if not _words(node):
         # Three spellings of the same name would say the same thing three times.
@@ -41,7 +47,7 @@ def _strings(node: cst.BaseString) -> Iterable[cst.CSTNode]:
 
 
 def _arguments(node: cst.Call) -> Iterable[cst.CSTNode]:
-    if not any(_words(argument.value) for argument in node.args):
+    if not any(_words(argument.value) or _label(argument) for argument in node.args):
         yield from mutators.operator_arg_removal(node)
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from rolling_panda.errors import InputError
 from server.__main__ import add_arguments
-from server.auth.access import access
+from server.auth.access import Tls, access
 from server.auth.users import UserFile
 from tests.support.certificates import self_signed
 
@@ -44,7 +44,8 @@ def test_users_let_in_from_elsewhere_but_not_beside_a_link(tmp_path):
 
 def test_a_certificate_needs_its_own_key(tmp_path):
     certificate, key = self_signed(tmp_path)
-    assert told("--tls-cert", certificate, "--tls-key", key).scheme == "https"
+    allowed = told("--tls-cert", certificate, "--tls-key", key)
+    assert allowed.scheme == "https" and allowed.tls == Tls(certificate, key)
     with pytest.raises(InputError, match="belong together"):
         told("--tls-cert", certificate)
     (tmp_path / "other").mkdir()

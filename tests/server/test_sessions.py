@@ -1,5 +1,5 @@
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rolling_panda.errors import InputError
@@ -69,8 +69,30 @@ def test_a_session_that_was_ended_is_gone():
     assert sessions.everyone() == ()
 
 
+def test_a_good_sign_in_makes_bad_ones_of_that_address_be_forgotten():
+    sessions = Sessions(60.0)
+    for round_ in range(3):
+        for _ in range(4):
+            with pytest.raises(SignInError) as caught:
+                sessions.sign_in("wrong", 0.0, "10.0.0.1")
+            assert caught.value.wait_s == 0.0, round_
+        sessions.sign_in(sessions.invite("ann", "viewer"), 0.0, "10.0.0.1")
+
+
+def test_who_guesses_at_one_address_keeps_nobody_else_waiting():
+    sessions = Sessions(60.0)
+    for _ in range(5):
+        with pytest.raises(SignInError):
+            sessions.sign_in("wrong", 0.0, "10.0.0.1")
+    good = sessions.invite("ann", "viewer")
+    with pytest.raises(SignInError, match="too many"):
+        sessions.sign_in(good, 0.5, "10.0.0.1")
+    assert sessions.sign_in(good, 0.5, "10.0.0.2").user == "ann"
+
+
 @settings(max_examples=50)
 @given(st.text())
+@example("\ud800 cannot be encoded")
 def test_no_guess_is_a_session(guess):
     sessions = Sessions(60.0)
     sessions.sign_in(sessions.invite("ann", "viewer"), 0.0)
