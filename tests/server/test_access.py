@@ -50,6 +50,6 @@ def test_a_certificate_needs_its_own_key(tmp_path):
         told("--tls-cert", certificate)
     (tmp_path / "other").mkdir()
     _, other = self_signed(tmp_path / "other")
-    for wrong in (other, tmp_path / "none.pem"):
-        with pytest.raises(InputError, match="cannot use the certificate"):
+    for wrong, why in ((other, "MISMATCH"), (tmp_path / "none.pem", "No such file"), ("a\0b", "embedded null")):
+        with pytest.raises(InputError, match=f"cannot use the certificate .*: .*{why}"):
             told("--tls-cert", certificate, "--tls-key", wrong)

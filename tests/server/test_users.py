@@ -78,7 +78,9 @@ def test_the_command_adds_lists_changes_and_removes(tmp_path, monkeypatch, capsy
     assert code == 0 and "ada may sign in as supervisor" in told and PASSWORD not in told
     file = UserFile(tmp_path / "users.json")
     assert file.check("ada", PASSWORD)
-    assert run(monkeypatch, capsys, "list", *state) == (0, "supervisor  ada\n")
+    file.add("bob", "viewer", PASSWORD)
+    assert run(monkeypatch, capsys, "list", *state) == (0, "supervisor  ada\nviewer      bob\n")
+    file.remove("bob")
     assert run(monkeypatch, capsys, "password", "ada", "--password-stdin", *state, typed="much longer one\n")[0] == 0
     assert file.check("ada", "much longer one")
     assert run(monkeypatch, capsys, "remove", "ada", *state)[0] == 0
@@ -88,7 +90,19 @@ def test_the_command_adds_lists_changes_and_removes(tmp_path, monkeypatch, capsy
 
 
 def test_a_password_is_asked_for_twice(tmp_path, monkeypatch, capsys):
-    typed = iter([PASSWORD, "something else"])
+    typed = iter([PASSWORD, "something else", PASSWORD, PASSWORD])
     monkeypatch.setattr("getpass.getpass", lambda prompt: next(typed))
     code, told = run(monkeypatch, capsys, "add", "ada", "--state", str(tmp_path))
     assert code == 1 and "differ" in told and not (tmp_path / "users.json").exists()
+    assert run(monkeypatch, capsys, "add", "ada", "--state", str(tmp_path))[0] == 0
+    assert UserFile(tmp_path / "users.json").check("ada", PASSWORD)
+
+
+@pytest.mark.parametrize("given_up", [KeyboardInterrupt, EOFError])
+def test_who_gives_up_at_the_password_changes_nothing(tmp_path, monkeypatch, capsys, given_up):
+    def ask(prompt):
+        raise given_up
+
+    monkeypatch.setattr("getpass.getpass", ask)
+    code, told = run(monkeypatch, capsys, "add", "ada", "--state", str(tmp_path))
+    assert code == 1 and "nothing was changed" in told and not (tmp_path / "users.json").exists()
