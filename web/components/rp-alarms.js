@@ -62,7 +62,13 @@ function newRow(severity) {
   const text = element("strong");
   const act = element("span", { class: "act" });
   const since = element("time", { text: clockWords(Date.now() / 1000), attributes: { title: "Since" } });
-  const row = element("li", { data: { severity } }, icon(severity), element("span", { class: "alarm-words" }, text, act), since);
+  const row = element(
+    "li",
+    { data: { severity } },
+    icon(severity),
+    element("span", { class: "alarm-words" }, text, act),
+    since,
+  );
   return { row, text, act, seen: 0 };
 }
 customElements.define("rp-alarms", RpAlarms);

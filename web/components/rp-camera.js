@@ -10,7 +10,11 @@ import { element, panelHead, setText, svg } from "../js/views/dom.js";
 /** @typedef {import("../js/link/messages.js").PagePoint} PagePoint */
 /** @typedef {readonly [number, number]} Pixel */
 
-/** Small signs inside the ring, in pixels around its centre. @type {Readonly<Record<import("../js/link/messages.js").PointState, string>>} */
+/**
+ * Small signs inside the ring, in pixels around its centre.
+ *
+ * @type {Readonly<Record<import("../js/link/messages.js").PointState, string>>}
+ */
 const SIGNS = Object.freeze({
   PROPOSED: "M0 -.5v1",
   ACCEPTED: "M-3 .2l2.2 2.2L3 -2.4",
@@ -87,7 +91,6 @@ class CameraMarks {
     if (title) setText(title, `${point.point_id}: ${POINT_WORDS[entry.state]}`);
   }
 }
-
 
 /** Label and title of the image's source, by kind of bridge. */
 const SOURCES = {

@@ -187,7 +187,12 @@ export class RpCharts extends HTMLElement {
     this.shown = signal(history);
     this.isOpen = false;
     this.when = element("span", { class: "hint number", attributes: { role: "status" } });
-    this.pause = element("button", { id: "pause-charts", class: "quiet", text: "Pause", attributes: { type: "button" } });
+    this.pause = element("button", {
+      id: "pause-charts",
+      class: "quiet",
+      text: "Pause",
+      attributes: { type: "button" },
+    });
     /** @type {Node[]} */
     this.tools = [this.when, this.pause];
     this.figures = READINGS.map((reading) => figure(reading.id, reading.label, reading.description));
@@ -252,7 +257,9 @@ export class RpCharts extends HTMLElement {
       const found = sampleAt(samples, pointed ?? newest);
       const words = found ? `${reading.format(found.value)} ${reading.unit}`.trim() : "–";
       setText(each.value, words);
-      const over = found !== null && (found.value > (reading.warnAbove ?? Infinity) || found.value < (reading.warnBelow ?? -Infinity));
+      const over =
+        found !== null &&
+        (found.value > (reading.warnAbove ?? Infinity) || found.value < (reading.warnBelow ?? -Infinity));
       each.box.classList.toggle("warned", over);
       each.canvas.setAttribute("aria-label", `${reading.label}: ${words}${over ? ", beyond its limit" : ""}`);
     });

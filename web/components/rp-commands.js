@@ -6,7 +6,10 @@ import { link, now, pageState, points } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
 import { element, setEnabled } from "../js/views/dom.js";
 
-/** @type {readonly (readonly [id: string, intent: import("../js/control/allowed.js").Intent, word: string, hint: string])[]} */
+/**
+ * @type {readonly (readonly [id: string, intent: import("../js/control/allowed.js").Intent, word: string, hint:
+ * string])[]}
+ */
 const BUTTONS = Object.freeze([
   ["arm", "Arm", "Arm", "Switch the drives on; nothing moves yet"],
   ["survey", "Survey", "Survey", "Drive along the row and look at every vine; nothing is cut"],
@@ -43,7 +46,8 @@ function surveyDistance() {
     id: "survey-distance",
     attributes: { "aria-label": "How far ahead the survey goes", title: "How far ahead along the row the survey goes" },
   });
-  for (const metres of DISTANCES) select.append(element("option", { text: `${metres} m`, attributes: { value: String(metres) } }));
+  for (const metres of DISTANCES)
+    select.append(element("option", { text: `${metres} m`, attributes: { value: String(metres) } }));
   select.value = String(USUAL_DISTANCE);
   return select;
 }

@@ -23,12 +23,23 @@ class RpInvite extends HTMLElement {
     });
     const user = element("input", {
       id: "invite-user",
-      attributes: { type: "text", required: "", maxlength: "40", pattern: "[A-Za-z0-9_.\\- ]+", value: "guest", autocomplete: "off" },
+      attributes: {
+        type: "text",
+        required: "",
+        maxlength: "40",
+        pattern: "[A-Za-z0-9_.\\- ]+",
+        value: "guest",
+        autocomplete: "off",
+      },
     });
     const role = element("select", { id: "invite-role" });
-    for (const [name, may] of ROLES) role.append(element("option", { text: `${name}: ${may}`, attributes: { value: name } }));
+    for (const [name, may] of ROLES)
+      role.append(element("option", { text: `${name}: ${may}`, attributes: { value: name } }));
     const words = element("p", { class: "hint", attributes: { role: "status" } });
-    const link = element("input", { id: "invite-link", attributes: { type: "text", readonly: "", "aria-label": "Sign-in link" } });
+    const link = element("input", {
+      id: "invite-link",
+      attributes: { type: "text", readonly: "", "aria-label": "Sign-in link" },
+    });
     const copy = element("button", { id: "invite-copy", text: "Copy", attributes: { type: "button" } });
     const made = element("div", { class: "invite-made" }, link, copy);
     const form = element(

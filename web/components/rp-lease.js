@@ -74,7 +74,8 @@ class RpLease extends HTMLElement {
    * @param {string} told
    */
   announceLoss(mine, number, told) {
-    if (this.told !== null && number !== this.told && this.mine && !mine) showToast("warning", `You no longer hold control: ${told}`);
+    if (this.told !== null && number !== this.told && this.mine && !mine)
+      showToast("warning", `You no longer hold control: ${told}`);
     this.told = number;
     this.mine = mine;
   }

@@ -25,7 +25,10 @@ class RpLinkBanner extends HTMLElement {
       const age = stateAge();
       if (status === "signed-out") {
         setText(title, "You are not signed in");
-        setText(words, "Each sign-in link works once: ask a supervisor who is signed in for a new one, or start the program again.");
+        setText(
+          words,
+          "Each sign-in link works once: ask a supervisor who is signed in for a new one, or start the program again.",
+        );
       } else {
         setText(title, "No link to the server");
         const old = age === null ? "" : `What you see is ${ageWords(age)} old. `;

@@ -100,7 +100,8 @@ class RpLog extends HTMLElement {
  */
 function choice(id, label, options) {
   const select = element("select", { id, attributes: { "aria-label": label } });
-  for (const [value, words] of options) select.append(element("option", { text: words, attributes: { value: value ?? "" } }));
+  for (const [value, words] of options)
+    select.append(element("option", { text: words, attributes: { value: value ?? "" } }));
   return select;
 }
 

@@ -18,7 +18,11 @@ const EDGE = 30;
 const SCROLL = 8;
 const HINT = "Arrows choose; Alt and an arrow move the chosen point, Alt and Home or End to the first or last place";
 
-/** Keys that move the selection, or with Alt the selected row: (index, last index) → index. @type {Readonly<Record<string, (at: number, last: number) => number>>} */
+/**
+ * Keys that move the selection, or with Alt the selected row: (index, last index) → index.
+ *
+ * @type {Readonly<Record<string, (at: number, last: number) => number>>}
+ */
 const STEPS = Object.freeze({
   ArrowDown: (at, last) => Math.min(at + 1, last),
   ArrowUp: (at) => Math.max(at - 1, 0),
@@ -37,13 +41,44 @@ class RpOrder extends HTMLElement {
 
   connectedCallback() {
     const words = element("span");
-    const back = element("button", { id: "planners-order", class: "quiet", text: "Plan's order", attributes: { type: "button" }, onclick: () => void plannersOrder() });
+    const back = element("button", {
+      id: "planners-order",
+      class: "quiet",
+      text: "Plan's order",
+      attributes: { type: "button" },
+      onclick: () => void plannersOrder(),
+    });
     this.space = element("div", { class: "order-space" });
     this.mark = element("div", { class: "order-mark" });
     this.mark.hidden = true;
-    this.list = element("div", { class: "order-list", attributes: { role: "listbox", tabindex: "0", "aria-label": "Order of work", "aria-description": HINT, title: HINT } }, this.space, this.mark);
+    this.list = element(
+      "div",
+      {
+        class: "order-list",
+        attributes: {
+          role: "listbox",
+          tabindex: "0",
+          "aria-label": "Order of work",
+          "aria-description": HINT,
+          title: HINT,
+        },
+      },
+      this.space,
+      this.mark,
+    );
     this.said = element("p", { class: "order-said", attributes: { role: "status" } });
-    this.box = element("details", { class: "rule order" }, element("summary", {}, words), element("div", { class: "order-body" }, this.list, element("div", { class: "order-foot" }, element("span", { text: "Drag a row, or Alt + arrows" }), back)), this.said);
+    this.box = element(
+      "details",
+      { class: "rule order" },
+      element("summary", {}, words),
+      element(
+        "div",
+        { class: "order-body" },
+        this.list,
+        element("div", { class: "order-foot" }, element("span", { text: "Drag a row, or Alt + arrows" }), back),
+      ),
+      this.said,
+    );
     this.replaceChildren(this.box);
     this.list.addEventListener("scroll", () => this.draw());
     this.list.addEventListener("keydown", (event) => this.key(event));
@@ -85,7 +120,14 @@ class RpOrder extends HTMLElement {
     if (!point) return;
     let row = this.rows.get(at);
     if (!row) {
-      row = element("div", { id: `order-${at}`, class: "order-row", attributes: { role: "option" } }, element("span", { class: "order-grip", text: "⠿", attributes: { "aria-hidden": "true" } }), element("span", { class: "order-number number" }), element("span", { class: "order-name" }), element("span", { class: "order-way number" }));
+      row = element(
+        "div",
+        { id: `order-${at}`, class: "order-row", attributes: { role: "option" } },
+        element("span", { class: "order-grip", text: "⠿", attributes: { "aria-hidden": "true" } }),
+        element("span", { class: "order-number number" }),
+        element("span", { class: "order-name" }),
+        element("span", { class: "order-way number" }),
+      );
       row.style.setProperty("top", `${at * ROW}px`);
       this.rows.set(at, row);
       this.space?.append(row);
@@ -168,7 +210,8 @@ class RpOrder extends HTMLElement {
     };
     const end = (/** @type {Event} */ ended) => {
       const to = ended.type === "pointerup" ? this.target : -1;
-      for (const kind of ["pointermove", "pointerup", "pointercancel"]) list.removeEventListener(kind, kind === "pointermove" ? /** @type {EventListener} */ (follow) : end);
+      for (const kind of ["pointermove", "pointerup", "pointercancel"])
+        list.removeEventListener(kind, kind === "pointermove" ? /** @type {EventListener} */ (follow) : end);
       this.dragged = "";
       this.target = -1;
       mark.hidden = true;

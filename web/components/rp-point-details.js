@@ -19,11 +19,19 @@ const STEPS = Object.freeze([-5, -1, 1, 5]);
 /** @type {readonly (readonly [word: string, hint: string, value: (point: PruningPoint) => string])[]} */
 const FACTS = Object.freeze([
   ["Cut", "What is cut, and how far past the last node that stays", cutWords],
-  ["Keeps", "Nodes that stay, of those seen on the cane", (point) => `${point.nodes_kept} of ${point.nodes_seen} nodes`],
+  [
+    "Keeps",
+    "Nodes that stay, of those seen on the cane",
+    (point) => `${point.nodes_kept} of ${point.nodes_seen} nodes`,
+  ],
   ["Cane", "Thickness, and the force that the blades are expected to need", caneWords],
   ["Place", "How well the place is known, one standard deviation, and the direction of the cane", placeWords],
   ["Clear of", "From the cut to the nearest known wire, cordon, and node that stays", clearWords],
-  ["Content", "Revision and hash of what is accepted", (point) => `${point.revision} · ${point.digest.slice(0, 8) || "–"}`],
+  [
+    "Content",
+    "Revision and hash of what is accepted",
+    (point) => `${point.revision} · ${point.digest.slice(0, 8) || "–"}`,
+  ],
 ]);
 
 /** @param {PruningPoint} point */
@@ -70,15 +78,40 @@ export class RpPointDetails extends HTMLElement {
     this.row = null;
     this.buttons = STEPS.map((step) => {
       const words = `${step > 0 ? "+" : "−"}${Math.abs(step)}`;
-      return element("button", { class: "quiet", text: words, attributes: { type: "button" }, onclick: () => this.move(step) });
+      return element("button", {
+        class: "quiet",
+        text: words,
+        attributes: { type: "button" },
+        onclick: () => this.move(step),
+      });
     });
     this.moves.append(element("span", { text: "Move, mm" }), ...this.buttons);
-    this.turn = element("input", { attributes: { type: "range", min: "-75", max: "75", step: "5", "aria-label": "Turn of the approach about the cane" } });
+    this.turn = element("input", {
+      attributes: {
+        type: "range",
+        min: "-75",
+        max: "75",
+        step: "5",
+        "aria-label": "Turn of the approach about the cane",
+      },
+    });
     this.turned = element("span", { class: "number" });
-    this.free = element("button", { class: "quiet", text: "As found", attributes: { type: "button" }, onclick: () => this.row && void turnApproach(this.row, null) });
+    this.free = element("button", {
+      class: "quiet",
+      text: "As found",
+      attributes: { type: "button" },
+      onclick: () => this.row && void turnApproach(this.row, null),
+    });
     this.turning = 0;
     this.turn.addEventListener("input", () => this.turnTo(Number(this.turn.value)));
-    this.approach = element("div", { class: "approach" }, element("span", { text: "Approach" }), this.turn, this.turned, this.free);
+    this.approach = element(
+      "div",
+      { class: "approach" },
+      element("span", { text: "Approach" }),
+      this.turn,
+      this.turned,
+      this.free,
+    );
     this.shown = "";
     this.tries = 0;
     this.timer = 0;
@@ -119,7 +152,11 @@ export class RpPointDetails extends HTMLElement {
     const { azimuth } = row.entry;
     const why = whyNotTurn(row);
     setEnabled(this.turn, why, "From where the blades come, turned about the cane; an accepted cut is planned anew");
-    setEnabled(this.free, why || (azimuth === null ? "It is chosen by what is found already" : ""), "Leave the approach to the search");
+    setEnabled(
+      this.free,
+      why || (azimuth === null ? "It is chosen by what is found already" : ""),
+      "Leave the approach to the search",
+    );
     if (this.turning) return;
     const degrees = azimuth === null ? 0 : Math.round((180 * azimuth) / Math.PI);
     this.turn.value = String(degrees);

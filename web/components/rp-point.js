@@ -18,7 +18,11 @@ export class RpRejectForm extends HTMLElement {
     this.row = null;
     this.input = element("input", {
       id: "reject-reason",
-      attributes: { placeholder: "Why? (may stay empty)", maxlength: String(TEXT_MAX_LENGTH), "aria-label": "Why it is rejected" },
+      attributes: {
+        placeholder: "Why? (may stay empty)",
+        maxlength: String(TEXT_MAX_LENGTH),
+        "aria-label": "Why it is rejected",
+      },
     });
   }
 
@@ -32,7 +36,14 @@ export class RpRejectForm extends HTMLElement {
     });
     const usual = element("div", { class: "usual" });
     for (const words of USUAL) {
-      usual.append(element("button", { class: "quiet", text: words, attributes: { type: "button" }, onclick: () => this.send(words) }));
+      usual.append(
+        element("button", {
+          class: "quiet",
+          text: words,
+          attributes: { type: "button" },
+          onclick: () => this.send(words),
+        }),
+      );
     }
     this.append(form, usual);
     this.addEventListener("keydown", (event) => {
@@ -117,7 +128,8 @@ export class RpPoint extends HTMLElement {
       this.reason,
     );
     this.addEventListener("click", (event) => {
-      if (this.row && !(/** @type {Element} */ (event.target).closest("button"))) selectAndReveal(this.row.point.point_id);
+      if (this.row && !(/** @type {Element} */ (event.target).closest("button")))
+        selectAndReveal(this.row.point.point_id);
     });
     this.addEventListener("focus", () => this.choose());
   }
@@ -162,12 +174,17 @@ export class RpPoint extends HTMLElement {
     // Rounded down, so that a value shown as enough for "Accept all" is enough.
     const sure = `${Math.floor(100 * point.confidence + 1e-9)} %`;
     const planned = row.plan?.order ? `no. ${row.plan.order}, way ${row.plan.duration_s.toFixed(1)} s` : "";
-    setText(this.facts, `${point.nodes_kept}/${point.nodes_seen} nodes · ${thick} · ${isUncertain(row) ? "only " : ""}${sure}`);
+    setText(
+      this.facts,
+      `${point.nodes_kept}/${point.nodes_seen} nodes · ${thick} · ${isUncertain(row) ? "only " : ""}${sure}`,
+    );
     const kept = `Keeps ${point.nodes_kept} of ${counted(point.nodes_seen, "node")}`;
     this.facts.title = `${kept}; the cane is ${thick} thick; confidence ${sure}${planWords(row)}`;
     setText(this.reason, inWords([planned, entry.reason, point.reason].filter(Boolean).join(" · ")));
     this.reason.title = this.reason.textContent ?? "";
-    const [yes, no] = isUnknown(row) ? ["I have looked: it is cut", "I have looked: it is not cut"] : ["Accept", "Reject"];
+    const [yes, no] = isUnknown(row)
+      ? ["I have looked: it is cut", "I have looked: it is not cut"]
+      : ["Accept", "Reject"];
     setEnabled(this.acceptButton, whyNotAccept(row), isUnknown(row) ? `${yes} (A)` : "Accept this cut (A)");
     setEnabled(this.rejectButton, whyNotReject(row), isUnknown(row) ? `${no} (R)` : "Reject this cut (R)");
     this.acceptButton.setAttribute("aria-label", `${yes} ${point.point_id}`);

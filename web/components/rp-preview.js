@@ -2,7 +2,20 @@
 
 import { whyNot } from "../js/control/allowed.js";
 import { workOrder } from "../js/control/order.js";
-import { approvePreview, askPreview, cutAt, hasPreview, hidePreview, moment, playing, requirePreview, showMoment, togglePlayback, whyNoApproval, whyNoPreview } from "../js/control/preview.js";
+import {
+  approvePreview,
+  askPreview,
+  cutAt,
+  hasPreview,
+  hidePreview,
+  moment,
+  playing,
+  requirePreview,
+  showMoment,
+  togglePlayback,
+  whyNoApproval,
+  whyNoPreview,
+} from "../js/control/preview.js";
 import { inWords } from "../js/state/format.js";
 import { link, now, pageState, points, preview, selected } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
@@ -15,17 +28,26 @@ const STEP = 0.05;
 
 class RpPreview extends HTMLElement {
   connectedCallback() {
-    const button = (/** @type {string} */ id, /** @type {string} */ text, /** @type {() => void} */ onclick) => element("button", { id, text, attributes: { type: "button" }, onclick });
+    const button = (/** @type {string} */ id, /** @type {string} */ text, /** @type {() => void} */ onclick) =>
+      element("button", { id, text, attributes: { type: "button" }, onclick });
     const all = button("preview", "Preview", () => void askPreview(""));
     const one = button("preview-one", "Chosen", () => void askPreview(selected.get()));
     const run = button("preview-play", "Play", togglePlayback);
     const close = button("preview-hide", "Hide", hidePreview);
     const yes = button("approve-preview", "Approve", () => void approvePreview());
-    const slider = element("input", { id: "preview-time", attributes: { type: "range", min: "0", step: String(STEP), "aria-label": "Moment of the preview" } });
+    const slider = element("input", {
+      id: "preview-time",
+      attributes: { type: "range", min: "0", step: String(STEP), "aria-label": "Moment of the preview" },
+    });
     const time = element("span", { class: "number preview-time" });
     const words = element("p", { class: "preview-words number", attributes: { role: "status" } });
     const required = element("input", { id: "require-preview", attributes: { type: "checkbox" } });
-    const label = element("label", { class: "preview-required", attributes: { for: "require-preview" } }, required, "Before each cut");
+    const label = element(
+      "label",
+      { class: "preview-required", attributes: { for: "require-preview" } },
+      required,
+      "Before each cut",
+    );
     const player = element("div", { class: "preview-player" }, run, slider, time, close, yes);
     this.replaceChildren(element("div", { class: "preview-tools" }, all, one, label, words), player);
     slider.addEventListener("input", () => {
@@ -52,7 +74,11 @@ class RpPreview extends HTMLElement {
       const accepted = workOrder();
       const chosen = accepted.some((row) => row.point.point_id === selected.get());
       setEnabled(all, whyNoPreview(accepted.length), "Show what the robot would do with the accepted points");
-      setEnabled(one, whyNoPreview(accepted.length) || (chosen ? "" : "Choose an accepted point first"), "Show the cut of the chosen point alone");
+      setEnabled(
+        one,
+        whyNoPreview(accepted.length) || (chosen ? "" : "Choose an accepted point first"),
+        "Show the cut of the chosen point alone",
+      );
       setEnabled(yes, whyNoApproval(), "This is what shall be done; it begins with Start");
       setText(run, playing.get() ? "Stop" : "Play");
       setEnabled(close, moment.get() === null ? "The ghost is not shown" : "", "Take the ghost out of the 3-D view");
@@ -92,7 +118,10 @@ function wordsOf(state, at) {
 
 /** @param {readonly import("../js/link/messages.js").PreviewedCut[]} cuts */
 function least(cuts) {
-  const nearest = cuts.reduce((a, b) => (b.clearance < a.clearance ? b : a), cuts[0] ?? { clearance: 0, between: ["", ""] });
+  const nearest = cuts.reduce(
+    (a, b) => (b.clearance < a.clearance ? b : a),
+    cuts[0] ?? { clearance: 0, between: ["", ""] },
+  );
   const omega = Math.min(...cuts.map((cut) => cut.manipulability));
   const margin = Math.min(...cuts.map((cut) => cut.joint_margin));
   return `least ${Math.round(1000 * nearest.clearance)} mm ${nearest.between.join("–")} · ω ${omega.toFixed(3)} · joints ${((180 / Math.PI) * margin).toFixed(0)}°`;

@@ -1,7 +1,16 @@
 // The queue of pruning points by vine and spur. Keys: arrows, A accept, R reject, Z undo, N new.
 
 import { countOf, whyNot } from "../js/control/allowed.js";
-import { accept, acceptAll, confidentPoints, decisions, undo, whyNoUndo, whyNotAccept, whyNotReject } from "../js/control/decisions.js";
+import {
+  accept,
+  acceptAll,
+  confidentPoints,
+  decisions,
+  undo,
+  whyNoUndo,
+  whyNotAccept,
+  whyNotReject,
+} from "../js/control/decisions.js";
 import { placing, setPlacing, whyNoPlacing } from "../js/control/placing.js";
 import { select } from "../js/control/selection.js";
 import { SURE } from "../js/link/messages.js";
@@ -24,7 +33,11 @@ const AGE = /[\d.]+ (s|min|h)\b/g;
 const HEADING = 20;
 /** Rows of Page up and Page down. */
 const PAGE = 6;
-/** Keys that move the selection: (index, last index) → index. @type {Readonly<Record<string, (at: number, last: number) => number>>} */
+/**
+ * Keys that move the selection: (index, last index) → index.
+ *
+ * @type {Readonly<Record<string, (at: number, last: number) => number>>}
+ */
 const STEPS = Object.freeze({
   ArrowDown: (at, last) => Math.min(at + 1, last),
   ArrowUp: (at) => Math.max(at - 1, 0),
@@ -36,18 +49,32 @@ const STEPS = Object.freeze({
 
 class RpQueue extends HTMLElement {
   connectedCallback() {
-    const source = element("span", { class: "tag", attributes: { title: "What tells cane, node and post apart in the image" } });
+    const source = element("span", {
+      class: "tag",
+      attributes: { title: "What tells cane, node and post apart in the image" },
+    });
     const { head, note } = panelHead("Pruning points", source, undoButton());
     const summary = element("p", { class: "summary number" });
     const list = element("div", { class: "groups", attributes: { role: "group", "aria-label": "Pruning points" } });
     const empty = element("div", { class: "empty", attributes: { role: "status" } });
     const open = [
-      undecidedList("another look", (count) => `${counted(count, "place")} ${count === 1 ? "needs" : "need"} another look`),
+      undecidedList(
+        "another look",
+        (count) => `${counted(count, "place")} ${count === 1 ? "needs" : "need"} another look`,
+      ),
       undecidedList("operator", (count) => `${counted(count, "place")} for you to decide`),
     ];
     list.addEventListener("keydown", (event) => this.key(event));
     list.addEventListener("reject", (event) => this.openRejectForm(/** @type {RpPoint} */ (event.target)));
-    this.append(head, document.createElement("rp-rule"), orderOfWork(), element("div", { class: "queue-tools" }, summary, acceptEvery(), addByHand()), list, empty, element("div", { class: "open-places" }, ...open.map((each) => each.box)));
+    this.append(
+      head,
+      document.createElement("rp-rule"),
+      orderOfWork(),
+      element("div", { class: "queue-tools" }, summary, acceptEvery(), addByHand()),
+      list,
+      empty,
+      element("div", { class: "open-places" }, ...open.map((each) => each.box)),
+    );
 
     /** @type {Map<string, HTMLElement>} */
     const groups = new Map();
@@ -245,13 +272,21 @@ function acceptEvery() {
     setText(button, `Accept all ${sure} (${words})`);
     const none = unsure === 0 ? "There is no proposed point" : `No proposed point is ${words}: decide one by one`;
     const rest = unsure === 0 ? "" : `; ${unsure} less sure: decide one by one`;
-    setEnabled(button, whyNot("AcceptAll") || (sure === 0 ? none : ""), `Accept every proposed point that is ${words}${rest}`);
+    setEnabled(
+      button,
+      whyNot("AcceptAll") || (sure === 0 ? none : ""),
+      `Accept every proposed point that is ${words}${rest}`,
+    );
   });
   return button;
 }
 
 function addByHand() {
-  const button = element("button", { id: "add-by-hand", attributes: { type: "button", "aria-label": "Add a point by hand" } }, icon("add"));
+  const button = element(
+    "button",
+    { id: "add-by-hand", attributes: { type: "button", "aria-label": "Add a point by hand" } },
+    icon("add"),
+  );
   button.addEventListener("click", () => setPlacing(!placing.get()));
   drawOn([placing, pageState, link, now], () => {
     setEnabled(button, whyNoPlacing(), "Add a point by hand: click a cane in the 3-D view or in the camera image");

@@ -57,7 +57,8 @@ export class RpReport extends HTMLElement {
     const since = report.began_at > 0 ? `since ${clockWords(report.began_at)}` : "nothing recorded yet";
     const left = report.cut_count - report.cuts.length;
     setText(this.words, `From the ledger, ${since}${left > 0 ? `; ${left} older cuts are in the ledger alone` : ""}.`);
-    const count = (/** @type {"done"|"not_cut"|"unknown"|"unreachable"} */ name) => report.vines.reduce((sum, vine) => sum + vine[name], 0);
+    const count = (/** @type {"done"|"not_cut"|"unknown"|"unreachable"} */ name) =>
+      report.vines.reduce((sum, vine) => sum + vine[name], 0);
     sums(this.sums, [
       ["Done", count("done")],
       ["Not cut", count("not_cut")],
@@ -68,18 +69,27 @@ export class RpReport extends HTMLElement {
       ["Refused", report.refusal_count],
     ]);
     this.vines.show(
-      report.vines.map((vine) => [vine.vine, vine.done, vine.not_cut, vine.unknown, vine.unreachable, (vine.seconds / 60).toFixed(1)]),
+      report.vines.map((vine) => [
+        vine.vine,
+        vine.done,
+        vine.not_cut,
+        vine.unknown,
+        vine.unreachable,
+        (vine.seconds / 60).toFixed(1),
+      ]),
       "No vine has been worked on yet.",
     );
     this.cuts.show(
-      [...report.cuts].reverse().map((cut) => [
-        cut.ended_at > 0 ? clockWords(cut.ended_at) : "now",
-        cut.point_id,
-        cut.vine,
-        [cut.outcome ? POINT_WORDS[cut.outcome] : "Cutting", inWords(cut.reason)].filter(Boolean).join(": "),
-        cut.ended_at > 0 ? cut.seconds.toFixed(1) : "–",
-        cut.user,
-      ]),
+      [...report.cuts]
+        .reverse()
+        .map((cut) => [
+          cut.ended_at > 0 ? clockWords(cut.ended_at) : "now",
+          cut.point_id,
+          cut.vine,
+          [cut.outcome ? POINT_WORDS[cut.outcome] : "Cutting", inWords(cut.reason)].filter(Boolean).join(": "),
+          cut.ended_at > 0 ? cut.seconds.toFixed(1) : "–",
+          cut.user,
+        ]),
       "Nothing has been cut yet.",
     );
     this.refusals.show(
@@ -137,6 +147,10 @@ function sums(list, pairs) {
  * @param {string} words
  */
 function download(path, name, words) {
-  return element("a", { class: "button", text: words, attributes: { href: path, download: name, title: `Save ${name}` } });
+  return element("a", {
+    class: "button",
+    text: words,
+    attributes: { href: path, download: name, title: `Save ${name}` },
+  });
 }
 customElements.define("rp-report", RpReport);

@@ -1,5 +1,5 @@
-// The robots of this server and their states. Each robot has its own page, loaded completely, so that no press can reach the
-// wrong robot. The history of the charts is stored in the tab for the way back.
+// The robots of this server and their states. Each robot has its own page, loaded completely, so that no press can
+// reach the wrong robot. The history of the charts is stored in the tab for the way back.
 
 import { hold } from "../js/control/teleoperation.js";
 import { fetchJson } from "../js/link/api.js";
@@ -11,7 +11,11 @@ import { setIcon } from "../js/views/icons.js";
 
 const KEY = `history of ${location.pathname}`;
 
-/** Times of the samples (ms since 1970) and a row of values for each name; null is unknown. @typedef {{ at: number[], rows: (number|null)[][] }} StoredHistory */
+/**
+ * Times of the samples (ms since 1970) and a row of values for each name; null is unknown.
+ *
+ * @typedef {{ at: number[], rows: (number|null)[][] }} StoredHistory
+ */
 
 function persistHistory() {
   restoreHistory();
@@ -39,10 +43,19 @@ function restoreHistory() {
   history.count = 0;
   at.forEach((wall, index) => {
     const sampled = wall - performance.timeOrigin;
-    if (performance.now() - sampled < SPAN_MS) history.add(sampled, rows.map((row) => row[index] ?? null));
+    if (performance.now() - sampled < SPAN_MS)
+      history.add(
+        sampled,
+        rows.map((row) => row[index] ?? null),
+      );
   });
   const fresh = since.names.map((name) => since.of(name));
-  fresh[0]?.forEach((sample, index) => history.add(sample.at, fresh.map((samples) => samples[index]?.value ?? null)));
+  fresh[0]?.forEach((sample, index) =>
+    history.add(
+      sample.at,
+      fresh.map((samples) => samples[index]?.value ?? null),
+    ),
+  );
 }
 
 /**
@@ -94,7 +107,15 @@ class RpRobots extends HTMLElement {
     const mode = element("span", { class: "robot-mode" });
     const alarm = element("span", { class: "robot-alarm" });
     const holder = element("span", { class: "robot-holder" });
-    const link = element("a", { attributes: { href: path }, data: { robot: name } }, shape, element("strong", { text: name }), mode, alarm, holder);
+    const link = element(
+      "a",
+      { attributes: { href: path }, data: { robot: name } },
+      shape,
+      element("strong", { text: name }),
+      mode,
+      alarm,
+      holder,
+    );
     const here = path === location.pathname;
     if (here) {
       link.setAttribute("aria-current", "page");

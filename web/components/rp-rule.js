@@ -42,7 +42,9 @@ const AGAIN_MS = 1000;
 /** An applied rule is shown for this time (ms) until perception confirms it. */
 const APPLIED_TIMEOUT_MS = 2500;
 
-/** @type {readonly { name: Quantity, label: string, unit: string, scale: number, range: [number, number, number] }[]} */
+/**
+ * @type {readonly { name: Quantity, label: string, unit: string, scale: number, range: [number, number, number] }[]}
+ */
 const QUANTITIES = Object.freeze([
   { name: "nodes_kept", label: "Nodes kept on a spur", unit: "", scale: 1, range: [1, 5, 1] },
   { name: "fruiting_nodes", label: "Nodes on the fruiting cane", unit: "", scale: 1, range: [3, 20, 1] },
@@ -61,8 +63,18 @@ class RpRule extends HTMLElement {
     super();
     this.summary = element("span");
     this.outcome = element("p", { class: "rule-outcome", attributes: { role: "status" } });
-    this.apply = element("button", { id: "rule-apply", class: "primary", text: "Apply", attributes: { type: "button" } });
-    this.discard = element("button", { id: "rule-discard", class: "quiet", text: "Discard", attributes: { type: "button" } });
+    this.apply = element("button", {
+      id: "rule-apply",
+      class: "primary",
+      text: "Apply",
+      attributes: { type: "button" },
+    });
+    this.discard = element("button", {
+      id: "rule-discard",
+      class: "quiet",
+      text: "Discard",
+      attributes: { type: "button" },
+    });
     /** @type {Map<Quantity, { row: HTMLElement, input: HTMLInputElement, value: HTMLElement }>} */
     this.sliders = new Map();
     /** @type {HTMLInputElement[]} */
@@ -81,7 +93,12 @@ class RpRule extends HTMLElement {
 
   connectedCallback() {
     const summary = element("summary", {}, this.summary);
-    const body = element("div", { class: "rule-body" }, this.systemChoice(), ...QUANTITIES.map((each) => this.slider(each)));
+    const body = element(
+      "div",
+      { class: "rule-body" },
+      this.systemChoice(),
+      ...QUANTITIES.map((each) => this.slider(each)),
+    );
     body.append(element("div", { class: "rule-foot" }, this.outcome, this.discard, this.apply));
     this.append(element("details", { class: "rule" }, summary, body));
     this.apply.addEventListener("click", () => void this.hold());
@@ -90,9 +107,15 @@ class RpRule extends HTMLElement {
   }
 
   systemChoice() {
-    const box = element("div", { class: "systems", attributes: { role: "radiogroup", "aria-label": "Training system" } });
+    const box = element("div", {
+      class: "systems",
+      attributes: { role: "radiogroup", "aria-label": "Training system" },
+    });
     for (const [system, word] of SYSTEMS) {
-      const input = element("input", { id: `system-${system}`, attributes: { type: "radio", name: "system", value: system } });
+      const input = element("input", {
+        id: `system-${system}`,
+        attributes: { type: "radio", name: "system", value: system },
+      });
       input.addEventListener("change", () => this.change({ system }));
       this.systems.push(input);
       box.append(element("label", { attributes: { for: input.id } }, input, element("span", { text: word })));
@@ -210,7 +233,11 @@ class RpRule extends HTMLElement {
       slider.row.hidden = name === "fruiting_nodes" && rule.system !== "guyot";
     }
     this.apply.hidden = this.discard.hidden = this.draft === null;
-    setEnabled(this.apply, why || (this.known ? "" : "It is not known yet what it would change"), "From now on points are by this rule; Undo takes it back");
+    setEnabled(
+      this.apply,
+      why || (this.known ? "" : "It is not known yet what it would change"),
+      "From now on points are by this rule; Undo takes it back",
+    );
   }
 }
 

@@ -1,4 +1,5 @@
-// The 3-D view in an iframe of the same origin. Its key and pointer events are observed, since they do not reach this page.
+// The 3-D view in an iframe of the same origin. Its key and pointer events are observed, since they do not reach this
+// page.
 
 import { listenForDriveKeys } from "../js/control/driving.js";
 import { listenForSpace } from "../js/control/stop.js";

@@ -3,7 +3,17 @@
 import { post } from "../js/link/api.js";
 import { PROCESSES } from "../js/link/messages.js";
 import { ageWords } from "../js/state/format.js";
-import { isLive, isOpening, link, now, pageState, processAge, roundTrip, say, stateAge } from "../js/state/page-state.js";
+import {
+  isLive,
+  isOpening,
+  link,
+  now,
+  pageState,
+  processAge,
+  roundTrip,
+  say,
+  stateAge,
+} from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
 import { element, setText } from "../js/views/dom.js";
 import { icon, setIcon } from "../js/views/icons.js";
@@ -46,7 +56,11 @@ class RpStatusBar extends HTMLElement {
         chip.dataset.present = unknown ? "unknown" : String(live);
         setIcon(shape, unknown ? "UNKNOWN" : live ? "present" : "gone");
         setText(age, live || unknown ? "" : since);
-        chip.title = unknown ? `${process}: ${isOpening() ? "not heard yet" : "not known without the server"}` : live ? `${process} is there` : `${process}: ${since}`;
+        chip.title = unknown
+          ? `${process}: ${isOpening() ? "not heard yet" : "not known without the server"}`
+          : live
+            ? `${process} is there`
+            : `${process}: ${since}`;
       });
     }
     return box;
@@ -60,8 +74,17 @@ class RpStatusBar extends HTMLElement {
       const trip = roundTrip.get();
       const open = link.get().status === "open";
       const opening = isOpening();
-      chip.dataset.quality = opening ? "" : !open || age === null || age > 1 ? "bad" : (trip ?? 0) > 200 || age > 0.5 ? "poor" : "good";
-      setText(words, open && trip !== null ? `${trip.toFixed(0)} ms · ${ageWords(age ?? 0)}` : opening ? "connecting…" : "no link");
+      chip.dataset.quality = opening
+        ? ""
+        : !open || age === null || age > 1
+          ? "bad"
+          : (trip ?? 0) > 200 || age > 0.5
+            ? "poor"
+            : "good";
+      setText(
+        words,
+        open && trip !== null ? `${trip.toFixed(0)} ms · ${ageWords(age ?? 0)}` : opening ? "connecting…" : "no link",
+      );
       chip.title = "Round trip between this page and the server, and the age of the newest state";
     });
     return chip;
@@ -70,7 +93,12 @@ class RpStatusBar extends HTMLElement {
   person() {
     const name = element("span", { class: "user-name" });
     const role = element("span", { class: "user-role" });
-    const leave = element("button", { id: "sign-out", class: "quiet", text: "Sign out", attributes: { type: "button" } });
+    const leave = element("button", {
+      id: "sign-out",
+      class: "quiet",
+      text: "Sign out",
+      attributes: { type: "button" },
+    });
     leave.addEventListener("click", async () => {
       const answer = await post("api/sign-out");
       if (answer.ok) location.replace("/");

@@ -27,7 +27,12 @@ class RpStop extends HTMLElement {
         },
       },
       icon("ESTOP_LATCHED"),
-      element("span", { class: "stop-words" }, label, element("small", { text: multiRobot ? "all robots · space bar" : "space bar" })),
+      element(
+        "span",
+        { class: "stop-words" },
+        label,
+        element("small", { text: multiRobot ? "all robots · space bar" : "space bar" }),
+      ),
     );
     // On pointerdown, so that a finger that slides off has still stopped the robot.
     button.addEventListener("pointerdown", (event) => {

@@ -32,7 +32,11 @@ class RpGauge extends HTMLElement {
     this.setAttribute("aria-label", kind.label);
     this.setAttribute("aria-valuemin", "0");
     this.setAttribute("aria-valuemax", String(kind.fullScale));
-    const trend = svg("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, class: "trend-box", "aria-hidden": "true" }, this.line);
+    const trend = svg(
+      "svg",
+      { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, class: "trend-box", "aria-hidden": "true" },
+      this.line,
+    );
     this.append(
       element("span", { class: "label", text: kind.label }),
       element("span", { class: "trend-cell" }, trend, this.warning),

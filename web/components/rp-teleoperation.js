@@ -2,7 +2,15 @@
 
 import { whyNoTeleoperation } from "../js/control/allowed.js";
 import { drive, gamepad, whyNoDriving } from "../js/control/driving.js";
-import { axes, hold, moving, setTeleoperating, showAxes, showMoving, teleoperating } from "../js/control/teleoperation.js";
+import {
+  axes,
+  hold,
+  moving,
+  setTeleoperating,
+  showAxes,
+  showMoving,
+  teleoperating,
+} from "../js/control/teleoperation.js";
 import { fetchJson } from "../js/link/api.js";
 import { nearWords } from "../js/state/format.js";
 import { link, now, pageState, showToast } from "../js/state/page-state.js";
@@ -33,7 +41,11 @@ class RpJoints extends HTMLElement {
         const joints = /** @type {import("../js/link/messages.js").ArmVelocities} */ (
           Array.from({ length: 7 }, (_, each) => (each === joint ? way * SPEED : 0))
         );
-        holdButton(button, () => hold.press("joint", () => ({ joints })), () => hold.release("joint"));
+        holdButton(
+          button,
+          () => hold.press("joint", () => ({ joints })),
+          () => hold.release("joint"),
+        );
         return button;
       };
       const [up, down] = [turn(1), turn(-1)];
@@ -111,17 +123,15 @@ class RpDrivePad extends HTMLElement {
       pad.addEventListener(name, (event) => /** @type {PointerEvent} */ (event).pointerId === finger && end());
     }
     pad.addEventListener("contextmenu", (event) => event.preventDefault());
-    document.addEventListener(
-      "pointerdown",
-      (event) => finger !== null && event.pointerId !== finger && end(),
-      { capture: true },
-    );
+    document.addEventListener("pointerdown", (event) => finger !== null && event.pointerId !== finger && end(), {
+      capture: true,
+    });
     hold.holding.subscribe((holding) => !holding && finger !== null && end());
 
     drawOn([moving, teleoperating, gamepad, pageState, link, now], () => {
       const why = whyNoDriving();
       pad.title = why || label;
-      pad.classList.toggle("greyed", why !== "");
+      pad.classList.toggle("disabled", why !== "");
       const held = gamepad.get() ? "Gamepad: hold a trigger and steer with the left stick." : "A gamepad works too.";
       setText(words, `Drag in the pad, or hold W A S D or the arrow keys. ${held}`);
     });
@@ -153,7 +163,14 @@ class RpTeleoperation extends HTMLElement {
     ]);
     const speed = element("input", {
       id: "share",
-      attributes: { type: "range", min: "10", max: "100", step: "10", value: "100", "aria-label": "Speed by hand in per cent" },
+      attributes: {
+        type: "range",
+        min: "10",
+        max: "100",
+        step: "10",
+        value: "100",
+        "aria-label": "Speed by hand in per cent",
+      },
     });
     const percent = element("span", { class: "number", text: "100 %" });
     speed.addEventListener("input", () => hold.speedScale.set(Number(speed.value) / 100));
@@ -166,7 +183,11 @@ class RpTeleoperation extends HTMLElement {
       holdWords,
       element("kbd", { text: "H" }),
     );
-    holdButton(button, () => hold.press("button"), () => hold.release("button"));
+    holdButton(
+      button,
+      () => hold.press("button"),
+      () => hold.release("button"),
+    );
 
     const pad = document.createElement("rp-drive-pad");
     const joints = document.createElement("rp-joints");
@@ -193,7 +214,10 @@ class RpTeleoperation extends HTMLElement {
       setText(percent, `${Math.round(100 * hold.speedScale.get())} %`);
       const controller = pageState.get()?.controller ?? null;
       const held = (holding && controller?.held_by) || "";
-      setText(words, held ? `${held[0]?.toUpperCase()}${held.slice(1)}.` : explanation(why, holding, part, nearWords(controller)));
+      setText(
+        words,
+        held ? `${held[0]?.toUpperCase()}${held.slice(1)}.` : explanation(why, holding, part, nearWords(controller)),
+      );
       words.classList.toggle("warned", held !== "" || (controller?.near?.distance ?? 1) < NEAR);
     });
   }

@@ -1,16 +1,35 @@
 // Over the 3-D view: camera presets, layers, measuring; and the hint while clicks place points.
 
 import { placing, setPlacing } from "../js/control/placing.js";
-import { LAYERS, PRESETS, layers, measured, measuring, placeCamera, setMeasuring, showLayer } from "../js/control/view-tools.js";
+import {
+  LAYERS,
+  PRESETS,
+  layers,
+  measured,
+  measuring,
+  placeCamera,
+  setMeasuring,
+  showLayer,
+} from "../js/control/view-tools.js";
 import { link, now, pageState } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
 
 class RpPlacing extends HTMLElement {
   connectedCallback() {
-    const done = element("button", { id: "placing-done", text: "Done", attributes: { type: "button", "aria-keyshortcuts": "Escape" } });
+    const done = element("button", {
+      id: "placing-done",
+      text: "Done",
+      attributes: { type: "button", "aria-keyshortcuts": "Escape" },
+    });
     done.addEventListener("click", () => setPlacing(false));
-    this.append(element("p", { text: "Click a cane that has been seen: a blue line here, or a cane in the camera image.", attributes: { role: "status" } }), done);
+    this.append(
+      element("p", {
+        text: "Click a cane that has been seen: a blue line here, or a cane in the camera image.",
+        attributes: { role: "status" },
+      }),
+      done,
+    );
     drawOn([placing], () => {
       this.hidden = !placing.get();
       document.body.classList.toggle("placing", placing.get());
@@ -58,7 +77,17 @@ class RpViewTools extends HTMLElement {
       });
     }
     const words = element("p", { class: "measured", attributes: { role: "status" } });
-    this.append(element("div", { class: "tools", attributes: { role: "toolbar", "aria-label": "3-D view" } }, ...presets, measure, open), list, words);
+    this.append(
+      element(
+        "div",
+        { class: "tools", attributes: { role: "toolbar", "aria-label": "3-D view" } },
+        ...presets,
+        measure,
+        open,
+      ),
+      list,
+      words,
+    );
 
     drawOn([measuring, measured, placing, link, pageState, now], () => {
       const on = measuring.get();

@@ -1,4 +1,5 @@
-// Entry point of the sign-in page: name and password, or the token of a link, which is removed from the address at once.
+// Entry point of the sign-in page: name and password, or the token of a link, which is removed from the address at
+// once.
 
 import { post } from "./link/api.js";
 

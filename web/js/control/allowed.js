@@ -1,4 +1,5 @@
-// Which intents are possible now, and otherwise why not. `whyNot…` functions return an empty string if nothing is in the way.
+// Which intents are possible now, and otherwise why not. `whyNot…` functions return an empty string if nothing is in
+// the way.
 
 import { OF_HOLDER } from "../link/messages.js";
 import { MODE_WORDS } from "../state/format.js";

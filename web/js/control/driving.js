@@ -13,8 +13,14 @@ const DEAD_ZONE = 0.15;
 const POLL_MS = 50;
 /** @type {Readonly<Record<string, readonly [ahead: number, left: number]>>} */
 const KEYS = Object.freeze({
-  KeyW: [1, 0], ArrowUp: [1, 0], KeyS: [-1, 0], ArrowDown: [-1, 0],
-  KeyA: [0, 1], ArrowLeft: [0, 1], KeyD: [0, -1], ArrowRight: [0, -1],
+  KeyW: [1, 0],
+  ArrowUp: [1, 0],
+  KeyS: [-1, 0],
+  ArrowDown: [-1, 0],
+  KeyA: [0, 1],
+  ArrowLeft: [0, 1],
+  KeyD: [0, -1],
+  ArrowRight: [0, -1],
 });
 
 /** Name of the gamepad in use; empty without one. */

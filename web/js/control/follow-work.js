@@ -1,4 +1,5 @@
-// At work the page selects the point that the robot is at, unless the operator has just selected or looked for another one.
+// At work the page selects the point that the robot is at, unless the operator has just selected or looked for another
+// one.
 
 import { now, pageState, points, selected } from "../state/page-state.js";
 import { placing } from "./placing.js";

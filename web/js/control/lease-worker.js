@@ -1,5 +1,6 @@
-// Renews the control lease from a worker, since loading the 3-D view blocks the page's thread for a second or two. A page
-// that hangs longer than HANGS_MS loses control. Hold to move does not depend on this: it needs states that are drawn.
+// Renews the control lease from a worker, since loading the 3-D view blocks the page's thread for a second or two. A
+// page that hangs longer than HANGS_MS loses control. Hold to move does not depend on this: it needs states that are
+// drawn.
 
 const EVERY_MS = 300;
 const HANGS_MS = 2000;

@@ -7,7 +7,10 @@ import { whyNoTeleoperation } from "./allowed.js";
 import { isTyping } from "./stop.js";
 
 /** @typedef {"button"|"key"|"gizmo"|"drive"|"pad"|"gamepad"|"joint"} HoldSource */
-/** @typedef {{ base?: import("../link/messages.js").BaseVelocity, joints?: import("../link/messages.js").ArmVelocities }} Wanted */
+/**
+ * @typedef {{ base?: import("../link/messages.js").BaseVelocity, joints?: import("../link/messages.js").ArmVelocities
+ * }} Wanted
+ */
 
 const PERIOD_MS = 50;
 /** Sources that lead the tool to the gizmo and may be held together. Any other source has to be the only one. */

@@ -9,7 +9,11 @@ import { isTyping } from "./stop.js";
 /** @typedef {import("../link/messages.js").CameraPreset} CameraPreset */
 /** @typedef {import("../link/messages.js").Layer} Layer */
 
-/** Each with its word and what it does; the keys 1 to 4 do the same. @type {readonly (readonly [CameraPreset, string, string])[]} */
+/**
+ * Each with its word and what it does; the keys 1 to 4 do the same.
+ *
+ * @type {readonly (readonly [CameraPreset, string, string])[]}
+ */
 export const PRESETS = Object.freeze([
   ["follow", "Follow", "Look over the robot along the row, and go along"],
   ["row", "Row", "Stand back and see some vines"],
@@ -36,7 +40,9 @@ export const measured = signal(/** @type {import("../link/messages.js").Measured
 /** @returns {ReadonlySet<Layer>} */
 function storedLayers() {
   const known = new Set(LAYERS.map(([layer]) => layer));
-  const kept = /** @type {Layer[]} */ ((localStorage.getItem(STORAGE_KEY) ?? "plant,points,trail,simulated").split(","));
+  const kept = /** @type {Layer[]} */ (
+    (localStorage.getItem(STORAGE_KEY) ?? "plant,points,trail,simulated").split(",")
+  );
   return new Set(kept.filter((layer) => known.has(layer)));
 }
 

@@ -57,7 +57,11 @@ const drawnInSoftware = () => {
 };
 
 const inSoftware = drawnInSoftware();
-/** Of each canvas: the client makes one to see whether it can, before the one that it draws in. @type {OffscreenFramebuffer[]} */
+/**
+ * Of each canvas: the client makes one to see whether it can, before the one that it draws in.
+ *
+ * @type {OffscreenFramebuffer[]}
+ */
 const behind = [];
 // A fixed resolution: the client's adaptive one stalls a slow machine for seconds, and a stalled view ends a hold.
 const ratio = Math.min(window.devicePixelRatio, inSoftware ? LARGEST_RATIO_IN_SOFTWARE : LARGEST_RATIO);
@@ -75,7 +79,8 @@ if (inSoftware) {
   const getContext = function (kind, options) {
     if (!kind.startsWith("webgl")) return plainContext.call(this, kind, options);
     const gl = plainContext.call(this, kind, { ...options, antialias: false });
-    if (gl instanceof WebGL2RenderingContext && !behind.some((each) => each.gl === gl)) behind.push(new OffscreenFramebuffer(gl));
+    if (gl instanceof WebGL2RenderingContext && !behind.some((each) => each.gl === gl))
+      behind.push(new OffscreenFramebuffer(gl));
     return gl;
   };
   HTMLCanvasElement.prototype.getContext = /** @type {any} */ (getContext);

@@ -1,8 +1,8 @@
 // Offscreen rendering of the 3-D view in software.
 //
-// A browser without a graphics card copies a canvas at the end of the frame and blocks the page's thread until all of it is
-// rendered, 0.1 s and more, in which no button reacts. So the client renders into an offscreen framebuffer, and only a
-// finished frame is copied into the canvas.
+// A browser without a graphics card copies a canvas at the end of the frame and blocks the page's thread until all of
+// it is rendered, 0.1 s and more, in which no button reacts. So the client renders into an offscreen framebuffer, and
+// only a finished frame is copied into the canvas.
 
 /** Period of polling for a finished frame (ms). */
 const ASK_MS = 4;

@@ -44,7 +44,8 @@ now.subscribe(() => {
   turns += 1;
 });
 /**
- * After this many updates (1 s) without a state the server is silent. Not milliseconds alone: while the browser loads the
+ * After this many updates (1 s) without a state the server is silent. Not milliseconds alone: while the browser loads
+ * the
  * 3-D view, this page does not run and messages wait unread.
  */
 const SILENT_TURNS = 4;
@@ -66,7 +67,8 @@ export function isOpening() {
 }
 
 /**
- * New lines of the server's log. After a reconnection the server repeats its last lines, and a restarted server counts from
+ * New lines of the server's log. After a reconnection the server repeats its last lines, and a restarted server counts
+ * from
  * the start; older lines that the page has are kept.
  *
  * @param {readonly PageEvent[]} events

@@ -30,7 +30,8 @@ function afterFault({ allowed }) {
 }
 
 function afterStop() {
-  if (hardwareStopPressed(pageState.get())) return "Release the robot's own emergency stop first, once the row is clear.";
+  if (hardwareStopPressed(pageState.get()))
+    return "Release the robot's own emergency stop first, once the row is clear.";
   return `See that the row is clear and write why it is safe to go on; ${ofSupervisor("Reset")}, then Arm.`;
 }
 
@@ -138,7 +139,12 @@ export function alarms() {
 
 /** @returns {Alarm} */
 function noLink() {
-  return alarm("link", "error", "This page has no link to the server", "It tries again by itself. Until then use the emergency stop on the robot.");
+  return alarm(
+    "link",
+    "error",
+    "This page has no link to the server",
+    "It tries again by itself. Until then use the emergency stop on the robot.",
+  );
 }
 
 /**
@@ -154,10 +160,13 @@ function alarm(id, severity, text, act) {
 
 /** @returns {Alarm[]} */
 function ofProcesses() {
-  if (!isLive("server")) return [alarm("server", "error", "The server is silent", "Wait, or start it again; the robot stops without it.")];
+  if (!isLive("server"))
+    return [alarm("server", "error", "The server is silent", "Wait, or start it again; the robot stops without it.")];
   return /** @type {const} */ (["bridge", "controller", "perception"])
     .filter(isGone)
-    .map((process) => alarm(process, process === "perception" ? "warning" : "error", staleWords(process), GONE[process] ?? ""));
+    .map((process) =>
+      alarm(process, process === "perception" ? "warning" : "error", staleWords(process), GONE[process] ?? ""),
+    );
 }
 
 /**
@@ -167,7 +176,14 @@ function ofProcesses() {
 function ofModes({ controller, bridge, stops }) {
   const found = [];
   if (stops.some((stop) => stop.hardware)) {
-    found.push(alarm("hardware", "error", "The emergency stop on the robot is pressed", "Release it there once the row is clear, then reset here."));
+    found.push(
+      alarm(
+        "hardware",
+        "error",
+        "The emergency stop on the robot is pressed",
+        "Release it there once the row is clear, then reset here.",
+      ),
+    );
   }
   const reason = controller?.reason ? `: ${controller.reason}` : "";
   switch (controller?.mode) {
@@ -185,15 +201,30 @@ function ofModes({ controller, bridge, stops }) {
       break;
     case "READY":
       // Takes the place of "Paused": Resume alone starts nothing.
-      if (waitingWork(controller)) found.push(alarm("paused", "warning", "The work waits to be begun again", waitingWork(controller)));
+      if (waitingWork(controller))
+        found.push(alarm("paused", "warning", "The work waits to be begun again", waitingWork(controller)));
       break;
   }
   if (bridge?.cutter === "jammed") {
-    found.push(alarm("jammed", "error", "The cutter is jammed", "Press the robot's emergency stop, then free the blades by hand."));
+    found.push(
+      alarm(
+        "jammed",
+        "error",
+        "The cutter is jammed",
+        "Press the robot's emergency stop, then free the blades by hand.",
+      ),
+    );
   }
   const atWork = controller?.mode === "AUTO" || controller?.mode === "TELEOP";
   if (bridge?.watchdog && atWork && isLive("controller")) {
-    found.push(alarm("watchdog", "error", "The bridge gets no commands in time and holds the robot", "See the load of its computer, then start again."));
+    found.push(
+      alarm(
+        "watchdog",
+        "error",
+        "The bridge gets no commands in time and holds the robot",
+        "See the load of its computer, then start again.",
+      ),
+    );
   }
   return found;
 }
@@ -205,21 +236,44 @@ function ofModes({ controller, bridge, stops }) {
 function ofWork({ controller, bridge, wider, plain_wire }) {
   const found = [];
   if (plain_wire) {
-    found.push(alarm("plain", "error", "The robot's wire is plain: every program on its machine can move it", "Start the program again without --plain-wire."));
+    found.push(
+      alarm(
+        "plain",
+        "error",
+        "The robot's wire is plain: every program on its machine can move it",
+        "Start the program again without --plain-wire.",
+      ),
+    );
   }
   if (wider.length > 0) {
-    found.push(alarm("wider", "warning", `Set wider than usual: ${wider.join("; ")}`, "If nobody means that, have the configuration changed back."));
+    found.push(
+      alarm(
+        "wider",
+        "warning",
+        `Set wider than usual: ${wider.join("; ")}`,
+        "If nobody means that, have the configuration changed back.",
+      ),
+    );
   }
   const unknown = points.get()?.points.filter((row) => row.entry.state === "UNKNOWN").length ?? 0;
   if (unknown > 0) {
-    found.push(alarm("unknown", "warning", `${counted(unknown, "cut")} ended unknown`, "Look at the plant, and say on the row whether it is cut."));
+    found.push(
+      alarm(
+        "unknown",
+        "warning",
+        `${counted(unknown, "cut")} ended unknown`,
+        "Look at the plant, and say on the row whether it is cut.",
+      ),
+    );
   }
   if (bridge && isLive("bridge") && bridge.real_time_factor < 0.9 && bridge.kind === "sim") {
     found.push(alarm("slow", "warning", "The simulation is slower than real time", "Close other programs."));
   }
   if (controller && isLive("controller")) {
     if (lateShare() > LATE_SHARE) {
-      found.push(alarm("late", "warning", "Control periods come too late", "Close other programs on the robot's computer."));
+      found.push(
+        alarm("late", "warning", "Control periods come too late", "Close other programs on the robot's computer."),
+      );
     }
     if (controller.joint_margin * DEGREE < 5) {
       found.push(alarm("margin", "warning", "A joint of the arm is near its limit", awayFromLimit(controller)));
@@ -230,7 +284,14 @@ function ofWork({ controller, bridge, wider, plain_wire }) {
   }
   const trips = history.of("page-round-trip").slice(-SLOW_SAMPLES);
   if (trips.length === SLOW_SAMPLES && trips.every((trip) => trip.value > SLOW_MS)) {
-    found.push(alarm("trip", "warning", "The link between this page and the server is slow", "Leading the tool may end by itself."));
+    found.push(
+      alarm(
+        "trip",
+        "warning",
+        "The link between this page and the server is slow",
+        "Leading the tool may end by itself.",
+      ),
+    );
   }
   return found;
 }

@@ -26,7 +26,8 @@ export function explainDisabled(page) {
     showToast("info", whyOf(control));
   });
   // A slider moves before the click, and by keys.
-  for (const name of ["mousedown", "touchstart"]) listen(name, (event, control) => isInput(control) && event.preventDefault());
+  for (const name of ["mousedown", "touchstart"])
+    listen(name, (event, control) => isInput(control) && event.preventDefault());
   for (const name of ["input", "change"]) listen(name, (event) => event.stopImmediatePropagation());
   listen("keydown", (event, control) => {
     const { key } = /** @type {KeyboardEvent} */ (event);

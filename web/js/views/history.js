@@ -76,7 +76,11 @@ export function recordHistory() {
       if (state === null || (!live && reading.id !== "page-round-trip")) return null;
       return reading.read(state);
     });
-    history.add(at, [...values, ...PROCESSES.map((process) => Number(isLive(process))), state?.controller?.ticks ?? null]);
+    history.add(at, [
+      ...values,
+      ...PROCESSES.map((process) => Number(isLive(process))),
+      state?.controller?.ticks ?? null,
+    ]);
     sampled.set(sampled.get() + 1);
   });
 }
