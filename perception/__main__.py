@@ -8,14 +8,14 @@ from pathlib import Path
 from perception.config import PerceptionConfig
 from perception.loop import Loop
 from perception.pipeline import Perception
-from perception.segmentation.segmenter_choice import choose_segmenter
+from perception.segmentation.segmenter import choose_segmenter
 from rolling_panda.config import RobotConfig, load_section
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.runtime.process import ProcessContext, run_process
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run until told to stop; returns the exit code."""
+    """Run until stopped; returns the exit code."""
     return run_process("perception", "Finds pruning points in the camera's frames.", run, argv=argv, check=_check)
 
 
@@ -25,7 +25,7 @@ def _check(arguments: argparse.Namespace) -> None:
 
 
 def run(context: ProcessContext) -> None:
-    """Work until `context.stopping` is set."""
+    """Run until `context.stopping` is set."""
     config = load_section(context.config_path, "perception", PerceptionConfig)
     model = RobotModel(load_section(context.config_path, "robot", RobotConfig))
     segmenter = choose_segmenter(config.segmenter, Path(config.weights) if config.weights else None, config.threads)

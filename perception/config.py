@@ -1,4 +1,4 @@
-"""What perception may be told: the pruning rule's numbers, what counts as seen, and how points are tracked."""
+"""Configuration of perception: pruning rule, skeleton, tracker, close-up checks and obstacles."""
 
 from typing import Annotated, Literal
 
@@ -6,42 +6,41 @@ from msgspec import Meta, Struct
 
 from rolling_panda.config import Positive
 
-Hits = Annotated[int, Meta(ge=1, le=1000)]
+Count = Annotated[int, Meta(ge=1, le=1000)]
 
 
 class RuleConfig(Struct, frozen=True, forbid_unknown_fields=True):
-    """The spur-pruning rule. Lengths along the cane in metres.
+    """Numbers of the pruning rule. Lengths along the cane in metres.
 
     Attributes:
-        system: How the vines are trained: `spur` (cordon) or `guyot`.
-        nodes_kept: Count nodes that stay on the new spur; the basal bud is not counted.
-        fruiting_nodes: The same on a Guyot vine's new cane.
+        system: Training system of the vines: `spur` (cordon) or `guyot`.
+        nodes_kept: Count nodes left on the new spur; the basal bud is not counted.
+        fruiting_nodes: Count nodes left on the fruiting cane of a Guyot vine.
         keeper_diameter: The lowest cane at least this thick becomes the new spur, else the thickest (m).
-        offset: Cut this far past the last kept node (m).
-        shift: By so much at most a cut is moved along the cane to keep another cane out of the blades (m).
-        short_internode: Where the next node is nearer than this, cut midway instead (m).
-        basal_reach: A node nearer to the cane's base than this is the basal bud (m).
-        clear_beyond: This much cane past the last kept node must be in plain view (m).
-        pruned: A cane that ends sooner than this past it has been pruned already (m).
-        node_room: A hidden stretch at least this far from every seen node might hide another node (m).
-        diameter_doubt: A diameter seen once and closer to `keeper_diameter` than this leaves the choice in doubt; over
-            more looks the less, by the root of their number (m).
-        steadiest: So many looks count for that at most: what they have in common does not average out.
-        crowded: Nodes nearer to each other than this past the basal bud may belong to two canes (m).
-        shortest_internode: The same for two that both stay (m).
-        longest_internode: Between nodes farther apart than this one was missed, or seen as something else (m).
-        height_doubt: Canes whose bases differ in height by less than this cannot be told apart by it (m).
-        stub_room: Least free stub between the keeper and the next cane for one cut that removes the rest (m).
-        shears_room: Wood that must stay keeps at least this distance from the cut (m).
-        crossing: Another cane this near to the cut would be between the open blades too: half their opening (m).
-        base_doubt: A cane whose base is hidden over more than this cannot have its nodes counted (m).
-        largest_diameter: Thicker wood is refused (m).
-        wire_distance: No cut is proposed nearer to a wire or a hose than this: 15 mm, and what a pixel is wide (m).
-        blade_reach: So far to either side of the wood the open blades stand (m).
-        blade_room: Where there is a choice, a wire is this far from the middle of each (m): what the controller keeps,
-            with half a blade's width.
-        cordon_distance: The same for cordon and trunk (m).
-        node_distance: The same for nodes that stay (m).
+        offset: Distance of the cut past the last kept node (m).
+        max_shift: Longest shift of the cut along the cane to clear other wood (m).
+        short_internode: The cut is midway to the next node where that is nearer than this (m).
+        basal_bud_distance: A node nearer to the base than this is the basal bud (m).
+        visible_beyond: Length past the last kept node that must be visible (m).
+        pruned_length: A cane that ends within this length past the last kept node is already pruned (m).
+        hidden_node_distance: A hidden stretch at least this far from every seen node may hide a node (m).
+        diameter_error: Standard error of a diameter from one frame (m). A choice that turns on less is undecided.
+        max_averaged: The error falls with the root of the number of frames, up to this number.
+        min_node_distance: Nodes closer than this past the basal bud may belong to two canes (m).
+        min_internode: The same for two kept nodes (m).
+        max_internode: Between kept nodes farther apart than this a node was missed (m).
+        height_error: Canes whose bases differ in height by less than this cannot be ordered (m).
+        min_stub: Shortest free stub between the keeper and the next cane for a renewal cut (m).
+        shears_clearance: Distance of the keeper from a renewal cut (m).
+        crossing_distance: Distance of other canes from a cut: half the opening of the blades (m).
+        max_base_gap: Longest hidden stretch at the base of a cane whose nodes can be counted (m).
+        max_diameter: Thickest wood that the shears may cut (m).
+        wire_distance: Distance of wires and hoses from a cut: 15 mm and one pixel (m).
+        blade_reach: Distance of the open blades from the axis of the wood (m).
+        blade_clearance: Preferred distance of a wire from the middle of each blade: that of the controller and half
+            the width of a blade (m).
+        cordon_distance: Distance of cordon and trunk from a cut (m).
+        node_distance: Distance of kept nodes from a cut (m).
     """
 
     system: Literal["spur", "guyot"] = "spur"
@@ -49,126 +48,126 @@ class RuleConfig(Struct, frozen=True, forbid_unknown_fields=True):
     fruiting_nodes: Annotated[int, Meta(ge=3, le=20)] = 8
     keeper_diameter: Positive = 0.006
     offset: Positive = 0.020
-    shift: Positive = 0.0085
+    max_shift: Positive = 0.0085
     short_internode: Positive = 0.040
-    basal_reach: Positive = 0.055
-    clear_beyond: Positive = 0.030
-    pruned: Positive = 0.045
-    node_room: Positive = 0.035
-    diameter_doubt: Positive = 0.00035
-    steadiest: Annotated[int, Meta(ge=1, le=100)] = 9
-    crowded: Positive = 0.03
-    shortest_internode: Positive = 0.05
-    longest_internode: Positive = 0.125
-    height_doubt: Positive = 0.004
-    stub_room: Positive = 0.016
-    shears_room: Positive = 0.022
-    base_doubt: Positive = 0.018
-    crossing: Positive = 0.015
-    largest_diameter: Positive = 0.015
+    basal_bud_distance: Positive = 0.055
+    visible_beyond: Positive = 0.030
+    pruned_length: Positive = 0.045
+    hidden_node_distance: Positive = 0.035
+    diameter_error: Positive = 0.00035
+    max_averaged: Annotated[int, Meta(ge=1, le=100)] = 9
+    min_node_distance: Positive = 0.03
+    min_internode: Positive = 0.05
+    max_internode: Positive = 0.125
+    height_error: Positive = 0.004
+    min_stub: Positive = 0.016
+    shears_clearance: Positive = 0.022
+    max_base_gap: Positive = 0.018
+    crossing_distance: Positive = 0.015
+    max_diameter: Positive = 0.015
     wire_distance: Positive = 0.0165
     blade_reach: Positive = 0.021
-    blade_room: Positive = 0.0146
+    blade_clearance: Positive = 0.0146
     cordon_distance: Positive = 0.020
     node_distance: Positive = 0.010
 
 
 class SkeletonConfig(Struct, frozen=True, forbid_unknown_fields=True):
-    """How pixels become canes.
+    """From pixels to canes.
 
     Attributes:
-        nearest: Depths below this are no measurement (m).
-        farthest: Wood beyond this belongs to another row (m).
-        depth_step: Neighbouring pixels that differ by more belong to different canes (m).
-        least_pixels: Smaller pieces of skeleton are dropped (px).
-        bridge: Longest hidden stretch over which two pieces may be one cane (m).
-        bend: Largest change of direction over such a stretch (rad).
-        miss: How far the straight continuation of one piece may pass by the other (m).
-        sample: Distance of samples along a cane (m).
-        smoothing: Standard deviation of the kernel that smooths a cane's axis (m).
-        reach: A cane grows from the spur or cordon within this distance of its base (m).
-        stray: A cane whose base is hidden but within this distance of a spur may be one of its canes (m).
-        border: A spur nearer than this to the image's edge may have canes out of view (px).
-        least_cane: Shorter pieces are not called canes (m).
-        least_node_pixels: Smaller node blobs are ignored (px).
-        widening: So much wider than they are canes come out of the segmenter (px); it says so itself.
+        min_depth: Smallest valid depth (m).
+        max_depth: Wood beyond this depth belongs to another row (m).
+        depth_step: Depth step between neighbouring pixels of different canes (m).
+        min_fragment_pixels: Shorter skeleton fragments are dropped (px).
+        max_gap: Longest hidden gap between two fragments of one cane (m).
+        max_bend: Largest change of direction over such a gap (rad).
+        max_lateral_offset: Largest distance of one fragment from the straight continuation of the other (m).
+        sample_spacing: Distance between samples of a cane's axis (m).
+        smoothing_sigma: Standard deviation of the kernel that smooths the axis (m).
+        root_distance: Largest distance of a cane's base from its spur (m).
+        stray_distance: A cane with its base within this distance of a spur, yet not rooted, may be one of its own (m).
+        border_margin: A spur nearer than this to the image border may have canes out of view (px).
+        min_cane_length: Shorter pieces are not canes (m).
+        min_node_pixels: Smaller node blobs are ignored (px).
+        width_bias: By how much the segmenter draws canes too wide (px); set from the segmenter.
     """
 
-    nearest: Positive = 0.15
-    farthest: Positive = 1.6
+    min_depth: Positive = 0.15
+    max_depth: Positive = 1.6
     depth_step: Positive = 0.012
-    least_pixels: Annotated[int, Meta(ge=2, le=100)] = 4
-    bridge: Positive = 0.06
-    bend: Positive = 0.5
-    miss: Positive = 0.008
-    sample: Positive = 0.005
-    smoothing: Positive = 0.012
-    reach: Positive = 0.035
-    stray: Positive = 0.09
-    border: Annotated[float, Meta(ge=0.0, le=1000.0)] = 30.0
-    least_cane: Positive = 0.03
-    least_node_pixels: Annotated[int, Meta(ge=1, le=100)] = 4
-    widening: Annotated[float, Meta(ge=-3.0, le=3.0)] = 0.0
+    min_fragment_pixels: Annotated[int, Meta(ge=2, le=100)] = 4
+    max_gap: Positive = 0.06
+    max_bend: Positive = 0.5
+    max_lateral_offset: Positive = 0.008
+    sample_spacing: Positive = 0.005
+    smoothing_sigma: Positive = 0.012
+    root_distance: Positive = 0.035
+    stray_distance: Positive = 0.09
+    border_margin: Annotated[float, Meta(ge=0.0, le=1000.0)] = 30.0
+    min_cane_length: Positive = 0.03
+    min_node_pixels: Annotated[int, Meta(ge=1, le=100)] = 4
+    width_bias: Annotated[float, Meta(ge=-3.0, le=3.0)] = 0.0
 
 
 class TrackerConfig(Struct, frozen=True, forbid_unknown_fields=True):
-    """How points keep their identity from frame to frame.
+    """Data association and life cycle of pruning points.
 
     Attributes:
-        association: A cut this near to a known point is the same one (m).
-        hits: Frames that must agree before a point is shown.
-        sparse_hits: After `sparse_looks` at a spur so many suffice, where no other frame said anything else.
-        sparse_looks: See there.
-        memory: Frames that a running average looks back.
-        moved: A point that has moved by more than this gets a new revision (m).
-        turned: The same for its tangent (rad).
-        gone: Frames that must show the cane gone before its point is withdrawn.
-        probe: The cane is looked for this far past the cut (m).
-        vine_spacing: Distance between vines (m), for numbering where no trunk is in view.
-        spur_separation: Spur positions nearer than this are one (m).
+        association_distance: Largest distance of a proposal from its track (m).
+        min_hits: Frames that must agree before a point is published.
+        sparse_hits: Frames that suffice after `sparse_observations` of a spur, without a competing track.
+        sparse_observations: See `sparse_hits`.
+        averaging_window: Frames that a running mean covers.
+        position_tolerance: A point that moved farther gets a new revision (m).
+        tangent_tolerance: The same for the tangent (rad).
+        gone_frames: Frames that must show the cane gone before its point is withdrawn.
+        probe_distance: The cane is checked this far past the cut (m).
+        vine_spacing: Distance between vines, for numbers where no trunk is in view (m).
+        spur_separation: Spur positions nearer than this are one spur (m).
     """
 
-    association: Positive = 0.03
-    hits: Hits = 3
-    sparse_hits: Hits = 2
-    sparse_looks: Hits = 6
-    memory: Hits = 20
-    moved: Positive = 0.004
-    turned: Positive = 0.15
-    gone: Hits = 3
-    probe: Positive = 0.025
+    association_distance: Positive = 0.03
+    min_hits: Count = 3
+    sparse_hits: Count = 2
+    sparse_observations: Count = 6
+    averaging_window: Count = 20
+    position_tolerance: Positive = 0.004
+    tangent_tolerance: Positive = 0.15
+    gone_frames: Count = 3
+    probe_distance: Positive = 0.025
     vine_spacing: Positive = 1.8
     spur_separation: Positive = 0.045
 
 
-class LookConfig(Struct, frozen=True, forbid_unknown_fields=True):
-    """A closer look at one point.
+class CloseUpConfig(Struct, frozen=True, forbid_unknown_fields=True):
+    """Close-up check of one point.
 
     Attributes:
-        nearest: The camera may be this near (m).
-        farthest: And this far (m).
-        window: Half the side of what is looked at around the point (m).
-        beyond: The cane stands when it goes on this far past the cut (m).
-        aside: A cane farther beside the point than this is another one (m).
-        short: A cane that ends this near to the cut, before or after it, may still be its cane (m).
-        aligned: Cosine of the largest angle between the cane and the point's tangent.
-        node_shift: The last node that stays may be seen so far from where it was, along the cane (m).
-        node_room: A cut keeps this far from every node (m).
+        min_distance: Smallest distance of the camera (m).
+        max_distance: Largest distance of the camera (m).
+        half_window: Half the side of the image window around the point (m).
+        probe_distance: The cane is standing when it continues this far past the cut (m).
+        max_lateral_offset: Largest distance of the cane's axis from the point (m).
+        max_end_gap: Largest distance along the cane between its end and the point (m).
+        min_alignment: Smallest cosine of the angle between the cane and the point's tangent.
+        max_node_shift: Largest shift of the last kept node along the cane (m).
+        node_clearance: Distance of every node from the cut (m).
     """
 
-    nearest: Positive = 0.25
-    farthest: Positive = 0.55
-    window: Positive = 0.09
-    beyond: Positive = 0.02
-    aside: Positive = 0.012
-    short: Positive = 0.02
-    aligned: Positive = 0.85
-    node_shift: Positive = 0.008
-    node_room: Positive = 0.008
+    min_distance: Positive = 0.25
+    max_distance: Positive = 0.55
+    half_window: Positive = 0.09
+    probe_distance: Positive = 0.02
+    max_lateral_offset: Positive = 0.012
+    max_end_gap: Positive = 0.02
+    min_alignment: Positive = 0.85
+    max_node_shift: Positive = 0.008
+    node_clearance: Positive = 0.008
 
 
-class Thickest(Struct, frozen=True, forbid_unknown_fields=True):
-    """Greatest plausible radius of a post, of a trunk, and of a cordon (m)."""
+class MaxRadius(Struct, frozen=True, forbid_unknown_fields=True):
+    """Largest plausible radius of a post, of a trunk, and of a cordon (m)."""
 
     post: Positive = 0.09
     trunk: Positive = 0.07
@@ -176,49 +175,49 @@ class Thickest(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class ObstacleConfig(Struct, frozen=True, forbid_unknown_fields=True):
-    """What becomes an obstacle that the arm keeps away from.
+    """What becomes an obstacle for the arm.
 
     Attributes:
-        nearest: Pixels nearer than this are not used (m).
-        thick_nearest: The same of posts, trunks and cordons: from near by, a network takes one for another, and wire or
-            canes for any of them, and what is as thick has been seen from farther away before (m).
-        farthest: The same for farther ones (m).
-        cell: Size of the cells in which points are gathered (m).
-        hits: Frames that must have shown a cell, more than refuted it.
-        cells: Cells of each kind that are remembered at most; the farthest are forgotten.
-        points: Pixels of one class used of a frame, about.
-        least: Cells that a rod needs.
-        shortest: Length that a rod needs (m).
-        apart: Posts and trunks farther apart than this along the row are two (m).
-        wire_apart: Wires farther apart than this in height are two (m).
-        piece: A cordon is cut into pieces of this length (m).
-        piece_apart: What is farther than this above, below or behind the rest of a piece is no part of it (m).
-        off_row: What is farther than this before or behind the row is none of its wood (m).
-        lean: A post or a trunk that leans by more than this is none (rad).
-        turn: The same of a cordon's or a wire's angle to the row (rad).
-        thickest: What is thicker is none of its kind.
-        most: Rods kept at most; of canes the nearest.
-        canes: Whether what stays of the canes is among them.
+        min_depth: Smallest depth of wire pixels (m).
+        min_depth_thick: The same for posts, trunks and cordons. The network confuses these classes close up, and wood
+            as thick was seen from farther away before (m).
+        max_depth: Largest depth of all pixels (m).
+        cell_size: Side of a grid cell (m).
+        min_hits: Frames that must have shown a cell, more than refuted it.
+        max_cells: Cells of each class; the farthest are dropped.
+        max_points: Pixels of one class used of a frame, approximately.
+        min_cells: Cells that a cylinder needs.
+        min_length: Length that a cylinder needs (m).
+        upright_separation: Posts and trunks farther apart than this along the row are two (m).
+        wire_separation: Wires farther apart than this in height are two (m).
+        cordon_piece: A cordon is split into pieces of this length (m).
+        cordon_separation: Cells of a piece with a gap of this across the row are two cordons (m).
+        row_tolerance: Wood farther than this from the row plane is rejected (m).
+        max_lean: Largest angle of a post or a trunk from the vertical (rad).
+        max_slope: Largest angle of a cordon or a wire from the row (rad).
+        max_radius: Thicker cylinders are rejected.
+        max_capsules: Capsules published, the nearest first.
+        canes: Whether the canes that stay are published too.
     """
 
-    nearest: Positive = 0.2
-    thick_nearest: Positive = 0.5
-    farthest: Positive = 2.0
-    cell: Positive = 0.02
-    hits: Hits = 3
-    cells: Annotated[int, Meta(ge=1000, le=10**7)] = 50000
-    points: Annotated[int, Meta(ge=10, le=100000)] = 4000
-    least: Annotated[int, Meta(ge=2, le=1000)] = 4
-    shortest: Positive = 0.05
-    apart: Positive = 0.15
-    wire_apart: Positive = 0.06
-    piece: Positive = 0.15
-    piece_apart: Positive = 0.06
-    off_row: Positive = 0.15
-    lean: Positive = 0.26
-    turn: Positive = 0.6
-    thickest: Thickest = Thickest()
-    most: Annotated[int, Meta(ge=1, le=500)] = 200
+    min_depth: Positive = 0.2
+    min_depth_thick: Positive = 0.5
+    max_depth: Positive = 2.0
+    cell_size: Positive = 0.02
+    min_hits: Count = 3
+    max_cells: Annotated[int, Meta(ge=1000, le=10**7)] = 50000
+    max_points: Annotated[int, Meta(ge=10, le=100000)] = 4000
+    min_cells: Annotated[int, Meta(ge=2, le=1000)] = 4
+    min_length: Positive = 0.05
+    upright_separation: Positive = 0.15
+    wire_separation: Positive = 0.06
+    cordon_piece: Positive = 0.15
+    cordon_separation: Positive = 0.06
+    row_tolerance: Positive = 0.15
+    max_lean: Positive = 0.26
+    max_slope: Positive = 0.6
+    max_radius: MaxRadius = MaxRadius()
+    max_capsules: Annotated[int, Meta(ge=1, le=500)] = 200
     canes: bool = True
 
 
@@ -226,30 +225,29 @@ class PerceptionConfig(Struct, frozen=True, forbid_unknown_fields=True):
     """Section `[perception]`.
 
     Attributes:
-        rate_hz: Turns of the process's loop a second; one heartbeat each.
-        hang_s: A frame that takes longer than this stops the heartbeat (s).
-        survey_nearest: A frame with the cordon nearer than this is no survey: it shows parts of spurs only, so that it
-            may confirm that wood has gone and propose nothing (m).
-        survey_farthest: The same for a cordon farther away, where canes are too thin in the image (m).
-        upright: Least cosine of the angle between the image's upward direction and the vertical. A camera turned over,
-            as by a hand that jogs a joint, sees what no network was trained on: such a frame changes nothing.
-        segmenter: Says which pixel shows what: `network`, or `labels`, the simulated camera's own, for comparison.
-        weights: ONNX file for the network; empty takes the one that is shipped.
-        threads: Of the network. With fewer than the machine has cores a frame takes longer; the loop that drives the
-            robot goes first either way.
-        fuse: Whether the rule is applied to what all frames have shown of a spur, or to each frame alone.
-        rule: Where to cut.
-        skeleton: Pixels to canes.
-        tracker: Points over time.
-        obstacles: What the arm keeps away from.
-        look: A closer look at one point.
+        rate_hz: Rate of the process's loop and heartbeat.
+        frame_timeout_s: A frame that takes longer stops the heartbeat.
+        survey_min_depth: Smallest median depth of the cordon in a survey frame (m). A nearer frame shows parts of
+            spurs only: it proposes nothing, but may confirm that wood is gone.
+        survey_max_depth: Largest median depth of the cordon in a survey frame; canes farther away are too thin (m).
+        min_upright: Smallest cosine of the angle between the image's upward direction and the vertical. Frames of a
+            camera turned farther are ignored, since the network was not trained on them.
+        segmenter: `network`, or `labels` for the label image of the simulated camera.
+        weights: ONNX file of the network; empty for the shipped one.
+        threads: Threads of the network.
+        fuse: Whether the rule is applied to the map of a spur over all frames, or to each frame alone.
+        rule: Pruning rule.
+        skeleton: From pixels to canes.
+        tracker: Pruning points over time.
+        obstacles: Obstacles for the arm.
+        close_up: Close-up check of one point.
     """
 
     rate_hz: Positive = 20.0
-    hang_s: Positive = 3.0
-    survey_nearest: Positive = 0.55
-    survey_farthest: Positive = 1.1
-    upright: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.8
+    frame_timeout_s: Positive = 3.0
+    survey_min_depth: Positive = 0.55
+    survey_max_depth: Positive = 1.1
+    min_upright: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.8
     segmenter: Literal["network", "labels"] = "network"
     weights: str = ""
     threads: Annotated[int, Meta(ge=1, le=64)] = 2
@@ -258,4 +256,4 @@ class PerceptionConfig(Struct, frozen=True, forbid_unknown_fields=True):
     skeleton: SkeletonConfig = SkeletonConfig()
     tracker: TrackerConfig = TrackerConfig()
     obstacles: ObstacleConfig = ObstacleConfig()
-    look: LookConfig = LookConfig()
+    close_up: CloseUpConfig = CloseUpConfig()

@@ -1,4 +1,4 @@
-"""The process's loop: newest frame in, points out, one heartbeat a turn."""
+"""The process's loop: newest frame in, points out, one heartbeat a cycle. Frames are processed on a worker thread."""
 
 import queue
 import threading
@@ -7,50 +7,105 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 from perception.config import PerceptionConfig
 from perception.pipeline import Perception
-from perception.worker import Worker
 from rolling_panda import messages as m
 from rolling_panda import topics
+from rolling_panda.errors import RollingPandaError
 from rolling_panda.messages.commands import PlantRequest
 from rolling_panda.messages.perception import CloseLook, Obstacles, PointCrop
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.transport.zenoh import Received, Transport
 
+Job = TypeVar("Job")
+Result = TypeVar("Result")
+
+#: Time that an operator's request waits for the worker (s); less than the timeout of the service.
+_REQUEST_TIMEOUT_S = 1.8
+#: Least time between log entries about rejected wood (s).
+_REJECTED_PERIOD_S = 60.0
+
+
+class Worker(Generic[Job, Result]):
+    """Runs one job at a time on a daemon thread. All methods are for one calling thread."""
+
+    def __init__(self, work: Callable[[Job], Result]) -> None:
+        """Start the thread.
+
+        Args:
+            work: Executes a job. A `RollingPandaError` is a result; `poll` raises any other exception.
+        """
+        self._work = work
+        self._submitted = threading.Event()
+        self._job: Job | None = None
+        self._since: float | None = None
+        self._done: Result | RollingPandaError | None = None
+        self._fatal: BaseException | None = None
+        threading.Thread(target=self._run, name="perception-worker", daemon=True).start()
+
+    def submit(self, job: Job, now: float) -> bool:
+        """Start a job; False while there is one, or its result was not polled."""
+        if self._since is not None:
+            return False
+        self._job, self._since = job, now
+        self._submitted.set()
+        return True
+
+    def poll(self) -> Result | RollingPandaError | None:
+        """The result or the error of a finished job, once; None without one."""
+        if self._fatal is not None:
+            raise self._fatal
+        done = self._done
+        if done is not None:
+            self._done, self._since = None, None
+        return done
+
+    def busy_for(self, now: float) -> float:
+        """Duration of the present job (s); 0 without one."""
+        return 0.0 if self._since is None else now - self._since
+
+    def _run(self) -> None:
+        while True:
+            self._submitted.wait()
+            self._submitted.clear()
+            job = self._job
+            assert job is not None
+            try:
+                self._done = self._work(job)
+            except RollingPandaError as error:
+                self._done = error
+            except BaseException as error:
+                self._fatal = error
+                return
+
 
 @dataclass(frozen=True)
-class _Result:
+class _Output:
     points: m.PruningPoints
     withdrawn: tuple[str, ...]
     obstacles: Obstacles
     crops: tuple[PointCrop, ...]
-    left_out: str
+    rejected_wood: str
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _Request:
     request: PlantRequest
     answer: Future[m.Answer]
 
 
-_Job = CameraFrame | _Asked
-#: How long an operator's question waits for the worker (s); less than the service's timeout.
-_ANSWER_S = 1.8
-#: What was left out as implausible is told this often at most (s).
-_LEFT_OUT_S = 60.0
-
-
 class Loop:
-    """Turns at `rate_hz`. Frames are worked on beside it; a frame that hangs stops the heartbeat's count."""
+    """Runs at `rate_hz`. A frame that takes too long stops the count of the heartbeat."""
 
     def __init__(self, transport: Transport, config: PerceptionConfig, perception: Perception) -> None:
-        """Subscribe and announce.
+        """Subscribe and advertise.
 
         Args:
-            transport: Open session.
+            transport: Open connection.
             config: Section `[perception]`.
-            perception: What does the work; from now on the worker's alone.
+            perception: The pipeline; used by the worker only from now on.
         """
         self._config = config
         self._frames = transport.slot(topics.CAMERA)
@@ -59,136 +114,131 @@ class Loop:
         self._crops = transport.publisher(topics.CROPS)
         self._heartbeat = transport.publisher(topics.HEARTBEAT)
         self._events = transport.publisher(topics.EVENT)
-        looks = transport.publisher(topics.LOOK)
-        # The controller waits for a look, so it is told before the rest of the frame is worked on.
-        self._worker: Worker[_Job, _Result] = Worker(lambda job: _work(perception, job, looks.put))
-        self._asked: queue.SimpleQueue[_Asked] = queue.SimpleQueue()
-        transport.serve(topics.PLANT, self._ask)
-        self._newest: m.PruningPoints | None = None
-        self._in_the_way: Obstacles | None = None
-        self._pictures: dict[tuple[str, int], PointCrop] = {}
-        """In the order in which they are repeated, the next one first."""
-        self._sightings = perception.sightings
-        self._noted: Received[CameraFrame] | None = None
+        checks = transport.publisher(topics.LOOK)
+        # The controller waits for a close-up check: it is published before the rest of the frame is processed.
+        self._worker: Worker[CameraFrame | _Request, _Output] = Worker(lambda job: _work(perception, job, checks.put))
+        self._requests: queue.SimpleQueue[_Request] = queue.SimpleQueue()
+        transport.serve(topics.PLANT, self._request)
+        self._newest: _Output | None = None
+        self._crop_cycle: dict[tuple[str, int], PointCrop] = {}
+        """Crops in the order of their repetition, the next one first."""
+        self._camera_rays = perception.camera_rays
+        self._last_frame: Received[CameraFrame] | None = None
         self._sequence = 0
-        self._sent = self._sent_obstacles = self._sent_crop = -1e9
+        self._points_sent = self._obstacles_sent = self._crop_sent = self._rejected_logged = -1e9
         self._last_error = ""
-        self._left_out, self._told_left_out = "", -1e9
-        self._shown: frozenset[str] = frozenset()
-        self._hanging = False
+        self._rejected_wood = ""
+        self._point_ids: frozenset[str] = frozenset()
+        self._timed_out = False
 
     def run(self, stopping: threading.Event) -> None:
-        """Keep time until told to stop."""
+        """Run until `stopping` is set."""
         period = 1.0 / self._config.rate_hz
         due = time.monotonic()
-        self._tell("info", "perception is up and waits for camera frames", due)
+        self._log("info", "perception is up and waits for camera frames", due)
         while not stopping.is_set():
-            self.turn(time.monotonic())
+            self.step(time.monotonic())
             due = max(due + period, time.monotonic())
             stopping.wait(max(0.0, due - time.monotonic()))
 
-    def turn(self, now: float) -> None:
-        """One turn at `now` (s, monotonic)."""
+    def step(self, now: float) -> None:
+        """One cycle at `now` (s, monotonic)."""
         done = self._worker.poll()
-        if done is not None and done.result is not None:
-            self._take(done.result, now)
+        if isinstance(done, RollingPandaError):
+            self._log_refused(str(done), now)
         elif done is not None:
-            self._refuse(str(done.error), now)
+            self._accept(done, now)
         frame = self._frames.peek()
-        if frame is not None and frame is not self._noted:
-            # Also those that are never worked on: the page shows them, and may click into them.
-            self._noted = frame
-            self._sightings.note(frame.message)
+        if frame is not None and frame is not self._last_frame:
+            # The page shows frames that are never processed too, and they can be clicked.
+            self._last_frame = frame
+            self._camera_rays.add(frame.message)
         if self._worker.busy_for(now) == 0.0:
-            if not self._asked.empty():
-                self._worker.submit(self._asked.get(), now)
+            if not self._requests.empty():
+                self._worker.submit(self._requests.get(), now)
             elif (frame := self._frames.take()) is not None:
                 self._worker.submit(frame.message, now)
-        if self._newest is not None and now - self._sent >= 1.0 / topics.POINTS.rate_hz:
-            self._publish(now)
-        if self._in_the_way is not None and now - self._sent_obstacles >= 1.0 / topics.OBSTACLES.rate_hz:
-            self._obstacles.put(self._in_the_way)
-            self._sent_obstacles = now
-        if self._pictures and now - self._sent_crop >= 1.0 / topics.CROPS.rate_hz:
-            self._repeat_crop(now)
+        if self._newest is not None:
+            if now - self._points_sent >= 1.0 / topics.POINTS.rate_hz:
+                self._publish_points(self._newest.points, now)
+            if now - self._obstacles_sent >= 1.0 / topics.OBSTACLES.rate_hz:
+                self._obstacles.put(self._newest.obstacles)
+                self._obstacles_sent = now
+        if self._crop_cycle and now - self._crop_sent >= 1.0 / topics.CROPS.rate_hz:
+            key = next(iter(self._crop_cycle))
+            self._crop_cycle[key] = self._crop_cycle.pop(key)
+            self._crops.put(self._crop_cycle[key])
+            self._crop_sent = now
         self._beat(now)
 
-    def _ask(self, request: PlantRequest) -> m.Answer:
-        """On a thread of the transport: waits until the worker has come to it."""
-        asked = _Asked(request, Future())
-        self._asked.put(asked)
+    def _request(self, request: PlantRequest) -> m.Answer:
+        """Wait for the worker's answer, on a thread of the transport."""
+        job = _Request(request, Future())
+        self._requests.put(job)
         try:
-            return asked.answer.result(_ANSWER_S)
+            return job.answer.result(_REQUEST_TIMEOUT_S)
         except FutureTimeoutError:
-            asked.answer.cancel()
+            job.answer.cancel()
             return m.Answer(ok=False, reason="perception is busy with a frame; nothing was done, ask again")
 
-    def _take(self, result: _Result, now: float) -> None:
-        self._newest, self._in_the_way, self._last_error = result.points, result.obstacles, ""
-        self._publish(now)
-        self._show_crops(result.crops)
-        shown = frozenset(point.point_id for point in result.points.points)
-        if shown - self._shown:
-            new = len(shown - self._shown)
-            self._tell("info", f"{new} new pruning point{'' if new == 1 else 's'}, {len(shown)} in all", now)
-        for text in result.withdrawn:
-            # Mostly since it was cut. Where somebody had accepted it, the controller warns.
-            self._tell("info", text, now)
-        self._shown = shown
-        if result.left_out != self._left_out and now - self._told_left_out >= _LEFT_OUT_S:
-            self._left_out, self._told_left_out = result.left_out, now
-            if result.left_out:
-                self._tell("info", f"taken for wood where none can be, and left out: {result.left_out}", now)
+    def _accept(self, output: _Output, now: float) -> None:
+        self._newest, self._last_error = output, ""
+        self._publish_points(output.points, now)
+        self._publish_new_crops(output.crops)
+        ids = frozenset(point.point_id for point in output.points.points)
+        if new := len(ids - self._point_ids):
+            self._log("info", f"{new} new pruning point{'' if new == 1 else 's'}, {len(ids)} in all", now)
+        for text in output.withdrawn:
+            # The controller warns where the point was accepted.
+            self._log("info", text, now)
+        self._point_ids = ids
+        if output.rejected_wood != self._rejected_wood and now - self._rejected_logged >= _REJECTED_PERIOD_S:
+            self._rejected_wood, self._rejected_logged = output.rejected_wood, now
+            if output.rejected_wood:
+                self._log("info", f"implausible wood left out of the obstacles: {output.rejected_wood}", now)
 
-    def _show_crops(self, crops: tuple[PointCrop, ...]) -> None:
+    def _publish_points(self, points: m.PruningPoints, now: float) -> None:
+        self._points.put(points)
+        self._points_sent = now
+
+    def _publish_new_crops(self, crops: tuple[PointCrop, ...]) -> None:
         wanted = {(crop.point_id, crop.revision): crop for crop in crops}
-        new = {key: crop for key, crop in wanted.items() if key not in self._pictures}
+        new = {key: crop for key, crop in wanted.items() if key not in self._crop_cycle}
         for crop in new.values():
             self._crops.put(crop)
-        self._pictures = {key: crop for key, crop in self._pictures.items() if key in wanted} | new
+        self._crop_cycle = {key: crop for key, crop in self._crop_cycle.items() if key in wanted} | new
 
-    def _repeat_crop(self, now: float) -> None:
-        key = next(iter(self._pictures))
-        crop = self._pictures.pop(key)
-        self._pictures[key] = crop
-        self._crops.put(crop)
-        self._sent_crop = now
-
-    def _refuse(self, reason: str, now: float) -> None:
-        # The same fault frame after frame is told once.
-        if reason.split(":")[-1] != self._last_error:
-            self._tell("error", f"a camera frame was refused: {reason}", now)
-        self._last_error = reason.split(":")[-1]
-
-    def _publish(self, now: float) -> None:
-        if self._newest is not None:
-            self._points.put(self._newest)
-            self._sent = now
+    def _log_refused(self, reason: str, now: float) -> None:
+        # An error that repeats frame after frame is logged once.
+        error = reason.split(":")[-1]
+        if error != self._last_error:
+            self._log("error", f"a camera frame was refused: {reason}", now)
+        self._last_error = error
 
     def _beat(self, now: float) -> None:
-        hanging = self._worker.busy_for(now) > self._config.hang_s
-        if hanging and not self._hanging:
-            self._tell("error", f"a frame has taken more than {self._config.hang_s:g} s", now)
-        self._hanging = hanging
-        if not hanging:
+        timed_out = self._worker.busy_for(now) > self._config.frame_timeout_s
+        if timed_out and not self._timed_out:
+            self._log("error", f"a frame has taken more than {self._config.frame_timeout_s:g} s", now)
+        self._timed_out = timed_out
+        if not timed_out:
             self._sequence += 1
         self._heartbeat.put(
-            m.Heartbeat(process="perception", sequence=self._sequence, status="hangs in a frame" if hanging else "")
+            m.Heartbeat(process="perception", sequence=self._sequence, status="hangs in a frame" if timed_out else "")
         )
 
-    def _tell(self, severity: m.Severity, text: str, now: float) -> None:
+    def _log(self, severity: m.Severity, text: str, now: float) -> None:
         self._events.put(m.LogEvent(header=m.Header(now), process="perception", severity=severity, text=text[:500]))
 
 
-def _work(perception: Perception, job: _Job, tell: Callable[[CloseLook], None]) -> _Result:
-    if isinstance(job, _Asked):
-        # What nobody waits for any more must not be done.
+def _work(perception: Perception, job: CameraFrame | _Request, publish: Callable[[CloseLook], None]) -> _Output:
+    if isinstance(job, _Request):
+        # A request that timed out is not executed.
         if job.answer.set_running_or_notify_cancel():
             job.answer.set_result(perception.answer(job.request))
         points = perception.points()
     else:
         if job.point_id:
-            tell(perception.look_closely(job))
+            publish(perception.check_close_up(job))
         points = perception.process(job)
     obstacles = Obstacles(header=points.header, capsules=perception.obstacles)
-    return _Result(points, perception.withdrawn, obstacles, perception.crops, perception.left_out)
+    return _Output(points, perception.withdrawn, obstacles, perception.crops, perception.rejected_wood)

@@ -1,7 +1,7 @@
 """`rolling-panda perceive IMAGE`: classes and pruning points of one photograph.
 
 Writes classes.png (indices as in `WOOD_CLASSES`, with a palette), overlay.png and points.json. With a depth image the
-points have places in the camera's frame; without, they are pixels, and lengths rest on the thickness of a common cane.
+points have positions in the camera's frame; without one they are pixels, scaled by the thickness of a common cane.
 """
 
 import argparse
@@ -13,20 +13,19 @@ from typing import Any, Literal
 
 import numpy as np
 from msgspec.structs import replace
-from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
+from perception.arrays import Labels
 from perception.config import PerceptionConfig, RuleConfig
-from perception.pipeline import with_widening
+from perception.pipeline import with_width_bias
 from perception.segmentation.network_segmenter import NetworkSegmenter
-from perception.segmentation.photograph import R_LEVEL, Photograph, load_photograph
-from perception.segmentation.segmenter_choice import SHIPPED
-from perception.single_image import Still, StillPoint, read_still
+from perception.segmentation.segmenter import SHIPPED
+from perception.single_image import R_LEVEL, ImageCut, ImageResult, Photograph, find_cuts, load_photograph
 from rolling_panda.errors import InputError, RollingPandaError
 from rolling_panda.messages.types import WOOD_CLASSES
 from rolling_panda.resources import resource
 
-#: One colour a class, for the palette of classes.png and the overlay.
+#: Colour of each class in the palette of classes.png and overlay.png.
 COLORS = (
     (30, 30, 34),
     (110, 120, 70),
@@ -40,7 +39,8 @@ COLORS = (
     (40, 80, 160),
     (230, 60, 60),
 )
-_TINT = 0.45
+#: Opacity of the classes in the overlay, and half the length of a cut's mark (px).
+_OPACITY, _MARK = 0.45, 12
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -55,24 +55,23 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--system", choices=("spur", "guyot"), default="spur", help="how the vine is trained")
     parser.add_argument("--nodes-kept", type=int, default=2, help="count nodes that stay on a spur (default: 2)")
     parser.add_argument("--offset", type=float, default=0.020, help="cut so far past the last one (m, default: 0.02)")
-    words = parser.parse_args(argv)
+    arguments = parser.parse_args(argv)
     try:
-        rule = _rule(words.system, words.nodes_kept, words.offset)
-        if not words.depth_unit > 0.0:
-            raise InputError(f"--depth-unit {words.depth_unit}: give the metres a count, more than 0")
-        # Before the network with its threads: what cannot be read ends at once.
-        photograph = load_photograph(words.image, words.depth, words.intrinsics, words.depth_unit)
-        segmenter = NetworkSegmenter(words.weights or resource(SHIPPED))
+        rule = _rule(arguments.system, arguments.nodes_kept, arguments.offset)
+        if not arguments.depth_unit > 0.0:
+            raise InputError(f"--depth-unit {arguments.depth_unit}: give the metres a count, more than 0")
+        photograph = load_photograph(arguments.image, arguments.depth, arguments.intrinsics, arguments.depth_unit)
+        segmenter = NetworkSegmenter(arguments.weights or resource(SHIPPED))
         labels = segmenter.classify(photograph.color, photograph.depth)
-        config = with_widening(replace(PerceptionConfig(), rule=rule), segmenter.widening)
-        still = read_still(photograph, labels, config)
-        words.out.mkdir(parents=True, exist_ok=True)
-        _write(words.out, words.image, photograph, labels, still, segmenter.name)
+        config = with_width_bias(replace(PerceptionConfig(), rule=rule), segmenter.width_bias)
+        result = find_cuts(photograph, labels, config)
+        arguments.out.mkdir(parents=True, exist_ok=True)
+        _write(arguments.out, arguments.image, photograph, labels, result, segmenter.name)
     except (RollingPandaError, OSError) as error:
         print(f"rolling-panda perceive: {error}", file=sys.stderr)
         return 1
-    print(f"{len(still.points)} points on {still.spurs} spurs; scale: {still.scale}")
-    for text in still.abstained:
+    print(f"{len(result.cuts)} points on {result.spurs} spurs; scale: {result.scale}")
+    for text in result.undecided:
         print(f"abstained: {text}")
     return 0
 
@@ -85,48 +84,47 @@ def _rule(system: Literal["spur", "guyot"], nodes_kept: int, offset: float) -> R
     return replace(RuleConfig(), system=system, nodes_kept=nodes_kept, offset=offset)
 
 
-def _write(
-    out: Path, image: Path, photograph: Photograph, labels: NDArray[np.uint8], still: Still, segmenter: str
-) -> None:
+def _write(out: Path, image: Path, photograph: Photograph, labels: Labels, result: ImageResult, segmenter: str) -> None:
     mask = Image.fromarray(labels, mode="P")
     mask.putpalette([value for color in COLORS for value in color])
-    share = photograph.size[0] / labels.shape[1]
+    scale = photograph.size[0] / labels.shape[1]
     mask.resize(photograph.size, Image.Resampling.NEAREST).save(out / "classes.png")
     tint = np.array(COLORS, np.float32)[labels]
-    shown = np.where(labels[..., None] > 1, (1 - _TINT) * photograph.color + _TINT * tint, photograph.color)
+    shown = np.where(labels[..., None] > 1, (1 - _OPACITY) * photograph.color + _OPACITY * tint, photograph.color)
     overlay = Image.fromarray(shown.astype(np.uint8)).resize(photograph.size, Image.Resampling.BILINEAR)
     draw = ImageDraw.Draw(overlay)
-    for number, point in enumerate(still.points, 1):
-        _mark(draw, point, number, share)
+    for number, cut in enumerate(result.cuts, 1):
+        _mark(draw, cut, number, scale)
     overlay.save(out / "overlay.png")
     document = {
         "image": image.name,
         "size": list(photograph.size),
         "segmenter": segmenter,
         "classes": list(WOOD_CLASSES),
-        "scale": still.scale,
+        "scale": result.scale,
         "intrinsics": "assumed" if photograph.assumed else "given",
-        "spurs": still.spurs,
-        "canes": still.canes,
-        "points": [_point(point, photograph, share) for point in still.points],
-        "abstained": list(still.abstained),
+        "spurs": result.spurs,
+        "canes": result.canes,
+        "points": [_point(cut, photograph, scale) for cut in result.cuts],
+        "abstained": list(result.undecided),
     }
     (out / "points.json").write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
 
 
-def _mark(draw: ImageDraw.ImageDraw, point: StillPoint, number: int, share: float) -> None:
-    (u, v), (x, y) = ((np.array(p) + 0.5) * share for p in (point.pixel, point.beyond))
+def _mark(draw: ImageDraw.ImageDraw, point: ImageCut, number: int, scale: float) -> None:
+    (u, v), (x, y) = ((np.array(p) + 0.5) * scale for p in (point.pixel, point.beyond))
     length = max(float(np.hypot(x - u, y - v)), 1e-6)
-    # The blade's line, square to the wood.
-    du, dv = -(y - v) / length * 12 * max(share, 1.0), (x - u) / length * 12 * max(share, 1.0)
-    draw.line((u - du, v - dv, u + du, v + dv), fill=(230, 30, 30), width=max(2, round(2 * share)))
+    # Square to the wood.
+    half = _MARK * max(scale, 1.0) / length
+    du, dv = -(y - v) * half, (x - u) * half
+    draw.line((u - du, v - dv, u + du, v + dv), fill=(230, 30, 30), width=max(2, round(2 * scale)))
     draw.text((u + abs(du) + 3, v - 6), str(number), fill=(230, 30, 30))
 
 
-def _point(point: StillPoint, photograph: Photograph, share: float) -> dict[str, Any]:
+def _point(point: ImageCut, photograph: Photograph, scale: float) -> dict[str, Any]:
     cut = point.cut
     metric = photograph.depth is not None
-    pixel = (np.array(point.pixel) + 0.5) * share - 0.5
+    pixel = (np.array(point.pixel) + 0.5) * scale - 0.5
     along = np.array(point.beyond) - np.array(point.pixel)
     return {
         "kind": cut.kind,

@@ -1,38 +1,164 @@
-"""Pruning points of a single picture: the plant model and the rule without a robot, with depth or in pixels only."""
+"""Pruning points of a single photograph, without a robot: with depth in metres, without depth in pixels."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import msgspec
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
+from PIL import Image, ImageOps
 from scipy.ndimage import distance_transform_edt
 from skimage.morphology import skeletonize
 
+from perception.arrays import Labels, Mask
 from perception.config import PerceptionConfig
-from perception.pipeline import perceive
-from perception.rules.keep_out import in_view
-from perception.rules.registry import apply_rule
-from perception.rules.spur import Cut
-from perception.segmentation.photograph import Photograph
-from perception.skeleton.fragments import CANE, NODE
+from perception.rules.keep_out import frame_keep_out
+from perception.rules.pruning import Cut, apply_rule
+from perception.segmentation.frame import CANE, NODE, View
+from perception.skeleton.topology import perceive_plant
+from rolling_panda.errors import InputError
+from rolling_panda.messages.robot import Intrinsics
 
-#: A common cane (m): the scale of a picture without depth.
+#: Wider photographs are scaled down to this, the width of the training images; least width and height (px).
+MAX_WIDTH, _MIN_SIZE = 848, 64
+#: Horizontal field of view without intrinsics (degrees): the colour camera of a RealSense D435i.
+_DEFAULT_FIELD_OF_VIEW = 69.0
+#: Plausible median depth (m).
+_PLAUSIBLE_DEPTH = (0.1, 20.0)
+#: Diameter of a common cane (m): the scale of a photograph without depth.
 _COMMON_DIAMETER = 0.008
-#: Canes thinner than this are too thin to follow (px).
-_THINNEST = 2.0
-_LEAST_PIXELS = 40
-#: A common cane is between 5 and 13 mm thick, so that without depth every length is known to this factor only.
-_SCALE_DOUBT = 1.6
+#: Least width of canes, and least number of cane pixels (px).
+_MIN_CANE_WIDTH, _MIN_CANE_PIXELS = 2.0, 40
+#: Without depth all lengths are uncertain by this factor: a common cane is 5 to 13 mm thick.
+_SCALE_UNCERTAINTY = 1.6
+#: A second image point of a cut is this far along the wood (m).
+_ALONG = 0.02
+#: Rotation of a level camera: x right, y down, z forward become x right, y forward, z up.
+R_LEVEL = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 
 
 @dataclass(frozen=True)
-class StillPoint:
-    """A cut in a picture; pixels are those of the picture as it was worked on.
+class Photograph:
+    """A photograph, scaled for the network.
 
     Attributes:
-        cut: As the rule says; its place is that of a level camera at the origin (x right, y forward, z up).
+        color: H×W×3, RGB.
+        depth: H×W (m), 0 = invalid; or None.
+        intrinsics: Of the scaled images.
+        assumed: Whether the intrinsics are a default.
+        size: Width and height of the file's image (px).
+    """
+
+    color: NDArray[np.uint8]
+    depth: NDArray[np.float32] | None
+    intrinsics: Intrinsics
+    assumed: bool
+    size: tuple[int, int]
+
+    def view(self, depth: NDArray[np.float32]) -> View:
+        """As a frame of a level camera at the origin, with the given depth."""
+        return View(0, 0.0, self.intrinsics, depth, None, b"", R_LEVEL, np.zeros(3))
+
+
+def load_photograph(
+    image: Path, depth: Path | None = None, intrinsics: Path | None = None, depth_unit: float = 0.001
+) -> Photograph:
+    """Read and check the files of one photograph.
+
+    Args:
+        image: Anything that Pillow reads.
+        depth: 16-bit PNG or TIFF with integer counts, or .npy with integer counts or floating-point metres.
+        intrinsics: JSON with width, height, fx, fy, cx, cy of the image.
+        depth_unit: Metres a count.
+
+    Raises:
+        InputError: A file cannot be read, sizes differ, or the depth cannot be in this unit.
+    """
+    color = _color(image)
+    size = (color.shape[1], color.shape[0])
+    if min(size) < _MIN_SIZE:
+        raise InputError(f"{image} is {size[0]}×{size[1]} pixels; at least {_MIN_SIZE}×{_MIN_SIZE} are needed")
+    metres = None if depth is None else _depth(depth, size, depth_unit)
+    k = _default_intrinsics(size) if intrinsics is None else _intrinsics(intrinsics, size)
+    if size[0] > MAX_WIDTH:
+        scale = MAX_WIDTH / size[0]
+        height = round(size[1] * scale)
+        color = np.asarray(Image.fromarray(color).resize((MAX_WIDTH, height), Image.Resampling.BOX))
+        if metres is not None:
+            # Nearest neighbour: a mean of foreground and background depth is meaningless.
+            rows = ((np.arange(height) + 0.5) / scale).astype(int).clip(max=size[1] - 1)
+            cols = ((np.arange(MAX_WIDTH) + 0.5) / scale).astype(int)
+            metres = np.ascontiguousarray(metres[rows][:, cols])
+        k = Intrinsics(
+            MAX_WIDTH, height, k.fx * scale, k.fy * scale, (k.cx + 0.5) * scale - 0.5, (k.cy + 0.5) * scale - 0.5
+        )
+    return Photograph(color, metres, k, intrinsics is None, size)
+
+
+def _color(path: Path) -> NDArray[np.uint8]:
+    try:
+        with Image.open(path) as image:
+            return np.asarray(ImageOps.exif_transpose(image).convert("RGB"), dtype=np.uint8)
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+        raise InputError(f"cannot read the image {path}: {error}") from error
+
+
+def _depth(path: Path, size: tuple[int, int], unit: float) -> NDArray[np.float32]:
+    try:
+        if path.suffix == ".npy":
+            values = np.load(path, allow_pickle=False)
+        else:
+            with Image.open(path) as image:
+                values = np.asarray(image)
+    except (OSError, SyntaxError, ValueError) as error:
+        raise InputError(f"cannot read the depth {path}: {error}") from error
+    if values.shape != (size[1], size[0]):
+        raise InputError(
+            f"{path} has the shape {values.shape}; the image needs {(size[1], size[0])}, one value a pixel"
+        )
+    if not (np.issubdtype(values.dtype, np.integer) or np.issubdtype(values.dtype, np.floating)):
+        raise InputError(f"{path} holds {values.dtype}; depth is integer counts or floating-point metres")
+    metres = values.astype(np.float32) * (unit if np.issubdtype(values.dtype, np.integer) else 1.0)
+    metres = np.where(np.isfinite(metres) & (metres > 0.0), metres, np.float32(0.0)).astype(np.float32)
+    valid = metres[metres > 0.0]
+    if not len(valid):
+        raise InputError(f"{path} has no depth at all: every value is 0, negative or not a number")
+    middle = float(np.median(valid))
+    if not _PLAUSIBLE_DEPTH[0] <= middle <= _PLAUSIBLE_DEPTH[1]:
+        raise InputError(
+            f"{path}: the median depth is {middle:.4g} m; give the metres a count with --depth-unit (now {unit:g})"
+        )
+    return metres
+
+
+def _intrinsics(path: Path, size: tuple[int, int]) -> Intrinsics:
+    try:
+        k = msgspec.json.decode(path.read_bytes(), type=Intrinsics)
+    except (OSError, msgspec.MsgspecError) as error:
+        raise InputError(
+            f"cannot read the intrinsics {path}: {error}; it needs width, height, fx, fy, cx, cy"
+        ) from error
+    if (k.width, k.height) != size:
+        raise InputError(f"{path} is for {k.width}×{k.height} pixels; the image has {size[0]}×{size[1]}")
+    if k.fx <= 0.0 or k.fy <= 0.0:
+        raise InputError(f"{path}: focal lengths must be positive, got {k.fx} and {k.fy}")
+    return k
+
+
+def _default_intrinsics(size: tuple[int, int]) -> Intrinsics:
+    focal = max(size) / 2 / float(np.tan(np.radians(_DEFAULT_FIELD_OF_VIEW) / 2))
+    return Intrinsics(size[0], size[1], focal, focal, (size[0] - 1) / 2, (size[1] - 1) / 2)
+
+
+@dataclass(frozen=True)
+class ImageCut:
+    """A cut in a photograph, with pixels of the scaled image.
+
+    Attributes:
+        cut: In the frame of a level camera at the origin (x right, y forward, z up).
         pixel: Column and row.
-        beyond: A little farther along the wood, column and row.
+        beyond: Column and row of a point farther along the wood.
         spur: Number along the cordon, from 1.
     """
 
@@ -43,77 +169,80 @@ class StillPoint:
 
 
 @dataclass(frozen=True)
-class Still:
-    """What one picture gives.
+class ImageResult:
+    """Cuts in one photograph.
 
     Attributes:
-        points: Cuts.
-        abstained: What it was not sure of, with the reasons.
-        spurs: Spurs seen.
-        canes: Canes that could be followed to one.
-        scale: Where lengths come from, in words.
+        cuts: Proposed cuts.
+        undecided: Reasons for what is undecided.
+        spurs: Number of spurs.
+        canes: Number of canes rooted at a spur.
+        scale: Source of the scale, as text.
     """
 
-    points: tuple[StillPoint, ...]
-    abstained: tuple[str, ...]
+    cuts: tuple[ImageCut, ...]
+    undecided: tuple[str, ...]
     spurs: int
     canes: int
     scale: str
 
 
-def read_still(photograph: Photograph, labels: NDArray[np.uint8], config: PerceptionConfig) -> Still:
-    """Find the cuts.
+def find_cuts(photograph: Photograph, labels: Labels, config: PerceptionConfig) -> ImageResult:
+    """Apply plant model and rule to a photograph.
 
     Args:
-        photograph: The picture.
-        labels: Its classes.
+        photograph: The photograph.
+        labels: H×W class indices.
         config: Section `[perception]`.
     """
     if photograph.depth is None:
         assumed = _assumed_depth(photograph, labels)
         if isinstance(assumed, str):
-            return Still((), (assumed,), 0, 0, "none")
+            return ImageResult((), (assumed,), 0, 0, "none")
         depth = np.full(labels.shape, assumed, np.float32)
-        config = _of_unknown_scale(config)
+        config = _with_scale_uncertainty(config)
         scale = f"no depth: the median cane is taken to be {1000 * _COMMON_DIAMETER:.0f} mm thick"
     else:
         depth, scale = photograph.depth, "depth image"
-        wood = (labels == CANE) | (labels == NODE)
-        if np.count_nonzero(wood & (depth > 0.0)) < _LEAST_PIXELS:
-            return Still((), ("no cane with depth was recognised: look again from 0.6 to 1 m",), 0, 0, scale)
+        if np.count_nonzero(_cane_mask(labels) & (depth > 0.0)) < _MIN_CANE_PIXELS:
+            return ImageResult((), ("no cane with depth was recognised: look again from 0.6 to 1 m",), 0, 0, scale)
     view = photograph.view(depth)
-    plant = perceive(view, labels, config)
-    points, abstained = [], []
-    keep_out = in_view(view, labels, (), config.rule)
+    plant = perceive_plant(view, labels, config.skeleton)
+    cuts, undecided = [], []
+    keep_out = frame_keep_out(view, labels, (), config.rule)
     for number, spur in enumerate(plant.spurs, 1):
-        decision = apply_rule(spur, config.rule, plant.beside(spur), keep_out)
-        abstained += [f"spur {number}: {reason}" for reason in decision.abstained]
+        decision = apply_rule(spur, config.rule, plant.other_canes(spur), keep_out)
+        undecided += [f"spur {number}: {reason}" for reason in decision.undecided]
         for cut in decision.cuts:
             u, v, _ = view.pixels(cut.position)[0]
-            x, y, _ = view.pixels(cut.position + 0.02 * cut.tangent)[0]
-            points.append(StillPoint(cut, (float(u), float(v)), (float(x), float(y)), number))
+            x, y, _ = view.pixels(cut.position + _ALONG * cut.tangent)[0]
+            cuts.append(ImageCut(cut, (float(u), float(v)), (float(x), float(y)), number))
     if not plant.spurs:
-        abstained.append("no spur was recognised: the cordon with its spurs must be in the picture")
-    return Still(tuple(points), tuple(abstained), len(plant.spurs), sum(len(s.canes) for s in plant.spurs), scale)
+        undecided.append("no spur was recognised: the cordon with its spurs must be in the picture")
+    return ImageResult(tuple(cuts), tuple(undecided), len(plant.spurs), sum(len(s.canes) for s in plant.spurs), scale)
 
 
-def _of_unknown_scale(config: PerceptionConfig) -> PerceptionConfig:
-    """What tells a wrong count by the distance of nodes must not take the scale for the vine."""
-    rule = msgspec.structs.replace(
+def _with_scale_uncertainty(config: PerceptionConfig) -> PerceptionConfig:
+    """Wider limits of plausible internodes, for lengths of uncertain scale."""
+    rule = replace(
         config.rule,
-        crowded=config.rule.crowded / _SCALE_DOUBT,
-        shortest_internode=config.rule.shortest_internode / _SCALE_DOUBT,
-        longest_internode=config.rule.longest_internode * _SCALE_DOUBT,
+        min_node_distance=config.rule.min_node_distance / _SCALE_UNCERTAINTY,
+        min_internode=config.rule.min_internode / _SCALE_UNCERTAINTY,
+        max_internode=config.rule.max_internode * _SCALE_UNCERTAINTY,
     )
-    return msgspec.structs.replace(config, rule=rule)
+    return replace(config, rule=rule)
 
 
-def _assumed_depth(photograph: Photograph, labels: NDArray[np.uint8]) -> float | str:
-    """Distance at which the canes seen would be commonly thick (m), or why there is none."""
-    wood = (labels == CANE) | (labels == NODE)
-    if np.count_nonzero(wood) < _LEAST_PIXELS:
+def _cane_mask(labels: Labels) -> Mask:
+    return np.isin(labels, (CANE, NODE))
+
+
+def _assumed_depth(photograph: Photograph, labels: Labels) -> float | str:
+    """Depth at which the visible canes would have a common thickness (m), or the reason why there is none."""
+    wood = _cane_mask(labels)
+    if np.count_nonzero(wood) < _MIN_CANE_PIXELS:
         return "no cane was recognised in this picture"
     width = 2.0 * float(np.median(distance_transform_edt(wood)[skeletonize(wood)])) - 1.0
-    if width < _THINNEST:
-        return f"canes are {width:.1f} pixels wide; go nearer or give a larger picture, so that they have {_THINNEST:g}"
+    if width < _MIN_CANE_WIDTH:
+        return f"canes are {width:.1f} pixels wide; {_MIN_CANE_WIDTH:g} are needed: go nearer or give a larger picture"
     return photograph.intrinsics.fx * _COMMON_DIAMETER / width

@@ -25,7 +25,7 @@ from controller.planning.cuts import CutPlanner
 from controller.planning.work_plan import WorkPlan
 from perception.config import PerceptionConfig
 from perception.pipeline import Perception
-from perception.segmentation.segmenter_choice import choose_segmenter
+from perception.segmentation.segmenter import choose_segmenter
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig, load_section
 from rolling_panda.messages import commands as intents
@@ -182,7 +182,7 @@ class ClosedLoop:
         if outputs.state is not None:
             self.inputs = replace(self.inputs, bridge=Sample(outputs.state, self.now))
         if outputs.frame is not None and outputs.frame.point_id:
-            self._looked = self.now + _LOOK_S, self.perception.look_closely(outputs.frame)
+            self._looked = self.now + _LOOK_S, self.perception.check_close_up(outputs.frame)
         if self._looked is not None and self.now >= self._looked[0]:
             self.inputs, self._looked = replace(self.inputs, look=Sample(self._looked[1], self.now)), None
         if outputs.frame is not None:

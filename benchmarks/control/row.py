@@ -31,7 +31,7 @@ from bridge.sim.vineyard.truth import judge
 from controller.config import ControllerConfig
 from controller.motion.follower import Tracking
 from controller.whole_body.registry import METHODS
-from perception.segmentation.segmenter_choice import SEGMENTERS
+from perception.segmentation.segmenter import SEGMENTERS
 from rolling_panda import messages as m
 from rolling_panda.config import load_section
 from rolling_panda.messages import commands as intents

@@ -29,9 +29,9 @@ class Confusion:
         return self._segmenter.name
 
     @property
-    def widening(self) -> float:
+    def width_bias(self) -> float:
         """As the segmenter's."""
-        return self._segmenter.widening
+        return self._segmenter.width_bias
 
     def segment(self, view: View) -> NDArray[np.uint8]:
         """As the segmenter's."""

@@ -32,7 +32,7 @@ class Stretch:
         frame_ms: Median processor time of a frame through segmentation, plant model and rule.
         spurs: Known at the end.
         points: Shown at the end.
-        obstacles: Rods and canes told at the end.
+        obstacles: Obstacles told at the end.
     """
 
     vines: int
@@ -68,7 +68,7 @@ def grow_long(seed: int, vines: int, step: float, perception: Perception, model:
             points = len(perception.process(frame).points)
             times.append(1000 * (time.process_time() - began))
             sequence += 1
-        spurs, told = len(perception.known.spurs), len(perception.obstacles)
+        spurs, told = len(perception.plant_map.spurs), len(perception.obstacles)
         out.append(Stretch(vine + 1, len(times), float(np.median(times)), spurs, points, told))
     return out
 

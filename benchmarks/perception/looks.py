@@ -20,7 +20,7 @@ from controller.work.point_queue import Ticket
 from perception.config import PerceptionConfig
 from perception.segmentation.frame import decode_frame
 from perception.segmentation.segmenter import Segmenter
-from perception.tracking.close_up import look_closely
+from perception.tracking.close_up import check_close_up
 from rolling_panda import messages as m
 from rolling_panda.errors import InputError
 from rolling_panda.messages.perception import CloseLook
@@ -54,7 +54,7 @@ class CloseCamera:
     """Looks at a row from near, with all errors of the camera on."""
 
     def __init__(self, camera: Camera, segmenter: Segmenter, config: PerceptionConfig, model: RobotModel) -> None:
-        """Bind the camera of a row; `config` as perception has it, with the segmenter's widening."""
+        """Bind the camera of a row; `config` as perception has it, with the segmenter's width bias."""
         self._camera, self._segmenter, self._config, self._model = camera, segmenter, config, model
         self._base, self._position = m.PlanarPose(), msgspec.convert((0.0, 0.0, *survey_arm()), m.Actuated)
         self._taken = _FIRST
@@ -65,7 +65,7 @@ class CloseCamera:
         image = self._camera.render(row, T_odom_camera, self._taken)
         frame = camera_frame(image, self._camera, self._base, self._position, self._taken)
         view = replace(decode_frame(frame, self._model), R=T_odom_camera[:3, :3], t=T_odom_camera[:3, 3])
-        return look_closely(view, self._segmenter, point, self._taken, self._config)
+        return check_close_up(view, self._segmenter, point, self._taken, self._config)
 
     @property
     def T_tool_camera(self) -> Array:

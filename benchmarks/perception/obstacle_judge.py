@@ -97,10 +97,10 @@ class ObstacleJudge:
         """
         config = self._config
         x, y, z = ((self._place - T_world_camera[:3, 3]) @ T_world_camera[:3, :3]).T
-        nearest = np.where(self._kind == "wire", config.nearest, config.thick_nearest)
+        nearest = np.where(self._kind == "wire", config.min_depth, config.min_depth_thick)
         safe = np.maximum(z, 1e-6)
         u, v = np.rint(k.fx * x / safe + k.cx), np.rint(k.fy * y / safe + k.cy)
-        ahead = (z > nearest) & (z < config.farthest) & (u > 0) & (u < k.width - 1) & (v > 0) & (v < k.height - 1)
+        ahead = (z > nearest) & (z < config.max_depth) & (u > 0) & (u < k.width - 1) & (v > 0) & (v < k.height - 1)
         rows, cols = v[ahead].astype(int), u[ahead].astype(int)
         # The lens looks a little elsewhere than it is taken to: a pixel beside will do.
         shown = np.zeros(len(rows), dtype=bool)
@@ -121,7 +121,7 @@ class ObstacleJudge:
         if not final:
             return
         for kind in KINDS:
-            seen = (self._kind == kind) & (self._looks >= self._config.hits)
+            seen = (self._kind == kind) & (self._looks >= self._config.min_hits)
             if not seen.any():
                 continue
             gaps = np.full(int(seen.sum()), np.inf)

@@ -32,8 +32,7 @@ from bridge.sim.vineyard.row import Array
 from perception.config import PerceptionConfig
 from perception.obstacles.obstacle_map import ObstacleMap
 from perception.segmentation.frame import View, decode_frame
-from perception.segmentation.segmenter import Segmenter
-from perception.segmentation.segmenter_choice import SEGMENTERS, choose_segmenter
+from perception.segmentation.segmenter import SEGMENTERS, Segmenter, choose_segmenter
 from rolling_panda import messages as m
 from rolling_panda.errors import RollingPandaError
 from rolling_panda.model.robot import RobotModel, configuration
@@ -157,14 +156,14 @@ def run(
         view, labels = taken[picture]
         if last[picture] == k:
             del taken[picture]
-        if -view.R[2, 1] < config.upright:
+        if -view.R[2, 1] < config.min_upright:
             continue
         began = time.perf_counter()
         capsules = known.update(view, labels)
         spent += time.perf_counter() - began
         if (k + 1) % max(1, len(shown) // _JUDGED) == 0 or k + 1 == len(shown):
             judge.judge(capsules, final=k + 1 == len(shown))
-            for (kind, reason), count in known.left_out.items():
+            for (kind, reason), count in known.rejected.items():
                 name = f"{kind} {reason}"
                 left_out[name] = max(left_out.get(name, 0), count)
     return Outcome(condition, seed, len(shown), len(last), judge.verdict(), 1000 * spent / max(1, len(shown)), left_out)

@@ -35,7 +35,7 @@ from bridge.sim.vineyard.grow import grow
 from perception.config import PerceptionConfig, RuleConfig
 from perception.pipeline import Perception
 from perception.segmentation.frame import decode_frame
-from perception.segmentation.segmenter_choice import SEGMENTERS, choose_segmenter
+from perception.segmentation.segmenter import SEGMENTERS, choose_segmenter
 from rolling_panda import messages as m
 from rolling_panda.errors import RollingPandaError
 from rolling_panda.model.robot import RobotModel, configuration

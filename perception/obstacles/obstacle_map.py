@@ -1,152 +1,147 @@
-"""What stands in the robot's way: posts, trunks, cordons and wires as rods, gathered over all frames.
+"""Obstacle map: posts, trunks, cordons and wires as capsules, from all frames.
 
-Cells gather the evidence for and against each kind of wood (`evidence.py`). Cells of a kind are told apart by where
-they are across the rod, and each group gets the lines that a trained row lets one expect there (`rods.py`). What no
-trained row has, such as wood far before or behind it, is left out and counted.
+There is an occupancy grid for each class (`occupancy.py`). Its occupied cells are split into groups by gaps, and
+cylinders are fitted to each group with priors from the geometry of a row (`cylinder_fit.py`). Implausible wood, such as
+wood off the row, is rejected and counted.
 """
 
 import math
 from collections import Counter
 
 import numpy as np
-from numpy.typing import NDArray
 
+from perception.arrays import Array, Index, Labels, vector3
 from perception.config import ObstacleConfig
-from perception.obstacles.evidence import Evidence, Surface
-from perception.obstacles.rods import Rod, RowPlane, rods_of, row_plane
-from perception.plant.clearance import Rods
-from perception.plant.model import Array
-from perception.segmentation.frame import Index, View
+from perception.obstacles.cylinder_fit import Cylinder, RowPlane, fit_cylinders, row_plane
+from perception.obstacles.occupancy import OccupancyGrid, OccupiedCells
+from perception.plant.capsules import CapsuleSet
+from perception.segmentation.frame import View
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.messages.types import WoodClass
 
-#: Share of all that is told that rods may be: on a long row the nearest, so that canes have room too.
-_RODS = 0.75
-#: How a class of rods stands: `upright`, `along` the row as one straight line, or along it in bent `pieces`.
+#: Share of the published capsules that may be cylinders; the rest is for canes.
+_MAX_SHARE = 0.75
+#: Course of each class: `upright`, straight `along` the row, or along it in bent `pieces`.
 _SHAPES: dict[WoodClass, str] = {"post": "upright", "trunk": "upright", "cordon": "pieces", "wire": "along"}
-
-#: Two uprights with less room between them are one (m).
+#: A post and a trunk with a smaller distance between their surfaces are the same thing (m).
 _SAME = 0.01
 
-Fitted = tuple[list[Rod], list[str]]
+#: Cylinders of a group, and the reasons of rejected ones.
+Fit = tuple[list[Cylinder], list[str]]
 
 
 class ObstacleMap:
-    """Gathers where wood is seen, and turns what is plausible into capsules."""
+    """Maps the wood that the robot must avoid."""
 
     def __init__(self, config: ObstacleConfig) -> None:
-        """Start with nothing seen."""
+        """Start with an empty map."""
         self._config = config
-        self._seen: dict[WoodClass, Evidence] = {
-            kind: Evidence(kind, config.cell, config.hits, config.cells) for kind in _SHAPES
+        self._grids: dict[WoodClass, OccupancyGrid] = {
+            kind: OccupancyGrid(kind, config.cell_size, config.min_hits, config.max_cells) for kind in _SHAPES
         }
-        self._fitted: dict[WoodClass, list[tuple[Array, Fitted]]] = {}
-        self.left_out: Counter[tuple[WoodClass, str]] = Counter()
-        """What was taken for wood where no such wood can be, by kind and reason, as of the last frame."""
+        self._fits: dict[WoodClass, list[tuple[Array, Fit]]] = {}
+        self.rejected: Counter[tuple[WoodClass, str]] = Counter()
+        """Implausible wood by class and reason, as of the last frame."""
 
-    def update(self, view: View, labels: NDArray[np.uint8]) -> tuple[Capsule, ...]:
-        """Take one frame in; everything known now.
+    def update(self, view: View, labels: Labels) -> tuple[Capsule, ...]:
+        """Add one frame; returns the map.
 
         Args:
             view: The frame.
             labels: H×W class indices.
 
         Returns:
-            Rods in odom (m), one radius along each; where they are too many the nearest ones.
+            Capsules in odom (m), the nearest where they are too many.
         """
         config = self._config
-        for kind, cells in self._seen.items():
-            nearest = config.nearest if kind == "wire" else config.thick_nearest
-            cells.update(view, labels, nearest, config.farthest, config.points)
-        held = {kind: cells.held() for kind, cells in self._seen.items()}
-        plane = row_plane(held)
-        self.left_out.clear()
-        capsules = self._once([capsule for kind, cells in held.items() for capsule in self._rods(kind, cells, plane)])
-        most = max(1, int(_RODS * config.most))
+        for kind, grid in self._grids.items():
+            min_depth = config.min_depth if kind == "wire" else config.min_depth_thick
+            grid.update(view, labels, min_depth, config.max_depth, config.max_points)
+        occupied = {kind: grid.occupied() for kind, grid in self._grids.items()}
+        plane = row_plane(occupied)
+        self.rejected.clear()
+        capsules = [capsule for kind, cells in occupied.items() for capsule in self._capsules(kind, cells, plane)]
+        capsules = self._without_duplicates(capsules)
+        most = max(1, int(_MAX_SHARE * config.max_capsules))
         if len(capsules) <= most:
             return tuple(capsules)
-        gaps = Rods(tuple(capsules)).gaps(view.t[None])[0]
-        return tuple(capsules[k] for k in np.sort(np.argsort(gaps, kind="stable")[:most]).tolist())
+        distances = CapsuleSet(tuple(capsules)).distances(view.t[None])[0]
+        return tuple(capsules[k] for k in np.sort(np.argsort(distances, kind="stable")[:most]).tolist())
 
-    def _rods(self, kind: WoodClass, cells: Surface, plane: RowPlane) -> list[Capsule]:
-        near = plane.near(cells.place, self._config.off_row)
-        astray = sum(len(group) >= self._config.least for group in self._groups(kind, cells.place[~near]))
-        if astray:
-            self.left_out[kind, "off the row"] += astray
-        cells = cells.take(near)
-        groups = [group for group in self._groups(kind, cells.place) if len(group) >= self._config.least]
-        fitted = self._fits(kind, cells, groups)
-        for _, implausible in fitted:
-            self.left_out.update((kind, reason) for reason in implausible)
+    def _capsules(self, kind: WoodClass, cells: OccupiedCells, plane: RowPlane) -> list[Capsule]:
+        near = plane.near(cells.position, self._config.row_tolerance)
+        if off_row := len(self._groups(kind, cells.position[~near])):
+            self.rejected[kind, "off the row"] += off_row
+        cells = cells.select(near)
+        fits = self._fit(kind, cells, self._groups(kind, cells.position))
+        for _, reasons in fits:
+            self.rejected.update((kind, reason) for reason in reasons)
         return [
-            Capsule(kind, _vector(rod.start), _vector(rod.end), rod.radius, rod.radius)
-            for rods, _ in fitted
-            for rod in rods
+            Capsule(kind, vector3(each.start), vector3(each.end), each.radius, each.radius)
+            for cylinders, _ in fits
+            for each in cylinders
         ]
 
-    def _once(self, capsules: list[Capsule]) -> list[Capsule]:
-        """What is taken for a post and for a trunk is the one of which more was seen."""
+    def _without_duplicates(self, capsules: list[Capsule]) -> list[Capsule]:
+        """Of a post and a trunk at the same place the longer one stays."""
         trunks = [capsule for capsule in capsules if capsule.kind == "trunk"]
         posts = tuple(capsule for capsule in capsules if capsule.kind == "post")
         if not trunks or not posts:
             return capsules
         middles = np.array([[trunk.start, trunk.end] for trunk in trunks]).mean(axis=1)
-        gaps = Rods(posts).gaps(middles) - np.array([[trunk.start_radius] for trunk in trunks])
+        gaps = CapsuleSet(posts).distances(middles) - np.array([[trunk.start_radius] for trunk in trunks])
         less: list[Capsule] = []
         for i, j in np.argwhere(gaps < _SAME).tolist():
             less.append(min(trunks[i], posts[j], key=lambda each: math.dist(each.start, each.end)))
         for each in less:
-            self.left_out[each.kind, "that another one is"] += 1
+            self.rejected[each.kind, "that another one is"] += 1
         return [capsule for capsule in capsules if not any(capsule is each for each in less)]
 
-    def _groups(self, kind: WoodClass, places: Array) -> list[Index]:
-        """Numbers of the cells that may be of the same rod."""
+    def _groups(self, kind: WoodClass, positions: Array) -> list[Index]:
+        """Indices of the cells of each cylinder or stretch of wire; small groups are dropped."""
         config, shape = self._config, _SHAPES[kind]
-        every = np.arange(len(places))
+        every = np.arange(len(positions))
         if shape == "upright":
-            return _groups(places, every, 0, config.apart)
-        if shape == "along":
-            return _groups(places, every, 2, config.wire_apart)
-        return _pieces(places, config.piece, config.piece_apart)
+            groups = _split(positions, every, 0, config.upright_separation)
+        elif shape == "along":
+            groups = _split(positions, every, 2, config.wire_separation)
+        else:
+            groups = _pieces(positions, config.cordon_piece, config.cordon_separation)
+        return [group for group in groups if len(group) >= config.min_cells]
 
-    def _fits(self, kind: WoodClass, cells: Surface, groups: list[Index]) -> list[Fitted]:
-        """The rods of each group; where no look has changed a group they stay."""
-        old = {(len(places), places[0].tobytes()): (places, fitted) for places, fitted in self._fitted.get(kind, [])}
+    def _fit(self, kind: WoodClass, cells: OccupiedCells, groups: list[Index]) -> list[Fit]:
+        """The cylinders of each group; unchanged groups are not fitted again."""
+        old = {(len(cached), cached[0].tobytes()): (cached, fit) for cached, fit in self._fits.get(kind, [])}
         new = []
         for group in groups:
-            places = cells.place[group]
-            before = old.get((len(places), places[0].tobytes()))
-            if before is not None and np.array_equal(before[0], places):
-                new.append(before)
+            positions = cells.position[group]
+            cached = old.get((len(positions), positions[0].tobytes()))
+            if cached is not None and np.array_equal(cached[0], positions):
+                new.append(cached)
             else:
-                new.append((places, rods_of(kind, cells.take(group), self._config)))
-        self._fitted[kind] = new
-        return [fitted for _, fitted in new]
+                new.append((positions, fit_cylinders(kind, cells.select(group), self._config)))
+        self._fits[kind] = new
+        return [fit for _, fit in new]
 
 
-def _groups(places: Array, which: Index, axis: int, apart: float) -> list[Index]:
-    """Of some places, by their numbers, groups between which there is a gap of `apart` along one axis."""
+def _split(positions: Array, which: Index, axis: int, separation: float) -> list[Index]:
+    """Groups of some positions, by index, with gaps of `separation` between them along one axis."""
     if len(which) == 0:
         return []
-    which = which[np.argsort(places[which, axis], kind="stable")]
-    return np.split(which, np.nonzero(np.diff(places[which, axis]) > apart)[0] + 1)
+    which = which[np.argsort(positions[which, axis], kind="stable")]
+    return np.split(which, np.nonzero(np.diff(positions[which, axis]) > separation)[0] + 1)
 
 
-def _pieces(places: Array, piece: float, apart: float) -> list[Index]:
-    """Places in groups by the stretch of the row, `piece` long, that they are in, without gaps of `apart` across it."""
-    if len(places) == 0:
+def _pieces(positions: Array, length: float, separation: float) -> list[Index]:
+    """Groups of positions in pieces of the row of a length, split at gaps of `separation` across it."""
+    if len(positions) == 0:
         return []
-    number = np.floor(places[:, 0] / piece)
+    number = np.floor(positions[:, 0] / length)
     order = np.argsort(number, kind="stable")
     pieces = np.split(order, np.nonzero(np.diff(number[order]))[0] + 1)
     return [
         body
         for each in pieces
-        for level in _groups(places, each, 2, apart)
-        for body in _groups(places, level, 1, apart)
+        for level in _split(positions, each, 2, separation)
+        for body in _split(positions, level, 1, separation)
     ]
-
-
-def _vector(point: Array) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in point)
-    return x, y, z

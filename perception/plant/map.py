@@ -1,7 +1,7 @@
-"""The vines as known from all frames: each spur once, its canes once, with what repeated looks say about them.
+"""Map of the vines over all frames: each spur and each cane once, with statistics over their observations.
 
-A cane seen again is known by its spur and by where its axis runs. Its nodes are those that were seen in a good share of
-the looks that could have shown them; places and radii are means over the looks, with their scatter.
+A cane is identified by its spur and the course of its axis. Its nodes are those seen in a sufficient share of the
+observations; positions and radii are means with their scatter.
 """
 
 from collections import deque
@@ -10,86 +10,120 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from perception.plant.model import Array, Cane, Node, Plant, Spur
+from perception.arrays import Array, interpolate, vector3
+from perception.plant.model import Cane, Node, Plant, Spur
 from perception.plant.numbering import SpurNumber
+from rolling_panda.messages.types import Vector3
 
-#: Two axes this near to each other are one cane (m).
+#: Axes nearer to each other than this are one cane (m).
 _SAME_CANE = 0.015
-#: Nodes this near along a cane are one (m).
+#: Nodes nearer than this along a cane are one (m).
 _SAME_NODE = 0.018
-#: Share of the looks at its place that must have shown a node.
-_SHARE = 0.4
-#: Looks that a mean goes back.
-_MEMORY = 20
+#: Share of a cane's observations that must have shown a node.
+_MIN_SHARE = 0.4
+#: Observations that a mean covers.
+_WINDOW = 20
+#: Points of a cane's line for display, and its least length (m).
+_LINE_POINTS, _MIN_LINE = 9, 0.02
 
 
 @dataclass
 class Estimate:
-    """Mean and scatter of something measured in several looks.
+    """Running mean and scatter of a measured vector.
 
     Attributes:
-        mean: Of the looks (N).
-        covariance: Of a single look (N×N).
-        looks: How many.
+        mean: Mean of the observations (N).
+        covariance: Covariance of a single observation (N×N).
+        count: Number of observations.
     """
 
     mean: Array
     covariance: Array
-    looks: int = 1
+    count: int = 1
 
     @classmethod
     def of(cls, value: Array) -> "Estimate":
-        """From a single look."""
+        """From a single observation."""
         return cls(np.array(value, dtype=float), np.zeros((len(value), len(value))))
 
     def add(self, value: Array) -> None:
-        """Take one more look in."""
-        self.looks += 1
-        share = 1.0 / min(self.looks, _MEMORY)
+        """Add an observation."""
+        self.count += 1
+        gain = 1.0 / min(self.count, _WINDOW)
         off = value - self.mean
-        self.mean = self.mean + share * off
-        self.covariance = (1.0 - share) * (self.covariance + share * np.outer(off, off))
+        self.mean = self.mean + gain * off
+        self.covariance = (1.0 - gain) * (self.covariance + gain * np.outer(off, off))
 
 
 @dataclass
 class KnownNode:
-    """A node: arc length from the cane's base (m), looks that showed it, and the most pixels it had."""
+    """A node: arc length from the cane's base (m), and its largest size (px)."""
 
-    arc: Estimate
+    estimate: Estimate
     pixels: int
+
+    @property
+    def arc(self) -> float:
+        """Mean arc length (m)."""
+        return float(self.estimate.mean[0])
 
 
 @dataclass
 class KnownCane:
-    """A cane over all looks.
+    """A cane over all observations.
 
     Attributes:
-        best: As seen in the look that showed most of it.
-        radius: Over the looks (1, m).
-        base: Over the looks (3, m, odom).
+        best: The most complete observation.
+        radius: Estimate (1, m).
+        base: Estimate (3, m, odom).
         nodes: Seen at least once, by arc length.
-        radii: Of the newest looks (m).
-        cut_at: Arc length where it was cut (m); infinite while it stands.
+        radii: Newest measurements (m).
+        cut_at: Arc length of a cut that was made (m); infinite while the cane stands.
     """
 
     best: Cane
     radius: Estimate
     base: Estimate
     nodes: list[KnownNode] = field(default_factory=list)
-    radii: deque[float] = field(default_factory=lambda: deque(maxlen=_MEMORY))
+    radii: deque[float] = field(default_factory=lambda: deque(maxlen=_WINDOW))
     cut_at: float = np.inf
 
-    def trusted(self) -> tuple[KnownNode, ...]:
-        """Nodes seen in a good share of the looks, on what still stands."""
-        return tuple(n for n in self.nodes if n.arc.looks >= _SHARE * self.base.looks and n.arc.mean[0] < self.cut_at)
+    @classmethod
+    def of(cls, cane: Cane) -> "KnownCane":
+        """From a single observation."""
+        known = cls(cane, Estimate.of(np.array([cane.radius])), Estimate.of(cane.base))
+        known.nodes = [KnownNode(Estimate.of(np.array([node.arc])), node.pixels) for node in cane.nodes]
+        known.radii.append(cane.radius)
+        return known
 
-    def steadied(self, cane: Cane) -> Cane:
-        """A look at it, as thick as all looks say: in a single one something beside it may have made it wide."""
-        return replace(cane, radius=float(np.median(self.radii)), looks=len(self.radii))
+    def add(self, cane: Cane) -> None:
+        """Add an observation."""
+        self.radius.add(np.array([cane.radius]))
+        self.radii.append(cane.radius)
+        self.base.add(cane.base)
+        if _unseen(cane) < _unseen(self.best) and cane.length > 0.2:
+            self.best = cane
+        for node in cane.nodes:
+            near = [known for known in self.nodes if abs(known.arc - node.arc) < _SAME_NODE]
+            if near:
+                same = min(near, key=lambda known: abs(known.arc - node.arc))
+                same.estimate.add(np.array([node.arc]))
+                same.pixels = max(same.pixels, node.pixels)
+            else:
+                self.nodes.append(KnownNode(Estimate.of(np.array([node.arc])), node.pixels))
+        self.nodes.sort(key=lambda node: node.arc)
+
+    def with_median_radius(self, cane: Cane) -> Cane:
+        """An observation of it with the median radius of all: single ones may include wood beside it."""
+        return replace(cane, radius=float(np.median(self.radii)), observations=len(self.radii))
 
     def as_cane(self) -> Cane:
-        """The best look with the nodes and the radius of all."""
-        nodes = tuple(Node(float(n.arc.mean[0]), n.pixels) for n in self.trusted())
+        """The best observation with the radius and the confirmed nodes of all, up to a cut."""
+        nodes = tuple(
+            Node(node.arc, node.pixels)
+            for node in self.nodes
+            if node.estimate.count >= _MIN_SHARE * self.base.count and node.arc < self.cut_at
+        )
         stands = self.best.arc <= self.cut_at
         if np.count_nonzero(stands) < 2:
             stands[:2] = True
@@ -97,10 +131,19 @@ class KnownCane:
         end = self.best.end if np.isinf(self.cut_at) else "free"
         return replace(self.best, axis=axis, arc=arc, nodes=nodes, radius=float(self.radius.mean[0]), end=end)
 
+    def line(self) -> tuple[Vector3, ...]:
+        """A few points of the standing axis for display (m, odom); empty where it is too short."""
+        start, end = float(self.best.arc[0]), min(self.best.length, self.cut_at)
+        if end - start < _MIN_LINE:
+            return ()
+        return tuple(
+            vector3(p) for p in interpolate(np.linspace(start, end, _LINE_POINTS), self.best.arc, self.best.axis)
+        )
+
 
 @dataclass
 class KnownSpur:
-    """A spur over all looks: where it is (3, m, odom), the look that showed most canes, and the canes."""
+    """A spur over all observations: its position (3, m, odom), its most complete observation and its canes."""
 
     number: SpurNumber
     position: Estimate
@@ -108,51 +151,50 @@ class KnownSpur:
     canes: list[KnownCane] = field(default_factory=list)
 
     def as_spur(self) -> Spur:
-        """The best look with canes as known from all."""
-        canes = [cane.as_cane() for cane in self.canes if 2 * cane.base.looks >= self.position.looks]
+        """The best observation with the mapped canes that at least half of the observations have shown."""
+        canes = [cane.as_cane() for cane in self.canes if 2 * cane.base.count >= self.position.count]
         return replace(self.best, canes=tuple(sorted(canes, key=lambda cane: -cane.length)))
+
+    def nearest_cane(self, position: Array) -> tuple[int, float, float]:
+        """Index, distance (m) and arc length (m) of the cane nearest to a position; distance infinite without canes."""
+        best = 0, np.inf, 0.0
+        for index, cane in enumerate(self.canes):
+            distances = np.linalg.norm(cane.best.axis - position, axis=1)
+            k = int(np.argmin(distances))
+            if distances[k] < best[1]:
+                best = index, float(distances[k]), float(cane.best.arc[k])
+        return best
 
 
 class PlantMap:
-    """Gathers plants frame by frame. Its size grows with what was seen, not with how long one looks."""
+    """Collects the plants of all frames. Its size depends on the row, not on the number of frames."""
 
     def __init__(self) -> None:
-        """Nothing is known yet."""
+        """Start with an unknown row."""
         self._spurs: dict[SpurNumber, KnownSpur] = {}
-        self._trunks: dict[int, Estimate] = {}
 
     def update(self, plant: Plant, numbers: tuple[SpurNumber, ...]) -> tuple[Spur, ...]:
-        """Take the plant of one frame in; returns its spurs with canes as thick as all looks so far say.
+        """Add the plant of one frame; returns its spurs with the median radius of each cane.
 
         Args:
-            plant: As perceived.
+            plant: Plant of one frame.
             numbers: Of its spurs, in their order.
         """
-        steadied = []
+        out = []
         for spur, number in zip(plant.spurs, numbers, strict=True):
             known = self._spurs.get(number)
             if known is None:
                 known = self._spurs[number] = KnownSpur(number, Estimate.of(spur.position), spur)
             else:
                 known.position.add(spur.position)
-                if not spur.doubt and (known.best.doubt or len(spur.canes) > len(known.best.canes)):
+                if not spur.incomplete and (known.best.incomplete or len(spur.canes) > len(known.best.canes)):
                     known.best = spur
-            canes = tuple(_add_cane(known, cane).steadied(cane) for cane in spur.canes)
-            steadied.append(replace(spur, canes=canes))
-        stand = np.array([spur.position.mean[:2] for spur in self._spurs.values()]).reshape(-1, 2)
-        vines = np.array([number.vine for number in self._spurs], dtype=int)
-        for place in plant.trunks:
-            near = vines[np.linalg.norm(stand - place[:2], axis=1) < 0.4].tolist()
-            if near:
-                vine = max(set(near), key=near.count)
-                if vine in self._trunks:
-                    self._trunks[vine].add(place)
-                else:
-                    self._trunks[vine] = Estimate.of(place)
-        return tuple(steadied)
+            canes = tuple(_associate(known, cane).with_median_radius(cane) for cane in spur.canes)
+            out.append(replace(spur, canes=canes))
+        return tuple(out)
 
     def sever(self, position: Array) -> bool:
-        """What lies beyond a cut at `position` (3, m, odom) is gone; whether any known cane passes there."""
+        """Remove the wood beyond a cut at `position` (3, m, odom); whether a known cane was there."""
         found = self.nearest_cane(position)
         if found is None or found[2] > _SAME_CANE:
             return False
@@ -161,59 +203,34 @@ class PlantMap:
         return True
 
     def nearest_cane(self, position: Array) -> tuple[KnownSpur, KnownCane, float, float] | None:
-        """Spur, cane, distance (m) and arc length (m) of the cane nearest to a place; None where none is known."""
-        best: tuple[KnownSpur, KnownCane, float, float] | None = None
-        for spur in self._spurs.values():
-            for cane in spur.canes:
-                gaps = np.linalg.norm(cane.best.axis - position, axis=1)
-                k = int(np.argmin(gaps))
-                if best is None or gaps[k] < best[2]:
-                    best = spur, cane, float(gaps[k]), float(cane.best.arc[k])
-        return best
+        """Spur, cane, distance (m) and arc length (m) of the cane nearest to a position; None without canes."""
+        found = [(spur, *spur.nearest_cane(position)) for spur in self._spurs.values() if spur.canes]
+        if not found:
+            return None
+        spur, index, distance, arc = min(found, key=lambda each: each[2])
+        return spur, spur.canes[index], distance, arc
 
     @property
     def spurs(self) -> tuple[KnownSpur, ...]:
         """All spurs, vine by vine."""
-        return tuple(self._spurs[number] for number in sorted(self._spurs, key=lambda n: (n.vine, n.spur)))
+        return tuple(spur for _, spur in sorted(self._spurs.items()))
 
-    @property
-    def trunks(self) -> dict[int, Estimate]:
-        """Where each vine's trunk was seen."""
-        return dict(self._trunks)
+    def cane_lines(self) -> tuple[tuple[Vector3, ...], ...]:
+        """The standing axis of each cane as a line for display (m, odom)."""
+        return tuple(line for spur in self.spurs for cane in spur.canes if (line := cane.line()))
 
 
-def _add_cane(spur: KnownSpur, cane: Cane) -> KnownCane:
+def _associate(spur: KnownSpur, cane: Cane) -> KnownCane:
     for known in spur.canes:
-        if _gap(known.best, cane) < _SAME_CANE:
-            break
-    else:
-        known = KnownCane(cane, Estimate.of(np.array([cane.radius])), Estimate.of(cane.base), _nodes(cane))
-        known.radii.append(cane.radius)
-        spur.canes.append(known)
-        return known
-    known.radius.add(np.array([cane.radius]))
-    known.radii.append(cane.radius)
-    known.base.add(cane.base)
-    if cane.base_gap + _unseen(cane) < known.best.base_gap + _unseen(known.best) and cane.length > 0.2:
-        known.best = cane
-    for node in cane.nodes:
-        near = [other for other in known.nodes if abs(float(other.arc.mean[0]) - node.arc) < _SAME_NODE]
-        if near:
-            same = min(near, key=lambda other: abs(float(other.arc.mean[0]) - node.arc))
-            same.arc.add(np.array([node.arc]))
-            same.pixels = max(same.pixels, node.pixels)
-        else:
-            known.nodes.append(KnownNode(Estimate.of(np.array([node.arc])), node.pixels))
-    known.nodes.sort(key=lambda node: float(node.arc.mean[0]))
-    return known
+        if _axis_distance(known.best, cane) < _SAME_CANE:
+            known.add(cane)
+            return known
+    spur.canes.append(KnownCane.of(cane))
+    return spur.canes[-1]
 
 
-def _nodes(cane: Cane) -> list[KnownNode]:
-    return [KnownNode(Estimate.of(np.array([node.arc])), node.pixels) for node in cane.nodes]
-
-
-def _gap(first: Cane, second: Cane) -> float:
-    """Median distance of the two axes over the first decimetres that both have."""
+def _axis_distance(first: Cane, second: Cane) -> float:
+    """Median distance of two axes near their base (m)."""
     near = second.axis[second.arc < 0.25]
     if len(near) < 2:
         near = second.axis
@@ -221,4 +238,5 @@ def _gap(first: Cane, second: Cane) -> float:
 
 
 def _unseen(cane: Cane) -> float:
-    return sum(span.end - span.start for span in cane.hidden)
+    """Length that was not seen (m)."""
+    return cane.base_gap + sum(span.end - span.start for span in cane.hidden)

@@ -1,13 +1,15 @@
-"""The vine as perceived in one frame: spurs and their canes, with what was seen and what was hidden."""
+"""Plant model of one frame: spurs and their canes, with visible and hidden stretches."""
 
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-#: Why a cane's axis stops: the wood ends there, something stands in front, or the image ends.
+from perception.arrays import Array, interpolate
+
+#: Mean distance of the visible half of a cylinder from its axis, in radii.
+SURFACE_OFFSET = np.pi / 4
+#: Why a cane's axis ends: the wood ends, something occludes it, or the image ends.
 CaneEnd = Literal["free", "hidden", "image border"]
 
 
@@ -18,8 +20,8 @@ class Span:
     start: float
     end: float
 
-    def meets(self, start: float, end: float) -> bool:
-        """Whether it has a part in common with start…end (m)."""
+    def overlaps(self, start: float, end: float) -> bool:
+        """Whether it overlaps start…end (m)."""
         return self.start < end and start < self.end
 
 
@@ -28,8 +30,8 @@ class Node:
     """A node seen on a cane.
 
     Attributes:
-        arc: From the cane's base (m).
-        pixels: How large it was seen.
+        arc: Arc length from the cane's base (m).
+        pixels: Size in the image (px).
     """
 
     arc: float
@@ -38,17 +40,17 @@ class Node:
 
 @dataclass(frozen=True)
 class Cane:
-    """A one-year cane as far as it was seen.
+    """The visible part of a one-year cane.
 
     Attributes:
         axis: Centre line from the base outwards, N×3 in odom (m), N ≥ 2.
         arc: Arc length of each axis point from where the cane leaves the spur (N, m), increasing.
         radius: Typical radius (m).
-        nodes: By arc length; the basal bud too when it was seen.
-        hidden: Stretches that were not seen, by arc length.
-        end: Why the axis stops.
+        nodes: By arc length, including a visible basal bud.
+        hidden: Occluded stretches, by arc length.
+        end: Why the axis ends.
         base_gap: Distance from the first axis point to the wood it grows from (m).
-        looks: Over how many looks the radius was measured.
+        observations: Number of observations in the radius.
     """
 
     axis: Array
@@ -58,7 +60,7 @@ class Cane:
     hidden: tuple[Span, ...]
     end: CaneEnd
     base_gap: float
-    looks: int = 1
+    observations: int = 1
 
     @property
     def base(self) -> Array:
@@ -72,8 +74,9 @@ class Cane:
         return float(self.arc[-1])
 
     def at(self, arc: float) -> Array:
-        """Point on the axis at an arc length (3, m, odom); ends are held, never extrapolated."""
-        return np.array([np.interp(arc, self.arc, self.axis[:, i]) for i in range(3)])
+        """Point on the axis at an arc length (3, m, odom); the ends are held."""
+        point: Array = interpolate(np.array([arc]), self.arc, self.axis)[0]
+        return point
 
     def tangent(self, arc: float, reach: float = 0.01) -> Array:
         """Unit vector along the axis, away from the base, from the chord `reach` (m) to either side."""
@@ -89,35 +92,35 @@ class Spur:
     """A spur position: two-year wood on the cordon, with the canes that grow from it.
 
     Attributes:
-        position: Centre of what was seen of it (3, m, odom).
-        axis: The stub from the cordon outwards, 2×3 in odom (m); None where it was not seen clearly.
-        radius: Of the stub (m), 0 where it was not seen clearly.
+        position: Centre of its visible surface (3, m, odom).
+        axis: The stub from the cordon outwards, 2×3 in odom (m); None where it is not clearly visible.
+        radius: Of the stub (m), 0 where it is not clearly visible.
         canes: Longest first.
-        doubt: Why not all of its canes may have been seen, in words; empty where nothing speaks for that.
+        incomplete: Reason why canes may be out of view; empty if none.
     """
 
     position: Array
     axis: Array | None
     radius: float
     canes: tuple[Cane, ...]
-    doubt: str = ""
+    incomplete: str = ""
 
 
 @dataclass(frozen=True)
 class Plant:
-    """Everything perceived in one frame.
+    """The plants of one frame.
 
     Attributes:
         spurs: In order along the cordon.
-        trunks: Where trunks stand, N×3 in odom (m).
-        loose: Axes of pieces of cane that could not be followed to a spur, each N×3 in odom (m).
+        trunks: Positions of trunks, N×3 in odom (m).
+        unrooted: Axes of canes without a spur, each N×3 in odom (m).
     """
 
     spurs: tuple[Spur, ...]
     trunks: Array
-    loose: tuple[Array, ...]
+    unrooted: tuple[Array, ...]
 
-    def beside(self, spur: Spur) -> Array:
-        """Axis points of all cane that is not the given spur's, N×3 in odom (m)."""
+    def other_canes(self, spur: Spur) -> Array:
+        """Axis points of all canes of other spurs, N×3 in odom (m)."""
         axes = [cane.axis for other in self.spurs if other is not spur for cane in other.canes]
-        return np.concatenate([np.zeros((0, 3)), *axes, *self.loose])
+        return np.concatenate([np.zeros((0, 3)), *axes, *self.unrooted])

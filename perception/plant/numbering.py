@@ -1,35 +1,39 @@
-"""Numbers for people: which vine, which spur on it, kept from frame to frame."""
+"""Vine and spur numbers that persist from frame to frame."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from perception.plant.model import Array, Plant
+from perception.arrays import Array
+from perception.plant.model import Plant
+
+#: A position's mean covers this many observations.
+_WINDOW = 20
 
 
 @dataclass
 class _Trunk:
-    place: Array
-    number: int
+    position: Array
+    vine: int
 
 
 @dataclass
 class _Site:
-    place: Array
-    seen: int
+    position: Array
+    count: int
     number: "SpurNumber"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, order=True)
 class SpurNumber:
-    """Vine along the row and spur position on it, both from 1 in the order in which they were first seen."""
+    """Vine along the row and spur on that vine, both from 1 in the order of their first observation."""
 
     vine: int
     spur: int
 
 
-class RowNumbers:
-    """Remembers spur positions and trunks, so that a spur keeps its number while the robot drives on."""
+class SpurNumbering:
+    """Remembers the positions of spurs and trunks, so that numbers do not change while the robot moves."""
 
     def __init__(self, spur_separation: float, vine_spacing: float) -> None:
         """Start with an unknown row; distances in metres, as in `TrackerConfig`."""
@@ -39,42 +43,36 @@ class RowNumbers:
         self._sites: list[_Site] = []
 
     def number(self, plant: Plant, along: Array) -> tuple[SpurNumber, ...]:
-        """The numbers of the plant's spurs, in their order.
+        """Numbers of the plant's spurs, in their order.
 
         Args:
-            plant: As perceived in one frame, spurs in order along the row.
+            plant: Plant of one frame, with spurs in order along the row.
             along: Unit vector along the row (3, odom).
         """
-        for place in plant.trunks:
-            self._trunk(place, along)
-        taken: set[int] = set()
-        return tuple(self._site(spur.position, along, taken) for spur in plant.spurs)
+        for position in plant.trunks:
+            if all(abs(float((position - t.position) @ along)) >= 0.3 * self._spacing for t in self._trunks):
+                self._trunks.append(_Trunk(position, self._vine(position, along)))
+        used: set[int] = set()
+        return tuple(self._site(spur.position, along, used) for spur in plant.spurs)
 
-    def _trunk(self, place: Array, along: Array) -> None:
-        for trunk in self._trunks:
-            if abs(float((place - trunk.place) @ along)) < 0.3 * self._spacing:
-                return
-        self._trunks.append(_Trunk(place, self._vine(place, along)))
-
-    def _vine(self, place: Array, along: Array) -> int:
-        """Number of the vine whose trunk is nearest along the row; vines out of view are counted by their spacing."""
+    def _vine(self, position: Array, along: Array) -> int:
+        """Vine with the nearest trunk along the row; vines out of view are counted by their spacing."""
         if not self._trunks:
             return 1
-        nearest = min(self._trunks, key=lambda trunk: abs(float((place - trunk.place) @ along)))
-        return max(0, nearest.number + round(float((place - nearest.place) @ along) / self._spacing))
+        nearest = min(self._trunks, key=lambda trunk: abs(float((position - trunk.position) @ along)))
+        return max(0, nearest.vine + round(float((position - nearest.position) @ along) / self._spacing))
 
-    def _site(self, place: Array, along: Array, taken: set[int]) -> SpurNumber:
-        gaps = np.linalg.norm(np.array([site.place for site in self._sites]).reshape(-1, 3) - place, axis=1)
-        gaps[list(taken)] = np.inf
-        k = int(np.argmin(gaps)) if len(gaps) else -1
-        if k >= 0 and gaps[k] < self._separation:
+    def _site(self, position: Array, along: Array, used: set[int]) -> SpurNumber:
+        distances = np.linalg.norm(np.array([site.position for site in self._sites]).reshape(-1, 3) - position, axis=1)
+        distances[list(used)] = np.inf
+        k = int(np.argmin(distances)) if len(distances) else -1
+        if k >= 0 and distances[k] < self._separation:
             site = self._sites[k]
-            site.seen += 1
-            site.place = site.place + (place - site.place) / min(site.seen, 20)
-            taken.add(k)
-            return site.number
-        vine = self._vine(place, along)
-        count = sum(site.number.vine == vine for site in self._sites)
-        self._sites.append(_Site(place, 1, SpurNumber(vine, count + 1)))
-        taken.add(len(self._sites) - 1)
-        return self._sites[-1].number
+            site.count += 1
+            site.position = site.position + (position - site.position) / min(site.count, _WINDOW)
+        else:
+            vine, k = self._vine(position, along), len(self._sites)
+            count = sum(site.number.vine == vine for site in self._sites)
+            self._sites.append(_Site(position, 1, SpurNumber(vine, count + 1)))
+        used.add(k)
+        return self._sites[k].number

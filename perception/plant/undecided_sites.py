@@ -1,4 +1,4 @@
-"""Places without a point: why, and whether another look may help or only a person."""
+"""Spurs without a pruning point: the reason, and whether another look may help or only an operator."""
 
 from dataclasses import dataclass
 
@@ -7,27 +7,27 @@ from msgspec.structs import replace
 from perception.plant.numbering import SpurNumber
 from rolling_panda import messages as m
 
-#: After so many looks from before a place another one would show no more.
-_ENOUGH = 12
+#: Observations from the front after which another look is not expected to help.
+_MAX_OBSERVATIONS = 12
 
 
-class MoreToSee(str):
-    """A reason for leaving a place alone that another look may take away. Any other reason is for a person."""
+class NeedsAnotherLook(str):
+    """A reason that another look may resolve. Any other reason is for an operator."""
 
     __slots__ = ()
 
 
 def abstention(reason: str, number: SpurNumber | None = None, position: m.Vector3 | None = None) -> m.Abstention:
-    """The wire form of a reason.
+    """The message of a reason.
 
     Args:
-        reason: In words; a `MoreToSee` asks for another look.
-        number: Of the spur, None where it is about no spur in particular.
+        reason: Text, or `NeedsAnotherLook`.
+        number: Of the spur; None where it is about no spur in particular.
         position: Of the spur (m, odom).
     """
     return m.Abstention(
         reason=reason[:500],
-        needs="another look" if isinstance(reason, MoreToSee) else "operator",
+        needs="another look" if isinstance(reason, NeedsAnotherLook) else "operator",
         vine=0 if number is None else number.vine,
         spur=0 if number is None else number.spur,
         position=position,
@@ -35,66 +35,62 @@ def abstention(reason: str, number: SpurNumber | None = None, position: m.Vector
 
 
 @dataclass(frozen=True)
-class _Open:
-    """What was said of a spur: whether it has a cut all the same, what is open, and whether that was from before it."""
-
-    cuts: bool
-    said: tuple[m.Abstention, ...]
-    before: bool
+class _Site:
+    has_cuts: bool
+    abstentions: tuple[m.Abstention, ...]
+    in_front: bool
 
 
-class OpenPlaces:
-    """What was said last of each spur that something was left open at, over all frames."""
+class UndecidedSites:
+    """Newest reasons of each undecided spur, over all frames."""
 
     def __init__(self) -> None:
-        """Nothing is open."""
-        self._open: dict[SpurNumber, _Open] = {}
-        self._looks: dict[SpurNumber, int] = {}
+        """Start without any."""
+        self._sites: dict[SpurNumber, _Site] = {}
+        self._observations: dict[SpurNumber, int] = {}
 
     def clear(self) -> None:
-        """Forget everything: the rule has changed."""
-        self._open.clear()
+        """Drop all reasons, after a change of the rule."""
+        self._sites.clear()
 
-    def note(
+    def update(
         self,
         number: SpurNumber,
-        cuts: bool,
+        has_cuts: bool,
         reasons: list[str],
         position: m.Vector3 | None = None,
-        before: bool = True,
+        in_front: bool = True,
     ) -> None:
-        """Say what is open at a spur from now on.
+        """Replace the reasons of a spur.
 
         Args:
             number: Of the spur.
-            cuts: Whether a cut is proposed there all the same.
-            reasons: None closes it.
+            has_cuts: Whether cuts are proposed there as well.
+            reasons: An empty list closes the site.
             position: Of the spur (m, odom).
-            before: Whether the camera was before it. What was seen from there is not taken back from aside.
+            in_front: Whether the camera is in front of it. Other views do not overrule one from the front.
         """
-        if before:
-            self._looks[number] = self._looks.get(number, 0) + 1
+        if in_front:
+            self._observations[number] = self._observations.get(number, 0) + 1
+        known = self._sites.get(number)
         if not reasons:
-            self._open.pop(number, None)
-            return
-        known = self._open.get(number)
-        if before or known is None or not known.before:
-            said = tuple(abstention(reason, number, position) for reason in reasons)
-            self._open[number] = _Open(cuts, said, before)
+            self._sites.pop(number, None)
+        elif in_front or known is None or not known.in_front:
+            abstentions = tuple(abstention(reason, number, position) for reason in reasons)
+            self._sites[number] = _Site(has_cuts, abstentions, in_front)
 
-    def told(self, shown: set[SpurNumber]) -> tuple[m.Abstention, ...]:
-        """Everything open, vine by vine; a look that saw too little takes nothing back at a spur that has a point."""
-        places = sorted(self._open.items(), key=lambda place: (place[0].vine, place[0].spur))
+    def abstentions(self, with_points: set[SpurNumber]) -> tuple[m.Abstention, ...]:
+        """All reasons in order of the spurs; those without a cut are omitted for spurs with a published point."""
         return tuple(
-            self._decided(each, self._looks.get(number, 0))
-            for number, place in places
-            if place.cuts or number not in shown
-            for each in place.said
+            self._escalated(each, self._observations.get(number, 0))
+            for number, site in sorted(self._sites.items())
+            if site.has_cuts or number not in with_points
+            for each in site.abstentions
         )
 
-    def _decided(self, place: m.Abstention, looks: int) -> m.Abstention:
-        """Where looks enough have not helped, it is for a person."""
-        if place.needs != "another look" or looks < _ENOUGH:
-            return place
-        reason = f"{place.reason}; {looks} looks from before it have not shown more: look yourself"
-        return replace(place, needs="operator", reason=reason[:500])
+    def _escalated(self, site: m.Abstention, observations: int) -> m.Abstention:
+        """Passed on to an operator after enough observations."""
+        if site.needs != "another look" or observations < _MAX_OBSERVATIONS:
+            return site
+        reason = f"{site.reason}; {observations} looks from the front have not shown more: check it yourself"
+        return replace(site, needs="operator", reason=reason[:500])

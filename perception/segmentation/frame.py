@@ -1,4 +1,4 @@
-"""A camera frame as arrays: decoded, checked, and placed in odom by the posture the robot measured."""
+"""Decoded camera frames with their camera pose in odom."""
 
 import io
 import math
@@ -10,26 +10,27 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from rolling_panda import messages as m
+from perception.arrays import Array, Index, Labels
 from rolling_panda.errors import MessageError
 from rolling_panda.messages.robot import CameraFrame, Intrinsics
+from rolling_panda.messages.types import WOOD_CLASSES
 from rolling_panda.model.robot import RobotModel, configuration
 
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
+#: Class indices, in the order of `WOOD_CLASSES`.
+BACKGROUND, GROUND, POST, TRUNK, CORDON, SPUR, CANE, NODE, WIRE, HOSE, OLD_CUT = range(len(WOOD_CLASSES))
 
 
 @dataclass(frozen=True)
 class View:
-    """One decoded frame.
+    """One decoded RGB-D frame.
 
     Attributes:
-        sequence: Of the frame.
-        stamp: When it was taken (s, sender's clock).
-        intrinsics: Of all images; a pixel's centre has whole coordinates.
-        depth: H×W, along the optical axis (m); 0 = no return.
-        labels: H×W class indices, or None without a label camera.
-        color_jpeg: As it came.
+        sequence: Number of the frame.
+        stamp: Time of exposure (s, sender's clock).
+        intrinsics: Of all images; pixel centres have integer coordinates.
+        depth: H×W, along the optical axis (m); 0 = invalid.
+        labels: H×W class indices; None without a label image.
+        color_jpeg: The compressed colour image.
         R: Rotation of the camera in odom (3×3).
         t: Position of the camera in odom (3, m).
     """
@@ -38,7 +39,7 @@ class View:
     stamp: float
     intrinsics: Intrinsics
     depth: NDArray[np.float32]
-    labels: NDArray[np.uint8] | None
+    labels: Labels | None
     color_jpeg: bytes
     R: Array
     t: Array
@@ -60,7 +61,7 @@ class View:
         return np.stack([k.fx * camera[:, 0] / safe + k.cx, k.fy * camera[:, 1] / safe + k.cy, z], axis=1)
 
     def part(self, rows: slice, cols: slice) -> "View":
-        """What a window of the frame shows, as a frame of its own; what reaches beyond the image is cut off.
+        """A window of the frame as a frame of its own, clipped to the image.
 
         Raises:
             MessageError: The colour image is no JPEG of the right size.
@@ -72,7 +73,6 @@ class View:
         jpeg = b""
         if self.color_jpeg:
             out = io.BytesIO()
-            # Hardly compressed: it is read once, at once.
             Image.fromarray(self.color()[window]).save(out, "JPEG", quality=98, subsampling=0)
             jpeg = out.getvalue()
         return replace(
@@ -84,10 +84,10 @@ class View:
         )
 
     def color(self) -> NDArray[np.uint8]:
-        """The H×W×3 colour image.
+        """The colour image, H×W×3, RGB.
 
         Raises:
-            MessageError: Not a JPEG of the size that the intrinsics say.
+            MessageError: It is not a JPEG of the size of the intrinsics.
         """
         k = self.intrinsics
         try:
@@ -100,14 +100,14 @@ class View:
 
 
 def decode_frame(frame: CameraFrame, model: RobotModel) -> View:
-    """Unpack a frame and place its camera by forward kinematics of the measured posture.
+    """Decode a frame; its camera pose follows from the measured joint positions by forward kinematics.
 
     Args:
         frame: As received.
-        model: The robot; its work space is used.
+        model: The robot; its `data` is overwritten.
 
     Raises:
-        MessageError: An image is corrupt or of the wrong size, a class is unknown, or the posture is not finite.
+        MessageError: An image is corrupt or of the wrong size, a class is unknown, or a number is not finite.
     """
     k = frame.intrinsics
     posture = (frame.base.x, frame.base.y, frame.base.phi, *frame.position)
@@ -121,10 +121,8 @@ def decode_frame(frame: CameraFrame, model: RobotModel) -> View:
     labels = None
     if frame.labels_zlib:
         labels = _image(frame.labels_zlib, k, "u1", "label", frame.sequence)
-        if labels.max(initial=0) >= len(m.WOOD_CLASSES):
-            raise MessageError(
-                f"frame {frame.sequence}: class {labels.max()} is unknown; there are {len(m.WOOD_CLASSES)}"
-            )
+        if labels.max(initial=0) >= len(WOOD_CLASSES):
+            raise MessageError(f"frame {frame.sequence}: class {labels.max()} is unknown, of {len(WOOD_CLASSES)}")
     T_odom_camera = model.pose(configuration(frame.base, frame.position), model.camera_id)
     return View(
         sequence=frame.sequence,
@@ -142,10 +140,26 @@ def _image(data: bytes, k: Intrinsics, kind: str, name: str, sequence: int) -> N
     expected = k.width * k.height * np.dtype(kind).itemsize
     unpack = zlib.decompressobj()
     try:
-        # One byte more than expected tells too long from right, and bounds what a hostile stream can unpack to.
+        # One byte more than expected detects a longer stream and bounds the memory that a hostile one can use.
         raw = unpack.decompress(data, expected + 1)
     except zlib.error as error:
         raise MessageError(f"frame {sequence}: the {name} image is corrupt: {error}") from error
     if len(raw) != expected or not unpack.eof:
-        raise MessageError(f"frame {sequence}: the {name} image has not the {expected} bytes of {k.width}×{k.height}")
+        raise MessageError(
+            f"frame {sequence}: the {name} image does not have the {expected} bytes of {k.width}×{k.height}"
+        )
     return np.frombuffer(raw, dtype=kind).reshape(k.height, k.width)
+
+
+def class_pixels(labels: Labels, classes: tuple[int, ...]) -> tuple[Index, Index]:
+    """Rows and columns of all pixels of some classes, row by row.
+
+    Args:
+        labels: H×W class indices.
+        classes: At least one class.
+    """
+    mask = labels == classes[0]
+    for each in classes[1:]:
+        mask |= labels == each
+    rows, cols = np.divmod(np.flatnonzero(mask), labels.shape[1])
+    return rows, cols

@@ -1,55 +1,93 @@
-"""Which pixel shows what: the interface, and the one that takes the simulated camera's own labels."""
+"""Segmenters: the interface, the simulated camera's label image, and the choice by name."""
 
+from pathlib import Path
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
+from perception.arrays import Labels
 from perception.segmentation.frame import View
-from rolling_panda.errors import InputError
+from perception.segmentation.network_segmenter import NetworkSegmenter
+from rolling_panda.errors import ConfigError, InputError, ModelError
+from rolling_panda.resources import resource
+
+SEGMENTERS = ("network", "labels")
+#: The shipped network.
+SHIPPED = "assets/network/vine.onnx"
 
 
 class Segmenter(Protocol):
-    """Turns a frame into a class image."""
+    """Semantic segmentation of a frame."""
 
     @property
     def name(self) -> str:
-        """What stands behind the classes, for people."""
+        """Name for people."""
 
     @property
-    def widening(self) -> float:
-        """How much wider than they are it draws canes, on average (px)."""
+    def width_bias(self) -> float:
+        """By how much it draws canes too wide, on average (px)."""
 
-    def segment(self, view: View) -> NDArray[np.uint8]:
+    def segment(self, view: View) -> Labels:
         """H×W indices into `WOOD_CLASSES`.
 
         Raises:
-            InputError: This segmenter cannot work on such a frame; the text says why.
+            InputError: It cannot work on this frame.
         """
 
 
 class LabelImageSegmenter:
-    """Takes the label image that a simulated camera sends along. It segments nothing itself."""
+    """Returns the label image of the simulated camera."""
 
-    @property
-    def name(self) -> str:
-        """It says where the classes come from."""
-        return "simulator labels"
+    name = "simulator labels"
+    width_bias = 0.0
 
-    @property
-    def widening(self) -> float:
-        """Nothing: it is what the camera rendered."""
-        return 0.0
-
-    def segment(self, view: View) -> NDArray[np.uint8]:
+    def segment(self, view: View) -> Labels:
         """The frame's own label image.
 
         Raises:
             InputError: The frame has none, as on a real robot.
         """
         if view.labels is None:
-            raise InputError(
-                "this frame has no label image, and the segmenter 'simulator labels' needs one: "
-                "only the simulated camera sends it"
-            )
+            raise InputError(f"the segmenter '{self.name}' needs a label image; only the simulated camera sends one")
         return view.labels
+
+
+class NoSegmenter:
+    """Rejects every frame, for a program without network weights."""
+
+    name = "none"
+    width_bias = 0.0
+
+    def __init__(self, reason: str) -> None:
+        """Store the reason given for every frame."""
+        self._reason = reason
+
+    def segment(self, view: View) -> Labels:
+        """Never returns.
+
+        Raises:
+            InputError: Always.
+        """
+        raise InputError(self._reason)
+
+
+def choose_segmenter(name: str, weights: Path | None = None, threads: int = 2) -> Segmenter:
+    """The segmenter of a name.
+
+    Args:
+        name: One of `SEGMENTERS`.
+        weights: ONNX file of the network; None for the shipped one.
+        threads: Threads of the network.
+
+    Raises:
+        ConfigError: There is no such segmenter, or the given weights do not fit.
+    """
+    if name == "labels":
+        return LabelImageSegmenter()
+    if name != "network":
+        raise ConfigError(f"no segmenter {name!r}; choose one of {', '.join(SEGMENTERS)}")
+    if weights is not None:
+        return NetworkSegmenter(weights, threads)
+    try:
+        return NetworkSegmenter(resource(SHIPPED), threads)
+    except ModelError as error:
+        # Without the shipped file the program still runs, and every frame says what is missing.
+        return NoSegmenter(f"no segmentation without the network's weights: {error}")

@@ -1,1 +1,1 @@
-"""Cane pixels to canes: fragments, links, centre lines and topology."""
+"""From cane pixels to rooted canes: fragments, linking, centre lines, topology."""

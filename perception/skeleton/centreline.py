@@ -1,46 +1,48 @@
-"""Chains to canes: centre line, radius, nodes and hidden stretches from the pixels that belong to each chain."""
+"""From chains to canes: centre line, width, nodes and hidden stretches from the pixels of each chain."""
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from perception.arrays import Array, Index, Mask, interpolate
 from perception.config import SkeletonConfig
-from perception.plant.model import Array, CaneEnd, Node, Span
-from perception.segmentation.frame import Index, View
-from perception.skeleton.fragments import Wood
+from perception.plant.model import SURFACE_OFFSET, CaneEnd, Node, Span
+from perception.segmentation.frame import View
+from perception.skeleton.fragments import CanePixels
 
-#: The seen half of a round rod lies on average π/4 of the radius in front of its axis.
-_SURFACE = np.pi / 4
 #: The radius is measured over this first stretch (m) and given for this distance from the base (m).
-_RADIUS_REACH, _RADIUS_AT = 0.35, 0.06
-#: Widths are measured over stretches of this length (m), each good to about this much (m): half a pixel or so.
+_RADIUS_STRETCH, _RADIUS_AT = 0.35, 0.06
+#: Widths are measured over stretches of this length (m), with about this error (m): half a pixel.
 _WIDTH_STEP, _WIDTH_NOISE = 0.01, 0.001
-#: Share of its diameter that a cane loses in a metre.
+#: Relative loss of diameter of a cane in a metre.
 _TAPER = 0.42
-#: Where a cane shows too little to measure its radius (m): that of a common cane.
-_FALLBACK_RADIUS = 0.004
-#: Consecutive samples of an axis nearer than this make no direction (m).
-_STANDSTILL = 1e-5
-#: Where another cane goes on beyond an end, no farther than this from it in depth, the two run into each other (m).
+#: Radius of a common cane, where none can be measured, and the range of measured radii (m).
+_FALLBACK_RADIUS, _MIN_RADIUS, _MAX_RADIUS = 0.004, 0.001, 0.05
+#: Pixels that a chain needs, and their largest distance from its samples (m).
+_MIN_PIXELS, _MAX_DISTANCE = 20, 0.02
+#: Least distance of consecutive axis samples (m).
+_MIN_STEP = 1e-5
+#: An end with another cane within this depth beyond it is joined to that cane (m).
 _JOINED = 0.02
-#: A piece of cane without pixels is hidden where it is at least this long (m); half a node.
-_HIDDEN = 0.006
+#: Least length of a hidden stretch (m): half a node. The same gap separates two nodes.
+_MIN_HIDDEN = 0.006
+#: An end is probed this far beyond its last point (m); something nearer than this in front of it occludes it (m).
+_PROBE, _OCCLUDER = 0.008, 0.01
 
 
 @dataclass(frozen=True)
 class Centreline:
-    """A cane without its root.
+    """A cane, not yet rooted.
 
     Attributes:
         axis: Centre line, N×3 in odom (m).
         arc: Arc length from the first axis point (N, m).
-        width_arc: Where along it the width was measured (K, m).
+        width_arc: Arc lengths of width measurements (K, m).
         width: Diameter there (K, m).
-        nodes: What was seen of them, by arc length.
-        hidden: Stretches not seen.
-        ends: Why it is seen no further than its first and its last point.
+        nodes: By arc length.
+        hidden: Occluded stretches.
+        ends: Why it ends at its first and at its last point.
     """
 
     axis: Array
@@ -52,50 +54,49 @@ class Centreline:
     ends: tuple[CaneEnd, CaneEnd]
 
 
-def centrelines(view: View, wood: Wood, chains: list[Array], config: SkeletonConfig) -> list[Centreline]:
+def centrelines(view: View, pixels: CanePixels, chains: list[Array], config: SkeletonConfig) -> list[Centreline]:
     """Measure each chain.
 
     Args:
         view: The frame.
-        wood: Its cane pixels.
-        chains: Rough centre lines, each M×3 in odom (m), in order along the cane.
+        pixels: Its cane pixels.
+        chains: Polylines along the canes, each M×3 in odom (m).
         config: Sampling and smoothing.
     """
-    lines = [line for line in (_resample(chain, config.sample) for chain in chains) if line is not None]
+    lines = [line for line in (_resample(chain, config.sample_spacing) for chain in chains) if line is not None]
     if not lines:
         return []
     samples = np.concatenate(lines)
-    distance, nearest = cKDTree(samples).query(wood.points, workers=1, distance_upper_bound=0.02)
-    pixels = np.nonzero(np.isfinite(distance))[0]
-    pixels = pixels[np.argsort(nearest[pixels], kind="stable")]
+    distance, nearest = cKDTree(samples).query(pixels.points, workers=1, distance_upper_bound=_MAX_DISTANCE)
+    near = np.nonzero(np.isfinite(distance))[0]
+    near = near[np.argsort(nearest[near], kind="stable")]
     first = np.concatenate([[0], np.cumsum([len(line) for line in lines])])
-    bounds = np.searchsorted(nearest[pixels], first)
+    bounds = np.searchsorted(nearest[near], first)
     stations = [_arc(line) for line in lines]
-    along = _project(samples, np.concatenate(stations), first, wood.points[pixels], nearest[pixels])
+    along = _project(samples, np.concatenate(stations), first, pixels.points[near], nearest[near])
     u, v, _ = view.pixels(samples).T
-    cane = np.zeros(view.depth.shape, dtype=bool)
-    cane[wood.rows, wood.cols] = True
+    cane = pixels.mask()
     out = []
     for k, line in enumerate(lines):
         own, part = slice(bounds[k], bounds[k + 1]), slice(first[k], first[k + 1])
-        rough = _Rough(line, stations[k], u[part], v[part], pixels[own], along[own])
-        measured = _measure(view, wood, cane, rough, config)
+        chain = _Chain(line, stations[k], u[part], v[part], near[own], along[own])
+        measured = _measure(view, pixels, cane, chain, config)
         if measured is not None:
             out.append(measured)
     return out
 
 
 @dataclass(frozen=True)
-class _Rough:
-    """A line before it is measured.
+class _Chain:
+    """A resampled chain with its pixels.
 
     Attributes:
-        line: Samples of it, N×3 in odom (m).
-        stations: Arc length of each (N, m).
-        u: Column of each in the image (N, px).
-        v: Row of each (N, px).
-        members: The pixels that are nearest to it (M).
-        along: Arc length at each of them (M, m).
+        line: Samples, N×3 in odom (m).
+        stations: Arc length of each sample (N, m).
+        u: Column of each sample (N, px).
+        v: Row of each sample (N, px).
+        members: Indices of its pixels (M).
+        along: Arc length of each pixel (M, m).
     """
 
     line: Array
@@ -106,19 +107,15 @@ class _Rough:
     along: Array
 
 
-def _measure(
-    view: View, wood: Wood, cane: NDArray[np.bool_], rough: _Rough, config: SkeletonConfig
-) -> Centreline | None:
-    line, stations, members, along = rough.line, rough.stations, rough.members, rough.along
-    if len(members) < 20:
+def _measure(view: View, pixels: CanePixels, cane: Mask, chain: _Chain, config: SkeletonConfig) -> Centreline | None:
+    stations, members, along = chain.stations, chain.members, chain.along
+    if len(members) < _MIN_PIXELS:
         return None
-    length = float(stations[-1])
-    width_arc, width = _widths(view, wood, rough, config.widening)
-    radius = float(np.clip(np.median(width) / 2, 0.001, 0.05)) if len(width) else _FALLBACK_RADIUS
-    axis = _smooth(line, stations, along, wood.points[members], config.smoothing)
-    steps = np.linalg.norm(np.diff(axis, axis=0), axis=1)
-    # Scattered pixels of a speck give no line.
-    if not np.isfinite(axis).all() or steps.min() < _STANDSTILL:
+    width_arc, width = _widths(view, pixels, chain, config.width_bias)
+    radius = _radius(float(np.median(width))) if len(width) else _FALLBACK_RADIUS
+    axis = _smooth(stations, along, pixels.points[members], config.smoothing_sigma)
+    # Scattered pixels give no line.
+    if not np.isfinite(axis).all() or np.linalg.norm(np.diff(axis, axis=0), axis=1).min() < _MIN_STEP:
         return None
     axis = _to_axis(view, axis, radius)
     return Centreline(
@@ -126,10 +123,14 @@ def _measure(
         arc=stations,
         width_arc=width_arc,
         width=width,
-        nodes=_nodes(wood, members, along, config),
-        hidden=_hidden(along, length),
+        nodes=_nodes(pixels, members, along, config),
+        hidden=_hidden(along, float(stations[-1])),
         ends=_ends(view, cane, axis),
     )
+
+
+def _radius(diameter: float) -> float:
+    return float(np.clip(diameter / 2, _MIN_RADIUS, _MAX_RADIUS))
 
 
 def _arc(line: Array) -> Array:
@@ -137,10 +138,9 @@ def _arc(line: Array) -> Array:
 
 
 def _resample(chain: Array, step: float) -> Array | None:
-    """The chain smoothed enough that its arc length is that of the cane, sampled evenly."""
+    """The chain sampled evenly, after a moving average: depth noise would make the arc length too long."""
     if len(chain) < 3:
         return None
-    # Noise in depth would lengthen a chain of raw points: order by the principal axis of a moving window instead.
     kernel = np.ones(5) / 5
     padded = np.concatenate([2 * chain[:1] - chain[2:0:-1], chain, 2 * chain[-1:] - chain[-2:-4:-1]])
     if len(padded) < len(chain) + 4:
@@ -150,13 +150,13 @@ def _resample(chain: Array, step: float) -> Array | None:
     if arc[-1] < 2 * step:
         return None
     stations = np.linspace(0.0, arc[-1], max(3, round(arc[-1] / step) + 1))
-    return np.stack([np.interp(stations, arc, smooth[:, i]) for i in range(3)], axis=1)
+    return interpolate(stations, arc, smooth)
 
 
 def _project(samples: Array, stations: Array, first: Index, points: Array, k: Index) -> Array:
-    """Arc length of the foot of each point on its line, sample `k` being nearest; beyond the ends it runs on straight.
+    """Arc length of each point projected on its line near sample `k`; the ends are extended straight.
 
-    The samples of all lines stand one after the other, those of each from one `first` to the next.
+    `samples` has the samples of all lines one after the other; those of a line begin at its `first`.
     """
     before, after = np.arange(len(samples)) - 1, np.arange(len(samples)) + 1
     before[first[:-1]], after[first[1:] - 1] = first[:-1], first[1:] - 1
@@ -166,21 +166,21 @@ def _project(samples: Array, stations: Array, first: Index, points: Array, k: In
     return out
 
 
-def _smooth(line: Array, stations: Array, along: Array, points: Array, width: float) -> Array:
-    """Local straight-line regression of the surface points over arc length, at each station.
+def _smooth(stations: Array, along: Array, points: Array, sigma: float) -> Array:
+    """Local linear regression of the surface points over arc length, at each station.
 
-    Pixels are first averaged in bins as long as half the kernel, so that the cost does not grow with their number.
+    Points are averaged in bins first, so that the cost does not grow with their number.
     """
-    step = width / 3
+    step = sigma / 3
     bins = np.clip(((along + step) / step).astype(int), 0, int(stations[-1] / step) + 2)
     count = np.bincount(bins).astype(float)
     used = count > 0
     s = np.bincount(bins, along)[used] / count[used]
     p = np.stack([np.bincount(bins, points[:, i])[used] / count[used] for i in range(3)], axis=1)
     u = s[None] - stations[:, None]
-    w = np.exp(-0.5 * (u / width) ** 2) * count[used][None]
-    # Where everything near is hidden, the nearest that was seen on either side still carries the line.
-    w += np.exp(-0.5 * (u / (5 * width)) ** 2) * 1e-3
+    w = np.exp(-0.5 * (u / sigma) ** 2) * count[used][None]
+    # A wide kernel of low weight bridges hidden stretches.
+    w += np.exp(-0.5 * (u / (5 * sigma)) ** 2) * 1e-3
     s0, s1, s2 = w.sum(1), (w * u).sum(1), (w * u**2).sum(1)
     weights = w * (s2[:, None] - s1[:, None] * u) / np.maximum(s0 * s2 - s1**2, 1e-18)[:, None]
     out: Array = weights @ p
@@ -188,20 +188,20 @@ def _smooth(line: Array, stations: Array, along: Array, points: Array, width: fl
 
 
 def _to_axis(view: View, surface: Array, radius: float) -> Array:
-    """Move the mean of the seen surface to the axis, away from the camera and square to the cane."""
+    """Move the mean of the visible surface to the axis, away from the camera and square to the cane."""
     direction = np.gradient(surface, axis=0)
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     ray = surface - view.t
     square = ray - np.einsum("ij,ij->i", ray, direction)[:, None] * direction
-    out: Array = surface + _SURFACE * radius * square / np.linalg.norm(square, axis=1, keepdims=True)
+    out: Array = surface + SURFACE_OFFSET * radius * square / np.linalg.norm(square, axis=1, keepdims=True)
     return out
 
 
 def base_radius(line: Centreline, reverse: bool) -> float:
-    """Radius of a cane near its base, from the stretch next to it.
+    """Radius of a cane near its base, as a robust mean over a long stretch.
 
-    Whole pixels make the width of an upright cane err by up to half a pixel over a hand's breadth, so a long stretch
-    stands for it, without the places where something in front makes it look narrow or something beside it wide.
+    Discretisation makes the width of an upright cane err by up to half a pixel over a decimetre. Outliers come from
+    occlusion and from wood beside the cane.
 
     Args:
         line: The cane.
@@ -209,47 +209,44 @@ def base_radius(line: Centreline, reverse: bool) -> float:
     """
     s, width = line.width_arc, line.width
     s = float(line.arc[-1]) - s if reverse else s
-    near = s < max(_RADIUS_REACH, float(s.min(initial=np.inf)) + 0.05)
+    near = s < max(_RADIUS_STRETCH, float(s.min(initial=np.inf)) + 0.05)
     if not near.any():
         return _FALLBACK_RADIUS
-    # A cane thins outwards; over so short a stretch the pixels cannot tell how fast, so the common taper stands for it.
+    # The taper cannot be measured over so short a stretch.
     base = width[near] / (1.0 - _TAPER * (s[near] - _RADIUS_AT))
     middle = float(np.median(base))
     good = np.abs(base - middle) < max(_WIDTH_NOISE, 0.2 * middle)
     width_at_base = float(np.mean(base[good])) if good.any() else middle
-    return float(np.clip(width_at_base / 2, 0.001, 0.05))
+    return _radius(width_at_base)
 
 
-def _widths(view: View, wood: Wood, rough: _Rough, widening: float) -> tuple[Array, Array]:
-    """Arc lengths and widths (m) of stretches without nodes: pixels a unit of length of the image, scaled by depth."""
-    line, stations, along = rough.line, rough.stations, rough.along
-    pixel_arc = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(rough.u), np.diff(rough.v)))])
+def _widths(view: View, pixels: CanePixels, chain: _Chain, bias: float) -> tuple[Array, Array]:
+    """Arc lengths and widths (m) of stretches without nodes: pixels per length in the image, scaled by depth."""
+    line, stations, along = chain.line, chain.stations, chain.along
+    pixel_arc = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(chain.u), np.diff(chain.v)))])
     edges = np.arange(0.0, float(stations[-1]) + 1e-9, _WIDTH_STEP)
     bins = np.floor(along / _WIDTH_STEP).astype(int)
     inside = (bins >= 0) & (bins < len(edges) - 1)
-    bins, pixels, size = bins[inside], rough.members[inside], max(0, len(edges) - 1)
+    bins, members, size = bins[inside], chain.members[inside], max(0, len(edges) - 1)
     count = np.bincount(bins, minlength=size)
-    node = np.bincount(bins, wood.node[pixels], minlength=size)
-    depth = np.bincount(bins, wood.depth[pixels], minlength=size) / np.maximum(count, 1)
+    node = np.bincount(bins, pixels.node[members], minlength=size)
+    depth = np.bincount(bins, pixels.depth[members], minlength=size) / np.maximum(count, 1)
     length = np.diff(np.interp(edges, stations, pixel_arc))
     focal = float(np.sqrt(view.intrinsics.fx * view.intrinsics.fy))
-    use = (count > 0) & (node == 0) & (length > 1.0)
-    s = (edges[:-1] + _WIDTH_STEP / 2)[use]
-    pixels_wide = np.maximum(count[use] / length[use] - widening, 0.5)
-    return s, pixels_wide * depth[use] / focal * _squareness(view, line, stations, s)
+    used = (count > 0) & (node == 0) & (length > 1.0)
+    s = (edges[:-1] + _WIDTH_STEP / 2)[used]
+    pixels_wide = np.maximum(count[used] / length[used] - bias, 0.5)
+    return s, pixels_wide * depth[used] / focal * _foreshortening(view, line, stations, s)
 
 
-def _squareness(view: View, line: Array, stations: Array, arc: Array) -> Array:
-    """True width over width in the image plane at some arc lengths: away from its middle an image is drawn out."""
-    places = np.concatenate([arc, arc + 0.01, arc - 0.01])
-    point, beyond, before = np.stack([np.interp(places, stations, line[:, i]) for i in range(3)], axis=1).reshape(
-        3, -1, 3
-    )
+def _foreshortening(view: View, line: Array, stations: Array, arc: Array) -> Array:
+    """True width over width in the image plane at some arc lengths: perspective stretches the image off its centre."""
+    point, beyond, before = interpolate(np.concatenate([arc, arc + 0.01, arc - 0.01]), stations, line).reshape(3, -1, 3)
     ray = (point - view.t) @ view.R
     along = (beyond - before) @ view.R
-    # Directions in the image plane: along the cane's image, and square to it.
-    drawn = along[:, :2] * ray[:, 2:] - ray[:, :2] * along[:, 2:]
-    across = np.stack([-drawn[:, 1], drawn[:, 0]], axis=1) / np.linalg.norm(drawn, axis=1, keepdims=True)
+    # Directions in the image plane: along the cane and across it.
+    image = along[:, :2] * ray[:, 2:] - ray[:, :2] * along[:, 2:]
+    across = np.stack([-image[:, 1], image[:, 0]], axis=1) / np.linalg.norm(image, axis=1, keepdims=True)
     (a, b, c), (x, y, z) = along.T, ray.T
     square = np.stack([b * z - c * y, c * x - a * z, a * y - b * x], axis=1)
     square /= np.linalg.norm(square, axis=1, keepdims=True)
@@ -257,38 +254,38 @@ def _squareness(view: View, line: Array, stations: Array, arc: Array) -> Array:
     return out
 
 
-def _nodes(wood: Wood, members: Index, along: Array, config: SkeletonConfig) -> tuple[Node, ...]:
+def _nodes(pixels: CanePixels, members: Index, along: Array, config: SkeletonConfig) -> tuple[Node, ...]:
     """Runs of node pixels along the cane."""
-    node = np.sort(along[wood.node[members]])
+    node = np.sort(along[pixels.node[members]])
     if not len(node):
         return ()
-    runs = np.split(node, np.nonzero(np.diff(node) > 0.006)[0] + 1)
-    return tuple(Node(float((run[0] + run[-1]) / 2), len(run)) for run in runs if len(run) >= config.least_node_pixels)
+    runs = np.split(node, np.nonzero(np.diff(node) > _MIN_HIDDEN)[0] + 1)
+    return tuple(Node(float((run[0] + run[-1]) / 2), len(run)) for run in runs if len(run) >= config.min_node_pixels)
 
 
 def _hidden(along: Array, length: float) -> tuple[Span, ...]:
     """Stretches without a pixel."""
     seen = np.sort(np.concatenate([[0.0], along[(along > 0.0) & (along < length)], [length]]))
-    gaps = np.nonzero(np.diff(seen) > _HIDDEN)[0]
+    gaps = np.nonzero(np.diff(seen) > _MIN_HIDDEN)[0]
     return tuple(Span(float(seen[g]), float(seen[g + 1])) for g in gaps)
 
 
-def _ends(view: View, cane: NDArray[np.bool_], axis: Array) -> tuple[CaneEnd, CaneEnd]:
-    """Why a cane is seen no further than its first and its last point."""
+def _ends(view: View, cane: Mask, axis: Array) -> tuple[CaneEnd, CaneEnd]:
+    """Why a cane ends at its first and at its last point."""
     tips = axis[[0, -1]]
     outward = tips - axis[[1, -2]]
     length = np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-9)
-    first, last = view.pixels(tips + outward / length * 0.008)
-    return _why(view, cane, *first.tolist()), _why(view, cane, *last.tolist())
+    first, last = view.pixels(tips + outward / length * _PROBE)
+    return _end(view, cane, *first.tolist()), _end(view, cane, *last.tolist())
 
 
-def _why(view: View, cane: NDArray[np.bool_], u: float, v: float, z: float) -> CaneEnd:
-    """Why a cane is not seen at a pixel and depth just beyond; where cane pixels go on, it runs into another one."""
+def _end(view: View, cane: Mask, u: float, v: float, z: float) -> CaneEnd:
+    """Why a cane is not visible at a pixel and depth just beyond its end."""
     height, width = view.depth.shape
     col, row = round(u), round(v)
     if not (3 <= col < width - 3 and 3 <= row < height - 3 and z > 0.0):
         return "image border"
-    patch: NDArray[np.float32] = view.depth[row - 1 : row + 2, col - 1 : col + 2]
-    nearer = (patch > 0.0) & (patch < z - 0.01)
+    patch = view.depth[row - 1 : row + 2, col - 1 : col + 2]
+    nearer = (patch > 0.0) & (patch < z - _OCCLUDER)
     joined = cane[row, col] and abs(float(view.depth[row, col]) - z) < _JOINED
     return "hidden" if nearer.any() or joined else "free"

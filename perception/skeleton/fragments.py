@@ -1,76 +1,82 @@
-"""Cane pixels to fragments: stretches of cane without a fork, as pixels in order along their skeleton.
+"""From cane pixels to fragments: ordered stretches of skeleton without a fork.
 
-Canes that cross in the image are taken apart where their depths differ; where they do not, the skeleton forks and
-is cut there. Joining what belongs together is the next step (`perception.skeleton.linking`).
+Canes that cross in the image are separated where their depths differ. Elsewhere the skeleton forks and is cut there;
+`perception.skeleton.linking` joins the fragments of one cane.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 from skimage.morphology import skeletonize
 
+from perception.arrays import Array, Index, Labels, Mask
 from perception.config import SkeletonConfig
-from perception.plant.model import Array
-from perception.segmentation.frame import Index, View
-from perception.segmentation.pixels import pixels_of
-from rolling_panda.messages.types import WOOD_CLASSES
+from perception.segmentation.frame import CANE, NODE, View, class_pixels
 
-CANE, NODE = WOOD_CLASSES.index("cane"), WOOD_CLASSES.index("node")
-_HALF = ((0, 1), (1, 0), (1, 1), (1, -1))
-#: A pixel of a skeleton with so many neighbours is a fork.
+#: Half of the eight neighbours: each pair of pixels once.
+_HALF_NEIGHBOURS = ((0, 1), (1, 0), (1, 1), (1, -1))
+#: Neighbours of a skeleton pixel that make it a fork.
 _FORK = 3
 #: Skeleton pixels averaged into one point of a fragment.
 _BIN = 4
-#: Half the width of a wide cane (px), and the places within it in rings, from near to far.
+#: Half the width of a wide cane (px), and the offsets within it in rings, from near to far.
 _HALF_WIDTH = 5
 _SQUARE = np.indices((2 * _HALF_WIDTH + 1,) * 2).reshape(2, -1).T - _HALF_WIDTH
-_FAR = (_SQUARE**2).sum(axis=1)
-_RINGS = tuple(_SQUARE[size == _FAR] for size in np.unique(_FAR[_FAR <= _HALF_WIDTH**2]))
+_SQUARED = (_SQUARE**2).sum(axis=1)
+_RINGS = tuple(_SQUARE[size == _SQUARED] for size in np.unique(_SQUARED[_SQUARED <= _HALF_WIDTH**2]))
 
 
 @dataclass(frozen=True)
-class Wood:
-    """The cane pixels of a frame.
+class CanePixels:
+    """Cane and node pixels of a frame, with N pixels.
 
     Attributes:
-        rows: Of each pixel.
-        cols: Of each pixel.
-        depth: Of each pixel (m); all have a return.
-        points: On the surface, N×3 in odom (m).
-        node: Which pixels were classed as a node.
-        component: Connected component by depth, one number a pixel.
-        touching: Pairs of pixels that touch in the image, P×2.
+        shape: Height and width of the image.
+        rows: Row (N).
+        cols: Column (N).
+        depth: Valid depth (N, m).
+        points: Surface points, N×3 in odom (m).
+        node: Whether the class is node (N).
+        component: Connected component without a depth step (N).
+        touching: Pairs of neighbours in the image, P×2.
     """
 
+    shape: tuple[int, ...]
     rows: Index
     cols: Index
     depth: Array
     points: Array
-    node: NDArray[np.bool_]
+    node: Mask
     component: Index
     touching: Index
+
+    def mask(self) -> Mask:
+        """The pixels as an image, H×W."""
+        image = np.zeros(self.shape, dtype=bool)
+        image[self.rows, self.cols] = True
+        return image
 
 
 @dataclass(frozen=True)
 class Fragment:
-    """A stretch of cane without a fork: surface points in order along it, M×3 in odom (m), M ≥ 1."""
+    """A stretch of skeleton without a fork: surface points in order, M×3 in odom (m), M ≥ 1, and its length (px)."""
 
     line: Array
     pixels: int
 
 
-def find_wood(view: View, labels: NDArray[np.uint8], config: SkeletonConfig) -> Wood:
-    """Cane and node pixels within range, and how they hang together without a step in depth."""
-    rows, cols = pixels_of(labels, (CANE, NODE))
+def find_cane_pixels(view: View, labels: Labels, config: SkeletonConfig) -> CanePixels:
+    """Cane and node pixels within the depth range, with their connected components."""
+    rows, cols = class_pixels(labels, (CANE, NODE))
     near = view.depth[rows, cols]
-    kept = (near > config.nearest) & (near < config.farthest)
-    rows, cols, depth = rows[kept], cols[kept], near[kept].astype(float)
+    valid = (near > config.min_depth) & (near < config.max_depth)
+    rows, cols, depth = rows[valid], cols[valid], near[valid].astype(float)
     touching = _neighbours(labels.shape, rows, cols)
-    return Wood(
+    return CanePixels(
+        labels.shape,
         rows,
         cols,
         depth,
@@ -81,33 +87,30 @@ def find_wood(view: View, labels: NDArray[np.uint8], config: SkeletonConfig) -> 
     )
 
 
-def find_fragments(wood: Wood, shape: tuple[int, ...], config: SkeletonConfig) -> list[Fragment]:
+def find_fragments(pixels: CanePixels, config: SkeletonConfig) -> list[Fragment]:
     """Skeletonise each component and cut the skeletons at their forks.
 
     Args:
-        wood: Cane pixels.
-        shape: Of the image.
-        config: What is too small.
+        pixels: Cane pixels.
+        config: Least size of a fragment.
     """
-    if not len(wood.rows):
+    if not len(pixels.rows):
         return []
     out: list[Fragment] = []
-    layer = _layers(wood)
+    layer = _layers(pixels)
     for number in range(int(layer.max()) + 1):
         chosen = np.nonzero(layer == number)[0]
-        # Only the part of the image in which there is cane costs time.
-        rows, cols = wood.rows[chosen], wood.cols[chosen]
+        # Cropped to the canes, for speed.
+        rows, cols = pixels.rows[chosen], pixels.cols[chosen]
         rows, cols = rows - (rows.min() - 1), cols - (cols.min() - 1)
         image = np.zeros((rows.max() + 2, cols.max() + 2), dtype=bool)
         image[rows, cols] = True
-        out += _layer_fragments(wood.points[chosen], rows, cols, skeletonize(image), config)
+        out += _layer_fragments(pixels.points[chosen], rows, cols, skeletonize(image), config)
     return out
 
 
-def _layer_fragments(
-    points: Array, rows: Index, cols: Index, skeleton: NDArray[np.bool_], config: SkeletonConfig
-) -> list[Fragment]:
-    """Fragments of one layer: surface points of its pixels and where these are in an image with an empty border."""
+def _layer_fragments(points: Array, rows: Index, cols: Index, skeleton: Mask, config: SkeletonConfig) -> list[Fragment]:
+    """Fragments of one layer, from its surface points and pixels in an image with an empty border."""
     at, beside = np.nonzero(skeleton)
     neighbours = sum(skeleton[at + dr, beside + dc].astype(np.int8) for dr in (-1, 0, 1) for dc in (-1, 0, 1)) - 1
     simple = neighbours < _FORK
@@ -115,7 +118,6 @@ def _layer_fragments(
     if not len(at):
         return []
     owner, order, lengths = _paths(skeleton.shape, at, beside)
-    # Every cane pixel joins the skeleton pixel nearest to it.
     nearest = _nearest(skeleton.shape, at, beside, rows, cols)
     bins = np.maximum(1, lengths // _BIN)
     first = np.concatenate([[0], np.cumsum(bins)])
@@ -125,19 +127,19 @@ def _layer_fragments(
     sums = np.stack([np.bincount(into, points[:, i], minlength=first[-1]) for i in range(3)], axis=1)
     line = sums / np.maximum(weight, 1)[:, None]
     out = []
-    for k in np.flatnonzero(lengths >= config.least_pixels):
+    for k in np.flatnonzero(lengths >= config.min_fragment_pixels):
         part = slice(first[k], first[k + 1])
         out.append(Fragment(line[part][weight[part] > 0], int(lengths[k])))
     return out
 
 
 def _nearest(shape: tuple[int, ...], at: Index, beside: Index, rows: Index, cols: Index) -> Index:
-    """For each pixel the index of the skeleton pixel nearest to it in the image.
+    """Index of the nearest skeleton pixel of each pixel.
 
-    Canes are some pixels wide, so it is looked for ring by ring, in a third of the time that a tree takes. The tree
-    decides for the few pixels that have none near, or two as near as each other.
+    Canes are a few pixels wide: a search ring by ring takes a third of the time of a k-d tree. The tree is used for the
+    few pixels without a near or with no unique nearest skeleton pixel.
     """
-    # With an empty border, row after row: every pixel's neighbours are a fixed step away.
+    # Flattened with an empty border, so that every neighbour is at a constant offset.
     stride = shape[1] + 2 * _HALF_WIDTH
     number = np.full((shape[0] + 2 * _HALF_WIDTH) * stride, -1, dtype=np.int32)
     number[(at + _HALF_WIDTH) * stride + beside + _HALF_WIDTH] = np.arange(len(at))
@@ -145,7 +147,7 @@ def _nearest(shape: tuple[int, ...], at: Index, beside: Index, rows: Index, cols
     out = np.full(len(rows), -1, dtype=np.intp)
     left = np.arange(len(rows))
     for ring in _RINGS:
-        # Numbers begin at −1, where there is none: of a ring that holds one number the sum tells which.
+        # Empty pixels are −1: in a ring with one number the sum gives that number.
         found = [number[place + step] for step in (ring @ [stride, 1]).tolist()]
         hits, total = np.zeros(len(left), dtype=np.int8), np.zeros(len(left), dtype=np.int64)
         for each in found:
@@ -165,24 +167,25 @@ def _nearest(shape: tuple[int, ...], at: Index, beside: Index, rows: Index, cols
 
 
 def _paths(shape: tuple[int, ...], rows: Index, cols: Index) -> tuple[Index, Index, Index]:
-    """Pixels of simple paths: the path of each, its place along it from one end, and the number of pixels of each path.
+    """Path of each pixel, its distance from one end of the path, and the length of each path (px).
 
-    A closed loop is walked both ways from one of its pixels.
+    A closed loop starts at one of its pixels and is ordered in both directions.
     """
     pairs = _neighbours(shape, rows, cols)
     size = len(rows)
     graph = sparse.coo_matrix((np.ones(len(pairs), dtype=bool), (pairs[:, 0], pairs[:, 1])), (size, size))
     count, owner = csgraph.connected_components(graph, directed=False)
     degree = np.bincount(pairs.ravel(), minlength=size)
-    # The last written stays: of each path the pixel with the fewest neighbours.
+    # The last assignment wins: of each path the pixel with the fewest neighbours.
     ends = np.zeros(count, dtype=np.intp)
-    inwards = np.argsort(-degree, kind="stable")
-    ends[owner[inwards]] = inwards
+    by_degree = np.argsort(-degree, kind="stable")
+    ends[owner[by_degree]] = by_degree
     along = csgraph.dijkstra(graph, directed=False, indices=ends, unweighted=True, min_only=True)
     return owner.astype(np.intp), along.astype(np.intp), np.bincount(owner, minlength=count)
 
 
 def _components(pairs: Index, depth: Array, step: float) -> Index:
+    """Connected component of each pixel, without a depth step between neighbours."""
     if not len(depth):
         return np.zeros(0, dtype=np.intp)
     near = np.abs(depth[pairs[:, 0]] - depth[pairs[:, 1]]) < step
@@ -193,27 +196,26 @@ def _components(pairs: Index, depth: Array, step: float) -> Index:
 
 
 def _neighbours(shape: tuple[int, ...], rows: Index, cols: Index) -> Index:
-    """Pairs of cane pixels that touch, as indices, P×2."""
+    """Pairs of neighbouring pixels, as indices, P×2."""
     height, width = shape
-    # With an empty border, row after row: every pixel's neighbours are a fixed step away.
     stride = width + 2
     number = np.full((height + 1) * stride, -1, dtype=np.int32)
     at = rows * stride + cols + 1
     number[at] = np.arange(len(rows))
     out = []
-    for dr, dc in _HALF:
+    for dr, dc in _HALF_NEIGHBOURS:
         beside = number[at + dr * stride + dc]
         here = np.flatnonzero(beside >= 0)
         out.append(np.stack([here, beside[here].astype(np.intp)], axis=1))
     return np.concatenate(out)
 
 
-def _layers(wood: Wood) -> Index:
-    """A layer number for each pixel, so that components that touch in the image lie in different layers."""
-    pairs = wood.component[wood.touching]
+def _layers(pixels: CanePixels) -> Index:
+    """Layer of each pixel (greedy graph colouring): components that touch in the image are in different layers."""
+    pairs = pixels.component[pixels.touching]
     pairs = np.unique(np.sort(pairs[pairs[:, 0] != pairs[:, 1]], axis=1), axis=0)
-    sizes = np.bincount(wood.component)
-    # Specks from noise would only add layers; they are put with the first and cost nothing.
+    sizes = np.bincount(pixels.component)
+    # Specks of noise are ignored, since they would only add layers.
     beside: dict[int, set[int]] = {}
     for a, b in pairs:
         if min(sizes[a], sizes[b]) >= 3:
@@ -225,5 +227,5 @@ def _layers(wood: Wood) -> Index:
         taken = {int(layer[other]) for other in beside.get(int(component), set()) & done}
         layer[component] = next(n for n in range(len(taken) + 1) if n not in taken)
         done.add(int(component))
-    out: Index = layer[wood.component]
+    out: Index = layer[pixels.component]
     return out

@@ -1,50 +1,52 @@
-"""Fragments to chains: joins the pieces of one cane across forks, wires and canes in front of it.
+"""From fragments to chains: joins the fragments of one cane across forks and occlusions.
 
-Two ends are joined where one continues the other: nearly straight on in space, over a short gap, with something in
-front of the gap. A gap that shows the background is no gap in the view but the end of the wood.
+Two ends are joined where one continues the other nearly straight over a short, occluded gap. A gap that shows the
+background is the end of the wood.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from perception.arrays import Array, Mask
 from perception.config import SkeletonConfig
-from perception.plant.model import Array
 from perception.segmentation.frame import View
 from perception.skeleton.fragments import Fragment
 
-#: A fragment shorter than this many pixels has no direction of its own and starts no chain.
-_SHORT = 10
-#: Points at the end of a fragment that give its direction.
+#: Shorter fragments have no reliable direction (px).
+_MIN_PIXELS = 10
+#: Points at the end of a fragment from which its direction is fitted.
 _TAIL = 6
+#: Largest overlap of two ends along their direction (m).
+_MAX_OVERLAP = 0.012
+#: Share of the samples of a gap that must be occluded.
+_MIN_OCCLUDED = 0.85
 
 
 @dataclass(frozen=True)
 class _End:
     fragment: int
-    last: bool
     point: Array
     outward: Array
 
 
-def link(view: View, fragments: list[Fragment], seen: NDArray[np.bool_], config: SkeletonConfig) -> list[Array]:
-    """Rough centre lines of canes, M×3 in odom (m), as chains of fragments.
+def link_fragments(view: View, fragments: list[Fragment], cane: Mask, config: SkeletonConfig) -> list[Array]:
+    """Chains of fragments: polylines along canes, each M×3 in odom (m).
 
     Args:
         view: The frame.
-        fragments: Stretches without forks; those too short to have a direction are left out.
-        seen: H×W, where cane is seen.
-        config: How far and how straight to join.
+        fragments: Fragments; short ones are ignored.
+        cane: Cane pixels, H×W.
+        config: Largest gap and bend.
     """
-    long = [fragment for fragment in fragments if fragment.pixels >= _SHORT and len(fragment.line) >= 2]
+    long = [fragment for fragment in fragments if fragment.pixels >= _MIN_PIXELS and len(fragment.line) >= 2]
     ends = _ends(long)
-    partner = _match(view, ends, seen, config)
+    partner = _match(view, ends, cane, config)
     chains, used = [], set()
     for start in range(len(long)):
         if start in used:
             continue
-        # Walk back to one end of the chain first; a closed loop is opened where the walk began.
+        # Go back to one end of the chain; a closed loop is opened at its start.
         at, visited = 2 * start, {start}
         while partner[at] >= 0 and partner[at] // 2 not in visited:
             at = partner[at] ^ 1
@@ -63,7 +65,7 @@ def link(view: View, fragments: list[Fragment], seen: NDArray[np.bool_], config:
 
 
 def _ends(fragments: list[Fragment]) -> list[_End]:
-    """Both ends of each fragment, in order. Tails of the same length are worked on together."""
+    """Both ends of each fragment, in order; tails of equal length are fitted together."""
     tails = [tail for each in fragments for tail in (each.line[:_TAIL][::-1], each.line[-_TAIL:])]
     sizes = np.array([len(tail) for tail in tails], dtype=int)
     points, outward = np.zeros((len(tails), 3)), np.zeros((len(tails), 3))
@@ -76,11 +78,11 @@ def _ends(fragments: list[Fragment]) -> list[_End]:
         axis = np.where(forwards[:, None], axis, -axis)
         outward[those] = axis
         points[those] = centre + axis * np.einsum("ij,ij->i", tail[:, -1] - centre, axis)[:, None]
-    return [_End(k // 2, k % 2 == 1, points[k], outward[k]) for k in range(len(tails))]
+    return [_End(k // 2, points[k], outward[k]) for k in range(len(tails))]
 
 
-def _match(view: View, ends: list[_End], seen: NDArray[np.bool_], config: SkeletonConfig) -> list[int]:
-    """For each end the end it is joined to, or -1: the best continuations first."""
+def _match(view: View, ends: list[_End], cane: Mask, config: SkeletonConfig) -> list[int]:
+    """For each end the end it is joined to, or -1: greedy, the lowest cost first."""
     partner = [-1] * len(ends)
     if not ends:
         return partner
@@ -90,38 +92,38 @@ def _match(view: View, ends: list[_End], seen: NDArray[np.bool_], config: Skelet
     gap = points[None] - points[:, None]
     distance = np.linalg.norm(gap, axis=2)
     ahead = np.einsum("ijk,ik->ij", gap, outward)
-    # How far the continuation of i passes by j, and the other way round.
-    miss = np.sqrt(np.maximum(distance**2 - ahead**2, 0.0))
+    # Lateral distance of j from the continuation of i.
+    lateral = np.sqrt(np.maximum(distance**2 - ahead**2, 0.0))
     facing = -outward @ outward.T
-    allowed = config.miss + 0.15 * distance
+    allowed = config.max_lateral_offset + 0.15 * distance
     good = (
         (owner[:, None] != owner[None])
-        & (distance < config.bridge)
-        & (ahead > -0.012)
-        & (ahead.T > -0.012)
-        & (miss < allowed)
-        & (miss.T < allowed)
-        & (facing > np.cos(config.bend))
+        & (distance < config.max_gap)
+        & (ahead > -_MAX_OVERLAP)
+        & (ahead.T > -_MAX_OVERLAP)
+        & (lateral < allowed)
+        & (lateral.T < allowed)
+        & (facing > np.cos(config.max_bend))
     )
-    cost = (miss + miss.T) / allowed + (1.0 - facing) * 10.0 + distance / config.bridge
+    cost = (lateral + lateral.T) / allowed + (1.0 - facing) * 10.0 + distance / config.max_gap
     for i, j in sorted(zip(*np.nonzero(np.triu(good)), strict=True), key=lambda pair: (float(cost[pair]), pair)):
-        if partner[i] < 0 and partner[j] < 0 and _covered(view, points[i], points[j], seen):
+        if partner[i] < 0 and partner[j] < 0 and _occluded(view, points[i], points[j], cane):
             partner[i], partner[j] = int(j), int(i)
     return partner
 
 
-def _covered(view: View, start: Array, end: Array, seen: NDArray[np.bool_]) -> bool:
-    """Whether nothing between two points shows what lies behind them."""
+def _occluded(view: View, start: Array, end: Array, cane: Mask) -> bool:
+    """Whether the line between two points is hidden by something nearer, or on cane."""
     fractions = np.linspace(0.0, 1.0, max(3, int(np.linalg.norm(end - start) / 0.002)))
     line = start + fractions[:, None] * (end - start)
     u, v, z = view.pixels(line).T
-    height, width = seen.shape
+    height, width = cane.shape
     cols, rows = np.rint(u).astype(int), np.rint(v).astype(int)
     inside = (cols >= 1) & (cols < width - 1) & (rows >= 1) & (rows < height - 1) & (z > 0)
     if not inside.all():
         return False
-    covered = np.zeros(len(z), dtype=bool)
+    occluded = np.zeros(len(z), dtype=bool)
     for dr, dc in ((0, 0), (0, 1), (0, -1), (1, 0), (-1, 0)):
         depth = view.depth[rows + dr, cols + dc]
-        covered |= seen[rows + dr, cols + dc] | ((depth > 0.0) & (depth < z + 0.01))
-    return bool(covered.mean() > 0.85)
+        occluded |= cane[rows + dr, cols + dc] | ((depth > 0.0) & (depth < z + 0.01))
+    return bool(occluded.mean() > _MIN_OCCLUDED)

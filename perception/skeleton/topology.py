@@ -1,69 +1,88 @@
-"""Which cane grows from which spur: canes rooted at the two-year wood they touch."""
+"""Plant topology: canes rooted at the spur that they touch."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
+from perception.arrays import Array, Index, Labels, distance
 from perception.config import SkeletonConfig
-from perception.plant.model import Array, Cane, Node, Plant, Span, Spur
-from perception.plant.undecided_sites import MoreToSee
-from perception.segmentation.frame import View
-from perception.segmentation.pixels import pixels_of
-from perception.skeleton.centreline import Centreline, base_radius
-from rolling_panda.messages.types import WOOD_CLASSES
+from perception.plant.model import SURFACE_OFFSET, Cane, Node, Plant, Span, Spur
+from perception.plant.undecided_sites import NeedsAnotherLook
+from perception.segmentation.depth_inpainting import inpaint_depth
+from perception.segmentation.frame import CORDON, OLD_CUT, SPUR, TRUNK, View, class_pixels
+from perception.skeleton.centreline import Centreline, base_radius, centrelines
+from perception.skeleton.fragments import find_cane_pixels, find_fragments
+from perception.skeleton.linking import link_fragments
 
-_SPUR, _CORDON, _TRUNK, _OLD_CUT = (WOOD_CLASSES.index(name) for name in ("spur", "cordon", "trunk", "old cut"))
-_EIGHT = np.ones((3, 3), dtype=bool)
-#: Spur pixels fewer than these are a speck.
-_LEAST_SPUR, _LEAST_TRUNK = 12, 300
-#: Pieces of spur nearer than this are one spur that something thin crosses (m).
-_SAME_SPUR = 0.025
+#: 8-connectivity.
+_CONNECTIVITY = np.ones((3, 3), dtype=bool)
+#: Least pixels of a spur and of a trunk.
+_MIN_SPUR, _MIN_TRUNK = 12, 300
+#: Blobs of spur nearer than this, with centres nearer than this, are one spur behind something thin (m).
+_SAME_SPUR, _NEAR_SPUR = 0.025, 0.08
+#: Every so many cordon pixels are used, and so many make a direction.
+_CORDON_STRIDE, _MIN_CORDON = 4, 50
 
 
-def build_plant(view: View, labels: NDArray[np.uint8], lines: list[Centreline], config: SkeletonConfig) -> Plant:
-    """Root every cane at the spur it grows from.
+def perceive_plant(view: View, labels: Labels, config: SkeletonConfig) -> Plant:
+    """Spurs and canes of one frame.
 
     Args:
         view: The frame.
-        labels: Its classes.
-        lines: Canes without roots.
-        config: How near is touching.
+        labels: H×W class indices.
+        config: Skeleton and topology.
     """
-    # An old cut is the end of the stub on which it is; those on trunk and arms touch no spur.
-    clouds = _merge(_clouds(view, labels, (_SPUR, _OLD_CUT), _LEAST_SPUR, config))
-    trunks = _clouds(view, labels, (_TRUNK,), _LEAST_TRUNK, config)
+    view = inpaint_depth(view, labels, config)
+    return _root_canes(view, labels, _trace(view, labels, config), config)
+
+
+def trace_canes(view: View, labels: Labels, config: SkeletonConfig) -> list[Centreline]:
+    """Centre lines of the canes of one frame, not yet rooted; arguments as of `perceive_plant`."""
+    return _trace(inpaint_depth(view, labels, config), labels, config)
+
+
+def _trace(view: View, labels: Labels, config: SkeletonConfig) -> list[Centreline]:
+    pixels = find_cane_pixels(view, labels, config)
+    chains = link_fragments(view, find_fragments(pixels, config), pixels.mask(), config)
+    return centrelines(view, pixels, chains, config)
+
+
+def _root_canes(view: View, labels: Labels, lines: list[Centreline], config: SkeletonConfig) -> Plant:
+    """Root every cane at the spur that one of its ends touches."""
+    # An old cut is the end of its stub; those on trunk and cordon touch no spur.
+    clouds = _merge(_clouds(view, labels, (SPUR, OLD_CUT), _MIN_SPUR, config))
+    trunks = _clouds(view, labels, (TRUNK,), _MIN_TRUNK, config)
     cordon = _cordon(view, labels, config)
     rooted: list[list[Cane]] = [[] for _ in clouds]
-    loose: list[Array] = []
+    unrooted: list[Array] = []
     strays: set[int] = set()
     if clouds:
         tree = cKDTree(np.concatenate(clouds))
         owner = np.repeat(np.arange(len(clouds)), [len(cloud) for cloud in clouds])
-        canes = [line for line in lines if line.arc[-1] >= config.least_cane]
+        canes = [line for line in lines if line.arc[-1] >= config.min_cane_length]
         ends = np.array([(line.axis[0], line.axis[-1]) for line in canes]).reshape(-1, 2, 3)
         for line, gaps, nearest in zip(canes, *tree.query(ends), strict=True):
             end = int(np.argmin(gaps))
-            if gaps[end] > config.reach:
-                loose.append(line.axis)
-                if gaps[end] < config.stray:
+            if gaps[end] > config.root_distance:
+                unrooted.append(line.axis)
+                if gaps[end] < config.stray_distance:
                     strays.add(int(owner[nearest[end]]))
             else:
                 rooted[int(owner[nearest[end]])].append(_cane(line, end == 1, float(gaps[end])))
     else:
-        loose = [line.axis for line in lines]
+        unrooted = [line.axis for line in lines]
     along = _row_direction(cordon, view)
     old_wood = cKDTree(cordon) if len(cordon) else None
     spurs = [
-        _spur(view, cloud, old_wood, canes, _doubt(view, cloud, k in strays, config))
+        _spur(view, cloud, old_wood, canes, _incomplete(view, cloud, k in strays, config))
         for k, (cloud, canes) in enumerate(zip(clouds, rooted, strict=True))
     ]
     spurs.sort(key=lambda spur: float(spur.position @ along))
-    return Plant(tuple(spurs), np.array([cloud.mean(axis=0) for cloud in trunks]).reshape(-1, 3), tuple(loose))
+    return Plant(tuple(spurs), np.array([cloud.mean(axis=0) for cloud in trunks]).reshape(-1, 3), tuple(unrooted))
 
 
 def _cane(line: Centreline, reverse: bool, gap: float) -> Cane:
-    # What lies between the spur's bark and the first point that was seen is part of the cane, and counts as hidden.
+    # The stretch between the spur's surface and the first visible point is part of the cane.
     length = float(line.arc[-1])
     nodes, hidden, axis, end = line.nodes, line.hidden, line.axis, line.ends[1]
     arc = line.arc
@@ -85,57 +104,62 @@ def _cane(line: Centreline, reverse: bool, gap: float) -> Cane:
 
 
 def _clouds(
-    view: View, labels: NDArray[np.uint8], kinds: tuple[int, ...], least: int, config: SkeletonConfig
+    view: View, labels: Labels, classes: tuple[int, ...], min_pixels: int, config: SkeletonConfig
 ) -> list[Array]:
-    """Surface points of each blob of some classes that has enough pixels of the first, each N×3 in odom (m)."""
-    rows, cols = pixels_of(labels, kinds)
-    depth = view.depth[rows, cols]
-    near = (depth > config.nearest) & (depth < config.farthest)
-    rows, cols, depth = rows[near], cols[near], depth[near].astype(float)
+    """Point cloud of each blob of some classes with enough pixels of the first class, each N×3 in odom (m)."""
+    rows, cols, depth = _in_range(view, labels, classes, config)
     if not len(rows):
         return []
     first, last = (rows.min(), cols.min()), (rows.max() + 1, cols.max() + 1)
     mask = np.zeros((last[0] - first[0], last[1] - first[1]), dtype=bool)
     mask[rows - first[0], cols - first[1]] = True
-    labelled, count = ndimage.label(mask, structure=_EIGHT)
+    labelled, count = ndimage.label(mask, structure=_CONNECTIVITY)
     owner = labelled[rows - first[0], cols - first[1]] - 1
-    enough = np.bincount(owner, labels[rows, cols] == kinds[0], minlength=count) >= least
+    enough = np.bincount(owner, labels[rows, cols] == classes[0], minlength=count) >= min_pixels
     points = view.points(rows, cols, depth)
     order = np.argsort(owner, kind="stable")
     bounds = np.searchsorted(owner[order], np.arange(count + 1))
     return [points[order[bounds[k] : bounds[k + 1]]] for k in range(count) if enough[k]]
 
 
+def _in_range(
+    view: View, labels: Labels, classes: tuple[int, ...], config: SkeletonConfig
+) -> tuple[Index, Index, Array]:
+    """Rows, columns and depth (m) of the pixels of some classes within the depth range."""
+    rows, cols = class_pixels(labels, classes)
+    depth = view.depth[rows, cols]
+    valid = (depth > config.min_depth) & (depth < config.max_depth)
+    return rows[valid], cols[valid], depth[valid].astype(float)
+
+
 def _merge(clouds: list[Array]) -> list[Array]:
     out: list[Array] = []
     for cloud in sorted(clouds, key=len, reverse=True):
         for k, other in enumerate(out):
-            if np.linalg.norm(other.mean(axis=0) - cloud.mean(axis=0)) < 0.08:
-                if float(cKDTree(other).query(cloud)[0].min()) < _SAME_SPUR:
-                    out[k] = np.concatenate([other, cloud])
-                    break
+            near = distance(other.mean(axis=0), cloud.mean(axis=0)) < _NEAR_SPUR
+            if near and cKDTree(other).query(cloud)[0].min() < _SAME_SPUR:
+                out[k] = np.concatenate([other, cloud])
+                break
         else:
             out.append(cloud)
     return out
 
 
-def _cordon(view: View, labels: NDArray[np.uint8], config: SkeletonConfig) -> Array:
-    rows, cols = pixels_of(labels, (_CORDON,))
-    depth = view.depth[rows, cols]
-    near = np.flatnonzero((depth > config.nearest) & (depth < config.farthest))[::4]
-    return view.points(rows[near], cols[near], depth[near].astype(float))
+def _cordon(view: View, labels: Labels, config: SkeletonConfig) -> Array:
+    rows, cols, depth = (each[::_CORDON_STRIDE] for each in _in_range(view, labels, (CORDON,), config))
+    return view.points(rows, cols, depth)
 
 
 def _row_direction(cordon: Array, view: View) -> Array:
-    """Unit vector along the row: the cordon's, turned to the camera's right where both allow."""
+    """Unit vector along the row: that of the cordon, else the camera's right."""
     right: Array = view.R[:, 0]
-    if len(cordon) < 50:
+    if len(cordon) < _MIN_CORDON:
         return right
     direction: Array = _principal(cordon - cordon.mean(axis=0))[1][0]
     return direction if float(direction[np.argmax(np.abs(direction))]) > 0.0 else -direction
 
 
-def _spur(view: View, cloud: Array, cordon: cKDTree | None, canes: list[Cane], doubt: str) -> Spur:
+def _spur(view: View, cloud: Array, cordon: cKDTree | None, canes: list[Cane], incomplete: str) -> Spur:
     centre = cloud.mean(axis=0)
     spread, axes = _principal(cloud - centre)
     axis, radius = None, 0.0
@@ -148,29 +172,24 @@ def _spur(view: View, cloud: Array, cordon: cKDTree | None, canes: list[Cane], d
         least, most = np.percentile(across, [5, 95])
         radius = float(most - least) / 2 * 1.05
         ray = centre - view.t
-        axis = ends + _surface(ray, axes[0]) * radius * np.pi / 4
-    return Spur(centre, axis, radius, tuple(sorted(canes, key=lambda cane: -cane.length)), doubt)
+        square = ray - float(ray @ axes[0]) * axes[0]
+        axis = ends + square / np.linalg.norm(square) * radius * SURFACE_OFFSET
+    return Spur(centre, axis, radius, tuple(sorted(canes, key=lambda cane: -cane.length)), incomplete)
 
 
 def _principal(off: Array) -> tuple[Array, Array]:
-    """Spreads along the principal axes of points about their mean, largest first, and the axes as rows."""
+    """Spread of centred points along their principal axes, largest first, and the axes as rows."""
     squares, axes = np.linalg.eigh(off.T @ off)
     return np.sqrt(np.maximum(squares[::-1], 0.0)), axes.T[::-1]
 
 
-def _doubt(view: View, cloud: Array, stray: bool, config: SkeletonConfig) -> str:
-    """Why some of the spur's canes may be out of sight."""
+def _incomplete(view: View, cloud: Array, stray: bool, config: SkeletonConfig) -> str:
+    """Why some of the spur's canes may be out of view; empty if none are."""
     height, width = view.depth.shape
     u, v, _ = view.pixels(cloud).T
-    margin = config.border
+    margin = config.border_margin
     if u.min() < margin or u.max() > width - margin or v.min() < margin or v.max() > height - 1:
-        return MoreToSee("the spur is at the edge of the image, so not all of its canes may be in view")
+        return NeedsAnotherLook("the spur is at the edge of the image, so not all of its canes may be in view")
     if stray:
-        return MoreToSee("a cane seems to start here, but its base is hidden")
+        return NeedsAnotherLook("a cane seems to start here, but its base is hidden")
     return ""
-
-
-def _surface(ray: Array, axis: Array) -> Array:
-    square = ray - float(ray @ axis) * axis
-    out: Array = square / np.linalg.norm(square)
-    return out

@@ -8,7 +8,7 @@ from pathlib import Path
 import onnx
 import torch
 
-from perception.segmentation.network_input import CHANNELS
+from perception.segmentation.network_segmenter import CHANNELS
 from perception.training.compact import CompactLabeller
 from perception.training.fit import BATCH, CROP, WEIGHTS, Trainer
 from perception.training.network import Labeller

@@ -9,7 +9,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from perception.segmentation.network_input import CHANNELS, network_input
+from perception.segmentation.network_segmenter import CHANNELS, network_input
 from perception.training.network import Network
 from perception.training.scenes import Scenes
 from rolling_panda.messages.types import WOOD_CLASSES, WoodClass

@@ -6,7 +6,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from perception.segmentation.network_input import network_input
+from perception.segmentation.network_segmenter import network_input
 from perception.training.network import Labeller
 from perception.training.scenes import Scenes
 from rolling_panda.messages.types import WOOD_CLASSES

@@ -36,7 +36,7 @@ def judged(*capsules):
     row, config = grow(VineyardConfig(), 1), ObstacleConfig()
     judge, camera, model = ObstacleJudge(row, config), Camera(CameraConfig(), 1), RobotModel()
     place = model.pose(configuration(m.PlanarPose(), (0.0, 0.0, *survey_arm())), model.camera_id).homogeneous
-    for number in range(config.hits):
+    for number in range(config.min_hits):
         judge.see(camera.render(row, place, number), camera.intrinsics, place)
     judge.judge(capsules, final=True)
     return row, judge.verdict()

@@ -19,7 +19,7 @@ TRUE[:, 6:] = NODE
 class Half:
     """Takes the right half of every picture for wire."""
 
-    name, widening = "half", 0.7
+    name, width_bias = "half", 0.7
 
     def segment(self, view: View):
         told = np.array(view.labels if view.labels is not None else TRUE)
@@ -40,7 +40,7 @@ def test_each_class_is_told_by_what_its_pixels_were_taken_for():
     table = shares(counts)
     assert table.keys() == {"cane", "node"}
     assert table["cane"]["cane"] == 0.6667 and table["cane"]["wire"] == 0.3333 and table["node"]["wire"] == 1.0
-    assert (watched.name, watched.widening) == ("half", 0.7)
+    assert (watched.name, watched.width_bias) == ("half", 0.7)
 
 
 def test_what_cannot_be_compared_is_not_counted():

@@ -13,9 +13,9 @@ from bridge.sim.camera.config import CameraConfig
 from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
-from perception.config import LookConfig, PerceptionConfig
+from perception.config import CloseUpConfig, PerceptionConfig
 from perception.pipeline import Perception
-from perception.segmentation.segmenter_choice import choose_segmenter
+from perception.segmentation.segmenter import choose_segmenter
 from rolling_panda import messages as m
 from rolling_panda.errors import MessageError
 from rolling_panda.messages.robot import CameraFrame
@@ -115,7 +115,7 @@ def test_what_shows_nothing_makes_no_point_and_says_why(
 @pytest.fixture(scope="module")
 def shown(model: RobotModel, good: CameraFrame) -> Perception:
     """Perception that shows points of the good frame, and looks closely from as far away as that was taken."""
-    config = PerceptionConfig(look=LookConfig(farthest=1.2))
+    config = PerceptionConfig(close_up=CloseUpConfig(max_distance=1.2))
     seen = Perception(config, choose_segmenter("labels", threads=1), model)
     for _ in range(AGAIN):
         seen.process(good)
@@ -124,7 +124,7 @@ def shown(model: RobotModel, good: CameraFrame) -> Perception:
 
 def test_a_closer_look_at_the_good_frame_sees_points(shown: Perception, good: CameraFrame) -> None:
     looks = [
-        shown.look_closely(msgspec.structs.replace(good, point_id=point.point_id)) for point in shown.points().points
+        shown.check_close_up(msgspec.structs.replace(good, point_id=point.point_id)) for point in shown.points().points
     ]
     assert [look.finding for look in looks].count("seen") >= 2
 
@@ -139,8 +139,8 @@ def test_a_closer_look_at_what_shows_nothing_neither_places_a_point_nor_calls_it
         frame = msgspec.structs.replace(bad(good, what), point_id=point.point_id)
         if what in REFUSED:
             with pytest.raises(MessageError, match="image|depth_unit"):
-                shown.look_closely(frame)
+                shown.check_close_up(frame)
             continue
-        look = shown.look_closely(frame)
+        look = shown.check_close_up(frame)
         assert look.finding in ("unseen", "changed") and look.reason and look.position is None
     assert shown.points().points == points

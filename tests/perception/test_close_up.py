@@ -17,7 +17,7 @@ from controller.work.cut_pose import cut_poses
 from perception.config import PerceptionConfig
 from perception.segmentation.frame import View, decode_frame
 from perception.segmentation.segmenter import LabelImageSegmenter
-from perception.tracking.close_up import look_closely
+from perception.tracking.close_up import check_close_up
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import CloseLook
 from rolling_panda.model.robot import RobotModel, configuration
@@ -81,7 +81,7 @@ def view_from_clear(row: Row, cut: RightCut, clearance: float = 0.22) -> View:
 
 
 def look(view: View, seen: m.PruningPoint) -> CloseLook:
-    return look_closely(view, SEES, seen, 7, PerceptionConfig())
+    return check_close_up(view, SEES, seen, 7, PerceptionConfig())
 
 
 def without(row: Row, cut: RightCut) -> Row:

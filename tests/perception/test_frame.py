@@ -3,8 +3,11 @@ import zlib
 import msgspec
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import array_shapes, arrays
 
-from perception.segmentation.frame import decode_frame
+from perception.segmentation.frame import class_pixels, decode_frame
 from perception.segmentation.segmenter import LabelImageSegmenter
 from rolling_panda import messages as m
 from rolling_panda.errors import InputError, MessageError
@@ -74,6 +77,23 @@ def test_a_colour_image_that_is_none_is_refused(model):
 def test_without_labels_the_label_segmenter_says_why(model):
     segmenter = LabelImageSegmenter()
     assert segmenter.name == "simulator labels"
-    with pytest.raises(InputError, match="no label image"):
+    with pytest.raises(InputError, match="needs a label image"):
         segmenter.segment(decode_frame(good_frame(labels_zlib=b""), model))
     assert segmenter.segment(decode_frame(good_frame(), model)).shape == (HEIGHT, WIDTH)
+
+
+@given(
+    arrays(np.uint8, array_shapes(min_dims=2, max_dims=2), elements=st.integers(0, 4)),
+    st.lists(st.integers(0, 4), min_size=1, max_size=3),
+)
+def test_all_pixels_of_the_classes_and_no_others_row_by_row(labels, kinds):
+    rows, cols = class_pixels(labels, tuple(kinds))
+    found = list(zip(rows.tolist(), cols.tolist(), strict=True))
+    assert found == [(r, c) for r, c in np.ndindex(labels.shape) if labels[r, c] in kinds]
+
+
+def test_a_window_of_an_image_counts_from_its_own_corner():
+    labels = np.zeros((6, 8), np.uint8)
+    labels[3, 5] = 2
+    rows, cols = class_pixels(labels[2:5, 4:8], (2,))
+    assert (rows.tolist(), cols.tolist()) == ([1], [1])

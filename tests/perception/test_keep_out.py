@@ -11,7 +11,7 @@ from controller.config import HierarchyConfig
 from controller.whole_body.collision_geometry import _TOOL_CAPSULES, BLADES
 from controller.work.cut_clearance import _ROOM
 from perception.config import RuleConfig
-from perception.rules.keep_out import as_known, in_view, wire_near
+from perception.rules.keep_out import frame_keep_out, map_keep_out, wire_in_image
 from perception.segmentation.frame import View
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import Capsule
@@ -44,7 +44,7 @@ def view(wire_row: int, wire_depth: float) -> View:
 def test_a_wire_beside_the_cut_or_in_the_way_keeps_the_blades_out(above: float, depth: float, near: bool) -> None:
     seen = view(round(119.5 - above * 400 / 0.8), depth)
     assert seen.labels is not None
-    assert wire_near(seen, seen.labels, CUT, 0.018) is near
+    assert wire_in_image(seen, seen.labels, CUT, 0.018) is near
 
 
 @given(x=st.floats(-3, 3), y=st.floats(-3, 3))
@@ -53,7 +53,7 @@ def test_cuts_out_of_the_image_are_answered_too(x: float, y: float) -> None:
     assert seen.labels is not None
     outside = replace(seen, labels=np.zeros_like(seen.labels))
     assert outside.labels is not None
-    assert wire_near(outside, outside.labels, np.array([x, y, 0.8]), 0.018) is False
+    assert wire_in_image(outside, outside.labels, np.array([x, y, 0.8]), 0.018) is False
 
 
 @pytest.mark.parametrize("kind", [WIRE, HOSE])
@@ -63,7 +63,7 @@ def test_the_drip_hose_is_kept_away_from_like_a_wire(kind: int) -> None:
         seen = view(round(119.5 - above * 400 / 0.8), 0.8)
         assert seen.labels is not None
         seen.labels[seen.labels == WIRE] = kind
-        assert bool(in_view(seen, seen.labels, (), RULE).reason(CUT)) is near
+        assert bool(frame_keep_out(seen, seen.labels, (), RULE).reason(CUT)) is near
 
 
 @pytest.mark.parametrize("kind", ["wire", "hose", "cordon", "trunk"])
@@ -71,8 +71,8 @@ def test_what_was_seen_before_keeps_the_blades_out_too(kind: m.WoodClass) -> Non
     least = 0.020 if kind in ("cordon", "trunk") else 0.015
     for gap, near in ((least - 0.001, True), (0.03, False)):
         rod = Capsule(kind, (-1.0, 0.01 + gap, 0.8), (1.0, 0.01 + gap, 0.8), 0.01, 0.01)
-        assert bool(as_known((rod,), RULE).reason(CUT)) is near, f"{kind} at {gap} m"
-    assert as_known((), RULE).reason(CUT) == ""
+        assert bool(map_keep_out((rod,), RULE).reason(CUT)) is near, f"{kind} at {gap} m"
+    assert map_keep_out((), RULE).reason(CUT) == ""
 
 
 @pytest.mark.parametrize(("lean", "fits"), [(0.0, True), (25.0, False), (-25.0, False)])
@@ -81,10 +81,10 @@ def test_on_wood_that_leans_one_blade_is_nearer_to_the_wire_than_the_cut_is(lean
     wire = Capsule("wire", (-1.0, 0.8, 1.022), (1.0, 0.8, 1.022), 0.002, 0.002)
     tangent = np.array([np.sin(np.radians(lean)), 0.0, np.cos(np.radians(lean))])
     place = np.array([0.0, 0.8, 1.0])
-    known = as_known((wire,), RULE)
+    known = map_keep_out((wire,), RULE)
     assert known.reason(place) == "", "it is far enough from the cut itself"
     assert known.fits(place, tangent) is fits
-    assert as_known((), RULE).fits(place, tangent)
+    assert map_keep_out((), RULE).fits(place, tangent)
 
 
 def test_blades_that_fit_are_as_far_from_a_wire_as_the_controller_keeps_them() -> None:
@@ -92,7 +92,7 @@ def test_blades_that_fit_are_as_far_from_a_wire_as_the_controller_keeps_them() -
     assert blades
     for aside, radius in blades:
         assert RULE.blade_reach >= aside
-        assert RULE.blade_room >= radius + HierarchyConfig().blade_distance + _ROOM
+        assert RULE.blade_clearance >= radius + HierarchyConfig().blade_distance + _ROOM
 
 
 @pytest.mark.parametrize(("lean", "fits"), [(0.0, True), (25.0, False), (-25.0, False)])
@@ -100,6 +100,6 @@ def test_so_it_is_with_a_wire_that_only_this_frame_shows(lean: float, fits: bool
     seen = view(round(119.5 - 0.021 * 400 / 0.8), 0.8)
     assert seen.labels is not None
     tangent = np.array([np.sin(np.radians(lean)), -np.cos(np.radians(lean)), 0.0])
-    keep_out = in_view(seen, seen.labels, (), RULE)
+    keep_out = frame_keep_out(seen, seen.labels, (), RULE)
     assert keep_out.reason(CUT) == ""
     assert keep_out.fits(CUT, tangent) is fits

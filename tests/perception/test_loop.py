@@ -5,8 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from perception.config import PerceptionConfig
-from perception.loop import Loop
-from perception.worker import Worker
+from perception.loop import Loop, Worker
 from rolling_panda import messages as m
 from rolling_panda.errors import MessageError
 from rolling_panda.messages.commands import SetRule
@@ -49,13 +48,13 @@ class Frame(str):
     point_id = ""
 
 
-class Eyes:
+class FakePerception:
     """Perception that does what its frames say."""
 
     withdrawn = ()
     crops = ()
-    left_out = ""
-    sightings = SimpleNamespace(note=lambda frame: None)
+    rejected_wood = ""
+    camera_rays = SimpleNamespace(add=lambda frame: None)
     obstacles = (Capsule("wire", (0.0, 0.75, 1.2), (2.0, 0.75, 1.2), 0.004, 0.004),)
 
     def __init__(self):
@@ -77,15 +76,15 @@ class Eyes:
 
 @pytest.fixture
 def parts():
-    wire, eyes = Wire(), Eyes()
-    yield wire, eyes, Loop(wire, PerceptionConfig(hang_s=1.0), eyes)
-    eyes.release.set()
+    wire, perception = Wire(), FakePerception()
+    yield wire, perception, Loop(wire, PerceptionConfig(frame_timeout_s=1.0), perception)
+    perception.release.set()
 
 
-def turn_until(loop, done, now=0.0):
+def step_until(loop, done, now=0.0):
     deadline = time.monotonic() + 5.0
     while not done():
-        loop.turn(now)
+        loop.step(now)
         assert time.monotonic() < deadline
         time.sleep(0.001)
 
@@ -94,34 +93,34 @@ def test_points_are_sent_when_they_are_new_and_again_at_two_hertz(parts):
     wire, _, loop = parts
     points = wire.out[POINTS.name].sent
     wire.frames.store(Frame("frame"), 0.0)
-    turn_until(loop, lambda: points)
+    step_until(loop, lambda: points)
     for tick in range(1, 41):
-        loop.turn(tick / 20.0)
+        loop.step(tick / 20.0)
     assert 4 <= len(points) - 1 <= 5
     assert len({id(message) for message in points}) == 1
 
 
 def test_obstacles_are_sent_once_a_second_from_the_first_frame_on(parts):
-    wire, eyes, loop = parts
+    wire, perception, loop = parts
     obstacles = wire.out[OBSTACLES.name].sent
-    loop.turn(0.0)
+    loop.step(0.0)
     assert not obstacles
     wire.frames.store(Frame("frame"), 0.0)
-    turn_until(loop, lambda: obstacles)
+    step_until(loop, lambda: obstacles)
     for tick in range(1, 62):
-        loop.turn(tick / 20.0)
+        loop.step(tick / 20.0)
     assert len(obstacles) == 4
-    assert obstacles[-1].capsules == eyes.obstacles
+    assert obstacles[-1].capsules == perception.obstacles
 
 
 def test_what_was_left_out_is_told_when_it_changes_and_at_most_once_a_minute(parts):
-    wire, eyes, loop = parts
+    wire, perception, loop = parts
 
-    def told(left_out, second):
-        eyes.left_out = left_out
+    def told(rejected_wood, second):
+        perception.rejected_wood = rejected_wood
         wire.frames.store(Frame(str(second)), float(second))
-        loop.turn(float(second))
-        turn_until(loop, lambda: loop._worker.busy_for(1e9) == 0.0, float(second))
+        loop.step(float(second))
+        step_until(loop, lambda: loop._worker.busy_for(1e9) == 0.0, float(second))
         return [event.text for event in wire.out[EVENT.name].sent if "left out" in event.text]
 
     assert "1 trunk leaning" in told("1 trunk leaning", 0)[0]
@@ -133,40 +132,40 @@ def test_what_was_left_out_is_told_when_it_changes_and_at_most_once_a_minute(par
 
 
 def test_the_heartbeat_counts_turns_and_stops_counting_when_a_frame_hangs(parts):
-    wire, eyes, loop = parts
+    wire, perception, loop = parts
     beats = wire.out[HEARTBEAT.name].sent
     wire.frames.store(Frame("hang"), 0.0)
     for tick in range(60):
-        loop.turn(tick / 20.0)
+        loop.step(tick / 20.0)
     counted = [beat.sequence for beat in beats]
     assert counted[:21] == list(range(1, 22))
     assert counted[-1] == counted[22] and beats[-1].status
     assert any("1 s" in event.text for event in wire.out[EVENT.name].sent)
-    eyes.release.set()
-    turn_until(loop, lambda: beats[-1].sequence > counted[-1], now=3.1)
+    perception.release.set()
+    step_until(loop, lambda: beats[-1].sequence > counted[-1], now=3.1)
 
 
 def test_a_corrupt_frame_is_told_once_and_sends_no_points(parts):
     wire, _, loop = parts
     events = wire.out[EVENT.name].sent
     wire.frames.store(Frame("corrupt"), 0.0)
-    turn_until(loop, lambda: events)
+    step_until(loop, lambda: events)
     wire.frames.store(Frame("corrupt"), 0.1)
     for _ in range(20):
-        loop.turn(0.2)
+        loop.step(0.2)
         time.sleep(0.001)
     assert [event.severity for event in events] == ["error"]
     assert not wire.out[POINTS.name].sent
 
 
 def test_new_points_and_points_that_were_cut_are_no_warnings(parts):
-    wire, eyes, loop = parts
+    wire, perception, loop = parts
     events = wire.out[EVENT.name].sent
     point = m.PruningPoint("p1", 1, (0.3, 0.8, 1.0), (0.0, 0.0, 1.0), 0.004, 0.9, 5, 2, 0, 0, "two nodes stay")
-    eyes.process = lambda frame: m.PruningPoints(header=m.Header(), segmenter="s", frames=1, points=(point,))
-    eyes.withdrawn = ("p2 withdrawn: it has been cut",)
+    perception.process = lambda frame: m.PruningPoints(header=m.Header(), segmenter="s", frames=1, points=(point,))
+    perception.withdrawn = ("p2 withdrawn: it has been cut",)
     wire.frames.store(Frame("frame"), 0.0)
-    turn_until(loop, lambda: len(events) == 2)
+    step_until(loop, lambda: len(events) == 2)
     assert [event.text for event in events] == ["1 new pruning point, 1 in all", "p2 withdrawn: it has been cut"]
     assert {event.severity for event in events} == {"info"}
 
@@ -190,14 +189,14 @@ def test_a_worker_takes_one_job_at_a_time():
     deadline = time.monotonic() + 5.0
     while (done := worker.poll()) is None:
         assert time.monotonic() < deadline
-    assert done.result is True and worker.busy_for(12.0) == 0.0
+    assert done is True and worker.busy_for(12.0) == 0.0
 
 
 def turns(loop, until, start=0.0):
     """Turn the loop until something holds, for at most five seconds."""
     limit = time.monotonic() + 5.0
     while not until() and time.monotonic() < limit:
-        loop.turn(start)
+        loop.step(start)
         time.sleep(0.005)
     assert until()
 
@@ -216,43 +215,43 @@ def test_a_request_is_answered_between_frames_and_its_points_are_sent_at_once(pa
 
 
 def test_a_request_that_waits_too_long_is_not_done_later(parts, monkeypatch):
-    wire, eyes, loop = parts
-    monkeypatch.setattr("perception.loop._ANSWER_S", 0.05)
+    wire, perception, loop = parts
+    monkeypatch.setattr("perception.loop._REQUEST_TIMEOUT_S", 0.05)
     done = []
-    monkeypatch.setattr(eyes, "answer", lambda request: done.append(request) or m.Answer(ok=True))
+    monkeypatch.setattr(perception, "answer", lambda request: done.append(request) or m.Answer(ok=True))
     assert not wire.ask(SetRule(user="Ada")).ok
     turns(loop, lambda: wire.out[POINTS.name].sent)
     assert done == []
 
 
 def test_a_picture_is_sent_when_it_is_new_and_again_now_and_then(parts):
-    wire, eyes, loop = parts
+    wire, perception, loop = parts
     sent = wire.out[CROPS.name].sent
-    eyes.crops = tuple(PointCrop(point_id=name, revision=1, sequence=1, jpeg=b"x") for name in ("p1", "p2"))
+    perception.crops = tuple(PointCrop(point_id=name, revision=1, sequence=1, jpeg=b"x") for name in ("p1", "p2"))
     wire.frames.store(Frame("frame"), 0.0)
     turns(loop, lambda: len(sent) >= 2)
     for tick in range(21):
-        loop.turn(tick / 20.0)
+        loop.step(tick / 20.0)
     assert [crop.point_id for crop in sent[:2]] == ["p1", "p2"]
     assert {crop.point_id for crop in sent[2:]} == {"p1", "p2"} and len(sent) <= 6
-    eyes.crops = (PointCrop(point_id="p2", revision=2, sequence=5, jpeg=b"y"),)
+    perception.crops = (PointCrop(point_id="p2", revision=2, sequence=5, jpeg=b"y"),)
     before = len(sent)
     wire.frames.store(Frame("frame"), 2.0)
     turns(loop, lambda: len(sent) > before, start=1.05)
     for tick in range(21):
-        loop.turn(2.0 + tick / 20.0)
+        loop.step(2.0 + tick / 20.0)
     assert {(crop.point_id, crop.revision) for crop in sent[before:]} == {("p2", 2)}
 
 
 def test_a_frame_that_is_never_worked_on_can_be_clicked_all_the_same(parts):
-    wire, eyes, loop = parts
+    wire, perception, loop = parts
     noted = []
-    loop._sightings = SimpleNamespace(note=noted.append)
+    loop._camera_rays = SimpleNamespace(add=noted.append)
     wire.frames.store(Frame("hang"), 0.0)
     turns(loop, lambda: noted)
     wire.frames.store(Frame("shown"), 0.1)
-    loop.turn(0.2)
+    loop.step(0.2)
     wire.frames.store(Frame("newer"), 0.3)
-    loop.turn(0.4)
+    loop.step(0.4)
     assert noted == ["hang", "shown", "newer"]
-    eyes.release.set()
+    perception.release.set()

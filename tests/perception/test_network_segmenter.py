@@ -11,9 +11,8 @@ from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from perception.segmentation.frame import View
-from perception.segmentation.network_input import network_input
-from perception.segmentation.network_segmenter import NetworkSegmenter, NoSegmenter
-from perception.segmentation.segmenter_choice import SHIPPED, choose_segmenter
+from perception.segmentation.network_segmenter import NetworkSegmenter, network_input
+from perception.segmentation.segmenter import SHIPPED, NoSegmenter, choose_segmenter
 from rolling_panda.errors import ConfigError, InputError, MessageError, ModelError
 from rolling_panda.messages.robot import Intrinsics
 from rolling_panda.messages.types import WOOD_CLASSES
@@ -71,7 +70,7 @@ def test_a_frame_is_decoded_and_its_depth_used(tmp_path):
 @pytest.mark.parametrize("color", [np.zeros((64, 64, 3), np.uint8), np.full((64, 64, 3), 255, np.uint8)])
 def test_a_picture_of_nothing_is_declined(tmp_path, color):
     segmenter = NetworkSegmenter(written(tmp_path, onnx_by_hand.brightest_channel(CLASSES)))
-    with pytest.raises(InputError, match="shows nothing"):
+    with pytest.raises(InputError, match="is blank"):
         segmenter.classify(color, None)
 
 
@@ -92,9 +91,9 @@ def test_a_frame_without_a_picture_is_refused(tmp_path):
         (onnx_by_hand.brightest_channel(["cane", "sky"]), "its classes are \\['cane', 'sky'\\]"),
         (onnx_by_hand.brightest_channel(None), "its classes are None"),
         (b"no network", "cannot load"),
-        (onnx_by_hand.brightest_channel(CLASSES, widening="much"), "its widening is 'much'"),
-        (onnx_by_hand.brightest_channel(CLASSES, widening="nan"), "its widening is"),
-        (onnx_by_hand.brightest_channel(CLASSES, widening="40"), "its widening is"),
+        (onnx_by_hand.brightest_channel(CLASSES, widening="much"), "'widening' is 'much'"),
+        (onnx_by_hand.brightest_channel(CLASSES, widening="nan"), "'widening' is"),
+        (onnx_by_hand.brightest_channel(CLASSES, widening="40"), "'widening' is"),
     ],
 )
 def test_a_network_that_does_not_fit_is_refused_in_words(tmp_path, data, says):
@@ -114,7 +113,7 @@ def test_without_the_shipped_weights_every_frame_is_declined_with_the_reason(mon
     def missing(path):
         raise ModelError(f"{path} is not part of this installation")
 
-    monkeypatch.setattr("perception.segmentation.segmenter_choice.resource", missing)
+    monkeypatch.setattr("perception.segmentation.segmenter.resource", missing)
     segmenter = choose_segmenter("network")
     assert isinstance(segmenter, NoSegmenter)
     with pytest.raises(InputError, match="without the network's weights: assets/network/vine.onnx"):
@@ -145,8 +144,8 @@ def test_the_shipped_network_sees_rows_it_was_not_trained_on():
 
 def test_a_network_says_how_much_too_wide_it_draws_canes(tmp_path):
     said = [
-        NetworkSegmenter(written(tmp_path, onnx_by_hand.brightest_channel(CLASSES, widening=text))).widening
+        NetworkSegmenter(written(tmp_path, onnx_by_hand.brightest_channel(CLASSES, widening=text))).width_bias
         for text in ("0.4", None)
     ]
     assert said == [0.4, 0.0]
-    assert 0.0 <= choose_segmenter("network").widening < 1.0 and choose_segmenter("labels").widening == 0.0
+    assert 0.0 <= choose_segmenter("network").width_bias < 1.0 and choose_segmenter("labels").width_bias == 0.0

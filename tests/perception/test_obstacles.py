@@ -12,8 +12,7 @@ from perception.config import ObstacleConfig, PerceptionConfig
 from perception.obstacles.obstacle_map import ObstacleMap
 from perception.pipeline import Perception
 from perception.segmentation.frame import decode_frame
-from perception.segmentation.segmenter import LabelImageSegmenter
-from perception.segmentation.segmenter_choice import choose_segmenter
+from perception.segmentation.segmenter import LabelImageSegmenter, choose_segmenter
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.model.robot import RobotModel, configuration
@@ -122,7 +121,7 @@ def test_of_too_many_rods_the_nearest_are_told():
     camera, model = Camera(CameraConfig(), 1), RobotModel()
     row, base, position = grow(VineyardConfig(), 1), m.PlanarPose(), (0.0, 0.0, *survey_arm())
     place = model.pose(configuration(base, position), model.camera_id).homogeneous
-    every, few = ObstacleMap(ObstacleConfig()), ObstacleMap(ObstacleConfig(most=8))
+    every, few = ObstacleMap(ObstacleConfig()), ObstacleMap(ObstacleConfig(max_capsules=8))
     for k in range(4):
         view = decode_frame(camera_frame(camera.render(row, place, k), camera, base, position, k), model)
         labels = LabelImageSegmenter().segment(view)

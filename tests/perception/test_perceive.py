@@ -149,4 +149,4 @@ def test_a_missing_photograph_is_said_before_the_network_is_loaded(tmp_path, mon
 def test_a_black_or_white_picture_is_refused(tmp_path, capsys, color):
     Image.fromarray(np.full((240, 320, 3), color, np.uint8)).save(tmp_path / "vine.jpg")
     assert main([str(tmp_path / "vine.jpg"), "--out", str(tmp_path / "out")]) == 1
-    assert "shows nothing" in capsys.readouterr().err
+    assert "is blank" in capsys.readouterr().err

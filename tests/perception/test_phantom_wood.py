@@ -13,9 +13,9 @@ from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from perception.config import ObstacleConfig
-from perception.obstacles.evidence import Surface
+from perception.obstacles.cylinder_fit import fit_cylinders
 from perception.obstacles.obstacle_map import ObstacleMap
-from perception.obstacles.rods import rods_of
+from perception.obstacles.occupancy import OccupiedCells
 from perception.segmentation.frame import decode_frame
 from rolling_panda import messages as m
 from rolling_panda.messages.types import WOOD_CLASSES
@@ -90,7 +90,7 @@ def test_a_post_that_lies_along_the_row_is_none_and_is_counted(taken_for):
         capsules = known.update(standing.frame(), labels)
     uprights = [capsule for capsule in capsules if capsule.kind in ("post", "trunk")]
     assert all(lean(capsule) < 15.0 and abs(capsule.start[0] - 0.5) < 0.05 for capsule in uprights)
-    assert known.left_out[WOOD_CLASSES[taken_for], "lying"] >= 1
+    assert known.rejected[WOOD_CLASSES[taken_for], "lying"] >= 1
 
 
 def test_wood_before_or_behind_the_row_is_none_and_is_counted():
@@ -103,7 +103,7 @@ def test_wood_before_or_behind_the_row_is_none_and_is_counted():
         capsules = known.update(view, labels)
     assert [capsule for capsule in capsules if capsule.kind == "trunk"]
     assert all(abs(capsule.start[1] - 0.75) < 0.06 for capsule in capsules)
-    assert known.left_out["trunk", "off the row"] == 1
+    assert known.rejected["trunk", "off the row"] == 1
 
 
 def test_what_is_taken_for_a_trunk_within_a_post_is_the_post():
@@ -123,11 +123,11 @@ def test_two_things_far_apart_and_at_different_heights_are_not_one_wire():
     place[:, 0] = np.concatenate([np.arange(30) * 0.02, 2.0 + np.arange(30) * 0.02])
     place[:, 1] = 0.75 + rng.normal(0.0, 0.002, 60)
     place[:, 2] = np.repeat([0.88, 0.93], 30) + rng.normal(0.0, 0.002, 60)
-    cells = Surface(place, np.zeros((60, 3)), np.tile([0.0, 1.0, 0.0], (60, 1)), np.ones(60))
-    rods, _ = rods_of("wire", cells, ObstacleConfig())
+    cells = OccupiedCells(place, np.zeros((60, 3)), np.tile([0.0, 1.0, 0.0], (60, 1)), np.ones(60))
+    rods, _ = fit_cylinders("wire", cells, ObstacleConfig())
     assert sorted(round(float(np.linalg.norm(rod.end - rod.start)), 1) for rod in rods) == [0.6, 0.6]
     place[:, 2] = 0.88
-    rods, _ = rods_of("wire", cells, ObstacleConfig())
+    rods, _ = fit_cylinders("wire", cells, ObstacleConfig())
     assert [round(float(np.linalg.norm(rod.end - rod.start)), 1) for rod in rods] == [2.6]
 
 
@@ -135,15 +135,15 @@ def test_a_few_places_far_apart_are_no_wire():
     rng = np.random.default_rng(0)
     x = np.arange(12) * 0.35
     place = np.stack([x, 0.75 + rng.normal(0.0, 0.01, 12), 0.97 + rng.normal(0.0, 0.01, 12)], axis=1)
-    cells = Surface(place, np.zeros((12, 3)), np.tile([0.0, 1.0, 0.0], (12, 1)), np.ones(12))
-    assert rods_of("wire", cells, ObstacleConfig())[0] == []
+    cells = OccupiedCells(place, np.zeros((12, 3)), np.tile([0.0, 1.0, 0.0], (12, 1)), np.ones(12))
+    assert fit_cylinders("wire", cells, ObstacleConfig())[0] == []
 
 
 def test_what_is_remembered_is_bounded_and_what_is_near_stays():
-    known = ObstacleMap(ObstacleConfig(cells=1000))
+    known = ObstacleMap(ObstacleConfig(max_cells=1000))
     for x in np.arange(-0.4, 4.4, 0.6):
         standing = Standing(3, float(x))
         for _ in range(4):
             capsules = known.update(standing.frame(), standing.labels)
-    assert all(len(cells) <= 1000 for cells in known._seen.values())
+    assert all(len(cells) <= 1000 for cells in known._grids.values())
     assert any(capsule.kind == "cordon" and abs(capsule.start[0] - x - 0.5) < 0.3 for capsule in capsules)

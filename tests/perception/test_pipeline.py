@@ -12,10 +12,11 @@ from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from perception.config import PerceptionConfig
-from perception.pipeline import Perception, perceive, with_widening
+from perception.pipeline import Perception, with_width_bias
 from perception.segmentation.frame import decode_frame
 from perception.segmentation.segmenter import LabelImageSegmenter
-from perception.tracking.tracker import Tracked
+from perception.skeleton.topology import perceive_plant
+from perception.tracking.tracker import TrackerUpdate
 from rolling_panda import messages as m
 from rolling_panda.errors import MessageError
 from rolling_panda.messages.commands import AddPoint, AddPointInImage, MovePoint, SetRule, TakeRuleBack, TryRule
@@ -163,7 +164,7 @@ def test_canes_drawn_too_wide_are_measured_as_thick_as_they_are(model, frames):
     wide[:, 1:][(view.labels[:, :-1] == cane) & (view.labels[:, 1:] <= 1)] = cane
 
     def radius(labels, widening):
-        plant = perceive(view, labels, with_widening(PerceptionConfig(), widening))
+        plant = perceive_plant(view, labels, with_width_bias(PerceptionConfig(), widening).skeleton)
         return np.median([cane.radius for spur in plant.spurs for cane in spur.canes if cane.length > 0.3])
 
     true = radius(view.labels, 0.0)
@@ -211,7 +212,7 @@ def test_another_rule_keeps_the_names_of_the_spurs_cuts(model, frames):
     for old, new in kept:
         moved = np.linalg.norm(np.subtract(old.position, new.position))
         assert new.point_id == old.point_id
-        assert (new.revision > old.revision) is bool(moved > PerceptionConfig().tracker.moved)
+        assert (new.revision > old.revision) is bool(moved > PerceptionConfig().tracker.position_tolerance)
 
 
 def test_a_point_that_a_person_moves_stays_there_and_its_spur_gets_no_other(model, frames):
@@ -322,7 +323,7 @@ def test_what_was_cut_meanwhile_does_not_come_back_with_the_rule(model, frames):
     seen.answer(SetRule(user="Ada", rule=rule))
     cut = next(point for point in seen.points().points if point.kind == "spur cut")
     # As `process` does where it sees the wood beyond a point gone.
-    seen._take(Tracked((), (), (np.array(cut.position),)))
+    seen._apply(TrackerUpdate((), (np.array(cut.position),)))
     seen.withdrawn = ("told with the frame",)
     seen.answer(TakeRuleBack(user="Ada", rule=rule))
     assert seen.withdrawn == (), "what a frame took away is told once"

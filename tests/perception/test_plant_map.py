@@ -1,15 +1,11 @@
-"""The vines as known from all frames, and as graphs."""
+"""Map of the vines over all frames."""
 
-from dataclasses import replace
-
-import networkx as nx
 import numpy as np
 import pytest
 
 from perception.plant.map import PlantMap
 from perception.plant.model import Cane, Node, Plant, Span, Spur
 from perception.plant.numbering import SpurNumber
-from perception.plant.plant_graph import vine_graphs
 
 NUMBER = SpurNumber(1, 4)
 TRUNK = np.array([[0.1, 0.0, 0.5]])
@@ -22,9 +18,9 @@ def cane(nodes=(0.02, 0.10, 0.18, 0.26), x=0.0, radius=0.004, length=0.5, **chan
     return Cane(axis, arc, radius, tuple(Node(node, 30) for node in nodes), **values)
 
 
-def plant(*canes, doubt=""):
+def plant(*canes, incomplete=""):
     stub = np.array([[0.0, 0.0, 0.91], [0.0, 0.0, 0.97]])
-    return Plant((Spur(np.array([0.0, 0.0, 0.94]), stub, 0.007, tuple(canes), doubt),), TRUNK, ())
+    return Plant((Spur(np.array([0.0, 0.0, 0.94]), stub, 0.007, tuple(canes), incomplete),), TRUNK, ())
 
 
 def known(*plants) -> PlantMap:
@@ -38,14 +34,14 @@ def test_a_cane_seen_again_is_one_cane_and_its_measures_are_means():
     looks = [plant(cane(radius=0.004 + d, x=d)) for d in (-0.0004, 0.0, 0.0004)]
     (spur,) = known(*looks).spurs
     (only,) = spur.canes
-    assert only.base.looks == 3
+    assert only.base.count == 3
     assert only.radius.mean[0] == pytest.approx(0.004) and only.radius.covariance[0, 0] > 0.0
 
 
 def test_a_look_is_as_thick_as_most_looks_say():
     map_, looks = PlantMap(), [0.004, 0.0041, 0.0065, 0.0039]
     told = [map_.update(plant(cane(radius=radius)), (NUMBER,))[0].canes[0] for radius in looks]
-    assert [only.looks for only in told] == [1, 2, 3, 4]
+    assert [only.observations for only in told] == [1, 2, 3, 4]
     assert told[0].radius == 0.004 and told[2].radius == pytest.approx(0.0041)
     assert told[3].radius == pytest.approx(0.00405) and told[3].nodes == cane().nodes
 
@@ -85,26 +81,25 @@ def test_after_a_cut_what_lay_beyond_is_gone():
 
 
 def test_a_doubtful_look_does_not_stand_for_a_clear_one():
-    (spur,) = known(plant(cane(), doubt="edge"), plant(cane())).spurs
-    assert spur.as_spur().doubt == ""
-    (spur,) = known(plant(cane()), plant(cane(), doubt="edge")).spurs
-    assert spur.as_spur().doubt == ""
+    (spur,) = known(plant(cane(), incomplete="edge"), plant(cane())).spurs
+    assert spur.as_spur().incomplete == ""
+    (spur,) = known(plant(cane()), plant(cane(), incomplete="edge")).spurs
+    assert spur.as_spur().incomplete == ""
 
 
-def test_a_vine_is_a_tree_from_trunk_to_nodes_with_places_and_radii():
-    graph = vine_graphs(known(*[plant(cane(), cane(x=0.03))] * 4))[1]
-    assert nx.is_arborescence(graph)
-    kinds = [graph.nodes[name]["kind"] for name in nx.dfs_preorder_nodes(graph, "trunk")]
-    assert kinds[:3] == ["trunk", "cordon", "spur"] and kinds.count("cane") == 2 and kinds.count("node") == 8
-    for name, data in graph.nodes(data=True):
-        assert data["position"].shape == (3,) and np.all(np.linalg.eigvalsh(data["covariance"]) >= -1e-15), name
-        if data["kind"] == "cane":
-            assert data["radius"] == pytest.approx(0.004)
-    last = [data for _, data in graph.nodes(data=True) if data["kind"] == "node"][3]
-    np.testing.assert_allclose(last["position"], [0.0, 0.0, 0.95 + 0.26], atol=1e-6)
+def test_every_known_cane_is_a_line_along_its_axis_also_when_a_later_frame_does_not_show_it():
+    both, one = plant(cane(), cane(x=0.06)), plant(cane())
+    lines = known(both, both, one).cane_lines()
+    assert sorted({place[0] for line in lines for place in line}) == [0.0, 0.06]
+    for line in lines:
+        np.testing.assert_allclose([line[0][2], line[-1][2]], [0.95, 1.45])
+        assert np.all(np.diff([place[2] for place in line]) > 0.0)
 
 
-def test_without_a_trunk_in_view_the_tree_begins_at_the_cordon():
-    unseen = replace(plant(cane()), trunks=np.zeros((0, 3)))
-    graph = vine_graphs(known(unseen, unseen))[1]
-    assert nx.is_arborescence(graph) and "trunk" not in graph
+def test_what_was_cut_off_is_not_drawn():
+    map_ = known(plant(cane()), plant(cane()))
+    map_.sever(np.array([0.0, 0.0, 1.10]))
+    (line,) = map_.cane_lines()
+    assert abs(line[-1][2] - 1.10) < 0.01
+    map_.sever(np.array([0.0, 0.0, 0.955]))
+    assert map_.cane_lines() == ()

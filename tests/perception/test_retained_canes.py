@@ -18,7 +18,7 @@ from perception.pipeline import Perception
 from perception.plant.map import PlantMap
 from perception.plant.model import Cane, Node, Plant, Spur
 from perception.plant.numbering import SpurNumber
-from perception.rules.spur import Cut
+from perception.rules.pruning import Cut
 from perception.segmentation.frame import View
 from perception.segmentation.segmenter import LabelImageSegmenter
 from perception.skeleton.fragments import CANE
@@ -89,7 +89,7 @@ def test_where_the_choice_is_open_every_cane_counts_as_far_as_the_rule_would_lea
     ends = sorted({(round(c.end[0], 2), round(top([c]), 3)) for c in capsules})
     assert ends == [(0.0, 0.19), (0.05, 0.16)]
     # Nodes that were not seen may be farther up than those that were.
-    assert top(told(known(cane(nodes=(0.02, 0.1))))) == pytest.approx(RULE.basal_reach + 0.2, abs=0.002)
+    assert top(told(known(cane(nodes=(0.02, 0.1))))) == pytest.approx(RULE.basal_bud_distance + 0.2, abs=0.002)
 
 
 def test_a_guyot_spur_keeps_both_canes():
@@ -118,8 +118,8 @@ def test_cuts_on_other_spurs_say_nothing():
 
 
 def test_a_cane_is_believed_after_enough_looks():
-    assert told(known(cane(), looks=CONFIG.hits - 1)) == ()
-    assert told(known(cane(), looks=CONFIG.hits)) != ()
+    assert told(known(cane(), looks=CONFIG.min_hits - 1)) == ()
+    assert told(known(cane(), looks=CONFIG.min_hits)) != ()
 
 
 def test_noise_moves_nothing_and_a_cane_that_has_moved_is_told_anew():
@@ -156,7 +156,7 @@ def test_a_cane_that_is_seen_to_have_gone_is_in_nobodys_way_until_it_is_seen_aga
         places = {round(c.end[0], 2) for c in told(plants, staying=staying, seen=view(0.0))}
         assert len(places) == left
     assert {round(c.end[0], 2) for c in told(plants, staying=staying)} == {0.0}, "no new look has shown it"
-    for _ in range(CONFIG.hits):
+    for _ in range(CONFIG.min_hits):
         plants.update(Plant((Spur(BASE, None, 0.007, (cane(0.05), cane())),), np.zeros((0, 3)), ()), (NUMBER,))
     assert {round(c.end[0], 2) for c in told(plants, staying=staying)} == {0.0, 0.05}
 

@@ -1,7 +1,10 @@
 """Pruning points of a single picture."""
 
+import json
+
 import numpy as np
 import pytest
+from PIL import Image
 
 from bridge.sim.camera.config import CameraConfig
 from bridge.sim.camera.renderer import Camera
@@ -9,8 +12,8 @@ from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from bridge.sim.vineyard.truth import judge
 from perception.config import PerceptionConfig
-from perception.segmentation.photograph import Photograph
-from perception.single_image import read_still
+from perception.single_image import Photograph, find_cuts, load_photograph
+from rolling_panda.errors import InputError
 
 PLACE = np.eye(4)
 PLACE[:3, :3] = np.column_stack([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
@@ -29,9 +32,9 @@ def picture():
 
 def test_with_depth_the_cuts_have_places_before_the_camera(picture):
     photograph, labels, right = picture
-    still = read_still(photograph, labels, PerceptionConfig())
-    cuts = [point.cut for point in still.points if point.cut.kind == "spur cut"]
-    assert len(cuts) >= 4 and still.scale == "depth image"
+    result = find_cuts(photograph, labels, PerceptionConfig())
+    cuts = [point.cut for point in result.cuts if point.cut.kind == "spur cut"]
+    assert len(cuts) >= 4 and result.scale == "depth image"
     # A level camera's frame is the world's but for its place.
     gaps = [np.linalg.norm(right - (cut.position + PLACE[:3, 3]), axis=1).min() for cut in cuts]
     assert np.mean(np.array(gaps) < 0.012) >= 0.8
@@ -40,9 +43,9 @@ def test_with_depth_the_cuts_have_places_before_the_camera(picture):
 def test_without_depth_they_are_pixels_near_the_same_places(picture):
     photograph, labels, right = picture
     flat = Photograph(photograph.color, None, photograph.intrinsics, True, (848, 480))
-    still = read_still(flat, labels, PerceptionConfig())
-    points = [point for point in still.points if point.cut.kind == "spur cut"]
-    assert len(points) >= 2 and "no depth" in still.scale
+    result = find_cuts(flat, labels, PerceptionConfig())
+    points = [point for point in result.cuts if point.cut.kind == "spur cut"]
+    assert len(points) >= 2 and "no depth" in result.scale
     k = photograph.intrinsics
     x, y, z = ((right - PLACE[:3, 3]) @ PLACE[:3, :3]).T
     pixels = np.stack([k.cx + k.fx * x / z, k.cy + k.fy * y / z], axis=1)
@@ -55,20 +58,98 @@ def test_a_picture_without_wood_gives_a_reason_and_no_point(picture):
     photograph, labels, _ = picture
     flat = Photograph(photograph.color, None, photograph.intrinsics, True, (848, 480))
     for picture_without in (photograph, flat):
-        still = read_still(picture_without, np.zeros_like(labels), PerceptionConfig())
-        assert not still.points and "no cane" in still.abstained[0]
+        result = find_cuts(picture_without, np.zeros_like(labels), PerceptionConfig())
+        assert not result.cuts and "no cane" in result.undecided[0]
 
 
 def test_depth_that_is_nowhere_on_wood_gives_no_point(picture):
     photograph, labels, _ = picture
     blind = Photograph(photograph.color, np.zeros_like(photograph.depth), photograph.intrinsics, False, (848, 480))
-    still = read_still(blind, labels, PerceptionConfig())
-    assert not still.points and "no cane with depth" in still.abstained[0]
+    result = find_cuts(blind, labels, PerceptionConfig())
+    assert not result.cuts and "no cane with depth" in result.undecided[0]
 
 
 def test_every_point_has_its_reason_and_a_direction_along_the_wood(picture):
     photograph, labels, _ = picture
-    for point in read_still(photograph, labels, PerceptionConfig()).points:
+    for point in find_cuts(photograph, labels, PerceptionConfig()).cuts:
         assert point.cut.reason.endswith(".") and 0.0 < point.cut.confidence <= 1.0
         # Away from the cordon is up in this picture.
         assert point.beyond[1] < point.pixel[1]
+
+
+@pytest.fixture
+def image(tmp_path):
+    path = tmp_path / "vine.png"
+    Image.fromarray(np.random.default_rng(0).integers(0, 255, (120, 200, 3), dtype=np.uint8)).save(path)
+    return path
+
+
+def depth_png(path, counts):
+    Image.fromarray(counts.astype(np.uint16)).save(path)
+    return path
+
+
+def test_depth_comes_as_counts_or_as_metres(tmp_path, image):
+    counts = np.full((120, 200), 800)
+    as_counts = load_photograph(image, depth_png(tmp_path / "d.png", counts))
+    np.save(tmp_path / "d.npy", counts / 1000.0)
+    as_metres = load_photograph(image, tmp_path / "d.npy")
+    np.save(tmp_path / "tenth.npy", (counts * 10).astype(np.uint16))
+    as_tenths = load_photograph(image, tmp_path / "tenth.npy", depth_unit=0.0001)
+    for photograph in (as_counts, as_metres, as_tenths):
+        assert np.allclose(photograph.depth, 0.8)
+
+
+def test_values_that_are_no_depth_become_none(tmp_path, image):
+    values = np.full((120, 200), 0.8)
+    values[0, :4] = [np.nan, np.inf, -1.0, 0.0]
+    np.save(tmp_path / "d.npy", values)
+    depth = load_photograph(image, tmp_path / "d.npy").depth
+    assert np.all(depth[0, :4] == 0.0) and np.all(depth[1] == np.float32(0.8))
+
+
+def test_a_wide_photograph_is_made_smaller_with_depth_and_intrinsics(tmp_path):
+    Image.fromarray(np.zeros((900, 1696, 3), np.uint8)).save(tmp_path / "a.jpg")
+    counts = np.tile(np.arange(1696) + 500, (900, 1))
+    k = {"width": 1696, "height": 900, "fx": 1000.0, "fy": 1000.0, "cx": 847.5, "cy": 449.5}
+    (tmp_path / "k.json").write_text(json.dumps(k), encoding="utf-8")
+    got = load_photograph(tmp_path / "a.jpg", depth_png(tmp_path / "d.png", counts), tmp_path / "k.json")
+    assert got.color.shape == (450, 848, 3) and got.size == (1696, 900) and not got.assumed
+    assert (got.intrinsics.fx, got.intrinsics.cx) == (500.0, 423.5)
+    # A pixel looks the same way before and after.
+    assert abs(got.depth[0, 100] - (201 + 500) / 1000) < 0.0011
+
+
+def test_intrinsics_that_nobody_gave_are_called_a_guess(image):
+    assert load_photograph(image).assumed
+
+
+@pytest.mark.parametrize(
+    ("counts", "unit", "says"),
+    [
+        (np.full((120, 200), 800), 1.0, "--depth-unit"),
+        (np.full((120, 200), 800), 0.00001, "--depth-unit"),
+        (np.zeros((120, 200)), 0.001, "no depth at all"),
+        (np.full((100, 200), 800), 0.001, "one value a pixel"),
+    ],
+)
+def test_a_depth_that_cannot_be_is_refused(tmp_path, image, counts, unit, says):
+    with pytest.raises(InputError, match=says):
+        load_photograph(image, depth_png(tmp_path / "d.png", counts), depth_unit=unit)
+
+
+def test_files_that_are_something_else_are_refused(tmp_path, image):
+    text = tmp_path / "x.png"
+    text.write_text("hello", encoding="utf-8")
+    with pytest.raises(InputError, match="cannot read the image"):
+        load_photograph(text)
+    with pytest.raises(InputError, match="cannot read the depth"):
+        load_photograph(image, text)
+    with pytest.raises(InputError, match="cannot read the intrinsics"):
+        load_photograph(image, None, text)
+    (tmp_path / "k.json").write_text('{"width":2,"height":2,"fx":1,"fy":1,"cx":0,"cy":0}', encoding="utf-8")
+    with pytest.raises(InputError, match="is for 2×2"):
+        load_photograph(image, None, tmp_path / "k.json")
+    Image.fromarray(np.zeros((20, 20, 3), np.uint8)).save(tmp_path / "small.png")
+    with pytest.raises(InputError, match="at least"):
+        load_photograph(tmp_path / "small.png")

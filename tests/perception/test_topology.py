@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from perception.config import PerceptionConfig
-from perception.pipeline import perceive
+from perception.config import SkeletonConfig
 from perception.segmentation.frame import View
+from perception.skeleton.topology import perceive_plant
 from rolling_panda import messages as m
 from rolling_panda.messages.robot import Intrinsics
 
@@ -36,7 +36,7 @@ def vine(cap: str) -> View:
 def test_a_cane_on_an_old_cut_grows_from_the_stub_below_it(cap: str) -> None:
     seen = vine(cap)
     assert seen.labels is not None
-    (spur,) = perceive(seen, seen.labels, PerceptionConfig()).spurs
+    (spur,) = perceive_plant(seen, seen.labels, SkeletonConfig()).spurs
     (cane,) = spur.canes
     assert cane.base_gap < 0.022 and len(cane.nodes) == 5
     assert spur.axis is not None and np.linalg.norm(spur.axis[1] - spur.axis[0]) > 0.08
@@ -46,4 +46,4 @@ def test_an_old_cut_by_itself_is_no_spur() -> None:
     seen = vine("spur")
     assert seen.labels is not None
     seen.labels[seen.labels == KIND("spur")] = KIND("old cut")
-    assert perceive(seen, seen.labels, PerceptionConfig()).spurs == ()
+    assert perceive_plant(seen, seen.labels, SkeletonConfig()).spurs == ()

@@ -7,8 +7,7 @@ import pytest
 torch = pytest.importorskip("torch", reason="the extra `training` is not installed: pip install '.[training]'")
 pytest.importorskip("onnx", reason="the extra `training` is not installed: pip install '.[training]'")
 
-from perception.segmentation.network_input import network_input
-from perception.segmentation.network_segmenter import NetworkSegmenter
+from perception.segmentation.network_segmenter import NetworkSegmenter, network_input
 from perception.training.compact import CompactLabeller
 from perception.training.export import write_network
 from perception.training.fit import (
@@ -70,7 +69,7 @@ def test_what_was_learned_survives_the_export(scenes, tmp_path):
     with torch.inference_mode():
         meant = Labeller(trainer.network, WEIGHTS)(torch.from_numpy(image)[None])[0].numpy()
     assert len(np.unique(meant)) > 1 and np.mean(said == meant) > 0.999
-    assert NetworkSegmenter(tmp_path / "net.onnx").widening == 0.25
+    assert NetworkSegmenter(tmp_path / "net.onnx").width_bias == 0.25
     card = (tmp_path / "net.md").read_text(encoding="utf-8")
     assert f"| cane | {score.overlap()['cane']:.3f} |" in card and "--seed 1 --rows 2 --steps 16" in card
 

@@ -10,8 +10,8 @@ from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from perception.config import SkeletonConfig
+from perception.segmentation.depth_inpainting import inpaint_depth
 from perception.segmentation.frame import View
-from perception.segmentation.mending import mended
 from rolling_panda import messages as m
 
 CANE = m.WOOD_CLASSES.index("cane")
@@ -29,7 +29,7 @@ def frame(config: CameraConfig) -> View:
 def test_canes_get_back_the_depth_that_bled_and_keep_the_rest():
     exact = frame(CameraConfig().ideal())
     bled = frame(msgspec.structs.replace(CameraConfig().ideal(), edge_bleed=0.4))
-    mend = mended(bled, bled.labels, SkeletonConfig())
+    mend = inpaint_depth(bled, bled.labels, SkeletonConfig())
     cane = exact.labels == CANE
     wrong, left = (np.abs(view.depth - exact.depth)[cane] > 0.015 for view in (bled, mend))
     assert wrong.mean() > 0.1
@@ -43,5 +43,5 @@ def test_a_lone_pixel_of_cane_loses_its_depth():
     labels = np.zeros_like(view.labels)
     labels[100, 100] = CANE
     depth = np.full_like(view.depth, 0.8)
-    lone = mended(dataclasses.replace(view, depth=depth), labels, SkeletonConfig())
+    lone = inpaint_depth(dataclasses.replace(view, depth=depth), labels, SkeletonConfig())
     assert lone.depth[100, 100] == 0.0 and lone.depth[100, 101] == np.float32(0.8)

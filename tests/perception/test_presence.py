@@ -1,4 +1,4 @@
-"""What a frame says of a place where wood was known to stand."""
+"""Presence of wood at known positions."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from perception.segmentation.frame import View
 from perception.skeleton.fragments import CANE
-from perception.tracking.wood_check import glance
+from perception.tracking.presence import wood_presence
 from rolling_panda.messages.robot import Intrinsics
 
 AT = np.array([0.0, 0.0, 0.8])
@@ -25,24 +25,24 @@ def view(behind=3.0, cane_depth=0.8, cols=slice(78, 83)):
 @pytest.mark.parametrize(
     ("seen", "place", "said"),
     [
-        (view(), AT, "standing"),
-        (view(), AT + [0.006, 0.0, 0.01], "standing"),
+        (view(), AT, "present"),
+        (view(), AT + [0.006, 0.0, 0.01], "present"),
         (view(), AT + [0.05, 0.0, 0.0], "gone"),
         (view(cane_depth=0.9), AT, "gone"),
-        (view(behind=0.5), AT + [0.05, 0.0, 0.0], "unseen"),
-        (view(cane_depth=0.0), AT, "unseen"),
-        (view(cane_depth=6.5535), AT, "unseen"),
-        (view(), AT + [0.5, 0.0, 0.0], "unseen"),
-        (view(), np.array([0.0, 0.0, 0.2]), "unseen"),
-        (view(), -AT, "unseen"),
+        (view(behind=0.5), AT + [0.05, 0.0, 0.0], "not visible"),
+        (view(cane_depth=0.0), AT, "not visible"),
+        (view(cane_depth=6.5535), AT, "not visible"),
+        (view(), AT + [0.5, 0.0, 0.0], "not visible"),
+        (view(), np.array([0.0, 0.0, 0.2]), "not visible"),
+        (view(), -AT, "not visible"),
     ],
 )
 def test_wood_is_there_or_not_or_the_place_cannot_be_seen(seen, place, said):
-    assert glance(seen, seen.labels, place) == said
+    assert wood_presence(seen, seen.labels, place) == [said]
 
 
 @given(x=st.floats(-2, 2), y=st.floats(-2, 2), z=st.floats(-2, 3))
 def test_where_nothing_is_wood_nothing_stands(x, y, z):
     seen = view()
     bare = replace(seen, labels=np.zeros_like(seen.labels))
-    assert glance(bare, bare.labels, np.array([x, y, z])) != "standing"
+    assert wood_presence(bare, bare.labels, np.array([x, y, z])) != ["present"]

@@ -3,8 +3,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from perception.plant.clearance import clearance
+from perception.plant.capsules import CapsuleSet
 from rolling_panda.messages.perception import Capsule
+
+
+def clearance(capsules, kind, place):
+    return CapsuleSet(capsules, (kind,)).nearest(place[None])[0]
+
 
 WIRE = Capsule("wire", (0.0, 0.0, 1.2), (2.0, 0.0, 1.2), 0.002, 0.002)
 CORDON = Capsule("cordon", (0.0, 0.0, 0.9), (1.0, 0.0, 0.9), 0.02, 0.04)
@@ -15,7 +20,7 @@ def test_it_is_measured_to_the_surface_of_the_nearest_of_the_kind():
     assert clearance((WIRE, CORDON), "wire", place) == pytest.approx(0.198)
     assert clearance((WIRE, CORDON), "cordon", place) == pytest.approx(0.06)
     assert clearance((WIRE,), "wire", np.array([-0.3, 0.0, 1.2])) == pytest.approx(0.298)
-    assert clearance((CORDON,), "wire", place) is None
+    assert clearance((CORDON,), "wire", place) == np.inf
     assert clearance((CORDON,), "cordon", np.array([0.5, 0.0, 0.9])) == pytest.approx(-0.03)
 
 

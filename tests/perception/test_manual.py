@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from perception.config import RuleConfig
-from perception.rules.by_hand import moved_by_hand, point_by_hand
+from perception.rules.manual import move_cut, place_cut
 from rolling_panda.messages.perception import Capsule
 from tests.perception.test_plant_map import NUMBER, cane, known, plant
 
@@ -14,7 +14,7 @@ TOWARDS = np.array([0.0, 1.0, 0.0])
 
 
 def place(x, height, known_map=MAP, obstacles=()):
-    return point_by_hand(known_map, np.array([x, -0.7, height]), TOWARDS, RULE, obstacles, "Ada")
+    return place_cut(known_map, np.array([x, -0.7, height]), TOWARDS, RULE, obstacles, "Ada")
 
 
 def test_a_click_beside_a_cane_snaps_to_its_axis_and_counts_its_nodes():
@@ -33,7 +33,7 @@ def test_the_nearer_of_two_canes_is_meant():
 
 @pytest.mark.parametrize(
     ("x", "height", "says"),
-    [(0.15, 1.17, "90 mm beside there: click on a blue line"), (0.5, 1.17, "not been seen yet: drive there")],
+    [(0.15, 1.17, "90 mm beside the click: click on a blue line"), (0.5, 1.17, "not been seen yet: drive there")],
 )
 def test_where_no_cane_is_it_says_what_to_do(x, height, says):
     assert says in place(x, height)
@@ -54,9 +54,9 @@ def test_no_slide_leads_past_two_nodes_side_by_side():
 
 
 def test_from_afar_a_click_may_be_farther_beside_the_cane():
-    far = point_by_hand(MAP, np.array([-0.04, -3.5, 1.17]), TOWARDS, RULE, (), "Ada")
+    far = place_cut(MAP, np.array([-0.04, -3.5, 1.17]), TOWARDS, RULE, (), "Ada")
     assert not isinstance(far, str)
-    near = point_by_hand(MAP, np.array([-0.04, -0.7, 1.17]), TOWARDS, RULE, (), "Ada")
+    near = place_cut(MAP, np.array([-0.04, -0.7, 1.17]), TOWARDS, RULE, (), "Ada")
     assert "40 mm beside" in near
 
 
@@ -76,7 +76,7 @@ def test_a_wire_a_thick_cane_and_a_cut_one_are_refused():
 
 
 def move(from_height, along, known_map=MAP, obstacles=()):
-    return moved_by_hand(known_map, np.array([0.003, 0.002, from_height]), along, RULE, obstacles, "Ada")
+    return move_cut(known_map, np.array([0.003, 0.002, from_height]), along, RULE, obstacles, "Ada")
 
 
 @pytest.mark.parametrize("along", [0.005, -0.01, 0.02])
@@ -92,8 +92,8 @@ def test_where_it_cannot_be_moved_to_there_is_a_reason():
     assert "from a node" in move(1.17, -0.035)
     assert "cut there already" in move(1.17, 2.0)
     assert "begins there" in move(1.17, -0.5)
-    assert "no cane that is known" in moved_by_hand(MAP, np.array([0.5, 0.0, 1.17]), 0.01, RULE, (), "Ada")
+    assert "no known cane" in move_cut(MAP, np.array([0.5, 0.0, 1.17]), 0.01, RULE, (), "Ada")
 
 
 def test_a_cane_behind_the_viewer_is_not_meant():
-    assert "not been seen" in point_by_hand(MAP, np.array([0.0, 0.7, 1.17]), TOWARDS, RULE, (), "Ada")
+    assert "not been seen" in place_cut(MAP, np.array([0.0, 0.7, 1.17]), TOWARDS, RULE, (), "Ada")

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from perception.config import RuleConfig
 from perception.plant.model import Cane, Node, Span, Spur
 from perception.rules.keep_out import KeepOut
-from perception.rules.spur import choose_keeper, count_nodes, cut_arc, decide
+from perception.rules.pruning import apply_rule, choose_keeper, count_nodes, cut_arc, cutting_force
 
 RULE = RuleConfig()
 
@@ -26,9 +26,9 @@ def spur(*canes):
 
 
 def test_a_single_cane_is_cut_two_centimetres_past_the_second_count_node():
-    decision = decide(spur(cane()), RULE)
+    decision = apply_rule(spur(cane()), RULE)
     (cut,) = decision.cuts
-    assert cut.kind == "spur cut" and not decision.abstained
+    assert cut.kind == "spur cut" and not decision.undecided
     np.testing.assert_allclose(cut.position, [0.0, 0.0, 1.20], atol=1e-9)
     np.testing.assert_allclose(cut.tangent, [0.0, 0.0, 1.0], atol=1e-9)
     assert (cut.nodes_seen, cut.nodes_kept) == (3, 2)
@@ -51,9 +51,9 @@ def test_it_abstains_where_it_has_not_seen_enough():
     assert "cut is hidden" in str(cut_arc(cane(hidden=(Span(0.195, 0.205),)), RULE))
     assert "side by side" in str(cut_arc(cane(nodes=(0.02, 0.1, 0.12, 0.2)), RULE))
     assert "base" in str(cut_arc(cane(base_gap=0.03), RULE))
-    assert decide(spur(), RULE).abstained and not decide(spur(), RULE).cuts
-    assert decide(replace(spur(cane()), doubt="edge"), RULE).abstained == ("edge",)
-    assert "thick" in decide(spur(cane(radius=0.009)), RULE).abstained[0]
+    assert apply_rule(spur(), RULE).undecided and not apply_rule(spur(), RULE).cuts
+    assert apply_rule(replace(spur(cane()), incomplete="edge"), RULE).undecided == ("edge",)
+    assert "thick" in apply_rule(spur(cane(radius=0.009)), RULE).undecided[0]
 
 
 def test_nodes_too_near_or_too_far_apart_are_not_counted():
@@ -88,7 +88,7 @@ def test_a_choice_within_the_noise_is_no_choice():
 
 def test_the_old_stub_goes_in_one_cut_beyond_the_keeper():
     low = cane(base=(0.025, 0.0, 0.93))
-    decision = decide(spur(low, cane(base=(0.0, 0.0, 0.99))), RULE)
+    decision = apply_rule(spur(low, cane(base=(0.0, 0.0, 0.99))), RULE)
     assert [cut.kind for cut in decision.cuts] == ["spur cut", "renewal cut"]
     position = decision.cuts[1].position
     assert 0.93 < position[2] < 0.99 and abs(position[0]) < 1e-9
@@ -96,26 +96,26 @@ def test_the_old_stub_goes_in_one_cut_beyond_the_keeper():
 
 def test_a_cut_where_another_cane_crosses_is_left_alone():
     crossing = np.array([[0.1 * k - 0.5, 0.008, 1.2] for k in range(11)])
-    assert "another cane" in decide(spur(cane()), RULE, crossing).abstained[0]
-    assert decide(spur(cane()), RULE, crossing + [0.0, 0.03, 0.0]).cuts
-    assert decide(spur(cane()), RULE, np.zeros((0, 3))).cuts
+    assert "another cane" in apply_rule(spur(cane()), RULE, crossing).undecided[0]
+    assert apply_rule(spur(cane()), RULE, crossing + [0.0, 0.03, 0.0]).cuts
+    assert apply_rule(spur(cane()), RULE, np.zeros((0, 3))).cuts
 
 
 def test_a_cut_gives_way_to_a_cane_or_a_wire_that_crosses_a_little_off_and_stays_on_its_internode():
     for side in (-1, 1):
         crossing = np.array([[0.1 * k - 0.5, 0.008, 1.2 + side * 0.010] for k in range(11)])
-        (cut,) = decide(spur(cane()), RULE, crossing).cuts
-        assert 0.0 < (1.2 - cut.position[2]) * side <= RULE.shift + 1e-9
-        assert np.linalg.norm(crossing - cut.position, axis=1).min() >= RULE.crossing
-    (cut,) = decide(spur(cane()), RULE, None, wire_from(1.196, 1.214)).cuts
-    assert cut.position[2] == pytest.approx(1.2 - RULE.shift / 2) and "16 mm past node 2" in cut.reason
-    assert decide(spur(cane()), RULE, None, wire_from(0.0, 9.0)).abstained == ("a wire is there",)
+        (cut,) = apply_rule(spur(cane()), RULE, crossing).cuts
+        assert 0.0 < (1.2 - cut.position[2]) * side <= RULE.max_shift + 1e-9
+        assert np.linalg.norm(crossing - cut.position, axis=1).min() >= RULE.crossing_distance
+    (cut,) = apply_rule(spur(cane()), RULE, None, wire_from(1.196, 1.214)).cuts
+    assert cut.position[2] == pytest.approx(1.2 - RULE.max_shift / 2) and "16 mm past node 2" in cut.reason
+    assert apply_rule(spur(cane()), RULE, None, wire_from(0.0, 9.0)).undecided == ("a wire is there",)
 
 
 @pytest.mark.parametrize(("tight", "best"), [((1.19, 1.203), 1.20425), ((1.197, 1.21), 1.19575), ((1.1, 1.3), 1.2)])
 def test_where_the_blades_only_just_have_room_a_better_place_nearby_is_taken(tight, best):
     beside = KeepOut(lambda place: "", lambda place, tangent: not tight[0] < place[2] < tight[1])
-    (cut,) = decide(spur(cane()), RULE, None, beside).cuts
+    (cut,) = apply_rule(spur(cane()), RULE, None, beside).cuts
     assert cut.position[2] == pytest.approx(best)
 
 
@@ -127,16 +127,16 @@ def test_blades_keep_10_mm_from_the_nodes():
     # Midway between nodes 30 mm apart; a cane crosses there, and to either side a node is too near.
     tight = cane(nodes=(0.02, 0.10, 0.18, 0.212))
     crossing = np.array([[0.0, 0.0145, 1.196]])
-    assert decide(spur(tight), RULE).cuts
-    assert all(cut.node_distance >= RULE.node_distance for cut in decide(spur(tight), RULE, crossing).cuts)
+    assert apply_rule(spur(tight), RULE).cuts
+    assert all(cut.node_distance >= RULE.node_distance for cut in apply_rule(spur(tight), RULE, crossing).cuts)
     nearer = replace(tight, nodes=(*tight.nodes[:3], Node(0.198, 30)))
-    assert not decide(spur(nearer), RULE).cuts
+    assert not apply_rule(spur(nearer), RULE).cuts
 
 
 def test_a_diameter_seen_often_leaves_less_in_doubt():
     near = [cane(radius=0.00311, base=(0.02, 0.0, 0.93)), cane(base=(0.0, 0.0, 0.99))]
     assert "too near" in choose_keeper(spur(*near), RULE)
-    often = [replace(each, looks=9) for each in near]
+    often = [replace(each, observations=9) for each in near]
     assert choose_keeper(spur(*often), RULE).cane is often[0]
     assert "too near" in choose_keeper(spur(often[0], near[1]), RULE), "one of them was seen once only"
 
@@ -151,15 +151,15 @@ def test_a_cane_that_runs_into_another_is_cut_where_enough_of_it_is_seen_and_a_p
 def test_a_stub_is_not_cut_where_the_blades_must_not_go():
     low, high = cane(base=(0.025, 0.0, 0.93)), cane(base=(0.0, 0.0, 0.99))
     cordon = KeepOut(lambda place: "the cordon is near" if place[2] < 1.0 else "", lambda place, tangent: True)
-    decision = decide(spur(low, high), RULE, None, cordon)
-    assert [cut.kind for cut in decision.cuts] == ["spur cut"] and "cordon" in decision.abstained[0]
+    decision = apply_rule(spur(low, high), RULE, None, cordon)
+    assert [cut.kind for cut in decision.cuts] == ["spur cut"] and "cordon" in decision.undecided[0]
 
 
 def test_a_cane_below_the_keeper_is_left_for_a_person():
     thin = cane(radius=0.0025, base=(0.02, 0.0, 0.93))
-    decision = decide(spur(thin, cane(base=(0.0, 0.0, 0.99))), RULE)
+    decision = apply_rule(spur(thin, cane(base=(0.0, 0.0, 0.99))), RULE)
     assert len(decision.cuts) == 1
-    assert "below the cane that stays" in decision.abstained[0]
+    assert "below the cane that stays" in decision.undecided[0]
 
 
 internodes = st.lists(st.floats(0.012, 0.12), min_size=0, max_size=8)
@@ -180,7 +180,7 @@ def test_a_cut_lies_between_its_nodes_and_never_past_what_was_seen(basal, gaps, 
     assert arc - counted[1].arc <= RULE.offset + 1e-12
     if len(counted) > 2:
         assert arc < counted[2].arc
-    assert not any(span.meets(arc - 0.005, arc + 0.005) for span in hidden)
+    assert not any(span.overlaps(arc - 0.005, arc + 0.005) for span in hidden)
 
 
 @settings(max_examples=40, deadline=None)
@@ -194,9 +194,72 @@ def test_a_decision_does_not_depend_on_order_or_place(radii, shift):
         return row(x), stub
 
     here, there = moved(0.0), moved(shift)
-    first = decide(Spur(here[1][0], here[1], 0.006, tuple(here[0])), RULE)
-    second = decide(Spur(there[1][0], there[1], 0.006, tuple(reversed(there[0]))), RULE)
+    first = apply_rule(Spur(here[1][0], here[1], 0.006, tuple(here[0])), RULE)
+    second = apply_rule(Spur(there[1][0], there[1], 0.006, tuple(reversed(there[0]))), RULE)
     assert [cut.kind for cut in first.cuts] == [cut.kind for cut in second.cuts]
     for a, b in zip(first.cuts, second.cuts, strict=True):
         np.testing.assert_allclose(a.position + [shift, 0.0, 0.0], b.position, atol=1e-9)
         assert a.reason == b.reason and 0.0 <= a.confidence <= 1.0
+
+
+GUYOT = RuleConfig(system="guyot")
+TEN = tuple(0.02 + 0.08 * k for k in range(11))
+
+
+def guyot_cane(nodes, x, height, radius=0.004, length=1.0):
+    arc = np.linspace(0.0, length, 201)
+    axis = np.array([x, 0.0, height]) + arc[:, None] * np.array([0.0, 0.0, 1.0])
+    return Cane(axis, arc, radius, tuple(Node(node, 30) for node in nodes), (), "image border", 0.0)
+
+
+def guyot_spur(*canes, incomplete=""):
+    return Spur(np.array([0.0, 0.0, 0.9]), None, 0.0, tuple(canes), incomplete)
+
+
+LOWER, UPPER = guyot_cane(TEN, 0.0, 0.90), guyot_cane(TEN, 0.06, 0.93)
+
+
+def test_the_lower_cane_keeps_two_nodes_and_the_upper_one_eight():
+    decision = apply_rule(guyot_spur(UPPER, LOWER), GUYOT)
+    assert [(cut.kind, cut.nodes_kept) for cut in decision.cuts] == [("spur cut", 2), ("cane cut", 8)]
+    short, long = decision.cuts
+    # 20 mm past the second and the eighth node; the basal bud is not counted.
+    np.testing.assert_allclose(short.position, [0.0, 0.0, 0.90 + 0.18 + 0.02], atol=1e-9)
+    np.testing.assert_allclose(long.position, [0.06, 0.0, 0.93 + 0.66 + 0.02], atol=1e-9)
+    assert "person" in decision.undecided[0]
+
+
+def test_the_operators_numbers_of_nodes_are_kept():
+    changed = RuleConfig(system="guyot", nodes_kept=1, fruiting_nodes=5)
+    assert [cut.nodes_kept for cut in apply_rule(guyot_spur(LOWER, UPPER), changed).cuts] == [1, 5]
+
+
+def test_a_cane_that_leaves_the_view_too_early_is_not_tipped():
+    decision = apply_rule(guyot_spur(LOWER, guyot_cane(TEN[:6], 0.06, 0.93, length=0.45)), GUYOT)
+    assert [cut.kind for cut in decision.cuts] == ["spur cut"]
+    assert any("only 5 of 8 nodes" in reason for reason in decision.undecided)
+
+
+@pytest.mark.parametrize("canes", [(), (LOWER,), (LOWER, UPPER, guyot_cane(TEN, 0.1, 0.95))])
+def test_anything_but_two_canes_is_left_for_a_person(canes):
+    decision = apply_rule(guyot_spur(*canes), GUYOT)
+    assert not decision.cuts and f"{len(canes)} canes" in decision.undecided[0]
+
+
+def test_doubts_end_in_no_cut():
+    assert not apply_rule(guyot_spur(LOWER, UPPER, incomplete="edge"), GUYOT).cuts
+    assert "same height" in apply_rule(guyot_spur(LOWER, guyot_cane(TEN, 0.06, 0.902)), GUYOT).undecided[0]
+    close = apply_rule(guyot_spur(LOWER, guyot_cane(TEN, 0.01, 0.93)), GUYOT)
+    assert not close.cuts and any("another cane passes" in reason for reason in close.undecided)
+    thick = apply_rule(guyot_spur(LOWER, guyot_cane(TEN, 0.06, 0.93, radius=0.009)), GUYOT)
+    assert [cut.kind for cut in thick.cuts] == ["spur cut"]
+
+
+def test_the_spur_rule_is_the_usual_one():
+    assert all(cut.kind != "cane cut" for cut in apply_rule(guyot_spur(LOWER, UPPER), RuleConfig()).cuts)
+
+
+def test_a_cane_of_the_paper_needs_the_force_that_was_measured():
+    # 263.5 N at 9.34 MPa: a cane of 28.2 mm², 6 mm thick.
+    assert cutting_force(0.003) == pytest.approx(263.5, rel=0.01)
+    assert cutting_force(0.006) == pytest.approx(4 * cutting_force(0.003))

@@ -1,0 +1,47 @@
+"""Whether wood is present at a known position, as far as one frame shows."""
+
+from typing import Literal
+
+import numpy as np
+
+from perception.arrays import Array, Labels
+from perception.segmentation.frame import CANE, NODE, SPUR, View
+
+#: Largest depth difference of the same wood (m).
+_SAME_DEPTH = 0.025
+#: Least depth (m): the camera is blind below 0.18 m (D435i), plus the error of a position.
+_MIN_DEPTH = 0.25
+#: Search radius across the view (m), for errors of odometry.
+_SEARCH_RADIUS = 0.008
+#: Wood farther behind the position than this belongs to another row (m).
+_OTHER_ROW = 0.8
+
+Presence = Literal["present", "gone", "not visible"]
+
+
+def wood_presence(view: View, labels: Labels, positions: Array) -> list[Presence]:
+    """Presence of spur, cane or node at positions on the axis of the wood (N×3, m, odom).
+
+    Args:
+        view: The frame.
+        labels: H×W class indices.
+        positions: To check.
+    """
+    return [_at(view, labels, u, v, z) for u, v, z in view.pixels(positions).tolist()]
+
+
+def _at(view: View, labels: Labels, u: float, v: float, z: float) -> Presence:
+    height, width = view.depth.shape
+    radius = max(2, round(view.intrinsics.fx * _SEARCH_RADIUS / max(z, 0.1)))
+    if z < _MIN_DEPTH or not (radius <= u < width - radius - 1 and radius <= v < height - radius - 1):
+        return "not visible"
+    row, col = round(v), round(u)
+    window = slice(row - radius, row + radius + 1), slice(col - radius, col + radius + 1)
+    depth = view.depth[window]
+    wood = np.isin(labels[window], (CANE, NODE, SPUR))
+    if (wood & (np.abs(depth - z) < _SAME_DEPTH)).any():
+        return "present"
+    # Occluded by something nearer, or wood with no depth or with that of another row.
+    if (wood & ((depth == 0.0) | (depth > z + _OTHER_ROW))).any() or ((depth > 0.0) & (depth < z - _SAME_DEPTH)).any():
+        return "not visible"
+    return "gone"
