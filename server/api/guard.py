@@ -15,11 +15,15 @@ from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from server.auth.sessions import Session, Sessions
+from server.connections.token_bucket import TokenBuckets
 
 _PUBLIC = frozenset({"/api/sign-in", "/api/health", "/api/openapi.json"})
 #: Requests whose body only labels them: one that is too long or too late (s) is left out, and the request goes on.
 _LABELLED = frozenset({"/api/stop"})
 _LABEL_S = 0.25
+#: Requests a second, and at once, that an address may make without a session; more wait their turn, but no longer (s).
+_STRANGERS_HZ, _STRANGERS_AT_ONCE, _WAIT_S = 200.0, 400.0, 5.0
+_TURN_S = 0.1
 _PROTECTED = ("/api", "/camera", "/viser", "/ws", "/robots")
 _SAFE_METHODS = frozenset({"GET", "HEAD"})
 
@@ -55,6 +59,7 @@ class Guard:
         self._cookie = cookie
         self._max_body = max_body
         self._on_refusal = on_refusal
+        self._strangers = TokenBuckets(_STRANGERS_HZ, _STRANGERS_AT_ONCE)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Let a request through or answer it here."""
@@ -73,10 +78,13 @@ class Guard:
                 _add_headers(MutableHeaders(scope=message), path, scope.get("scheme") == "https")
             await send(message)
 
+        session = self.session(scope)
+        if session is None and not await self._has_turn(scope):
+            await _refuse(with_headers, 429, "too many requests without a session come from this address; try later")
+            return
         if scope["method"] not in _SAFE_METHODS and not self._origin_allowed(scope):
             await _refuse(with_headers, 403, "this request does not come from the page of this server (Origin)")
             return
-        session = self.session(scope)
         if session is None and not is_open(path):
             await _refuse(with_headers, 401, "sign in first: open the sign-in link of this server")
             return
@@ -104,6 +112,16 @@ class Guard:
             return
         scope.setdefault("state", {})["session"] = session
         await self._app(scope, receive, send)
+
+    async def _has_turn(self, scope: Scope) -> bool:
+        """Wait while others of this address, who have no session either, ask too often."""
+        address = scope["client"][0] if scope.get("client") else ""
+        until = time.monotonic() + _WAIT_S
+        while not self._strangers.take(address, now := time.monotonic()):
+            if now > until:
+                return False
+            await asyncio.sleep(_TURN_S)
+        return True
 
     def session(self, scope: Scope) -> Session | None:
         """The session of a request's cookie."""

@@ -25,7 +25,7 @@ _A_TURN = 16
 #: What a session may say at once through all of its WebSockets, in seconds of its rate.
 _BURST_S = 2.0
 #: How many WebSockets a session may open a second and at once: a new 3-D view is sent all that is in it.
-_OPEN_HZ, _OPEN_AT_ONCE = 4.0, 8.0
+_OPEN_HZ, _OPEN_AT_ONCE = 10.0, 20.0
 
 
 class Connection:

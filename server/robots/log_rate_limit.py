@@ -4,7 +4,9 @@ The log goes into the robot's ledger, and nobody with a script may fill its disk
 """
 
 from collections import OrderedDict
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+from server.connections.token_bucket import TokenBucket
 
 #: So many lines at once, and so many a second after that.
 AT_ONCE, LINES_HZ = 20.0, 1.0
@@ -14,8 +16,7 @@ _SOURCES = 1000
 
 @dataclass
 class _Source:
-    tokens: float
-    at: float
+    lines: TokenBucket = field(default_factory=lambda: TokenBucket(LINES_HZ, AT_ONCE))
     left_out: int = 0
 
 
@@ -28,15 +29,12 @@ class LogRateLimiter:
 
     def line(self, source: str, text: str, now: float) -> str:
         """The line to write for what `source` did; empty where it has written enough for now."""
-        known = self._sources.setdefault(source, _Source(AT_ONCE, now))
+        known = self._sources.setdefault(source, _Source())
         self._sources.move_to_end(source)
         if len(self._sources) > _SOURCES:
             self._sources.popitem(last=False)
-        known.tokens = min(AT_ONCE, known.tokens + (now - known.at) * LINES_HZ)
-        known.at = now
-        if known.tokens < 1.0:
+        if not known.lines.take(now):
             known.left_out += 1
             return ""
-        known.tokens -= 1.0
         more, known.left_out = known.left_out, 0
         return f"{text} (and {more} lines like it before)" if more else text

@@ -1,6 +1,7 @@
 """How often one session may ask for motion: what comes faster is refused, and moves nothing."""
 
 from rolling_panda.errors import InputError
+from server.connections.token_bucket import TokenBucket
 
 MOST_HZ = 60.0
 #: What a busy browser had to keep back may come at once, up to so many requests.
@@ -12,7 +13,7 @@ class MotionRate:
 
     def __init__(self) -> None:
         """Nobody has asked yet."""
-        self._buckets: dict[str, tuple[float, float]] = {}
+        self._buckets: dict[str, TokenBucket] = {}
 
     def count(self, session_id: str, now: float) -> None:
         """A session asks for motion.
@@ -20,10 +21,7 @@ class MotionRate:
         Raises:
             InputError: It does so too often.
         """
-        tokens, at = self._buckets.get(session_id, (_AT_ONCE, now))
-        tokens = min(_AT_ONCE, tokens + (now - at) * MOST_HZ)
-        self._buckets[session_id] = max(0.0, tokens - 1.0), now
-        if tokens < 1.0:
+        if not self._buckets.setdefault(session_id, TokenBucket(MOST_HZ, _AT_ONCE)).take(now):
             raise InputError(f"at most {MOST_HZ:.0f} requests for motion a second; ask less often")
 
     def forget(self, session_id: str) -> None:

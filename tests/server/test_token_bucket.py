@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.connections.token_bucket import TokenBucket
+from server.connections.token_bucket import TokenBucket, TokenBuckets
 
 
 def test_a_page_at_work_is_never_refused():
@@ -24,3 +24,11 @@ def test_no_stretch_of_time_has_more_than_the_rate_and_the_burst(asked):
         for end, _ in taken:
             within = sum(tokens for at, tokens in taken if start <= at <= end)
             assert end < start or within <= 20.0 + 50.0 * (end - start) + 1e-6
+
+
+def test_each_key_has_its_own_bucket_and_many_keys_do_not_fill_the_memory():
+    buckets = TokenBuckets(1.0, 2.0, most=3)
+    assert [buckets.take("a", 0.0) for _ in range(3)] == [True, True, False]
+    assert buckets.take("b", 0.0)
+    assert all(buckets.take(f"other {number}", 0.0) for number in range(100))
+    assert buckets.take("a", 0.0), "forgotten"
