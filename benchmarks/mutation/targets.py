@@ -24,7 +24,7 @@ def _tests(folder: str, names: str) -> tuple[str, ...]:
 #: are left out: tests measure against them, and they move no robot.
 TARGETS = {
     "codec": Target(("rolling_panda/transport/codec.py",), _tests("rolling_panda", "codec")),
-    "server.auth": Target(("server/auth/*",), _tests("server", "access users sessions throttle sign_in")),
+    "server.auth": Target(("server/auth/*",), _tests("server", "access users sessions throttle passwords")),
     "controller.ledger": Target(
         ("controller/ledger/*",),
         _tests(

@@ -1,6 +1,7 @@
 """The record of a robot is checked and written out from the command line."""
 
 import csv
+import io
 import json
 import sqlite3
 from pathlib import Path
@@ -9,6 +10,7 @@ import pytest
 
 from controller.ledger.audit import main
 from controller.ledger.store import FILE, Entry, Ledger
+from rolling_panda.runtime.state_folder import usual_state_folder
 
 
 @pytest.fixture
@@ -64,6 +66,40 @@ def test_json_has_every_row_with_its_body(folder: Path, capsys: pytest.CaptureFi
     assert rows[1]["body"]["text"] == "schneidet «p1»" and len(rows[1]["hash"]) == 64
 
 
+def test_a_body_that_is_no_json_is_told_as_it_is_and_text_as_it_was_written(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with Ledger(folder) as ledger:
+        ledger.append([Entry("t", "event", "bridge", "{no json")])
+    _, out, _ = run(capsys, "export", "--state", str(folder))
+    assert json.loads(out)[2]["body"] == "{no json" and "«p1»" in out
+    assert run(capsys, "export", "--json", "--state", str(folder))[1] == out
+
+
+def test_the_folder_is_that_of_the_robots_state(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    state = usual_state_folder("rp7")
+    state.mkdir(parents=True)
+    Ledger(state).close()
+    assert run(capsys, "verify", "--robot-id", "rp7")[0] == 0
+    assert run(capsys, "verify", "--robot-id", "rp8")[0] == 1
+
+
+def test_who_has_read_enough_of_an_export_ends_it_without_a_word(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Closed(io.StringIO):
+        def write(self, text: str) -> int:
+            raise BrokenPipeError
+
+    told = io.StringIO()
+    monkeypatch.setattr("sys.stdout", Closed())
+    monkeypatch.setattr("sys.stderr", told)
+    assert main(["export", "--state", str(folder)]) == 0
+    # Python itself would complain there at its end.
+    assert told.closed
+
+
 def test_csv_has_the_same(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     _, out, _ = run(capsys, "export", "--csv", "--state", str(folder))
     rows = list(csv.DictReader(out.splitlines()))
@@ -88,3 +124,6 @@ def test_what_is_asked_wrongly_is_told_in_one_line(tmp_path: Path, capsys: pytes
     with pytest.raises(SystemExit):
         main(["verify", "--expect", "12"])
     assert "64 hexadecimal digits" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main([])
+    assert "COMMAND" in capsys.readouterr().err

@@ -1,14 +1,66 @@
+"""What the controller restores and records when it starts, and the number of its start."""
+
+import hashlib
+import json
+
+import msgspec
 import pytest
 
-from controller.ledger.start import count_start
+from controller.ledger.journal import ApproachRow, OrderRow, PreviewRow, TicketRow
+from controller.ledger.start import Restored, count_start, restored, start_record
+from controller.ledger.store import Entry, Ledger
 from rolling_panda.errors import InputError
+from tests.support.fake_wire import pruning_point
 
 
 def test_each_start_has_a_number_of_its_own(tmp_path):
     assert [count_start(tmp_path) for _ in range(3)] == [1, 2, 3]
 
 
-def test_a_count_that_cannot_be_read_starts_nothing(tmp_path):
-    (tmp_path / "controller-starts").write_text("many")
-    with pytest.raises(InputError, match="holds 'many'"):
+@pytest.mark.parametrize("content", [b"many", b"", b"-1", b"1.5", b"\xff"])
+def test_a_count_that_is_none_starts_nothing(tmp_path, content):
+    (tmp_path / "controller-starts").write_bytes(content)
+    with pytest.raises(InputError, match="no count of starts; .* remove it|cannot read the count of starts"):
         count_start(tmp_path)
+    assert (tmp_path / "controller-starts").read_bytes() == content
+
+
+def test_a_count_that_cannot_be_read_or_written_starts_nothing(tmp_path):
+    with pytest.raises(InputError, match="cannot count this start in .*: No such file"):
+        count_start(tmp_path / "none")
+    (tmp_path / "controller-starts").mkdir()
+    with pytest.raises(InputError, match="cannot read the count of starts"):
+        count_start(tmp_path)
+
+
+def test_a_start_is_recorded_with_its_configuration(tmp_path):
+    config = tmp_path / "sim.toml"
+    config.write_bytes(b"[controller]\nname = '\xff'\n")
+    record = start_record(config, "run-7")
+    body = json.loads(msgspec.json.encode(record.body))
+    assert (record.number, record.kind, record.name) == (0, "start", "controller")
+    assert body["run_id"] == "run-7" and body["config"] == "[controller]\nname = '\ufffd'\n"
+    assert body["config_sha256"] == hashlib.sha256(config.read_bytes()).hexdigest()
+    assert body["program"]["version"]
+
+
+def test_the_newest_of_each_row_is_restored_and_nothing_of_an_empty_ledger(tmp_path):
+    assert restored(tmp_path) == Restored()
+    old, new = (TicketRow(point=pruning_point("p1"), state=state) for state in ("PROPOSED", "ACCEPTED"))
+    other = TicketRow(point=pruning_point("p2"), state="REJECTED", reason="too thick")
+    orders = [OrderRow(order=(name,), revision=number, user="ada") for number, name in enumerate(("p2", "p1"))]
+    rows = [
+        *(("ticket", row.point.point_id, row) for row in (old, other, new)),
+        *(("order", "order", row) for row in orders),
+        *(("preview", "preview", PreviewRow(required=required)) for required in (True, False)),
+        *(
+            ("approach", name, ApproachRow(azimuth=azimuth))
+            for name, azimuth in (("p1", 0.1), ("p2", 0.2), ("p1", 0.3))
+        ),
+    ]
+    with Ledger(tmp_path) as ledger:
+        ledger.append([Entry("t", kind, name, msgspec.json.encode(row).decode()) for kind, name, row in rows])
+    found = restored(tmp_path)
+    assert found.tickets == (other, new)
+    assert (found.order, found.preview) == (orders[-1], PreviewRow(required=False))
+    assert found.approaches == (("p2", ApproachRow(azimuth=0.2)), ("p1", ApproachRow(azimuth=0.3)))
