@@ -151,6 +151,15 @@ def test_rows_of_a_newer_version_are_refused_by_naming_the_version(tmp_path: Pat
         restored(tmp_path)
 
 
+def test_what_went_wrong_with_which_ledger_is_told(tmp_path: Path) -> None:
+    ledger = Ledger(tmp_path)
+    ledger.close()
+    with pytest.raises(LedgerError, match=f"cannot write the ledger {tmp_path / FILE}: "):
+        ledger.append([entry(1)])
+    with pytest.raises(LedgerError, match=f"cannot read the ledger {tmp_path / FILE}: "):
+        list(ledger.newest("event"))
+
+
 def test_rows_refuse_to_be_changed(tmp_path: Path) -> None:
     path = written(tmp_path)
     database = sqlite3.connect(path)

@@ -7,11 +7,12 @@ import time
 import pytest
 
 from controller.ledger.check import reading, verify
-from controller.ledger.journal import Record
+from controller.ledger.journal import Record, TicketRow
 from controller.ledger.store import Ledger, read
 from controller.ledger.writer import LedgerWriter
 from rolling_panda import messages as m
 from rolling_panda.errors import LedgerError
+from tests.support.fake_wire import pruning_point
 
 
 def record(number, text="x"):
@@ -111,6 +112,21 @@ def test_the_end_writes_what_waits_and_closes(writers):
     writer.write([record(number) for number in range(1, 3001)])
     writer.close()
     assert len(disk.rows) == 3000 and disk.closed
+
+
+def test_the_report_tells_of_what_is_durable_and_of_no_more(writers):
+    disk = Disk()
+    writer = writers(lambda: disk)
+    cutting, cut = (TicketRow(point=pruning_point("p1"), state=state, cut_id="c1") for state in ("INTENT", "DONE"))
+    writer.write([Record(1, "ticket", "p1", cutting)])
+    eventually(lambda: writer.report.cuts)
+    assert [each.outcome for each in writer.report.cuts] == [""]
+    disk.go.clear()
+    writer.write([Record(2, "ticket", "p1", cut)])
+    time.sleep(0.05)
+    assert [each.outcome for each in writer.report.cuts] == [""]
+    disk.go.set()
+    eventually(lambda: [each.outcome for each in writer.report.cuts] == ["DONE"])
 
 
 def test_a_flood_of_lines_is_counted_instead_of_recorded(writers):
