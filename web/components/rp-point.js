@@ -118,12 +118,7 @@ export class RpPoint extends HTMLElement {
     this.setAttribute("role", "listitem");
     this.tabIndex = -1;
     this.append(
-      element(
-        "div",
-        { class: "point-text" },
-        element("div", { class: "point-head" }, this.chip, this.place),
-        this.facts,
-      ),
+      element("div", {}, element("div", { class: "point-head" }, this.chip, this.place), this.facts),
       element("div", { class: "point-actions" }, this.acceptButton, this.rejectButton),
       this.reason,
     );

@@ -15,7 +15,7 @@ const WORDS = Object.freeze({
 
 class RpStop extends HTMLElement {
   connectedCallback() {
-    const label = element("span", { class: "stop-label" });
+    const label = element("span");
     const button = element(
       "button",
       {

@@ -26,7 +26,6 @@ const NEEDS = Object.freeze({
   PlannersOrder: "The order cannot be changed",
   RejectPoint: "Points cannot be rejected",
   ReconsiderPoint: "Decisions cannot be taken back",
-  RestoreAccepted: "Acceptances cannot be restored",
   ResolvePoint: "How a cut ended cannot be said",
 });
 
@@ -43,16 +42,22 @@ export function whyNothing() {
   return "";
 }
 
+/** Why nothing can be asked of the controller. */
+function whyNoController() {
+  const nothing = whyNothing();
+  if (nothing) return nothing;
+  const known = pageState.get()?.controller && isLive("controller");
+  return known ? "" : staleWords("controller") || "The controller is not there";
+}
+
 /**
  * Why the controller would refuse an intent now.
  *
  * @param {Intent} intent Name of the intent, as in `ControllerState.allowed`.
  */
 export function whyNot(intent) {
-  const nothing = whyNothing();
-  if (nothing) return nothing;
   const controller = pageState.get()?.controller ?? null;
-  if (controller === null || !isLive("controller")) return staleWords("controller") || "The controller is not there";
+  if (controller === null || whyNoController()) return whyNoController();
   // Acknowledging a fault moves nothing and needs no control.
   const ofHolder = OF_HOLDER.includes(intent) && controller.mode !== "FAULT";
   if (controller.allowed.includes(intent)) return ofHolder ? whyNotHolder() : "";
@@ -80,10 +85,8 @@ function whyNotHolder() {
 
 /** Why teleoperation is not possible now. */
 export function whyNoTeleoperation() {
-  const nothing = whyNothing();
-  if (nothing) return nothing;
   const controller = pageState.get()?.controller ?? null;
-  if (controller === null || !isLive("controller")) return staleWords("controller") || "The controller is not there";
+  if (controller === null || whyNoController()) return whyNoController();
   if (!isLive("bridge")) return staleWords("bridge") || "The bridge is not there";
   if (controller.mode === "READY" || controller.mode === "TELEOP") return whyNotHolder();
   return `Teleoperation needs Ready; the mode is ${MODE_WORDS[controller.mode]}`;
