@@ -10,8 +10,7 @@ import { isSignedIn } from "./api.js";
 const PING_MS = 100;
 /**
  * Without a message for this many timer turns the link is dead. Turns instead of milliseconds: while the 3-D view
- * blocks
- * this thread, messages wait unread.
+ * blocks this thread, messages wait unread.
  */
 const SILENT_TURNS = 25;
 const RETRY_MS = [250, 500, 1000, 2000, 3000];

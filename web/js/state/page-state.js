@@ -45,8 +45,7 @@ now.subscribe(() => {
 });
 /**
  * After this many updates (1 s) without a state the server is silent. Not milliseconds alone: while the browser loads
- * the
- * 3-D view, this page does not run and messages wait unread.
+ * the 3-D view, this page does not run and messages wait unread.
  */
 const SILENT_TURNS = 4;
 /** A page that has just been opened waits this many updates (5 s) before silence is an alarm. */
@@ -68,8 +67,7 @@ export function isOpening() {
 
 /**
  * New lines of the server's log. After a reconnection the server repeats its last lines, and a restarted server counts
- * from
- * the start; older lines that the page has are kept.
+ * from the start; older lines that the page has are kept.
  *
  * @param {readonly PageEvent[]} events
  * @param {boolean} first Is this the first batch of a connection?

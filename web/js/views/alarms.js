@@ -10,103 +10,6 @@ import { history } from "./history.js";
 /** @typedef {import("../link/messages.js").ControllerState} ControllerState */
 /** @typedef {import("../link/messages.js").PageState} PageState */
 
-const NOT_MENDED = "Mend the cause. A second after it has gone";
-
-/** @param {ControllerState} controller In PAUSED. */
-function afterPause({ interrupted }) {
-  return `${control()}When that is seen to, ${press("Resume")}, then ${goOn(interrupted)}.`;
-}
-
-/** @param {ControllerState} controller In PROTECTIVE_STOP. */
-function afterProtectiveStop({ allowed }) {
-  const mended = allowed.includes("Acknowledge");
-  return `${control()}${mended ? "The cause has gone:" : `${NOT_MENDED},`} ${press("Acknowledge")}, then Resume.`;
-}
-
-/** @param {ControllerState} controller In FAULT. */
-function afterFault({ allowed }) {
-  const mended = allowed.includes("Acknowledge");
-  return `${mended ? "The cause has gone:" : `${NOT_MENDED},`} ${ofSupervisor("Acknowledge")}, then Arm.`;
-}
-
-function afterStop() {
-  if (hardwareStopPressed(pageState.get()))
-    return "Release the robot's own emergency stop first, once the row is clear.";
-  return `See that the row is clear and write why it is safe to go on; ${ofSupervisor("Reset")}, then Arm.`;
-}
-
-/**
- * Advice for work that was interrupted, after Resume; empty if none waits.
- *
- * @param {ControllerState} controller
- */
-function waitingWork({ mode, interrupted }) {
-  if (mode !== "READY" || interrupted !== "work" || countOf("ACCEPTED") === 0) return "";
-  return `${control()}${capital(press(goOn("work")))} to go on.`;
-}
-
-/** @param {ControllerState} controller */
-function awayFromLimit({ mode }) {
-  switch (mode) {
-    case "AUTO":
-      return "Nothing yet: the robot leads itself back. If it does not, press Pause, then Resume and Home.";
-    case "TELEOP":
-      return "Lead the tool back towards the base; or let go, and press Home.";
-    case "READY":
-      return `${control()}${capital(press("Home"))}, or lead the tool back towards the base.`;
-    case "PAUSED":
-      return `${control()}${capital(press("Resume"))}, then Home.`;
-    case "IDLE":
-      return `${control()}${capital(press("Arm"))}, then Home.`;
-    default:
-      return "Once the robot is ready again, press Home.";
-  }
-}
-
-/** First step while another person holds control. */
-function control() {
-  const { held, mine, user } = holder();
-  return held && !mine && !viewing() ? `${user} holds control: press Ask or Take. ` : "";
-}
-
-/** @param {string} button */
-function press(button) {
-  return viewing() ? `an operator presses ${button}` : `press ${button}`;
-}
-
-/** @param {string} button */
-function ofSupervisor(button) {
-  return pageState.get()?.role === "supervisor" ? `press ${button}` : `a supervisor presses ${button}`;
-}
-
-/**
- * How to continue what was interrupted.
- *
- * @param {import("../link/messages.js").Interrupted} what
- */
-function goOn(what) {
-  const accepted = countOf("ACCEPTED") > 0;
-  if (what === "teleoperation") return "hold again";
-  if (what === "survey") return accepted ? "Survey to look on, or Start to cut" : "Survey to look on";
-  if (!accepted) return countOf("PROPOSED") > 0 ? "accept points, then Start" : "Survey";
-  return startAfterPreview();
-}
-
-function startAfterPreview() {
-  const told = preview.get();
-  if (!told?.required || told.phase === "approved") return "Start";
-  return told.phase === "ready" ? "Approve and Start" : "Preview, Approve and Start";
-}
-
-function viewing() {
-  return pageState.get()?.role === "viewer";
-}
-
-/** @param {string} words */
-function capital(words) {
-  return words.charAt(0).toUpperCase() + words.slice(1);
-}
-
 /** @typedef {{ id: string, severity: "error"|"warning", text: string, act: string }} Alarm */
 
 const DEGREE = 180 / Math.PI;
@@ -302,4 +205,101 @@ function lateShare() {
   const ticks = history.of("ticks").slice(-LATE_SAMPLES);
   const grown = (/** @type {typeof late} */ samples) => (samples.at(-1)?.value ?? 0) - (samples[0]?.value ?? 0);
   return grown(ticks) > 0 ? grown(late) / grown(ticks) : 0;
+}
+
+const NOT_MENDED = "Mend the cause. A second after it has gone";
+
+/** @param {ControllerState} controller In PAUSED. */
+function afterPause({ interrupted }) {
+  return `${control()}When that is seen to, ${press("Resume")}, then ${goOn(interrupted)}.`;
+}
+
+/** @param {ControllerState} controller In PROTECTIVE_STOP. */
+function afterProtectiveStop({ allowed }) {
+  const mended = allowed.includes("Acknowledge");
+  return `${control()}${mended ? "The cause has gone:" : `${NOT_MENDED},`} ${press("Acknowledge")}, then Resume.`;
+}
+
+/** @param {ControllerState} controller In FAULT. */
+function afterFault({ allowed }) {
+  const mended = allowed.includes("Acknowledge");
+  return `${mended ? "The cause has gone:" : `${NOT_MENDED},`} ${ofSupervisor("Acknowledge")}, then Arm.`;
+}
+
+function afterStop() {
+  if (hardwareStopPressed(pageState.get()))
+    return "Release the robot's own emergency stop first, once the row is clear.";
+  return `See that the row is clear and write why it is safe to go on; ${ofSupervisor("Reset")}, then Arm.`;
+}
+
+/**
+ * Advice for work that was interrupted, after Resume; empty if none waits.
+ *
+ * @param {ControllerState} controller
+ */
+function waitingWork({ mode, interrupted }) {
+  if (mode !== "READY" || interrupted !== "work" || countOf("ACCEPTED") === 0) return "";
+  return `${control()}${capital(press(goOn("work")))} to go on.`;
+}
+
+/** @param {ControllerState} controller */
+function awayFromLimit({ mode }) {
+  switch (mode) {
+    case "AUTO":
+      return "Nothing yet: the robot leads itself back. If it does not, press Pause, then Resume and Home.";
+    case "TELEOP":
+      return "Lead the tool back towards the base; or let go, and press Home.";
+    case "READY":
+      return `${control()}${capital(press("Home"))}, or lead the tool back towards the base.`;
+    case "PAUSED":
+      return `${control()}${capital(press("Resume"))}, then Home.`;
+    case "IDLE":
+      return `${control()}${capital(press("Arm"))}, then Home.`;
+    default:
+      return "Once the robot is ready again, press Home.";
+  }
+}
+
+/** First step while another person holds control. */
+function control() {
+  const { held, mine, user } = holder();
+  return held && !mine && !viewing() ? `${user} holds control: press Ask or Take. ` : "";
+}
+
+/** @param {string} button */
+function press(button) {
+  return viewing() ? `an operator presses ${button}` : `press ${button}`;
+}
+
+/** @param {string} button */
+function ofSupervisor(button) {
+  return pageState.get()?.role === "supervisor" ? `press ${button}` : `a supervisor presses ${button}`;
+}
+
+/**
+ * How to continue what was interrupted.
+ *
+ * @param {import("../link/messages.js").Interrupted} what
+ */
+function goOn(what) {
+  const accepted = countOf("ACCEPTED") > 0;
+  if (what === "teleoperation") return "hold again";
+  if (what === "survey") return accepted ? "Survey to look on, or Start to cut" : "Survey to look on";
+  if (!accepted) return countOf("PROPOSED") > 0 ? "accept points, then Start" : "Survey";
+  return startAfterPreview();
+}
+
+function startAfterPreview() {
+  const told = preview.get();
+  if (!told?.required || told.phase === "approved") return "Start";
+  return told.phase === "ready" ? "Approve and Start" : "Preview, Approve and Start";
+}
+
+function viewing() {
+  return pageState.get()?.role === "viewer";
+}
+
+/** @param {string} words */
+function capital(words) {
+  return words.charAt(0).toUpperCase() + words.slice(1);
 }

@@ -57,8 +57,7 @@ export function setText(node, text) {
 
 /**
  * Enable a control, or disable it with a reason. Uses `aria-disabled`: a control with the `disabled` attribute takes
- * neither
- * press nor focus and could not show its reason (`disabled-reasons.js`).
+ * neither press nor focus and could not show its reason (`disabled-reasons.js`).
  *
  * @param {HTMLButtonElement|HTMLInputElement} button
  * @param {string} why Reason; empty to enable.
