@@ -1,7 +1,6 @@
-"""Poses and images in Foxglove's own well-known schemas, so that its 3-D and image panels show them unasked.
+"""Poses and images in Foxglove's well-known schemas, for its 3-D and image panels.
 
-Field names are those of Foxglove's published JSON schemas `foxglove.FrameTransform`, `foxglove.PoseInFrame` and
-`foxglove.CompressedImage`.
+The schemas are `foxglove.FrameTransform`, `foxglove.PoseInFrame` and `foxglove.CompressedImage`.
 """
 
 import base64
@@ -20,25 +19,25 @@ _TEXT = {"type": "string"}
 
 
 @dataclass(frozen=True)
-class View:
-    """One of Foxglove's schemas, the channel for it, and how a message of ours becomes one; None for nothing."""
+class FoxgloveChannel:
+    """A channel, its schema, and the conversion of a message and its stamp (ns); None if there is nothing to show."""
 
-    channel: str
     name: str
+    schema_name: str
     properties: dict[str, Any]
-    make: Callable[[Any, int], dict[str, Any] | None]
+    convert: Callable[[Any, int], dict[str, Any] | None]
 
     @property
     def schema(self) -> dict[str, Any]:
         """The JSON schema."""
-        return {"title": self.name, "type": "object", "properties": self.properties}
+        return {"title": self.schema_name, "type": "object", "properties": self.properties}
 
 
 def _time(stamp_ns: int) -> dict[str, int]:
     return {"sec": stamp_ns // 10**9, "nsec": stamp_ns % 10**9}
 
 
-def _base(message: m.Odometry, stamp_ns: int) -> dict[str, Any]:
+def _base_transform(message: m.Odometry, stamp_ns: int) -> dict[str, Any]:
     half = message.pose.phi / 2
     return {
         "timestamp": _time(stamp_ns),
@@ -49,15 +48,15 @@ def _base(message: m.Odometry, stamp_ns: int) -> dict[str, Any]:
     }
 
 
-def _tool(message: m.ControllerState, stamp_ns: int) -> dict[str, Any] | None:
+def _tool_pose(message: m.ControllerState, stamp_ns: int) -> dict[str, Any] | None:
     pose = message.T_odom_tool
     if pose is None:
         return None
-    placed = {
+    converted = {
         "position": dict(zip("xyz", pose.position, strict=True)),
         "orientation": dict(zip("xyzw", pose.quat_xyzw, strict=True)),
     }
-    return {"timestamp": _time(stamp_ns), "frame_id": "odom", "pose": placed}
+    return {"timestamp": _time(stamp_ns), "frame_id": "odom", "pose": converted}
 
 
 def _image(message: CameraFrame, stamp_ns: int) -> dict[str, Any]:
@@ -65,9 +64,9 @@ def _image(message: CameraFrame, stamp_ns: int) -> dict[str, Any]:
     return {"timestamp": _time(stamp_ns), "frame_id": "camera", "data": data, "format": "jpeg"}
 
 
-#: By the type of our message.
-VIEWS: dict[type[m.Message], View] = {
-    m.Odometry: View(
+#: By message type.
+CHANNELS: dict[type[m.Message], FoxgloveChannel] = {
+    m.Odometry: FoxgloveChannel(
         "tf",
         "foxglove.FrameTransform",
         {
@@ -77,9 +76,9 @@ VIEWS: dict[type[m.Message], View] = {
             "translation": _VECTOR,
             "rotation": _QUATERNION,
         },
-        _base,
+        _base_transform,
     ),
-    m.ControllerState: View(
+    m.ControllerState: FoxgloveChannel(
         "tool",
         "foxglove.PoseInFrame",
         {
@@ -87,9 +86,9 @@ VIEWS: dict[type[m.Message], View] = {
             "frame_id": _TEXT,
             "pose": {"type": "object", "properties": {"position": _VECTOR, "orientation": _QUATERNION}},
         },
-        _tool,
+        _tool_pose,
     ),
-    CameraFrame: View(
+    CameraFrame: FoxgloveChannel(
         "camera",
         "foxglove.CompressedImage",
         {

@@ -1,9 +1,10 @@
-"""Which messages of a recording are due: those of the time that passes, or after a jump the newest of each kind."""
+"""Plays a recording: the messages that are due, and after a seek the newest of each topic and process."""
 
 import bisect
 from collections import defaultdict
+from typing import Any
 
-from recorder.tape import Recorded, Tape
+from recorder.recording import RecordedMessage, Recording
 from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.messages import supervision as control_messages
@@ -11,7 +12,7 @@ from rolling_panda.messages.commands import SeekReplay
 from rolling_panda.messages.supervision import ReplayState
 from rolling_panda.topics import Topic
 
-# What the robot tells of itself; commands and what pages ask for stay in the recording.
+#: State of the robot; commands and requests are not played.
 _PLAYED = {
     topic.name
     for topic in (
@@ -19,96 +20,89 @@ _PLAYED = {
         topics.HEARTBEAT, topics.EVENT, topics.CAMERA, topics.POINTS, topics.CROPS, topics.OBSTACLES, topics.SCENERY,
     )
 }  # fmt: skip
-# While nothing passes, what is slower than this (Hz) is told once, and the rest so often (s) that it stays fresh.
-_FAST_HZ, _AGAIN_S = 5.0, 0.1
+#: While paused, messages of topics at least this fast (Hz) are repeated with this period (s), so that they do not get
+#: stale.
+_REPEATED_HZ, _REPEAT_PERIOD_S = 5.0, 0.1
 
 
 class Player:
-    """A position in a tape that moves with time. Pure: `now` (s) is the caller's clock."""
+    """Playback position in a recording. It has no clock: `now` (s) is the caller's."""
 
-    def __init__(self, tape: Tape, name: str, now: float) -> None:
-        """At the beginning, playing.
+    def __init__(self, recording: Recording, name: str, now: float) -> None:
+        """Start playing at the beginning.
 
         Args:
-            tape: Its messages in order.
-            name: Of the file, for people.
+            recording: The recording.
+            name: Of the file, for display.
             now: Present time (s).
         """
-        self._name, self._tape = name, tape
-        self._rows = [row for row in tape.rows if row.topic.name in _PLAYED and not _of_the_server(row)]
-        self._times = [row.at - tape.begins_at for row in self._rows]
-        kinds: defaultdict[tuple[str, str], list[int]] = defaultdict(list)
-        for index, row in enumerate(self._rows):
-            if row.topic is not topics.EVENT:
-                kinds[row.topic.name, _process(row)].append(index)
-        self._kinds = list(kinds.values())
-        self._position, self._now, self._told = 0.0, now, float("-inf")
+        self._name, self._recording = name, recording
+        self._messages = [each for each in recording.messages if is_played(each.topic) and _process(each) != "server"]
+        self._times = [each.at - recording.begins_at for each in self._messages]
+        sources: defaultdict[tuple[str, str], list[int]] = defaultdict(list)
+        for index, each in enumerate(self._messages):
+            if each.topic is not topics.EVENT:
+                sources[each.topic.name, _process(each)].append(index)
+        self._sources = list(sources.values())
+        self._position, self._now, self._repeated = 0.0, now, float("-inf")
         self._next = 0
-        self._jumped = False
+        self._sought = False
         self._playing = True
 
     @property
     def state(self) -> ReplayState:
-        """Where it stands."""
+        """Playback state."""
         return ReplayState(
             name=self._name,
-            begins_at=self._tape.begins_at,
-            duration_s=self._tape.duration_s,
+            begins_at=self._recording.begins_at,
+            duration_s=self._recording.duration_s,
             position_s=self._position,
             playing=self._playing,
         )
 
     def seek(self, request: SeekReplay) -> None:
-        """Go somewhere, or stand still, or go on."""
+        """Set the position, pause or continue."""
         self._playing = request.playing
         if request.position_s is not None:
-            self._position = min(request.position_s, self._tape.duration_s)
+            self._position = min(request.position_s, self._recording.duration_s)
             self._next = bisect.bisect_right(self._times, self._position)
-            self._jumped = True
+            self._sought = True
 
-    def step(self, now: float) -> list[Recorded]:
-        """Let time pass until `now`; what is to be told, in order."""
-        passed, self._now = now - self._now, now
-        due: list[Recorded] = []
-        if self._jumped:
-            self._jumped = False
-            self._told = now
-            due = self._newest(all_kinds=True)
+    def step(self, now: float) -> list[RecordedMessage]:
+        """Advance to `now`; returns the messages that are due, in order."""
+        elapsed, self._now = now - self._now, now
+        due: list[RecordedMessage] = []
+        if self._sought:
+            self._sought = False
+            self._repeated = now
+            due = self._newest(0.0)
         if self._playing:
-            self._position = min(self._position + passed, self._tape.duration_s)
+            self._position = min(self._position + elapsed, self._recording.duration_s)
             end = bisect.bisect_right(self._times, self._position)
-            due += self._rows[self._next : end]
+            due += self._messages[self._next : end]
             self._next = end
-            self._playing = self._position < self._tape.duration_s
-        elif now - self._told >= _AGAIN_S:
-            self._told = now
-            due += self._newest(all_kinds=False)
+            self._playing = self._position < self._recording.duration_s
+        elif now - self._repeated >= _REPEAT_PERIOD_S:
+            self._repeated = now
+            due += self._newest(_REPEATED_HZ)
         return due
 
-    def _newest(self, all_kinds: bool) -> list[Recorded]:
-        """The newest of each kind up to the position."""
-        found = []
-        for indices in self._kinds:
-            before = bisect.bisect_left(indices, self._next)
-            row = self._rows[indices[before - 1]] if before else None
-            if row is not None and (all_kinds or row.topic.rate_hz >= _FAST_HZ):
-                found.append(row)
-        return found
+    def _newest(self, min_rate_hz: float) -> list[RecordedMessage]:
+        """The newest message of each source up to the position, of topics with a least rate."""
+        counts = [(indices, bisect.bisect_left(indices, self._next)) for indices in self._sources]
+        newest = [self._messages[indices[count - 1]] for indices, count in counts if count]
+        return [each for each in newest if each.topic.rate_hz >= min_rate_hz]
 
 
-def _process(row: Recorded) -> str:
-    """What several processes tell on one topic is not one kind."""
-    if row.topic is topics.HEARTBEAT or row.topic is topics.STOPS:
-        message = row.message()
+def _process(recorded: RecordedMessage) -> str:
+    """The sender, on topics with several senders; else empty."""
+    if recorded.topic is topics.HEARTBEAT or recorded.topic is topics.STOPS:
+        message = recorded.message()
         if isinstance(message, m.Heartbeat | control_messages.StopState):
             return str(message.process)
     return ""
 
 
-def _of_the_server(row: Recorded) -> bool:
-    return _process(row) == "server"
-
-
-def played(topic: Topic[m.Message]) -> bool:
-    """Whether messages of this topic are told again."""
+def is_played(topic: Topic[Any]) -> bool:
+    """Whether messages of this topic are played."""
     return topic.name in _PLAYED

@@ -1,6 +1,7 @@
-"""`rolling-panda record`: write down all that is on the robot's wire, until Ctrl-C."""
+"""`rolling-panda record`: record all messages of a robot until Ctrl-C."""
 
 import argparse
+import functools
 import queue
 import sys
 import threading
@@ -9,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from recorder.recording import Recording
+from recorder.recording import RecordingWriter
 from rolling_panda import messages as m
 from rolling_panda.errors import RollingPandaError
 from rolling_panda.runtime.priority import take_priority
@@ -18,13 +19,13 @@ from rolling_panda.topics import TOPICS, Topic
 from rolling_panda.transport.access import RECORDER
 from rolling_panda.transport.zenoh import Onlooker
 
-# Twice as often as a killed recorder may lose.
-_FLUSH_S = 0.4
+#: A killed recorder loses up to twice this.
+_FLUSH_PERIOD_S = 0.4
 _POLL_S = 0.05
-# Some seconds of everything: a disk that stalls for longer costs the newest.
-_WAITING = 20_000
+#: Several seconds of all messages: a longer stall of the disk drops the newest.
+_QUEUE_SIZE = 20_000
 
-Waiting = queue.Queue[tuple[Topic[Any], m.Message, int]]
+MessageQueue = queue.Queue[tuple[Topic[Any], m.Message, int]]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -36,57 +37,53 @@ def main(argv: Sequence[str] | None = None) -> int:
     stopping = stop_on_signals()
     if arguments.exit_with_parent:
         end_with_parent(stopping)
-    # The robot comes first.
     take_priority("background")
     try:
         with Onlooker(wire_config(arguments), arguments.robot_id, RECORDER) as wire:
-            count, lost = record(wire, arguments.out, stopping)
+            count, dropped = record(wire, arguments.out, stopping)
     except RollingPandaError as error:
         print(f"rolling-panda record: {error}", file=sys.stderr)
         return 1
-    print(f"{count} messages in {arguments.out}" + (f", {lost} more were lost" if lost else ""), flush=True)
+    print(f"{count} messages in {arguments.out}" + (f", {dropped} dropped" if dropped else ""), flush=True)
     return 0
 
 
 def record(wire: Onlooker, path: Path, stopping: threading.Event) -> tuple[int, int]:
-    """Record until `stopping` is set: how many messages were written, and how many came too fast for that.
+    """Record until `stopping` is set; returns the numbers of messages written and dropped.
 
     Raises:
         InputError: The file cannot be written.
     """
-    recording = Recording(path, wire.robot_id)
-    waiting: Waiting = queue.Queue(_WAITING)
-    lost = 0
+    writer = RecordingWriter(path, wire.robot_id)
+    messages: MessageQueue = queue.Queue(_QUEUE_SIZE)
+    dropped = 0
 
-    def taker(topic: Topic[Any]) -> Any:
-        def take(message: m.Message, at: float) -> None:
-            nonlocal lost
-            try:
-                waiting.put_nowait((topic, message, time.time_ns() - round(1e9 * (time.monotonic() - at))))
-            except queue.Full:
-                lost += 1
-
-        return take
+    def enqueue(topic: Topic[Any], message: m.Message, received_at: float) -> None:
+        nonlocal dropped
+        try:
+            messages.put_nowait((topic, message, time.time_ns() - round(1e9 * (time.monotonic() - received_at))))
+        except queue.Full:
+            dropped += 1
 
     for topic in TOPICS:
-        wire.subscribe(topic, taker(topic))
+        wire.subscribe(topic, functools.partial(enqueue, topic))
     print(f"recording to {path}", flush=True)
     try:
         flushed = time.monotonic()
         while not stopping.wait(_POLL_S):
-            _write(recording, waiting)
-            if time.monotonic() - flushed >= _FLUSH_S:
-                recording.flush()
+            _write(writer, messages)
+            if time.monotonic() - flushed >= _FLUSH_PERIOD_S:
+                writer.flush()
                 flushed = time.monotonic()
     finally:
-        _write(recording, waiting)
-        recording.close()
-    return recording.messages, lost
+        _write(writer, messages)
+        writer.close()
+    return writer.message_count, dropped
 
 
-def _write(recording: Recording, waiting: Waiting) -> None:
-    for _ in range(waiting.qsize()):
-        recording.add(*waiting.get_nowait())
+def _write(writer: RecordingWriter, messages: MessageQueue) -> None:
+    for _ in range(messages.qsize()):
+        writer.write(*messages.get_nowait())
 
 
 if __name__ == "__main__":

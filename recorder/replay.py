@@ -1,4 +1,4 @@
-"""`rolling-panda replay FILE`: a recording on the operator's page, with a scrubber, until Ctrl-C. Nothing moves."""
+"""`rolling-panda replay FILE`: play a recording on the operator's page until Ctrl-C. Nothing moves."""
 
 import argparse
 import secrets
@@ -13,8 +13,8 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from recorder.player import Player, played
-from recorder.tape import read_tape
+from recorder.player import Player, is_played
+from recorder.recording import read_recording
 from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.cli.demo import choose_router_port, write_secret
@@ -30,11 +30,10 @@ from rolling_panda.transport.settings import DEFAULT_ENDPOINT
 from rolling_panda.transport.zenoh import Router, Transport
 
 _HOST = "127.0.0.1"
-_PERIOD_S = 0.01
-_STATE_S = 0.1
-_REFUSAL = m.Answer(ok=False, reason="this is a recording; nothing can be asked of the robot")
-# Who told what is played.
-_ABSENT: tuple[m.Process, ...] = ("bridge", "controller", "perception")
+_PERIOD_S, _STATE_PERIOD_S = 0.01, 0.1
+_REFUSED = m.Answer(ok=False, reason="this is a recording; nothing can be asked of the robot")
+#: Processes that the replay stands in for.
+_REPLAYED: tuple[m.Process, ...] = ("bridge", "controller", "perception")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -51,9 +50,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: argparse.Namespace, stopping: threading.Event) -> int:
-    tape = read_tape(arguments.file)
-    if not tape.whole:
-        print(f"{arguments.file} ends in the middle: its recorder was killed", flush=True)
+    recording = read_recording(arguments.file)
+    if not recording.complete:
+        print(f"{arguments.file} is incomplete: its recorder was killed", flush=True)
     endpoint = f"tls/{_HOST}:{choose_router_port(DEFAULT_ENDPOINT)}"
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="rolling-panda-")))
@@ -62,47 +61,45 @@ def _run(arguments: argparse.Namespace, stopping: threading.Event) -> int:
         wire = TransportConfig(connect=(endpoint,), certificates=certificates)
         router = replace(wire, mode="router", connect=(), listen=(endpoint,))
         stack.callback(Router(router).close)
-        stage = stack.enter_context(Stage(wire, Player(tape, arguments.file.name, time.monotonic())))
+        replay = stack.enter_context(Replay(wire, Player(recording, arguments.file.name, time.monotonic())))
         supervisor = Supervisor(folder)
         stack.callback(supervisor.end)
         token, token_file = secrets.token_urlsafe(32), folder / "sign-in-token"
         write_secret(token_file, token)
-        words = ["--connect", endpoint, "--certificates", certificates, "--port", str(arguments.port)]
-        words += ["--sign-in-token-file", str(token_file), "--state", str(folder), "--exit-with-parent"]
-        supervisor.start("server", python_command("server", words))
+        options = ["--connect", endpoint, "--certificates", certificates, "--port", str(arguments.port)]
+        options += ["--sign-in-token-file", str(token_file), "--state", str(folder), "--exit-with-parent"]
+        supervisor.start("server", python_command("server", options))
         page = f"http://127.0.0.1:{arguments.port}"
-        print(f"{arguments.file}: {tape.duration_s:.0f} s, {len(tape.rows)} messages", flush=True)
+        print(f"{arguments.file}: {recording.duration_s:.0f} s, {len(recording.messages)} messages", flush=True)
         print(f"\nSign in once with this link, on this machine:\n\n    {page}/sign-in?token={token}\n", flush=True)
         while not stopping.wait(_PERIOD_S):
-            stage.step(time.monotonic())
+            replay.step(time.monotonic())
             death = supervisor.death()
             if death is not None:
                 raise InputError(f"the page's server ended {death.how}: {death.tail}")
     return 0
 
 
-class Stage:
-    """The wire on which a player stands in for those who were recorded."""
+class Replay:
+    """Publishes a recording in place of the recorded processes, and refuses requests to them."""
 
     def __init__(self, config: TransportConfig, player: Player) -> None:
-        """Announce them, and refuse what is asked of them."""
+        """Advertise the topics and services of the recorded processes."""
         self._player, self._lock = player, threading.Lock()
-        self._wires = {process: Transport(config, process, ROBOT_ID) for process in _ABSENT}
-        self._put: dict[str, Any] = {}
+        self._wires = {process: Transport(config, process, ROBOT_ID) for process in _REPLAYED}
+        self._publishers: dict[str, Any] = {}
         for topic in TOPICS:
-            if played(topic):
-                wire = next(
-                    (self._wires[process] for process in _ABSENT if process == topic.sender), self._wires["bridge"]
-                )
-                self._put[topic.name] = wire.publisher(topic)
-        own = self._wires["controller"]
-        self._state = own.publisher(topics.REPLAY)
-        own.serve(topics.SEEK, self._seek)
-        own.serve(topics.INTENT, lambda request: _REFUSAL)
-        self._wires["perception"].serve(topics.PLANT, lambda request: _REFUSAL)
-        self._told = float("-inf")
+            if is_played(topic):
+                wires = [wire for process, wire in self._wires.items() if process == topic.sender]
+                self._publishers[topic.name] = (wires or [self._wires["bridge"]])[0].publisher(topic)
+        controller = self._wires["controller"]
+        self._state = controller.publisher(topics.REPLAY)
+        controller.serve(topics.SEEK, self._seek)
+        controller.serve(topics.INTENT, lambda request: _REFUSED)
+        self._wires["perception"].serve(topics.PLANT, lambda request: _REFUSED)
+        self._state_sent = float("-inf")
 
-    def __enter__(self) -> "Stage":
+    def __enter__(self) -> "Replay":
         """Return itself."""
         return self
 
@@ -112,13 +109,13 @@ class Stage:
             wire.close()
 
     def step(self, now: float) -> None:
-        """Tell what is due."""
+        """Publish the messages that are due."""
         with self._lock:
             due, state = self._player.step(now), self._player.state
-        for row in due:
-            self._put[row.topic.name].put(row.message())
-        if now - self._told >= _STATE_S:
-            self._told = now
+        for recorded in due:
+            self._publishers[recorded.topic.name].put(recorded.message())
+        if now - self._state_sent >= _STATE_PERIOD_S:
+            self._state_sent = now
             self._state.put(state)
 
     def _seek(self, request: SeekReplay) -> m.Answer:

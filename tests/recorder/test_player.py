@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from recorder.player import Player
-from recorder.tape import Recorded, Tape
+from recorder.recording import RecordedMessage, Recording
 from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.messages.commands import SeekReplay
@@ -17,41 +17,41 @@ from rolling_panda.topics import Topic
 BEGAN = 1.8e9
 
 
-def recorded(topic: Topic[Any], at: float, message: m.Message) -> Recorded:
-    return Recorded(topic, BEGAN + at, msgspec.json.encode(message))
+def recorded(topic: Topic[Any], at: float, message: m.Message) -> RecordedMessage:
+    return RecordedMessage(topic, BEGAN + at, msgspec.json.encode(message))
 
 
-def joints(k: int) -> Recorded:
+def joints(k: int) -> RecordedMessage:
     rest = (0.0,) * 9
     message = m.JointState(header=m.Header(0.1 * k), sequence=k, position=rest, velocity=rest)
     return recorded(topics.JOINTS, 0.1 * k, message)
 
 
-def heartbeat(at: float, process: m.Process) -> Recorded:
+def heartbeat(at: float, process: m.Process) -> RecordedMessage:
     return recorded(topics.HEARTBEAT, at, m.Heartbeat(process=process, sequence=1))
 
 
-def event(at: float, text: str) -> Recorded:
+def event(at: float, text: str) -> RecordedMessage:
     return recorded(topics.EVENT, at, m.LogEvent(header=m.Header(), process="bridge", severity="info", text=text))
 
 
-def stop(at: float) -> Recorded:
+def stop(at: float) -> RecordedMessage:
     return recorded(topics.STOP, at, m.StopRequest(stop_id="s1", source="page", user="ada", reason="a branch"))
 
 
-def tape(*more: Recorded) -> Tape:
-    rows = [*(joints(k) for k in range(101)), *more]
-    return Tape(tuple(sorted(rows, key=lambda row: row.at)), True)
+def recording(*more: RecordedMessage) -> Recording:
+    messages = [*(joints(k) for k in range(101)), *more]
+    return Recording(tuple(sorted(messages, key=lambda each: each.at)), True)
 
 
-def sequences(rows: Sequence[Recorded]) -> list[int]:
-    messages = [row.message() for row in rows if row.topic is topics.JOINTS]
+def sequences(messages: Sequence[RecordedMessage]) -> list[int]:
+    messages = [each.message() for each in messages if each.topic is topics.JOINTS]
     return [message.sequence for message in messages if isinstance(message, m.JointState)]
 
 
 @given(st.lists(st.floats(0.001, 0.9), max_size=30))
 def test_each_message_is_told_once_in_order_as_its_time_comes(steps: list[float]) -> None:
-    player, now, told = Player(tape(), "a.mcap", 50.0), 50.0, []
+    player, now, told = Player(recording(), "a.mcap", 50.0), 50.0, []
     for step in steps:
         now += step
         told += sequences(player.step(now))
@@ -61,29 +61,29 @@ def test_each_message_is_told_once_in_order_as_its_time_comes(steps: list[float]
 
 def test_a_jump_tells_the_newest_of_each_kind_and_each_process_and_no_old_events() -> None:
     beats = heartbeat(2.0, "bridge"), heartbeat(2.5, "controller"), heartbeat(6.0, "controller")
-    player = Player(tape(*beats, event(1.0, "long ago"), event(8.0, "later")), "a.mcap", 0.0)
+    player = Player(recording(*beats, event(1.0, "long ago"), event(8.0, "later")), "a.mcap", 0.0)
     player.seek(SeekReplay(position_s=5.04, playing=False))
     due = player.step(0.1)
     assert sequences(due) == [50]
-    assert [row.at - BEGAN for row in due if row.topic is topics.HEARTBEAT] == [2.0, 2.5]
-    assert topics.EVENT not in [row.topic for row in due]
+    assert [each.at - BEGAN for each in due if each.topic is topics.HEARTBEAT] == [2.0, 2.5]
+    assert topics.EVENT not in [each.topic for each in due]
     player.seek(SeekReplay(playing=True))
     due = player.step(3.1)
     assert sequences(due) == list(range(51, 81))
-    assert [row.message().text for row in due if row.topic is topics.EVENT] == ["later"]  # type: ignore[attr-defined]
+    assert [each.message().text for each in due if each.topic is topics.EVENT] == ["later"]  # type: ignore[attr-defined]
 
 
 def test_standing_still_it_keeps_fresh_what_is_told_often_and_stays_where_it_is() -> None:
-    player = Player(tape(), "a.mcap", 0.0)
+    player = Player(recording(), "a.mcap", 0.0)
     player.seek(SeekReplay(position_s=3.0, playing=False))
     told = [sequences(player.step(0.05 * k)) for k in range(1, 41)]
-    assert {k for rows in told for k in rows} == {30}
+    assert {k for messages in told for k in messages} == {30}
     assert sum(map(len, told)) >= 15
     assert (player.state.position_s, player.state.playing) == (3.0, False)
 
 
 def test_it_ends_standing_at_the_end() -> None:
-    player = Player(tape(), "a.mcap", 0.0)
+    player = Player(recording(), "a.mcap", 0.0)
     player.step(25.0)
     assert (player.state.position_s, player.state.playing) == (10.0, False)
     player.seek(SeekReplay(position_s=0.0))
@@ -91,5 +91,5 @@ def test_it_ends_standing_at_the_end() -> None:
 
 
 def test_no_command_and_nothing_of_the_server_is_told_again() -> None:
-    player = Player(tape(stop(1.0), heartbeat(1.0, "server")), "a.mcap", 0.0)
-    assert {row.topic.name for row in player.step(20.0)} == {topics.JOINTS.name}
+    player = Player(recording(stop(1.0), heartbeat(1.0, "server")), "a.mcap", 0.0)
+    assert {each.topic.name for each in player.step(20.0)} == {topics.JOINTS.name}

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from recorder.tape import read_tape
+from recorder.recording import read_recording
 from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.config import TransportConfig
@@ -45,9 +45,9 @@ def test_a_killed_recorder_loses_less_than_a_second_and_one_that_is_ended_nothin
     endpoint: str, tmp_path: Path, killed: bool
 ) -> None:
     path = tmp_path / "a.mcap"
-    words = ["--out", str(path), "--plain-wire", "--connect", endpoint]
+    options = ["--out", str(path), "--plain-wire", "--connect", endpoint]
     recorder = subprocess.Popen(
-        python_command("recorder.record", words), stdout=subprocess.PIPE, text=True, env=child_environment()
+        python_command("recorder.record", options), stdout=subprocess.PIPE, text=True, env=child_environment()
     )
     assert recorder.stdout is not None and "recording" in recorder.stdout.readline()
     with Transport(TransportConfig(connect=(endpoint,), plain_wire=True), "bridge", "rp1") as transport:
@@ -57,12 +57,12 @@ def test_a_killed_recorder_loses_less_than_a_second_and_one_that_is_ended_nothin
     recorder.send_signal(signal.SIGINT)
     code = recorder.wait(20)
     recorder.stdout.close()
-    tape = read_tape(path)
-    numbers = [row.message().sequence for row in tape.rows if row.topic is topics.JOINTS]  # type: ignore[attr-defined]
+    recording = read_recording(path)
+    numbers = [each.message().sequence for each in recording.messages if each.topic is topics.JOINTS]  # type: ignore[attr-defined]
     assert numbers == list(range(numbers[0], numbers[0] + len(numbers))), "none is missing in between"
     if killed:
-        assert code == -signal.SIGKILL and not tape.whole
-        assert last - tape.rows[-1].at < 1.0
+        assert code == -signal.SIGKILL and not recording.complete
+        assert last - recording.messages[-1].at < 1.0
     else:
-        assert code == 0 and tape.whole
+        assert code == 0 and recording.complete
         assert numbers == list(range(270))

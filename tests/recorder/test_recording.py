@@ -9,10 +9,8 @@ from typing import Any
 import pytest
 from mcap.reader import make_reader
 
-from recorder.foxglove import VIEWS
-from recorder.recording import Recording
-from recorder.schemas import schema_of
-from recorder.tape import read_tape
+from recorder.foxglove import CHANNELS
+from recorder.recording import RecordingWriter, read_recording, schema_of
 from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.errors import InputError
@@ -36,18 +34,18 @@ def odometry(k: int) -> m.Odometry:
     return m.Odometry(header=m.Header(k * 0.02, "odom"), sequence=k, pose=pose, linear=0.3, angular=0.0)
 
 
-def fill(recording: Recording, seconds: int) -> None:
+def fill(writer: RecordingWriter, seconds: int) -> None:
     for k in range(50 * seconds):
-        recording.add(topics.ODOMETRY, odometry(k), BEGAN + k * 20_000_000)
+        writer.write(topics.ODOMETRY, odometry(k), BEGAN + k * 20_000_000)
         if k % 25 == 0:
-            recording.add(topics.CAMERA, FRAME, BEGAN + k * 20_000_000)
-            recording.flush()
+            writer.write(topics.CAMERA, FRAME, BEGAN + k * 20_000_000)
+            writer.flush()
 
 
 def test_the_librarys_reader_finds_every_message_with_its_schema(tmp_path: Path) -> None:
-    recording = Recording(tmp_path / "a.mcap", "rp1")
-    fill(recording, 4)
-    recording.close()
+    writer = RecordingWriter(tmp_path / "a.mcap", "rp1")
+    fill(writer, 4)
+    writer.close()
     with (tmp_path / "a.mcap").open("rb") as file:
         reader = make_reader(file)
         summary = reader.get_summary()
@@ -87,42 +85,42 @@ def test_every_schema_is_one_that_a_viewer_reads(kind: type[m.Message]) -> None:
 
 
 def test_what_views_show_is_what_their_schema_says() -> None:
-    for view, message in ((VIEWS[m.Odometry], odometry(3)), (VIEWS[CameraFrame], FRAME)):
-        shown = view.make(message, BEGAN)
-        assert shown is not None and set(shown) == set(view.schema["properties"])
+    for channel, message in ((CHANNELS[m.Odometry], odometry(3)), (CHANNELS[CameraFrame], FRAME)):
+        shown = channel.convert(message, BEGAN)
+        assert shown is not None and set(shown) == set(channel.schema["properties"])
 
 
 def test_a_recording_is_read_back_as_it_was(tmp_path: Path) -> None:
-    recording = Recording(tmp_path / "a.mcap", "rp1")
-    fill(recording, 2)
-    recording.close()
-    tape = read_tape(tmp_path / "a.mcap")
-    assert tape.whole
-    assert tape.duration_s == pytest.approx(1.98)
-    got = [row.message() for row in tape.rows if row.topic is topics.ODOMETRY]
+    writer = RecordingWriter(tmp_path / "a.mcap", "rp1")
+    fill(writer, 2)
+    writer.close()
+    recording = read_recording(tmp_path / "a.mcap")
+    assert recording.complete
+    assert recording.duration_s == pytest.approx(1.98)
+    got = [each.message() for each in recording.messages if each.topic is topics.ODOMETRY]
     assert got == [odometry(k) for k in range(100)]
-    assert [row.message() for row in tape.rows if row.topic is topics.CAMERA][0] == FRAME
+    assert [each.message() for each in recording.messages if each.topic is topics.CAMERA][0] == FRAME
 
 
 def test_of_a_file_that_was_cut_off_all_that_was_flushed_is_read(tmp_path: Path) -> None:
-    recording = Recording(tmp_path / "a.mcap", "rp1")
-    fill(recording, 4)
+    writer = RecordingWriter(tmp_path / "a.mcap", "rp1")
+    fill(writer, 4)
     torn = tmp_path / "torn.mcap"
     torn.write_bytes((tmp_path / "a.mcap").read_bytes()[:-7])
-    recording.close()
-    tape = read_tape(torn)
-    assert not tape.whole
+    writer.close()
+    recording = read_recording(torn)
+    assert not recording.complete
     # Everything but the last half second, which was never flushed, and what the cut has taken.
-    assert tape.duration_s >= 2.9
+    assert recording.duration_s >= 2.9
 
 
 def test_a_file_that_exists_stays_and_what_is_no_recording_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "notes.mcap"
     path.write_text("not to be lost")
     with pytest.raises(InputError, match="exists already"):
-        Recording(path, "rp1")
+        RecordingWriter(path, "rp1")
     assert path.read_text() == "not to be lost"
     with pytest.raises(InputError, match="no recording"):
-        read_tape(path)
+        read_recording(path)
     with pytest.raises(InputError, match="cannot read"):
-        read_tape(tmp_path / "nowhere.mcap")
+        read_recording(tmp_path / "nowhere.mcap")

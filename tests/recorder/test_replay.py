@@ -6,59 +6,59 @@ from collections.abc import Iterator
 import pytest
 
 from recorder.player import Player
-from recorder.replay import Stage
+from recorder.replay import Replay
 from rolling_panda import topics
 from rolling_panda.config import TransportConfig
 from rolling_panda.messages import commands as intents
 from rolling_panda.messages.commands import SeekReplay
 from rolling_panda.transport.zenoh import Router, Transport
-from tests.recorder.test_player import event, joints, tape
+from tests.recorder.test_player import event, joints, recording
 from tests.support.live_robot import free_port
 
 pytestmark = pytest.mark.alone
 
 
 @pytest.fixture
-def server() -> Iterator[tuple[Stage, Transport]]:
+def server() -> Iterator[tuple[Replay, Transport]]:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     router = Router(TransportConfig(mode="router", connect=(), listen=(endpoint,), plain_wire=True))
     server = Transport(TransportConfig(connect=(endpoint,), plain_wire=True), "server", "rp1")
-    stage = Stage(
+    replay = Replay(
         TransportConfig(connect=(endpoint,), plain_wire=True),
-        Player(tape(event(0.35, "it begins")), "a.mcap", time.monotonic()),
+        Player(recording(event(0.35, "it begins")), "a.mcap", time.monotonic()),
     )
     end = time.monotonic() + 5.0
     while not {"bridge", "controller", "perception"} <= server.present() and time.monotonic() < end:
         time.sleep(0.02)
-    yield stage, server
-    stage.__exit__()
+    yield replay, server
+    replay.__exit__()
     server.close()
     router.close()
 
 
-def test_a_server_sees_the_robot_of_the_recording_and_moves_in_it(server: tuple[Stage, Transport]) -> None:
-    stage, wire = server
+def test_a_server_sees_the_robot_of_the_recording_and_moves_in_it(server: tuple[Replay, Transport]) -> None:
+    replay, wire = server
     slot, state, events = wire.slot(topics.JOINTS), wire.slot(topics.REPLAY), wire.feed(topics.EVENT, 10)
     end = time.monotonic() + 1.0
     while time.monotonic() < end:
-        stage.step(time.monotonic())
+        replay.step(time.monotonic())
         time.sleep(0.01)
     assert {"bridge", "controller", "perception"} <= wire.present()
     newest = slot.peek()
     assert newest is not None and 5 <= newest.message.sequence <= 15
     assert [received.message.text for received in events.drain()] == ["it begins"]
     assert wire.call(topics.SEEK, SeekReplay(position_s=7.0, playing=False)).ok
-    stage.step(time.monotonic())
+    replay.step(time.monotonic())
     time.sleep(0.3)
     newest = slot.peek()
     assert newest is not None and newest.message == joints(70).message()
-    stage.step(time.monotonic())
+    replay.step(time.monotonic())
     time.sleep(0.2)
     told = state.peek()
     assert told is not None and (told.message.position_s, told.message.playing) == (7.0, False)
 
 
-def test_nothing_can_be_asked_of_a_recorded_robot(server: tuple[Stage, Transport]) -> None:
+def test_nothing_can_be_asked_of_a_recorded_robot(server: tuple[Replay, Transport]) -> None:
     _, wire = server
     answer = wire.call(topics.INTENT, intents.Arm(user="ada"))
     assert not answer.ok and "recording" in answer.reason

@@ -7,7 +7,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from recorder.recording import Recording
+from recorder.recording import RecordingWriter
 from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.runtime.launch import child_environment, python_command
@@ -21,19 +21,19 @@ pytestmark = [pytest.mark.alone, pytest.mark.slow]
 
 def record(path: Path) -> None:
     """Ten seconds in which the base drives a metre; after three Ada accepts a point."""
-    recording = Recording(path, "rp1")
+    writer = RecordingWriter(path, "rp1")
     entry = m.QueueEntry(point_id="p1", state="ACCEPTED", user="ada")
     for k in range(500):
         at = 1_800_000_000_000_000_000 + k * 20_000_000
-        recording.add(topics.JOINTS, fake_wire.joints(k + 1), at)
-        recording.add(topics.ODOMETRY, fake_wire.odometry(k + 1, 0.002 * k), at)
+        writer.write(topics.JOINTS, fake_wire.joints(k + 1), at)
+        writer.write(topics.ODOMETRY, fake_wire.odometry(k + 1, 0.002 * k), at)
         if k % 5 == 0:
             queue = (entry,) if k > 150 else ()
-            recording.add(topics.BRIDGE, fake_wire.bridge_state(), at)
-            recording.add(topics.CONTROLLER, fake_wire.controller_state(queue), at)
+            writer.write(topics.BRIDGE, fake_wire.bridge_state(), at)
+            writer.write(topics.CONTROLLER, fake_wire.controller_state(queue), at)
         if k % 50 == 0:
-            recording.add(topics.POINTS, fake_wire.pruning_points(fake_wire.pruning_point()), at)
-    recording.close()
+            writer.write(topics.POINTS, fake_wire.pruning_points(fake_wire.pruning_point()), at)
+    writer.close()
 
 
 def test_a_recording_is_shown_moved_in_and_asked_in_vain(tmp_path: Path) -> None:
