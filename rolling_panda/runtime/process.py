@@ -2,6 +2,7 @@
 
 import argparse
 import os
+import queue
 import signal
 import sys
 import threading
@@ -139,10 +140,21 @@ def add_common_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def stop_on_signals() -> threading.Event:
-    """An event that SIGINT and SIGTERM set."""
+    """An event that SIGINT and SIGTERM set.
+
+    Another thread sets it: a handler runs in the middle of whatever the main thread does, and where that is
+    `Event.wait`, setting the same event there waits forever for the lock that the main thread holds.
+    """
     stopping = threading.Event()
+    caught: queue.SimpleQueue[int] = queue.SimpleQueue()
+
+    def watch() -> None:
+        caught.get()
+        stopping.set()
+
+    threading.Thread(target=watch, name="signal-watch", daemon=True).start()
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stopping.set())
+        signal.signal(number, lambda number, _: caught.put(number))
     return stopping
 
 

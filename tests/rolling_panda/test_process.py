@@ -46,6 +46,19 @@ def run(context):
 sys.exit(run_process("bridge", "hangs", run))
 """
 
+SIGNALLED_WHILE_IT_WAITS = """
+import random, signal
+from rolling_panda.runtime.process import stop_on_signals
+
+chance = random.Random(0)
+for _ in range(1000):
+    stopping = stop_on_signals()
+    signal.signal(signal.SIGALRM, signal.getsignal(signal.SIGINT))
+    signal.setitimer(signal.ITIMER_REAL, chance.uniform(1e-5, 3e-4))
+    while not stopping.wait(1e-6):
+        pass
+"""
+
 
 @pytest.fixture(scope="module")
 def endpoint() -> Iterator[str]:
@@ -177,3 +190,8 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
 
 def never(context: ProcessContext) -> None:
     raise AssertionError("must not start")
+
+
+def test_a_signal_is_heard_at_whatever_instant_it_comes() -> None:
+    """Setting an event in a handler that has interrupted a wait for that event hangs, now and then."""
+    subprocess.run([sys.executable, "-c", SIGNALLED_WHILE_IT_WAITS], cwd=ROOT, timeout=30, check=True)
