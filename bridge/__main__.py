@@ -9,14 +9,15 @@ from pathlib import Path
 from bridge.config import BridgeConfig
 from bridge.core.bridge import BridgeCore
 from bridge.core.cut_memory import CutFile
-from bridge.core.state_memory import Memory, open_memory
+from bridge.core.state_memory import Memory, begin_anew, open_memory
 from bridge.loop import BridgeLoop
 from bridge.real.config import RealConfig
 from bridge.sim.camera.config import CameraConfig
 from bridge.sim.vineyard.config import VineyardConfig
 from rolling_panda.config import RobotConfig, load_section
+from rolling_panda.errors import RollingPandaError
 from rolling_panda.resources import resource
-from rolling_panda.runtime.process import ProcessContext, run_process
+from rolling_panda.runtime.process import ProcessContext, add_common_arguments, run_process, state_folder
 from rolling_panda.runtime.state_folder import alone
 
 
@@ -24,6 +25,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the bridge; returns the exit code."""
     about = "The robot, with its own watchdog, limits and latched stop."
     words = with_usual_config(sys.argv[1:] if argv is None else argv)
+    if "--begin-anew" in words:
+        return _begin_anew(words)
     return run_process("bridge", about, _run, _arguments, words, _check)
 
 
@@ -42,6 +45,26 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--check", action="store_true", help="real: look at every device, move none, print a table")
     parser.add_argument("--fakes", action="store_true", help="real: drivers on fakes of the devices, and it says so")
     parser.add_argument("--readonly", action="store_true", help="real: tell the robot's state, command nothing")
+    parser.add_argument(
+        "--begin-anew", action="store_true", help="set aside what it remembers, latch a stop in its place, and end"
+    )
+
+
+def _begin_anew(words: Sequence[str]) -> int:
+    """Without the wire, which is not there where the program does not start."""
+    parser = argparse.ArgumentParser(prog="rolling-panda bridge")
+    add_common_arguments(parser)
+    _arguments(parser)
+    arguments = parser.parse_args(words)
+    try:
+        folder = state_folder(arguments)
+        with alone(folder, "bridge"):
+            done = begin_anew(folder)
+    except (RollingPandaError, OSError) as error:
+        print(f"rolling-panda bridge: {error}", file=sys.stderr)
+        return 1
+    print(f"{done}; a stop is latched, which a supervisor has to reset once the bridge runs")
+    return 0
 
 
 def _seed(text: str) -> int:

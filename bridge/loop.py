@@ -27,7 +27,7 @@ class BridgeLoop:
         self._motion: Slot[m.MotionCommand] = Slot()
         self._commanded = threading.Event()
         transport.subscribe(topics.MOTION, self._command)
-        self._cuts = transport.feed(topics.CUT, 32)
+        self._cuts, self._tokens = transport.feed(topics.CUT, 32), transport.feed(topics.TOKEN, 32)
         self._pictures = transport.feed(topics.PICTURE, 8)
         transport.subscribe(topics.STOP, self._stop)
         transport.serve(topics.RELEASE, self._release)
@@ -51,6 +51,8 @@ class BridgeLoop:
         outputs, wall_time = [], time.time()
         with self._lock:
             due = self._time.due(clock)
+            for request in self._tokens.drain():
+                self._core.on_token(request.message, self._time.now)
             motion = self._motion.take()
             if motion is not None:
                 self._core.on_motion(motion.message, self._time.now, motion.at)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from controller.config import ControllerConfig
 from controller.core import Controller
-from controller.ledger.start import count_start, restored, start_record
+from controller.ledger.start import restored, start_record
 from controller.ledger.store import Ledger
 from controller.ledger.writer import LedgerWriter
 from controller.loop import Loop
@@ -16,6 +16,7 @@ from controller.planner_process import PlannerProcess
 from controller.stop_file import open_stop_file
 from rolling_panda.config import RobotConfig, load_section
 from rolling_panda.runtime.process import ProcessContext, run_process
+from rolling_panda.runtime.state_folder import alone
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -29,11 +30,16 @@ def _check(arguments: argparse.Namespace) -> None:
 
 
 def _run(context: ProcessContext) -> None:
+    with alone(context.state_folder, "controller"):
+        _work(context)
+
+
+def _work(context: ProcessContext) -> None:
     config = load_section(context.config_path, "controller", ControllerConfig)
     robot_config = load_section(context.config_path, "robot", RobotConfig)
     run_id = uuid.uuid4().hex[:12]
     folder = context.state_folder
-    controller = Controller(config, robot_config, run_id, starts=count_start(folder))
+    controller = Controller(config, robot_config, run_id)
     stop_file = open_stop_file(folder)
     before = restored(folder)
     controller.restore(before.tickets, stop_file.stops, before.order, before.preview, before.approaches)

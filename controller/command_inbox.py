@@ -59,8 +59,10 @@ class CommandInbox:
         self._controller, self._barrier = controller, barrier
         self._waiting: queue.SimpleQueue[tuple[intents.Intent, float, Future[m.Answer]]] = queue.SimpleQueue()
 
-    def ask(self, intent: intents.Intent) -> m.Answer:
-        """Hand the intent to the loop and wait for its answer."""
+    def ask(self, intent: intents.Intent) -> m.Answer | None:
+        """Hand the intent to the loop and wait for its answer; None where it is another controller's to answer."""
+        if self._controller.waits:
+            return None
         future: Future[m.Answer] = Future()
         self._waiting.put((intent, time.monotonic(), future))
         try:

@@ -49,7 +49,6 @@ class Controller:
         robot_config: RobotConfig,
         run_id: str = "cut",
         method: Method | None = None,
-        starts: int = 0,
     ) -> None:
         """Build the robot's model and start in IDLE.
 
@@ -58,7 +57,6 @@ class Controller:
             robot_config: Section `[robot]`.
             run_id: Makes this start's cut ids unlike any other's; letters, digits, `_.:-`.
             method: Whole-body method in place of the configured one.
-            starts: How often a controller of this robot has started, counted durably.
 
         Raises:
             ConfigError: There is no such method.
@@ -74,7 +72,7 @@ class Controller:
         self._movement = Movement(
             config, robot_config, self._queue, self._event_log, run_id, self._known, method, permit
         )
-        self._supervisor = Supervisor(config, self._movement, self._event_log, starts)
+        self._supervisor = Supervisor(config, self._movement, self._event_log)
         self._queue_requests = QueueRequests(self._queue)
         self._inputs, self._stale_filter = StepInputs(), StaleMessageFilter()
         self._points_seen: object = None
@@ -87,6 +85,15 @@ class Controller:
     def mode(self) -> m.Mode:
         """Mode of the supervision machine."""
         return self._supervisor.mode
+
+    @property
+    def waits(self) -> bool:
+        """Whether another controller commands the robot: this one tells nothing and is asked nothing."""
+        return self._supervisor.fencing.waits
+
+    def give_way(self) -> m.TokenRequest:
+        """What gives the robot to the next controller, when this one ends."""
+        return self._supervisor.fencing.give_way()
 
     @property
     def recorded(self) -> int:
@@ -129,8 +136,9 @@ class Controller:
         supervisor.review(now)
         moved = self._move(now)
         cut = self._cut(*moved.cut) if moved.cut is not None and self.mode == "AUTO" else None
-        token = None if supervisor.health.overruled else supervisor.authority.token
-        motion = self._movement.send(moved.xi, token, inputs.joints, self.mode == "ESTOP_LATCHED")
+        joints, fencing = inputs.joints, supervisor.fencing
+        motion = self._movement.send(moved.xi, fencing.token, joints, self.mode == "ESTOP_LATCHED")
+        token = None if joints is None else fencing.request(joints.message.sequence, self.mode, now)
         release = supervisor.stops.release_due()
         state = control = stops = plan = request = preview = shown = wanted = None
         if now >= self._state_due:
@@ -144,8 +152,10 @@ class Controller:
         events, records = self._event_log.take(), self._journal.take()
         return Outputs(
             motion=motion,
+            token=token,
             cut=cut,
             release=release,
+            stop=supervisor.stop_due,
             state=state,
             events=events,
             plan=plan,
@@ -217,7 +227,7 @@ class Controller:
         return moved
 
     def _cut(self, cut_id: str, point_id: str) -> m.CutCommand | None:
-        token, joints = self._supervisor.authority.token, self._inputs.joints
+        token, joints = self._supervisor.fencing.token, self._inputs.joints
         if token is None or joints is None:
             return None
         return m.CutCommand(
@@ -225,7 +235,7 @@ class Controller:
         )
 
     def _picture(self, now: float) -> PictureRequest | None:
-        token = self._supervisor.authority.token
+        token = self._supervisor.fencing.token
         due = None if token is None else self._movement.sequence.picture(now)
         if token is None or due is None:
             return None

@@ -1,4 +1,4 @@
-"""Clients that may hold control, and the fencing token of each command."""
+"""Clients that may hold control, and the fencing token of the commands."""
 
 from dataclasses import dataclass
 
@@ -13,11 +13,11 @@ class Client:
 
 @dataclass(frozen=True)
 class Token:
-    """What every motion command and cut order carries: an older one actuates nothing.
+    """What every motion command and cut order carries: any other one actuates nothing.
 
     Attributes:
-        epoch: Grows with each lease given, each new beginning and each start of the controller, durably.
-        nonce: Random: two controllers that count alike are still told apart.
+        epoch: Given out by the bridge, one more with each token.
+        nonce: Drawn by this controller, 64 random bits.
     """
 
     epoch: int

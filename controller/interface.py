@@ -32,8 +32,10 @@ class Outputs:
     """
 
     motion: m.MotionCommand | None = None
+    token: m.TokenRequest | None = None
     cut: m.CutCommand | None = None
     release: m.ReleaseStop | None = None
+    stop: m.StopRequest | None = None
     state: m.ControllerState | None = None
     events: tuple[m.LogEvent, ...] = ()
     plan: SessionPlan | None = None

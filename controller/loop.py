@@ -2,9 +2,11 @@
 
 import queue
 import statistics
+import sys
 import threading
 import time
 from collections import deque
+from dataclasses import replace
 from typing import Generic
 
 from controller.command_inbox import CommandInbox, CommitBarrier
@@ -43,6 +45,7 @@ from rolling_panda.topics import (
     STOP,
     STOPS,
     TELEOP,
+    TOKEN,
     Topic,
 )
 from rolling_panda.transport.zenoh import Msg, Slot, Transport
@@ -110,6 +113,7 @@ class Loop:
         self._log_events = transport.feed(EVENT, 1000)
         self._look, self._picture = self._newest(LOOK), transport.publisher(PICTURE)
         self._motion, self._cut = transport.publisher(MOTION), transport.publisher(CUT)
+        self._token, self._stop = transport.publisher(TOKEN), transport.publisher(STOP)
         self._state, self._event = transport.publisher(CONTROLLER), transport.publisher(EVENT)
         self._plan, self._control = transport.publisher(PLAN), transport.publisher(CONTROL)
         self._preview = transport.publisher(PREVIEW)
@@ -152,8 +156,18 @@ class Loop:
         return LedgerState(state.durable, state.failure or self._stop_file.failure)
 
     def publish(self, outputs: Outputs, now: float) -> None:
-        """Send what is due; the state when all that it tells is durable."""
+        """Send what is due; the state when all that it tells is durable.
+
+        While another controller commands the robot, its word alone is on the wire: of this one only events are.
+        """
         self._ledger.write(outputs.records)
+        waits = self._controller.waits
+        if waits:
+            outputs = replace(outputs, state=None, control=None, plan=None, preview=None, preview_motion=None)
+        if outputs.token is not None:
+            self._token.put(outputs.token)
+        if outputs.stop is not None:
+            self._stop.put(outputs.stop)
         if outputs.motion is not None:
             self._motion.put(outputs.motion)
         if outputs.cut is not None:
@@ -171,7 +185,8 @@ class Loop:
             self._stops_told = outputs.stops
         # What is told to be latched is so after a restart as well; where the disk does not take it, there is a fault.
         if self._stops_told is not None and (self._stop_file.kept or self._stop_file.failure):
-            self._latched.put(self._stops_told)
+            if not waits:
+                self._latched.put(self._stops_told)
             self._stops_told = None
         if outputs.control is not None:
             self._control.put(outputs.control)
@@ -187,7 +202,9 @@ class Loop:
             self._preview_motion.put(outputs.preview_motion)
         for event in outputs.events:
             self._event.put(event)
-        if now >= self._report_due:
+            if waits:
+                print(f"rolling-panda controller: {event.text}", file=sys.stderr, flush=True)
+        if now >= self._report_due and not waits:
             self._report_due = now + 1.0 / REPORT.rate_hz
             self._report.put(self._ledger.report)
 
@@ -213,6 +230,7 @@ class Loop:
                 time.sleep(wait)
             else:
                 due += int(-wait / self._period) * self._period
+        self._token.put(self._controller.give_way())
 
     def _newest(self, topic: Topic[Msg]) -> "_Newest[Msg]":
         return _Newest(self._transport.slot(topic), self._clock)

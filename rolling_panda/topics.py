@@ -93,6 +93,10 @@ MOTION = Topic(
     "command/motion", m.MotionCommand, "controller", "bridge", 100, "REAL_TIME", "DROP",
     "velocity of every actuator, newest wins", express=True,
 )
+TOKEN = Topic(
+    "command/token", m.TokenRequest, "controller", "bridge", 5, "REAL_TIME", "DROP",
+    "who wants to command the robot, repeated for as long as it does", express=True,
+)
 CUT = Topic(
     "command/cut", m.CutCommand, "controller", "bridge", 0, "REAL_TIME", "BLOCK",
     "close the blades once, repeated until seen", express=True,
@@ -195,8 +199,8 @@ REPLAY = Topic(
 )
 
 TOPICS: tuple[Topic[Any], ...] = (
-    MOTION, CUT, PICTURE, STOP, TELEOP, JOINTS, ODOMETRY, BRIDGE, CONTROLLER, PLAN, REPORT, HEARTBEAT, EVENT, CAMERA,
-    PREVIEW, PREVIEW_MOTION, POINTS, CROPS, LOOK, OBSTACLES, SCENERY, PRESENCE, CONTROL, STOPS, HARDWARE_STOP,
+    MOTION, TOKEN, CUT, PICTURE, STOP, TELEOP, JOINTS, ODOMETRY, BRIDGE, CONTROLLER, PLAN, REPORT, HEARTBEAT, EVENT,
+    CAMERA, PREVIEW, PREVIEW_MOTION, POINTS, CROPS, LOOK, OBSTACLES, SCENERY, PRESENCE, CONTROL, STOPS, HARDWARE_STOP,
     REPLAY,
 )
 

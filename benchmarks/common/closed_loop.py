@@ -197,6 +197,10 @@ class ClosedLoop:
     def _send(self, outputs: Outputs) -> None:
         if outputs.motion is not None:
             self.bridge.on_motion(outputs.motion, self.now)
+        if outputs.token is not None:
+            self.bridge.on_token(outputs.token, self.now)
+        if outputs.stop is not None:
+            self.bridge.on_stop(outputs.stop, self.now)
         if outputs.cut is not None:
             self.bridge.on_cut(outputs.cut, self.now)
         if outputs.picture is not None:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import msgspec
 import numpy as np
 
+from bridge.core.fence import Fence
 from controller.core import Controller
 from controller.inputs import Sample
 from controller.interface import Outputs, StepInputs
@@ -70,7 +71,8 @@ class KinematicRobot:
         self.q: Array = np.zeros(12)
         self.q[ARM_Q] = self.start_arm
         self.xi: Array = np.zeros(NXI)
-        self._sequence, self._epoch = 0, 0
+        self._sequence, self._followed, self._moving = 0, 0, False
+        self._fence = Fence()
         self._cut_id, self._cut_at = "", 0.0
         self._told_presence = False
         self._points: Sample[m.PruningPoints] | None = None
@@ -133,7 +135,11 @@ class KinematicRobot:
         command = np.zeros(NXI)
         if out.motion is not None:
             command = np.array(out.motion.xi)
-            self._epoch = out.motion.epoch
+            if self._fence.refuse(out.motion.epoch, out.motion.token) is not None:
+                raise ValueError(f"a command of epoch {out.motion.epoch}, which is not the fence's")
+            self._followed, self._moving = out.motion.sequence, bool(command.any())
+        if out.token is not None:
+            self._fence.ask(out.token.token, self.now, not self._moving)
         if out.picture is not None:
             self._look = self._looked(out.picture)
         if out.cut is not None and out.cut.cut_id != self._cut_id:
@@ -204,7 +210,7 @@ class KinematicRobot:
         return m.BridgeState(
             header=m.Header(self.now),
             kind="sim",
-            epoch=self._epoch,
+            epoch=self._fence.epoch,
             watchdog=False,
             stop_id=self.stop_id,
             stopped_by="ada" if self.stop_id else "",
@@ -212,6 +218,9 @@ class KinematicRobot:
             cut_id=self._cut_id,
             outcome=self.outcome if done else "",
             real_time_factor=1.0,
+            holder=self._fence.holder,
+            sequence=self._followed,
+            moving=self._moving,
         )
 
     def _integrate(self, command: Array) -> None:

@@ -58,7 +58,7 @@ class EndlessRow(World):
         """At work on the first points. There is no camera, so that nothing is looked at from near."""
         super().__init__(seed)
         self.config = msgspec.structs.replace(self.config, confirm=False, verify=False)
-        self.controller = self.new_controller(1)
+        self.controller = self.new_controller()
         self.cut_ids: set[str] = set()
         self._shown = 0
         self._people = (_USER,)

@@ -106,22 +106,26 @@ def _garbage(world: World) -> None:
     world.intruder = send
 
 
-def _older_token(world: World) -> None:
-    """A controller from before, which goes on to command as it did."""
-    epoch = world.bridge.step(world.now).state
-    before = (epoch.epoch if epoch is not None else world.memory.remembered.epoch) - 1
+def _commands(ahead: int, token: str = "") -> Inject:
+    """Another sender, whose epoch is so far ahead, with a token of its own or the robot's."""
 
-    def send(world: World) -> None:
-        if world.ticks % 10 == 0:
+    def inject(world: World) -> None:
+        def send(world: World) -> None:
+            real = world.commanded
+            if world.ticks % 10 or real is None:
+                return
             command = m.MotionCommand(
-                epoch=before,
+                epoch=real.epoch + ahead,
+                token=token or real.token,
                 sequence=2**40 + world.ticks,
                 echo=world.ticks // 10,
                 xi=(3.0, -3.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
             )
             world.bridge.on_motion(command, world.now)
 
-    world.intruder = send
+        world.intruder = send
+
+    return inject
 
 
 def _stuck_wheel(world: World) -> None:
@@ -178,7 +182,9 @@ FAULTS: tuple[Fault, ...] = (
     Fault("loss, delay, duplicates and reorder both ways", "R8", _GO_ON, _bad_link),
     Fault("NaN, infinity, out of range", "R9", _GO_ON, _garbage),
     Fault("NaN, infinity, out of range, driven by hand", "R10", _GO_ON, _garbage, "base", _FULL),
-    Fault("an older controller's commands", "R11", _GO_ON, _older_token),
+    Fault("an older controller's commands", "R11", _GO_ON, _commands(-1, "own")),
+    Fault("commands of an epoch that nobody was given", "R11", _GO_ON, _commands(1, "own")),
+    Fault("commands of another sender under the robot's token", "R11", 0.8, _commands(0)),
     Fault("holder silent in automatic work", "R12", 1.5, _set(heard=False)),
     Fault("control taken by another", "R13", 0.5, _taken_over),
     Fault("release of the hold", "R15", 0.15, _set(holds=False), "base"),

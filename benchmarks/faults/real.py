@@ -100,6 +100,7 @@ class Commander:
         self.transport = Transport(TransportConfig(connect=(endpoint,), plain_wire=True), "controller", "rp1")
         self.state = self.transport.slot(topics.BRIDGE)
         self._joints, self._motion = self.transport.slot(topics.JOINTS), self.transport.publisher(topics.MOTION)
+        self._tokens = self.transport.publisher(topics.TOKEN)
         self._rng, self._limits = rng, RobotModel().limits
         self._sequence, self._until = 0, 0.0
         self._xi = _REST
@@ -114,7 +115,10 @@ class Commander:
                 # After any silence, of a device too, the robot waits for a command at rest.
                 xi = self._random(time.monotonic()) if moving and self.follows() else _REST
                 echo = got.message.sequence
-                self._motion.put(m.MotionCommand(epoch=1, sequence=self._sequence, echo=echo, xi=xi))
+                self._tokens.put(m.TokenRequest(token="bench", echo=echo, mode="AUTO"))
+                state = self.state.peek()
+                epoch = 0 if state is None else state.message.epoch
+                self._motion.put(m.MotionCommand(epoch=epoch, token="bench", sequence=self._sequence, echo=echo, xi=xi))
             time.sleep(0.002)
 
     @property

@@ -124,8 +124,7 @@ class World:
         self.robot = LaggedRobot(self.config.home)
         self.memory = Memory()
         self.bridge = self.new_bridge()
-        self.controller = self.new_controller(1)
-        self.starts = 1
+        self.controller = self.new_controller()
         self.motion, self.state, self.odometry = (Link(self.rng) for _ in range(3))
         self.now = 0.0
         self.ticks = 0
@@ -144,14 +143,13 @@ class World:
         odometer = Odometer(MODEL.drive, OdometryConfig(), TICK_S)
         return BridgeCore(self.robot, BridgeConfig(), MODEL.limits, odometer, "sim", memory=self.memory)
 
-    def new_controller(self, starts: int) -> Controller:
-        """A controller that starts for the so-manieth time."""
-        return Controller(self.config, RobotConfig(), starts=starts)
+    def new_controller(self) -> Controller:
+        """A controller that has just started."""
+        return Controller(self.config, RobotConfig())
 
     def restart_controller(self) -> None:
         """It ends and starts again, with no memory of what it was doing."""
-        self.starts += 1
-        self.controller = self.new_controller(self.starts)
+        self.controller = self.new_controller()
         self.inputs = StepInputs(present=self.inputs.present)
 
     def tick(self) -> None:
@@ -167,7 +165,10 @@ class World:
         for message in (*self.state.arrived(self.now), *self.odometry.arrived(self.now)):
             self._hear(Sample(message, self.now))
         for command in self.motion.arrived(self.now):
-            self.bridge.on_motion(command, self.now)
+            if isinstance(command, m.TokenRequest):
+                self.bridge.on_token(command, self.now)
+            else:
+                self.bridge.on_motion(command, self.now)
         self.intruder(self)
         if self.ticks % _CONTROL_TICKS == 0 and self.alive:
             self._control()
@@ -282,6 +283,10 @@ class World:
         if out.motion is not None:
             self.commanded = out.motion
             self.motion.push(out.motion, self.now)
+        if out.token is not None:
+            self.motion.push(out.token, self.now)
+        if out.stop is not None:
+            self.bridge.on_stop(out.stop, self.now)
         if out.cut is not None:
             self.bridge.on_cut(out.cut, self.now)
         if out.release is not None:

@@ -36,7 +36,7 @@ TARGETS = {
         ("controller/supervision/*",),
         _tests(
             "controller",
-            "authority modes permission supervisor health stale_messages stop_latch lease controller_control "
+            "authority fencing modes permission supervisor health stale_messages stop_latch lease controller_control "
             "two_operators controller_interruptions queue_requests",
         ),
     ),
@@ -44,7 +44,7 @@ TARGETS = {
         ("bridge/core/*",),
         _tests(
             "bridge",
-            "validator latch limiter watchdog cut_memory cut_orders bridge_core bridge_memory odometer picture "
+            "fence validator latch limiter watchdog cut_memory cut_orders bridge_core bridge_memory odometer picture "
             "camera_trigger refusals robot_faults robot_time round_trip time_ratio",
         ),
     ),

@@ -13,6 +13,7 @@ from bridge.config import BridgeConfig
 from bridge.core.camera_trigger import CameraTrigger, Posture
 from bridge.core.cut_memory import CutMemory
 from bridge.core.cut_orders import FORGETFUL, CutOrders
+from bridge.core.fence import SILENT_S, Fence
 from bridge.core.interface import Measurement, Robot, Setpoint
 from bridge.core.latch import StopLatch
 from bridge.core.limiter import Limiter
@@ -30,7 +31,7 @@ from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.messages.supervision import StopState
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import Limits
-from rolling_panda.topics import BRIDGE, CUT, MOTION, ODOMETRY, PICTURE, STOPS
+from rolling_panda.topics import BRIDGE, CUT, MOTION, ODOMETRY, PICTURE, STOPS, TOKEN
 from rolling_panda.transport.zenoh import Rejections
 
 TICK_S = 0.001
@@ -44,6 +45,9 @@ MOVING_CUT = "the robot is not at rest"
 # A robot that nobody has stepped for so long (s) has come to rest by its own deadlines, or is on its way: what is sent
 # begins with how it really moves.
 _STANDSTILL_S = 0.05
+# In these modes of its holder nothing moves, but for braking (s).
+_STILL: tuple[m.Mode, ...] = ("IDLE", "FAULT", "ESTOP_LATCHED")
+_BRAKING_S = 0.3
 # Faster than this (rad/s) is motion that the camera should follow.
 _MOVING = 0.01
 
@@ -106,7 +110,12 @@ class BridgeCore:
         self._scenery_revision = -1
         self._memory = memory or Memory()
         before = self._memory.remembered
-        self._gate = CommandValidator(limits.velocity, config.max_age_s, before.epoch, before.token)
+        self._fence = Fence(before.epoch, before.token)
+        self._gate = CommandValidator(limits.velocity, config.max_age_s, self._fence)
+        #: Whether a restart would know who holds the token; only then they are told.
+        self._fence_kept = True
+        self._mode: tuple[m.Mode | None, float] = None, 0.0
+        self._wanted, self._unwanted_said = 0.0, False
         self._latch = StopLatch(before.stops, before.released, before.released_by)
         self._watchdog = Watchdog(config.fade_s, config.deadline_s)
         self._limiter = Limiter(limits, config.wheel_acceleration, config.joint_margin, TICK_S)
@@ -137,16 +146,35 @@ class BridgeCore:
 
     def on_motion(self, command: m.MotionCommand, now: float, clock: float | None = None) -> None:
         """Take a motion command received at `now`; a refused one is counted and changes nothing."""
-        epoch = self._gate.epoch
-        reason = self._gate.refuse(command, now, not np.any(self._limiter.sent))
+        reason = self._gate.refuse(command, now)
         if reason is not None:
             self.refusals.add(MOTION.name, reason)
             return
-        if command.epoch != epoch:
-            self._remember()
         self._desired = np.array(command.xi)
         self._watchdog.feed(now, self._limiter.braking_s(self._desired))
         self._round_trip.back(command.echo, self._clock if clock is None else clock)
+
+    def on_token(self, request: m.TokenRequest, now: float) -> None:
+        """Give the fencing token out, let its holder keep it, or take it back."""
+        epoch = self._fence.epoch
+        if request.gives_way:
+            if self._fence.give_way(request.token):
+                self._halt()
+                self._token_changed(f"the controller that held epoch {epoch} has given way")
+            return
+        reason = self._gate.ask(request, now, not np.any(self._limiter.sent))
+        if reason is not None:
+            self.refusals.add(TOKEN.name, reason)
+            return
+        self._mode = request.mode, now
+        if self._fence.epoch != epoch:
+            self._halt()
+            self._token_changed(f"a controller has got the token: epoch {self._fence.epoch}")
+
+    def _token_changed(self, text: str) -> None:
+        self._say("info", text)
+        self._remember()
+        self._fence_kept, self._state_due = False, True
 
     def on_cut(self, command: m.CutCommand, now: float) -> None:
         """Close the blades, once for a `cut_id`."""
@@ -170,7 +198,7 @@ class BridgeCore:
 
     def on_picture(self, request: PictureRequest) -> None:
         """Take a picture as soon as the camera is free; only for the controller whose commands are taken."""
-        if request.epoch != self._gate.epoch:
+        if request.epoch != self._fence.epoch:
             self.refusals.add(PICTURE.name, "not the controller's that commands the robot")
             return
         self._shutter.want(request)
@@ -225,7 +253,7 @@ class BridgeCore:
         xi = self._limiter.step(share * self._desired, self._measured.position[2:])
         blades = not (stopped or tripped)
         releases = self._faults.releases
-        self.robot.write(Setpoint(xi, blades, self._gate.epoch, self._gate.sequence, self._clock, releases))
+        self.robot.write(Setpoint(xi, blades, self._fence.epoch, self._gate.sequence, self._clock, releases))
         self._measured = self.robot.read()
         self._ticks += 1
         self._follow_cut()
@@ -262,7 +290,7 @@ class BridgeCore:
 
     def _remember(self) -> None:
         latch = self._latch
-        self._memory.keep(Remembered(self._gate.epoch, self._gate.token, latch.stops, latch.over, latch.released_by))
+        self._memory.keep(Remembered(self._fence.epoch, self._fence.token, latch.stops, latch.over, latch.released_by))
 
     def _begin_cut(self, cut_id: str, outcome: m.Outcome) -> None:
         self._cut_id, self._outcome = cut_id, outcome
@@ -292,6 +320,8 @@ class BridgeCore:
             if ticks % _ODOMETRY_TICKS == 0:
                 self._odometer.measure(ticks, now, self._measured.velocity[:2])
             odometry = self._odometer.due(ticks)
+        if not self._fence_kept and self._memory.kept:
+            self._fence_kept = self._state_due = True
         if self._state_due or ticks % _STATE_TICKS == 0:
             state = self._state(now)
             self._events += [("warning", line) for line in self.refusals.lines(now)]
@@ -332,10 +362,12 @@ class BridgeCore:
     def _state(self, now: float) -> m.BridgeState:
         self._state_due = False
         self._round_trip.forget(self._clock)
+        moving = bool(np.any(self._limiter.sent))
+        self._watch_mode(moving, now)
         return m.BridgeState(
             header=m.Header(now),
             kind=self.kind,
-            epoch=self._gate.epoch,
+            epoch=self._fence.epoch,
             watchdog=self._was_tripped,
             stop_id=self._latch.stop_id,
             stopped_by=self._latch.stopped_by,
@@ -348,7 +380,20 @@ class BridgeCore:
             rejections=self.refusals.counts(),
             battery=self._measured.battery,
             wider=self._wider,
+            holder=self._fence.holder if self._fence_kept else "",
+            sequence=max(0, self._gate.sequence),
+            moving=moving,
         )
+
+    def _watch_mode(self, moving: bool, now: float) -> None:
+        """Say it when the robot moves though the mode of who holds the token, as they told it last, moves nothing."""
+        mode, at = self._mode
+        if not moving or (mode is not None and mode not in _STILL and now - at <= SILENT_S):
+            self._wanted, self._unwanted_said = now, False
+        elif now - self._wanted > _BRAKING_S and not self._unwanted_said:
+            self._unwanted_said = True
+            why = f"the controller's mode is {mode}" if mode in _STILL else "no controller says what it does"
+            self._say("error", f"the robot is commanded to move, though {why}")
 
     def _frame(self, now: float) -> CameraFrame | None:
         measured: Measurement = self._measured

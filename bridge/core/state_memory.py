@@ -1,12 +1,15 @@
 """What the bridge must still know after a restart, so that an older token never moves the robot again."""
 
+import secrets
+import time
 from pathlib import Path
 
 import msgspec
 
 from rolling_panda.messages.supervision import StopRecord
+from rolling_panda.messages.types import Epoch
 from rolling_panda.runtime.latest_file import LatestFileWriter
-from rolling_panda.runtime.state_folder import read_kept
+from rolling_panda.runtime.state_folder import read_kept, replace_durably
 
 _NAME = "bridge.json"
 
@@ -15,14 +18,14 @@ class Remembered(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What is kept.
 
     Attributes:
-        epoch: Newest one accepted.
-        token: Random part of its token; None before the first.
+        epoch: Of the newest fencing token given out.
+        token: Its random part; None when nobody holds it.
         stops: Latched stops, the newest first.
         released: Ids of stops that were released: late repetitions of them latch nothing.
         released_by: Who released the last one, and why.
     """
 
-    epoch: int = 0
+    epoch: Epoch = 0
     token: str | None = None
     stops: tuple[StopRecord, ...] = ()
     released: tuple[str, ...] = ()
@@ -68,5 +71,23 @@ def open_memory(folder: Path) -> Memory:
         InputError: It cannot be read: a bridge that does not know what was stopped must not start.
     """
     path = folder / _NAME
-    remembered = read_kept(path, Remembered, Remembered(), "what the bridge remembers")
+    remedy = f"look whether the robot may move, then give: rolling-panda bridge --begin-anew --state {folder}"
+    remembered = read_kept(path, Remembered, Remembered(), "what the bridge remembers", remedy)
     return Memory(remembered, LatestFileWriter(path))
+
+
+def begin_anew(folder: Path) -> str:
+    """Set aside what the bridge remembers, whatever it is, and latch a stop in its place; returns what was done.
+
+    Nobody knows any more what was stopped: a supervisor has to look and to reset before anything moves.
+
+    Raises:
+        OSError: The folder cannot be written.
+    """
+    path, done = folder / _NAME, "the bridge begins anew: it remembered nothing"
+    if path.exists():
+        aside = path.replace(path.with_suffix(".aside"))
+        done = f"the bridge begins anew: what it remembered is set aside in {aside}"
+    stop = StopRecord(f"anew-{secrets.token_hex(8)}", "bridge", "", done[:500], time.time())
+    replace_durably(path, msgspec.json.encode(Remembered(stops=(stop,))))
+    return done

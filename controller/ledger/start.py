@@ -1,4 +1,4 @@
-"""The controller's start: what it restores from the ledger, what it records first, and the durable count of starts."""
+"""The controller's start: what it restores from the ledger, and what it records first."""
 
 import hashlib
 from dataclasses import dataclass
@@ -11,8 +11,7 @@ from controller.ledger.journal import ApproachRow, OrderRow, PreviewRow, Record,
 from controller.ledger.store import Ledger
 from rolling_panda import __version__
 from rolling_panda.cli.about import About, about
-from rolling_panda.errors import InputError, LedgerError
-from rolling_panda.runtime.state_folder import replace_durably
+from rolling_panda.errors import LedgerError
 
 Row = TypeVar("Row", bound=msgspec.Struct)
 
@@ -95,29 +94,3 @@ def _written_by(ledger: Ledger) -> str:
     except msgspec.MsgspecError:
         starts = []
     return f"version {starts[-1].program.version}" if starts else "a version that did not say which"
-
-
-_NAME = "controller-starts"
-
-
-def count_start(folder: Path) -> int:
-    """Count one more start; it is on disk when this returns.
-
-    Raises:
-        InputError: The count cannot be read or written.
-    """
-    path = folder / _NAME
-    try:
-        text = path.read_text(encoding="ascii") if path.exists() else "0"
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot read the count of starts in {path}: {error}") from error
-    if not text.strip().isdecimal():
-        raise InputError(
-            f"{path} holds {text[:40]!r}, no count of starts; with every other process ended, remove it to begin anew"
-        )
-    starts = int(text) + 1
-    try:
-        replace_durably(path, f"{starts}\n".encode())
-    except OSError as error:
-        raise InputError(f"cannot count this start in {path}: {error.strerror}") from error
-    return starts

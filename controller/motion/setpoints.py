@@ -20,6 +20,8 @@ class Setpoints:
         """At rest."""
         self._saturation = saturation
         self._number = 0
+        #: Number of the newest command that was more than to rest.
+        self.moved = 0
         self._token: Token | None = None
         self._rest = 0
         self.sent: Array = np.zeros(NXI)
@@ -49,6 +51,8 @@ class Setpoints:
             self._rest, xi = self._rest - 1, np.zeros(NXI)
         self.sent, self.before = xi, self.sent
         self._number += 1
+        if xi.any():
+            self.moved = self._number
         a, b, c, d, e, f, g, h, i = xi.tolist()
         return m.MotionCommand(
             epoch=token.epoch,

@@ -1,12 +1,11 @@
 """Control authority: lease, presence and the rights of each client. Pure: `now` is an argument."""
 
 import math
-from collections.abc import Callable
 from typing import Final
 
-from controller.identity import Client, Token
+from controller.identity import Client
 from controller.inputs import Sample
-from controller.supervision.lease import Lease, first_epoch
+from controller.supervision.lease import Lease
 from controller.supervision.modes import Rights, Who
 from rolling_panda.messages import commands as intents
 from rolling_panda.messages.supervision import NEVER_SEEN_S, ControlState, Presence
@@ -19,36 +18,21 @@ ABOUT_CONTROL: Final = (intents.TakeControl, intents.RequestControl, intents.Gra
 class Authority:
     """Keeps the lease by what the server says of who is there."""
 
-    def __init__(self, draw: Callable[[], str], supervision_s: float, starts: int = 0) -> None:
+    def __init__(self, supervision_s: float) -> None:
         """Nobody is there.
 
         Args:
-            draw: Gives the random part of a new token.
             supervision_s: Automatic work goes on for so long without anybody who sees the robot (s).
-            starts: How often a controller of this robot has started, this time included.
         """
-        self._lease, self._starts = Lease(draw), starts
+        self._lease = Lease()
         self._supervision_s = supervision_s
         self._newest: Sample[Presence] | None = None
         self._seen = -math.inf
 
     @property
-    def token(self) -> Token | None:
-        """Of the commands; None before the bridge has been heard."""
-        return self._lease.token
-
-    @property
     def held(self) -> bool:
         """Whether somebody holds control, and keeps it."""
         return self._lease.holder is not None and self._lease.coming is None
-
-    def begin(self, seen: int) -> None:
-        """Count tokens from above the newest epoch that the bridge has accepted, and above all of earlier starts."""
-        self._lease.begin(first_epoch(self._starts, seen))
-
-    def begin_anew(self) -> None:
-        """Go on under a newer token; who holds control keeps it."""
-        self._lease.begin_anew()
 
     def review(self, presence: Sample[Presence] | None, at_rest: bool, now: float) -> str:
         """Take in who is there. Returns why the robot must stop; empty when nobody lost control.
@@ -123,7 +107,6 @@ class Authority:
         return ControlState(
             holder="" if holder is None else holder.key,
             user="" if holder is None else holder.user,
-            epoch=0 if lease.token is None else lease.token.epoch,
             expires_s=lease.left(now),
             requested_by="" if requested is None else requested.user,
             requested_key="" if requested is None else requested.key,

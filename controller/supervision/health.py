@@ -25,7 +25,7 @@ class Health:
         perception: Age of perception's newest heartbeat.
         present: Processes connected now.
         watchdog: The bridge says that its watchdog holds the robot.
-        overruled: The bridge has accepted a newer controller than this one.
+        overruled: Another controller holds the bridge's token.
         refused: How many motion commands the bridge has refused since its start.
         ledger: Why what is done cannot be recorded; empty when it can.
         tracking_error: Why the robot does not do what it is told; empty when it does.
@@ -46,12 +46,12 @@ class Health:
     obstacles: float = 0.0
 
 
-def health(inputs: Inputs, epoch: int | None, now: float, ledger: str = "", tracking_error: str = "") -> Health:
+def health(inputs: Inputs, overruled: bool, now: float, ledger: str = "", tracking_error: str = "") -> Health:
     """How fresh the inputs are.
 
     Args:
         inputs: Newest of everything.
-        epoch: Of this controller, None before the first bridge state.
+        overruled: Another controller holds the bridge's token.
         now: Monotonic time (s).
         ledger: Why what is done cannot be recorded.
         tracking_error: Why the robot does not do what it is told.
@@ -69,7 +69,7 @@ def health(inputs: Inputs, epoch: int | None, now: float, ledger: str = "", trac
         perception=age(inputs.perception_seen),
         present=inputs.present,
         watchdog=bridge is not None and bridge.message.watchdog,
-        overruled=bridge is not None and epoch is not None and bridge.message.epoch > epoch,
+        overruled=overruled,
         refused=0 if bridge is None else _refused(bridge.message),
         ledger=ledger,
         tracking_error=tracking_error,
@@ -102,6 +102,7 @@ class Verdict:
 
 
 FINE = Verdict("none")
+OVERRULED = "another controller commands this robot"
 
 
 def check(mode: Mode, moving: bool, health: Health, config: ControllerConfig) -> Verdict:
@@ -113,8 +114,8 @@ def check(mode: Mode, moving: bool, health: Health, config: ControllerConfig) ->
         health: Of the inputs.
         config: Ages allowed.
     """
-    if health.overruled:
-        return Verdict("fault", "another controller commands this robot")
+    if health.overruled and mode != "IDLE":
+        return Verdict("fault", OVERRULED)
     if health.ledger:
         return Verdict("fault", health.ledger)
     if not moving and mode not in ("AUTO", "TELEOP"):
@@ -132,13 +133,13 @@ def check(mode: Mode, moving: bool, health: Health, config: ControllerConfig) ->
 
 def cause(health: Health, config: ControllerConfig) -> str:
     """Why a PROTECTIVE_STOP or FAULT could not be left now; empty when its cause is gone."""
-    if health.overruled:
-        return "another controller commands this robot"
     return health.ledger or sensors(health, config) or ("watchdog" if health.watchdog else "")
 
 
 def sensors(health: Health, config: ControllerConfig) -> str:
     """Why the robot's own data do not allow motion; empty when they do."""
+    if health.overruled:
+        return OVERRULED
     if health.tracking_error:
         return health.tracking_error
     if health.joints > config.joints_max_age_s:

@@ -1,14 +1,11 @@
 """The lease of control: one holder at a time, valid while it is renewed. Pure: `now` is an argument."""
 
 import math
-import secrets
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Final
 
-from controller.identity import Client, Token
+from controller.identity import Client
 
-#: So many leases can be given between two starts of the controller.
-_LEASES_A_START: Final = 1 << 20
 #: A lease whose holder has said nothing for so long has ended (s).
 LIFE_S: Final = 1.0
 #: A request that nobody has answered for so long is forgotten (s).
@@ -18,29 +15,14 @@ _REQUEST_S: Final = 30.0
 class Lease:
     """Who holds control. The robot changes hands only at rest; until then nobody but who holds it moves it."""
 
-    def __init__(self, draw: Callable[[], str]) -> None:
-        """Nobody holds control.
-
-        Args:
-            draw: Gives the random part of a new token.
-        """
-        self._draw = draw
+    def __init__(self) -> None:
+        """Nobody holds control."""
         self._renewed = self._asked = -math.inf
         self.holder: Client | None = None
         self.coming: Client | None = None
         self.requested: Client | None = None
-        self.token: Token | None = None
         self.told = self._lost = ""
         self.told_number = 0
-
-    def begin(self, epoch: int) -> None:
-        """Count tokens from here; what the robot does before somebody holds control is to stand still."""
-        self.token = Token(epoch, self._draw())
-
-    def begin_anew(self) -> None:
-        """A newer token for whoever holds control."""
-        if self.token is not None:
-            self.begin(self.token.epoch + 1)
 
     def held_by(self, client: Client) -> bool:
         """Whether this client holds control and nobody is about to take it."""
@@ -130,7 +112,6 @@ class Lease:
         self.holder, self.coming, self._renewed = client, None, now
         if self.requested is not None and self.requested.key == client.key:
             self.requested = None
-        self.begin_anew()
         self._tell(told)
 
     def _drop(self, told: str) -> None:
@@ -139,18 +120,3 @@ class Lease:
 
     def _tell(self, told: str) -> None:
         self.told, self.told_number = told, self.told_number + 1
-
-
-def draw_nonce() -> str:
-    """The random part of a new token, 64 bits."""
-    return secrets.token_hex(8)
-
-
-def first_epoch(starts: int, seen: int) -> int:
-    """Where a controller begins to count: above all that it gave out before, and above what the bridge has seen.
-
-    Args:
-        starts: How often a controller of this robot has started, this time included.
-        seen: Newest epoch that the bridge has accepted.
-    """
-    return max(starts * _LEASES_A_START, seen + 1)

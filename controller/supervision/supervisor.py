@@ -1,5 +1,6 @@
 """Supervision of one robot: mode, latched stops, control authority and health of the inputs."""
 
+import secrets
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Final
@@ -11,7 +12,7 @@ from controller.ledger.journal import EventLogger
 from controller.supervision import health as safety
 from controller.supervision import modes
 from controller.supervision.authority import Authority, client_of
-from controller.supervision.lease import draw_nonce
+from controller.supervision.fencing import FencingToken
 from controller.supervision.modes import Event
 from controller.supervision.permission import Situation
 from controller.supervision.stop_latch import StopLatch
@@ -20,32 +21,39 @@ from rolling_panda import messages as m
 from rolling_panda.messages import commands as intents
 from rolling_panda.messages.supervision import StopRecord
 
-#: A bridge whose watchdog has held the robot for so long (s) is offered another token.
+#: A bridge whose watchdog has held the robot for so long (s) is asked for another token.
 _ANEW_S: Final = 2.0
+#: Braking to rest takes less than this (s, the bridge's clock), and so does one command with a spoilt number, which the
+#: watchdog ends.
+_BRAKING_S: Final = 0.4
 
 
 class Supervisor:
     """The machine of modes with everything that drives it. `take` the inputs of each period first, then `review`."""
 
-    def __init__(self, config: ControllerConfig, movement: Movement, event_log: EventLogger, starts: int) -> None:
+    def __init__(self, config: ControllerConfig, movement: Movement, event_log: EventLogger) -> None:
         """Start in IDLE.
 
         Args:
             config: Section `[controller]`.
             movement: What is ended when a mode ends.
             event_log: Records events for people.
-            starts: How often a controller of this robot has started, counted durably.
         """
         self._config, self._movement, self._event_log = config, movement, event_log
         self.stops = StopLatch()
-        self.authority = Authority(draw_nonce, config.supervision_s, starts)
+        self.authority = Authority(config.supervision_s)
+        self.fencing = FencingToken()
+        #: The stop to send to the bridge, until it shows that it has latched one.
+        self.stop_due: m.StopRequest | None = None
+        #: Stamp of the newest bridge state in which nothing moved but by this controller's commands.
+        self._explained = 0.0
         self.state = modes.boot()
         #: What was under way when it was paused or stopped for its protection, until something is begun.
         self.interrupted: m.Interrupted = ""
         self._inputs = Inputs()
         #: When the bridge last did as it was told, and how many commands it had refused by then.
         self._obeyed, self._refused = 0.0, 0
-        self.health = safety.health(self._inputs, None, 0.0)
+        self.health = safety.health(self._inputs, False, 0.0)
 
     @property
     def mode(self) -> m.Mode:
@@ -71,17 +79,17 @@ class Supervisor:
             now: Monotonic time (s).
         """
         self._inputs = inputs
-        if self.bridge is not None and self.authority.token is None:
-            self.authority.begin(self.bridge.epoch)
-            self._obeyed = now
-        token, tracking_error = self.authority.token, self._movement.body.tracking_error.reason
-        self.health = safety.health(inputs, None if token is None else token.epoch, now, trouble, tracking_error)
+        if changed := self.fencing.take(self.bridge, now):
+            self._event_log.say("warning" if self.fencing.overruled else "info", changed)
+        tracking_error = self._movement.body.tracking_error.reason
+        self.health = safety.health(inputs, self.fencing.overruled, now, trouble, tracking_error)
 
     def review(self, now: float) -> None:
         """End what must not go on, and begin what an operator's hand holds."""
         self._review_token(now)
         inputs, bridge = self._inputs, self.bridge
-        latched = self.stops.take(inputs.stops, bridge, inputs.wall_time)
+        stops = (*inputs.stops, *self._review_motion())
+        latched = self.stops.take(stops, bridge, inputs.wall_time)
         if latched:
             self.event(Event.STOP, now, latched)
         elif self.stops.released(bridge):
@@ -152,15 +160,32 @@ class Supervisor:
     def _review_token(self, now: float) -> None:
         """One command with a spoilt number far ahead, once accepted, would have all others refused for good."""
         health = self.health
-        if health.watchdog and not health.overruled:
+        if health.watchdog and self.fencing.token is not None:
             if now - self._obeyed < _ANEW_S or not self._movement.at_rest:
                 return
             if health.refused > self._refused:
-                self.authority.begin_anew()
+                self.fencing.give_way()
                 self._event_log.say(
-                    "warning", f"the bridge refused every command for {_ANEW_S:.0f} s: a new token begins"
+                    "warning", f"the bridge refused every command for {_ANEW_S:.0f} s: another token is asked for"
                 )
         self._obeyed, self._refused = now, health.refused
+
+    def _review_motion(self) -> tuple[m.StopRequest, ...]:
+        """Stop a robot that moves under this controller's token though not by its commands."""
+        bridge = self.bridge
+        if bridge is None or bridge.stop_id:
+            self.stop_due = None
+        if bridge is None or self.fencing.token is None or not self._movement.unknown_motion(bridge):
+            self._explained = 0.0 if bridge is None else bridge.header.stamp
+            return ()
+        if bridge.header.stamp - self._explained <= _BRAKING_S:
+            return ()
+        reason = "the robot moves by commands that this controller has not sent"
+        stop = m.StopRequest(stop_id=f"motion-{secrets.token_hex(8)}", source="controller", user="", reason=reason)
+        self.stop_due = stop
+        # Whoever sends them knows this token.
+        self.fencing.give_way()
+        return (stop,)
 
     def _pause(self, reason: str, now: float) -> None:
         """What moves comes to rest, and nothing resumes by itself."""

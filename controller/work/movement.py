@@ -92,6 +92,10 @@ class Movement:
         """Whether nothing moves by what was sent last."""
         return self._setpoints.at_rest
 
+    def unknown_motion(self, bridge: m.BridgeState) -> bool:
+        """Whether the bridge moves the robot by a command that is none of this controller's, or was one to rest."""
+        return bridge.moving and bridge.sequence > self._setpoints.moved
+
     def take(self, inputs: Inputs) -> None:
         """Take in what was measured and what stands around."""
         self.body.take(inputs)

@@ -11,6 +11,7 @@ from rolling_panda.messages.types import (
     Covariance,
     CutKind,
     Digest,
+    Epoch,
     Finite,
     Fraction,
     Header,
@@ -146,12 +147,12 @@ class PictureRequest(Message, frozen=True, kw_only=True):
     """Controller → bridge: take a picture of a point now. Repeated until seen; the bridge acts on a `number` once.
 
     Attributes:
-        epoch: Of the controller, as in `MotionCommand`.
+        epoch: As in `MotionCommand`.
         number: Strictly increasing within an epoch.
         point_id: What is looked at; the frame carries it.
     """
 
-    epoch: Count
+    epoch: Epoch
     number: Count
     point_id: Name
 

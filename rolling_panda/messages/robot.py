@@ -1,5 +1,6 @@
 """What the robot is told and what it tells: motion, cuts, stops, joints, odometry, camera frames."""
 
+import hashlib
 from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
@@ -9,10 +10,12 @@ from rolling_panda.messages.types import (
     ActuatedVelocity,
     BridgeKind,
     Count,
+    Epoch,
     Finite,
     Fraction,
     Header,
     Message,
+    Mode,
     Name,
     NonNegative,
     Outcome,
@@ -22,19 +25,43 @@ from rolling_panda.messages.types import (
 )
 
 
+class TokenRequest(Message, frozen=True, kw_only=True):
+    """Controller → bridge: give me the fencing token, let me keep it, or take it back.
+
+    Repeated by who holds the token too. Nobody else is given one before the holder gives way, or has been silent for a
+    second; `BridgeState` says whose it is, and under which epoch.
+
+    Attributes:
+        token: Random part of the token, drawn by who asks and told to nobody but the bridge.
+        echo: `sequence` of the newest `JointState`; judged as that of a motion command.
+        mode: Of the controller that asks; of no account where it gives way.
+        gives_way: It takes its token back: the next one who asks is given one.
+    """
+
+    token: Annotated[str, Meta(min_length=1, max_length=32)]
+    echo: Count = 0
+    mode: Mode = "IDLE"
+    gives_way: bool = False
+
+
+def fingerprint(token: str) -> str:
+    """What may be told of a token: who has drawn it knows it again, and nobody else can use it."""
+    return hashlib.sha256(token.encode()).hexdigest()[:16]
+
+
 class MotionCommand(Message, frozen=True, kw_only=True):
     """Controller → bridge: the velocity of every actuator, newest wins.
 
     Attributes:
-        epoch: Counts starts of the controller and leases given, durably; an older one is refused.
+        epoch: Of the token, as the bridge has given it out; any other one is refused.
         sequence: Strictly increasing within an epoch.
         echo: `sequence` of the newest `JointState` the command was computed from. The bridge knows when it sent that
             state, so it judges the command's age on its own clock.
         xi: [θ̇_l, θ̇_r, q̇₁…q̇₇] in rad/s.
-        token: Random part of the lease's token; within an epoch another one is refused.
+        token: Random part of the token; any other one is refused.
     """
 
-    epoch: Count
+    epoch: Epoch
     sequence: Count
     echo: Count
     xi: ActuatedVelocity
@@ -47,7 +74,7 @@ class CutCommand(Message, frozen=True, kw_only=True):
     `epoch`, `token` and `echo` are judged as those of a motion command, and the robot has to be at rest.
     """
 
-    epoch: Count
+    epoch: Epoch
     cut_id: Name
     point_id: Name
     echo: Count = 0
@@ -103,7 +130,10 @@ class BridgeState(Message, frozen=True, kw_only=True):
 
     Attributes:
         kind: `sim`, `real`, or `fakes`: the real robot's drivers with fakes in place of the devices.
-        epoch: Newest controller epoch accepted.
+        epoch: Of the newest token given out; 0 before the first.
+        holder: First 16 hexadecimal digits of the SHA-256 of its random part; empty when nobody holds it.
+        sequence: Of the command that the robot follows, or followed last.
+        moving: Whether what is sent to the actuators is anything but zero.
         watchdog: True while no valid setpoint has come for the deadline: base 0, arm holds, cutter inhibited.
         stop_id: The latched software stop, empty when none.
         stopped_by: User and reason of that stop.
@@ -120,7 +150,7 @@ class BridgeState(Message, frozen=True, kw_only=True):
 
     header: Header
     kind: BridgeKind
-    epoch: Count
+    epoch: Epoch
     watchdog: bool
     stop_id: Annotated[str, Meta(max_length=64)]
     stopped_by: Text
@@ -133,6 +163,9 @@ class BridgeState(Message, frozen=True, kw_only=True):
     rejections: tuple[RejectionCount, ...] = ()
     battery: Fraction | None = None
     wider: tuple[Text, ...] = ()
+    holder: Annotated[str, Meta(max_length=16)] = ""
+    sequence: Count = 0
+    moving: bool = False
 
 
 class ReleaseStop(Message, frozen=True, kw_only=True):

@@ -178,7 +178,6 @@ class ControlState(Message, frozen=True, kw_only=True):
     Attributes:
         holder: Key of who holds control, empty when nobody.
         user: Their name.
-        epoch: Of the token that motion commands and cut orders carry now.
         expires_s: How long the lease still lives without a word of its holder (s).
         requested_by: Name of who asks for control, empty when nobody.
         requested_key: Their key.
@@ -190,7 +189,6 @@ class ControlState(Message, frozen=True, kw_only=True):
 
     holder: ClientKey
     user: Text
-    epoch: Count
     expires_s: NonNegative
     requested_by: Text
     requested_key: ClientKey

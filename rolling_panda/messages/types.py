@@ -1,6 +1,6 @@
 """Types that the messages share: bounded numbers, names, headers and poses."""
 
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Final, Literal, get_args
 
 from msgspec import Meta, Struct
 
@@ -13,6 +13,9 @@ Fraction = Annotated[float, Meta(ge=0.0, le=1.0)]
 Angle = Annotated[float, Meta(ge=-1e6, le=1e6)]
 Speed = Annotated[float, Meta(ge=-100.0, le=100.0)]
 Count = Annotated[int, Meta(ge=0, le=2**62)]
+#: Grows by one with each fencing token that the bridge gives out: at one a second this lasts for 30 years.
+MOST_EPOCHS: Final = 10**9
+Epoch = Annotated[int, Meta(ge=0, le=MOST_EPOCHS)]
 #: Without the last part of the pattern a newline at the end would pass: "$" also matches before it.
 Name = Annotated[str, Meta(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9_.:\-]+(?!\n)$")]
 Text = Annotated[str, Meta(max_length=500)]

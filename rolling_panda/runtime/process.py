@@ -60,7 +60,16 @@ class ProcessContext:
         Raises:
             InputError: It cannot be made.
         """
-        return open_state_folder(self.arguments.state or usual_state_folder(self.arguments.robot_id))
+        return state_folder(self.arguments)
+
+
+def state_folder(arguments: argparse.Namespace) -> Path:
+    """The state folder that a command line means; made where it is missing.
+
+    Raises:
+        InputError: It cannot be made.
+    """
+    return open_state_folder(arguments.state or usual_state_folder(arguments.robot_id))
 
 
 def run_process(

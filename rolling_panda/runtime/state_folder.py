@@ -63,7 +63,13 @@ def alone(folder: Path, process: str) -> Iterator[None]:
         os.close(descriptor)
 
 
-def read_kept(path: Path, kind: type[Kept], nothing: Kept, what: str) -> Kept:
+def read_kept(
+    path: Path,
+    kind: type[Kept],
+    nothing: Kept,
+    what: str,
+    remedy: str = "look whether the robot may move, then remove it",
+) -> Kept:
     """What `replace_durably` last wrote as JSON; `nothing` where it has never written.
 
     Args:
@@ -71,6 +77,7 @@ def read_kept(path: Path, kind: type[Kept], nothing: Kept, what: str) -> Kept:
         kind: What it must decode to.
         nothing: What there is before the first time.
         what: What it says, in words, for the error.
+        remedy: What to do when it cannot be read.
 
     Raises:
         InputError: It cannot be read: a program that does not know what was stopped must not start.
@@ -78,9 +85,7 @@ def read_kept(path: Path, kind: type[Kept], nothing: Kept, what: str) -> Kept:
     try:
         return msgspec.json.decode(path.read_bytes(), type=kind) if path.exists() else nothing
     except (OSError, msgspec.MsgspecError) as error:
-        raise InputError(
-            f"cannot read {what} in {path}: {error}; look whether the robot may move, then remove it"
-        ) from error
+        raise InputError(f"cannot read {what} in {path}: {error}; {remedy}") from error
 
 
 def replace_durably(path: Path, content: bytes) -> None:

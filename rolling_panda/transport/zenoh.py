@@ -226,8 +226,8 @@ class Transport(Onlooker):
             )
         )
 
-    def serve(self, service: Service[Req], answer: Callable[[Req], m.Answer]) -> None:
-        """Answer requests with `answer(request)`, on a thread of the transport."""
+    def serve(self, service: Service[Req], answer: Callable[[Req], m.Answer | None]) -> None:
+        """Answer requests with `answer(request)`, on a thread of the transport; None leaves it to somebody else."""
         decoder = StrictDecoder(*service.requests)
 
         def reply(query: zenoh.Query) -> None:
@@ -237,10 +237,11 @@ class Transport(Onlooker):
                     request = decoder.decode(_bounded(payload.to_bytes() if payload is not None else b""))
                 except MessageError as error:
                     self._reject(service.name, str(error))
-                    result = m.Answer(ok=False, reason=str(error)[:500])
+                    result: m.Answer | None = m.Answer(ok=False, reason=str(error)[:500])
                 else:
                     result = answer(request)
-                query.reply(query.key_expr, encode(result))
+                if result is not None:
+                    query.reply(query.key_expr, encode(result))
 
         self._session.declare_queryable(key(self.robot_id, service.name), reply)
 

@@ -113,16 +113,36 @@ def test_duplicates_reorders_and_replays_are_not_actuated(rig: Rig) -> None:
     assert "sequence not newer" in rig.refusals
 
 
-def test_an_older_token_actuates_nothing(rig: Rig) -> None:
-    rig.epoch = 5
+@pytest.mark.parametrize(("epoch", "words"), [(0, "an older controller"), (2, "has not given out")])
+def test_an_epoch_that_is_not_the_given_one_actuates_nothing(rig: Rig, epoch: int, words: str) -> None:
     rig.run(0.2, REST)
-    rig.epoch = 4
+    assert rig.state.epoch == rig.epoch == 1
+    rig.epoch = epoch
     rig.run(0.5, FORWARD)
     assert rig.at_rest()
-    assert "older" in rig.refusals
-    rig.cut("c1", epoch=4)
+    assert words in rig.refusals
+    rig.cut("c1")
     rig.run(0.1, REST)
     assert rig.plant.bites() == 0
+
+
+def test_another_controller_is_given_the_token_once_the_holder_is_silent_or_gives_way(rig: Rig) -> None:
+    rig.drive_on()
+    rig.ask("b2")
+    rig.run(0.1, FORWARD)
+    assert "command/token: another controller commands the robot" in rig.refusals
+    assert rig.state.holder == m.fingerprint(rig.token) and not rig.at_rest()
+    rig.run(1.5, None)
+    rig.ask("b2")
+    rig.run(0.1, None)
+    assert (rig.state.epoch, rig.state.holder) == (2, m.fingerprint("b2"))
+    rig.run(0.3, FORWARD)
+    assert rig.at_rest() and "older" in rig.refusals
+    rig.core.on_token(m.TokenRequest(token="b2", gives_way=True), rig.now)
+    rig.epoch = 3
+    rig.run(0.2, REST)
+    assert rig.until(lambda: not rig.at_rest(), FORWARD)
+    assert rig.plant.breaches() == []
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, 1e308, 100.0])

@@ -10,7 +10,7 @@ from bridge.core.bridge import TICK_S, BridgeCore
 from bridge.core.interface import Measurement, Setpoint
 from bridge.core.odometer import Odometer
 from bridge.core.picture import Picture
-from bridge.core.state_memory import Memory
+from bridge.core.state_memory import Memory, Remembered
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import PictureRequest
 from tests.support.bridge_rig import MODEL, PICTURE, REST, Commander
@@ -96,7 +96,7 @@ def release(stop_id: str = "s1") -> m.ReleaseStop:
 
 
 def cut(bench: Bench, cut_id: str, epoch: int = 1) -> m.CutCommand:
-    return m.CutCommand(epoch=epoch, echo=bench.echo, cut_id=cut_id, point_id="p1")
+    return m.CutCommand(epoch=epoch, token=bench.token, echo=bench.echo, cut_id=cut_id, point_id="p1")
 
 
 def test_it_follows_a_controller_and_says_so(bench: Bench) -> None:
@@ -284,25 +284,68 @@ def test_no_cut_before_any_motion_command_or_in_motion_or_from_an_old_view(bench
     assert bench.robot.cuts == ["c2"]
 
 
-def test_after_a_restart_an_older_token_moves_nothing(bench: Bench) -> None:
-    memory = Memory()
-    bench.core = BridgeCore(bench.robot, BridgeConfig(), MODEL.limits, odometer(), "sim", memory=memory)
-    bench.epoch = 7
-    bench.drive_on()
-    assert memory.remembered.epoch == 7
-    again = Bench()
-    again.core = BridgeCore(again.robot, BridgeConfig(), MODEL.limits, odometer(), "sim", memory=memory)
-    again.epoch = 6
-    again.run(0.2, REST)
-    again.run(0.2, FORWARD)
+def test_after_a_restart_an_older_token_moves_nothing_and_the_newest_one_goes_on(bench: Bench) -> None:
+    memory = Memory(Remembered(epoch=6, token="before"))
+
+    def started(token: str, epoch: int) -> Bench:
+        out = Bench()
+        out.core = BridgeCore(out.robot, BridgeConfig(), MODEL.limits, odometer(), "sim", memory=memory)
+        out.token, out.epoch = token, epoch
+        out.run(0.2, REST)
+        out.run(0.2, FORWARD)
+        return out
+
+    assert started("before", 6).moved_within(0.2) > 0.0
+    # Another one waits until the one from before the restart has had its time.
+    bench = started("after", 7)
+    assert bench.moved_within(0.4) == 0.0
+    bench.run(1.0, REST)
+    bench.run(0.2, FORWARD)
+    assert bench.moved_within(0.2) > 0.0 and memory.remembered.epoch == bench.state.epoch == 7
+    again = started("before", 6)
     assert again.moved_within(0.4) == 0.0
     assert any("older" in row.reason for row in again.state.rejections)
+    assert started("after", 7).moved_within(0.2) > 0.0
+
+
+def test_who_holds_the_token_is_told_once_a_restart_would_know_it(bench: Bench) -> None:
+    class SlowDisk(Memory):
+        kept = False
+
+    disk = SlowDisk()
+    bench.core = BridgeCore(bench.robot, BridgeConfig(), MODEL.limits, odometer(), "sim", memory=disk)
+    bench.run(0.2, REST)
+    assert bench.state.holder == ""
+    disk.kept = True
+    bench.run(0.002, REST)
+    assert bench.state.holder == m.fingerprint(bench.token)
+
+
+@pytest.mark.parametrize("mode", ["IDLE", "FAULT", "ESTOP_LATCHED"])
+def test_the_bridge_says_it_when_it_moves_though_its_controllers_mode_moves_nothing(bench: Bench, mode: m.Mode) -> None:
+    bench.drive_on()
+    assert not any("commanded to move" in line for line in bench.log)
+    bench.mode = mode
+    bench.run(1.5, FORWARD)
+    assert sum(f"commanded to move, though the controller's mode is {mode}" in line for line in bench.log) == 1
+    bench.mode = "AUTO"
+    bench.run(1.0, REST)
+    bench.run(0.5, FORWARD)
+    assert sum("commanded to move" in line for line in bench.log) == 1
+
+
+def test_the_bridge_says_it_when_it_moves_and_nobody_says_why(bench: Bench) -> None:
+    bench.drive_on()
+    for _ in range(150):
+        bench.run(0.01, None)
+        # Of the right token, though without the holder's word of its mode.
+        bench.core.on_motion(bench.message(FORWARD), bench.now)
+    assert bench.state.moving and any("no controller says what it does" in line for line in bench.log)
 
 
 def test_an_older_controllers_cut_is_refused(bench: Bench) -> None:
-    bench.epoch = 5
     bench.run(0.1, REST)
-    bench.core.on_cut(cut(bench, "c1", epoch=4), bench.now)
+    bench.core.on_cut(cut(bench, "c1", epoch=0), bench.now)
     bench.run(0.1, REST)
     assert bench.robot.cuts == []
     assert any("older" in row.reason for row in bench.state.rejections)
@@ -313,7 +356,9 @@ def test_what_is_refused_is_counted_and_logged_once(bench: Bench) -> None:
     for _ in range(50):
         bench.sequence += 1
         bench.core.on_motion(
-            m.MotionCommand(epoch=1, sequence=bench.sequence, echo=bench.echo, xi=(100.0, *REST[1:])),  # type: ignore[arg-type]
+            m.MotionCommand(
+                epoch=1, token=bench.token, sequence=bench.sequence, echo=bench.echo, xi=(100.0, *REST[1:])
+            ),  # type: ignore[arg-type]
             bench.now,
         )
         bench.run(0.01, FORWARD)
@@ -345,7 +390,7 @@ def test_odometry_is_the_integral_of_the_wheels(bench: Bench) -> None:
 @given(
     st.lists(
         st.tuples(
-            st.sampled_from(["move", "old", "fast", "stop", "release", "silence", "epoch"]),
+            st.sampled_from(["move", "old", "fast", "stop", "release", "silence", "other"]),
             st.lists(st.floats(-2.0, 2.0), min_size=9, max_size=9),
         ),
         max_size=25,
@@ -365,8 +410,10 @@ def test_nothing_beyond_the_limits_is_ever_sent(script: list[tuple[str, list[flo
             bench.core.on_stop(stop(f"s{bench.now:.3f}"), bench.now)
         elif act == "release":
             bench.core.on_release(release(bench.state.stop_id or "none"), bench.now)
-        elif act == "epoch":
+        elif act == "other":
+            bench.core.on_token(m.TokenRequest(token=bench.token, gives_way=True), bench.now)
             bench.epoch += 1
+            bench.token += "x"
             bench.run(0.3, REST)
         bench.run(0.06, None if act == "silence" else tuple(xi))
     sent = np.array([setpoint.xi for setpoint in bench.robot.sent])

@@ -40,6 +40,7 @@ class Live:
     state: Slot[m.BridgeState]
     events: Feed[m.LogEvent]
     motion: Publisher[m.MotionCommand]
+    tokens: Publisher[m.TokenRequest]
     sequence: int = 0
 
     def drive(self, seconds: float, xi: tuple[float, ...]) -> float:
@@ -50,8 +51,10 @@ class Live:
             if joints is not None:
                 self.sequence += 1
                 sent = time.monotonic()
+                epoch, echo = self.newest().epoch, joints.message.sequence
+                self.tokens.put(m.TokenRequest(token="a", echo=echo, mode="TELEOP"))
                 self.motion.put(
-                    m.MotionCommand(epoch=1, sequence=self.sequence, echo=joints.message.sequence, xi=xi)  # type: ignore[arg-type]
+                    m.MotionCommand(epoch=epoch, token="a", sequence=self.sequence, echo=echo, xi=xi)  # type: ignore[arg-type]
                 )
             time.sleep(0.002)
         return sent
@@ -125,6 +128,7 @@ def _running(folder: Path, endpoint: str, config: Path) -> Iterator[Live]:
             transport.slot(topics.BRIDGE),
             transport.feed(topics.EVENT, 200),
             transport.publisher(topics.MOTION),
+            transport.publisher(topics.TOKEN),
         )
         until(lambda: bridge.joints.peek() is not None and bridge.state.peek() is not None)
         yield bridge

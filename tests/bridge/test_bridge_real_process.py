@@ -108,6 +108,7 @@ def test_it_follows_the_wire_or_only_tells_the_robots_state(site: Site, readonly
     try:
         joints, state = transport.slot(topics.JOINTS), transport.slot(topics.BRIDGE)
         events, motion = transport.feed(topics.EVENT, 100), transport.publisher(topics.MOTION)
+        tokens = transport.publisher(topics.TOKEN)
         until(lambda: joints.peek() is not None and state.peek() is not None)
         first = joints.peek()
         assert first is not None
@@ -120,7 +121,8 @@ def test_it_follows_the_wire_or_only_tells_the_robots_state(site: Site, readonly
                 if got is not None:
                     sequence += 1
                     echo = got.message.sequence
-                    motion.put(m.MotionCommand(epoch=1, sequence=sequence, echo=echo, xi=xi))  # type: ignore[arg-type]
+                    tokens.put(m.TokenRequest(token="a", echo=echo, mode="TELEOP"))
+                    motion.put(m.MotionCommand(epoch=1, token="a", sequence=sequence, echo=echo, xi=xi))  # type: ignore[arg-type]
                 time.sleep(0.002)
         wheels, newest = site.base.tell()["wheels"], state.peek()
         assert newest is not None and newest.message.kind == "real"

@@ -39,7 +39,9 @@ def drive(core: BridgeCore, seconds: float, silent_after: float = 1e9) -> str:
             if now < silent_after:
                 sequence += 1
                 xi = FORWARD if now > 0.05 else (0.0,) * 9
-                core.on_motion(m.MotionCommand(epoch=1, sequence=sequence, echo=echo, xi=xi), now)  # type: ignore[arg-type]
+                core.on_token(m.TokenRequest(token="a", echo=echo, mode="TELEOP"), now)
+                command = m.MotionCommand(epoch=1, token="a", sequence=sequence, echo=echo, xi=xi)  # type: ignore[arg-type]
+                core.on_motion(command, now)
     core.robot.close()
     return digest.hexdigest()
 

@@ -5,9 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bridge.core import fence as f
 from bridge.core import validator as g
+from bridge.core.fence import Fence
 from bridge.core.validator import CommandValidator
-from rolling_panda.messages.robot import CutCommand, MotionCommand
+from rolling_panda.messages.robot import CutCommand, MotionCommand, TokenRequest
 from rolling_panda.model.robot import RobotModel
 
 LIMIT = RobotModel().limits.velocity
@@ -28,7 +30,7 @@ def cut(epoch: int = 1, echo: int = 1, token: str = "aa") -> CutCommand:
 @pytest.fixture
 def awake() -> CommandValidator:
     """A gate that has sent joint state 1 at t = 0 and has taken sequence 1 of epoch 1 at rest."""
-    gate = CommandValidator(LIMIT, 0.2)
+    gate = CommandValidator(LIMIT, 0.2, Fence(1, "aa"))
     gate.sent(1, 0.0)
     assert gate.refuse(command(1, REST), 0.0) is None
     return gate
@@ -36,16 +38,17 @@ def awake() -> CommandValidator:
 
 def test_a_fresh_newer_command_passes(awake: CommandValidator) -> None:
     assert awake.refuse(command(2), 0.1) is None
-    assert (awake.epoch, awake.sequence) == (1, 2)
+    assert awake.sequence == 2
 
 
 @pytest.mark.parametrize(
     ("message", "now", "reason"),
     [
         (command(1), 0.1, g.OLD_SEQUENCE),
-        (command(9, epoch=0), 0.1, g.OLD_EPOCH),
-        (command(9, token="bb"), 0.1, g.OTHER_TOKEN),
-        (command(9, epoch=2), 0.1, g.NOT_AT_REST),
+        (command(9, epoch=0), 0.1, f.OLD_EPOCH),
+        (command(9, token="bb"), 0.1, f.OTHER_TOKEN),
+        (command(9, epoch=2), 0.1, f.UNKNOWN_EPOCH),
+        (command(9, REST, epoch=2, token="bb"), 0.1, f.UNKNOWN_EPOCH),
         (command(2), 0.21, g.TOO_OLD),
         (command(2, echo=7), 0.1, g.UNSENT_ECHO),
         (command(2, (math.nan, *REST[1:])), 0.1, g.NOT_FINITE),
@@ -57,42 +60,41 @@ def test_a_refused_command_changes_nothing(
     awake: CommandValidator, message: MotionCommand, now: float, reason: str
 ) -> None:
     assert awake.refuse(message, now) == reason
-    assert (awake.epoch, awake.sequence) == (1, 1)
+    assert awake.sequence == 1
     assert awake.refuse(command(2), 0.1) is None
 
 
-def test_a_new_controller_starts_its_sequence_again_and_silences_the_old_one(awake: CommandValidator) -> None:
+def request(token: str = "bb", echo: int = 2) -> TokenRequest:
+    return TokenRequest(token=token, echo=echo, mode="IDLE")
+
+
+def test_a_new_controller_starts_its_sequence_again_at_rest_and_silences_the_old_one(awake: CommandValidator) -> None:
     assert awake.refuse(command(500), 0.1) is None
-    assert awake.refuse(command(1, REST, epoch=2, token="bb"), 0.1) is None
-    assert awake.refuse(command(501), 0.1) == g.OLD_EPOCH
-    assert awake.refuse(command(2, epoch=2, token="bb"), 0.1) is None
+    awake.sent(2, 1.2)
+    assert awake.ask(request(), 1.2, at_rest=True) is None
+    assert awake.refuse(command(501, echo=2), 1.2) == f.OLD_EPOCH
+    assert awake.refuse(command(1, epoch=2, token="bb", echo=2), 1.2) == g.NOT_AT_REST
+    assert awake.refuse(command(1, REST, epoch=2, token="bb", echo=2), 1.2) is None
+    assert awake.refuse(command(2, epoch=2, token="bb", echo=2), 1.2) is None
 
 
-def test_control_changes_hands_only_at_rest(awake: CommandValidator) -> None:
-    assert awake.refuse(command(2), 0.1) is None
-    assert awake.refuse(command(3, REST, epoch=2), 0.1, at_rest=False) == g.MOVING
-    assert awake.refuse(command(3), 0.1, at_rest=False) is None
-    assert awake.refuse(command(4, REST, epoch=2), 0.1, at_rest=True) is None
+def test_who_asks_again_goes_on_with_its_sequence(awake: CommandValidator) -> None:
+    assert awake.refuse(command(5), 0.1) is None
+    assert awake.ask(request("aa", 1), 0.1, at_rest=False) is None
+    assert awake.refuse(command(5), 0.1) == g.OLD_SEQUENCE
+    assert awake.refuse(command(6), 0.1) is None
 
 
-def test_two_controllers_that_count_alike_are_told_apart(awake: CommandValidator) -> None:
-    assert awake.refuse(command(7, token="bb"), 0.1) == g.OTHER_TOKEN
-    assert awake.refuse(command(7, REST, token="bb"), 0.1) == g.OTHER_TOKEN
+def test_a_request_that_was_long_on_its_way_is_given_nothing(awake: CommandValidator) -> None:
+    assert awake.ask(request(echo=1), 9.0, at_rest=True) == g.TOO_OLD
+    assert awake.ask(request(echo=7), 9.0, at_rest=True) == g.UNSENT_ECHO
 
 
-def test_after_a_restart_the_bridge_knows_which_token_was_the_newest() -> None:
-    gate = CommandValidator(LIMIT, 0.2, epoch=5, token="aa")
-    gate.sent(1, 0.0)
-    assert gate.refuse(command(1, REST, epoch=4), 0.0) == g.OLD_EPOCH
-    assert gate.refuse(command(1, REST, epoch=5, token="bb"), 0.0) == g.OTHER_TOKEN
-    assert gate.refuse(command(1, REST, epoch=5), 0.0) is None
-
-
-def test_a_cut_needs_the_token_of_the_newest_motion_and_a_fresh_view(awake: CommandValidator) -> None:
+def test_a_cut_needs_the_token_and_a_fresh_view(awake: CommandValidator) -> None:
     assert awake.refuse_cut(cut(), 0.1) is None
-    assert awake.refuse_cut(cut(epoch=0), 0.1) == g.OLD_EPOCH
-    assert "no motion command" in (awake.refuse_cut(cut(epoch=2), 0.1) or "")
-    assert awake.refuse_cut(cut(token="bb"), 0.1) == g.OTHER_TOKEN
+    assert awake.refuse_cut(cut(epoch=0), 0.1) == f.OLD_EPOCH
+    assert awake.refuse_cut(cut(epoch=2), 0.1) == f.UNKNOWN_EPOCH
+    assert awake.refuse_cut(cut(token="bb"), 0.1) == f.OTHER_TOKEN
     assert awake.refuse_cut(cut(echo=2), 0.1) == g.UNSENT_ECHO
     assert awake.refuse_cut(cut(), 0.21) == g.TOO_OLD
 
@@ -109,7 +111,7 @@ def test_after_a_standstill_only_rest_wakes(awake: CommandValidator) -> None:
 
 
 def test_a_state_sent_long_ago_is_too_old_and_not_unknown() -> None:
-    gate = CommandValidator(LIMIT, 0.2)
+    gate = CommandValidator(LIMIT, 0.2, Fence(1, "aa"))
     for sequence in range(1, 1000):
         gate.sent(sequence, sequence * 0.01)
     assert gate.refuse(command(1, REST, echo=1), 9.99) == g.TOO_OLD
@@ -131,9 +133,9 @@ def test_a_state_sent_long_ago_is_too_old_and_not_unknown() -> None:
 def test_whatever_comes_what_passes_is_newer_fresh_and_within_limits(
     stream: list[tuple[int, int, int, list[float], float]],
 ) -> None:
-    gate = CommandValidator(LIMIT, 0.2)
+    gate = CommandValidator(LIMIT, 0.2, Fence(1, "aa"))
     sent: dict[int, float] = {}
-    passed = [(0, -1)]
+    passed = [(1, -1)]
     now = 0.0
     for tick, (epoch, sequence, echo, xi, wait) in enumerate(stream):
         now += wait

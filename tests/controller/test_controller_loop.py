@@ -7,6 +7,7 @@ import time
 import msgspec
 import pytest
 
+from bridge.core.fence import Fence
 from controller.config import ControllerConfig
 from controller.core import Controller
 from controller.ledger.check import reading, verify
@@ -17,7 +18,19 @@ from controller.stop_file import open_stop_file
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig, TransportConfig
 from rolling_panda.messages import commands as intents
-from rolling_panda.topics import BRIDGE, CONTROLLER, EVENT, HEARTBEAT, INTENT, JOINTS, MOTION, ODOMETRY, RELEASE, STOP
+from rolling_panda.topics import (
+    BRIDGE,
+    CONTROLLER,
+    EVENT,
+    HEARTBEAT,
+    INTENT,
+    JOINTS,
+    MOTION,
+    ODOMETRY,
+    RELEASE,
+    STOP,
+    TOKEN,
+)
 from rolling_panda.transport.zenoh import Router, Transport
 
 pytestmark = pytest.mark.alone
@@ -39,6 +52,7 @@ class Rest:
         self.releases = []
         self.bridge.serve(RELEASE, self._release)
         self.stop_id = ""
+        self.fence, self.asked = Fence(7), self.bridge.feed(TOKEN, 100)
         self.beats = True
         self._senders = [self.bridge.publisher(topic) for topic in (JOINTS, ODOMETRY, BRIDGE)]
         self._beat = self.server.publisher(HEARTBEAT)
@@ -53,13 +67,16 @@ class Rest:
         self._sequence += 1
         n, header = self._sequence, m.Header(time.monotonic(), "odom")
         joints, odometry, bridge = self._senders
+        for request in self.asked.drain():
+            self.fence.ask(request.message.token, request.at, True)
         joints.put(m.JointState(header=header, sequence=n, position=(0.0, 0.0, *CONFIG.home), velocity=(0.0,) * 9))
         odometry.put(m.Odometry(header=header, sequence=n, pose=m.PlanarPose(), linear=0.0, angular=0.0))
         bridge.put(
             m.BridgeState(
                 header=header,
                 kind="sim",
-                epoch=7,
+                epoch=self.fence.epoch,
+                holder=self.fence.holder,
                 watchdog=False,
                 stop_id=self.stop_id,
                 stopped_by="eve" if self.stop_id else "",

@@ -86,13 +86,13 @@ def test_the_age_of_a_picture_is_told_by_its_stamp_however_often_it_is_repeated(
     def seen(stamp, at=100.0):
         joints = m.JointState(header=m.Header(50.0), sequence=1, position=(0.0,) * 9, velocity=(0.0,) * 9)
         told = Obstacles(header=m.Header(stamp), capsules=())
-        return health(Inputs(joints=Sample(joints, 100.0), obstacles=Sample(told, at)), None, 100.0).obstacles
+        return health(Inputs(joints=Sample(joints, 100.0), obstacles=Sample(told, at)), False, 100.0).obstacles
 
     assert seen(49.0) == 1.0
     assert seen(40.0) == 10.0
     assert seen(60.0) == 10.0, "a stamp from the future is as wrong"
     assert seen(50.0, at=90.0) == 10.0
-    assert health(Inputs(), None, 0.0).obstacles == float("inf")
+    assert health(Inputs(), False, 0.0).obstacles == float("inf")
 
 
 @pytest.mark.parametrize("mode", ["IDLE", "READY", "AUTO"])

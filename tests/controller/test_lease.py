@@ -1,34 +1,22 @@
-import itertools
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from controller.identity import Client
-from controller.supervision.lease import LIFE_S, Lease, first_epoch
+from controller.supervision.lease import LIFE_S, Lease
 
 ADA, BOB, EVE = Client("a", "Ada"), Client("b", "Bob"), Client("e", "Eve")
 
 
-def lease(epoch=10):
-    numbers = itertools.count()
-    out = Lease(lambda: f"{next(numbers):04x}")
-    out.begin(epoch)
-    return out
-
-
 def held():
-    out = lease()
+    out = Lease()
     out.claim(ADA, 0.0)
     return out
 
 
-def test_who_comes_first_holds_control_under_a_new_token():
-    it = lease()
-    before = it.token
-    it.claim(ADA, 0.0)
+def test_who_comes_first_holds_control():
+    it = held()
     assert it.held_by(ADA) and not it.held_by(BOB)
-    assert it.token.epoch == before.epoch + 1 and it.token.nonce != before.nonce
     it.claim(BOB, 0.1)
     assert it.held_by(ADA)
     assert it.refusal(ADA) == ""
@@ -67,16 +55,15 @@ def test_taking_over_needs_a_confirmation_and_a_robot_at_rest():
     it = held()
     assert "confirm" in it.take(BOB, False, 0.1)
     assert it.held_by(ADA)
-    token = it.token
     assert it.take(BOB, True, 0.1) == ""
     # From here on nobody moves it.
     assert not it.held_by(ADA) and not it.held_by(BOB)
     assert "wait" in it.refusal(ADA) and "wait" in it.refusal(BOB)
     it.renew({"a": 0.2, "b": 0.2})
     it.review(False, 0.2)
-    assert it.token == token and not it.held_by(BOB)
+    assert not it.held_by(BOB)
     it.review(True, 0.3)
-    assert it.held_by(BOB) and it.token.epoch == token.epoch + 1
+    assert it.held_by(BOB)
     assert it.told == "Bob holds control, before Ada"
 
 
@@ -117,14 +104,6 @@ def test_control_is_given_back_by_its_holder():
     assert "take it" in it.request(BOB, 0.1)
 
 
-def test_epochs_grow_over_restarts_whatever_was_lost():
-    assert first_epoch(1, 0) < first_epoch(2, 0)
-    given_out = first_epoch(1, 0) + 5
-    assert first_epoch(2, given_out) > given_out
-    # The count of starts was lost, but the bridge remembers.
-    assert first_epoch(1, first_epoch(7, 0) + 3) > first_epoch(7, 0) + 3
-
-
 @settings(max_examples=200)
 @given(
     st.lists(
@@ -137,11 +116,11 @@ def test_epochs_grow_over_restarts_whatever_was_lost():
         max_size=80,
     )
 )
-def test_there_is_never_more_than_one_holder_and_tokens_only_grow(script):
-    it, now, renewed = lease(), 0.0, 0.0
+def test_there_is_never_more_than_one_holder(script):
+    it, now, renewed = Lease(), 0.0, 0.0
     for act, client, wait, at_rest in script:
         now += wait
-        before, token = it.holder, it.token
+        before = it.holder
         match act:
             case "claim":
                 it.claim(client, now)
@@ -166,16 +145,14 @@ def test_there_is_never_more_than_one_holder_and_tokens_only_grow(script):
                     assert now - renewed < LIFE_S
         if it.holder is not None and it.holder != before:
             renewed = now
-            assert it.token.epoch > token.epoch
             assert before is None or (act == "review" and at_rest)
-        assert it.token.epoch >= token.epoch
         assert sum(it.held_by(each) for each in (ADA, BOB, EVE)) <= 1
 
 
 @pytest.mark.parametrize("pair", [(ADA, BOB), (BOB, ADA)])
 def test_a_thousand_times_two_operators_take_at_once_and_one_has_it(pair):
     for _ in range(1000):
-        it = lease()
+        it = Lease()
         answers = [it.take(client, True, 0.0) for client in pair]
         it.review(True, 0.0)
         assert answers.count("") == 1 and it.held_by(pair[0]) and not it.held_by(pair[1])

@@ -39,6 +39,8 @@ from rolling_panda.config import TransportConfig
 from rolling_panda.transport.zenoh import Transport
 
 class Desk:
+    waits = False
+
     def __init__(self, rows):
         self.journal = Journal()
         self.queue = PointQueue(ControllerConfig(), self.journal)

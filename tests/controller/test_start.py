@@ -1,36 +1,14 @@
-"""What the controller restores and records when it starts, and the number of its start."""
+"""What the controller restores and records when it starts."""
 
 import hashlib
 import json
 
 import msgspec
-import pytest
 
 from controller.ledger.journal import ApproachRow, OrderRow, PreviewRow, TicketRow
-from controller.ledger.start import Restored, count_start, restored, start_record
+from controller.ledger.start import Restored, restored, start_record
 from controller.ledger.store import Entry, Ledger
-from rolling_panda.errors import InputError
 from tests.support.fake_wire import pruning_point
-
-
-def test_each_start_has_a_number_of_its_own(tmp_path):
-    assert [count_start(tmp_path) for _ in range(3)] == [1, 2, 3]
-
-
-@pytest.mark.parametrize("content", [b"many", b"", b"-1", b"1.5", b"\xff"])
-def test_a_count_that_is_none_starts_nothing(tmp_path, content):
-    (tmp_path / "controller-starts").write_bytes(content)
-    with pytest.raises(InputError, match="no count of starts; .* remove it|cannot read the count of starts"):
-        count_start(tmp_path)
-    assert (tmp_path / "controller-starts").read_bytes() == content
-
-
-def test_a_count_that_cannot_be_read_or_written_starts_nothing(tmp_path):
-    with pytest.raises(InputError, match="cannot count this start in .*: No such file"):
-        count_start(tmp_path / "none")
-    (tmp_path / "controller-starts").mkdir()
-    with pytest.raises(InputError, match="cannot read the count of starts"):
-        count_start(tmp_path)
 
 
 def test_a_start_is_recorded_with_its_configuration(tmp_path):

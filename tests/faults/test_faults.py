@@ -12,6 +12,7 @@ from benchmarks.faults.forked_trials import apart
 from benchmarks.faults.kinds import FAULTS
 from benchmarks.faults.run import deal, main, run_trial, start
 from benchmarks.faults.world import World
+from rolling_panda import messages as m
 from rolling_panda.messages import commands as intents
 from rolling_panda.messages.supervision import BaseVelocity
 
@@ -47,10 +48,10 @@ def test_a_robot_that_something_else_keeps_still_stays_under_its_token(held_by):
         plain = world.robot.read
         world.robot.read = lambda: replace(plain(), fault="the wheels say nothing")
     world.run(0.5)
-    token = world.controller._supervisor.authority.token
-    assert world.bridge._state(world.now).watchdog
+    token = world.controller._supervisor.fencing.token
+    assert token is not None and world.bridge._state(world.now).watchdog
     world.run(5.0)
-    assert world.controller._supervisor.authority.token == token
+    assert world.controller._supervisor.fencing.token == token
 
 
 def test_a_spoiled_number_that_was_accepted_does_not_keep_the_robot_still_for_good():
@@ -70,23 +71,118 @@ def test_a_spoiled_number_that_was_accepted_does_not_keep_the_robot_still_for_go
     world._until_it_moves(0.5)
 
 
-def test_who_was_overruled_by_another_controller_does_not_come_back_when_that_one_has_ended():
+def test_who_was_overruled_gets_the_token_back_when_the_other_has_ended_and_its_fault_can_be_acknowledged():
     world = World(0)
     world.drive()
     world.held = None
     world.run(1.0)
-    newer = world.commanded.epoch + 1
-    # It sends one command, at rest, and is gone.
-    other = replace_field(world.commanded, epoch=newer, token="other", sequence=1, xi=(0.0,) * 9)
-    assert not any(world.commanded.xi)
-    late = world.commanded
-    world.bridge.on_motion(other, world.now)
+    token = world.controller._supervisor.fencing.token
+    # It is silent for long enough for another one to get the token, which is gone at once.
+    world.alive = False
+    world.run(1.2)
+    world.bridge.on_token(m.TokenRequest(token="other", echo=world.ticks // 10, mode="IDLE"), world.now)
+    world.alive = True
+    world.run(0.5)
+    assert world.controller.mode == "FAULT" and world.controller.waits
     for _ in range(20):
         # What was on its way still comes, and is refused.
-        world.bridge.on_motion(late, world.now)
+        world.bridge.on_motion(world.commanded, world.now)
+        world.run(0.2)
+        assert abs(world.robot.now.velocity).max() < 1e-3
+    assert world.controller._supervisor.fencing.token.epoch == token.epoch + 2
+    world.ask(intents.Acknowledge(user="ada", role="supervisor"))
+    assert world.controller.mode == "IDLE"
+
+
+def second_controller(world):
+    """Another controller that hears and is heard as the first one."""
+    other = world.new_controller()
+
+    def step(world):
+        if world.ticks % 10 == 5:
+            out = other.step(replace(world.inputs, presence=None, teleop=None), world.now)
+            if out.token is not None:
+                world.bridge.on_token(out.token, world.now)
+            if out.motion is not None:
+                world.bridge.on_motion(out.motion, world.now)
+
+    world.intruder = step
+    return other
+
+
+def test_a_second_controller_waits_while_the_first_works_and_takes_over_when_that_one_is_gone():
+    world = World(0)
+    world.drive()
+    other = second_controller(world)
+    world.modes.clear()
+    world.run(3.0)
+    assert set(world.modes) == {"TELEOP"} and abs(world.robot.now.velocity[:2]).min() > 0.5
+    assert other.waits and other.mode == "IDLE" and other._supervisor.fencing.token is None
+    assert "another controller commands the robot" in {
+        row.reason.split(";")[0] for row in world.bridge.refusals.counts() if row.topic == "command/token"
+    }
+    assert not other.answer(intents.Arm(user="eve", role="supervisor"), world.now).ok
+    epoch = world.commanded.epoch
+    world.alive = False
+    world.run(1.4)
+    assert not other.waits and other._supervisor.fencing.token.epoch == epoch + 1
+    assert abs(world.robot.now.velocity).max() < 1e-3
+
+
+def test_a_second_controller_does_not_put_the_first_into_a_fault_that_stays():
+    world = World(0)
+    world._armed()
+    other = second_controller(world)
+    # The first one hangs for so long that the second takes over, and goes on.
+    world.alive = False
+    world.run(2.0)
+    world.alive = True
+    world.run(1.0)
+    assert world.controller.mode == "FAULT" and world.controller.waits and not other.waits
+    world.bridge.on_token(other.give_way(), world.now)
+    world.intruder = lambda world: None
+    world.run(2.0)
+    assert not world.controller.waits
+    world.ask(intents.Acknowledge(user="ada", role="supervisor"))
+    assert world.controller.mode == "IDLE"
+
+
+@pytest.mark.parametrize("mode", ["IDLE", "TELEOP"])
+def test_commands_by_somebody_else_under_the_robots_own_token_are_seen_stopped_and_told(mode):
+    world = World(0)
+    if mode == "IDLE":
         world.run(0.5)
-    assert world.controller.mode == "FAULT" and world.inputs.bridge.message.epoch == newer
-    assert world.inputs.bridge.message.watchdog
+    else:
+        world.drive()
+        world.held = None
+    world.intruder, said, step = partial(thief, world.commanded), [], world.bridge.step
+    world.bridge.step = lambda now: (out := step(now), said.extend(event.text for event in out.events))[0]
+    before = world.robot.now.position
+    world.run(1.0)
+    assert world.controller.mode == "ESTOP_LATCHED" and abs(world.robot.now.velocity).max() < 1e-3
+    assert "commands that this controller has not sent" in world.bridge._latch.stopped_by
+    assert 0.05 < abs(world.robot.now.position - before).max() < 1.0
+    told = [text for text in said if "commanded to move" in text]
+    assert told == (["the robot is commanded to move, though the controller's mode is IDLE"] if mode == "IDLE" else [])
+    # The token that is known to others is worth nothing any more.
+    (stop,) = world.bridge._latch.stops
+    world._people = ("ada",)
+    world.run(0.3)
+    world.ask(intents.Reset(user="ada", role="supervisor", reason="looked", stop_id=stop.stop_id))
+    assert world.bridge.on_release(m.ReleaseStop(stop_id=stop.stop_id, user="ada", reason="looked"), world.now).ok
+    world.run(2.0)
+    assert world.controller.mode == "IDLE" and abs(world.robot.now.velocity).max() < 1e-3
+    world.intruder = lambda world: None
+    world.run(0.5)
+    world._armed()
+
+
+def thief(stolen, world):
+    """Has heard a command with its token, and turns the arm by it."""
+    if world.ticks % 10 == 5:
+        xi = (0.0, 0.0, 1.0, *(0.0,) * 6)
+        number = 2**40 + world.ticks
+        world.bridge.on_motion(replace_field(stolen, sequence=number, echo=world.ticks // 10, xi=xi), world.now)
 
 
 def test_trials_are_dealt_out_to_the_faults_of_a_requirement_each_with_a_seed_of_its_own():

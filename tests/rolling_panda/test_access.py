@@ -18,7 +18,7 @@ from rolling_panda.config import TransportConfig
 from rolling_panda.errors import InputError, ServiceError, TransportError
 from rolling_panda.messages import commands as intents
 from rolling_panda.runtime.launch import child_environment, python_command
-from rolling_panda.topics import BRIDGE, INTENT, JOINTS, MOTION, RELEASE, SERVICES, STOP, TOPICS, key
+from rolling_panda.topics import BRIDGE, INTENT, JOINTS, MOTION, RELEASE, SERVICES, STOP, TOKEN, TOPICS, key
 from rolling_panda.transport.access import BEARERS, CALLERS, access_control
 from rolling_panda.transport.certificates import APART, NAMES, main, make
 from rolling_panda.transport.codec import encode
@@ -224,16 +224,19 @@ def test_apart_each_has_its_own_and_they_are_kept_until_they_are_too_old(tmp_pat
     assert "--apart is for one robot; got a, b" in capsys.readouterr().err
 
 
-def commands(wire: Onlooker, epoch: int, seconds: float) -> None:
-    """Drive forward by motion commands that answer the newest joint state, as a controller does."""
-    joints = wire.slot(JOINTS)
+def commands(wire: Onlooker, seconds: float) -> None:
+    """Ask for the token, and drive forward by commands that answer the newest joint state, as a controller does."""
+    joints, state = wire.slot(JOINTS), wire.slot(BRIDGE)
     end, sequence = time.monotonic() + seconds, 0
     while time.monotonic() < end:
-        newest = joints.peek()
+        newest, bridge = joints.peek(), state.peek()
         if newest is not None:
-            sequence += 1
-            xi = (0.0 if sequence < 20 else 1.0,) * 2 + (0.0,) * 7
-            command = m.MotionCommand(epoch=epoch, sequence=sequence, echo=newest.message.sequence, xi=xi)
+            sequence, echo = sequence + 1, newest.message.sequence
+            xi = (0.0 if sequence < 40 else 1.0,) * 2 + (0.0,) * 7
+            # The epoch of one's own making is what the bridge has given out, where that is not told.
+            epoch = 1 if bridge is None else bridge.message.epoch
+            command = m.MotionCommand(epoch=epoch, token="aa", sequence=sequence, echo=echo, xi=xi)
+            wire._session.put(key("rp1", TOKEN.name), encode(m.TokenRequest(token="aa", echo=echo, mode="TELEOP")))
             wire._session.put(key("rp1", MOTION.name), encode(command))
         time.sleep(0.01)
 
@@ -266,10 +269,10 @@ def test_only_the_controller_moves_the_robot(certificates: Path, tmp_path: Path)
                 time.sleep(0.05)
         for intruder in ("server", "perception"):
             with Transport(settings, intruder, "rp1") as wire:
-                commands(wire, 7, 1.0)
+                commands(wire, 1.0)
         assert driven() < 1e-3
         with Transport(settings, "controller", "rp1") as wire:
-            commands(wire, 8, 1.5)
+            commands(wire, 1.5)
         time.sleep(0.3)
         assert driven() > 0.02
     finally:

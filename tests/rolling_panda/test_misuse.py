@@ -22,7 +22,7 @@ def server():
 
 def control(holder):
     return ControlState(
-        holder=holder, user="", epoch=1, expires_s=1.0, requested_by="", requested_key="", coming="", told="",
+        holder=holder, user="", expires_s=1.0, requested_by="", requested_key="", coming="", told="",
         told_number=0, supervised=True,
     )  # fmt: skip
 

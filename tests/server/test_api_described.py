@@ -69,7 +69,7 @@ class Answering(FakeWire):
         self.deliver(topics.PREVIEW, PreviewState(header=HEADER, required=False, phase="ready", preview_hash="0f",
                      start=PlanarPose(0.0, 0.0, 0.0), position=joints().position))  # fmt: skip
         self.deliver(topics.PREVIEW_MOTION, PreviewMotion(header=HEADER, preview_hash="0f"))
-        self.deliver(topics.CONTROL, ControlState(holder="", user="", epoch=1, expires_s=0.0, requested_by="",
+        self.deliver(topics.CONTROL, ControlState(holder="", user="", expires_s=0.0, requested_by="",
                      requested_key="", coming="", told="", told_number=0, supervised=True))  # fmt: skip
 
 

@@ -50,8 +50,9 @@ class Commander:
 
     core: BridgeCore
 
-    def __init__(self, token: str = "") -> None:
+    def __init__(self, token: str = "a1") -> None:
         self.epoch, self.sequence, self.echo, self.token = 1, 0, 0, token
+        self.mode: m.Mode = "TELEOP"
         self.now = 0.0
         self.outputs: list[BridgeOutputs] = []
 
@@ -65,7 +66,14 @@ class Commander:
             token=self.token,
         )
 
+    def ask(self, token: str = "") -> None:
+        """Ask for the fencing token, or to keep it."""
+        request = m.TokenRequest(token=token or self.token, echo=self.echo, mode=self.mode)
+        self.core.on_token(request, self.now)
+
     def command(self, xi: tuple[float, ...]) -> None:
+        if self.sequence % 10 == 0:
+            self.ask()
         self.core.on_motion(self.message(xi), self.now)
 
     def hear(self, out: BridgeOutputs, xi: tuple[float, ...] | None) -> None:
@@ -85,7 +93,7 @@ class Rig(Commander):
     """Steps the bridge and answers each of its joint states, for as long as there is something to say."""
 
     def __init__(self, parts: Parts) -> None:
-        super().__init__("a1")
+        super().__init__()
         self.parts, self.plant = parts, parts.plant
         self.start()
 

@@ -14,7 +14,7 @@ from bridge.core.state_memory import Memory
 from bridge.loop import BridgeLoop
 from controller.config import ControllerConfig
 from controller.core import Controller
-from controller.ledger.start import count_start, restored
+from controller.ledger.start import restored
 from controller.ledger.store import Ledger
 from controller.ledger.writer import LedgerWriter
 from controller.loop import Loop
@@ -52,7 +52,7 @@ class LiveTwo:
         """Start it, or end it and start it again with what is on disk."""
         self.stop_controller()
         stop_file = open_stop_file(self.folder)
-        controller = Controller(CONFIG, RobotConfig(), starts=count_start(self.folder))
+        controller = Controller(CONFIG, RobotConfig())
         before = restored(self.folder)
         controller.restore(before.tickets, stop_file.stops, before.order, before.preview)
         stack = ExitStack()

@@ -134,6 +134,9 @@ class Movement:
             self.sequence.abort()
         self.teleoperation.refuse()
 
+    def unknown_motion(self, bridge):
+        return bridge.moving and bridge.sequence > self._setpoints.moved
+
     def busy(self, bridge):
         if self._home or self.sequence.cutting or (bridge is not None and bridge.cutter == "closing"):
             return "busy"

@@ -75,7 +75,7 @@ class World:
     def start_controller(self):
         in_intent = self.starts > 0 and any(t.state == "INTENT" for t in self.controller._queue.tickets())
         self.starts += 1
-        self.controller = Controller(ControllerConfig(), RobotConfig(), run_id=f"r{self.starts}", starts=self.starts)
+        self.controller = Controller(ControllerConfig(), RobotConfig(), run_id=f"r{self.starts}")
         written = self.chance.randrange(len(self.rows) + 1) if self.rows else 0
         self.judge.controller_started(self.rows[written - 1][0] if written else self.durable, in_intent)
         for _, name, body in self.rows[:written]:
@@ -127,7 +127,7 @@ class World:
         self.inputs = replace(self.inputs, **changes)
         self.judge.delivered(self.inputs)
         out = self.controller.step(self.inputs, self.now)
-        for message in (out.motion, out.cut, out.state, out.control, out.stops, out.preview, *out.events):
+        for message in (out.motion, out.token, out.cut, out.state, out.control, out.stops, out.preview, *out.events):
             assert message is None or as_received(message) == message
         self.judge.stepped(self, out)
         self.inputs = replace(self.inputs, stops=())
@@ -154,6 +154,11 @@ class World:
 
     def send(self, out):
         self.deaf = max(0, self.deaf - 1)
+        if out.token is not None and not self.deaf:
+            self.bridge.on_token(out.token, self.now)
+        if out.stop is not None and not self.deaf:
+            self.bridge.on_stop(out.stop, self.now)
+            self.judge.stop_at_bridge(out.stop.stop_id)
         if out.motion is not None and not self.deaf:
             self.motions = [*self.motions[-30:], out.motion]
             self.bridge.on_motion(out.motion, self.now)

@@ -38,6 +38,8 @@ def bad_commands(token: str, epoch: int, echo: int) -> dict[str, bytes]:
         "old sequence": spoilt(sequence=0),
         "old epoch": spoilt(epoch=0),
         "another token": spoilt(token="guessed"),
+        "an epoch of its own": spoilt(epoch=epoch + 1, token="mine"),
+        "an absurd epoch": spoilt(epoch=2**62, token="mine"),
         "out of limits": spoilt(xi=[50.0, *FAST[1:]]),
         "another type": spoilt(type="TeleopTarget"),
         "not msgpack": b"\xc1 move",

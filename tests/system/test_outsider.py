@@ -47,6 +47,7 @@ SAID: dict[str, list[dict[str, Any]]] = {
         {"type": "MotionCommand", "epoch": epoch, "sequence": 1, "echo": 0, "xi": [0.5] * 9, "token": "mine"}
         for epoch in (0, 1, 2, 2**62)
     ],
+    "command/token": [{"type": "TokenRequest", "token": "mine", "echo": 0, "mode": "AUTO"}],
     "command/stop": [{"type": "StopRequest", "stop_id": "outside", "source": "x", "user": "eve", "reason": "because"}],
     "simulation/hardware-stop": [{"type": "HardwareStop", "pressed": True}],
     "service/intent": [{"type": "Arm", "user": "eve", "role": "supervisor"}],

@@ -28,11 +28,11 @@ export type ActuatedVelocity = [number, number, number, number, number, number, 
 
 export type BridgeKind = "sim"|"real"|"fakes";
 
+export type Mode = "IDLE"|"READY"|"TELEOP"|"AUTO"|"PAUSED"|"PROTECTIVE_STOP"|"FAULT"|"ESTOP_LATCHED";
+
 export type Outcome = ""|"DONE"|"FAILED_NOT_CUT"|"UNKNOWN";
 
 export type Interrupted = ""|"work"|"survey"|"teleoperation";
-
-export type Mode = "IDLE"|"READY"|"TELEOP"|"AUTO"|"PAUSED"|"PROTECTIVE_STOP"|"FAULT"|"ESTOP_LATCHED";
 
 export type Phase = ""|"APPROACH"|"LOOK"|"ADVANCE"|"CUT"|"RETREAT"|"SURVEY";
 
@@ -207,7 +207,7 @@ export interface BridgeState {
   header: Header;
   /** `sim`, `real`, or `fakes`: the real robot's drivers with fakes in place of the devices. */
   kind: BridgeKind;
-  /** Newest controller epoch accepted. */
+  /** Of the newest token given out; 0 before the first. */
   epoch: number;
   /** True while no valid setpoint has come for the deadline: base 0, arm holds, cutter inhibited. */
   watchdog: boolean;
@@ -233,6 +233,12 @@ export interface BridgeState {
   battery: number|null;
   /** Numbers of safety that its configuration sets less strictly than usual, within their hard bounds. */
   wider: string[];
+  /** First 16 hexadecimal digits of the SHA-256 of its random part; empty when nobody holds it. */
+  holder: string;
+  /** Of the command that the robot follows, or followed last. */
+  sequence: number;
+  /** Whether what is sent to the actuators is anything but zero. */
+  moving: boolean;
 }
 
 /** Bridge → all: measured actuated coordinates, [θ_l, θ_r, q₁…q₇] (rad, rad/s), as sensor_msgs/JointState. */
@@ -258,8 +264,6 @@ export interface ControlState {
   holder: string;
   /** Their name. */
   user: string;
-  /** Of the token that motion commands and cut orders carry now. */
-  epoch: number;
   /** How long the lease still lives without a word of its holder (s). */
   expires_s: number;
   /** Name of who asks for control, empty when nobody. */

@@ -1,0 +1,75 @@
+"""The fencing token: which controller may command the robot. The bridge alone gives it out, to one at a time."""
+
+from typing import Final
+
+from rolling_panda.messages.robot import fingerprint
+from rolling_panda.messages.types import MOST_EPOCHS
+
+#: A holder that has sent nothing valid for so long has lost the token to the next one who asks (s). Longer than the
+#: watchdog's deadline, so that the robot has come to rest before.
+SILENT_S: Final = 1.0
+
+OLD_EPOCH = "an older controller's command"
+UNKNOWN_EPOCH = "an epoch that the bridge has not given out"
+OTHER_TOKEN = "another token than that of this epoch"
+HELD = "another controller commands the robot; a token is given once that one has ended or is silent"
+MOVING = "the robot still moves; a token is given at rest"
+USED_UP = "no epoch is left; end the bridge and give: rolling-panda bridge --begin-anew"
+
+
+class Fence:
+    """At most one holder; each token has the next epoch. Times are the robot's (s)."""
+
+    def __init__(self, epoch: int = 0, token: str | None = None) -> None:
+        """Start with what was given out before.
+
+        Args:
+            epoch: Of the newest token; 0 before the first.
+            token: Its random part; None when nobody holds it.
+        """
+        self.epoch, self.token = epoch, token
+        self._heard: float | None = None
+
+    @property
+    def holder(self) -> str:
+        """Fingerprint of the token; empty when nobody holds it."""
+        return "" if self.token is None else fingerprint(self.token)
+
+    def refuse(self, epoch: int, token: str) -> str | None:
+        """Why a command under this token is not the holder's; None when it is."""
+        if epoch != self.epoch:
+            return OLD_EPOCH if epoch < self.epoch else UNKNOWN_EPOCH
+        return None if token == self.token else OTHER_TOKEN
+
+    def hear(self, now: float) -> None:
+        """The holder has sent something valid."""
+        self._heard = now
+
+    def ask(self, token: str, now: float, at_rest: bool) -> str:
+        """Give the token to who asks, or let who holds it keep it; why not, empty when it is theirs.
+
+        Args:
+            token: Random part, drawn by who asks.
+            now: Present time.
+            at_rest: Whether nothing moves by what was sent last; only then control changes hands.
+        """
+        if self._heard is None:
+            # Who held it before a restart of the bridge has as long as ever to be heard.
+            self._heard = now
+        if token != self.token:
+            if self.token is not None and now - self._heard < SILENT_S:
+                return HELD
+            if not at_rest:
+                return MOVING
+            if self.epoch >= MOST_EPOCHS:
+                return USED_UP
+            self.epoch, self.token = self.epoch + 1, token
+        self._heard = now
+        return ""
+
+    def give_way(self, token: str) -> bool:
+        """The holder gives the token back; False from anybody else."""
+        if token != self.token:
+            return False
+        self.token = None
+        return True

@@ -1,0 +1,102 @@
+"""A second controller of one robot, as processes of their own over TLS: it waits, says so, and takes over."""
+
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+
+from rolling_panda.config import TransportConfig
+from rolling_panda.resources import resource
+from rolling_panda.runtime.launch import child_environment, python_command
+from rolling_panda.topics import BRIDGE, CONTROLLER
+from rolling_panda.transport.certificates import make
+from rolling_panda.transport.zenoh import Onlooker
+from tests.rolling_panda.test_access import free_port
+
+pytestmark = pytest.mark.alone
+
+
+class Site:
+    """Router and bridge run; controllers come and go."""
+
+    def __init__(self, folder: Path, stack: ExitStack) -> None:
+        self.folder, self.stack = folder, stack
+        make(folder / "certificates", ("127.0.0.1",), 2)
+        self.endpoint = f"tls/127.0.0.1:{free_port()}"
+        text = resource("assets/config/sim.toml").read_text().replace("width = 848", "width = 64")
+        (folder / "sim.toml").write_text(text.replace("height = 480", "height = 48"))
+        self.run("rolling_panda", "router", "--listen", self.endpoint)
+        self.process("bridge", "bridge", "bridge")
+        shown = str(folder / "certificates")
+        wire = TransportConfig(connect=(self.endpoint,), connect_timeout_s=20.0, certificates=shown)
+        self.onlooker = stack.enter_context(Onlooker(wire, "rp1"))
+        self._bridge, self._controller = self.onlooker.slot(BRIDGE), self.onlooker.slot(CONTROLLER)
+
+    def run(self, module: str, *words: str, said: str = "router") -> "subprocess.Popen[bytes]":
+        command = python_command(module, [*words, "--certificates", str(self.folder / "certificates")])
+        with (self.folder / f"{said}.log").open("w") as log:
+            process = subprocess.Popen(command, env=child_environment(), stderr=log)
+        self.stack.callback(process.wait, 10)
+        self.stack.callback(process.kill)
+        return process
+
+    def process(self, module: str, state: str, said: str) -> "subprocess.Popen[bytes]":
+        own = ["--connect", self.endpoint, "--config", str(self.folder / "sim.toml")]
+        return self.run(module, *own, "--state", str(self.folder / state), said=said)
+
+    def said(self, name: str) -> str:
+        """What this process wrote to its standard error."""
+        return (self.folder / f"{name}.log").read_text()
+
+    @property
+    def held(self) -> tuple[int, str]:
+        """Epoch and holder of the fencing token."""
+        newest = self._bridge.peek()
+        return (0, "") if newest is None else (newest.message.epoch, newest.message.holder)
+
+    def mode(self) -> str:
+        newest = self._controller.peek()
+        return "" if newest is None else newest.message.mode
+
+    def refused(self) -> int:
+        newest = self._bridge.peek()
+        assert newest is not None
+        return sum(row.count for row in newest.message.rejections if row.topic == "command/token")
+
+
+def until(condition: Callable[[], bool], limit_s: float = 60.0) -> None:
+    began = time.monotonic()
+    while not condition():
+        assert time.monotonic() - began < limit_s, "waited in vain"
+        time.sleep(0.005)
+
+
+@pytest.fixture
+def site(tmp_path: Path) -> Iterator[Site]:
+    with ExitStack() as stack:
+        yield Site(tmp_path, stack)
+
+
+def test_it_waits_says_so_and_takes_over_after_the_first_has_ended_or_was_killed(site: Site) -> None:
+    first = site.process("controller", "one", "first")
+    until(lambda: bool(site.held[1]) and site.mode() == "IDLE")
+    epoch, holder = site.held
+    second, same = site.process("controller", "two", "second"), site.process("controller", "one", "same")
+    assert same.wait(60) == 1 and f"another controller works with {site.folder / 'one'}" in site.said("same")
+    until(lambda: site.refused() > 5)
+    assert "another controller commands this robot; this one waits" in site.said("second")
+    assert site.held == (epoch, holder) and site.mode() == "IDLE"
+    first.terminate()
+    until(lambda: site.held[1] not in ("", holder), 20.0)
+    assert site.held[0] == epoch + 1 and first.wait(20) == 0
+    holder = site.held[1]
+    third = site.process("controller", "one", "third")
+    before = site.refused()
+    until(lambda: site.refused() > before + 5)
+    second.kill()
+    until(lambda: site.held[1] not in ("", holder), 20.0)
+    assert site.held[0] == epoch + 2 and third.poll() is None
+    until(lambda: site.mode() == "IDLE")
