@@ -13,6 +13,8 @@ from bridge.core.picture import Picture
 from bridge.core.state_memory import Memory, Remembered
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import PictureRequest
+from rolling_panda.messages.supervision import StopState
+from rolling_panda.transport.zenoh import Rejections
 from tests.support.bridge_rig import MODEL, PICTURE, REST, Commander
 
 MIDDLE = (MODEL.limits.lower[5:] + MODEL.limits.upper[5:]) / 2
@@ -26,6 +28,7 @@ class IdealRobot:
         self.now = Measurement(np.concatenate([np.zeros(2), MIDDLE]), np.zeros(9), "open", "", "", "")
         self.sent: list[Setpoint] = []
         self.cuts: list[str] = []
+        self.points: list[str] = []
 
     def read(self) -> Measurement:
         return self.now
@@ -37,6 +40,7 @@ class IdealRobot:
 
     def cut(self, cut_id: str, point_id: str) -> None:
         self.cuts.append(cut_id)
+        self.points.append(point_id)
         self.now = replace(self.now, cutter="closing", cut_id=cut_id, outcome="")
 
     def end_cut(self, outcome: m.Outcome) -> None:
@@ -70,6 +74,10 @@ class Bench(Commander):
         self.run(0.1, REST)
         self.run(0.5, FORWARD)
         assert self.robot.sent[-1].xi == pytest.approx(FORWARD)
+
+    @property
+    def stops(self) -> StopState:
+        return next(out.stops for out in reversed(self.outputs) if out.stops is not None)
 
     @property
     def log(self) -> list[str]:
@@ -224,12 +232,12 @@ def test_the_emergency_stop_button_stops_latches_and_has_to_be_released_first(be
     bench.run(0.5, FORWARD)
     assert 0.0 < bench.moved_within(0.5) <= 0.3
     assert bench.state.stop_id.startswith("hardware-")
-    told = next(out.stops for out in reversed(bench.outputs) if out.stops)
-    assert told.hardware
+    assert bench.stops.hardware
     assert "button is pressed" in bench.core.on_release(release(bench.state.stop_id), bench.now).reason
     bench.robot.now = replace(bench.robot.now, emergency=False)
     bench.run(0.01, FORWARD)
     assert bench.state.stop_id and bench.moved_within(0.01) == 0.0
+    assert not bench.stops.hardware, "that it is not pressed any more is told at once"
     assert bench.core.on_release(release(bench.state.stop_id), bench.now).ok
 
 
@@ -238,12 +246,13 @@ def test_a_cut_is_made_once_and_its_end_is_told(bench: Bench) -> None:
     for _ in range(20):
         bench.core.on_cut(cut(bench, "c1"), bench.now)
         bench.run(0.01, REST)
-    assert bench.robot.cuts == ["c1"]
+    assert (bench.robot.cuts, bench.robot.points) == (["c1"], ["p1"])
     assert (bench.state.cut_id, bench.state.outcome) == ("c1", "")
     bench.robot.end_cut("DONE")
     bench.run(0.01, REST)
     assert (bench.state.cut_id, bench.state.outcome) == ("c1", "DONE")
-    assert any("c1: DONE, said the robot" in line for line in bench.log)
+    told = [event for out in bench.outputs for event in out.events if "c1: DONE, said the robot" in event.text]
+    assert [event.severity for event in told] == ["info"]
     bench.core.on_cut(cut(bench, "c1"), bench.now)
     assert bench.robot.cuts == ["c1"]
 
@@ -367,6 +376,23 @@ def test_what_is_refused_is_counted_and_logged_once(bench: Bench) -> None:
     assert bench.robot.sent[-1].xi == pytest.approx(FORWARD)
 
 
+def test_the_robot_is_told_which_command_it_follows_and_when_by_the_machines_clock(bench: Bench) -> None:
+    bench.run(0.1, REST)
+    bench.core.step(bench.now + 1e-3, clock=77.5)
+    sent = bench.robot.sent[-1]
+    assert (sent.epoch, sent.sequence, sent.at) == (bench.epoch, bench.sequence, 77.5)
+
+
+def test_what_the_transport_refused_is_told_with_the_bridges_own() -> None:
+    table = Rejections()
+    core = BridgeCore(IdealRobot(), BridgeConfig(), MODEL.limits, odometer(), "sim", rejections=table)
+    table.add("command/motion", "no message")
+    states = [out.state for out in (core.step(tick * 1e-3) for tick in range(1, 1100)) if out.state is not None]
+    assert [(row.topic, row.reason, row.count) for row in states[-1].rejections] == [
+        ("command/motion", "no message", 1)
+    ]
+
+
 def test_messages_come_at_their_rates_with_growing_sequences(bench: Bench) -> None:
     bench.run(2.0, REST)
     joints = [out.joints for out in bench.outputs if out.joints]
@@ -432,6 +458,7 @@ def test_a_picture_is_taken_at_once_for_the_controller_whose_commands_are_taken_
         bench.core.on_picture(PictureRequest(epoch=epoch, number=number, point_id="p4"))
         bench.run(0.05, REST)
         frames = [out.frame for out in bench.outputs[before:] if out.frame is not None]
+        assert all(frame.header == m.Header(pytest.approx(bench.now, abs=0.06), "camera") for frame in frames)
         return [(frame.point_id, frame.number) for frame in frames if frame.point_id]
 
     assert look(bench.epoch + 1, 1) == []

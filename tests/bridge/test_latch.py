@@ -46,6 +46,24 @@ def test_a_restart_releases_nothing_and_forgets_nothing() -> None:
     assert not again.stop(stop("a"))
 
 
+def test_of_very_many_stops_the_newest_and_the_first_are_told() -> None:
+    latch = StopLatch()
+    for count in range(1, 121):
+        assert latch.stop(stop(f"s{count}"))
+        told = [each.stop_id for each in latch.stops]
+        newest = [f"s{number}" for number in range(count, 0, -1)]
+        assert told == (newest if count <= 50 else [*newest[:49], "s1"])
+
+
+def test_of_very_many_released_stops_the_last_thousand_are_remembered() -> None:
+    latch = StopLatch()
+    for number in range(1005):
+        latch.stop(stop(f"s{number}"))
+        assert latch.release(release(f"s{number}")) == ""
+    assert latch.over == tuple(f"s{number}" for number in range(5, 1005))
+    assert not latch.stop(stop("s5")) and latch.stop(stop("s4"))
+
+
 def test_while_the_button_is_pressed_nothing_is_released() -> None:
     latch = StopLatch()
     latch.stop(stop("a"))
