@@ -1,6 +1,7 @@
 """HTTP with limits of time: for a TLS handshake and a request's head, for its body, and for reading the answer."""
 
 import asyncio
+import random
 from typing import Any
 
 import h11
@@ -13,6 +14,7 @@ from server.connections.listener import Connection, Connections, refusal
 
 #: Whoever still sends would be reset before they have read why it ends; so it stays open for so long, unread (s).
 LINGER_S = 1.0
+_EARLIEST = 0.8
 
 
 class SiteConfig(uvicorn.Config):
@@ -111,7 +113,9 @@ class TimedHttp(H11Protocol):
         self._awaited = awaited
         if awaited:
             limits = self.config.limits
-            self._connection.expect(limits.body_s if awaited == "body" else limits.head_s, self._late)
+            most = limits.body_s if awaited == "body" else limits.head_s
+            # Many that came at once are not ended at once.
+            self._connection.expect(most * random.uniform(_EARLIEST, 1.0), self._late)
         else:
             self._connection.rest()
 

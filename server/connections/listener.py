@@ -81,9 +81,9 @@ class Connections:
         """Count a connection that was accepted; False, and it does not count, where there is no room to be made."""
         crowded = self._of_address[new.address] >= self.limits.connections_per_address
         if crowded or len(self._open) >= self.limits.connections:
-            others = (each for each in self._open.values() if not crowded or each.address == new.address)
             # Whoever has had an answer is less likely to be one of many that say nothing.
-            idle = min((each for each in others if not each.busy), key=lambda each: each.served, default=None)
+            address = new.address if crowded else ""
+            idle = self._first_idle(address, served=False) or self._first_idle(address, served=True)
             whose = new.address if crowded else "all addresses together"
             if idle is None:
                 self.note(f"refused a connection from {new.address}: too many of {whose} are in use", new.address)
@@ -97,6 +97,10 @@ class Connections:
         self._open[new.peer] = new
         self._of_address[new.address] += 1
         return True
+
+    def _first_idle(self, address: str, served: bool) -> Connection | None:
+        every = (each for each in self._open.values() if not each.busy and each.served is served)
+        return next((each for each in every if not address or each.address == address), None)
 
     def of(self, transport: asyncio.BaseTransport) -> Connection:
         """The connection under this transport, which ends it from now on; one that does not count if it was ended."""

@@ -25,7 +25,7 @@ BODY = b"POST /api/sign-in HTTP/1.1\r\nHost: a\r\nOrigin: %s\r\nContent-Length: 
 @pytest.fixture(scope="module")
 def plain():
     wire = FakeWire()
-    config = ServerConfig(head_s=0.8, body_s=1.5, connections_per_address=12, socket_messages_hz=70.0)
+    config = ServerConfig(head_s=0.8, body_s=2.0, connections_per_address=12, socket_messages_hz=70.0)
     with running_server(wire, config) as running, telling(wire):
         yield running
 
