@@ -6,8 +6,7 @@ import numpy as np
 
 from benchmarks.perception.judge import ON_AXIS, JudgedPoint, RowJudge, Sight, nearest_rod, sight_places
 from bridge.sim.vineyard.row import Array
-from bridge.sim.vineyard.truth import RightCut
-from bridge.sim.vineyard.truth_guyot import judge_guyot
+from bridge.sim.vineyard.truth import RightCut, judge_guyot
 from rolling_panda import messages as m
 
 #: What the two canes of a vine's spur are cut for, lower one first; these numbers stand for the spur's in results.

@@ -11,7 +11,7 @@ from benchmarks.perception.judge import JudgedPoint, RowJudge
 from benchmarks.perception.points import camera_frame, survey_arm
 from bridge.config import BridgeConfig
 from bridge.sim.camera.renderer import Camera
-from bridge.sim.robot.cutter import bite
+from bridge.sim.robot.cutter import close_blades
 from bridge.sim.vineyard.row import Array, Row
 from controller.config import ControllerConfig
 from controller.work.cut_checks import not_as_accepted
@@ -107,7 +107,7 @@ def look_again(points: Sequence[m.PruningPoint], row: Row, eye: CloseCamera, opi
         into.after.append(opinion.point(refined))
         at = poses.cut.homogeneous.copy()
         at[:3, 3] = seen.position
-        cut = bite(row, at, BridgeConfig())
+        cut = close_blades(row, at, BridgeConfig())
         afterwards = eye.look(cut.row, T_odom_camera, point)
         if afterwards.finding != "severed":
             afterwards = eye.look(cut.row, T_odom_camera, point)

@@ -1,8 +1,8 @@
-"""`python -m bridge.fakes`: the robot's devices as fakes, in a process of their own.
+"""`python -m bridge.fakes`: fake devices of the robot in a process.
 
-It prints `ready`, and ends when its standard input closes. Each line that comes in there tells a device something
-(`base press`, `base free`, `base mute TOPIC`, `base stuck`, `arm collide`, `arm press`, `arm drop COUNT`, `report`, …)
-and is answered by a line of JSON: what every device does, and what its monitor has seen.
+It prints `ready`, and ends when its standard input closes. Each line of input commands a device (`base press`,
+`base free`, `base mute TOPIC`, `base stuck`, `arm collide`, `arm press`, `arm drop COUNT`, `report`, …). The answer is
+a line of JSON with the state of every device and the findings of its monitor.
 """
 
 import argparse
@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from bridge.fakes.bodies import AirBlades, ArmBody, BladeBody, ExactArm, LaggingWheels, WheelBody
+from bridge.fakes.bodies import ArmBody, BladeBody, FirstOrderWheels, FreeBlades, IdealArm, WheelBody
 from bridge.fakes.control_box import ControlBox
 from bridge.fakes.cutter import FakeCutter
 from bridge.fakes.mp500 import FakeMp500
@@ -34,16 +34,16 @@ from rolling_panda.transport.zenoh import ForeignWire, Onlooker
 
 
 class Device(Protocol):
-    """What every fake can be asked from outside."""
+    """Interface of every fake device."""
 
     def tell(self, words: list[str]) -> None:
-        """Something happens to it."""
+        """Execute a command."""
 
     def report(self) -> dict[str, object]:
-        """What it does and has seen."""
+        """State, and findings of the monitor."""
 
     def close(self) -> None:
-        """It goes."""
+        """Close connections."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -75,7 +75,7 @@ def _parser() -> argparse.ArgumentParser:
 
 @dataclass(frozen=True)
 class _Bodies:
-    """What the devices move."""
+    """Mechanics of the devices."""
 
     arm: ArmBody
     wheels: WheelBody
@@ -84,8 +84,8 @@ class _Bodies:
 
 def _bodies(arguments: argparse.Namespace, picture_hz: float, stack: ExitStack) -> _Bodies:
     if arguments.seed is None:
-        return _Bodies(ExactArm(), LaggingWheels(), AirBlades())
-    # Here and not above: the devices alone need no simulator.
+        return _Bodies(IdealArm(), FirstOrderWheels(), FreeBlades())
+    # Imported here: without --seed no simulator is needed.
     from bridge.fakes.vineyard_plant import VineyardPlant
     from bridge.sim.build import simulated_robot
 
@@ -108,9 +108,9 @@ def _wire(arguments: argparse.Namespace) -> TransportConfig:
 
 def _run(arguments: argparse.Namespace) -> None:
     ended = stop_on_signals()
-    # Devices have computers of their own.
+    # Real devices have computers of their own.
     take_priority("control")
-    # The control box must not wait long for the other threads.
+    # Shorter waits of the control box for other threads.
     sys.setswitchinterval(0.0005)
     if arguments.seed is not None and arguments.connect is None:
         raise InputError("--seed puts all devices on one robot: give --connect too")

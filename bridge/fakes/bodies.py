@@ -1,4 +1,4 @@
-"""What the fakes move: mechanics of the arm, of the wheels and of the blades, exact ones here."""
+"""Mechanics behind the fake devices: interfaces of arm, wheels and blades, and ideal ones."""
 
 import math
 import threading
@@ -10,14 +10,14 @@ import numpy as np
 from rolling_panda.model.differential_drive import Array
 
 TICK_S = 0.001
-#: Posture in which an arm without a row around it begins: the survey posture (rad).
+#: Start posture of an arm without a row: the survey posture (rad).
 START = np.array([-0.2784, -0.1128, -0.0354, -2.0055, 1.6759, 1.2124, -0.269])
 _WHEEL_LAG_S = 0.05
 _CLOSE_S = 0.2
 
 
 class ArmBody(Protocol):
-    """Seven joints. One thread moves them."""
+    """Seven joints, moved by one thread."""
 
     @property
     def q(self) -> Array:
@@ -28,7 +28,7 @@ class ArmBody(Protocol):
         """Measured velocities (7, rad/s)."""
 
     def move(self, velocity: Array) -> None:
-        """Let a millisecond pass with these velocities commanded (7, rad/s)."""
+        """Advance by a millisecond with commanded velocities (7, rad/s)."""
 
 
 class WheelBody(Protocol):
@@ -44,28 +44,28 @@ class WheelBody(Protocol):
 
     @property
     def time(self) -> float:
-        """Their own time (s)."""
+        """Time of the wheels (s)."""
 
     def drive(self, goal: Array, dt: float) -> None:
-        """Go on for `dt` seconds with these speeds wanted (2, rad/s)."""
+        """Advance by `dt` (s) with target speeds (2, rad/s)."""
 
 
 class BladeBody(Protocol):
-    """The blades; called from threads that may wait."""
+    """The blades; the calling threads may block."""
 
     @property
-    def bites(self) -> int:
-        """How often they have met."""
+    def closures(self) -> int:
+        """Number of completed closures."""
 
     def shut(self) -> str:
-        """Close: empty when they have met, else what kept them from it."""
+        """Close; empty on success, else the reason."""
 
     def open(self) -> None:
-        """Open, also in the middle of closing."""
+        """Open, even while closing."""
 
 
-class ExactArm:
-    """Moves exactly as commanded."""
+class IdealArm:
+    """An arm that moves exactly as commanded."""
 
     def __init__(self) -> None:
         """At rest in the start posture."""
@@ -73,13 +73,13 @@ class ExactArm:
         self.dq: Array = np.zeros(7)
 
     def move(self, velocity: Array) -> None:
-        """Go on with constant acceleration to the new velocity."""
+        """Advance with constant acceleration to the new velocity."""
         self.q = self.q + 0.5 * (velocity + self.dq) * TICK_S
         self.dq = velocity.copy()
 
 
-class LaggingWheels:
-    """Follow with a first-order lag, in the machine's own time."""
+class FirstOrderWheels:
+    """Wheels with a first-order lag, in real time."""
 
     def __init__(self) -> None:
         """At rest."""
@@ -88,32 +88,32 @@ class LaggingWheels:
 
     @property
     def time(self) -> float:
-        """The machine's."""
+        """Real time (s)."""
         return time.monotonic()
 
     def drive(self, goal: Array, dt: float) -> None:
-        """Go on towards the goal."""
+        """Advance towards the target speeds."""
         before = self.speed
         self.speed = before + (goal - before) * (1.0 - math.exp(-dt / _WHEEL_LAG_S))
         self.turned = self.turned + 0.5 * (before + self.speed) * dt
 
 
-class AirBlades:
-    """Close on nothing."""
+class FreeBlades:
+    """Blades with nothing between them."""
 
     def __init__(self) -> None:
         """Open."""
-        self.bites = 0
+        self.closures = 0
         self._opened = threading.Event()
 
     def shut(self) -> str:
-        """Meet after a while, unless they are opened before."""
+        """Close after a while, unless they are opened before."""
         self._opened.clear()
         if self._opened.wait(_CLOSE_S):
             return "opened before they met"
-        self.bites += 1
+        self.closures += 1
         return ""
 
     def open(self) -> None:
-        """At once."""
+        """Open at once."""
         self._opened.set()

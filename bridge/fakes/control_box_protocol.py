@@ -1,6 +1,6 @@
-"""What travels between libfranka 0.9 and the arm's control box, as `struct` formats: protocol version 5.
+"""Messages between libfranka 0.9 and the control box as `struct` formats: protocol version 5.
 
-Learnt from the public headers `research_interface/robot/{service_types,rbk_types,error}.h` of libfranka-common.
+Source: the public headers `research_interface/robot/{service_types,rbk_types,error}.h` of libfranka-common.
 """
 
 import struct
@@ -23,7 +23,7 @@ IDLE, MOVING, REFLEX, USER_STOPPED, RECOVERING = 1, 2, 4, 5, 6
 GENERATOR_IDLE, GENERATOR_JOINT_VELOCITY = 0, 2
 JOINT_IMPEDANCE, OTHER_CONTROLLER = 0, 3
 
-# Places in the arrays of errors.
+# Indices in the arrays of errors.
 POSITION_LIMIT, JOINT_REFLEX, VELOCITY_LIMIT, VELOCITY_STEP, ACCELERATION_STEP, COMMUNICATION = 0, 6, 13, 14, 15, 25
 ERRORS = 41
 
@@ -33,7 +33,7 @@ _AFTER_DDQ = 7 + 6 + 7 + 6 + 7 + 6 + 6 + 6 + 3 + 2 + 2 + 2 + 16 + 6 + 6
 _STATE = struct.Struct(f"<Q{_BEFORE_TAU}d21d35d{_AFTER_DDQ}d14dBB{ERRORS}s{ERRORS}sBd")
 # message id; q, dq, pose, twist, elbow; elbow valid; finished; torques
 COMMAND = struct.Struct("<Q7d7d16d6d2d??7d")
-# Places in it.
+# Indices in it.
 VELOCITY, FINISHED = slice(8, 15), 40
 _IDENTITY = np.eye(4).T.ravel().tolist()
 Joints = NDArray[np.float64]
@@ -41,7 +41,7 @@ Joints = NDArray[np.float64]
 
 @dataclass
 class State:
-    """What changes in the state that is sent each millisecond; `dq_d` and `ddq_d` are commanded, the rest measured."""
+    """Variable part of the 1 kHz state message; `dq_d` and `ddq_d` are commanded, the rest is measured."""
 
     number: int = 0
     q: Joints = field(default_factory=lambda: np.zeros(7))

@@ -1,4 +1,4 @@
-"""Secateurs as a ROS 2 service shows them: `true` closes the blades, `false` opens them."""
+"""Fake secateurs as a ROS 2 service: `true` closes the blades, `false` opens them."""
 
 from bridge.fakes.bodies import BladeBody
 from bridge.real import ros_messages as ros
@@ -6,22 +6,22 @@ from rolling_panda.transport.zenoh import ForeignWire
 
 
 class FakeCutter:
-    """Answers when the blades are there."""
+    """Answers when the blades have arrived."""
 
     def __init__(self, wire: ForeignWire, service: str, blades: BladeBody) -> None:
-        """Serve `service`; the wire is closed with the cutter."""
+        """Serve `service`; `close` closes the wire."""
         self._wire, self._blades = wire, blades
         wire.serve(service, self._answer)
 
     def report(self) -> dict[str, object]:
-        """How often the blades have met."""
-        return {"bites": self._blades.bites}
+        """Number of completed closures."""
+        return {"bites": self._blades.closures}
 
     def tell(self, words: list[str]) -> None:
-        """It has no buttons."""
+        """No commands."""
 
     def close(self) -> None:
-        """Let go of the wire."""
+        """Close the wire."""
         self._wire.close()
 
     def _answer(self, request: bytes) -> bytes:

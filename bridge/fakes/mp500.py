@@ -1,4 +1,4 @@
-"""A base that the driver takes for an MP-500: the maker's topics and services over Zenoh, and a monitor of commands."""
+"""Fake MP-500: the maker's topics and services over Zenoh, and a monitor of commands."""
 
 import math
 import threading
@@ -15,23 +15,23 @@ from rolling_panda.transport.zenoh import ForeignWire
 RATE_HZ = 50.0
 # The maker's own.
 _WATCHDOG_S = 1.0
-# What the base can take (maker's figures: m/s, m/s²), and what the monitor calls a breach.
+# Limits of the base (maker's figures: m/s, m/s²).
 _SPEED, _ACCELERATION = 1.5, 2.4
-_REST = 0.05
+_STANDSTILL = 0.05
 # CDR of a request without arguments: a header, and one byte since a structure has at least one.
 _NO_ARGUMENTS = b"\x00\x01\x00\x00\x00"
 _CHARGE = 0.8
 
 
 class FakeMp500:
-    """Follows `cmd_vel` as the maker's nodes do: its watchdog of 1 s, its stops; `tell` presses its buttons."""
+    """Follows `cmd_vel` as the maker's nodes do, with a watchdog of 1 s and stops; `tell` presses its buttons."""
 
     def __init__(self, wire: ForeignWire, wheels: WheelBody, drive: DifferentialDrive) -> None:
-        """Answer on the wire, which is closed with the base; nothing turns before `run`.
+        """Serve on the wire; the wheels do not move before `run`.
 
         Args:
-            wire: Where the maker's nodes would be.
-            wheels: What moves.
+            wire: Closed with the base.
+            wheels: Mechanics of the wheels.
             drive: Geometry of the base.
         """
         # Zenoh closes a session that nobody holds.
@@ -40,9 +40,9 @@ class FakeMp500:
         self._command, self._command_at, self._commands = (0.0, 0.0), -math.inf, 0
         self._state, self._soft, self._stuck = mp500.FREE, False, False
         self._muted: set[str] = set()
-        self._breaches: list[str] = []
+        self._violations: list[str] = []
         self._fastest = self._steepest = 0.0
-        self._still_at: float | None = None
+        self._standstill_since: float | None = None
         self._pose, self._turned = (0.0, 0.0, 0.0), wheels.turned
         wire.subscribe(mp500.COMMAND, self._on_command)
         wire.serve(mp500.SOFT_STOP, lambda request: self._on_soft(request, True))
@@ -51,15 +51,15 @@ class FakeMp500:
         self._put = {name: wire.publisher(name) for name in names}
 
     def run(self, ended: threading.Event) -> None:
-        """Turn and tell until `ended` is set."""
+        """Move and publish until `ended` is set."""
         last = time.monotonic()
         while not ended.wait(max(0.0, last + 1 / RATE_HZ - time.monotonic())):
             now = time.monotonic()
-            self._turn(now - last, now)
+            self._step(now - last, now)
             last = now
 
     def tell(self, words: list[str]) -> None:
-        """Press, confirm or free a button, silence a topic, let the wheels run away, or forget what was monitored."""
+        """Press, confirm or release the button, mute a topic, let the wheels run away, or reset the monitor."""
         with self._lock:
             match words:
                 case ["press"]:
@@ -73,24 +73,24 @@ class FakeMp500:
                 case ["stuck"]:
                     self._stuck = True
                 case ["clear"]:
-                    self._breaches, self._fastest, self._steepest = [], 0.0, 0.0
+                    self._violations, self._fastest, self._steepest = [], 0.0, 0.0
 
     def report(self) -> dict[str, object]:
-        """What it does, and what its monitor has seen."""
+        """State, and findings of the monitor."""
         with self._lock:
             return {
                 "wheels": self._wheels.speed.tolist(),
                 "travel": self._wheels.turned.tolist(),
                 "command": list(self._command),
                 "commands": self._commands,
-                "breaches": self._breaches,
+                "breaches": self._violations,
                 "worst": [self._fastest, self._steepest],
-                "still_s": -1.0 if self._still_at is None else time.monotonic() - self._still_at,
+                "still_s": -1.0 if self._standstill_since is None else time.monotonic() - self._standstill_since,
                 "soft": self._soft,
             }
 
     def close(self) -> None:
-        """Let go of the wire."""
+        """Close the wire."""
         self._wire.close()
 
     def _on_command(self, data: bytes, at: float) -> None:
@@ -99,12 +99,12 @@ class FakeMp500:
         with self._lock:
             powered = self._state == mp500.FREE and not self._soft
             if not (math.isfinite(v) and math.isfinite(omega)) or abs(v) > _SPEED:
-                self._breaches.append(f"velocity {v}, {omega}")
-            # Two commands may come in closer together than they were sent, or some in between be lost on the wire.
+                self._violations.append(f"velocity {v}, {omega}")
+            # Commands may arrive closer together than they were sent, and some may be lost.
             passed = max(at - self._command_at, 1.0 / RATE_HZ)
             step = abs(v - self._command[0]) / passed if powered and self._commands else 0.0
             if step > 1.5 * _ACCELERATION:
-                self._breaches.append(f"from {self._command[0]:.3f} to {v:.3f} m/s in {passed:.3f} s")
+                self._violations.append(f"from {self._command[0]:.3f} to {v:.3f} m/s in {passed:.3f} s")
             self._fastest = max(self._fastest, abs(v) / _SPEED)
             self._steepest = max(self._steepest, step / _ACCELERATION)
             self._command, self._command_at = (v, omega), at
@@ -117,7 +117,7 @@ class FakeMp500:
                 self._soft = stop
         return ros.encode(ros.make(ros.SUCCESS, success=understood))
 
-    def _turn(self, dt: float, now: float) -> None:
+    def _step(self, dt: float, now: float) -> None:
         with self._lock:
             goal = np.array(self._drive.wheels(*self._command))
             if self._state != mp500.FREE or self._soft or now - self._command_at > _WATCHDOG_S:
@@ -125,10 +125,10 @@ class FakeMp500:
             if self._stuck and not self._soft:
                 goal = np.array([1.0, 1.0])
             self._wheels.drive(goal, dt)
-            if np.abs(self._wheels.speed).max() > _REST:
-                self._still_at = None
-            elif self._still_at is None:
-                self._still_at = now
+            if np.abs(self._wheels.speed).max() > _STANDSTILL:
+                self._standstill_since = None
+            elif self._standstill_since is None:
+                self._standstill_since = now
             state, soft, muted = self._state, self._soft, set(self._muted)
         for name, message in self._messages(state, soft).items():
             if name not in muted:
@@ -142,7 +142,7 @@ class FakeMp500:
             ros.JOINT_STATE,
             header=header,
             name=["wheel_front_left_joint", "wheel_front_right_joint"],
-            # Raw counts of the encoders, as the relay board tells them.
+            # Raw encoder counts of the relay board.
             position=np.array([137.0, -137.0]),
             velocity=np.array([speed[0], -speed[1]]),
             effort=np.zeros(0),
@@ -190,7 +190,7 @@ def _vector(x: float, z: float) -> object:
 
 
 def battery(header: object, share: float) -> object:
-    """The maker's battery message with this charge (0…1)."""
+    """The maker's battery message with a charge (0…1)."""
     return ros.make(
         ros.BATTERY_STATE,
         header=header,

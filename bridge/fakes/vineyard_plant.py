@@ -1,4 +1,4 @@
-"""One physics behind all fakes: the simulated robot beside its row, which the fake devices move and look at."""
+"""The simulated robot behind the fake devices."""
 
 import threading
 import time
@@ -14,35 +14,35 @@ from bridge.sim.robot.robot import SimulatedRobot
 from rolling_panda.model.differential_drive import Array
 
 _PICTURE_TICKS = 10
-# However slow the machine: the blades take a third of a second of the robot's own time.
-_BITE_S = 10.0
+# For a slow machine: the blades take a third of a second of simulated time.
+_CLOSE_TIMEOUT_S = 10.0
 
-#: Is given a picture and the machine's time (s since 1970) at which it was exposed.
-TakePicture = Callable[[Picture, float], None]
+#: Called with a picture and the Unix time of its exposure (s).
+PictureCallback = Callable[[Picture, float], None]
 
 
 class VineyardPlant:
-    """Arm, wheels and blades of one simulated robot. The arm's thread lets time pass; the others look and order."""
+    """Arm, wheels and blades of one simulated robot. The arm's thread advances time; other threads read and command."""
 
-    def __init__(self, robot: SimulatedRobot, picture_hz: float, take: TakePicture) -> None:
-        """Stand still.
+    def __init__(self, robot: SimulatedRobot, picture_hz: float, on_picture: PictureCallback) -> None:
+        """Start at rest.
 
         Args:
             robot: Closed with the plant.
-            picture_hz: Exposures a second of the robot's time.
-            take: Is given each picture, in the arm's thread.
+            picture_hz: Rate of exposures in simulated time.
+            on_picture: Called with each picture, in the arm's thread.
         """
-        self._robot, self._take = robot, take
+        self._robot, self._on_picture = robot, on_picture
         self._period = round(1 / picture_hz / TICK_S)
         self._ticks, self._exposed, self._exposed_at = 0, -self._period, 0.0
         self._waiting = False
         self._goal = np.zeros(2)
         self._measured = _own(robot.read())
         self._number = 0
-        self._ordered = ""
+        self._requested_cut = ""
         self._blades = False
         self._lock = threading.Lock()
-        self.bites = 0
+        self.closures = 0
 
     @property
     def q(self) -> Array:
@@ -70,59 +70,59 @@ class VineyardPlant:
         return self._robot.time
 
     def move(self, velocity: Array) -> None:
-        """The physics go on by a millisecond, with the arm's joints commanded so (7, rad/s)."""
+        """Advance the physics by a millisecond, with commanded joint velocities (7, rad/s)."""
         with self._lock:
-            ordered, self._ordered = self._ordered, ""
+            requested, self._requested_cut = self._requested_cut, ""
             blades = self._blades
-        if ordered:
-            self._robot.cut(ordered, "")
+        if requested:
+            self._robot.cut(requested, "")
         xi = np.concatenate([self._goal, velocity])
         self._robot.write(Setpoint(xi, blades, 0, self._ticks, time.monotonic()))
         self._measured = _own(self._robot.read())
         self._ticks += 1
         if self._ticks % _PICTURE_TICKS == 0:
-            self._photograph()
+            self._capture()
 
     def drive(self, goal: Array, dt: float) -> None:
-        """The wheels' servos are given these speeds (2, rad/s)."""
+        """Set the target speeds of the wheels (2, rad/s)."""
         self._goal = goal.copy()
 
     def shut(self) -> str:
-        """Close the blades on what is between them; empty when they have met."""
+        """Close the blades; empty on success, else the reason."""
         with self._lock:
             self._number += 1
-            name = f"bite-{self._number}"
-            self._ordered, self._blades = name, True
-        end = time.monotonic() + _BITE_S
+            name = f"cut-{self._number}"
+            self._requested_cut, self._blades = name, True
+        end = time.monotonic() + _CLOSE_TIMEOUT_S
         while not ((now := self._measured).cut_id == name and now.outcome):
             if time.monotonic() > end:
                 return "the blades have not met"
             time.sleep(TICK_S)
-        # Blades know whether they have met, not whether anything was between them.
+        # Real blades report closure, not whether anything was cut.
         if now.cutter == "jammed" or not self._blades:
             return now.detail
-        self.bites += 1
+        self.closures += 1
         return ""
 
     def open(self) -> None:
-        """Blades that close open again."""
+        """Open the blades, even while closing."""
         with self._lock:
             self._blades = False
 
     def close(self) -> None:
-        """End the physics."""
+        """Close the robot."""
         self._robot.close()
 
-    def _photograph(self) -> None:
+    def _capture(self) -> None:
         expose = not self._waiting and self._ticks - self._exposed >= self._period
         if expose:
             self._waiting, self._exposed, self._exposed_at = True, self._ticks, time.time()
         picture = self._robot.capture(expose)
         if picture is not None:
             self._waiting = False
-            self._take(picture, self._exposed_at)
+            self._on_picture(picture, self._exposed_at)
 
 
 def _own(measured: Measurement) -> Measurement:
-    # The simulated robot's own arrays change under whoever reads them in another thread.
+    # Copies for other threads: the robot's arrays change in place.
     return replace(measured, position=measured.position.copy(), velocity=measured.velocity.copy())

@@ -9,7 +9,7 @@ from bridge.core.cut_memory import CutMemory
 from bridge.core.odometer import Odometer
 from bridge.core.state_memory import Memory
 from bridge.sim.camera.config import CameraConfig
-from bridge.sim.camera.render_process import InlinePhotographer, Photographer, ProcessPhotographer
+from bridge.sim.camera.render_process import CameraRenderer, InlineRenderer, RenderProcess
 from bridge.sim.robot.robot import SimulatedRobot
 from bridge.sim.robot.trace import TraceWriter
 from bridge.sim.vineyard.config import VineyardConfig
@@ -31,17 +31,17 @@ def simulated_bridge(
     cuts: CutMemory | None = None,
     memory: Memory | None = None,
 ) -> BridgeCore:
-    """A bridge with the simulated robot beside a row grown from `seed`.
+    """Bridge core with the simulated robot beside a row grown from `seed`.
 
     Args:
         config_path: TOML file with the sections robot, bridge, vineyard and camera.
-        seed: Of the row and of the camera's noise.
-        trace: File to record every physics step in.
-        camera: `inline` renders within a step, so that the same seed and commands give the same messages; `process`
-            renders beside it, so that the physics keeps time.
-        rejections: Table to count refusals in, shared with the transport.
-        cuts: Remembers cuts through restarts; None for as long as this lives.
-        memory: What survives a restart; None forgets.
+        seed: Of row and camera.
+        trace: File for a trace of every physics step.
+        camera: `inline` renders within a step, for reproducible messages; `process` renders in a process, for real
+            time.
+        rejections: Counters of refusals, shared with the transport.
+        cuts: Cuts that survive a restart; None for this run only.
+        memory: State that survives a restart; None for none.
 
     Raises:
         ConfigError: A section is wrong, or the trace cannot be written.
@@ -60,8 +60,7 @@ def simulated_robot(
 ) -> SimulatedRobot:
     """The simulated robot beside a row grown from `seed`; arguments as of `simulated_bridge`.
 
-    The camera as a `device` renders in a process too, which does not step back: a camera exposes however busy the
-    computer is.
+    A camera of kind `device` renders in a process with normal priority, as a real camera does not depend on the load.
 
     Raises:
         ConfigError: A section is wrong, or the trace cannot be written.
@@ -70,16 +69,16 @@ def simulated_robot(
     row = grow(load_section(config_path, "vineyard", VineyardConfig), seed)
     lens = load_section(config_path, "camera", CameraConfig)
     writer = None if trace is None else TraceWriter(trace)
-    photographer: Photographer = (
-        InlinePhotographer(lens, seed)
+    renderer: CameraRenderer = (
+        InlineRenderer(lens, seed)
         if camera == "inline"
-        else ProcessPhotographer(lens, seed, "interface" if camera == "device" else "background")
+        else RenderProcess(lens, seed, "interface" if camera == "device" else "background")
     )
-    return SimulatedRobot(config, row, photographer, writer)
+    return SimulatedRobot(config, row, renderer, writer)
 
 
 def subscribe_button(core: BridgeCore, transport: Onlooker) -> None:
-    """Let the wire press the emergency stop button that the simulated robot would have."""
+    """Connect the emergency stop button of the simulated robot to its topic."""
     robot = core.robot
 
     def press(message: HardwareStop, at: float) -> None:

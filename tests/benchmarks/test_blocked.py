@@ -7,11 +7,11 @@ import pytest
 
 from benchmarks.perception.blocked import CANE_ROOM, WIRE_ROOM, blocked_by
 from bridge.sim.vineyard.row import Rod, Row
-from bridge.sim.vineyard.truth import stretch
+from bridge.sim.vineyard.truth import right_cut
 
 #: An upright internode of 80 mm; the cut is right over 20 mm of it.
 CANE = Rod("cane", np.zeros(3), np.array([0.0, 0.0, 0.08]), 0.004, 0.004, vine=0, spur=1, cane=0)
-CUT = stretch(0, CANE, 0.030, 0.040, 0.050)
+CUT = right_cut(0, CANE, 0.030, 0.040, 0.050)
 RADIUS = 0.0015
 
 

@@ -68,7 +68,7 @@ def test_the_stop_halts_a_moving_robot_and_only_a_reset_with_a_start_moves_it_ag
     assert loop.state.mode == "IDLE"
     loop.close()
     record = trace.read(tmp_path / "trace")
-    assert record.still_after(pressed) < 0.5
+    assert record.stopping_time(pressed) < 0.5
 
 
 @pytest.mark.parametrize("seed", [5])

@@ -7,7 +7,7 @@ from msgspec.structs import replace
 from benchmarks.perception.guyot_judge import GuyotJudge
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
-from bridge.sim.vineyard.truth_guyot import judge_guyot
+from bridge.sim.vineyard.truth import judge_guyot
 from rolling_panda.messages.types import CutKind
 from tests.benchmarks.test_bench_perception import point
 

@@ -146,7 +146,7 @@ def test_it_drives_stops_on_silence_and_the_trace_shows_both(live: Live) -> None
     trace = read(live.trace)
     moving = trace.rows[(trace.rows["clock"] > last - 0.1) & (trace.rows["clock"] < last)]
     assert np.median(moving["base_velocity"][:, 0]) == pytest.approx(0.2, abs=0.03)
-    assert trace.still_after(last) < 0.4
+    assert trace.stopping_time(last) < 0.4
 
 
 def test_the_widest_deadline_that_can_be_set_still_stops_it_within_its_bound(tmp_path: Path) -> None:
@@ -197,7 +197,7 @@ def test_a_stop_by_wire_latches_until_released(live: Live) -> None:
     live.drive(0.3, FORWARD)
     assert live.newest().stop_id == ""
     time.sleep(0.2)
-    assert read(live.trace).still_after(at) < 0.5
+    assert read(live.trace).stopping_time(at) < 0.5
 
 
 def test_rubbish_on_the_command_topic_is_counted_and_said(live: Live) -> None:

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from bridge.config import BridgeConfig
-from bridge.sim.robot.cutter import Cutter, bite
+from bridge.sim.robot.cutter import Cutter, close_blades
 from bridge.sim.vineyard.row import Rod, Row
 from rolling_panda.messages.types import WoodClass
 
@@ -21,7 +21,7 @@ def along_row(kind: WoodClass, z: float, radius: float) -> Rod:
 
 def test_a_cane_between_the_blades_is_severed_at_the_blade_plane() -> None:
     bud = Rod("node", np.array([0, 0, 1.2]), np.array([0, 0, 1.21]), 0.005, 0.005, parent=0)
-    result = bite(Row((upright(), bud)), TOOL, CONFIG)
+    result = close_blades(Row((upright(), bud)), TOOL, CONFIG)
     assert [item.index for item in result.severed] == [0]
     assert result.severed[0].point == pytest.approx([0.0, 0.0, 1.0])
     cane = result.row.rods[0]
@@ -36,7 +36,7 @@ def test_a_cane_between_the_blades_is_severed_at_the_blade_plane() -> None:
     [(0.014, 0.0, True), (0.016, 0.0, False), (-0.016, 0.0, False), (0.0, 0.017, True), (0.0, 0.019, False)],
 )
 def test_only_what_is_within_the_opening_and_the_blades_reach(x: float, y: float, cut: bool) -> None:
-    result = bite(Row((upright(x, y),)), TOOL, CONFIG)
+    result = close_blades(Row((upright(x, y),)), TOOL, CONFIG)
     assert bool(result.severed) == cut
     assert result.detail == ("" if cut else "nothing between the blades")
     assert not result.jammed
@@ -44,12 +44,12 @@ def test_only_what_is_within_the_opening_and_the_blades_reach(x: float, y: float
 
 def test_a_cane_that_ends_below_the_blades_is_not_cut() -> None:
     short = Rod("cane", np.array([0, 0, 0.8]), np.array([0, 0, 0.999]), 0.004, 0.004)
-    assert bite(Row((short,)), TOOL, CONFIG).severed == ()
+    assert close_blades(Row((short,)), TOOL, CONFIG).severed == ()
 
 
 def test_two_canes_are_both_severed_and_both_reported() -> None:
     row = Row((upright(-0.01), upright(0.01), upright(0.3)))
-    result = bite(row, TOOL, CONFIG)
+    result = close_blades(row, TOOL, CONFIG)
     assert [item.index for item in result.severed] == [0, 1]
     assert result.row.rods[2] is row.rods[2]
 
@@ -65,7 +65,7 @@ def test_two_canes_are_both_severed_and_both_reported() -> None:
 )
 def test_wire_post_and_thick_wood_jam_the_blades_and_nothing_is_severed(hard: Rod, words: str) -> None:
     row = Row((upright(0.005), hard))
-    result = bite(row, TOOL, CONFIG)
+    result = close_blades(row, TOOL, CONFIG)
     assert result.jammed
     assert words in result.detail
     assert result.severed == ()
@@ -73,16 +73,16 @@ def test_wire_post_and_thick_wood_jam_the_blades_and_nothing_is_severed(hard: Ro
 
 
 def test_a_wire_beside_the_blade_plane_does_not_jam() -> None:
-    assert not bite(Row((upright(), along_row("wire", 1.01, 0.00125))), TOOL, CONFIG).jammed
+    assert not close_blades(Row((upright(), along_row("wire", 1.01, 0.00125))), TOOL, CONFIG).jammed
 
 
 def test_nothing_at_all_is_nothing() -> None:
-    assert bite(Row(()), TOOL, CONFIG).detail == "nothing between the blades"
+    assert close_blades(Row(()), TOOL, CONFIG).detail == "nothing between the blades"
 
 
 def test_the_blades_meet_after_the_closing_time_and_open_as_long() -> None:
     cutter = Cutter(CONFIG)
-    cutter.begin("c1", "p1")
+    cutter.start("c1", "p1")
     steps = 0
     while not cutter.step(0.001, True):
         steps += 1
@@ -99,7 +99,7 @@ def test_the_blades_meet_after_the_closing_time_and_open_as_long() -> None:
 
 def test_an_inhibited_cutter_opens_without_cutting() -> None:
     cutter = Cutter(CONFIG)
-    cutter.begin("c1", "p1")
+    cutter.start("c1", "p1")
     assert not cutter.step(0.001, True)
     assert not cutter.step(0.001, False)
     assert (cutter.state, cutter.outcome) == ("opening", "FAILED_NOT_CUT")

@@ -5,7 +5,7 @@ import pytest
 
 from bridge.core.picture import Picture
 from bridge.sim.camera.config import CameraConfig
-from bridge.sim.camera.render_process import InlinePhotographer, Photographer, ProcessPhotographer
+from bridge.sim.camera.render_process import CameraRenderer, InlineRenderer, RenderProcess
 from bridge.sim.vineyard.row import Rod, Row
 
 pytestmark = pytest.mark.alone
@@ -16,10 +16,10 @@ ROW = Row((Rod("post", np.array([0.0, 1.0, 0.0]), np.array([0.0, 1.0, 2.0]), 0.0
 EYE = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 1], [0, 0, 0, 1]])
 
 
-def wait(photographer: Photographer) -> Picture:
+def wait(renderer: CameraRenderer) -> Picture:
     end = time.monotonic() + 20
     while time.monotonic() < end:
-        picture = photographer.ready()
+        picture = renderer.ready()
         if picture is not None:
             return picture
         time.sleep(0.005)
@@ -27,7 +27,7 @@ def wait(photographer: Photographer) -> Picture:
 
 
 def test_beside_the_physics_the_pictures_are_the_same_and_a_killed_renderer_comes_back() -> None:
-    inline, beside = InlinePhotographer(LENS, 7), ProcessPhotographer(LENS, 7)
+    inline, beside = InlineRenderer(LENS, 7), RenderProcess(LENS, 7)
     try:
         for row in (ROW, ROW, Row(())):
             assert inline.expose(row, EYE)

@@ -64,7 +64,7 @@ def test_a_dead_controller_leaves_base_and_arm_still_within_400_ms(config: Path,
     assert moving["base_velocity"][-1][0] == pytest.approx(0.3, abs=0.01)
     assert np.abs(moving["velocity"][-1][2:]).max() > 0.3
     # The last command left at 0.999 s.
-    assert trace.still_after(0.999) <= 0.4
+    assert trace.stopping_time(0.999) <= 0.4
     assert trace.rows["contacts"].max() == 0
 
 

@@ -7,7 +7,7 @@ import pytest
 from bridge.config import BridgeConfig
 from bridge.core.interface import Setpoint
 from bridge.core.picture import Picture
-from bridge.sim.robot.robot import SimulatedRobot
+from bridge.sim.robot.robot import SimulatedRobot, VelocityServos
 from bridge.sim.robot.trace import TraceWriter, read
 from bridge.sim.vineyard.row import Array, Rod, Row
 from rolling_panda.config import load_section
@@ -19,7 +19,7 @@ DRIVE = RobotModel().drive
 
 
 class Blind:
-    """A photographer without a camera."""
+    """A renderer without a camera."""
 
     def expose(self, row: Row, T_world_camera: Array) -> bool:
         return False
@@ -142,3 +142,21 @@ def test_servos_stay_calm_in_any_posture(seed: int) -> None:
     for _ in range(300):
         sim.write(setpoint())
     assert np.abs(sim.read().velocity).max() < 0.01
+
+
+def test_speed_follows_a_step_with_the_configured_lag() -> None:
+    lag, inertia, dt = 0.05, np.diag([0.8]), 0.001
+    servos = VelocityServos(np.array([lag]), np.array([60.0]), dt)
+    speed, trail = np.zeros(1), []
+    for _ in range(500):
+        speed = speed + np.linalg.solve(inertia, servos.step(np.ones(1), speed, inertia)) * dt
+        trail.append(float(speed[0]))
+    # The area above the curve is the lag of any chain of first-order lags.
+    assert abs(sum(1.0 - value for value in trail) * dt - lag) < 0.003
+    assert abs(trail[-1] - 1.0) < 1e-3
+
+
+def test_torque_stays_in_its_bound() -> None:
+    servos = VelocityServos(np.array([0.02, 0.02]), np.array([12.0, 5.0]), 0.001)
+    for _ in range(100):
+        assert np.all(np.abs(servos.step(np.array([1e3, -1e3]), np.zeros(2), np.eye(2))) <= [12.0, 5.0])

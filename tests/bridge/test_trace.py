@@ -43,9 +43,9 @@ def test_stillness_is_judged_from_true_velocities(tmp_path: Path) -> None:
     with TraceWriter(tmp_path / "t") as trace:
         write_steps(trace, 400, moving_until=300)
     loaded = read(tmp_path / "t")
-    assert loaded.still_after(0.1) == pytest.approx(0.2)
-    assert loaded.still_after(0.35) == 0.0
-    assert loaded.still_after(9.0) == float("inf")
+    assert loaded.stopping_time(0.1) == pytest.approx(0.2)
+    assert loaded.stopping_time(0.35) == 0.0
+    assert loaded.stopping_time(9.0) == float("inf")
 
 
 def test_another_file_is_refused(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from bridge.sim.camera.config import CameraConfig
 from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.command import main
 from bridge.sim.vineyard.config import VineyardConfig
-from bridge.sim.vineyard.file import Vineyard, load, right_places, save
+from bridge.sim.vineyard.file import Vineyard, cut_positions, load, save
 from bridge.sim.vineyard.grow import grow
 from bridge.sim.vineyard.truth import judge
 from rolling_panda.errors import InputError
@@ -27,7 +27,7 @@ def test_a_row_comes_back_as_it_was_and_looks_the_same(tmp_path, training):
     place[:3, 3] = [0.5, 0.0, 1.0]
     first, second = (Camera(CameraConfig(width=212, height=120), 1).render(v.row, place) for v in (written, read))
     assert np.array_equal(first.color, second.color) and np.array_equal(first.rods, second.rods)
-    assert np.array_equal(right_places(written), right_places(read))
+    assert np.array_equal(cut_positions(written), cut_positions(read))
 
 
 def test_a_row_that_was_cut_comes_back_cut_and_without_truth(tmp_path):

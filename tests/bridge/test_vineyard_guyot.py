@@ -6,8 +6,7 @@ from hypothesis import strategies as st
 
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
-from bridge.sim.vineyard.truth import judge
-from bridge.sim.vineyard.truth_guyot import judge_guyot
+from bridge.sim.vineyard.truth import judge, judge_guyot
 
 GUYOT = VineyardConfig(training="guyot")
 seeds = st.integers(0, 2**31)

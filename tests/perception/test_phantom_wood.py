@@ -8,8 +8,8 @@ import pytest
 
 from benchmarks.perception.points import camera_frame, survey_arm
 from bridge.sim.camera.config import CameraConfig
-from bridge.sim.camera.depth import measured_depth
 from bridge.sim.camera.renderer import Camera
+from bridge.sim.camera.sensors import depth_sensor
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from perception.config import ObstacleConfig
@@ -43,7 +43,7 @@ class Standing:
         self._width[seen] = thick[image.rods[seen]] * camera.intrinsics.fx / self._true[seen]
 
     def frame(self):
-        depth = measured_depth(self.config, self.view.intrinsics.fx, self._true, self._width, self._rng)
+        depth = depth_sensor(self.config, self.view.intrinsics.fx, self._true, self._width, self._rng)
         return replace(self.view, depth=depth)
 
 

@@ -31,4 +31,4 @@ def test_a_full_disk_stops_the_robot_and_the_stop_still_works(tmp_path: Path) ->
         robot.wait(lambda: robot.mode() == "ESTOP_LATCHED", 5, "the stop")
         whole = verify(tmp_path / "state")
         assert whole.problem == "" and whole.rows >= rows
-    assert trace.read(robot.trace).still_after(filled) < 1.0
+    assert trace.read(robot.trace).stopping_time(filled) < 1.0

@@ -34,7 +34,7 @@ def test_base_and_arm_are_still_soon_after_a_process_is_killed(tmp_path: Path, n
         if name == "perception":
             robot.wait(lambda: robot.gone(name), 5, "the server to say that perception has gone")
         robot.wait(lambda: robot.clock() > killed + 1.5, 5, "the robot to come to rest")
-    assert trace.read(robot.trace).still_after(killed) < LIMIT_S
+    assert trace.read(robot.trace).stopping_time(killed) < LIMIT_S
 
 
 def test_a_killed_controller_is_missed_and_a_new_one_moves_nothing_by_itself(tmp_path: Path) -> None:
@@ -52,7 +52,7 @@ def test_a_killed_controller_is_missed_and_a_new_one_moves_nothing_by_itself(tmp
         # What was accepted still is, and waits for somebody to arm and start.
         states = {row["entry"]["state"] for row in robot.points()}
         assert "ACCEPTED" in states and states <= {"ACCEPTED", "UNREACHABLE", "PROPOSED"}
-    assert trace.read(robot.trace).still_after(killed) < LIMIT_S
+    assert trace.read(robot.trace).stopping_time(killed) < LIMIT_S
 
 
 def test_the_server_says_that_the_bridge_has_gone_and_keeps_its_last_state(tmp_path: Path) -> None:

@@ -92,7 +92,7 @@ def stop_in_mid_approach(page: Page, robot: LiveRobot, stop: Press) -> float:
     record = trace.read(robot.trace)
     last = record.rows[record.rows["clock"] <= pressed][-1]
     assert abs(last["base_velocity"][0]) > 0.02, "the base no longer drove when the button was pressed"
-    return record.still_after(pressed)
+    return record.stopping_time(pressed)
 
 
 def reset_and_arm(page: Page, robot: LiveRobot) -> None:

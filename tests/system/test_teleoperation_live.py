@@ -49,7 +49,7 @@ def test_the_tool_follows_a_held_target_and_rests_when_nothing_more_comes(tmp_pa
         silent = robot.clock()
         robot.wait(lambda: robot.mode() == "READY" and robot.clock() > silent + 1.0, 10, "the hold to end")
     record = trace.read(robot.trace)
-    assert record.still_after(silent) < LIMIT_S
+    assert record.stopping_time(silent) < LIMIT_S
     assert np.linalg.norm(record.rows["tool"][-1] - goal["position"]) < 0.1, "the tool stopped on its way back"
 
 
@@ -98,4 +98,4 @@ def test_the_tool_follows_the_dragged_gizmo_and_rests_when_it_is_let_go(tmp_path
     moved = record.rows["tool"][-1] - origin
     assert moved[0] > 0.03
     assert np.abs(moved[1:]).max() < 0.02, "an arrow leads along its axis alone"
-    assert record.still_after(released) < LIMIT_S
+    assert record.stopping_time(released) < LIMIT_S

@@ -14,23 +14,23 @@ Pixels = Annotated[int, Meta(ge=16, le=4096)]
 
 
 class CameraConfig(Struct, frozen=True, forbid_unknown_fields=True):
-    """Image size, lens, and what the sensors make of the scene.
+    """Image size, lens and errors of the sensors.
 
     Attributes:
         width: Image width (px).
         height: Image height (px).
         horizontal_fov_deg: Full horizontal field of view (degrees).
-        min_range: Nothing nearer has a depth (m).
-        max_range: Nothing farther has a depth (m).
+        min_range: Smallest valid depth (m).
+        max_range: Largest valid depth (m).
         depth_unit: Depth is a multiple of this (m).
         baseline: Between the two infrared imagers (m).
         disparity_noise: Standard deviation of the matched disparity (px); 0 switches the noise off.
-        edge_bleed: Share of the pixels along steps in depth that get the depth of what is in front, a mixture, or none.
-        thin_width: Things seen narrower than this lose depth in patches, all the more the narrower they are (px).
-        calibration_angle: Standard deviation of the camera's turn from where the robot takes it to be (rad); one draw.
+        edge_bleed: Share of the pixels along depth steps that get the foreground depth, a mixture, or none.
+        thin_width: Objects narrower than this lose depth in patches, in proportion (px).
+        calibration_angle: Standard deviation of the hand-eye calibration error (rad).
         color_noise: Standard deviation of the colour sensor's noise (of 255).
         color_blur: Standard deviation of its blur (px).
-        appearance: How much bark, light and exposure differ from seed to seed: 0 not at all, 1 as in one winter.
+        appearance: Variation of bark, light and exposure between seeds: 0 for none, 1 for one winter.
     """
 
     width: Pixels = 848
@@ -49,7 +49,7 @@ class CameraConfig(Struct, frozen=True, forbid_unknown_fields=True):
     appearance: Annotated[float, Meta(ge=0.0, le=3.0)] = 1.0
 
     def ideal(self) -> "CameraConfig":
-        """The same lens without any error, for judges."""
+        """The same lens without errors, for benchmarks."""
         return replace(
             self,
             disparity_noise=0.0,

@@ -1,4 +1,4 @@
-"""Turns the rods of a row into one triangle mesh for ray casting, and remembers which rod each triangle is of."""
+"""Triangle mesh of a row for ray casting."""
 
 from dataclasses import dataclass
 
@@ -25,11 +25,11 @@ class Hits:
 
 
 class RodMesh:
-    """The standing rods of one row revision, ready to be seen."""
+    """Mesh of the standing rods of one row revision."""
 
     def __init__(self, row: Row) -> None:
         """Mesh every standing rod."""
-        # The rods of the rows behind are numbered on from those of this row.
+        # Rods of the rows behind have indices after those of this row.
         standing = [*row.standing(), *enumerate(row.backdrop, len(row.rods))]
         count = len(row.rods) + len(row.backdrop)
         self.revision = row.revision
@@ -56,7 +56,7 @@ class RodMesh:
         self._owner = np.concatenate(owner) if owner else np.zeros(0, np.int32)
         self._scene = EmbreeScene() if owner else None
         if self._scene is not None:
-            # The scene does not keep its geometry alive.
+            # The scene holds no reference to its geometry.
             self._geometry = TriangleMesh(self._scene, np.concatenate(vertices), np.concatenate(faces))
 
     def first_hits(self, origins: Floats, directions: Floats) -> Hits:

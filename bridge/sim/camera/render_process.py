@@ -1,4 +1,4 @@
-"""Where the simulated camera renders: at once, in this thread, or beside the physics in a process of its own."""
+"""Rendering of the camera: in the calling thread, or in a process beside the physics."""
 
 import multiprocessing
 import queue
@@ -15,21 +15,21 @@ from rolling_panda.model.differential_drive import Array
 from rolling_panda.runtime.priority import Role, take_priority
 
 
-class Photographer(Protocol):
-    """Turns an exposure into a picture."""
+class CameraRenderer(Protocol):
+    """Renders exposures."""
 
     def expose(self, row: Row, T_world_camera: Array) -> bool:
-        """Take a picture of the row as it is now; False, and no picture, while the last one is not ready."""
+        """Start an exposure of the present row; False while the last one is not ready."""
 
     def ready(self) -> Picture | None:
-        """The picture that has become ready since the last call, or None."""
+        """The finished picture, once; None without one."""
 
     def close(self) -> None:
-        """End; safe to call twice."""
+        """Close; idempotent."""
 
 
-class InlinePhotographer:
-    """Renders inside `expose`: the same calls give the same pictures, and the simulation waits for them."""
+class InlineRenderer:
+    """Renders inside `expose`, so that the same calls give the same pictures."""
 
     def __init__(self, config: CameraConfig, seed: int) -> None:
         """Prepare the camera."""
@@ -45,27 +45,27 @@ class InlinePhotographer:
         return True
 
     def ready(self) -> Picture | None:
-        """The picture just rendered, once."""
+        """The rendered picture, once."""
         picture, self._picture = self._picture, None
         return picture
 
     def close(self) -> None:
-        """Nothing to end."""
+        """Nothing to close."""
 
 
-class ProcessPhotographer:
-    """Renders in the process `camera-renderer`, since a picture takes as long as hundreds of physics steps.
+class RenderProcess:
+    """Renders in a process: a picture takes as long as hundreds of physics steps.
 
-    A thread waits for that process, so that the physics never does. A renderer that dies is started again.
+    A thread waits for that process. A process that dies is started again.
     """
 
     def __init__(self, config: CameraConfig, seed: int, role: Role = "background") -> None:
-        """Start the process. It ends when this side of the pipe closes, however that happens.
+        """Start the process. It ends when the pipe closes.
 
         Args:
             config: Lens and errors.
             seed: Of the noise.
-            role: Scheduling of the process: whoever keeps time comes first.
+            role: Scheduling priority of the process.
         """
         self._config, self._seed, self._role = config, seed, role
         self._known: Row | None = None
@@ -78,7 +78,7 @@ class ProcessPhotographer:
         self._thread.start()
 
     def expose(self, row: Row, T_world_camera: Array) -> bool:
-        """Ask for a picture; the row itself crosses only when it has changed."""
+        """Request a picture; the row is sent only when it has changed."""
         if self._busy:
             return False
         self._busy = True
@@ -86,14 +86,14 @@ class ProcessPhotographer:
         return True
 
     def ready(self) -> Picture | None:
-        """The picture asked for, when it is there."""
+        """The requested picture, once it is ready."""
         picture = self._picture
         if picture is not None:
             self._picture, self._busy = None, False
         return picture
 
     def close(self) -> None:
-        """End the process."""
+        """End process and thread."""
         self._closing = True
         self._requests.put(None)
         self._process.kill()
@@ -136,12 +136,12 @@ class ProcessPhotographer:
 
 def _render_until_closed(pipe: Connection, config: CameraConfig, seed: int, role: Role) -> None:
     take_priority(role)
-    photographer, row = InlinePhotographer(config, seed), Row(())
+    renderer, row = InlineRenderer(config, seed), Row(())
     try:
         while True:
             changed, T_world_camera = pipe.recv()
             row = row if changed is None else changed
-            photographer.expose(row, T_world_camera)
-            pipe.send(photographer.ready())
+            renderer.expose(row, T_world_camera)
+            pipe.send(renderer.ready())
     except (EOFError, BrokenPipeError, KeyboardInterrupt):
         return

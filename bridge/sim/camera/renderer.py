@@ -4,11 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bridge.sim.camera.color import Bytes, Palette
 from bridge.sim.camera.config import CameraConfig
-from bridge.sim.camera.depth import measured_depth, miscalibration
-from bridge.sim.camera.image import photographed
 from bridge.sim.camera.mesh import Floats, Indices, RodMesh
+from bridge.sim.camera.palette import Bytes, Palette
+from bridge.sim.camera.sensors import color_sensor, depth_sensor, miscalibration
 from bridge.sim.vineyard.row import Array, Row
 from rolling_panda.messages.types import WOOD_CLASSES
 
@@ -21,10 +20,9 @@ class RgbdImage:
 
     Attributes:
         color: H×W×3, RGB.
-        depth: H×W, along the optical axis (m), with the sensor's noise; 0 where there is none.
-        labels: H×W, index in `WOOD_CLASSES` of what the pixel really shows, without error; the rows behind are
-            background.
-        rods: H×W, index in `Row.rods` of what the pixel shows, -1 elsewhere: for judges only.
+        depth: H×W, measured along the optical axis (m); 0 = invalid.
+        labels: H×W, true class, index in `WOOD_CLASSES`; the rows behind are background.
+        rods: H×W, index in `Row.rods`, -1 elsewhere; ground truth for benchmarks.
     """
 
     color: Bytes
@@ -34,14 +32,14 @@ class RgbdImage:
 
 
 class Camera:
-    """Renders a row as seen from a place. Keeps the mesh of the last row it saw; not thread-safe."""
+    """Renders a row from a camera pose. Caches the mesh of the last row; not thread-safe."""
 
     def __init__(self, config: CameraConfig | None = None, seed: int = 0) -> None:
         """Prepare the rays.
 
         Args:
             config: Image size, lens and noise.
-            seed: Of the noise and of the colours; not negative.
+            seed: Of noise and colours; not negative.
         """
         self.config = config or CameraConfig()
         self.intrinsics = self.config.intrinsics()
@@ -50,7 +48,7 @@ class Camera:
         self._turn = miscalibration(self.config.calibration_angle, seed).astype(np.float32)
         k = self.intrinsics
         u, v = np.meshgrid((np.arange(k.width) - k.cx) / k.fx, (np.arange(k.height) - k.cy) / k.fy)
-        # Directions reach to depth 1, so the distance a ray comes back with is the depth itself.
+        # Rays have length 1 along the optical axis, so that their distances are depths.
         self._rays = np.stack([u, v, np.ones_like(u)], -1).reshape(-1, 3).astype(np.float32)
         self._lengths = np.linalg.norm(self._rays, axis=1)
         self._row: Row | None = None
@@ -60,18 +58,18 @@ class Camera:
         """Colour, depth and labels of `row` and of the ground z = 0.
 
         Args:
-            row: What stands.
-            T_world_camera: Homogeneous placement (4×4) of the optical frame: z forward, x right, y down.
+            row: The row.
+            T_world_camera: Homogeneous pose (4×4) of the optical frame: z forward, x right, y down.
             frame: Number of the frame; the same number gives the same noise.
         """
         if row is not self._row:
             self._mesh, self._row = RodMesh(row), row
-        eye = T_world_camera[:3, 3].astype(np.float32)
+        origin = T_world_camera[:3, 3].astype(np.float32)
         rays: Floats = self._rays @ (T_world_camera[:3, :3].astype(np.float32) @ self._turn).T
-        hits = self._mesh.first_hits(np.broadcast_to(eye, rays.shape).copy(), rays)
+        hits = self._mesh.first_hits(np.broadcast_to(origin, rays.shape).copy(), rays)
         depth = hits.distance
         down = rays[:, 2] < -1e-6
-        floor = np.where(down, -eye[2] / np.where(down, rays[:, 2], np.float32(-1.0)), np.float32(np.inf))
+        floor = np.where(down, -origin[2] / np.where(down, rays[:, 2], np.float32(-1.0)), np.float32(np.inf))
         on_ground = floor < depth
         depth = np.where(on_ground, floor, depth).astype(np.float32)
         on_rod = (hits.rod >= 0) & ~on_ground
@@ -80,25 +78,25 @@ class Camera:
         own = on_rod & (hits.rod < self._mesh.reachable)
         labels[own] = self._mesh.kind[hits.rod[own]]
         color = np.empty((len(rays), 3), np.float32)
-        color[on_ground] = self._ground_color(eye, rays[on_ground], depth[on_ground])
+        color[on_ground] = self._ground_color(origin, rays[on_ground], depth[on_ground])
         rods = hits.rod[on_rod]
-        points = eye + rays[on_rod] * depth[on_rod, None]
+        points = origin + rays[on_rod] * depth[on_rod, None]
         color[on_rod] = self._rod_color(rods, points)
         sky = ~on_ground & ~on_rod
         color[sky] = self._palette.sky(rays[sky, 2] / self._lengths[sky])
         shape = (self.intrinsics.height, self.intrinsics.width)
         rng = np.random.default_rng([self._seed, frame])
-        seen_width = np.full(len(rays), np.inf, np.float32)
-        seen_width[on_rod] = self._mesh.width[rods] * np.float32(self.intrinsics.fx) / depth[on_rod]
+        pixel_width = np.full(len(rays), np.inf, np.float32)
+        pixel_width[on_rod] = self._mesh.width[rods] * np.float32(self.intrinsics.fx) / depth[on_rod]
         return RgbdImage(
-            photographed(self.config, color.reshape(*shape, 3), rng.spawn(1)[0]),
-            measured_depth(self.config, self.intrinsics.fx, depth.reshape(shape), seen_width.reshape(shape), rng),
+            color_sensor(self.config, color.reshape(*shape, 3), rng.spawn(1)[0]),
+            depth_sensor(self.config, self.intrinsics.fx, depth.reshape(shape), pixel_width.reshape(shape), rng),
             labels.reshape(shape),
             np.where(own, hits.rod, np.int32(-1)).reshape(shape),
         )
 
-    def _ground_color(self, eye: Floats, rays: Floats, depth: Floats) -> Floats:
-        x, y = eye[0] + rays[:, 0] * depth, eye[1] + rays[:, 1] * depth
+    def _ground_color(self, origin: Floats, rays: Floats, depth: Floats) -> Floats:
+        x, y = origin[0] + rays[:, 0] * depth, origin[1] + rays[:, 1] * depth
         return self._palette.ground(x, y, depth)
 
     def _rod_color(self, rods: "np.ndarray[tuple[int], np.dtype[np.int32]]", points: Floats) -> Floats:

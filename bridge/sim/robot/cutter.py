@@ -1,4 +1,4 @@
-"""The secateurs: blades that close on what is really between them."""
+"""The simulated secateurs."""
 
 from dataclasses import dataclass
 
@@ -17,8 +17,8 @@ _IGNORED = frozenset({"background", "ground"})
 
 
 @dataclass(frozen=True)
-class Severed:
-    """One rod that was cut through: its index and the rod as it was, and where (3, m, world)."""
+class SeveredRod:
+    """A severed rod: its index, the rod before the cut, and the position of the cut (3, m, world)."""
 
     index: int
     rod: Rod
@@ -26,46 +26,46 @@ class Severed:
 
 
 @dataclass(frozen=True)
-class Bite:
-    """What the blades did when they met: the row afterwards, what was severed, and why not if nothing was."""
+class CutResult:
+    """Result of closing the blades: the new row, the severed rods, and the reason if there are none."""
 
     row: Row
-    severed: tuple[Severed, ...]
+    severed: tuple[SeveredRod, ...]
     jammed: bool
     detail: str
 
 
 class Cutter:
-    """Blades that close in `close_s`, bite at the end of it, and take as long to open again."""
+    """State machine of the blades: they close in `close_s` and open in the same time."""
 
     def __init__(self, config: BridgeConfig) -> None:
         """Start open."""
         self._config = config
-        self._left = 0.0
+        self._remaining = 0.0
         self.state: CutterState = "open"
         self.cut_id = ""
         self.point_id = ""
         self.outcome: Outcome = ""
         self.detail = ""
 
-    def begin(self, cut_id: str, point_id: str) -> None:
-        """Begin to close."""
+    def start(self, cut_id: str, point_id: str) -> None:
+        """Start to close."""
         self.cut_id, self.point_id = cut_id, point_id
         self.outcome, self.detail = "", ""
-        self.state, self._left = "closing", self._config.close_s
+        self.state, self._remaining = "closing", self._config.close_s
 
     def step(self, dt: float, enabled: bool) -> bool:
-        """Let `dt` seconds pass; True when the blades meet now and `bite` is due.
+        """Advance by `dt` (s); True when the blades are closed and `close_blades` is due.
 
-        Without `enabled` blades that close open again: nothing was cut.
+        Closing blades open again when they are not `enabled`.
         """
         if self.state == "open":
             return False
         if self.state == "closing" and not enabled:
             self.finish("FAILED_NOT_CUT", "the cutter was inhibited before the blades met", jammed=False)
             return False
-        self._left -= dt
-        if self._left > dt / 2:
+        self._remaining -= dt
+        if self._remaining > dt / 2:
             return False
         if self.state == "closing":
             return True
@@ -73,26 +73,26 @@ class Cutter:
         return False
 
     def finish(self, outcome: Outcome, detail: str, jammed: bool) -> None:
-        """Say how the cut ended, and open."""
+        """Set the outcome and start to open."""
         self.outcome, self.detail = outcome, detail
-        self.state, self._left = "jammed" if jammed else "opening", self._config.close_s
+        self.state, self._remaining = "jammed" if jammed else "opening", self._config.close_s
 
 
-def bite(row: Row, T_world_tool: Array, config: BridgeConfig) -> Bite:
+def close_blades(row: Row, T_world_tool: Array, config: BridgeConfig) -> CutResult:
     """Close the blades on the row.
 
-    A cane, spur or node is severed where its axis passes the blade plane (through the tool's origin, square to its y)
-    between the blades. A wire, post, trunk, cordon or any wood thicker than the blades take, with any part of it
-    there, jams them, and then nothing is severed.
+    A cane, spur or node is severed where its axis crosses the blade plane (through the tool's origin, normal to its y)
+    between the blades. Any part of a wire, post, trunk or cordon, or too thick wood, between the blades jams them, and
+    nothing is severed.
 
     Args:
-        row: As it stands.
+        row: The row.
         T_world_tool: Homogeneous pose of the tool (4×4).
         config: Sizes of the blades.
     """
     standing = [(i, rod) for i, rod in row.standing() if rod.kind not in _IGNORED]
     if not standing:
-        return Bite(row, (), False, "nothing between the blades")
+        return CutResult(row, (), False, "nothing between the blades")
     R, p = T_world_tool[:3, :3], T_world_tool[:3, 3]
     starts = (np.array([rod.start for _, rod in standing]) - p) @ R
     ends = (np.array([rod.end for _, rod in standing]) - p) @ R
@@ -107,23 +107,23 @@ def bite(row: Row, T_world_tool: Array, config: BridgeConfig) -> Bite:
         index, rod = standing[k]
         local = rod.at(float(fraction[k]))[1] if crosses[k] else 0.0
         if rod.kind not in _SOFT and touched[k]:
-            return Bite(row, (), True, f"a {rod.kind} is between the blades")
+            return CutResult(row, (), True, f"a {rod.kind} is between the blades")
         if 2 * local > config.largest_diameter:
-            return Bite(row, (), True, f"{rod.kind} of {2000 * local:.0f} mm is too thick for the blades")
+            return CutResult(row, (), True, f"{rod.kind} of {2000 * local:.0f} mm is too thick for the blades")
         if crosses[k]:
             cuts.append((index, rod, float(fraction[k])))
     if not cuts:
-        return Bite(row, (), False, "nothing between the blades")
-    severed = tuple(Severed(index, rod, rod.at(along)[0]) for index, rod, along in cuts)
+        return CutResult(row, (), False, "nothing between the blades")
+    severed = tuple(SeveredRod(index, rod, rod.at(along)[0]) for index, rod, along in cuts)
     for index, _, along in cuts:
-        # An earlier cut of this bite may have taken the rod along.
+        # An earlier cut may have removed the rod.
         if row.rods[index] is not None:
             row = row.sever(index, along)
-    return Bite(row, severed, False, "")
+    return CutResult(row, severed, False, "")
 
 
 def _plane_crossing(starts: Array, ends: Array) -> Array:
-    """Fraction 0…1 at which each rod's axis passes y = 0; NaN where it does not."""
+    """Fraction 0…1 at which each rod's axis crosses y = 0; NaN where it does not."""
     rise = ends[:, 1] - starts[:, 1]
     flat = np.abs(rise) < 1e-9
     fraction = -starts[:, 1] / np.where(flat, 1.0, rise)
@@ -136,7 +136,7 @@ def _between(points: Array, config: BridgeConfig) -> Mask:
 
 
 def _touches(starts: Array, ends: Array, radius: Array, config: BridgeConfig) -> Mask:
-    """Whether any part of each rod is between the blades: its axis clipped to the slot, grown by its radius."""
+    """Whether any part of each rod is between the blades: slab test of its axis, with the box grown by its radius."""
     half = np.array([config.opening / 2, config.blade_half_thickness, config.blade_half_length])
     reach = np.broadcast_to(half, starts.shape) + radius[:, None]
     along = ends - starts

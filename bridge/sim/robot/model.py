@@ -1,14 +1,13 @@
-"""The robot and the solid parts of the row as a MuJoCo model, from the same numbers as the Pinocchio model.
+"""MuJoCo model of the robot and the solid parts of the row, from the same parameters as the Pinocchio model.
 
 Physics assumptions:
-- Flat, hard floor. Each driven wheel touches it in one point below its middle (a sphere of the rolling radius), so the
-  track is exact and turning does not scrub.
-- The caster's fork and wheel are extra bodies; they take part in rolling and swivelling and trail as the real one.
-- The base stands on its three wheels with a free joint; nothing but friction keeps it in place.
-- Posts, trunks, cordons and wires are rigid. Canes and spurs are thin and give way: they are cut and seen, but collide
-  with nothing.
-- Arm, tool and base meet each other, the floor and the row. Pairs that touch in every posture, as the Panda's own
-  description lists them, are left out.
+- Flat, hard floor. Each driven wheel has one contact point below its centre (a sphere of the rolling radius), so that
+  the track is exact and turning does not scrub.
+- The caster's fork and wheel are bodies of their own.
+- The base has a free joint; only friction holds it.
+- Posts, trunks, cordons and wires are rigid. Canes and spurs are visible and can be cut, but do not collide.
+- Arm, tool and base collide with each other, the floor and the row, except for the pairs that the Panda's description
+  excludes.
 """
 
 import xml.etree.ElementTree as ET
@@ -29,13 +28,13 @@ STEP_S = 0.001
 WHEELS = ("wheel_left", "wheel_right")
 ARM = tuple(f"panda_joint{i}" for i in range(1, 8))
 SOLID = frozenset({"post", "trunk", "cordon", "wire", "hose"})
-_ROLLS, _MEETS_ROW, _MEETS_BASE, _MEETS_ARM = 1, 2, 4, 8
-# Estimates: nobody published the caster's masses.
+_ROLLS, _HITS_ROW, _HITS_BASE, _HITS_ARM = 1, 2, 4, 8
+# Estimates; the masses of the caster are not published.
 _FORK_MASS, _CASTER_MASS = 0.6, 0.8
 _CASTER_RADIUS, _CASTER_TRAIL = 0.080, 0.060
-# A wheel's motor seen through its gear (kg·m²): estimate; 1e-4 of a rotor at about 1:30.
+# Inertia of a wheel's motor reflected through its gear (kg·m²): estimate, 1e-4 at about 1:30.
 _WHEEL_ROTOR = 0.1
-# Stiff and nearly at once: under its load a wheel sinks in by less than 1 µm.
+# Stiff: a loaded wheel penetrates the floor by less than 1 µm.
 _FLOOR_SOLREF = (0.002, 1.0)
 _FLOOR_SOLIMP = (0.99, 0.999, 0.0001, 0.5, 2.0)
 _RUBBER = 0.9
@@ -43,14 +42,14 @@ _RUBBER = 0.9
 
 @dataclass(frozen=True)
 class Plant:
-    """A compiled model and where things are in it.
+    """A compiled model and its indices.
 
     Attributes:
         model: MjModel.
         xi_q: Indices of ξ in qpos (9).
         xi_v: Indices of ξ in qvel (9).
         xi_block: Open mesh of xi_v, which picks the rows and columns of ξ from a mass matrix.
-        wheel_load: Inertia that a driving wheel feels of the robot on the ground (kg·m²).
+        wheel_load: Inertia of the robot felt by a driven wheel (kg·m²).
         arm_v: Indices of the arm's joints in qvel (7).
         tool: Site of the tool frame.
         camera: Site of the camera's optical frame.
@@ -125,12 +124,12 @@ def _options(spec: Any) -> None:
     spec.option.timestep = STEP_S
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    # Friction much stiffer than the normal direction: without it the wheels creep under the servo's torque.
+    # Friction much stiffer than the normal direction: otherwise the wheels creep under the servo torque.
     spec.option.impratio = 100.0
     spec.option.iterations = 30
     spec.option.gravity = (0.0, 0.0, -9.81)
     floor = spec.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 0.05])
-    floor.contype, floor.conaffinity = 0, _ROLLS | _MEETS_BASE
+    floor.contype, floor.conaffinity = 0, _ROLLS | _HITS_BASE
     _rubber(floor, _RUBBER)
 
 
@@ -151,7 +150,7 @@ def _add_row(spec: Any, row: Row) -> None:
             fromto=[*rod.start, *rod.end],
             size=[max(rod.start_radius, rod.end_radius), 0.0, 0.0],
         )
-        geom.contype, geom.conaffinity = 0, _MEETS_ROW
+        geom.contype, geom.conaffinity = 0, _HITS_ROW
 
 
 def _add_base(spec: Any, robot: Any) -> Any:
@@ -239,17 +238,16 @@ def _add_collision(bodies: dict[int, Any], robot: Any, link: str, collision: Any
     body = bodies[robot.frames[robot.getFrameId(link)].parentJoint]
     geom = body.add_geom(type=kind, size=size, pos=T.translation, quat=_quat_wxyz(T.rotation))
     near_base = link in ("base_link", "panda_link1", "panda_link2")
-    # Link 7 is the body of cutter and camera too, and stands beside link 5 in every posture.
+    # Link 7 has the body of cutter and camera, and is next to link 5 in every posture.
     meets_arm = link not in ("base_link", "panda_link7")
-    geom.contype = _MEETS_ROW | (0 if near_base else _MEETS_BASE) | (_MEETS_ARM if meets_arm else 0)
-    geom.conaffinity = _MEETS_BASE if link == "base_link" else _MEETS_ARM if meets_arm else 0
+    geom.contype = _HITS_ROW | (0 if near_base else _HITS_BASE) | (_HITS_ARM if meets_arm else 0)
+    geom.conaffinity = _HITS_BASE if link == "base_link" else _HITS_ARM if meets_arm else 0
 
 
 def _exclude_neighbours(spec: Any) -> None:
-    """Leave out pairs of arm links that the Panda's description says touch always, by neighbourhood or by shape.
+    """Exclude the pairs of arm links that the Panda's SRDF excludes.
 
-    Its hand is not here: cutter and camera are part of the body of joint 7 and stand where the hand would. They may
-    come near to link 5, as the hand may not, so that pair stays in.
+    Cutter and camera replace the hand in the body of joint 7 and may touch link 5, so that this pair is kept.
     """
     text = (panda_description() / "srdf" / "panda.srdf").read_text()
     joint_of = {f"panda_link{i}": f"panda_joint{i}" for i in range(1, 8)}

@@ -1,12 +1,14 @@
-"""The simulated robot: MuJoCo's base and arm, the cutter and the camera behind the bridge's interface.
+"""The simulated robot behind the bridge's interface: MuJoCo model, velocity servos, cutter and camera.
 
-Physics assumptions beside those of `bridge.sim.robot.model`:
-- Wheels and arm are velocity servos with a first-order lag. The arm's gravity and Coriolis torques are compensated
-  inside, as the Panda does it, so it holds still without being commanded.
-- Encoders are exact. What the odometry gets wrong, it gets wrong by slip and by wood in the way.
-- What is severed vanishes at once; it does not fall.
+Physics assumptions in addition to those of `bridge.sim.robot.model`:
+- Wheels and arm are velocity servos with a first-order lag. They are outside MuJoCo's actuators: implicit integration
+  of stiff ones changes the wheel speeds after the friction solve, and the base slides by centimetres. Gravity and
+  Coriolis torques of the arm are compensated, as on the Panda.
+- Encoders are exact. Odometry errors come from slip and from contact with wood.
+- Severed wood disappears at once.
 """
 
+import math
 from collections import Counter
 from dataclasses import dataclass
 from typing import Any
@@ -17,46 +19,78 @@ import numpy as np
 from bridge.config import BridgeConfig
 from bridge.core.interface import Measurement, Setpoint
 from bridge.core.picture import Picture
-from bridge.sim.camera.render_process import Photographer
-from bridge.sim.robot.cutter import Bite, Cutter, bite
+from bridge.sim.camera.render_process import CameraRenderer
+from bridge.sim.robot.cutter import CutResult, Cutter, close_blades
 from bridge.sim.robot.model import STEP_S, build_plant
-from bridge.sim.robot.servo import VelocityServos
 from bridge.sim.robot.trace import CUTTER, TraceWriter
 from bridge.sim.vineyard.row import Row
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.model.differential_drive import Array
 
-_SHOWN = frozenset({"post", "trunk", "cordon", "spur", "cane", "node", "wire", "hose", "old cut"})
+_DISPLAYED = frozenset({"post", "trunk", "cordon", "spur", "cane", "node", "wire", "hose", "old cut"})
 _WHEELS_ON_FLOOR = 3
 _SETTLING_STEPS = 200
 # Torque of the servos (N·m): URDF of the base, data sheet of the Panda.
 _TORQUE = np.array([60.0, 60.0, 87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0])
 
 
+#: Time constant of the loop that makes a joint follow the lagged setpoint (s): well above a step of 1 ms.
+LOOP_S = 0.010
+
+
+class VelocityServos:
+    """First-order lag on the setpoint, then a velocity loop with bounded torque."""
+
+    def __init__(self, lag_s: Array, torque: Array, dt: float) -> None:
+        """At rest.
+
+        Args:
+            lag_s: Time constant from setpoint to speed (n, s), of which `LOOP_S` is the loop itself.
+            torque: Bound (n, N·m), on top of what compensates gravity.
+            dt: Step (s).
+        """
+        self._blend = np.array([1.0 - math.exp(-dt / max(lag - LOOP_S, dt / 10)) for lag in lag_s])
+        self._torque = torque
+        self._speed = np.zeros_like(lag_s)
+
+    def step(self, setpoint: Array, measured: Array, inertia: Array) -> Array:
+        """Torques (n, N·m) towards a setpoint.
+
+        Args:
+            setpoint: Speeds asked for (n, rad/s).
+            measured: Speeds (n, rad/s).
+            inertia: What the servos have to move now (n×n, kg·m²): with it the joints do not disturb each other.
+        """
+        self._speed += self._blend * (setpoint - self._speed)
+        wanted = inertia @ (self._speed - measured) / LOOP_S
+        bounded: Array = np.minimum(np.maximum(wanted, -self._torque), self._torque)
+        return bounded
+
+
 @dataclass(frozen=True)
 class TrueBase:
-    """Where base_link really is: x, y (m), heading (rad, not wrapped); velocity along its x and y (m/s), yaw rate."""
+    """True pose of base_link: x, y (m), heading (rad, not wrapped); velocity along its x and y (m/s), yaw rate."""
 
     pose: Array
     velocity: Array
 
 
 class SimulatedRobot:
-    """Implements `bridge.core.interface.Robot`; `write` lets 1 ms pass."""
+    """Implements `bridge.core.interface.Robot`; `write` advances by 1 ms."""
 
     def __init__(
         self,
         config: BridgeConfig,
         row: Row,
-        photographer: Photographer,
+        renderer: CameraRenderer,
         trace: TraceWriter | None = None,
     ) -> None:
-        """Stand at odom's origin in the start posture, at rest.
+        """Start at the origin of odom, at rest in the start posture.
 
         Args:
             config: Of the bridge.
-            row: What stands beside the robot.
-            photographer: Renders the camera's pictures; closed with the robot.
+            row: The row beside the robot.
+            renderer: Renderer of the camera; closed with the robot.
             trace: Records every step; closed with the robot.
 
         Raises:
@@ -64,7 +98,7 @@ class SimulatedRobot:
         """
         self._config = config
         self.row = row
-        self._photographer = photographer
+        self._renderer = renderer
         self._trace = trace
         self._plant = build_plant(row)
         self._data = mujoco.MjData(self._plant.model)
@@ -77,7 +111,7 @@ class SimulatedRobot:
         self._heading = 0.0
         self._scenery: tuple[int, tuple[Capsule, ...]] = (-1, ())
         self.contacts = self.self_contacts = 0
-        #: The emergency stop button that the simulated robot would have is pressed.
+        #: State of the emergency stop button.
         self.emergency = False
 
     @property
@@ -104,23 +138,23 @@ class SimulatedRobot:
         self._advance(setpoint.xi)
         self.contacts, self.self_contacts = self._contacts() if data.ncon > _WHEELS_ON_FLOOR else (0, 0)
         if self._cutter.step(STEP_S, setpoint.blades):
-            self._bite(setpoint)
+            self._close_blades(setpoint)
         if self._trace is not None:
             self._record(self._trace, setpoint)
 
     def cut(self, cut_id: str, point_id: str) -> None:
-        """Begin to close the blades."""
-        self._cutter.begin(cut_id, point_id)
+        """Start to close the blades."""
+        self._cutter.start(cut_id, point_id)
 
     def capture(self, expose: bool) -> Picture | None:
-        """Expose from where the camera really is, or fetch what is ready."""
+        """Expose at the true camera pose, and fetch a finished picture."""
         if expose:
-            self._photographer.expose(self.row, self._site(self._plant.camera))
-        return self._photographer.ready()
+            self._renderer.expose(self.row, self._site(self._plant.camera))
+        return self._renderer.ready()
 
     def close(self) -> None:
-        """End the camera and the trace."""
-        self._photographer.close()
+        """Close renderer and trace."""
+        self._renderer.close()
         if self._trace is not None:
             self._trace.close()
 
@@ -129,7 +163,7 @@ class SimulatedRobot:
         x, y = self._data.qpos[:2]
         w, i, j, k = self._data.qpos[3:7]
         heading = np.arctan2(2 * (w * k + i * j), 1 - 2 * (j * j + k * k))
-        # Follow the turns: arctan2 jumps at half a turn.
+        # Unwrapped.
         self._heading += float(np.remainder(heading - self._heading + np.pi, 2 * np.pi) - np.pi)
         c, s = np.cos(self._heading), np.sin(self._heading)
         vx, vy = self._data.qvel[:2]
@@ -145,7 +179,7 @@ class SimulatedRobot:
         return self._site(self._plant.camera)
 
     def scenery(self) -> tuple[int, tuple[Capsule, ...]]:
-        """Revision of the row, and the row as rods for the display."""
+        """Revision of the row, and the row as capsules for display."""
         if self._scenery[0] != self.row.revision:
             self._scenery = (self.row.revision, _capsules(self.row))
         return self._scenery
@@ -156,7 +190,7 @@ class SimulatedRobot:
         return VelocityServos(lag, _TORQUE, STEP_S)
 
     def _inertia(self) -> Array:
-        """What the servos have to move: the arm as it stands, and half of the robot for each wheel."""
+        """Inertia felt by the servos: that of the arm, and half of the robot for each wheel."""
         model, plant = self._plant.model, self._plant
         mujoco.mj_fullM(model, self._data, self._M)
         inertia: Array = self._M[plant.xi_block]
@@ -167,12 +201,12 @@ class SimulatedRobot:
     def _advance(self, xi: Array) -> None:
         data, plant = self._data, self._plant
         data.ctrl[:] = self._servos.step(xi, data.qvel[plant.xi_v], self._inertia())
-        # The bias of the step before: 1 ms old, as the Panda's own compensation is.
+        # The bias is 1 ms old, as in the Panda's own compensation.
         data.qfrc_applied[plant.arm_v] = data.qfrc_bias[plant.arm_v]
         mujoco.mj_step(plant.model, data)
 
     def _settle(self) -> None:
-        """Let the wheels take their load, then call this place the origin."""
+        """Let the wheels settle under load, then move to the origin."""
         data, plant = self._data, self._plant
         for _ in range(_SETTLING_STEPS):
             self._advance(np.zeros(len(plant.xi_v)))
@@ -192,21 +226,21 @@ class SimulatedRobot:
         return T
 
     def _contacts(self) -> tuple[int, int]:
-        """Contacts with the row, and of the robot with itself."""
+        """Numbers of contacts with the row and of self-contacts."""
         geom = self._data.contact.geom
         row = self._plant.solid[geom].any(axis=1)
         itself = ~row & ~self._plant.rolling[geom].any(axis=1)
         return int(np.count_nonzero(row)), int(np.count_nonzero(itself))
 
-    def _bite(self, setpoint: Setpoint) -> None:
+    def _close_blades(self, setpoint: Setpoint) -> None:
         tool = self.true_tool()
-        result = bite(self.row, tool, self._config)
+        result = close_blades(self.row, tool, self._config)
         self.row = result.row
-        self._cutter.finish("DONE" if result.severed else "FAILED_NOT_CUT", _sentence(result), result.jammed)
+        self._cutter.finish("DONE" if result.severed else "FAILED_NOT_CUT", _detail(result), result.jammed)
         if self._trace is not None:
             self._trace.event(self._cut_event(result, tool, setpoint))
 
-    def _cut_event(self, result: Bite, tool: Array, setpoint: Setpoint) -> dict[str, Any]:
+    def _cut_event(self, result: CutResult, tool: Array, setpoint: Setpoint) -> dict[str, Any]:
         cutter = self._cutter
         return {
             "event": "cut",
@@ -245,7 +279,7 @@ class SimulatedRobot:
         trace.commit()
 
 
-def _sentence(result: Bite) -> str:
+def _detail(result: CutResult) -> str:
     if not result.severed:
         return result.detail
     counts = Counter(item.rod.kind for item in result.severed)
@@ -262,5 +296,5 @@ def _capsules(row: Row) -> tuple[Capsule, ...]:
             float(rod.end_radius),
         )
         for _, rod in row.standing()
-        if rod.kind in _SHOWN
+        if rod.kind in _DISPLAYED
     )

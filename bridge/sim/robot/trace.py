@@ -1,8 +1,8 @@
-"""The independent record at the simulated actuator: one row a physics step, and an event a cut.
+"""Trace of the simulated actuators: one row for each physics step, and one event for each cut.
 
-The file is a sequence of blocks: one letter, a length (uint32, little-endian), then that many bytes. `H` is JSON with
-the fields of a row, `R` is rows, `E` is one event in JSON. Blocks are handed to the operating system whole, every 100
-steps, so that a killed bridge loses no more than that; a torn last block is left out when reading.
+The file is a sequence of blocks: one letter, a length (uint32, little-endian), and the data. `H` is JSON with the
+fields of a row, `R` is rows, `E` is one event in JSON. A block is written every 100 steps, the most that a killed
+bridge loses; an incomplete last block is ignored.
 """
 
 import json
@@ -35,8 +35,8 @@ ROW = np.dtype(
     ]
 )
 CUTTER = ("open", "closing", "opening", "jammed")
-_BLOCK = 100
-_HEAD = struct.Struct("<cI")
+_ROWS_PER_BLOCK = 100
+_BLOCK_HEADER = struct.Struct("<cI")
 
 
 @dataclass(frozen=True)
@@ -46,15 +46,13 @@ class Trace:
     rows: NDArray[Any]
     events: tuple[dict[str, Any], ...]
 
-    def still_after(self, clock: float, base: float = 0.01, joint: float = 0.01) -> float:
-        """The robot's seconds from a fault until base and arm are still and stay so; inf if never.
-
-        Simulated seconds, which are those of the clock unless the machine is too slow for real time.
+    def stopping_time(self, clock: float, base: float = 0.01, joint: float = 0.01) -> float:
+        """Simulated time (s) from a fault to standstill of base and arm; infinite without standstill.
 
         Args:
-            clock: When the fault was (s, the bridge's clock).
-            base: What counts as still (m/s, and rad/s of yaw).
-            joint: What counts as still for an arm joint (rad/s).
+            clock: Time of the fault (s, the bridge's clock).
+            base: Largest speed of the base at standstill (m/s, and rad/s of yaw).
+            joint: Largest speed of an arm joint at standstill (rad/s).
         """
         after = self.rows[self.rows["clock"] >= clock]
         moving = (np.abs(after["base_velocity"]).max(axis=1, initial=0.0) > base) | (
@@ -70,7 +68,7 @@ class TraceWriter:
     """Writes a trace. Fill `row` and call `commit` for each step."""
 
     def __init__(self, path: Path) -> None:
-        """Begin the file, replacing what was there.
+        """Create the file, or replace it.
 
         Raises:
             ConfigError: The file cannot be written.
@@ -79,7 +77,7 @@ class TraceWriter:
             self._file = path.open("wb", buffering=0)
         except OSError as error:
             raise ConfigError(f"cannot write the trace {path}: {error.strerror}") from error
-        self._rows = np.zeros(_BLOCK, ROW)
+        self._rows = np.zeros(_ROWS_PER_BLOCK, ROW)
         self._filled = 0
         self._block(b"H", json.dumps({"row": ROW.descr, "cutter": CUTTER}).encode())
 
@@ -89,24 +87,24 @@ class TraceWriter:
         return self._rows[self._filled]
 
     def commit(self) -> None:
-        """The row is complete."""
+        """Complete the row."""
         self._filled += 1
-        if self._filled == _BLOCK:
+        if self._filled == _ROWS_PER_BLOCK:
             self.flush()
 
     def event(self, event: dict[str, Any]) -> None:
-        """Write an event at once, after the rows before it."""
+        """Write an event after the rows before it."""
         self.flush()
         self._block(b"E", json.dumps(event).encode())
 
     def flush(self) -> None:
-        """Hand over the rows that wait."""
+        """Write the buffered rows."""
         if self._filled:
             self._block(b"R", self._rows[: self._filled].tobytes())
             self._filled = 0
 
     def close(self) -> None:
-        """Write what waits and close; safe to call twice."""
+        """Write the buffered rows and close; idempotent."""
         if not self._file.closed:
             self.flush()
             self._file.close()
@@ -120,21 +118,21 @@ class TraceWriter:
         self.close()
 
     def _block(self, kind: bytes, data: bytes) -> None:
-        self._file.write(_HEAD.pack(kind, len(data)) + data)
+        self._file.write(_BLOCK_HEADER.pack(kind, len(data)) + data)
 
 
 def read(path: Path) -> Trace:
-    """Load a trace, also one that is still being written or whose writer was killed.
+    """Load a trace; it may be incomplete.
 
     Raises:
         InputError: Not a trace, or of another version.
     """
     data = path.read_bytes()
     blocks, events, at, header = [], [], 0, None
-    while at + _HEAD.size <= len(data):
-        kind, length = _HEAD.unpack_from(data, at)
-        body = data[at + _HEAD.size : at + _HEAD.size + length]
-        at += _HEAD.size + length
+    while at + _BLOCK_HEADER.size <= len(data):
+        kind, length = _BLOCK_HEADER.unpack_from(data, at)
+        body = data[at + _BLOCK_HEADER.size : at + _BLOCK_HEADER.size + length]
+        at += _BLOCK_HEADER.size + length
         if len(body) < length:
             break
         if kind == b"H":

@@ -12,19 +12,19 @@ from PIL import Image, ImageDraw
 from bridge.sim.camera.config import CameraConfig
 from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
-from bridge.sim.vineyard.file import Vineyard, right_places, save
+from bridge.sim.vineyard.file import Vineyard, cut_positions, save
 from bridge.sim.vineyard.grow import grow
 from bridge.sim.vineyard.row import Array
 from rolling_panda.config import load_section
 from rolling_panda.errors import RollingPandaError
 
-#: The picture shows this much of the row from this far (m).
+#: Width of the picture at the row, and distance of the camera (m); radius of a ring (px).
 _ACROSS, _AWAY = 2.4, 1.4
 _MARK = 5
 
 
 def picture(vineyard: Vineyard, vine: int = 0) -> Image.Image:
-    """A vine from the front, with a red ring at every place where a cut is right.
+    """A vine from the front, with a red ring at every right cut.
 
     Args:
         vineyard: The row.
@@ -37,7 +37,7 @@ def picture(vineyard: Vineyard, vine: int = 0) -> Image.Image:
     place[:3, 3] = [config.first_vine_x + vine * config.vine_spacing, config.row_distance - _AWAY, 1.1]
     image = Image.fromarray(camera.render(vineyard.row, place).color)
     draw = ImageDraw.Draw(image)
-    for u, v in _pixels(camera, place, right_places(vineyard)):
+    for u, v in _pixels(camera, place, cut_positions(vineyard)):
         draw.ellipse((u - _MARK, v - _MARK, u + _MARK, v + _MARK), outline=(230, 30, 30), width=2)
     return image
 
@@ -60,27 +60,29 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--vines", type=int, help="how many (default: as configured)")
     parser.add_argument("--training", choices=("cordon", "guyot"), help="how the vines are trained")
     parser.add_argument("--config", type=Path, metavar="FILE", help="TOML file with a section [vineyard]")
-    words = parser.parse_args(argv)
+    arguments = parser.parse_args(argv)
     try:
-        if words.seed < 0:
-            parser.error(f"--seed {words.seed} is negative; give 0 or more")
-        config = VineyardConfig() if words.config is None else load_section(words.config, "vineyard", VineyardConfig)
-        if words.training is not None:
-            config = msgspec.structs.replace(config, training=words.training)
-        if words.vines is not None:
-            if not 1 <= words.vines <= 100:
-                parser.error(f"--vines {words.vines}: give 1 to 100")
-            config = msgspec.structs.replace(config, vines=words.vines)
-        vineyard = Vineyard(words.seed, config, grow(config, words.seed))
-        save(words.out, vineyard)
-        picture(vineyard).save(words.out.with_suffix(".png"))
+        if arguments.seed < 0:
+            parser.error(f"--seed {arguments.seed} is negative; give 0 or more")
+        config = (
+            VineyardConfig() if arguments.config is None else load_section(arguments.config, "vineyard", VineyardConfig)
+        )
+        if arguments.training is not None:
+            config = msgspec.structs.replace(config, training=arguments.training)
+        if arguments.vines is not None:
+            if not 1 <= arguments.vines <= 100:
+                parser.error(f"--vines {arguments.vines}: give 1 to 100")
+            config = msgspec.structs.replace(config, vines=arguments.vines)
+        vineyard = Vineyard(arguments.seed, config, grow(config, arguments.seed))
+        save(arguments.out, vineyard)
+        picture(vineyard).save(arguments.out.with_suffix(".png"))
     except RollingPandaError as error:
         print(f"rolling-panda vineyard: {error}", file=sys.stderr)
         return 1
     print(
-        f"{config.vines} vines ({config.training}), {len(vineyard.row.rods)} rods, {len(right_places(vineyard))} cuts"
+        f"{config.vines} vines ({config.training}), {len(vineyard.row.rods)} rods, {len(cut_positions(vineyard))} cuts"
     )
-    print(f"{words.out}\n{words.out.with_suffix('.png')}")
+    print(f"{arguments.out}\n{arguments.out.with_suffix('.png')}")
     return 0
 
 

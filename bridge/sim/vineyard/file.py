@@ -1,4 +1,4 @@
-"""A grown row with its truth as one file, so that others can look at the same row: JSON, lengths in metres."""
+"""Files with a row and its truth: JSON, lengths in metres."""
 
 from pathlib import Path
 
@@ -7,8 +7,7 @@ import numpy as np
 
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.row import Array, Rod, Row
-from bridge.sim.vineyard.truth import RightCut, judge
-from bridge.sim.vineyard.truth_guyot import judge_guyot
+from bridge.sim.vineyard.truth import RightCut, judge, judge_guyot
 from rolling_panda.errors import ConfigError, InputError
 from rolling_panda.messages.types import Vector3, WoodClass
 
@@ -63,11 +62,11 @@ class Vineyard(msgspec.Struct, frozen=True):
 
 
 def save(path: Path, vineyard: Vineyard) -> None:
-    """Write the row and, beside it, what a grower would cut.
+    """Write a row; an uncut one with its truth.
 
     Args:
         path: File to write.
-        vineyard: A row that has not been cut yet has its truth written too.
+        vineyard: The row.
 
     Raises:
         ConfigError: The file cannot be written.
@@ -106,13 +105,13 @@ def load(path: Path) -> Vineyard:
     rods = tuple(None if rod is None else _decoded(rod) for rod in document.rods)
     for index, rod in enumerate(rods):
         if rod is not None and rod.parent >= index:
-            raise InputError(f"{path}: rod {index} hangs on rod {rod.parent}; parents stand before their children")
+            raise InputError(f"{path}: rod {index} has parent {rod.parent}; parents come before their children")
     row = Row(rods, document.revision, tuple(_decoded(rod) for rod in document.backdrop))
     return Vineyard(document.seed, document.config, row)
 
 
-def right_places(vineyard: Vineyard) -> Array:
-    """The best place of every cut that the rule asks for (N×3, m, world)."""
+def cut_positions(vineyard: Vineyard) -> Array:
+    """Best position of every right cut (N×3, m, world)."""
     return np.array([cut.best for cut in _truth(vineyard)]).reshape(-1, 3)
 
 
@@ -128,7 +127,7 @@ def _decoded(rod: _Rod) -> Rod:
 
 
 def _truth(vineyard: Vineyard) -> list[_Right]:
-    """Every stretch where a cut is right."""
+    """All right cuts."""
     out: list[_Right] = []
     if vineyard.config.training == "guyot":
         for vine in judge_guyot(vineyard.row):

@@ -1,6 +1,6 @@
-"""The row as rods: what the camera sees, what the blades cut, and what falls when they do.
+"""The simulated row as rods.
 
-Ground truth of the simulation. It never crosses the wire except as display scenery and pixels.
+It is ground truth: only images and display scenery leave the simulation.
 """
 
 from collections.abc import Iterable
@@ -19,15 +19,15 @@ class Rod:
     """A straight piece of wood, post or wire with round ends; its place in `Row.rods` is its index.
 
     Attributes:
-        kind: What it is.
-        start: End that is nearer to the root (3, m, world).
+        kind: Class.
+        start: End nearer to the root (3, m, world).
         end: Other end (3, m, world).
         start_radius: Radius at `start` (m).
         end_radius: Radius at `end` (m).
-        parent: Index of the rod that carries it; -1 where the ground or a post does.
+        parent: Index of the rod that carries it; -1 for none.
         vine: Vine along the row, -1 for posts, wires and ground.
-        spur: Spur position on the vine, -1 where there is none.
-        cane: Cane on the spur, -1 where there is none.
+        spur: Spur on the vine, -1 for none.
+        cane: Cane on the spur, -1 for none.
     """
 
     kind: WoodClass
@@ -48,12 +48,12 @@ class Rod:
 
 @dataclass(frozen=True)
 class Row:
-    """A row as it stands. Severing makes a new row with a higher `revision`; indices stay what they were.
+    """An immutable row. A cut gives a new row with a higher `revision`; indices do not change.
 
     Attributes:
-        rods: All rods ever; one that has gone is None.
-        revision: Grows with every cut.
-        backdrop: Rods of the rows behind: they are seen and never reached.
+        rods: All rods; None for removed ones.
+        revision: Number of cuts.
+        backdrop: Rods of the rows behind: visible only.
     """
 
     rods: tuple[Rod | None, ...]
@@ -61,20 +61,18 @@ class Row:
     backdrop: tuple[Rod, ...] = ()
 
     def standing(self) -> Iterable[tuple[int, Rod]]:
-        """Index and rod of what still stands."""
+        """Index and rod of all that are not removed."""
         return ((index, rod) for index, rod in enumerate(self.rods) if rod is not None)
 
     def sever(self, index: int, fraction: float) -> "Row":
-        """The row after rod `index` was cut through at `fraction` of its length: all that it carried beyond has gone.
-
-        Children of the cut rod that sit nearer to its start than the cut (buds on a cane) stay.
+        """The row after a cut through rod `index` at `fraction` of its length, without all that it carried beyond.
 
         Raises:
-            IndexError: The rod is gone or there is no such rod.
+            IndexError: The rod is removed or does not exist.
         """
         cut = self.rods[index]
         if cut is None:
-            raise IndexError(f"rod {index} has already gone")
+            raise IndexError(f"rod {index} has been removed already")
         point, radius = cut.at(fraction)
         length = float(np.linalg.norm(cut.end - cut.start))
         gone: set[int] = set()

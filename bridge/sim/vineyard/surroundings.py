@@ -1,16 +1,16 @@
-"""What stands in a row beside the wood of the year: posts, wires, hose, ties, old wounds, and the rows behind."""
+"""Posts, wires, hose, ties and old cuts of a row, and the rows behind."""
 
 import numpy as np
 
-from bridge.sim.vineyard.cane import Growth, towards, uniform
+from bridge.sim.vineyard.cane import RowBuilder, draw, unit_vector
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.row import Array, Rod
 
 #: A tie is a ring of this length and thickness around wood and wire (m).
-_TIE_LENGTH, _TIE_THICK = 0.012, 0.002
+_TIE_LENGTH, _TIE_THICKNESS = 0.012, 0.002
 
 
-def posts_and_wires(growth: Growth) -> None:
+def add_posts_and_wires(growth: RowBuilder) -> None:
     """Append posts and wires."""
     config = growth.config
     first, last = _ends(config)
@@ -26,7 +26,7 @@ def posts_and_wires(growth: Growth) -> None:
         growth.add(Rod("wire", ends[0], ends[1], config.wire_radius, config.wire_radius))
 
 
-def hose(growth: Growth) -> None:
+def add_hose(growth: RowBuilder) -> None:
     """Append the drip hose."""
     config = growth.config
     if config.hose_height > 0.0:
@@ -34,19 +34,19 @@ def hose(growth: Growth) -> None:
         growth.add(Rod("hose", ends[0], ends[1], config.hose_radius, config.hose_radius))
 
 
-def wounds(growth: Growth, rng: np.random.Generator, first: int) -> None:
+def add_old_cuts(growth: RowBuilder, rng: np.random.Generator, first: int) -> None:
     """Append old cuts: one on the tip of every stub, and some on trunk and arms.
 
     Args:
         growth: The row so far.
-        rng: Source of every draw.
+        rng: Random generator.
         first: Index of the vine's first rod.
     """
     config = growth.config
     present = [(index, rod) for index, rod in enumerate(growth.rods) if index >= first and rod is not None]
     for index, rod in present:
         if rod.kind == "spur":
-            tip = rod.end + uniform(rng, config.old_cut) * towards(rod.end - rod.start)
+            tip = rod.end + draw(rng, config.old_cut) * unit_vector(rod.end - rod.start)
             growth.add(Rod("old cut", rod.end, tip, rod.end_radius, rod.end_radius * 0.9, index, rod.vine, rod.spur))
     bark = [(index, rod) for index, rod in present if rod.kind in ("trunk", "cordon")]
     for _ in range(int(rng.integers(config.old_cuts_a_vine[0], config.old_cuts_a_vine[1] + 1))):
@@ -54,23 +54,23 @@ def wounds(growth: Growth, rng: np.random.Generator, first: int) -> None:
         point, thickness = rod.at(float(rng.uniform(0.1, 0.9)))
         outward = _square(rng, rod)
         radius = min(float(rng.uniform(0.005, 0.010)), 0.6 * thickness)
-        tip = point + (thickness + uniform(rng, config.old_cut)) * outward
+        tip = point + (thickness + draw(rng, config.old_cut)) * outward
         growth.add(Rod("old cut", point, tip, radius, radius, index, rod.vine))
 
 
-def ties(growth: Growth, rng: np.random.Generator, first: int) -> None:
-    """Append ties around arms; the blades must keep off them as off the wire, and so they are of its kind."""
+def add_ties(growth: RowBuilder, rng: np.random.Generator, first: int) -> None:
+    """Append ties around arms; they have the class of the wire, which the blades must avoid too."""
     config = growth.config
     arms = [rod for rod in growth.rods[first:] if rod is not None and rod.kind == "cordon"]
     for _ in range(int(rng.integers(config.ties_a_vine[0], config.ties_a_vine[1] + 1))):
         rod = arms[int(rng.integers(len(arms)))]
         point, thickness = rod.at(float(rng.uniform(0.2, 0.8)))
-        along = towards(rod.end - rod.start) * _TIE_LENGTH / 2
-        growth.add(Rod("wire", point - along, point + along, thickness + _TIE_THICK, thickness + _TIE_THICK))
+        along = unit_vector(rod.end - rod.start) * _TIE_LENGTH / 2
+        growth.add(Rod("wire", point - along, point + along, thickness + _TIE_THICKNESS, thickness + _TIE_THICKNESS))
 
 
 def backdrop(config: VineyardConfig, seed: int) -> tuple[Rod, ...]:
-    """The rows behind, in less detail: what is seen between the canes."""
+    """The rows behind, in less detail."""
     rng = np.random.default_rng([seed, 2**20])
     rods: list[Rod] = []
     first, last = _ends(config)
@@ -88,7 +88,7 @@ def backdrop(config: VineyardConfig, seed: int) -> tuple[Rod, ...]:
             for _ in range(2 * config.spurs_per_arm * 2):
                 start = np.array([x + rng.uniform(-0.9, 0.9), y, config.cordon_height])
                 lean = rng.normal(0.0, config.cane_tilt, 2)
-                tip = start + uniform(rng, config.cane_length) * towards(np.array([lean[0], lean[1], 1.0]))
+                tip = start + draw(rng, config.cane_length) * unit_vector(np.array([lean[0], lean[1], 1.0]))
                 rods.append(Rod("cane", start, tip, config.cane_radius_mean, 0.5 * config.cane_radius_mean))
     return tuple(rods)
 
@@ -100,6 +100,6 @@ def _ends(config: VineyardConfig) -> tuple[float, float]:
 
 def _square(rng: np.random.Generator, rod: Rod) -> Array:
     """A random unit vector square to the rod (3)."""
-    axis = towards(rod.end - rod.start)
+    axis = unit_vector(rod.end - rod.start)
     across = rng.standard_normal(3)
-    return towards(across - float(across @ axis) * axis)
+    return unit_vector(across - float(across @ axis) * axis)

@@ -1,7 +1,10 @@
-"""Where a grower would cut the simulated row: the judge for tests and benchmarks, never an input of perception.
+"""Ground truth of the right cuts, for tests and benchmarks; never an input of perception.
 
-The rule of spur pruning with two count nodes: keep the lowest cane that is thick enough, take the stub with its other
-canes off in one cut beyond it, and shorten it a little past its second node; the basal bud is not counted.
+Spur pruning with two count nodes: keep the lowest cane that is thick enough, remove the stub with its other canes in
+one cut beyond it, and shorten it past its second node. The basal bud is not counted.
+
+Guyot: the lower cane of the spur is cut to two nodes and becomes the next spur, the upper one is shortened to the
+fruiting nodes, and last year's cane is removed in one cut beyond the head.
 """
 
 from dataclasses import dataclass
@@ -10,11 +13,11 @@ import numpy as np
 
 from bridge.sim.vineyard.row import Array, Rod, Row
 
-#: Count nodes that stay; cut past the last one: at best, least and most; internodes shorter than this are halved (m).
+#: Count nodes kept; distance of the cut past the last one: best, least, most; shorter internodes are halved (m).
 KEPT_NODES = 2
 BEST_PAST, LEAST_PAST, MOST_PAST = 0.020, 0.010, 0.030
 SHORT_INTERNODE = 0.040
-#: A cane at least as thick as this makes a new spur (m).
+#: Least diameter of a new spur (m).
 GOOD_DIAMETER = 0.006
 #: Wood left on either side of a cut through the stub (m).
 _STUB_MARGIN = 0.004
@@ -39,7 +42,7 @@ class RightCut:
     tangent: Array
 
     def past_best(self, point: Array) -> float:
-        """How far beyond the best place `point` (3, m) is along the wood (m, signed)."""
+        """Signed distance of `point` (3, m) beyond the best place along the wood (m)."""
         return float((point - self.best) @ self.tangent)
 
     def holds(self, rod: int, point: Array) -> bool:
@@ -47,13 +50,13 @@ class RightCut:
         return rod == self.rod and float((point - self.least) @ self.tangent) >= 0.0 >= self.past_most(point)
 
     def past_most(self, point: Array) -> float:
-        """How far beyond the last right place `point` (3, m) is along the wood (m, signed)."""
+        """Signed distance of `point` (3, m) beyond the last right place along the wood (m)."""
         return float((point - self.most) @ self.tangent)
 
 
 @dataclass(frozen=True)
 class SpurTruth:
-    """What is right for one spur.
+    """Right cuts of one spur.
 
     Attributes:
         vine: Vine along the row.
@@ -79,7 +82,7 @@ class SpurTruth:
 
 
 def judge(row: Row) -> tuple[SpurTruth, ...]:
-    """The truth for every spur that carries canes, in the order of vines and spurs; `row` has not been cut yet."""
+    """Truth of every spur with canes, in the order of vines and spurs, for an uncut row."""
     stubs: dict[tuple[int, int], int] = {}
     chains: dict[tuple[int, int], dict[int, list[tuple[int, Rod]]]] = {}
     for index, rod in row.standing():
@@ -87,7 +90,7 @@ def judge(row: Row) -> tuple[SpurTruth, ...]:
             stubs[rod.vine, rod.spur] = index
         elif rod.cane >= 0:
             chains.setdefault((rod.vine, rod.spur), {}).setdefault(rod.cane, []).append((index, rod))
-    # Shoots of a Guyot vine stand on no stub (`bridge.sim.vineyard.truth_guyot`).
+    # Shoots of a Guyot vine have no stub.
     return tuple(_judge_spur(row, stubs[place], place, chains[place]) for place in sorted(chains) if place in stubs)
 
 
@@ -110,14 +113,14 @@ def _judge_spur(
         keeper=keeper,
         diameter=diameters[keeper],
         nodes=np.array(middles).reshape(-1, 3),
-        cut=shortening(chains[keeper], KEPT_NODES),
+        cut=shortening_cut(chains[keeper], KEPT_NODES),
         renewal=_renewal(stub_index, stub, along[keeper], along[beyond[0]]) if beyond else None,
         surplus=tuple(cane for cane in upwards if along[cane] < along[keeper]),
     )
 
 
-def shortening(chain: list[tuple[int, Rod]], kept: int) -> RightCut | None:
-    """Where a cane is cut so that so many count nodes stay; None where it has fewer.
+def shortening_cut(chain: list[tuple[int, Rod]], kept: int) -> RightCut | None:
+    """The right cut of a cane for a number of kept nodes; None where it has fewer.
 
     Args:
         chain: Its rods with their indices, base first.
@@ -136,17 +139,17 @@ def shortening(chain: list[tuple[int, Rod]], kept: int) -> RightCut | None:
         if half + length + following < SHORT_INTERNODE:
             best = (half + length + following) / 2 - half
     least, most = max(least, 0.0), min(most, length)
-    return stretch(index, rod, least, min(max(best, least), most), most)
+    return right_cut(index, rod, least, min(max(best, least), most), most)
 
 
 def _renewal(index: int, stub: Rod, keeper: float, following: float) -> RightCut:
     least, most = keeper + _STUB_MARGIN, following - _STUB_MARGIN
     if most < least:
         least = most = (keeper + following) / 2
-    return stretch(index, stub, least, (least + most) / 2, most)
+    return right_cut(index, stub, least, (least + most) / 2, most)
 
 
-def stretch(index: int, rod: Rod, least: float, best: float, most: float) -> RightCut:
+def right_cut(index: int, rod: Rod, least: float, best: float, most: float) -> RightCut:
     """The right stretch of a rod, by distances from its start (m)."""
     tangent = (rod.end - rod.start) / _length(rod)
     points = [rod.start + distance * tangent for distance in (least, best, most)]
@@ -154,7 +157,7 @@ def stretch(index: int, rod: Rod, least: float, best: float, most: float) -> Rig
 
 
 def _diameter(chain: list[tuple[int, Rod]]) -> float:
-    # The first internode past the basal bud, where a grower looks; the stub of a cane that has no bud.
+    # In the first internode past the basal bud.
     rod = chain[2][1] if len(chain) > 2 else chain[0][1]
     return 2.0 * rod.at(0.5)[1]
 
@@ -165,3 +168,57 @@ def _along(stub: Rod, point: Array) -> float:
 
 def _length(rod: Rod) -> float:
     return float(np.linalg.norm(rod.end - rod.start))
+
+
+#: Nodes on the cane that will fruit.
+FRUITING_NODES = 8
+#: Old cane left at the head, and kept free before its first shoot (m).
+_STUMP, _BEFORE_SHOOT = 0.03, 0.02
+
+
+@dataclass(frozen=True)
+class GuyotTruth:
+    """Right cuts of one Guyot vine.
+
+    Attributes:
+        vine: Vine along the row.
+        lower: The spur's cane that becomes the next spur.
+        upper: The spur's cane that becomes the next fruiting cane.
+        spur_cut: On the lower one; None where it has too few nodes.
+        cane_cut: On the upper one; the same.
+        removal: Of last year's cane.
+    """
+
+    vine: int
+    lower: int
+    upper: int
+    spur_cut: RightCut | None
+    cane_cut: RightCut | None
+    removal: RightCut
+
+
+def judge_guyot(row: Row) -> tuple[GuyotTruth, ...]:
+    """Truth of every Guyot vine, in order, for an uncut row."""
+    chains: dict[int, dict[int, list[tuple[int, Rod]]]] = {}
+    arms: dict[int, tuple[int, Rod]] = {}
+    for index, rod in row.standing():
+        if rod.cane >= 0 and rod.spur == 0:
+            chains.setdefault(rod.vine, {}).setdefault(rod.cane, []).append((index, rod))
+        elif rod.kind == "cordon":
+            arms.setdefault(rod.vine, (index, rod))
+    out = []
+    for vine in sorted(chains):
+        lower, upper = sorted(chains[vine], key=lambda cane: float(chains[vine][cane][0][1].start[2]))
+        index, arm = arms[vine]
+        length = float(np.linalg.norm(arm.end - arm.start))
+        out.append(
+            GuyotTruth(
+                vine=vine,
+                lower=lower,
+                upper=upper,
+                spur_cut=shortening_cut(chains[vine][lower], KEPT_NODES),
+                cane_cut=shortening_cut(chains[vine][upper], FRUITING_NODES),
+                removal=right_cut(index, arm, _STUMP, _STUMP + 0.02, length - _BEFORE_SHOOT),
+            )
+        )
+    return tuple(out)
