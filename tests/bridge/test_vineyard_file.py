@@ -57,7 +57,7 @@ def test_a_file_of_another_format_or_with_orphans_is_refused(tmp_path):
         load(path)
     document["rods"][3][5] = 900
     path.write_bytes(msgspec.json.encode(document))
-    with pytest.raises(InputError, match="parents stand before"):
+    with pytest.raises(InputError, match="parents come before"):
         load(path)
 
 
