@@ -1,1 +1,1 @@
-"""Camera frames to pruning points that explain themselves."""
+"""From camera frames to pruning points with reasons."""

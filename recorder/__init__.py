@@ -1,1 +1,1 @@
-"""Recording and replay: what was on the robot's wire, as MCAP files."""
+"""Recording and replay of all messages of a robot, as MCAP files."""

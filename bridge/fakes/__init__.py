@@ -1,1 +1,1 @@
-"""Fakes of the robot's devices that the makers' own client libraries talk to; for a machine without the robot."""
+"""Fake devices of the robot, for the makers' own client libraries."""

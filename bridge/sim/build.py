@@ -51,8 +51,8 @@ def simulated_bridge(
     model = RobotModel(limits)
     odometer = Odometer(model.drive, config.odometry, TICK_S, seed)
     robot = simulated_robot(config_path, seed, trace, camera)
-    told = (*wider("bridge", config), *wider("robot", limits))
-    return BridgeCore(robot, config, model.limits, odometer, "sim", robot.scenery, rejections, cuts, memory, told)
+    widened = (*wider("bridge", config), *wider("robot", limits))
+    return BridgeCore(robot, config, model.limits, odometer, "sim", robot.scenery, rejections, cuts, memory, widened)
 
 
 def simulated_robot(

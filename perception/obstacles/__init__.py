@@ -1,1 +1,1 @@
-"""Posts, trunks, cordons and wires that the robot keeps away from."""
+"""Obstacle map of posts, trunks, cordons and wires."""

@@ -1,1 +1,1 @@
-"""The vine as a model: spurs, canes, numbers, and the map over all frames."""
+"""Plant model: spurs, canes, their numbers, and the map over all frames."""

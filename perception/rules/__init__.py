@@ -1,1 +1,1 @@
-"""Pruning rules: from a spur to cuts, and what the blades must keep out of."""
+"""Pruning rules, keep-out zones of the blades, and points by hand."""

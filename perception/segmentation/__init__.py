@@ -1,1 +1,1 @@
-"""Frames and photographs to a class for each pixel."""
+"""Decoded frames and their semantic segmentation."""

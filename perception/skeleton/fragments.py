@@ -224,8 +224,8 @@ def _layers(pixels: CanePixels) -> Index:
     layer = np.zeros(len(sizes), dtype=np.intp)
     done: set[int] = set()
     for component in np.argsort(-sizes, kind="stable"):
-        taken = {int(layer[other]) for other in beside.get(int(component), set()) & done}
-        layer[component] = next(n for n in range(len(taken) + 1) if n not in taken)
+        used = {int(layer[other]) for other in beside.get(int(component), set()) & done}
+        layer[component] = next(n for n in range(len(used) + 1) if n not in used)
         done.add(int(component))
     out: Index = layer[pixels.component]
     return out

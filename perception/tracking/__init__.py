@@ -1,1 +1,1 @@
-"""What is known over time: tracked points, closer looks and canes that stay."""
+"""State over time: tracked points, close-up checks, retained canes."""

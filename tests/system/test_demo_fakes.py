@@ -43,7 +43,7 @@ def test_an_accepted_point_is_cut_where_it_was_accepted_by_libfranka_ros_and_lib
     # the longest that may be configured, and what is paused for longer is taken up again.
     patient = (
         "[controller]\nobstacles_max_age_s = 10.0\nlook_timeout_s = 20.0\nperception_max_age_s = 2.0\n\n"
-        "[perception]\nhang_s = 20.0"
+        "[perception]\nframe_timeout_s = 20.0"
     )
     small = "[vineyard]\nvines = 1\nrows_behind = 0\n\n"
     config.write_text(text.replace("[perception]", small + patient))

@@ -1,4 +1,4 @@
-"""Numbers of the simulated eye-in-hand camera, after the RealSense D435i."""
+"""Configuration of the simulated eye-in-hand camera, after the RealSense D435i."""
 
 import math
 from typing import Annotated

@@ -1,1 +1,1 @@
-"""The simulated row, its growth, its file and its truth."""
+"""The simulated row: growth, files and ground truth."""

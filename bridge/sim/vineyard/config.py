@@ -1,4 +1,4 @@
-"""Numbers of the row that the simulation grows: spreads of spur-pruned, vertically shoot-positioned vineyards."""
+"""Configuration of the simulated row, after spur-pruned, vertically shoot-positioned vineyards."""
 
 from typing import Annotated, Literal
 
@@ -13,49 +13,49 @@ Count = Annotated[int, Meta(ge=0, le=100)]
 
 
 class VineyardConfig(Struct, frozen=True, forbid_unknown_fields=True):
-    """What `grow` draws from. Pairs are the lower and upper end of a spread; all lengths in metres, angles in radians.
+    """Ranges from which `grow` draws. Pairs are lower and upper end; lengths in metres, angles in radians.
 
     Attributes:
         training: `cordon`: two permanent arms with spurs. `guyot`: one cane of last year laid along the wire, and a
             spur of two nodes beside it.
-        row_distance: The row runs along +x at this y.
-        first_vine_x: Trunk of vine 0.
-        vines: How many vines.
-        vine_spacing: From trunk to trunk.
+        row_distance: y of the row, which runs along +x.
+        first_vine_x: x of the trunk of vine 0.
+        vines: Number of vines.
+        vine_spacing: Distance between trunks.
         vines_per_post: Vines between two posts.
-        post_radius: Of a post.
-        post_height: Of a post.
+        post_radius: Radius of a post.
+        post_height: Height of a post.
         wires: Heights of the wires above the cordon; the fruiting wire under the cordon is always there.
-        wire_radius: Of every wire.
-        cordon_height: Axis of the cordon above the ground.
-        cordon_radius: Of an arm at its end and at the trunk.
-        trunk_radius: At the head and at the ground.
-        first_spur: Trunk to first spur along an arm.
-        spur_spacing: Between two spurs on an arm.
-        spurs_per_arm: At most so many.
-        stub_length: Two-year wood of a spur, outside the cordon.
-        stub_radius: Of that stub.
-        cane_shares: Share of spurs with one, two and three canes.
-        cane_length: One-year cane.
-        cane_radius: Of a cane at its base; drawn around the mean.
-        cane_radius_mean: Mean of that draw.
-        cane_radius_deviation: Standard deviation of that draw.
+        wire_radius: Radius of every wire.
+        cordon_height: Height of the cordon's axis above the ground.
+        cordon_radius: Radius of an arm at its end and at the trunk.
+        trunk_radius: Radius of a trunk at the head and at the ground.
+        first_spur: Distance from the trunk to the first spur along an arm.
+        spur_spacing: Distance between two spurs on an arm.
+        spurs_per_arm: Largest number of spurs on an arm.
+        stub_length: Length of a spur's two-year wood outside the cordon.
+        stub_radius: Radius of that stub.
+        cane_shares: Shares of spurs with one, two and three canes.
+        cane_length: Length of a one-year cane.
+        cane_radius: Limits of the radius of a cane at its base.
+        cane_radius_mean: Mean of that radius.
+        cane_radius_deviation: Standard deviation of that radius.
         cane_taper: Radius at the tip as a share of that at the base.
-        cane_tilt: Standard deviation of a cane's lean along the row; across the row it is half of that.
-        basal: From the cane's base (where it leaves the stub's bark) to the middle of the basal bud.
-        internode: Between the middles of two nodes.
-        node_length: Of the swelling.
-        node_swelling: Radius of the swelling over the cane's radius there.
-        cane_droop: How far a cane's tip leans over under its weight.
-        guyot_nodes: Shoots on the cane that was laid down.
-        guyot_radius: Of that cane at its tip and at the head.
-        old_cut: Height of the old wound on the tip of a stub.
-        old_cuts_a_vine: Old wounds on trunk and arms, at least and at most.
-        ties_a_vine: Ties that hold arms to the wire, at least and at most.
-        hose_height: Of the drip hose above the ground; 0 for a row without.
-        hose_radius: Of the drip hose.
-        rows_behind: Rows seen behind this one.
-        row_spacing: Between two rows.
+        cane_tilt: Standard deviation of a cane's lean along the row; half of that across the row.
+        basal: Distance from the cane's base, at the stub's surface, to the middle of the basal bud.
+        internode: Distance between the middles of two nodes.
+        node_length: Length of a node.
+        node_swelling: Radius of a node as a factor of the cane's radius.
+        cane_droop: Lean of a cane's tip under its weight.
+        guyot_nodes: Shoots on the cane of last year.
+        guyot_radius: Radius of that cane at its tip and at the head.
+        old_cut: Height of the old cut on the tip of a stub.
+        old_cuts_a_vine: Number of old cuts on trunk and arms.
+        ties_a_vine: Number of ties of arms to the wire.
+        hose_height: Height of the drip hose above the ground; 0 for none.
+        hose_radius: Radius of the drip hose.
+        rows_behind: Visible rows behind this one.
+        row_spacing: Distance between two rows.
     """
 
     training: Literal["cordon", "guyot"] = "cordon"
@@ -99,10 +99,10 @@ class VineyardConfig(Struct, frozen=True, forbid_unknown_fields=True):
     row_spacing: Positive = 2.5
 
     def check(self) -> None:
-        """Refuse what no vine could be.
+        """Check the ranges.
 
         Raises:
-            ConfigError: A spread runs backwards, or the shares of canes do not add up to 1.
+            ConfigError: A range is reversed, or the shares of canes do not add up to 1.
         """
         for name in self.__struct_fields__:
             value = getattr(self, name)
