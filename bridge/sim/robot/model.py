@@ -198,9 +198,7 @@ def _add_caster(base: Any, T_base_pivot: Any) -> None:
     half, disc = _CASTER_MASS * _CASTER_RADIUS**2 / 4, _CASTER_MASS * _CASTER_RADIUS**2 / 2
     wheel.mass, wheel.ipos, wheel.inertia = _CASTER_MASS, [0, 0, 0], [half, disc, half]
     wheel.explicitinertial = True
-    tyre = wheel.add_geom(name="caster_tyre", type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[_CASTER_RADIUS, 0.0, 0.0])
-    tyre.contype, tyre.conaffinity = _ROLLS, 0
-    _rubber(tyre, _RUBBER)
+    _add_wheel_contact(wheel, _CASTER_RADIUS)
 
 
 def _add_collisions(bodies: dict[int, Any], robot: Any) -> None:

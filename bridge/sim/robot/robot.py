@@ -23,7 +23,7 @@ from bridge.sim.camera.render_process import CameraRenderer
 from bridge.sim.robot.cutter import CutResult, Cutter, close_blades
 from bridge.sim.robot.model import STEP_S, build_plant
 from bridge.sim.robot.trace import CUTTER, TraceWriter
-from bridge.sim.vineyard.row import Row
+from bridge.sim.vineyard.row import Row, vector3
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.model.differential_drive import Array
 
@@ -288,13 +288,7 @@ def _detail(result: CutResult) -> str:
 
 def _capsules(row: Row) -> tuple[Capsule, ...]:
     return tuple(
-        Capsule(
-            rod.kind,
-            (float(rod.start[0]), float(rod.start[1]), float(rod.start[2])),
-            (float(rod.end[0]), float(rod.end[1]), float(rod.end[2])),
-            float(rod.start_radius),
-            float(rod.end_radius),
-        )
+        Capsule(rod.kind, vector3(rod.start), vector3(rod.end), float(rod.start_radius), float(rod.end_radius))
         for _, rod in row.standing()
         if rod.kind in _DISPLAYED
     )

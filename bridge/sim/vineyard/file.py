@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 
 from bridge.sim.vineyard.config import VineyardConfig
-from bridge.sim.vineyard.row import Array, Rod, Row
+from bridge.sim.vineyard.row import Array, Rod, Row, vector3
 from bridge.sim.vineyard.truth import RightCut, judge, judge_guyot
 from rolling_panda.errors import ConfigError, InputError
 from rolling_panda.messages.types import Vector3, WoodClass
@@ -116,7 +116,7 @@ def cut_positions(vineyard: Vineyard) -> Array:
 
 
 def _encoded(rod: Rod) -> _Rod:
-    start, end = vector(rod.start), vector(rod.end)
+    start, end = vector3(rod.start), vector3(rod.end)
     radii = float(rod.start_radius), float(rod.end_radius)
     return _Rod(rod.kind, start, end, *radii, rod.parent, rod.vine, rod.spur, rod.cane)
 
@@ -144,10 +144,4 @@ def _truth(vineyard: Vineyard) -> list[_Right]:
 def _right(vine: int, spur: int, cane: int, kind: str, cut: RightCut | None) -> list[_Right]:
     if cut is None:
         return []
-    return [_Right(kind, vine, spur, cane, cut.rod, vector(cut.least), vector(cut.best), vector(cut.most))]
-
-
-def vector(values: Array) -> Vector3:
-    """Three plain floats."""
-    x, y, z = (float(value) for value in values)
-    return x, y, z
+    return [_Right(kind, vine, spur, cane, cut.rod, vector3(cut.least), vector3(cut.best), vector3(cut.most))]
