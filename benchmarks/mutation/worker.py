@@ -6,6 +6,7 @@ Run in the target's folder with SAMPLE, SEED and WORKERS; `results.json` is what
 import hashlib
 import json
 import os
+import re
 import sys
 from collections import Counter, defaultdict
 from collections.abc import Iterable
@@ -20,10 +21,9 @@ from mutmut.state import state
 from mutmut.stats import status_by_exit_code
 
 _AGAIN = (None, "survived", "no tests")
-#: Tests that cannot be imported, which without the mutant they can.
-_BROKEN = 2
-#: pytest itself went wrong, which says nothing.
-_NOTHING = (None, 4, 255)
+_KILLED = 1
+#: The tests could not be run, or were not, which says nothing.
+_NOTHING = (None, 2, 4, 255)
 _execute, _arguments = PytestRunner.execute_pytest, PytestRunner._pytest_args_regular_run
 
 
@@ -35,8 +35,8 @@ class _Imports:
         self.failed = False
 
     def pytest_collectreport(self, report: Any) -> None:
-        """A module was imported, or could not be."""
-        self.failed = self.failed or report.failed
+        """A module was imported, or could not be: by the mutant's doing where that stands in the traceback."""
+        self.failed = self.failed or (report.failed and re.search(r"__mutmut_\d", str(report.longrepr)) is not None)
 
     def pytest_collection_finish(self, session: Any) -> None:
         """All modules are imported."""
@@ -47,14 +47,14 @@ class _Imports:
 
 
 def execute(runner: PytestRunner, words: list[str], **others: Any) -> int:
-    """Run pytest; tests that cannot be imported are no mistake of the command line."""
+    """Run pytest; a mutant that keeps tests from being imported is killed."""
     imports = _Imports()
     try:
-        return int(_execute(runner, words, **{**others, "plugins": [*others.get("plugins", ()), imports]}))
+        code = int(_execute(runner, words, **{**others, "plugins": [*others.get("plugins", ()), imports]}))
     except BadTestExecutionCommandsException:
-        if imports.failed:
-            return _BROKEN
-        raise
+        if not imports.failed:
+            raise
+    return _KILLED if imports.failed else code
 
 
 def tests_in_order(runner: PytestRunner, tests: Iterable[str]) -> list[str]:
@@ -72,9 +72,7 @@ def order(seed: int, name: str) -> str:
 
 def status(exit_code: int | None) -> str | None:
     """What an exit code of a mutant's tests says; None where it was not tried."""
-    if exit_code in _NOTHING:
-        return None
-    return "broken" if exit_code == _BROKEN else str(status_by_exit_code[exit_code])
+    return None if exit_code in _NOTHING else str(status_by_exit_code[exit_code])
 
 
 def change(name: str, path: Path) -> dict[str, str]:
