@@ -37,7 +37,7 @@ TARGETS = {
         _tests(
             "controller",
             "authority fencing modes permission supervisor health stale_messages stop_latch lease controller_control "
-            "two_operators controller_interruptions queue_requests",
+            "fencing two_operators controller_interruptions queue_requests",
         ),
     ),
     "bridge.core": Target(

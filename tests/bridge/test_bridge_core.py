@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from bridge.config import BridgeConfig, OdometryConfig
 from bridge.core.bridge import TICK_S, BridgeCore
+from bridge.core.cut_memory import ForLife
 from bridge.core.interface import Measurement, Setpoint
 from bridge.core.odometer import Odometer
 from bridge.core.picture import Picture
@@ -255,6 +256,19 @@ def test_a_cut_is_made_once_and_its_end_is_told(bench: Bench) -> None:
     assert [event.severity for event in told] == ["info"]
     bench.core.on_cut(cut(bench, "c1"), bench.now)
     assert bench.robot.cuts == ["c1"]
+
+
+def test_a_cut_that_was_made_before_the_bridge_started_is_not_made_again(bench: Bench) -> None:
+    class Known(ForLife):
+        @property
+        def known(self) -> frozenset[str]:
+            return frozenset({"c1"})
+
+    bench.core = BridgeCore(bench.robot, BridgeConfig(), MODEL.limits, odometer(), "sim", cuts=Known())
+    bench.run(0.1, REST)
+    for cut_id in ("c1", "c2"):
+        bench.core.on_cut(cut(bench, cut_id), bench.now)
+    assert bench.robot.cuts == ["c2"]
 
 
 @pytest.mark.parametrize("fault", ["stop", "silence"])
