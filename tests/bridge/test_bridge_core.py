@@ -15,6 +15,7 @@ from bridge.core.state_memory import Memory, Remembered
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import PictureRequest
 from rolling_panda.messages.supervision import StopState
+from rolling_panda.topics import TOKEN
 from rolling_panda.transport.zenoh import Rejections
 from tests.support.bridge_rig import MODEL, PICTURE, REST, Commander
 
@@ -364,6 +365,16 @@ def test_the_bridge_says_it_when_it_moves_and_nobody_says_why(bench: Bench) -> N
         # Of the right token, though without the holder's word of its mode.
         bench.core.on_motion(bench.message(FORWARD), bench.now)
     assert bench.state.moving and any("no controller says what it does" in line for line in bench.log)
+
+
+def test_the_mode_that_somebody_without_the_token_tells_counts_for_nothing(bench: Bench) -> None:
+    bench.drive_on()
+    bench.mode = "IDLE"
+    for _ in range(150):
+        bench.run(0.01, FORWARD)
+        bench.core.on_token(m.TokenRequest(token="other", echo=bench.echo, mode="AUTO"), bench.now)
+    assert any("the controller's mode is IDLE" in line for line in bench.log)
+    assert any(row.topic == TOKEN.name and row.count >= 100 for row in bench.state.rejections)
 
 
 def test_an_older_controllers_cut_is_refused(bench: Bench) -> None:
