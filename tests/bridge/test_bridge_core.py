@@ -16,6 +16,7 @@ from rolling_panda import messages as m
 from rolling_panda.messages.perception import PictureRequest
 from rolling_panda.messages.supervision import StopState
 from rolling_panda.topics import TOKEN
+from rolling_panda.transport.codec import StrictDecoder, encode
 from rolling_panda.transport.zenoh import Rejections
 from tests.support.bridge_rig import MODEL, PICTURE, REST, Commander
 
@@ -157,6 +158,7 @@ def test_the_software_stop_latches_and_release_moves_nothing(bench: Bench) -> No
     bench.run(0.5, FORWARD)
     assert 0.0 < bench.moved_within(0.5) <= 0.2
     assert (bench.state.stop_id, bench.state.watchdog) == ("s1", False)
+    assert bench.state.stopped_by == "ada: button"
     assert not bench.core.on_release(release("other"), bench.now).ok
     bench.run(0.1, FORWARD)
     assert bench.core.on_release(release(), bench.now).ok
@@ -426,6 +428,24 @@ def test_messages_come_at_their_rates_with_growing_sequences(bench: Bench) -> No
     assert 40 <= len([out for out in bench.outputs if out.state]) <= 44
     frames = [out.frame for out in bench.outputs if out.frame]
     assert [frame.sequence for frame in frames] == [1, 2, 3, 4]
+    for out in bench.outputs:
+        for message in (out.joints, out.odometry, out.state, out.frame, out.stops, *out.events):
+            assert message is None or StrictDecoder(type(message)).decode(encode(message)) == message
+
+
+def test_what_stands_around_is_told_when_it_has_changed_and_now_and_then() -> None:
+    revision = 3
+    config = BridgeConfig()
+    core = BridgeCore(IdealRobot(), config, MODEL.limits, odometer(), "sim", scenery=lambda: (revision, ()))
+
+    def told(first: int, last: int) -> list[int]:
+        outs = [core.step(tick * TICK_S).scenery for tick in range(first, last)]
+        return [scenery.revision for scenery in outs if scenery is not None]
+
+    period = round(config.scenery_s / TICK_S)
+    assert told(1, period) == [3]
+    revision = 4
+    assert told(period, 2 * period + 2) == [4, 4, 4]
 
 
 def test_odometry_is_the_integral_of_the_wheels(bench: Bench) -> None:
