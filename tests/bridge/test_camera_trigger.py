@@ -39,6 +39,7 @@ def test_never_two_exposures_at_once_and_the_posture_is_that_of_the_exposure() -
     frame = shutter.frame(PICTURE)
     assert frame is not None
     assert (frame.header.stamp, frame.base.x, frame.sequence) == (0.25, 1.0, 1)
+    assert frame.position == Q
     assert shutter.frame(PICTURE) is None
 
 

@@ -64,3 +64,17 @@ def test_what_the_controller_may_send_a_thousand_times_a_second_is_sent_on_uncha
         change = np.where(np.abs(sent[ARM_XI] + change) < 1.0, change, change - np.clip(change, -jerk, jerk))
         sent[ARM_XI] += change
         np.testing.assert_allclose(bound.step(sent, arm), sent, atol=1e-12)
+
+
+def test_where_packets_may_be_lost_the_arm_may_go_on_with_its_acceleration_and_stays_below_its_velocity() -> None:
+    repeats = 20
+    bound, arm = Limiter(LIMITS, 13.5, 0.01, DT, repeats), (LOWER + UPPER) / 2
+    most, before = LIMITS.velocity[ARM_XI], np.zeros(7)
+    for goal in (1e6, -1e6, 1e6):
+        fastest = np.zeros(7)
+        for _ in range(1500):
+            sent = bound.step(np.full(9, goal), arm)[ARM_XI]
+            change, before = sent - before, sent
+            assert np.all(np.abs(sent + repeats * change) <= most + 1e-9)
+            fastest = np.maximum(fastest, np.sign(goal) * sent)
+        assert np.all(fastest > 0.9 * np.minimum(most, np.sqrt(LIMITS.acceleration[ARM_XI] * (UPPER - LOWER) / 2)))
