@@ -68,10 +68,11 @@ def test_who_takes_control_gets_a_robot_at_rest_and_has_to_resume():
 
 def test_giving_control_back_in_motion_pauses():
     r = far_at_work()
+    assert r.state.interrupted == ""
     assert r.ask(intents.ReturnControl(user="ada")).ok
     r.run(0.5)
     assert np.abs(r.xi).max() < 2e-3
-    assert r.state.mode == "PAUSED"
+    assert (r.state.mode, r.state.interrupted) == ("PAUSED", "work")
 
 
 def test_a_stop_is_for_a_supervisor_to_reset():

@@ -49,6 +49,13 @@ def test_reset_ends_only_when_the_bridge_shows_the_release():
     assert not latch.released(BRIDGE)
 
 
+def test_a_reset_where_nothing_is_latched_releases_nothing():
+    latch = StopLatch()
+    assert "another stop" in latch.ask_release(msgspec.structs.replace(RESET, stop_id="a"), BRIDGE, 1.0)
+    assert latch.ask_release(RESET, BRIDGE, 1.0) == ""
+    assert latch.release_due() is None and not latch.released(BRIDGE)
+
+
 def test_echoes_of_a_released_stop_latch_nothing_but_the_bridges_latch_always_counts():
     latch = StopLatch()
     latch.take((stop("a"),), bridge("a"))
