@@ -37,7 +37,8 @@ TARGETS = {
         _tests(
             "controller",
             "authority fencing modes permission supervisor health stale_messages stop_latch lease controller_control "
-            "fencing two_operators controller_interruptions queue_requests",
+            "two_operators controller_interruptions queue_requests tracking_error "
+            "controller_work",
         ),
     ),
     "bridge.core": Target(

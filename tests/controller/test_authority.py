@@ -29,6 +29,13 @@ def test_rights_follow_role_and_lease():
     assert it.rights(BOB, "supervisor") == {"anyone", "operator", "supervisor"}
 
 
+def test_what_is_told_names_the_holder_and_nobody_where_nobody_holds():
+    it = authority()
+    assert it.message(0.0).holder == ""
+    it.claim(ADA, 0.0)
+    assert it.message(0.0).holder == ADA.key
+
+
 def test_the_servers_word_renews_the_lease_and_its_silence_ends_it():
     it = authority()
     it.claim(ADA, 0.0)

@@ -175,3 +175,11 @@ def test_severity_grows_from_idle_to_the_stop():
     ranks = [modes.severity(mode) for mode in SEVERITY]
     assert ranks == sorted(ranks)
     assert modes.severity("ESTOP_LATCHED") > modes.severity("FAULT") > modes.severity("PAUSED")
+
+
+def test_a_repeated_stop_or_fault_is_no_refusal_and_a_fault_under_a_stop_says_why_it_changes_nothing():
+    for mode, event in (("ESTOP_LATCHED", Event.STOP), ("FAULT", Event.FAULT)):
+        state = reach(mode)
+        assert modes.step(state, event, 0.0, "again") == modes.Transition(state)
+    told = modes.step(reach("ESTOP_LATCHED"), Event.FAULT, 0.0, "the ledger")
+    assert told.refused == "a fault changes nothing: the robot is in ESTOP_LATCHED"
