@@ -1,4 +1,4 @@
-"""The application: routes, error answers and the guard around them."""
+"""The application: routes, error responses and the middleware around them."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -16,23 +16,18 @@ from rolling_panda.messages.page import PageEvents, PagePoints, PageState
 from rolling_panda.messages.supervision import SessionPlan, SessionReport
 from rolling_panda.messages.types import Severity
 from rolling_panda.resources import resource
-from server.api.answers import answer
-from server.api.camera import camera_router
+from server.api.commands import commands_router
 from server.api.control import Control, control_router
-from server.api.guard import Guard, is_open, is_protected
-from server.api.operator import operator_router
-from server.api.order import order_router
+from server.api.middleware import SecurityMiddleware, is_protected, is_public
 from server.api.page_files import PageFiles
-from server.api.pages import pages_router
+from server.api.page_socket import page_socket_router
 from server.api.plant import plant_router
 from server.api.preview import Previewed, preview_router
-from server.api.replay import replay_router
-from server.api.report import report_router
-from server.api.robot import robot_router
-from server.api.robots import path_of, robots_router
-from server.api.site import page_router, site_router
+from server.api.responses import answer
+from server.api.robots import RobotRouter, path_of, robots_router
+from server.api.sign_in import page_router, sign_in_router
+from server.api.state import camera_router, state_router
 from server.auth.sessions import Session
-from server.robot_router import RobotRouter
 from server.robots.app_state import AppState
 from server.robots.context import Result, RobotContext
 from server.scene.viser_proxy import viser_router
@@ -45,12 +40,12 @@ _ABOUT = (
 )
 
 
-#: What requests are answered with that FastAPI does not know.
+#: Response types that are no Pydantic models.
 _MESSAGES = (PageState, PagePoints, PageEvents, SessionPlan, SessionReport, Previewed, Control)
 
 
 class _Application(FastAPI):
-    """Describes the page's own messages and the session's cookie too, which FastAPI does not know."""
+    """Adds the msgspec messages and the session cookie to the OpenAPI document."""
 
     cookie = ""
 
@@ -62,69 +57,66 @@ class _Application(FastAPI):
         components["securitySchemes"] = {"session": {"type": "apiKey", "in": "cookie", "name": self.cookie}}
         for path, methods in document["paths"].items():
             for operation in methods.values():
-                operation["security"] = [] if is_open(path) else [{"session": []}]
+                operation["security"] = [] if is_public(path) else [{"session": []}]
         return document
 
 
 class _PageFiles(Mount):
-    """The page's files. Under the paths of the API there are none, so what is asked there is not theirs to refuse."""
+    """Serves the page's files; it does not match the paths of the API, whose 404 is the API's own."""
 
     def matches(self, scope: Scope) -> tuple[Match, Scope]:
         return (Match.NONE, {}) if is_protected(scope["path"]) else super().matches(scope)
 
 
-def create_app(reception: AppState, origins: frozenset[str]) -> ASGIApp:
-    """The guarded application; `origins` are the exact origins that the page may have.
+def create_app(app_state: AppState, origins: frozenset[str]) -> ASGIApp:
+    """The application; `origins` are the exact permitted origins of the page.
 
-    One robot is at `/`. Several are at `/robots/NAME/` each, and `/` has what is about all of them.
+    One robot is at `/`. Several are at `/robots/NAME/` each, and `/` has the routes for all of them.
     """
-    if len(reception.desks) == 1:
-        (desk,) = reception.desks.values()
-        return robot_app(reception, desk, origins)
-    robots = {name: robot_app(reception, desk, origins, path_of(name)) for name, desk in reception.desks.items()}
-    return RobotRouter(robots, _hall(reception, origins))
+    if len(app_state.robots) == 1:
+        (robot,) = app_state.robots.values()
+        return robot_app(app_state, robot, origins)
+    robots = {name: robot_app(app_state, robot, origins, path_of(name)) for name, robot in app_state.robots.items()}
+    return RobotRouter(robots, _common_app(app_state, origins))
 
 
-def robot_app(reception: AppState, desk: RobotContext, origins: frozenset[str], path: str = "/") -> ASGIApp:
-    """Everything about one robot, which is at this path."""
+def robot_app(app_state: AppState, robot: RobotContext, origins: frozenset[str], path: str = "/") -> ASGIApp:
+    """The application of one robot, at this path."""
 
-    def dropped(session: Session, kind: str) -> None:
-        desk.note("warning", f"a view of {session.user} sent {kind!r} to the 3-D view; dropped", session.client)
+    def log_dropped(session: Session, kind: str) -> None:
+        robot.note("warning", f"a view of {session.user} sent {kind!r} to the 3-D view; dropped", session.client)
 
-    def ended(session: Session, reason: str) -> None:
-        desk.note("warning", f"a view of {session.user} was closed: {reason}", session.client)
+    def log_closed(session: Session, reason: str) -> None:
+        robot.note("warning", f"a view of {session.user} was closed: {reason}", session.client)
 
     files = PageFiles(web := resource("web"))
     routers = (
         page_router(web, files),
-        site_router(reception),
-        camera_router(desk),
-        operator_router(desk),
-        plant_router(desk),
-        order_router(desk),
-        preview_router(desk),
-        control_router(desk),
-        robot_router(desk),
-        replay_router(desk),
-        report_router(desk),
-        pages_router(desk),
-        viser_router(desk.scene, desk.may_move, desk.dragged, dropped, ended),
+        sign_in_router(app_state),
+        commands_router(robot),
+        state_router(robot),
+        camera_router(robot),
+        plant_router(robot),
+        preview_router(robot),
+        control_router(robot),
+        page_socket_router(robot),
+        viser_router(robot.scene, robot.may_move, robot.on_gizmo, log_dropped, log_closed),
     )
-    return _guarded(routers, files, reception, origins, desk.note, path)
+    return _application(routers, files, app_state, origins, robot.note, path)
 
 
-def _hall(reception: AppState, origins: frozenset[str]) -> ASGIApp:
-    """What several robots have in common."""
-    first = path_of(next(iter(reception.desks)))
+def _common_app(app_state: AppState, origins: frozenset[str]) -> ASGIApp:
+    """The routes for all robots together."""
+    first = path_of(next(iter(app_state.robots)))
     files = PageFiles(web := resource("web"))
-    routers = (page_router(web, files, first), site_router(reception), robots_router(reception))
-    return _guarded(routers, files, reception, origins, reception.note)
+    routers = (page_router(web, files, first), sign_in_router(app_state), robots_router(app_state))
+    return _application(routers, files, app_state, origins, app_state.note)
 
 
-def _guarded(
+def _application(
     routers: Sequence[APIRouter],
     files: PageFiles,
-    reception: AppState,
+    app_state: AppState,
     origins: frozenset[str],
     note: Callable[[Severity, str, str], None],
     path: str = "/",
@@ -139,39 +131,39 @@ def _guarded(
         redirect_slashes=False,
         servers=None if path == "/" else [{"url": path.rstrip("/")}],
     )
-    app.cookie = reception.cookie
+    app.cookie = app_state.cookie
     for router in routers:
         app.include_router(router)
     app.router.routes.append(_PageFiles("/", files, name="web"))
-    app.add_exception_handler(RequestValidationError, _invalid)
-    app.add_exception_handler(HTTPException, _failed)
-    return Guard(
+    app.add_exception_handler(RequestValidationError, _validation_error)
+    app.add_exception_handler(HTTPException, _http_error)
+    return SecurityMiddleware(
         files.before(app),
-        reception.sessions,
+        app_state.sessions,
         origins,
-        reception.cookie,
-        reception.max_body_bytes,
+        app_state.cookie,
+        app_state.max_body_bytes,
         on_refusal=lambda text: note("warning", text, "a foreign page"),
     )
 
 
-async def _invalid(_: Request, error: Exception) -> JSONResponse:
-    """Validation errors in words: which field, what is wrong."""
+async def _validation_error(_: Request, error: Exception) -> JSONResponse:
+    """Validation errors as text: each field with its error."""
     problems = error.errors() if isinstance(error, RequestValidationError) else []
-    words = [f"{'.'.join(str(part) for part in problem['loc'])}: {problem['msg']}" for problem in problems[:5]]
-    return answer(Result(422, False, "; ".join(words)[:500] or "the request is wrong"))
+    errors = [f"{'.'.join(str(part) for part in problem['loc'])}: {problem['msg']}" for problem in problems[:5]]
+    return answer(Result(422, False, "; ".join(errors)[:500] or "the request is wrong"))
 
 
-async def _failed(request: Request, error: Exception) -> JSONResponse:
+async def _http_error(request: Request, error: Exception) -> JSONResponse:
     if not isinstance(error, HTTPException):
         return answer(Result(500, False, ""))
     if error.status_code == 400:
-        # FastAPI's answer to bytes that are no text.
+        # FastAPI's response to bytes that are not UTF-8.
         return answer(Result(422, False, "the body is not JSON in UTF-8"))
-    told = answer(Result(error.status_code, False, str(error.detail)[:500]))
-    told.headers.update(error.headers or {})
+    response = answer(Result(error.status_code, False, str(error.detail)[:500]))
+    response.headers.update(error.headers or {})
     if error.status_code == 405:
-        # Each route knows of its own method alone, and two may share a path.
+        # Starlette lists the methods of one route alone, and two may share a path.
         path = getattr(request.scope.get("route"), "path_format", "")
-        told.headers["Allow"] = ", ".join(request.app.openapi()["paths"].get(path, {"get": None})).upper()
-    return told
+        response.headers["Allow"] = ", ".join(request.app.openapi()["paths"].get(path, {"get": None})).upper()
+    return response

@@ -1,7 +1,7 @@
-"""What the server does all the time for each robot: heartbeat, states to the pages, 3-D view, teleoperation, log.
+"""The server's periodic work for each robot: heartbeat, states for the pages, 3-D view, teleoperation, log.
 
-One asyncio loop does all of it, and the heartbeat is sent from that same loop: when it hangs, the heartbeat stops and
-the controller stops the robot; with several robots, each of them.
+All of it runs on one asyncio loop, which sends the heartbeat too. When the loop hangs, the heartbeat stops, and the
+controller of each robot stops its robot.
 """
 
 import asyncio
@@ -9,125 +9,101 @@ import time
 from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
-from rolling_panda.model.robot import configuration
 from rolling_panda.topics import HEARTBEAT, PRESENCE
 from server.robots.app_state import AppState
 from server.robots.context import RobotContext
 
-#: Posture older than this (s) is drawn grey: it is only the last known one.
-_STALE_S = 1.0
 _POINTS_RATE_HZ = 5.0
 _LOG_RATE_HZ = 10.0
-#: Whose account has been removed is out after this long (s).
-_ACCOUNTS_S = 0.5
+#: Sessions of removed accounts end within this time (s).
+_ACCOUNTS_PERIOD_S = 0.5
+#: Distinct rejected messages that are logged.
+_MAX_WARNINGS = 1000
 
 
 class Loop:
-    """The server's periodic work for one robot."""
+    """The periodic work for one robot."""
 
-    def __init__(self, desk: RobotContext) -> None:
+    def __init__(self, robot: RobotContext) -> None:
         """Nothing runs yet."""
-        self._desk = desk
-        self._turns = 0
-        self._number = 0
-        self._scenery_at = 0.0
+        self._robot = robot
+        self._heartbeats = 0
+        self._states = 0
         self._warned: set[tuple[str, str]] = set()
 
     def jobs(self) -> list[Coroutine[Any, Any, None]]:
         """Endless coroutines; cancel them to end."""
-        config, looking = self._desk.config, self._desk.looking
+        robot = self._robot
         return [
-            _every(1 / HEARTBEAT.rate_hz, self._beat),
-            _every(1 / PRESENCE.rate_hz, self._presence),
-            _every(1 / config.page_rate_hz, self._state),
-            _every(1 / config.scene_rate_hz, self._scene),
-            _every(1 / config.teleop_rate_hz, self._teleop),
-            _every(1 / _POINTS_RATE_HZ, self._points),
-            _every(1 / _POINTS_RATE_HZ, looking.draw),
-            _every(1 / _LOG_RATE_HZ, self._log),
+            _every(1 / HEARTBEAT.rate_hz, self._send_heartbeat),
+            _every(1 / PRESENCE.rate_hz, self._send_presence),
+            _every(1 / robot.config.page_rate_hz, self._publish_state),
+            _every(1 / robot.config.scene_rate_hz, robot.scene_updater.step),
+            _every(1 / robot.config.teleop_rate_hz, self._send_teleop),
+            _every(1 / _POINTS_RATE_HZ, self._update_points),
+            _every(1 / _LOG_RATE_HZ, self._update_log),
         ]
 
-    async def _beat(self, now: float) -> None:
-        self._turns += 1
-        self._desk.link.beat(self._turns)
+    async def _send_heartbeat(self, now: float) -> None:
+        self._heartbeats += 1
+        self._robot.link.send_heartbeat(self._heartbeats)
 
-    async def _presence(self, now: float) -> None:
-        self._desk.link.presence_of(self._desk.people.message(now))
+    async def _send_presence(self, now: float) -> None:
+        self._robot.link.send_presence(self._robot.presence.message(now))
 
-    async def _state(self, now: float) -> None:
-        self._number += 1
-        desk = self._desk
-        desk.made_state(desk.view.state(self._number, len(desk.pages), now), now)
-        desk.wake_pages()
+    async def _publish_state(self, now: float) -> None:
+        self._states += 1
+        robot = self._robot
+        robot.publish_state(robot.view.state(self._states, len(robot.pages), now), now)
+        robot.wake_pages()
 
-    async def _scene(self, now: float) -> None:
-        desk = self._desk
-        desk.scene.fly(now)
-        posture = desk.link.posture(now)
-        if posture is not None:
-            desk.scene.move(configuration(posture.base, posture.position))
-            desk.scene.robot.set_grey(posture.age_s > _STALE_S)
-        desk.scene.fall.step(now)
-
-    async def _teleop(self, now: float) -> None:
-        desk = self._desk
-        desk.end_lapsed_hold(now)
-        target = desk.teleop.due(now)
+    async def _send_teleop(self, now: float) -> None:
+        robot = self._robot
+        robot.end_lapsed_hold(now)
+        target = robot.teleop.next_message(now)
         if target is not None:
-            desk.link.teleop(target)
+            robot.link.send_teleop(target)
 
-    async def _points(self, now: float) -> None:
-        desk = self._desk
-        points = desk.view.points(now)
-        if points is not desk.points:
-            desk.points = points
-            desk.scene.show_points(points.points)
-            desk.wake_pages()
-        bridge = desk.link.bridge.peek()
-        desk.scene.show_cuts(points.points, bridge.message if bridge is not None else None, now)
-        received = desk.link.points.peek()
-        if received is not None:
-            desk.scene.show_canes(received.message.canes)
-        preview = desk.link.preview_motion.peek()
-        if preview is not None:
-            desk.scene.ghost.take(preview.message)
-        scenery = desk.link.scenery.peek()
-        if scenery is not None and scenery.at != self._scenery_at:
-            self._scenery_at = scenery.at
-            desk.scene.show_row(scenery.message, now)
-        tool = desk.view.tool(now)
+    async def _update_points(self, now: float) -> None:
+        robot = self._robot
+        points = robot.view.points(now)
+        if points is not robot.points:
+            robot.points = points
+            robot.wake_pages()
+        tool = robot.view.tool(now)
         if tool is not None:
-            led = desk.teleop.holder if desk.teleop.leads_gizmo else None
-            for owner in desk.scene.gizmos.follow(tool, led):
-                desk.teleop.aim(owner, tool)
+            holder = robot.teleop.holder if robot.teleop.follows_gizmo else None
+            for owner in robot.scene.gizmos.follow(tool, holder):
+                robot.teleop.set_target(owner, tool)
+        await robot.scene_updater.update(points, now)
 
-    async def _log(self, now: float) -> None:
-        desk = self._desk
-        before = desk.log.number
-        for received in desk.link.events.drain():
+    async def _update_log(self, now: float) -> None:
+        robot = self._robot
+        before = robot.log.number
+        for received in robot.link.events.drain():
             event = received.message
             if event.process != "server":
-                desk.log.add(event.process, event.severity, event.text, time.time() - (now - received.at))
-        while desk.link.refused:
-            topic, reason = desk.link.refused.popleft()
-            if (topic, reason) not in self._warned and len(self._warned) < 1000:
+                robot.log.add(event.process, event.severity, event.text, time.time() - (now - received.at))
+        while robot.link.refused:
+            topic, reason = robot.link.refused.popleft()
+            if (topic, reason) not in self._warned and len(self._warned) < _MAX_WARNINGS:
                 self._warned.add((topic, reason))
-                desk.note("warning", f"refused a message on {topic}: {reason}")
-        if desk.log.number != before:
-            desk.wake_pages()
+                robot.note("warning", f"refused a message on {topic}: {reason}")
+        if robot.log.number != before:
+            robot.wake_pages()
 
 
-def watch_accounts(reception: AppState) -> Coroutine[Any, Any, None]:
-    """Endless: whoever's account has been removed is out soon."""
+def watch_accounts(app_state: AppState) -> Coroutine[Any, Any, None]:
+    """Endless: ends the sessions of removed and changed accounts."""
 
-    async def look(now: float) -> None:
-        reception.end_void_sessions()
+    async def check(now: float) -> None:
+        app_state.end_void_sessions()
 
-    return _every(_ACCOUNTS_S, look)
+    return _every(_ACCOUNTS_PERIOD_S, check)
 
 
 async def _every(period_s: float, job: Callable[[float], Awaitable[None]]) -> None:
-    """Run `job(now)` each period; turns that were missed are left out, not caught up."""
+    """Run `job(now)` each period; missed periods are skipped."""
     due = time.monotonic()
     while True:
         now = time.monotonic()

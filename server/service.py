@@ -36,7 +36,7 @@ from server.robots.context import RobotContext
 from server.robots.event_log import EventLog
 from server.robots.link import RobotLink
 from server.robots.page_view import PageView
-from server.robots.presence import PresentPeople
+from server.robots.presence import PresenceTracker
 from server.robots.teleop import TeleopHold
 from server.scene.robot_meshes import Part, robot_parts
 from server.scene.scene import Scene
@@ -135,7 +135,7 @@ async def serve(
     """
     allowed = allowed or Access()
     port = int(door.getsockname()[1])
-    reception = AppState(
+    app_state = AppState(
         sessions,
         address,
         # Cookies do not know ports: two servers on one machine must not sign each other's people out.
@@ -147,14 +147,14 @@ async def serve(
     model = RobotModel()
     parts = robot_parts(model.model)
     for name, wire in wires.items():
-        reception.desks[name] = _desk(config, wire, model, parts, reception)
+        app_state.robots[name] = _robot_context(config, wire, model, parts, app_state)
     own = {f"{allowed.scheme}://{name}:{port}" for name in ("127.0.0.1", "localhost")}
     origins = frozenset({*own, *config.origins})
-    app = create_app(reception, origins)
+    app = create_app(app_state, origins)
     built()
-    work = [watch_accounts(reception), *(job for desk in reception.desks.values() for job in Loop(desk).jobs())]
+    work = [watch_accounts(app_state), *(job for robot in app_state.robots.values() for job in Loop(robot).jobs())]
     jobs = [asyncio.create_task(job) for job in work]
-    connections = Connections(config, lambda text, by: reception.note("warning", text, f"connections of {by}"))
+    connections = Connections(config, lambda text, by: app_state.note("warning", text, f"connections of {by}"))
     door.count(connections, allowed.tls is not None)
     site = asyncio.create_task(_site(app, connections, door, stopping, allowed.tls))
     try:
@@ -170,18 +170,18 @@ async def serve(
             job.cancel()
         stopping.set()
         await asyncio.gather(*jobs, site, return_exceptions=True)
-        for desk in reception.desks.values():
-            desk.scene.close()
-            desk.link.close()
+        for robot in app_state.robots.values():
+            robot.scene.close()
+            robot.link.close()
 
 
-def _desk(
-    config: ServerConfig, wire: Transport, model: RobotModel, parts: list[Part], reception: AppState
+def _robot_context(
+    config: ServerConfig, wire: Transport, model: RobotModel, parts: list[Part], app_state: AppState
 ) -> RobotContext:
-    """The desk of the robot on this wire, with a 3-D view of its own."""
+    """The context of the robot on this wire, with its own 3-D view."""
     loop = asyncio.get_running_loop()
 
-    def soon(function: Callable[..., object], *arguments: object) -> None:
+    def call_soon(function: Callable[..., object], *arguments: object) -> None:
         # Once the loop is closed, viser's thread has nobody left to tell.
         with contextlib.suppress(RuntimeError):
             loop.call_soon_threadsafe(function, *arguments)
@@ -189,28 +189,28 @@ def _desk(
     scene = Scene(
         model.model,
         parts,
-        soon,
+        call_soon,
         # None is called before a page is served.
-        on_select=lambda owner, point_id: desk.clicked(owner, point_id),
-        on_sightline=lambda owner, origin, direction: desk.sighted(owner, origin, direction),
-        on_stranger=lambda: desk.note("warning", "refused a connection to the 3-D view from outside the page"),
+        on_select=lambda owner, point_id: robot.on_point_clicked(owner, point_id),
+        on_ray=lambda owner, origin, direction: robot.on_click(owner, origin, direction),
+        on_refusal=lambda: robot.note("warning", "refused a connection to the 3-D view from outside the page"),
     )
     link, told = RobotLink(wire), wider("server", config)
-    desk = RobotContext(
+    robot = RobotContext(
         config,
         link,
         scene,
         PageView(link, model, told, wire.plain),
         EventLog(config.log_lines),
         TeleopHold(config),
-        PresentPeople(),
-        held_elsewhere=lambda session: reception.held_elsewhere(session, desk),
+        PresenceTracker(),
+        held_elsewhere=lambda session: app_state.held_elsewhere(session, robot),
     )
     for line in told:
-        desk.note("warning", f"set wider than usual: {line}")
+        robot.note("warning", f"set wider than usual: {line}")
     if wire.plain:
-        desk.note("error", PLAIN_WARNING)
-    return desk
+        robot.note("error", PLAIN_WARNING)
+    return robot
 
 
 class _Site(uvicorn.Server):

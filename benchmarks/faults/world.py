@@ -31,7 +31,7 @@ from rolling_panda.messages.perception import Obstacles
 from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
 from rolling_panda.model.robot import RobotModel, configuration, pose_message
 from server.auth.sessions import Session
-from server.robots.presence import PresentPeople
+from server.robots.presence import PresenceTracker
 
 MODEL = RobotModel()
 _USER = "ada"
@@ -136,7 +136,7 @@ class World:
         self.commanded: m.MotionCommand | None = None
         self.intruder: Callable[[World], None] = lambda world: None
         self._people: tuple[str, ...] = ()
-        self._there = PresentPeople()
+        self._there = PresenceTracker()
 
     def new_bridge(self) -> BridgeCore:
         """A bridge that remembers what the last one did."""
@@ -275,9 +275,9 @@ class World:
         """Each page says that it is there, and which state it has drawn."""
         for name in self._people:
             session = Session("", name, "supervisor", 0.0, client=name)
-            self._there.heard(session, self.now)
+            self._there.on_activity(session, self.now)
             if self.watched:
-                self._there.saw(session, self.now)
+                self._there.on_seen(session, self.now)
 
     def _send(self, out: Outputs) -> None:
         if out.motion is not None:

@@ -66,10 +66,10 @@ TARGETS = {
         (
             "controller/motion/teleoperation.py",
             "server/robots/teleop.py",
-            "server/robots/motion_rate.py",
+            "server/robots/event_log.py",
             "server/scene/viser_filter.py",
         ),
-        _tests("controller", "teleoperation") + _tests("server", "teleop motion_rate viser_filter"),
+        _tests("controller", "teleoperation") + _tests("server", "teleop event_log viser_filter"),
     ),
-    "server.guard": Target(("server/api/guard.py",), _tests("server", "guard sign_in")),
+    "server.middleware": Target(("server/api/middleware.py",), _tests("server", "middleware sign_in")),
 }

@@ -13,7 +13,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.typing import Origin, Subprotocol
 
-from server.scene.scene import VIEW_VERSION
+from server.scene.viser_internals import VISER_VERSION
 
 _CAMERA = msgspec.msgpack.encode(
     {
@@ -81,7 +81,7 @@ class Attackers:
 
     async def view(self) -> None:
         """Messages to the 3-D view, as fast as they are taken."""
-        await self._flood("/viser", _CAMERA, [Subprotocol(f"viser-v{VIEW_VERSION}")])
+        await self._flood("/viser", _CAMERA, [Subprotocol(f"viser-v{VISER_VERSION}")])
 
     async def page(self) -> None:
         """Messages of a page, as fast as they are taken."""

@@ -17,7 +17,7 @@ from websockets.typing import Origin, Subprotocol
 
 from rolling_panda.errors import RollingPandaError
 from rolling_panda.runtime.launch import child_environment, python_command
-from server.scene.scene import VIEW_VERSION
+from server.scene.viser_internals import VISER_VERSION
 
 _OPEN_S, _CLOSE_S = 30.0, 0.2
 _FRAME = re.compile(r'"camera_frame":(\d+)')
@@ -56,7 +56,7 @@ async def look_on(url: str, cookie: str, pages: int, slow: int, whole: bool = Fa
         readers = []
         for number in range(pages):
             page = await opened("/ws")
-            view = await opened("/viser", [Subprotocol(f"viser-v{VIEW_VERSION}")]) if whole else None
+            view = await opened("/viser", [Subprotocol(f"viser-v{VISER_VERSION}")]) if whole else None
             if number >= slow:
                 readers.append(group.create_task(_read(page, images if whole else None)))
                 if view is not None:

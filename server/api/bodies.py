@@ -1,4 +1,4 @@
-"""Bodies of the REST requests: strict, bounded, no unknown field, no NaN."""
+"""Request and response bodies of the REST interface: strict types, bounds, no unknown fields, no NaN."""
 
 import json
 from typing import Annotated, Any, Literal
@@ -11,21 +11,21 @@ from rolling_panda.messages.types import Role
 
 #: As `rolling_panda.messages.Name`.
 POINT_ID: Any = Path(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9_.:\-]+$")
-#: Leaves room for who stopped the robot in a log line of 500 characters.
+#: Leaves room for the user's name in a log line of 500 characters.
 STOP_REASON_LENGTH = 400
-#: Whole numbers above it are not exact in every JSON reader.
-_MOST = 2**53
+#: Larger integers are not exact in every JSON parser.
+_MAX_INTEGER = 2**53
 _Text = Annotated[str, Field(max_length=500)]
 _Metre = Annotated[float, Field(ge=-1e4, le=1e4)]
 _Unit = Annotated[float, Field(ge=-1.001, le=1.001)]
 
 
-def _as_whole(value: Any) -> Any:
-    # JSON knows one kind of number: 2.0 is a whole one too.
+def _as_integer(value: Any) -> Any:
+    # JSON has one kind of number: 2.0 is an integer too.
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
-_WHOLE = BeforeValidator(_as_whole)
+_INTEGER = BeforeValidator(_as_integer)
 
 
 class _Body(BaseModel):
@@ -33,7 +33,7 @@ class _Body(BaseModel):
 
 
 class _JsonTuples(_Body):
-    """JSON has no tuples, so these fields take lists of the same length."""
+    """JSON has no tuples: these fields take lists of the same length."""
 
     @field_validator("*", mode="before")
     @classmethod
@@ -74,113 +74,113 @@ class SignIn(_Body):
         return self
 
 
-class SignInWay(BaseModel):
-    """How people sign in to this server: with a password, or with a link that works once."""
+class SignInMethod(BaseModel):
+    """How to sign in to this server: with a password, or with a single-use link."""
 
     password: bool
 
 
 class AcceptPoint(_Body):
-    """The revision that the operator saw; an older one is refused. With the point's hash another content is too."""
+    """The revision that the operator saw; an older one is refused. With `digest`, changed content is refused too."""
 
-    revision: Annotated[int, Field(ge=0, le=_MOST), _WHOLE]
+    revision: Annotated[int, Field(ge=0, le=_MAX_INTEGER), _INTEGER]
     digest: Annotated[str, Field(max_length=64, pattern=r"^[0-9a-f]*$")] = ""
 
 
 class RejectPoint(_Body):
-    """Why."""
+    """The reason."""
 
     reason: _Text = ""
 
 
 class ResolvePoint(_Body):
-    """How an UNKNOWN cut ended, and how that was found out."""
+    """How an UNKNOWN cut ended, and how that was established."""
 
     outcome: Literal["DONE", "FAILED_NOT_CUT"]
     reason: Annotated[str, Field(min_length=1, max_length=400)]
 
 
 class Survey(_Body):
-    """How far ahead along the row (m)."""
+    """Distance along the row (m)."""
 
     distance: Annotated[float, Field(ge=0.1, le=500.0)] = 4.0
 
 
 class MoveInQueue(_Body):
-    """Before which point; empty for the end. With the revision of the order that was seen, from `GET /api/state`."""
+    """The point to go before; empty for the end. `revision` is that of the order in `GET /api/state`."""
 
     before: Annotated[str, Field(max_length=64)] = ""
-    revision: Annotated[int, Field(ge=0, le=_MOST), _WHOLE]
+    revision: Annotated[int, Field(ge=0, le=_MAX_INTEGER), _INTEGER]
 
 
 class TurnApproach(_Body):
-    """Turn of the approach about the cane (rad); null leaves it to the search."""
+    """Angle of the approach about the cane (rad); null leaves it to the search."""
 
     azimuth: Annotated[float, Field(ge=-3.2, le=3.2)] | None = None
 
 
 class PlannersOrder(_Body):
-    """The revision of the order that was seen."""
+    """The revision of the order in `GET /api/state`."""
 
-    revision: Annotated[int, Field(ge=0, le=_MOST), _WHOLE]
+    revision: Annotated[int, Field(ge=0, le=_MAX_INTEGER), _INTEGER]
 
 
 class Place(_Body):
-    """A place that was left open."""
+    """A site without a decision."""
 
-    vine: Annotated[int, Field(ge=1, le=100000), _WHOLE]
-    spur: Annotated[int, Field(ge=0, le=100000), _WHOLE]
+    vine: Annotated[int, Field(ge=1, le=100000), _INTEGER]
+    spur: Annotated[int, Field(ge=0, le=100000), _INTEGER]
 
 
 class AskPreview(_Body):
-    """Of which point alone; empty for all accepted ones in their order."""
+    """The point to preview; empty for all accepted ones in their order."""
 
     point_id: Annotated[str, Field(max_length=64)] = ""
 
 
 class ApprovePreview(_Body):
-    """The hash of the preview that was looked at."""
+    """The hash of the preview that the operator saw."""
 
     preview_hash: Annotated[str, Field(max_length=64, pattern=r"^[0-9a-f]*$")]
 
 
 class RequirePreview(_Body):
-    """Whether a cut begins only with its preview approved."""
+    """Whether each cut needs an approved preview."""
 
     required: bool
 
 
 class AcceptAll(_Body):
-    """Least confidence, 0…1; what is below it waits to be decided one by one."""
+    """Least confidence, 0…1; points below it stay proposed."""
 
     confidence: Annotated[float, Field(ge=0.0, le=1.0)] = SURE
 
 
 class Stop(_Body):
-    """Why, for the log. The stop never fails over it: what is too long is cut, what cannot be read is left out."""
+    """The reason, for the log. It cannot fail the stop: it is cut where too long, and ignored where unreadable."""
 
     reason: str = "software stop"
 
     @classmethod
     def read(cls, content: bytes) -> "Stop":
-        """The stop that a body asks for, whatever it holds."""
+        """The stop of a request body, whatever it contains."""
         try:
-            told = json.loads(content)["reason"]
+            reason = json.loads(content)["reason"]
         except (ValueError, RecursionError, LookupError, TypeError):
             return cls()
-        # A lone surrogate is JSON, but no text that could be sent on.
-        text = told.encode(errors="replace").decode() if isinstance(told, str) else ""
+        # A lone surrogate is valid JSON, but cannot be encoded as UTF-8.
+        text = reason.encode(errors="replace").decode() if isinstance(reason, str) else ""
         return cls(reason=text[:STOP_REASON_LENGTH]) if text else cls()
 
 
 class TakeControl(_Body):
-    """`confirm` that control is to be taken from who holds it."""
+    """`confirm` takes control from its holder."""
 
     confirm: bool = False
 
 
 class Reset(_Body):
-    """Why it is safe again; with `stop_id`, a stop that was pressed after that one is not reset with it."""
+    """Why it is safe again; with `stop_id`, stops that came after that one stay latched."""
 
     reason: Annotated[str, Field(min_length=1, max_length=500)]
     stop_id: Annotated[str, Field(max_length=64)] = ""
@@ -194,7 +194,7 @@ class Target(_JsonTuples):
 
     @property
     def refused(self) -> str:
-        """Why this is no place for the tool; empty when it is. No description of a request can say so much."""
+        """Why the quaternion is invalid; empty where it is valid. JSON Schema cannot express this."""
         length = sum(part * part for part in self.quat_xyzw) ** 0.5
         return "" if abs(length - 1.0) <= 1e-2 else f"a quaternion has length 1, this one has {length:.3f}"
 
@@ -210,11 +210,11 @@ _JointVelocity = Annotated[float, Field(ge=-10.0, le=10.0)]
 
 
 class Teleop(_JsonTuples):
-    """Hold, and what for; with none of the three the last demand stays.
+    """Hold the robot to a command; with none of the three the last one stays.
 
     `target`: the tool goes there; its quaternion has length 1. With `base` too: the tool keeps to it while the base
-    moves. `base` alone: the base drives, the arm stands. `joints` alone (rad/s): joints turn, the base stands. All at
-    `share` of the usual speed.
+    moves. `base` alone: the base drives, the arm stands. `joints` alone (rad/s): joints turn, the base stands. `share`
+    scales the speed.
     """
 
     model_config = ConfigDict(
@@ -251,44 +251,44 @@ class Teleop(_JsonTuples):
 
 
 class Invite(_Body):
-    """Who is invited."""
+    """The invited user."""
 
     user: Annotated[str, Field(min_length=1, max_length=40, pattern=r"^[A-Za-z0-9_.\- ]+$")]
     role: Role
 
 
 class Outcome(BaseModel):
-    """Done or not, and the reason in words."""
+    """Success, and a message."""
 
     ok: bool
     reason: str
 
 
 class Invited(Outcome):
-    """Done, and the link to hand on."""
+    """Success, and the sign-in link."""
 
     link: str
 
 
 class Me(BaseModel):
-    """Who is signed in."""
+    """The signed-in user."""
 
     user: str
     role: Role
 
 
 class Rule(_Body):
-    """The numbers of the pruning rule; what is left out takes its usual value. Lengths in metres."""
+    """Parameters of the pruning rule; omitted ones take their defaults. Lengths in metres."""
 
     system: Literal["spur", "guyot"] = "spur"
-    nodes_kept: Annotated[int, Field(ge=1, le=5), _WHOLE] = 2
-    fruiting_nodes: Annotated[int, Field(ge=3, le=20), _WHOLE] = 8
+    nodes_kept: Annotated[int, Field(ge=1, le=5), _INTEGER] = 2
+    fruiting_nodes: Annotated[int, Field(ge=3, le=20), _INTEGER] = 8
     keeper_diameter: Annotated[float, Field(ge=0.003, le=0.015)] = 0.006
     offset: Annotated[float, Field(ge=0.005, le=0.05)] = 0.020
 
 
 class RuleOutcome(Outcome):
-    """How many points would be cut elsewhere or otherwise, go, or come, and how many acceptances would be void."""
+    """How many points a rule would move, remove and add, and how many acceptances it would void."""
 
     moved: int = 0
     gone: int = 0
@@ -297,28 +297,28 @@ class RuleOutcome(Outcome):
 
 
 class Move(_Body):
-    """So far along the cane (m): away from the cordon, or towards it where negative."""
+    """Distance along the cane (m), positive away from the cordon."""
 
     along: Annotated[float, Field(ge=-0.1, le=0.1)]
 
 
 class Seek(_Body):
-    """Where a recording goes on (s from its beginning; where it is when left out), or stands still."""
+    """Position in a recording (s from its start; the present one when omitted), and whether it plays."""
 
     position_s: Annotated[float, Field(ge=0.0, le=1e9)] | None = None
     playing: bool = True
 
 
 class Ray(_JsonTuples):
-    """A line of sight in odom (m): the point goes on the known cane that it passes nearest."""
+    """A ray in odom (m): the point is placed on the known cane nearest to it."""
 
     origin: tuple[_Metre, _Metre, _Metre]
     direction: tuple[_Unit, _Unit, _Unit]
 
 
 class Pixel(_Body):
-    """A place in a camera image, as shares of its width and height; `sequence` is that of the frame."""
+    """A pixel of a camera image, as fractions of its width and height; `sequence` is that of the frame."""
 
-    sequence: Annotated[int, Field(ge=0, le=_MOST), _WHOLE]
+    sequence: Annotated[int, Field(ge=0, le=_MAX_INTEGER), _INTEGER]
     u: Annotated[float, Field(ge=0.0, le=1.0)]
     v: Annotated[float, Field(ge=0.0, le=1.0)]

@@ -1,4 +1,4 @@
-"""REST for control of the robot's motion: who holds it, and how it changes hands."""
+"""REST for control of the robot: who holds it, and its transfer."""
 
 import msgspec
 from fastapi import APIRouter, Depends, Response
@@ -6,51 +6,52 @@ from fastapi import APIRouter, Depends, Response
 from rolling_panda.messages import commands as intents
 from rolling_panda.messages.supervision import ClientKey, ControlState
 from server.api import bodies as body
-from server.api.answers import ANSWERS, NOT_YET, Caller, Operator, answer, gives, heard, message
+from server.api.dependencies import Caller, Operator, activity
+from server.api.responses import COMMAND, UNAVAILABLE, answer, message, query
 from server.robots.context import Result, RobotContext
 
 
 class Control(ControlState, frozen=True, kw_only=True, tag="ControlState"):
-    """What the controller says of control, with the key of who asks."""
+    """The state of control, with the caller's key."""
 
     client: ClientKey
 
 
-def control_router(desk: RobotContext) -> APIRouter:
+def control_router(robot: RobotContext) -> APIRouter:
     """Everything under `/api/control`."""
-    router = APIRouter(prefix="/api/control", tags=["control"], dependencies=[Depends(heard(desk))])
+    router = APIRouter(prefix="/api/control", tags=["control"], dependencies=[Depends(activity(robot))])
 
-    @router.get("", responses=gives(Control, NOT_YET))
+    @router.get("", responses=query(Control, UNAVAILABLE))
     async def control(session: Caller) -> Response:
-        """Who holds control, who asks for it, and for how long the lease still lives; `client` is the caller's key."""
-        received = desk.link.control.peek()
+        """Who holds control, who requests it, and the remaining time of the lease; `client` is the caller's key."""
+        received = robot.link.control.peek()
         if received is None:
             return answer(Result(503, False, "The controller has not said yet who holds control; ask again."))
         return message(Control(**msgspec.structs.asdict(received.message), client=session.client))
 
-    @router.post("/here", responses=ANSWERS)
+    @router.post("/here", responses=COMMAND)
     async def here(session: Operator) -> Response:
-        """Say that the caller is there, which keeps control: a page does so while the 3-D view keeps it busy."""
+        """Report presence, which renews the lease: a page does so while the 3-D view keeps it busy."""
         return answer(Result(200, True, ""))
 
-    @router.post("/take", responses=ANSWERS)
+    @router.post("/take", responses=COMMAND)
     async def take(session: Operator, request: body.TakeControl) -> Response:
-        """Hold control. From somebody else only with `confirm`; the robot stops first, and they are told."""
-        return answer(await desk.ask(session, intents.TakeControl(user=session.user, confirmed=request.confirm)))
+        """Take control; from its holder only with `confirm`, after a stop of the robot."""
+        return answer(await robot.ask(session, intents.TakeControl(user=session.user, confirmed=request.confirm)))
 
-    @router.post("/request", responses=ANSWERS)
+    @router.post("/request", responses=COMMAND)
     async def request_it(session: Operator) -> Response:
-        """Ask who holds control to grant it."""
-        return answer(await desk.ask(session, intents.RequestControl(user=session.user)))
+        """Request control from its holder."""
+        return answer(await robot.ask(session, intents.RequestControl(user=session.user)))
 
-    @router.post("/grant", responses=ANSWERS)
+    @router.post("/grant", responses=COMMAND)
     async def grant(session: Operator) -> Response:
-        """Give control to who has asked for it; the robot stops first."""
-        return answer(await desk.ask(session, intents.GrantControl(user=session.user)))
+        """Grant control to who has requested it; the robot stops first."""
+        return answer(await robot.ask(session, intents.GrantControl(user=session.user)))
 
-    @router.post("/return", responses=ANSWERS)
+    @router.post("/return", responses=COMMAND)
     async def give_back(session: Operator) -> Response:
-        """Give control up; what moves is paused."""
-        return answer(await desk.ask(session, intents.ReturnControl(user=session.user)))
+        """Return control; motion is paused."""
+        return answer(await robot.ask(session, intents.ReturnControl(user=session.user)))
 
     return router

@@ -1,7 +1,7 @@
-"""The page's files as they are sent: read once at the start, few of them, and small.
+"""The page's static files: minified scripts, one bundled stylesheet, and preloads, cached in memory at the start.
 
-Scripts go without comments, types and indentation, a third of them. The stylesheets, for which the first paint waits,
-go as one, and the page names all its scripts, so that the browser asks for them at once and not one after the other.
+Scripts are sent without comments, types and indentation, which are a third of them. The stylesheets block the first
+paint and are bundled. The page preloads all its scripts, so that the browser requests them at once.
 """
 
 import hashlib
@@ -12,80 +12,82 @@ from starlette.responses import Response
 from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-#: A type for the type checker beside code; what it is about stands in parentheses after it.
+#: A JSDoc type cast beside code; the cast expression follows in parentheses.
 _TYPE = re.compile(r"/\*\* @type [^*`]*\*/ ?")
 _STYLESHEET = re.compile(r'^ *<link rel="stylesheet" href="([\w./-]+\.css)">\n', re.MULTILINE)
 _SCRIPT = re.compile(r'^( *)<script type="module" src="([\w./-]+\.js)"></script>\n', re.MULTILINE)
-#: What a script needs before it runs; what it imports later, with `import(…)`, is not among it.
+#: A static import; dynamic ones, `import(…)`, are not preloaded.
 _IMPORT = re.compile(r'^(?:import|export) (?:[^"(]* from )?"(\.[\w./-]+\.js)";', re.MULTILINE)
 _STYLES = "page.css"
-_KINDS = {".js": "text/javascript", ".css": "text/css", ".html": "text/html"}
+_MEDIA_TYPES = {".js": "text/javascript", ".css": "text/css", ".html": "text/html"}
 
 
 class PageFiles(StaticFiles):
-    """A folder of files, of which scripts, the joined stylesheet and the page are kept. Scripts keep their lines."""
+    """A folder of files, of which scripts, the bundled stylesheet and the page are cached. Scripts keep their lines."""
 
     def __init__(self, folder: Path) -> None:
         """Read `folder`, which has the page's `index.html`."""
         super().__init__(directory=folder)
         scripts = {
-            file.relative_to(folder).as_posix(): as_sent(file.read_text(encoding="utf-8"))
+            file.relative_to(folder).as_posix(): minified(file.read_text(encoding="utf-8"))
             for file in sorted(folder.rglob("*.js"))
         }
         page = (folder / "index.html").read_text(encoding="utf-8")
         styles = (folder / name for name in _STYLESHEET.findall(page))
-        self._kept = {
+        self._cache = {
             **scripts,
             _STYLES: "\n".join(style.read_text(encoding="utf-8") for style in styles),
-            "index.html": hastened(page, scripts),
+            "index.html": with_preloads(page, scripts),
         }
-        self._tags = {name: f'"{hashlib.sha256(text.encode()).hexdigest()[:32]}"' for name, text in self._kept.items()}
+        self._etags = {
+            name: f'"{hashlib.sha256(text.encode()).hexdigest()[:32]}"' for name, text in self._cache.items()
+        }
 
     async def get_response(self, path: str, scope: Scope) -> Response:
-        """The file, or that it has not changed."""
-        if path not in self._kept or scope["method"] not in ("GET", "HEAD"):
+        """The file, or 304 where it has not changed."""
+        if path not in self._cache or scope["method"] not in ("GET", "HEAD"):
             return await super().get_response(path, scope)
-        return self.kept(path, scope)
+        return self.cached(path, scope)
 
-    def kept(self, name: str, scope: Scope) -> Response:
-        """One of the files that are kept, or that it has not changed.
+    def cached(self, name: str, scope: Scope) -> Response:
+        """A cached file, or 304 where it has not changed.
 
         Raises:
-            KeyError: It is none of them.
+            KeyError: It is not cached.
         """
-        headers = {"ETag": self._tags[name], "Cache-Control": "no-cache"}
-        asked = dict(scope["headers"]).get(b"if-none-match", b"").decode("latin-1")
-        if asked == headers["ETag"]:
+        headers = {"ETag": self._etags[name], "Cache-Control": "no-cache"}
+        requested = dict(scope["headers"]).get(b"if-none-match", b"").decode("latin-1")
+        if requested == headers["ETag"]:
             return Response(status_code=304, headers=headers)
-        return Response(self._kept[name], media_type=_KINDS[PurePosixPath(name).suffix], headers=headers)
+        return Response(self._cache[name], media_type=_MEDIA_TYPES[PurePosixPath(name).suffix], headers=headers)
 
     def before(self, app: ASGIApp) -> ASGIApp:
-        """`app`, which is not asked for scripts and stylesheet: its many routes cost more than the file."""
-        quick = {f"/{name}" for name in self._kept if not name.endswith(".html")}
+        """`app` with the cached scripts and stylesheet served first, since matching its many routes costs more."""
+        paths = {f"/{name}" for name in self._cache if not name.endswith(".html")}
 
-        async def either(scope: Scope, receive: Receive, send: Send) -> None:
-            if scope["type"] == "http" and scope["method"] in ("GET", "HEAD") and scope["path"] in quick:
-                await self.kept(scope["path"][1:], scope)(scope, receive, send)
+        async def dispatch(scope: Scope, receive: Receive, send: Send) -> None:
+            if scope["type"] == "http" and scope["method"] in ("GET", "HEAD") and scope["path"] in paths:
+                await self.cached(scope["path"][1:], scope)(scope, receive, send)
             else:
                 await app(scope, receive, send)
 
-        return either
+        return dispatch
 
 
-def hastened(page: str, scripts: dict[str, str]) -> str:
-    """The page with one stylesheet in place of its several, and with its scripts named in the order of their need."""
+def with_preloads(page: str, scripts: dict[str, str]) -> str:
+    """The page with the bundled stylesheet and a preload of each script."""
     first, found = _STYLESHEET.search(page), _SCRIPT.search(page)
     if first is None or found is None:
         return page
     indent, entry = found.groups()
-    preloads = "".join(f'{indent}<link rel="modulepreload" href="{name}">\n' for name in needed(entry, scripts))
-    one = f'{indent}<link rel="stylesheet" href="{_STYLES}">\n'
-    joined = page[: first.start()] + one + _STYLESHEET.sub("", page[first.end() :])
-    return _SCRIPT.sub(lambda script: script[0] + preloads, joined, count=1)
+    preloads = "".join(f'{indent}<link rel="modulepreload" href="{name}">\n' for name in imports_of(entry, scripts))
+    bundle = f'{indent}<link rel="stylesheet" href="{_STYLES}">\n'
+    bundled = page[: first.start()] + bundle + _STYLESHEET.sub("", page[first.end() :])
+    return _SCRIPT.sub(lambda script: script[0] + preloads, bundled, count=1)
 
 
-def needed(entry: str, scripts: dict[str, str]) -> list[str]:
-    """What a script imports, and what that imports, without itself: the nearest first."""
+def imports_of(entry: str, scripts: dict[str, str]) -> list[str]:
+    """The scripts that a script imports, directly and indirectly, in breadth-first order."""
     order = [entry]
     for name in order:
         for imported in _IMPORT.findall(scripts[name]):
@@ -105,10 +107,10 @@ def _resolved(folder: PurePosixPath, path: str) -> str:
     return "/".join(parts)
 
 
-def as_sent(script: str) -> str:
-    """A script in which lines that are nothing but comment are empty, and no line is indented.
+def minified(script: str) -> str:
+    """A script without indentation and comment lines, which become empty.
 
-    Of comments beside code only types go. A template literal has to end on the line where it begins.
+    Of the comments beside code only type casts are removed. A template literal has to end on its first line.
     """
     lines, inside = [], False
     for line in script.split("\n"):

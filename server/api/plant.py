@@ -1,4 +1,4 @@
-"""REST for what an operator asks of perception: another pruning rule, what one would change, and points by hand."""
+"""REST for requests to perception: pruning rules, points placed by hand, and crops of points."""
 
 from dataclasses import replace
 from typing import Annotated
@@ -11,79 +11,82 @@ from rolling_panda.messages.page import PagePoints
 from rolling_panda.messages.perception import PruningRule
 from rolling_panda.messages.types import RuleEffect
 from server.api import bodies as body
-from server.api.answers import ABSENT, ANSWERS, WRONG, Caller, Operator, PointId, answer, gives
+from server.api.dependencies import Caller, Operator, PointId
+from server.api.responses import COMMAND, INVALID, NOT_FOUND, answer, query
 from server.robots.context import Result, RobotContext
 
 
-def plant_router(desk: RobotContext) -> APIRouter:
-    """What is asked of perception; each answer says what came of it."""
+def plant_router(robot: RobotContext) -> APIRouter:
+    """Requests that perception answers."""
     router = APIRouter(prefix="/api", tags=["points"])
 
-    @router.post("/rule", responses=ANSWERS)
+    @router.post("/rule", responses=COMMAND)
     async def rule(session: Operator, request: body.Rule) -> Response:
-        """Prune by these numbers from now on. Points of all that was seen change at once; accepted ones may go."""
+        """Set the pruning rule. All points change at once; accepted ones may be removed."""
         wanted = ask.SetRule(user=session.user, rule=PruningRule(**request.model_dump()))
-        return answer(await desk.ask_perception(session, wanted))
+        return answer(await robot.ask_perception(session, wanted))
 
-    @router.post("/rule/what-if", responses=ANSWERS | {200: {"model": body.RuleOutcome}})
+    @router.post("/rule/what-if", responses=COMMAND | {200: {"model": body.RuleOutcome}})
     async def what_if(session: Operator, request: body.Rule) -> Response:
-        """What these numbers would change; nothing does. `voided` counts the acceptances that would be void."""
+        """What a rule would change, without setting it. `voided` counts the acceptances that would become void."""
         wanted = ask.TryRule(user=session.user, rule=PruningRule(**request.model_dump()))
-        result = await desk.ask_perception(session, wanted)
+        result = await robot.ask_perception(session, wanted)
         if not result.ok or result.effect is None:
             return answer(result)
-        return JSONResponse(rule_outcome(result.effect, desk.points).model_dump())
+        return JSONResponse(rule_outcome(result.effect, robot.points).model_dump())
 
-    @router.post("/rule/undo", responses=ANSWERS)
-    async def take_back(session: Operator, request: body.Rule) -> Response:
-        """Take the rule that is in force back: the points and acceptances are again as before it.
+    @router.post("/rule/undo", responses=COMMAND)
+    async def undo(session: Operator, request: body.Rule) -> Response:
+        """Undo the present rule: restore the points and acceptances from before it.
 
-        The numbers are those of that rule as it was seen: one that somebody has changed since is refused. What was cut,
-        decided or placed by hand meanwhile stays so.
+        The body has the rule that the caller saw; where it has changed since, the request is refused. Later cuts,
+        decisions and points by hand stay.
         """
         rule = PruningRule(**request.model_dump())
-        done = await desk.ask_perception(session, ask.TakeRuleBack(user=session.user, rule=rule))
+        done = await robot.ask_perception(session, ask.TakeRuleBack(user=session.user, rule=rule))
         if not done.ok:
             return answer(done)
-        restored = await desk.ask(session, ask.RestoreAccepted(user=session.user, rule=rule))
+        restored = await robot.ask(session, ask.RestoreAccepted(user=session.user, rule=rule))
         if not restored.ok:
             return answer(replace(restored, reason=f"the rule is back, its acceptances are not: {restored.reason}"))
         return answer(done)
 
-    @router.post("/points/by-hand", responses=ANSWERS)
+    @router.post("/points/by-hand", responses=COMMAND)
     async def by_hand(session: Operator, request: body.Ray) -> Response:
         """Add a point where a line of sight meets a cane; `reason` is its name."""
         wanted = ask.AddPoint(user=session.user, origin=request.origin, direction=request.direction)
-        return answer(await desk.ask_perception(session, wanted))
+        return answer(await robot.ask_perception(session, wanted))
 
-    @router.post("/points/by-hand-in-image", responses=ANSWERS)
+    @router.post("/points/by-hand-in-image", responses=COMMAND)
     async def by_hand_in_image(session: Operator, request: body.Pixel) -> Response:
         """Add a point on the cane under a pixel of one of the newest camera images; `reason` is its name."""
         return answer(
-            await desk.ask_perception(session, ask.AddPointInImage(user=session.user, **request.model_dump()))
+            await robot.ask_perception(session, ask.AddPointInImage(user=session.user, **request.model_dump()))
         )
 
-    @router.post("/points/{point_id}/move", responses=ANSWERS)
+    @router.post("/points/{point_id}/move", responses=COMMAND)
     async def move(session: Operator, point_id: PointId, request: body.Move) -> Response:
-        """Move a point along its cane; `reason` says what it is now. An acceptance of it may be void then."""
+        """Move a point along its cane; `reason` describes the result. Its acceptance may become void."""
         wanted = ask.MovePoint(user=session.user, point_id=point_id, along=request.along)
-        return answer(await desk.ask_perception(session, wanted))
+        return answer(await robot.ask_perception(session, wanted))
 
     @router.get(
         "/points/{point_id}/crop",
         response_class=Response,
-        responses=gives("image/jpeg", {204: {"description": "No picture has come yet: ask again."}}, ABSENT, WRONG),
+        responses=query(
+            "image/jpeg", {204: {"description": "No picture has come yet: ask again."}}, NOT_FOUND, INVALID
+        ),
     )
     async def crop(session: Caller, point_id: PointId, revision: Annotated[int, Query(ge=0)] | None = None) -> Response:
-        """What the camera saw around a point, the cut in the middle, as JPEG; of one revision where that is said.
+        """The camera image around a point, the cut in the middle, as JPEG; of one revision where that is given.
 
-        204 while no picture of a known point has come: ask again.
+        204 while no image of a known point has come: ask again.
         """
-        found = desk.link.crops.get(point_id)
+        found = robot.link.crops.get(point_id)
         if found is None or revision not in (None, found.revision):
-            known = desk.points.points if desk.points is not None else ()
+            known = robot.points.points if robot.points is not None else ()
             if any(row.point.point_id == point_id for row in known):
-                # Nothing is wrong yet, and a browser's console should not say so.
+                # Not an error, which a browser's console would show.
                 return Response(status_code=204)
             return answer(Result(404, False, f"there is no point {point_id!r}"))
         return Response(found.jpeg, media_type="image/jpeg")
@@ -92,7 +95,7 @@ def plant_router(desk: RobotContext) -> APIRouter:
 
 
 def rule_outcome(effect: RuleEffect, points: PagePoints | None) -> body.RuleOutcome:
-    """What a rule would change, with the acceptances that it would make void, in numbers and in words."""
+    """The effect of a rule and the acceptances that it would void, as numbers and as text."""
     rows = () if points is None else points.points
     accepted = {row.point.point_id for row in rows if row.entry.state in ("ACCEPTED", "UNREACHABLE")}
     voided = len(accepted & {*effect.moved, *effect.gone})

@@ -1,18 +1,21 @@
-"""REST for all robots of the server together: which there are, and one stop for all of them."""
+"""Several robots of one server: each has its application under its own path; here are the list and the stop of all."""
 
 import asyncio
+from collections.abc import Mapping
 
 from fastapi import APIRouter, HTTPException, Request, Response
 from fastapi.responses import RedirectResponse
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from server.api import bodies as body
-from server.api.answers import ANSWERS, SIGNED_IN, STOP_BODY, Caller, answer
+from server.api.dependencies import Caller
+from server.api.responses import COMMAND, SIGNED_IN, STOP_BODY, answer
 from server.auth.sessions import Session
 from server.robots.app_state import AppState
 from server.robots.context import Result, RobotContext
-from server.robots.summary import Glance, glance
+from server.robots.summary import RobotSummary, summarize
 
-#: Below it each robot has a page and an interface of its own.
+#: Each robot's page and REST interface are below it.
 ROBOTS = "/robots"
 
 
@@ -21,48 +24,71 @@ def path_of(name: str) -> str:
     return f"{ROBOTS}/{name}/"
 
 
-def robots_router(reception: AppState) -> APIRouter:
+def robots_router(app_state: AppState) -> APIRouter:
     """Routes that belong to no single robot, where there are several."""
     router = APIRouter()
 
     @router.get("/api/robots", tags=["robots"], responses=SIGNED_IN)
-    async def robots(session: Caller) -> list[Glance]:
-        """Every robot at a glance. Asking is not looking: it keeps nobody's control, and no work going."""
+    async def robots(session: Caller) -> list[RobotSummary]:
+        """A summary of every robot. The request counts neither as presence nor as a view of a robot."""
         return [
-            glance(name, path_of(name), desk.state, desk.points, session.client)
-            for name, desk in reception.desks.items()
+            summarize(name, path_of(name), robot.state, robot.points, session.client)
+            for name, robot in app_state.robots.items()
         ]
 
-    @router.post("/api/stop", tags=["robots"], responses=ANSWERS, openapi_extra=STOP_BODY)
+    @router.post("/api/stop", tags=["robots"], responses=COMMAND, openapi_extra=STOP_BODY)
     async def stop(session: Caller, request: Request) -> Response:
         """Software stop of every robot, by every role; 503 = the bridge of one did not confirm, `reason` says whose.
 
-        Without a body, or with one that cannot be read, it stops all the same.
+        A missing or unreadable body does not prevent the stop.
         """
         reason = body.Stop.read(await request.body()).reason
-        return answer(await stop_all(reception.desks, session, reason))
+        return answer(await stop_all(app_state.robots, session, reason))
 
     @router.get(f"{ROBOTS}/{{name}}", include_in_schema=False)
     async def robot(name: str) -> Response:
-        if name not in reception.desks:
-            raise unknown(name, reception)
+        if name not in app_state.robots:
+            raise unknown(name, app_state)
         return RedirectResponse(path_of(name))
 
     @router.api_route(f"{ROBOTS}/{{name}}/{{rest:path}}", methods=["GET", "HEAD", "POST"], include_in_schema=False)
-    async def nowhere(name: str) -> Response:
-        raise unknown(name, reception)
+    async def not_found(name: str) -> Response:
+        raise unknown(name, app_state)
 
     return router
 
 
-async def stop_all(desks: dict[str, RobotContext], session: Session, reason: str) -> Result:
-    """Stop every robot at the same time; as bad as the worst of them, in the words of each."""
-    results = await asyncio.gather(*(desk.stop(session, reason) for desk in desks.values()))
-    words = "; ".join(f"{name}: {result.reason}" for name, result in zip(desks, results, strict=True))
-    return Result(max(result.status for result in results), all(result.ok for result in results), words)
+async def stop_all(robots: dict[str, RobotContext], session: Session, reason: str) -> Result:
+    """Stop every robot at once; the status is the worst, the reason has that of each."""
+    results = await asyncio.gather(*(robot.stop(session, reason) for robot in robots.values()))
+    reasons = "; ".join(f"{name}: {result.reason}" for name, result in zip(robots, results, strict=True))
+    return Result(max(result.status for result in results), all(result.ok for result in results), reasons)
 
 
-def unknown(name: str, reception: AppState) -> HTTPException:
-    """There is no such robot."""
-    there = ", ".join(reception.desks)
+def unknown(name: str, app_state: AppState) -> HTTPException:
+    """The error for a name that no robot has."""
+    there = ", ".join(app_state.robots)
     return HTTPException(404, f"there is no robot {name[:64]!r} here; there are: {there} (GET /api/robots)")
+
+
+class RobotRouter:
+    """ASGI application that dispatches each request to its robot's application, or to the one for all robots.
+
+    A robot's application is given the path without its prefix, as if it were alone. So middleware, routes and the
+    filter of the 3-D view are the same for one robot and for several, and none of them can reach another robot.
+    """
+
+    def __init__(self, robots: Mapping[str, ASGIApp], common: ASGIApp) -> None:
+        """Serve `robots` by name, and every other path by `common`."""
+        self._robots = {path_of(name): app for name, app in robots.items()}
+        self._common = common
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Dispatch a request."""
+        if scope["type"] in ("http", "websocket"):
+            path: str = scope["path"]
+            for prefix, app in self._robots.items():
+                if path.startswith(prefix):
+                    await app({**scope, "path": path[len(prefix) - 1 :]}, receive, send)
+                    return
+        await self._common(scope, receive, send)

@@ -1,4 +1,4 @@
-"""Who comes in and goes: one sign-in, one cookie and one session for every robot of this server."""
+"""State that all robots of this server share: sessions, sign-in and the contexts of the robots."""
 
 import time
 from dataclasses import dataclass, field
@@ -12,16 +12,16 @@ from server.robots.context import Result, RobotContext
 
 @dataclass(eq=False)
 class AppState:
-    """What the desks of all robots share; the server's event loop alone touches it.
+    """Shared state of the server; it belongs to the event loop.
 
     Attributes:
-        sessions: Who is signed in.
-        address: How the page is reached on this machine.
-        cookie: Name of the session's cookie.
-        invite_s: Life of a sign-in link that a supervisor makes (s).
+        sessions: Signed-in sessions.
+        address: Of the page on this machine.
+        cookie: Name of the session cookie.
+        invite_s: Lifetime of a sign-in link that a supervisor makes (s).
         max_body_bytes: Longest request body.
-        passwords: None where a link signs in.
-        desks: One a robot, by the robot's name.
+        passwords: None where sign-in is by link.
+        robots: By name.
     """
 
     sessions: Sessions
@@ -30,18 +30,18 @@ class AppState:
     invite_s: float
     max_body_bytes: int
     passwords: Passwords | None = None
-    desks: dict[str, RobotContext] = field(default_factory=dict)
-    _users_trouble: str = ""
+    robots: dict[str, RobotContext] = field(default_factory=dict)
+    _users_error: str = ""
 
     def note(self, severity: m.Severity, text: str, by: str = "") -> None:
-        """Write a line into the log of every robot; `by` whom, who must not fill it."""
-        for desk in self.desks.values():
-            desk.note(severity, text, by)
+        """Write a line into the log of every robot; see `RobotContext.note`."""
+        for robot in self.robots.values():
+            robot.note(severity, text, by)
 
     def sign_out(self, session: Session) -> None:
-        """End a session everywhere; what it held of any robot is let go."""
-        for desk in self.desks.values():
-            desk.leave(session)
+        """End a session; its holds of all robots are released."""
+        for robot in self.robots.values():
+            robot.end_session(session)
         self.sessions.end(session)
         self.note("info", f"{session.user} signed out")
 
@@ -54,25 +54,25 @@ class AppState:
         return Result(200, True, f"{self.address}/sign-in?token={token}")
 
     def end_void_sessions(self) -> None:
-        """Sign out whoever's account has been removed or changed."""
+        """Sign out the sessions of removed and changed accounts."""
         if self.passwords is None:
             return
         try:
             accounts = {user.name: user.fingerprint for user in self.passwords.users.everyone()}
         except InputError as error:
-            # Whoever is at work stays at work; nobody new comes in.
-            if str(error) != self._users_trouble:
-                self._users_trouble = str(error)
-                self.note("error", self._users_trouble)
+            # Sessions stay signed in while the file cannot be read; nobody new can sign in.
+            if str(error) != self._users_error:
+                self._users_error = str(error)
+                self.note("error", self._users_error)
             return
-        self._users_trouble = ""
+        self._users_error = ""
         for session in self.sessions.void(accounts):
             self.note("warning", f"the account of {session.user} was removed or changed")
             self.sign_out(session)
 
     def held_elsewhere(self, session: Session, here: RobotContext) -> str:
         """Name of another robot that this session holds now; empty where it holds none."""
-        for name, desk in self.desks.items():
-            if desk is not here and desk.teleop.holder == session.session_id:
+        for name, robot in self.robots.items():
+            if robot is not here and robot.teleop.holder == session.session_id:
                 return name
         return ""

@@ -1,13 +1,20 @@
-"""The log that the page shows: the last lines of every process, numbered."""
+"""The log that the page shows: the last lines of every process, numbered, and a rate limit for each source of lines."""
 
-from collections import deque
+from collections import OrderedDict, deque
+from dataclasses import dataclass, field
 
 from rolling_panda import messages as m
 from rolling_panda.messages.page import PageEvent
+from server.connections.token_bucket import TokenBucket
+
+#: Lines of one source: at once, and per second after that.
+BURST, RATE_HZ = 20.0, 1.0
+#: With more sources than these the oldest are forgotten.
+_MAX_SOURCES = 1000
 
 
 class EventLog:
-    """Keeps the last lines. Not thread-safe: the server's event loop alone touches it."""
+    """Keeps the last lines. Not thread-safe: it belongs to the server's event loop."""
 
     def __init__(self, lines: int) -> None:
         """Keep up to `lines` lines."""
@@ -15,13 +22,40 @@ class EventLog:
         self.number = 0
 
     def add(self, process: str, severity: m.Severity, text: str, wall_time: float) -> None:
-        """Append a line; `wall_time` is s since 1970, for people."""
+        """Append a line; `wall_time` is Unix time (s)."""
         self.number += 1
         self._events.append(PageEvent(self.number, wall_time, process, severity, text))
 
     def after(self, number: int, at_most: int) -> tuple[PageEvent, ...]:
-        """The newest `at_most` lines that came after line `number`, oldest first."""
-        waiting = min(self.number - number, len(self._events), at_most)
-        if waiting <= 0:
-            return ()
-        return tuple(self._events[index] for index in range(len(self._events) - waiting, len(self._events)))
+        """The newest `at_most` lines after line `number`, oldest first."""
+        count = min(self.number - number, len(self._events), at_most)
+        return tuple(self._events)[len(self._events) - count :] if count > 0 else ()
+
+
+@dataclass
+class _Source:
+    lines: TokenBucket = field(default_factory=lambda: TokenBucket(RATE_HZ, BURST))
+    left_out: int = 0
+
+
+class LogRateLimiter:
+    """Limits the lines of each source, since the robot's ledger stores them; left-out lines are counted.
+
+    No clock here: `now` is given (s).
+    """
+
+    def __init__(self) -> None:
+        """No source is known."""
+        self._sources: OrderedDict[str, _Source] = OrderedDict()
+
+    def line(self, source: str, text: str, now: float) -> str:
+        """The line to write; empty while the source is over its limit."""
+        known = self._sources.setdefault(source, _Source())
+        self._sources.move_to_end(source)
+        if len(self._sources) > _MAX_SOURCES:
+            self._sources.popitem(last=False)
+        if not known.lines.take(now):
+            known.left_out += 1
+            return ""
+        left_out, known.left_out = known.left_out, 0
+        return f"{text} (and {left_out} lines like it before)" if left_out else text

@@ -1,6 +1,6 @@
-"""The server's end of the robot's wire: newest states in, intents, stops and teleoperation out.
+"""The server's connection to one robot: newest states in, intents, stops and teleoperation out.
 
-Zenoh calls back on its own threads; those only store to slots and feeds, which the server's event loop reads.
+Zenoh's callbacks run on its own threads; they only store to slots and feeds, which the server's event loop reads.
 """
 
 import asyncio
@@ -10,6 +10,7 @@ import time
 from collections import deque
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Any
 
 from rolling_panda import messages as m
 from rolling_panda import topics
@@ -23,15 +24,15 @@ from rolling_panda.transport.zenoh import Received, Transport
 
 _STOP_REPEATS = 5
 _STOP_SPACING_S = 0.025
-#: Images of the camera that are kept: a page asks for the one that it was told of, and newer ones may have come since.
-_MOST_IMAGES = 5
-#: Pictures of points that are kept; of 8 kB each at most.
-_MOST_CROPS = 3000
+#: Camera images that are kept: a page asks for the frame of its state, and newer ones may have come since.
+_MAX_IMAGES = 5
+#: Crops of points that are kept, of at most 8 kB each.
+_MAX_CROPS = 3000
 
 
 @dataclass(frozen=True)
 class Posture:
-    """Where the robot is now, as measured: base in odom, [θ_l, θ_r, q₁…q₇] (rad), and the age of the older (s)."""
+    """The measured posture: base in odom, [θ_l, θ_r, q₁…q₇] (rad), and the age of the older of both (s)."""
 
     base: m.PlanarPose
     position: m.Actuated
@@ -39,7 +40,7 @@ class Posture:
 
 
 class RobotLink:
-    """Everything that the server hears from the robot and says to it."""
+    """Receives the robot's messages and sends the server's."""
 
     def __init__(self, transport: Transport) -> None:
         """Subscribe to what the page and the 3-D view need."""
@@ -51,7 +52,7 @@ class RobotLink:
         self.replay = transport.slot(topics.REPLAY)
         self.camera = transport.slot(topics.CAMERA)
         self.images: dict[int, bytes] = {}
-        """Of the newest few frames, by their sequence."""
+        """JPEG of the newest frames, by sequence."""
         transport.subscribe(topics.CAMERA, self._on_frame)
         self.points = transport.slot(topics.POINTS)
         self.plan = transport.slot(topics.PLAN)
@@ -61,7 +62,7 @@ class RobotLink:
         self.scenery = transport.slot(topics.SCENERY)
         self.obstacles = transport.slot(topics.OBSTACLES)
         self.crops: dict[str, PointCrop] = {}
-        """The newest picture of each point, by its id."""
+        """The newest crop of each point, by id."""
         transport.subscribe(topics.CROPS, self._on_crop)
         self.control = transport.slot(topics.CONTROL)
         self.stops: dict[str, Received[StopState]] = {}
@@ -74,7 +75,7 @@ class RobotLink:
         self._beat = transport.publisher(topics.HEARTBEAT)
         self._presence = transport.publisher(topics.PRESENCE)
         self._event = transport.publisher(topics.EVENT)
-        # Its own thread, so that a controller that does not answer can never delay anything else.
+        # Own threads, so that a controller that does not answer delays nothing else.
         self._callers = ThreadPoolExecutor(max_workers=4, thread_name_prefix="intent")
         self._writer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="event")
         self.refused: deque[tuple[str, str]] = deque(maxlen=100)
@@ -86,8 +87,7 @@ class RobotLink:
         Raises:
             ServiceError: It did not answer in time.
         """
-        loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(self._callers, self._transport.call, topics.INTENT, intent)
+        return await self._call(topics.INTENT, intent)
 
     async def ask_perception(self, request: PlantRequest) -> m.Answer:
         """Ask perception.
@@ -95,22 +95,24 @@ class RobotLink:
         Raises:
             ServiceError: It did not answer in time.
         """
-        loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(self._callers, self._transport.call, topics.PLANT, request)
+        return await self._call(topics.PLANT, request)
 
     async def seek(self, request: SeekReplay) -> m.Answer:
-        """Ask who plays a recording.
+        """Ask the player of a recording.
 
         Raises:
-            ServiceError: Nobody does.
+            ServiceError: There is none.
         """
+        return await self._call(topics.SEEK, request)
+
+    async def _call(self, service: topics.Service[Any], request: object) -> m.Answer:
         loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(self._callers, self._transport.call, topics.SEEK, request)
+        return await loop.run_in_executor(self._callers, self._transport.call, service, request)
 
-    def stop(self, user: str, reason: str) -> str:
-        """Send the software stop now and again a few times over 100 ms; its id. It needs no controller.
+    def send_stop(self, user: str, reason: str) -> str:
+        """Send the software stop, repeated over 100 ms; returns its id. It needs no controller.
 
-        On a thread of its own: the topic blocks when the wire is full, and the server's loop must not wait for that.
+        It is sent on its own thread, since the topic blocks when the wire is congested.
         """
         request = m.StopRequest(stop_id=f"s-{secrets.token_hex(8)}", source="server", user=user, reason=reason)
 
@@ -124,27 +126,27 @@ class RobotLink:
         return request.stop_id
 
     def not_latched(self, stop_id: str) -> tuple[str, ...]:
-        """Of bridge and controller those that have not said that they hold this stop latched."""
-        told = {process: {stop.stop_id for stop in state.message.stops} for process, state in self.stops.items()}
+        """Those of bridge and controller that have not reported this stop as latched."""
+        latched = {process: {stop.stop_id for stop in state.message.stops} for process, state in self.stops.items()}
         bridge = self.bridge.peek()
         if bridge is not None:
-            told.setdefault("bridge", set()).add(bridge.message.stop_id)
-        return tuple(process for process in ("bridge", "controller") if stop_id not in told.get(process, ()))
+            latched.setdefault("bridge", set()).add(bridge.message.stop_id)
+        return tuple(process for process in ("bridge", "controller") if stop_id not in latched.get(process, ()))
 
-    def teleop(self, target: TeleopTarget) -> None:
-        """Publish where the held gizmo is."""
+    def send_teleop(self, target: TeleopTarget) -> None:
+        """Publish the teleoperation target."""
         self._teleop.put(target)
 
-    def presence_of(self, people: Presence) -> None:
-        """Say who is there."""
-        self._presence.put(people)
+    def send_presence(self, presence: Presence) -> None:
+        """Publish the present sessions."""
+        self._presence.put(presence)
 
-    def beat(self, sequence: int) -> None:
-        """Say that the server's loop has turned."""
+    def send_heartbeat(self, sequence: int) -> None:
+        """Publish the heartbeat of the server's loop."""
         self._beat.put(m.Heartbeat(process="server", sequence=sequence))
 
-    def event(self, severity: m.Severity, text: str, now: float) -> None:
-        """Publish a line of the log, on a thread of its own, as this topic blocks too."""
+    def send_event(self, severity: m.Severity, text: str, now: float) -> None:
+        """Publish a line of the log, on its own thread, since this topic blocks too."""
         event = m.LogEvent(header=m.Header(stamp=now), process="server", severity=severity, text=text[:500])
         self._writer.submit(self._event.put, event)
 
@@ -156,7 +158,7 @@ class RobotLink:
         return Posture(odometry.message.pose, joints.message.position, now - min(joints.at, odometry.at))
 
     def presence(self, now: float) -> tuple[ProcessPresence, ...]:
-        """One row a process: connected, and the age of its last word."""
+        """One row for each process: whether it is connected, and the age of its last message."""
         present = self._transport.present()
         ages = {
             "bridge": min(self.joints.age(now), self.bridge.age(now)),
@@ -171,20 +173,20 @@ class RobotLink:
         return tuple(rows)
 
     def close(self) -> None:
-        """Stop waiting for answers."""
+        """Abandon calls without an answer."""
         self._callers.shutdown(wait=False, cancel_futures=True)
         self._writer.shutdown(wait=False, cancel_futures=True)
 
     def _on_frame(self, message: CameraFrame, at: float) -> None:
         self.images[message.sequence] = message.color_jpeg
-        if len(self.images) > _MOST_IMAGES:
+        if len(self.images) > _MAX_IMAGES:
             del self.images[next(iter(self.images))]
 
     def _on_crop(self, message: PointCrop, at: float) -> None:
-        # Renewed at the end, so that points long gone are the first to be forgotten.
+        # The newest goes last, so that the oldest crops are dropped first.
         self.crops.pop(message.point_id, None)
         self.crops[message.point_id] = message
-        if len(self.crops) > _MOST_CROPS:
+        if len(self.crops) > _MAX_CROPS:
             del self.crops[next(iter(self.crops))]
 
     def _on_stops(self, message: StopState, at: float) -> None:

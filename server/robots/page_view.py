@@ -1,4 +1,4 @@
-"""What the page is shown, put together from the newest messages of the robot."""
+"""The page's messages, built from the newest messages of the robot."""
 
 import math
 
@@ -7,18 +7,17 @@ import numpy as np
 
 from rolling_panda import messages as m
 from rolling_panda.messages.page import PagePlan, PagePoint, PagePoints, PageState
-from rolling_panda.messages.robot import CameraFrame
+from rolling_panda.messages.robot import CameraFrame, JointState
 from rolling_panda.messages.supervision import SessionPlan
 from rolling_panda.messages.types import Role
-from rolling_panda.model.robot import ARM_Q, RobotModel, configuration, pose_message
+from rolling_panda.model.robot import ARM_Q, Limits, RobotModel, configuration, pose_message
 from server.auth.sessions import Session
-from server.robots.limits import speed_shares
 from server.robots.link import RobotLink
 
-#: A count of frames alone is not worth sending every point again more often than this (s).
-_RECOUNT_S = 5.0
-#: The cane's direction in an image is told from a place so far along its tangent (m).
-_BEYOND = 0.05
+#: Where the count of frames alone has changed, all points are sent again after this time (s).
+_FRAME_COUNT_PERIOD_S = 5.0
+#: The cane's direction in an image is computed from a point so far along its tangent (m).
+_TANGENT_STEP = 0.05
 _NOT_QUEUED = "the controller has not taken it up yet"
 
 
@@ -28,21 +27,21 @@ class PageView:
     def __init__(
         self, link: RobotLink, model: RobotModel, wider: tuple[str, ...] = (), plain_wire: bool = False
     ) -> None:
-        """Show what is heard.
+        """Build messages from what comes over `link`.
 
         Args:
             link: To read from.
             model: Projects points into the image.
-            wider: What is set so in the server itself.
-            plain_wire: Whether the robot's wire is not protected.
+            wider: Limits of the server that are set wider than usual.
+            plain_wire: Whether the robot's wire is unencrypted.
         """
         self._wider, self._plain_wire = wider, plain_wire
         self._link = link
         self._model = model
         self._seen: dict[str, m.PruningPoint] = {}
-        self._made_from: tuple[object, ...] = ()
-        self._made: PagePoints | None = None
-        self._made_at = 0.0
+        self._built_from: tuple[object, ...] = ()
+        self._built: PagePoints | None = None
+        self._built_at = 0.0
 
     @property
     def arm_limits(self) -> tuple[tuple[float, float], ...]:
@@ -51,7 +50,7 @@ class PageView:
         return tuple(zip(limits.lower[ARM_Q].tolist(), limits.upper[ARM_Q].tolist(), strict=True))
 
     def state(self, number: int, viewers: int, now: float) -> PageState:
-        """The state of this moment, addressed to nobody yet."""
+        """The current state, without a recipient; see `addressed`."""
         controller, bridge = self._link.controller.peek(), self._link.bridge.peek()
         replay = self._link.replay.peek()
         joints, odometry = self._link.joints.peek(), self._link.odometry.peek()
@@ -72,7 +71,7 @@ class PageView:
             control=control.message if control else None,
             replay=replay.message if replay else None,
             stops=tuple(self._link.stops[process].message for process in sorted(self._link.stops)),
-            # The same section may be read by several processes, from one file.
+            # Several processes may read the same section of one file.
             wider=tuple(
                 dict.fromkeys(
                     (
@@ -87,7 +86,7 @@ class PageView:
         )
 
     def tool(self, now: float) -> m.Pose | None:
-        """Measured T_odom_tool, or None before the robot has said where it is."""
+        """Measured T_odom_tool; None before the first posture."""
         posture = self._link.posture(now)
         if posture is None:
             return None
@@ -98,33 +97,33 @@ class PageView:
         return pose_message(self._model.pose(configuration(frame.base, frame.position), self._model.camera_id))
 
     def points(self, now: float) -> PagePoints:
-        """Every point in the order of work; those that perception no longer sees stay while the queue has them.
+        """All points in the order of work; points that perception no longer reports stay while they are queued.
 
-        The same object as before while nothing has changed; the count of frames alone is renewed now and then.
+        Returns the same object while nothing has changed; a change of the frame count alone is delayed.
         """
         received, controller = self._link.points.peek(), self._link.controller.peek()
         camera = self._link.camera.peek()
         queue = controller.message.queue if controller else ()
         plan = self._link.plan.peek()
-        made_from = (received, camera, queue, plan)
-        before = self._made
-        if before is not None and made_from == self._made_from:
+        built_from = (received, camera, queue, plan)
+        before = self._built
+        if before is not None and built_from == self._built_from:
             return before
-        made = self._make_points(
+        built = self._build_points(
             received.message if received else None,
             queue,
             camera.message if camera else None,
             plan.message if plan else None,
         )
-        self._made_from = made_from
+        self._built_from = built_from
         if before is not None:
-            recounted = msgspec.structs.replace(before, frames=made.frames)
-            if made == before or (made == recounted and now - self._made_at <= _RECOUNT_S):
+            recounted = msgspec.structs.replace(before, frames=built.frames)
+            if built == before or (built == recounted and now - self._built_at <= _FRAME_COUNT_PERIOD_S):
                 return before
-        self._made, self._made_at = made, now
-        return made
+        self._built, self._built_at = built, now
+        return built
 
-    def _make_points(
+    def _build_points(
         self,
         perceived: m.PruningPoints | None,
         queue: tuple[m.QueueEntry, ...],
@@ -143,7 +142,7 @@ class PageView:
             if point.point_id not in queued
         ]
         pixels = project([point.position for point, _ in rows], camera, self._model)
-        beyond = project([_beyond(point) for point, _ in rows], camera, self._model)
+        ahead = project([_ahead(point) for point, _ in rows], camera, self._model)
         planned = (
             {} if plan is None or plan.state != "valid" else {each.plan.point_id: each.plan for each in plan.points}
         )
@@ -153,10 +152,10 @@ class PageView:
                     point,
                     entry,
                     pixel,
-                    _angle(pixel, further),
+                    _angle(pixel, next_pixel),
                     planned.get(point.point_id) if entry.state in ("ACCEPTED", "UNREACHABLE") else None,
                 )
-                for (point, entry), pixel, further in zip(rows, pixels, beyond, strict=True)
+                for (point, entry), pixel, next_pixel in zip(rows, pixels, ahead, strict=True)
             ),
             abstained=perceived.abstained if perceived else (),
             segmenter=perceived.segmenter if perceived else "",
@@ -167,9 +166,9 @@ class PageView:
         )
 
 
-def _beyond(point: m.PruningPoint) -> m.Vector3:
-    """A place on the cane's tangent, past the cut."""
-    x, y, z = (np.array(point.position) + _BEYOND * np.array(point.tangent)).tolist()
+def _ahead(point: m.PruningPoint) -> m.Vector3:
+    """A point on the cane's tangent, past the cut."""
+    x, y, z = (np.array(point.position) + _TANGENT_STEP * np.array(point.tangent)).tolist()
     return x, y, z
 
 
@@ -181,7 +180,7 @@ def _angle(here: tuple[float, float] | None, there: tuple[float, float] | None) 
 
 
 def addressed(state: PageState, session: Session) -> PageState:
-    """The same state for one reader."""
+    """The same state for one recipient."""
     role: Role = session.role
     return msgspec.structs.replace(state, user=session.user, role=role, client=session.client)
 
@@ -203,3 +202,8 @@ def project(
         u, v = float(round(lens.fx * x / z + lens.cx)), float(round(lens.fy * y / z + lens.cy))
         pixels.append((u, v) if 0 <= u < lens.width and 0 <= v < lens.height else None)
     return pixels
+
+
+def speed_shares(joints: JointState, limits: Limits) -> tuple[float, ...]:
+    """Speed of each actuator as a fraction of its limit, wheels first (9)."""
+    return tuple(np.round(np.abs(joints.velocity) / limits.velocity, 3).tolist())

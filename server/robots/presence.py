@@ -1,65 +1,68 @@
-"""Who is there, for the controller: it renews the lease and tells whether somebody sees the robot. No clock here."""
+"""Which sessions are present, for the controller's lease, and how old the robot's state is that each has seen.
+
+No clock here: `now` is given (s).
+"""
 
 from dataclasses import dataclass
 
 from rolling_panda.messages.supervision import NEVER_SEEN_S, Person, Presence
 from server.auth.sessions import Session
 
-#: Who has been silent for so long (s) is not there any more.
-HEARD_S = 1.0
-#: The first word after so long a silence (s) is told at once: with the next turn it could come too late for the lease.
-_SILENT_S = 0.4
+#: A session that has sent nothing for so long (s) is absent.
+PRESENT_S = 1.0
+#: The first activity after a longer silence (s) is published at once; the next period could be too late for the lease.
+_SILENCE_S = 0.4
 
 
 @dataclass
 class _Client:
     session: Session
-    heard_at: float
+    active_at: float
     seen_at: float
 
 
-class PresentPeople:
-    """When each session was heard from, and how old the robot was as it was last drawn or fetched."""
+class PresenceTracker:
+    """When each session was last active, and when the state was measured that it has seen."""
 
     def __init__(self) -> None:
-        """Nobody is there."""
+        """No session is present."""
         self._clients: dict[str, _Client] = {}
         self._sequence = 0
 
-    def heard(self, session: Session, now: float) -> bool:
-        """A page or a script of this session has said something.
+    def on_activity(self, session: Session, now: float) -> bool:
+        """A page or a script of this session has sent something.
 
         Returns:
-            Whether that is news that should not wait: somebody who may operate has been silent for a while.
+            Whether to publish at once: the session may operate and has been silent for a while.
         """
         client = self._of(session)
-        news = session.may_operate and now - client.heard_at > _SILENT_S
-        client.heard_at = now
-        return news
+        publish = session.may_operate and now - client.active_at > _SILENCE_S
+        client.active_at = now
+        return publish
 
-    def saw(self, session: Session, seen_at: float) -> bool:
-        """Something of this session has drawn or fetched the robot as it was at this time (s).
+    def on_seen(self, session: Session, seen_at: float) -> bool:
+        """A page or a script of this session has rendered or fetched a state that was measured at `seen_at` (s).
 
         Returns:
-            Whether that is news that should not wait: nobody of this session has seen the robot for a while.
+            Whether to publish at once: the session had not seen the robot for a while.
         """
         client = self._of(session)
-        news = seen_at - client.seen_at > HEARD_S
+        publish = seen_at - client.seen_at > PRESENT_S
         client.seen_at = max(client.seen_at, seen_at)
-        return news
+        return publish
 
     def view_age_s(self, session: Session, now: float) -> float:
-        """Age of the newest state of the robot that something of this session has drawn or fetched (s)."""
+        """Age of the newest state that this session has rendered or fetched (s)."""
         client = self._clients.get(session.client)
         return NEVER_SEEN_S if client is None else _view_age_s(client, now)
 
     def forget(self, session: Session) -> None:
-        """The last of this session has gone."""
+        """The session is absent from now on."""
         self._clients.pop(session.client, None)
 
     def message(self, now: float) -> Presence:
-        """Who is there now (s)."""
-        self._clients = {key: client for key, client in self._clients.items() if now - client.heard_at <= HEARD_S}
+        """The sessions that are present at `now` (s)."""
+        self._clients = {key: client for key, client in self._clients.items() if now - client.active_at <= PRESENT_S}
         self._sequence += 1
         return Presence(
             sequence=self._sequence,
@@ -68,7 +71,7 @@ class PresentPeople:
                     key,
                     client.session.user,
                     client.session.role,
-                    max(0.0, now - client.heard_at),
+                    max(0.0, now - client.active_at),
                     _view_age_s(client, now),
                 )
                 for key, client in self._clients.items()

@@ -1,4 +1,4 @@
-"""A robot at a glance, for whoever looks at another one: mode, who holds control, and the worst that needs somebody."""
+"""A summary of a robot for the pages of the other robots: mode, holder of control, and the most urgent alarm."""
 
 from typing import Literal
 
@@ -7,8 +7,8 @@ from pydantic import BaseModel
 from rolling_panda.messages.page import PagePoints, PageState, ProcessPresence
 from rolling_panda.messages.types import Mode
 
-#: Words of a process that are older than this (s) say nothing of now.
-_OLD_S = {"bridge": 1.0, "controller": 1.0, "perception": 2.0}
+#: A process whose last message is older than this (s) counts as silent.
+_SILENT_S = {"bridge": 1.0, "controller": 1.0, "perception": 2.0}
 _STOPPED: dict[Mode, str] = {
     "ESTOP_LATCHED": "Stopped",
     "PROTECTIVE_STOP": "Protective stop",
@@ -16,17 +16,17 @@ _STOPPED: dict[Mode, str] = {
 }
 
 
-class Glance(BaseModel):
-    """One robot of this server, in brief.
+class RobotSummary(BaseModel):
+    """One robot of this server.
 
     Attributes:
-        name: As on the wire.
-        path: Its page; what is asked of it by REST lies below, as `PATHapi/state`.
-        mode: Of its controller; None before the first word of it.
+        name: On the wire.
+        path: Of its page; its REST interface is below, as `PATHapi/state`.
+        mode: Of its controller; None before its first message.
         severity: Of `alarm`.
-        alarm: The worst that needs somebody now, in words; empty when nothing does.
-        holder: Name of who holds control; empty when nobody does.
-        yours: Whether that is the caller.
+        alarm: The most urgent alarm; empty without one.
+        holder: User who holds control; empty when nobody does.
+        yours: Whether the caller holds control.
         pages: Open pages of this robot.
     """
 
@@ -40,15 +40,15 @@ class Glance(BaseModel):
     pages: int
 
 
-def glance(name: str, path: str, state: PageState | None, points: PagePoints | None, client: str) -> Glance:
-    """What `state` and `points` come to, for the session with this client key."""
+def summarize(name: str, path: str, state: PageState | None, points: PagePoints | None, client: str) -> RobotSummary:
+    """The summary of `state` and `points` for the session with this client key."""
     if state is None:
-        return Glance(
+        return RobotSummary(
             name=name, path=path, mode=None, severity="error", alarm="not seen yet", holder="", yours=False, pages=0
         )
-    severity, alarm = _worst(state, points)
+    severity, alarm = _alarm(state, points)
     control = state.control
-    return Glance(
+    return RobotSummary(
         name=name,
         path=path,
         mode=None if state.controller is None else state.controller.mode,
@@ -60,24 +60,24 @@ def glance(name: str, path: str, state: PageState | None, points: PagePoints | N
     )
 
 
-def _worst(state: PageState, points: PagePoints | None) -> tuple[Literal["", "warning", "error"], str]:
-    gone = [row.process for row in state.processes if row.process in _OLD_S and not _lives(row)]
+def _alarm(state: PageState, points: PagePoints | None) -> tuple[Literal["", "warning", "error"], str]:
+    silent = [row.process for row in state.processes if row.process in _SILENT_S and not _is_alive(row)]
     if any(stop.hardware for stop in state.stops):
         return "error", "Emergency stop on the robot is pressed"
     for process in ("bridge", "controller"):
-        if process in gone:
+        if process in silent:
             return "error", f"{process} is silent"
     controller, bridge = state.controller, state.bridge
     if controller is not None and controller.mode in _STOPPED:
         return "error", ": ".join(part for part in (_STOPPED[controller.mode], controller.reason) if part)
     if bridge is not None and bridge.cutter == "jammed":
         return "error", "The cutter is jammed"
-    if "perception" in gone:
+    if "perception" in silent:
         return "warning", "perception is silent"
     if points is not None and any(row.entry.state == "UNKNOWN" for row in points.points):
         return "warning", "A cut ended unknown"
     return "", ""
 
 
-def _lives(row: ProcessPresence) -> bool:
-    return row.present and row.age_s is not None and row.age_s < _OLD_S[row.process]
+def _is_alive(row: ProcessPresence) -> bool:
+    return row.present and row.age_s is not None and row.age_s < _SILENT_S[row.process]

@@ -1,4 +1,4 @@
-"""Hold-to-run: whose gizmo the tool follows, and when the hold has ended. Pure: `now` is an argument."""
+"""Hold-to-run: one session moves the robot while it renews its hold. No clock here: `now` is given (s)."""
 
 from dataclasses import dataclass
 
@@ -7,13 +7,13 @@ from rolling_panda.errors import InputError
 from rolling_panda.messages.supervision import ArmVelocities, BaseVelocity, TeleopTarget
 from server.config import ServerConfig
 
-#: The end of a hold is said this often, since a single message may be lost.
-_RELEASES = 5
+#: The end of a hold is sent this often, since a message may be lost.
+_RELEASE_REPEATS = 5
 
 
 @dataclass(frozen=True)
-class Aim:
-    """What a holder wants of the robot, as in `TeleopTarget`."""
+class TeleopCommand:
+    """What the robot does while it is held, as in `TeleopTarget`."""
 
     target: m.Pose | None = None
     base: BaseVelocity | None = None
@@ -27,158 +27,155 @@ class _Hold:
     view: str
     client: str
     renewed_at: float
-    aim: Aim
+    command: TeleopCommand
     share: float = 1.0
 
 
 class TeleopHold:
     """One holder at a time; the first wins.
 
-    A hold lives while it is renewed within `hold_timeout_s` and the holder has lately drawn a state of the robot that
-    is not older than `view_timeout_s`. One that has lapsed goes on with the next word within `hold_resume_s`; later its
-    holder lets go first: who slept, or was not heard while this process did, moves nothing on waking.
+    A hold lapses unless it is renewed within `hold_timeout_s` and its view has rendered a state that is not older than
+    `view_timeout_s`. A lapsed hold continues with a renewal within `hold_resume_s`; after that its holder has to
+    release first, so that a suspended page or server moves nothing when it wakes.
     """
 
     def __init__(self, config: ServerConfig) -> None:
-        """Nobody holds."""
+        """No session holds."""
         self._config = config
         self._hold: _Hold | None = None
         self._ended: _Hold | None = None
-        #: When each holder whose hold has lapsed, and who has not let go since, renewed it last.
+        #: Last renewal of each lapsed hold that was not released since (s).
         self._lapsed: dict[str, float] = {}
-        self._releases = 0
+        self._releases_left = 0
         self._sequence = 0
-        self._aims: dict[str, Aim] = {}
-        self._drawn_at: dict[str, float] = {}
-        self._lag: dict[str, float] = {}
+        self._commands: dict[str, TeleopCommand] = {}
+        self._rendered_at: dict[str, float] = {}
+        self._latency_s: dict[str, float] = {}
 
     @property
     def holder(self) -> str | None:
-        """Key of who holds now."""
+        """Key of the session that holds now."""
         return None if self._hold is None else self._hold.holder
 
-    def drew(self, view: str, seen_at: float, now: float) -> None:
-        """A view says at `now` that it has drawn the robot in the posture that was measured at `seen_at` (s)."""
-        if seen_at > self._drawn_at.get(view, float("-inf")):
-            self._drawn_at[view] = seen_at
-            self._lag[view] = max(0.0, now - seen_at)
+    def view_rendered(self, view: str, seen_at: float, now: float) -> None:
+        """A view reports at `now` that it has rendered a state that was measured at `seen_at` (s)."""
+        if seen_at > self._rendered_at.get(view, float("-inf")):
+            self._rendered_at[view] = seen_at
+            self._latency_s[view] = max(0.0, now - seen_at)
 
-    def unseen(self, view: str) -> None:
-        """A view has gone."""
-        self._drawn_at.pop(view, None)
-        self._lag.pop(view, None)
+    def forget_view(self, view: str) -> None:
+        """A view has closed."""
+        self._rendered_at.pop(view, None)
+        self._latency_s.pop(view, None)
 
-    def aim(self, holder: str, target: m.Pose) -> None:
-        """Set where this holder's gizmo is; the newest wins. While base or joints are held it leads nothing."""
-        if not self._holds_otherwise(holder):
-            self.want(holder, Aim(target))
+    def set_target(self, holder: str, target: m.Pose) -> None:
+        """Set the pose of this holder's gizmo; without effect while they hold base or joints."""
+        if self.holder != holder or self.follows_gizmo:
+            self.set_command(holder, TeleopCommand(target))
 
-    def want(self, holder: str, aim: Aim) -> None:
-        """Set what this holder wants; the newest wins."""
-        self._aims[holder] = aim
+    def set_command(self, holder: str, command: TeleopCommand) -> None:
+        """Set this holder's command; the newest wins."""
+        self._commands[holder] = command
         if self._hold is not None and self._hold.holder == holder:
-            self._hold.aim = aim
+            self._hold.command = command
 
     @property
-    def leads_gizmo(self) -> bool:
-        """Whether the hold that there is follows a target: then the gizmo stays where it was dragged."""
-        return self._hold is not None and self._hold.aim.target is not None
-
-    def _holds_otherwise(self, holder: str) -> bool:
-        return self.holder == holder and not self.leads_gizmo
+    def follows_gizmo(self) -> bool:
+        """Whether the robot is held to a target: then the gizmo stays where it was dragged."""
+        return self._hold is not None and self._hold.command.target is not None
 
     def hold(self, holder: str, user: str, now: float, view: str = "", client: str = "", share: float = 1.0) -> None:
-        """Start or renew a hold, by what `view` shows: the page that holds, not another one of the same person.
+        """Start or renew a hold.
 
         Args:
-            holder: Key of who holds.
-            user: Their name.
+            holder: Key of the session.
+            user: Its user.
             now: Monotonic time (s).
-            view: What shows them the robot; empty for their own key.
-            client: Who, as the controller knows them.
-            share: Of the usual speed, 0…1.
+            view: The page that holds; empty for a script, which is its own view.
+            client: The session's key at the controller.
+            share: Speed scale, 0…1.
 
         Raises:
-            InputError: Somebody else holds, the holder's view is old, there is no target, or their last hold lapsed
-                long ago and they have not let go since.
+            InputError: Somebody else holds, the view is stale, there is no target, or the last hold has lapsed and was
+                not released since.
         """
         self.expire(now)
         if self._hold is not None and self._hold.holder != holder:
             raise InputError(f"{self._hold.user} is holding the robot; wait until they let go")
-        if self.must_let_go(holder, now):
+        if self.must_release(holder, now):
             raise InputError(
                 f"your hold ended, as nothing was heard of it in time, and more than {self._config.hold_resume_s} s "
                 "have passed: let go, then hold again"
             )
         view = view or holder
-        age = now - self._drawn_at.get(view, float("-inf"))
+        age = now - self._rendered_at.get(view, float("-inf"))
         if age > self._config.view_timeout_s:
             raise InputError("the view of the robot is not current; teleoperation needs one younger than 0.5 s")
-        if holder not in self._aims:
+        if holder not in self._commands:
             raise InputError("there is no target yet; show the gizmo first")
         if self._hold is None:
-            self._hold = _Hold(holder, user, view, client, now, self._aims[holder])
+            self._hold = _Hold(holder, user, view, client, now, self._commands[holder])
         self._hold.renewed_at, self._hold.view, self._hold.share = now, view, share
         self._lapsed.pop(holder, None)
 
-    def must_let_go(self, holder: str, now: float) -> bool:
-        """Whether this holder's hold lapsed so long ago that the next one begins only after they have let go."""
+    def must_release(self, holder: str, now: float) -> bool:
+        """Whether this holder's hold lapsed so long ago that it has to be released before the next one."""
         return now - self._lapsed.get(holder, now) > self._config.hold_resume_s
 
     def release(self, holder: str) -> bool:
-        """End this holder's hold at once; True when they were holding."""
+        """End this holder's hold at once; True when it was holding."""
         self._lapsed.pop(holder, None)
         if self._hold is None or self._hold.holder != holder:
             return False
         self._ended, self._hold = self._hold, None
-        self._releases = _RELEASES
-        self._aims.pop(holder, None)
+        self._releases_left = _RELEASE_REPEATS
+        self._commands.pop(holder, None)
         return True
 
-    def aim_nowhere(self, holder: str) -> None:
-        """This holder's gizmo is gone, and where it was means nothing any more."""
-        self._aims.pop(holder, None)
+    def clear_target(self, holder: str) -> None:
+        """This holder's gizmo was removed: forget its pose."""
+        self._commands.pop(holder, None)
 
     def forget(self, holder: str) -> bool:
-        """The holder has gone: end the hold and drop what is known of it; True when they were holding."""
+        """The session has ended: release its hold and forget it; True when it was holding."""
         held = self.release(holder)
-        self._aims.pop(holder, None)
-        self.unseen(holder)
+        self._commands.pop(holder, None)
+        self.forget_view(holder)
         return held
 
     def expire(self, now: float) -> str | None:
-        """End a hold that was not renewed or whose holder no longer sees the robot; who that was, else None."""
+        """End a hold that was not renewed in time or whose view is stale; returns its holder, else None."""
         hold = self._hold
         if hold is None:
             return None
-        seen_at = self._drawn_at.get(hold.view, float("-inf"))
+        seen_at = self._rendered_at.get(hold.view, float("-inf"))
         if now - hold.renewed_at <= self._config.hold_timeout_s and now - seen_at <= self._config.view_timeout_s:
             return None
         self.release(hold.holder)
         self._lapsed[hold.holder] = hold.renewed_at
         return hold.holder
 
-    def due(self, now: float) -> TeleopTarget | None:
-        """What to publish at this tick: the held target, an end of hold, or nothing."""
+    def next_message(self, now: float) -> TeleopTarget | None:
+        """The message to send now: the held command, the end of a hold, or none."""
         self.expire(now)
         if self._hold is not None:
             return self._message(True, self._hold)
-        if self._releases > 0 and self._ended is not None:
-            self._releases -= 1
+        if self._releases_left > 0 and self._ended is not None:
+            self._releases_left -= 1
             return self._message(False, self._ended)
         return None
 
     def _message(self, holds: bool, hold: _Hold) -> TeleopTarget:
         self._sequence += 1
-        aim = hold.aim
+        command = hold.command
         return TeleopTarget(
             sequence=self._sequence,
             hold=holds,
             user=hold.user,
-            target=aim.target,
-            base=aim.base,
-            joints=aim.joints,
+            target=command.target,
+            base=command.base,
+            joints=command.joints,
             client=hold.client,
             share=hold.share,
-            round_trip_s=min(self._lag.get(hold.view, 0.0), 1e3),
+            round_trip_s=min(self._latency_s.get(hold.view, 0.0), 1e3),
         )

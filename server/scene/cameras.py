@@ -1,4 +1,4 @@
-"""Where a view's camera stands: presets, each for the views of the one who asked, and one that goes along."""
+"""Cameras of the views: presets, following the base, and flights to a point; each applies to one session's views."""
 
 import math
 from collections import deque
@@ -10,153 +10,158 @@ import viser
 from rolling_panda.messages.page import CameraPreset
 from rolling_panda.model.differential_drive import Array
 
-#: A camera that goes along is moved when the base has gone so far (m).
+#: A following camera is moved when the base has moved so far (m).
 _STEP = 0.004
-#: Where a new view begins is told anew when the base has gone so far (m) or turned so far (rad).
-_BEGIN_STEP = 0.3
-#: A camera is so long on its way to a point (s). Who has moved a camera is not taken along for so long (s).
-_FLIGHT_S, HOLD_OFF_S = 0.5, 8.0
-#: It comes to rest so far from the point (m): no nearer than the first, no farther than the second.
+#: The initial camera of new views is updated when the base has moved so far (m) or turned so far (rad).
+_INITIAL_CAMERA_STEP = 0.3
+#: Duration of a flight (s). A camera that the user has moved is not flown without being asked for so long (s).
+_FLIGHT_S, USER_PRIORITY_S = 0.5, 8.0
+#: Smallest and largest distance from the point at the end of a flight (m).
 _NEAREST, _FARTHEST = 0.5, 1.0
-#: Where it comes from if not from where it is: behind the robot's shoulder, in the base's axes.
-_USUAL = np.array([-0.55, -0.75, 0.4])
-#: A view reports its camera late. Farther than this (m) from each place where it was put, somebody has moved it.
+#: Default direction of a close-up: from behind the robot's shoulder, in the base's axes.
+_DEFAULT_OFFSET = np.array([-0.55, -0.75, 0.4])
+#: A view reports its camera with a delay. Farther than this (m) from each commanded position, the user has moved it.
 _ECHO = 0.03
 
 
 @dataclass(frozen=True)
-class Shot:
-    """Where a camera stands and where it looks (3 each, m, odom)."""
+class CameraPose:
+    """Position of a camera and the point that it looks at (3 each, m, odom)."""
 
     position: Array
     look_at: Array
 
 
-def shot(preset: CameraPreset, q: Array, tool: Array) -> Shot:
-    """Where a preset puts the camera.
+def preset_pose(preset: CameraPreset, q: Array, tool: Array) -> CameraPose:
+    """The camera pose of a preset.
 
     Args:
-        preset: `follow` looks over the robot along the row and goes along with the base; `row` stands back to see some
-            vines; `tool` is near the tool; `top` looks down on robot and row.
+        preset: `follow` looks over the robot along the row and follows the base; `row` shows several vines from a
+            distance; `tool` is near the tool; `top` looks down on robot and row.
         q: Configuration of the robot (12).
-        tool: Place of the tool (3, m, odom).
+        tool: Position of the tool (3, m, odom).
     """
     base = np.array([q[0], q[1], 0.0])
     c, s = math.cos(q[2]), math.sin(q[2])
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     if preset == "tool":
-        return Shot(tool + turn @ [-0.45, -0.6, 0.35], tool)
+        return CameraPose(tool + turn @ [-0.45, -0.6, 0.35], tool)
     position, look_at = {
         "follow": ([-1.45, -1.95, 1.85], [0.3, 0.45, 0.8]),
         "row": ([0.6, -3.6, 1.9], [0.6, 0.7, 0.9]),
         "top": ([0.3, 0.0, 4.6], [0.3, 0.35, 0.6]),
     }[preset]
-    return Shot(base + turn @ position, base + turn @ look_at)
+    return CameraPose(base + turn @ position, base + turn @ look_at)
 
 
-def near_shot(place: Array, position: Array, heading: float) -> Shot:
-    """Where a camera looks at a place from: from where it is, but near, on the robot's side of the row and from above.
+def close_up(point: Array, position: Array, heading: float) -> CameraPose:
+    """A close-up of a point: from the camera's direction where that is on the robot's side of the row and above it.
 
     Args:
-        place: To be looked at (3, m, odom).
+        point: To look at (3, m, odom).
         position: Of the camera (3, m, odom).
         heading: Of the base (rad).
     """
     c, s = math.cos(heading), math.sin(heading)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    away = position - place
+    away = position - point
     far = max(float(np.linalg.norm(away)), 1e-6)
     across, up = float(away @ turn[:, 1]) / far, float(away[2]) / far
     if across > -0.3 or not -0.1 < up < 0.8:
-        away = turn @ _USUAL
+        away = turn @ _DEFAULT_OFFSET
         far = max(min(far, _FARTHEST), _NEAREST)
-        return Shot(place + away * (far / float(np.linalg.norm(away))), place)
-    return Shot(place + away * (max(min(far, _FARTHEST), _NEAREST) / far), place)
+        return CameraPose(point + away * (far / float(np.linalg.norm(away))), point)
+    return CameraPose(point + away * (max(min(far, _FARTHEST), _NEAREST) / far), point)
 
 
 @dataclass(frozen=True)
 class _Flight:
-    begins: Shot
-    ends: Shot
-    since: float
+    start: CameraPose
+    end: CameraPose
+    started_at: float
 
-    def at(self, now: float) -> Shot:
-        share = min(max((now - self.since) / _FLIGHT_S, 0.0), 1.0)
-        eased = share * share * (3.0 - 2.0 * share)
-        return Shot(
-            self.begins.position + eased * (self.ends.position - self.begins.position),
-            self.begins.look_at + eased * (self.ends.look_at - self.begins.look_at),
+    def at(self, now: float) -> CameraPose:
+        fraction = min(max((now - self.started_at) / _FLIGHT_S, 0.0), 1.0)
+        eased = fraction * fraction * (3.0 - 2.0 * fraction)
+        return CameraPose(
+            self.start.position + eased * (self.end.position - self.start.position),
+            self.start.look_at + eased * (self.end.look_at - self.start.look_at),
         )
 
 
 @dataclass
 class _View:
-    """Of one view: where its camera was put, where it was seen last, and when a hand has moved it.
+    """The camera of one view.
 
-    `flight` is under way, `place` is what it waits to be taken to.
+    Attributes:
+        commanded: Its last commanded positions.
+        reported: Its last reported position.
+        user_moved_at: When the user has moved it (s).
+        flight: Under way.
+        target: The point that it flies to, or will.
     """
 
-    put: deque[Array] = field(default_factory=lambda: deque(maxlen=60))
-    seen: Array | None = None
-    by_hand_at: float = -math.inf
+    commanded: deque[Array] = field(default_factory=lambda: deque(maxlen=60))
+    reported: Array | None = None
+    user_moved_at: float = -math.inf
     flight: _Flight | None = None
-    place: Array | None = None
+    target: Array | None = None
 
 
 @dataclass
-class _Along:
+class _Follower:
     client: viser.ClientHandle
     base: Array
     offset: Array
-    gaze: Array
+    look_at_offset: Array
 
 
 class SceneCameras:
-    """Moves the cameras of views, and says where new ones begin: near the robot. Called from the server's loop."""
+    """Moves the cameras of views, and the initial camera of new ones. Called from the server's loop."""
 
     def __init__(self, server: viser.ViserServer) -> None:
-        """Every camera stands where its owner leaves it."""
-        self._along: dict[int, _Along] = {}
+        """No camera is moved yet."""
+        self._followers: dict[int, _Follower] = {}
         self._views: dict[int, _View] = {}
         self._heading = 0.0
         self._now = -math.inf
-        self._begin = server.initial_camera
-        self._begin.fov = 0.82
-        self._begun = np.full(3, np.inf)
-        self._begin_near(np.zeros(3))
+        self._initial_camera = server.initial_camera
+        self._initial_camera.fov = 0.82
+        self._initial_base = np.full(3, np.inf)
+        self._update_initial_camera(np.zeros(3))
 
-    def take(self, preset: CameraPreset, clients: list[viser.ClientHandle], q: Array, tool: Array) -> None:
-        """Put the cameras of these views where `preset` has them."""
-        wanted = shot(preset, q, tool)
+    def apply_preset(self, preset: CameraPreset, clients: list[viser.ClientHandle], q: Array, tool: Array) -> None:
+        """Move the cameras of these views to a preset."""
+        pose = preset_pose(preset, q, tool)
         for client in clients:
-            self._along.pop(client.client_id, None)
+            self._followers.pop(client.client_id, None)
             client.camera.up_direction = (0.0, 0.0, 1.0)
-            self._put(client, wanted)
-            # Who says where a camera shall be wants it there for a while.
+            self._command(client, pose)
+            # A preset counts as a motion by the user, who wants it to stay for a while.
             view = self._view(client)
-            view.by_hand_at, view.flight, view.place = self._now, None, None
+            view.user_moved_at, view.flight, view.target = self._now, None, None
             if preset == "follow":
                 base = np.array([q[0], q[1], 0.0])
-                self._along[client.client_id] = _Along(client, base, wanted.position - base, wanted.look_at - base)
+                self._followers[client.client_id] = _Follower(client, base, pose.position - base, pose.look_at - base)
 
-    def fly(self, clients: list[viser.ClientHandle], place: Array, gently: bool = False) -> None:
-        """Bring the cameras of these views to a place (3, m, odom), in a short flight.
+    def fly(self, clients: list[viser.ClientHandle], point: Array, wait_for_user: bool = False) -> None:
+        """Fly the cameras of these views to a point (3, m, odom).
 
         Args:
             clients: Their views.
-            place: To be looked at.
-            gently: Not before `HOLD_OFF_S` have passed since somebody moved the camera; then it is brought there.
+            point: To look at.
+            wait_for_user: Not before `USER_PRIORITY_S` have passed since the user moved the camera.
         """
         for client in clients:
             view = self._view(client)
-            if view.place is not None and bool((view.place == place).all()) and view.flight is not None:
+            if view.target is not None and bool((view.target == point).all()) and view.flight is not None:
                 continue
-            view.place, view.flight = place, None
-            if not gently:
-                view.by_hand_at = -math.inf
+            view.target, view.flight = point, None
+            if not wait_for_user:
+                view.user_moved_at = -math.inf
 
     def step(self, clients: list[viser.ClientHandle], now: float) -> None:
-        """Take cameras on, and notice which ones somebody moves.
+        """Continue the flights, and detect cameras that the user has moved.
 
         Args:
             clients: All views.
@@ -165,57 +170,59 @@ class SceneCameras:
         self._now = now
         for client in clients:
             view, position = self._view(client), np.array(client.camera.position)
-            moved = view.seen is not None and float(np.abs(position - view.seen).max()) > _STEP
-            view.seen = position
-            if moved and not any(float(np.abs(position - put).max()) <= _ECHO for put in view.put):
-                view.by_hand_at = now
+            moved = view.reported is not None and float(np.abs(position - view.reported).max()) > _STEP
+            view.reported = position
+            if moved and not any(float(np.abs(position - each).max()) <= _ECHO for each in view.commanded):
+                view.user_moved_at = now
                 if view.flight is not None:
-                    view.flight = view.place = None
-            if view.place is None or now - view.by_hand_at < HOLD_OFF_S:
+                    view.flight = view.target = None
+            if view.target is None or now - view.user_moved_at < USER_PRIORITY_S:
                 continue
             if view.flight is None:
-                self._along.pop(client.client_id, None)
-                begins = Shot(position, np.array(client.camera.look_at))
-                view.flight = _Flight(begins, near_shot(view.place, position, self._heading), now)
-            here = view.flight.at(now)
-            self._put(client, here)
-            if now - view.flight.since >= _FLIGHT_S:
-                view.flight = view.place = None
+                self._followers.pop(client.client_id, None)
+                start = CameraPose(position, np.array(client.camera.look_at))
+                view.flight = _Flight(start, close_up(view.target, position, self._heading), now)
+            self._command(client, view.flight.at(now))
+            if now - view.flight.started_at >= _FLIGHT_S:
+                view.flight = view.target = None
 
     def _view(self, client: viser.ClientHandle) -> _View:
         return self._views.setdefault(client.client_id, _View())
 
-    def _put(self, client: viser.ClientHandle, wanted: Shot) -> None:
-        self._view(client).put.append(wanted.position)
+    def _command(self, client: viser.ClientHandle, pose: CameraPose) -> None:
+        self._view(client).commanded.append(pose.position)
         with client.atomic():
-            client.camera.position = wanted.position
-            client.camera.look_at = wanted.look_at
+            client.camera.position = pose.position
+            client.camera.look_at = pose.look_at
 
     def follow(self, q: Array) -> None:
-        """Take along the cameras that follow the base; whoever turns or moves theirs keeps it so, going along."""
-        self._begin_near(q[:3])
+        """Move the cameras that follow the base; an offset that the user has changed is kept."""
+        self._update_initial_camera(q[:3])
         self._heading = float(q[2])
         base = np.array([q[0], q[1], 0.0])
-        for along in list(self._along.values()):
-            camera = along.client.camera
+        for follower in list(self._followers.values()):
+            camera = follower.client.camera
             position = np.array(camera.position)
-            put = self._view(along.client).put
-            if min(float(np.abs(position - each).max()) for each in put) > _ECHO:
-                along.offset, along.gaze = position - along.base, np.array(camera.look_at) - along.base
-                put.append(position)
-            if float(np.abs(base - along.base).max()) < _STEP:
+            commanded = self._view(follower.client).commanded
+            if min(float(np.abs(position - each).max()) for each in commanded) > _ECHO:
+                follower.offset, follower.look_at_offset = (
+                    position - follower.base,
+                    np.array(camera.look_at) - follower.base,
+                )
+                commanded.append(position)
+            if float(np.abs(base - follower.base).max()) < _STEP:
                 continue
-            along.base = base
-            self._put(along.client, Shot(base + along.offset, base + along.gaze))
+            follower.base = base
+            self._command(follower.client, CameraPose(base + follower.offset, base + follower.look_at_offset))
 
-    def _begin_near(self, base: Array) -> None:
-        if float(np.abs(base - self._begun).max()) < _BEGIN_STEP:
+    def _update_initial_camera(self, base: Array) -> None:
+        if float(np.abs(base - self._initial_base).max()) < _INITIAL_CAMERA_STEP:
             return
-        self._begun = base.copy()
-        begin = shot("follow", base, base)
-        self._begin.position, self._begin.look_at = begin.position, begin.look_at
+        self._initial_base = base.copy()
+        pose = preset_pose("follow", base, base)
+        self._initial_camera.position, self._initial_camera.look_at = pose.position, pose.look_at
 
     def forget(self, client_id: int) -> None:
         """A view has closed."""
-        self._along.pop(client_id, None)
+        self._followers.pop(client_id, None)
         self._views.pop(client_id, None)

@@ -15,13 +15,13 @@ from rolling_panda.model.robot import placement
 #: Length of the gizmo's arrows, seen from the side (CSS px).
 GIZMO_PX = 110.0
 _NAME = "/gizmo"
-#: The gizmo follows the tool while nobody has dragged it; smaller movements (m, quaternion parts) are not sent.
-_FOLLOW = 1e-3
+#: An undragged gizmo follows the tool; smaller motions (m, quaternion components) are not sent.
+_DEADBAND = 1e-3
 
 
 @dataclass
 class _Gizmo:
-    """One session's. Its arrows may lie along other axes than the tool's: `offset` is the tool's rotation in them."""
+    """A session's gizmo: `drawn` is the rotation of its arrows in odom, `offset` that of the tool in its arrows."""
 
     pose: m.Pose
     axes: GizmoAxes = "tool"
@@ -32,7 +32,7 @@ class _Gizmo:
 
 
 class SceneGizmos:
-    """Shows gizmos and works out where they were dragged. Used from the server's loop alone."""
+    """Shows gizmos and works out where they were dragged. Called from the server's loop."""
 
     def __init__(self) -> None:
         """No gizmo is shown."""
@@ -41,7 +41,7 @@ class SceneGizmos:
         """Of the base in odom (rad), for gizmos along its axes."""
 
     def shown(self, owner: str) -> bool:
-        """Has this session a gizmo now?"""
+        """Whether this session's gizmo is shown."""
         return owner in self._gizmos
 
     def show(self, owner: str, pose: m.Pose, clients: list[viser.ClientHandle], axes: GizmoAxes = "tool") -> None:
@@ -59,7 +59,7 @@ class SceneGizmos:
             return
         handle = client.scene.add_transform_controls(
             _NAME,
-            # As large on the screen (px) from near and far, so that a finger can take it.
+            # The same size on the screen (px) at every distance, so that a finger can grab it.
             fixed=True,
             scale=GIZMO_PX,
             line_width=4.0,
@@ -70,12 +70,12 @@ class SceneGizmos:
         gizmo.handles[client.client_id] = handle
 
     def drag(self, owner: str, position: m.Vector3, wxyz: tuple[float, float, float, float]) -> m.Pose | None:
-        """`owner` has dragged the arrows to here in odom; where the tool shall go, None when that is nowhere."""
+        """`owner` has dragged the arrows to here in odom; returns the target pose of the tool, None without one."""
         gizmo, drawn = self._gizmos.get(owner), pin.Quaternion(*wxyz)
         if gizmo is None or drawn.norm() < 1e-9:
             return None
         for handle in gizmo.handles.values():
-            # Viser sends what differs from what it believes to be drawn, so it has to know that the browser moved it.
+            # Viser sends differences to what it last set, so its copy has to follow the browser's drag.
             handle.position[:], handle.wxyz[:] = position, wxyz
         drawn.normalize()
         gizmo.drawn = drawn
@@ -96,16 +96,16 @@ class SceneGizmos:
                 handle.remove()
 
     def follow(self, tool: m.Pose, holder: str | None) -> list[str]:
-        """Keep every gizmo that nobody has dragged at the tool, except that of `holder`; whose gizmos moved."""
+        """Move every undragged gizmo to the tool, except that of `holder`; returns the owners of those that moved."""
         moved = []
         for owner, gizmo in self._gizmos.items():
-            if owner != holder and not gizmo.dragged and _apart(gizmo.pose, tool) > _FOLLOW:
+            if owner != holder and not gizmo.dragged and _difference(gizmo.pose, tool) > _DEADBAND:
                 self._place(gizmo, tool)
                 moved.append(owner)
         return moved
 
     def reset(self, owner: str, tool: m.Pose | None) -> None:
-        """Bring a gizmo back to the tool; where that is not known now, it follows as soon as it is."""
+        """Return a gizmo to the tool; where the tool's pose is unknown, it follows once it is known."""
         gizmo = self._gizmos.get(owner)
         if gizmo is not None:
             gizmo.dragged = False
@@ -113,7 +113,7 @@ class SceneGizmos:
                 self._place(gizmo, tool)
 
     def pose(self, owner: str) -> m.Pose | None:
-        """Where the gizmo of `owner` is in odom, or None without one."""
+        """Pose of the tool at the gizmo of `owner` in odom; None without one."""
         gizmo = self._gizmos.get(owner)
         return None if gizmo is None else gizmo.pose
 
@@ -133,5 +133,5 @@ def _wxyz(quaternion: Any) -> tuple[float, float, float, float]:
     return (quaternion.w, quaternion.x, quaternion.y, quaternion.z)
 
 
-def _apart(a: m.Pose, b: m.Pose) -> float:
+def _difference(a: m.Pose, b: m.Pose) -> float:
     return float(np.abs(np.array([*a.position, *a.quat_xyzw]) - np.array([*b.position, *b.quat_xyzw])).max())

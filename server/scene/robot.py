@@ -1,23 +1,34 @@
-"""The robot in the 3-D view: one frame a moving body, sent only when it has moved."""
+"""The robot in the 3-D view: as measured, as the ghost of a preview, and the trail of the tool."""
 
+from bisect import bisect_right
+from collections import deque
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import viser
 
+from rolling_panda import messages as m
+from rolling_panda.messages.supervision import PreviewMotion, PreviewRow
 from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.robot import configuration
 from server.scene.robot_meshes import Color, Part
 
 _BASE_JOINT = "base_phi"
-#: Smaller movements (m, and quaternion parts) are not sent: they cannot be seen, and noise would never let it rest.
-_STILL = 2e-5
-#: Likewise of the base, where odometry wanders by a third of a millimetre, and of a milliradian, while it stands still.
-_BASE_STILL = 1e-3
+#: Smaller motions (m, and quaternion components) are not sent: they are invisible, and noise would be sent for ever.
+_DEADBAND = 2e-5
+#: The base's: odometry drifts by a third of a millimetre, and of a milliradian, at standstill.
+_BASE_DEADBAND = 1e-3
+_GHOST_COLOR, _GHOST_OPACITY = (120, 190, 255), 0.35
+_TRAIL = "/trail/line"
+#: A point is added when the tool has moved so far (m); the trail has at most so many.
+_TRAIL_STEP, _TRAIL_POINTS = 0.01, 200
+_TRAIL_NEW, _TRAIL_OLD = np.array([150, 205, 255.0]), np.array([62, 72, 84.0])
 
 
 class SceneRobot:
-    """Draws the robot and moves it."""
+    """The robot as measured: one frame for each moving body, sent only when it has moved."""
 
     def __init__(self, server: viser.ViserServer, model: Any, parts: list[Part]) -> None:
         """Put the bodies into the scene at q = 0; `model` is the Pinocchio model."""
@@ -50,8 +61,8 @@ class SceneRobot:
             x, y, z, w = pin.Quaternion(placement.rotation).coeffs()
             pose = np.array([*placement.translation, w, x, y, z])
             sent = self._sent.get(joint)
-            still = _BASE_STILL if joint == self._base else _STILL
-            if sent is None or float(np.abs(pose - sent).max()) > still:
+            deadband = _BASE_DEADBAND if joint == self._base else _DEADBAND
+            if sent is None or float(np.abs(pose - sent).max()) > deadband:
                 moved.append((joint, pose))
         if not moved:
             return False
@@ -62,26 +73,135 @@ class SceneRobot:
                 self._frames[joint].wxyz = pose[3:]
         return True
 
-    def corners(self) -> Array:
-        """Every triangle of the robot where it is drawn now (n×3×3, m, odom)."""
-        placed = []
+    def triangles(self) -> Array:
+        """Every triangle of the robot as drawn now (n×3×3, m, odom)."""
+        transformed = []
         for part in self._parts:
-            where = self._data.oMi[part.joint]
-            vertices = part.vertices @ where.rotation.T + where.translation
-            placed.append(vertices[part.faces])
-        corners: Array = np.concatenate(placed)
-        return corners
+            T_odom_joint = self._data.oMi[part.joint]
+            vertices = part.vertices @ T_odom_joint.rotation.T + T_odom_joint.translation
+            transformed.append(vertices[part.faces])
+        triangles: Array = np.concatenate(transformed)
+        return triangles
 
     def set_grey(self, grey: bool) -> None:
-        """Grey the robot while what is shown is only its last known state."""
+        """Grey the robot while its posture is stale."""
         if grey == self._grey:
             return
         self._grey = grey
         with self._server.atomic():
             for handle, color in self._meshes:
-                handle.color = _greyed(color) if grey else color
+                handle.color = _grey_of(color) if grey else color
 
 
-def _greyed(color: Color) -> Color:
+class PreviewGhost:
+    """The robot at a time of the preview, see-through, with the path of the tool; each session has its own time."""
+
+    def __init__(self, model: Any, parts: list[Part]) -> None:
+        """Bind the robot's Pinocchio model and its meshes."""
+        self._model, self._parts = model, parts
+        self._data = model.createData()
+        self._base = int(model.getJointId(_BASE_JOINT))
+        self._times: dict[str, float] = {}
+        self._motion: PreviewMotion | None = None
+        self._drawn: dict[int, str] = {}
+
+    def set_motion(self, motion: PreviewMotion) -> None:
+        """Show this motion from now on."""
+        self._motion = motion
+
+    def show(self, owner: str, time: float | None, clients: Sequence[viser.ClientHandle]) -> None:
+        """Show the robot at a time of the preview (s) on the views of `owner`; None hides it."""
+        if time is None or self._motion is None or not self._motion.rows:
+            self._times.pop(owner, None)
+            for client in clients:
+                client.scene.remove_by_name("/ghost")
+                self._drawn.pop(client.client_id, None)
+            return
+        self._times[owner] = time
+        for client in clients:
+            self._draw(client, self._motion, configuration_at(self._motion.rows, time))
+
+    def attach(self, owner: str, client: viser.ClientHandle) -> None:
+        """A view of `owner` has opened."""
+        if owner in self._times:
+            self.show(owner, self._times[owner], [client])
+
+    def detach(self, client_id: int) -> None:
+        """A view has closed."""
+        self._drawn.pop(client_id, None)
+
+    def _draw(self, client: viser.ClientHandle, motion: PreviewMotion, q: Array) -> None:
+        if client.client_id not in self._drawn:
+            for joint in range(self._base, self._model.njoints):
+                client.scene.add_frame(f"/ghost/{joint}", show_axes=False)
+            for number, part in enumerate(self._parts):
+                client.scene.add_mesh_simple(
+                    f"/ghost/{part.joint}/part{number}",
+                    part.vertices,
+                    part.faces,
+                    color=_GHOST_COLOR,
+                    opacity=_GHOST_OPACITY,
+                    cast_shadow=False,
+                    receive_shadow=False,
+                )
+        if self._drawn.get(client.client_id) != motion.preview_hash:
+            self._drawn[client.client_id] = motion.preview_hash
+            tools = [row.tool for row in motion.rows]
+            pairs = np.array(list(zip(tools, tools[1:], strict=False)), dtype=np.float32)
+            if len(pairs):
+                client.scene.add_line_segments(
+                    "/ghost/tool", pairs, colors=_GHOST_COLOR, thickness=2.0, thickness_units="screen"
+                )
+        pin.forwardKinematics(self._model, self._data, q)
+        with client.atomic():
+            for joint in range(self._base, self._model.njoints):
+                frame = client.scene.get_handle_by_name(f"/ghost/{joint}")
+                if frame is not None:
+                    placement = self._data.oMi[joint]
+                    x, y, z, w = pin.Quaternion(placement.rotation).coeffs()
+                    frame.position, frame.wxyz = placement.translation, np.array([w, x, y, z])
+
+
+class ToolTrail:
+    """The tool's last positions as a line that fades into the past; sent only when it has grown."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        """Start with an empty trail."""
+        self._server = server
+        self._positions: deque[m.Vector3] = deque(maxlen=_TRAIL_POINTS)
+
+    def extend(self, position: m.Vector3) -> bool:
+        """Add the tool's position (m, odom); True when the trail has grown."""
+        if self._positions and float(np.linalg.norm(np.subtract(position, self._positions[-1]))) < _TRAIL_STEP:
+            return False
+        self._positions.append(position)
+        if len(self._positions) > 1:
+            self._draw()
+        return True
+
+    def _draw(self) -> None:
+        positions = np.array(self._positions, dtype=np.float32)
+        fade = np.linspace(0.0, 1.0, len(positions))[:, None]
+        colors = (_TRAIL_OLD + fade * (_TRAIL_NEW - _TRAIL_OLD)).astype(np.uint8)
+        self._server.scene.add_line_segments(
+            _TRAIL,
+            np.stack([positions[:-1], positions[1:]], axis=1),
+            colors=np.stack([colors[:-1], colors[1:]], axis=1),
+            thickness=2.0,
+            thickness_units="screen",
+        )
+
+
+def configuration_at(rows: Sequence[PreviewRow], time: float) -> Array:
+    """Configuration (12) at a time (s), interpolated between rows; the first or last one outside of them."""
+    index = bisect_right([row.time for row in rows], time)
+    a, b = rows[max(index - 1, 0)], rows[min(index, len(rows) - 1)]
+    fraction = 0.0 if b.time <= a.time else min(max((time - a.time) / (b.time - a.time), 0.0), 1.0)
+    q_a, q_b = configuration(a.base, a.position), configuration(b.base, b.position)
+    q: Array = q_a + fraction * (q_b - q_a)
+    return q
+
+
+def _grey_of(color: Color) -> Color:
     level = round(60 + 0.3 * sum(color) / 3)
     return (level, level, level)

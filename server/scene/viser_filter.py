@@ -1,7 +1,7 @@
-"""What a browser may say to the 3-D view. Default-deny: a frame that is not one of these, exactly, is dropped.
+"""A filter of the browser's messages to viser. A frame that is not exactly one of the listed messages is dropped.
 
-Viser trusts its client: it clicks disabled buttons, sets sliders beyond their ends, moves gizmos through their limits
-and opens public tunnels when told to. So each frame is decoded strictly, and what passes is encoded anew.
+Viser trusts its client, which may click disabled buttons, set sliders beyond their ends, move gizmos through their
+limits and open public tunnels. So each frame is decoded strictly and encoded again.
 """
 
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ class _ClientMessage(Struct, frozen=True, tag_field="type", forbid_unknown_field
 
 
 class ViewerCamera(_ClientMessage, frozen=True, tag="ViewerCameraMessage"):
-    """Where the view's camera is. Anybody who is signed in."""
+    """The view's camera. Every role may send it."""
 
     wxyz: _QuatWxyz
     position: Vector3
@@ -39,7 +39,7 @@ class ViewerCamera(_ClientMessage, frozen=True, tag="ViewerCameraMessage"):
 
 
 class SceneNodeClick(_ClientMessage, frozen=True, tag="SceneNodeClickMessage"):
-    """A click on something in the scene."""
+    """A click on a node of the scene."""
 
     name: _NodeName
     instance_index: int | None
@@ -51,7 +51,7 @@ class SceneNodeClick(_ClientMessage, frozen=True, tag="SceneNodeClickMessage"):
 
 
 class ScenePointer(_ClientMessage, frozen=True, tag="ScenePointerMessage"):
-    """A click anywhere into the scene, while somebody places points by hand."""
+    """A click anywhere in the scene, while a session places points or measures."""
 
     event_type: Literal["click"]
     ray_origin: Vector3
@@ -61,7 +61,7 @@ class ScenePointer(_ClientMessage, frozen=True, tag="ScenePointerMessage"):
 
 
 class GizmoUpdate(_ClientMessage, frozen=True, tag="TransformControlsUpdateMessage"):
-    """The gizmo was dragged to here."""
+    """The gizmo was dragged to this pose."""
 
     name: Literal["/gizmo"]
     wxyz: _QuatWxyz
@@ -77,7 +77,7 @@ class GizmoDragStart(_ClientMessage, frozen=True, tag="TransformControlsDragStar
 
 
 class GizmoDragEnd(_ClientMessage, frozen=True, tag="TransformControlsDragEndMessage"):
-    """The gizmo was let go."""
+    """The gizmo was released."""
 
     name: Literal["/gizmo"]
     owner: _Owner = ""
@@ -90,12 +90,12 @@ _ENCODER = msgspec.msgpack.Encoder()
 
 @dataclass(frozen=True)
 class Admitted:
-    """A frame that was read and found right.
+    """A valid frame.
 
     Attributes:
-        frame: To pass on to viser; empty to leave it out, as all that is said of the gizmo: viser would take where it
-            was dragged for where it is drawn some time later, and after that not draw it back where it had been.
-        gizmo: What it says of the gizmo, where that matters: dragged to a place, if it may be, or let go of.
+        frame: To pass on to viser; empty to pass on nothing, as with all messages about the gizmo. Viser would store
+            the dragged pose late, and then not draw the gizmo back at its earlier pose.
+        gizmo: The gizmo's drag, where it is permitted, or the end of one.
     """
 
     frame: bytes
@@ -103,12 +103,12 @@ class Admitted:
 
 
 def admit(frame: bytes, may_operate: bool, may_move: bool = True) -> Admitted | None:
-    """What to pass on to viser; None to drop the frame as forged.
+    """Check a frame for viser; None where it is forged and has to be dropped.
 
     Args:
         frame: One binary WebSocket frame from a browser.
-        may_operate: May this session point at things and drag the gizmo?
-        may_move: May it drag the gizmo now, or does somebody else hold control? To let go is always heard.
+        may_operate: Whether the session's role may click and drag.
+        may_move: Whether it may drag the gizmo now: nobody else holds control. A release always passes.
     """
     try:
         message = _DECODER.decode(frame)
@@ -122,14 +122,14 @@ def admit(frame: bytes, may_operate: bool, may_move: bool = True) -> Admitted | 
         return Admitted(b"", message)
     if isinstance(message, GizmoDragStart):
         return Admitted(b"")
-    # Encoded anew, so that viser reads what was checked here and nothing else.
+    # Encoded again, so that viser reads exactly what was checked here.
     return Admitted(_ENCODER.encode(message))
 
 
-def kind(frame: bytes) -> str:
-    """What a dropped frame said it was, for the log."""
+def message_type(frame: bytes) -> str:
+    """The type that a dropped frame claims, for the log."""
     try:
-        said = msgspec.msgpack.decode(frame)
+        decoded = msgspec.msgpack.decode(frame)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
         return "not a message"
-    return str(said.get("type", "no type"))[:60] if isinstance(said, dict) else "not a message"
+    return str(decoded.get("type", "no type"))[:60] if isinstance(decoded, dict) else "not a message"

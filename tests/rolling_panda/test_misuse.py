@@ -8,7 +8,7 @@ from websockets.exceptions import ConnectionClosed
 
 from rolling_panda import topics
 from rolling_panda.messages.supervision import ControlState
-from tests.server.test_pages import Page
+from tests.server.test_page_socket import Page
 from tests.support.fake_wire import FakeWire, telling
 from tests.support.running_server import running_server
 

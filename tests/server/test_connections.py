@@ -275,8 +275,8 @@ def test_one_session_has_a_limit_through_all_of_its_sockets():
 
 
 def test_who_has_no_session_waits_where_an_address_asks_too_often(monkeypatch):
-    for name, value in (("_STRANGERS_HZ", 0.01), ("_STRANGERS_AT_ONCE", 20.0), ("_WAIT_S", 0.2)):
-        monkeypatch.setattr(f"server.api.guard.{name}", value)
+    for name, value in (("_VISITOR_RATE_HZ", 0.01), ("_VISITOR_BURST", 20.0), ("_MAX_WAIT_S", 0.2)):
+        monkeypatch.setattr(f"server.api.middleware.{name}", value)
     with running_server(FakeWire()) as server, server.client() as client, server.visitor() as visitor:
         refused = eventually(lambda: (answer := visitor.get("/api/health")).status_code == 429 and answer, 20.0)
         assert "without a session" in refused.json()["reason"]

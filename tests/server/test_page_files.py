@@ -5,7 +5,7 @@ import pytest
 from starlette.exceptions import HTTPException
 
 from rolling_panda.resources import resource
-from server.api.page_files import PageFiles, as_sent, hastened, needed
+from server.api.page_files import PageFiles, imports_of, minified, with_preloads
 
 SCRIPT = """\
 // What this is for.
@@ -42,7 +42,7 @@ return two * x;
 
 
 def test_lines_of_comment_alone_are_left_out_and_every_other_line_keeps_its_number():
-    assert as_sent(SCRIPT) == SENT
+    assert minified(SCRIPT) == SENT
 
 
 def ask(files, path, **headers):
@@ -58,7 +58,7 @@ def test_every_script_of_the_page_is_sent_and_nothing_outside_the_folder():
         name = script.relative_to(folder).as_posix()
         answer = ask(files, name)
         assert answer.status_code == 200 and answer.headers["content-type"].startswith("text/javascript")
-        assert answer.body == as_sent(script.read_text(encoding="utf-8")).encode()
+        assert answer.body == minified(script.read_text(encoding="utf-8")).encode()
         assert ask(files, name, if_none_match=answer.headers["etag"]).status_code == 304
         assert ask(files, name, if_none_match='"another"').status_code == 200
     assert ask(files, "css/base.css").status_code == 200
@@ -92,5 +92,5 @@ def test_scripts_are_named_with_what_they_need_and_not_what_they_fetch_later():
         "c.js": "export const c = 1;\n",
         "late.js": "",
     }
-    assert needed("app.js", scripts) == ["components/a.js", "b.js", "c.js"]
-    assert hastened("<p>no scripts</p>", scripts) == "<p>no scripts</p>"
+    assert imports_of("app.js", scripts) == ["components/a.js", "b.js", "c.js"]
+    assert with_preloads("<p>no scripts</p>", scripts) == "<p>no scripts</p>"

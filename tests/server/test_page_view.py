@@ -5,11 +5,11 @@ import pytest
 from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.messages.page import PagePlan
-from rolling_panda.messages.robot import CameraFrame, Intrinsics
+from rolling_panda.messages.robot import CameraFrame, Intrinsics, JointState
 from rolling_panda.messages.supervision import PlannedPoint, PointPlan, SessionPlan
 from rolling_panda.model.robot import RobotModel, configuration
 from server.robots.link import RobotLink
-from server.robots.page_view import PageView, project
+from server.robots.page_view import PageView, project, speed_shares
 from tests.support.fake_wire import (
     ARM,
     HEADER,
@@ -174,3 +174,10 @@ def test_a_canes_direction_in_the_image_goes_with_its_point(wire, view, along, a
     (row,) = view.points(0.0).points
     assert row.pixel == (320.0, 240.0)
     assert row.cane_angle == (None if angle is None else pytest.approx(angle, abs=0.01))
+
+
+def test_speeds_are_fractions_of_each_actuators_limit():
+    velocity = (-5.6, 0.0, 0.0, 2.175, 0.0, 0.0, 0.0, 0.0, -1.305)
+    state = JointState(header=HEADER, sequence=1, position=(50.0, -50.0, *ARM), velocity=velocity)
+    shares = speed_shares(state, RobotModel().limits)
+    assert shares == pytest.approx((0.5, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.5), abs=1e-3)

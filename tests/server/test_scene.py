@@ -9,7 +9,7 @@ import pytest
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import Capsule, Scenery
 from rolling_panda.model.robot import RobotModel
-from server.scene.markers import STATE_COLORS, beyond_marker, cut_marker
+from server.scene.meshes import STATE_COLORS, cut_marker, unreachable_marker
 from server.scene.scene import Scene
 from tests.support.played_server import bridge, point
 
@@ -38,7 +38,7 @@ def shown(scene: Scene, state: m.PointState) -> tuple[Any, tuple[int, ...]]:
 
 
 def test_a_point_that_cannot_be_reached_has_another_marker_until_it_can(scene: Scene) -> None:
-    for state, shape in (("ACCEPTED", cut_marker()), ("UNREACHABLE", beyond_marker()), ("ACCEPTED", cut_marker())):
+    for state, shape in (("ACCEPTED", cut_marker()), ("UNREACHABLE", unreachable_marker()), ("ACCEPTED", cut_marker())):
         vertices, color = shown(scene, state)
         assert np.allclose(vertices, shape.vertices) and color == STATE_COLORS[state]
     scene.show_points((point(2, "PROPOSED"),))
@@ -88,13 +88,13 @@ def test_what_the_blades_have_cut_off_falls_for_a_second_and_is_gone(scene: Scen
     piece = falling(scene, "plant")
     low, high = np.asarray(piece.vertices)[:, 2].min(), np.asarray(piece.vertices)[:, 2].max()
     assert (low, high) == (pytest.approx(0.9), pytest.approx(1.8)), "all that was above the cut"
-    scene.fall.step(100.2)
+    scene.falling.step(100.2)
     assert piece.position[2] == pytest.approx(-0.5 * 9.81 * 0.04)
-    scene.fall.step(100.8)
+    scene.falling.step(100.8)
     assert piece.position[2] == pytest.approx(-0.9), "it lies on the ground, and fades"
     assert 0.0 < piece.opacity < 1.0
-    scene.fall.step(101.0)
-    assert falling(scene, "plant") is None and not scene.fall.busy
+    scene.falling.step(101.0)
+    assert falling(scene, "plant") is None
     at_work(scene, "DONE", "DONE")
     scene.show_canes((cane(0.2, top=1.81), cane(0.4)))
     assert highest(scene, 0.2) == pytest.approx(0.9) and falling(scene, "plant") is None, "and does not fall again"
@@ -142,7 +142,7 @@ def test_what_the_simulator_severed_falls_too_and_another_row_does_not(scene: Sc
     heights = np.asarray(piece.vertices)[:, 2]
     assert (heights.min(), heights.max()) == (pytest.approx(0.9), pytest.approx(1.5))
     assert np.asarray(scene._server.scene.get_handle_by_name("/row/cane").vertices)[:, 2].max() == pytest.approx(0.9)
-    scene.fall.step(102.0)
+    scene.falling.step(102.0)
     assert late_view(scene) >= {"/row/cane", "/row/post"} and falling(scene, "row") is None
     scene.show_row(row(40, post), now=103.0)
     scene.show_row(row(0, foot, tip, post), now=104.0)

@@ -1,4 +1,4 @@
-"""The robot in the 3-D view is sent when it has moved, and not for what odometry wanders while it stands still."""
+"""The robot, the ghost of a preview and the trail of the tool in the 3-D view."""
 
 from contextlib import nullcontext
 from types import SimpleNamespace
@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from rolling_panda import messages as m
+from rolling_panda.messages.supervision import PreviewRow
 from rolling_panda.model.robot import RobotModel, configuration
-from server.scene.robot import SceneRobot
+from server.scene.robot import SceneRobot, ToolTrail, configuration_at
 
 MODEL = RobotModel().model
 ARM = (0.1, -0.4, 0.2, -1.9, 0.0, 1.6, 0.8)
@@ -53,3 +54,44 @@ def test_a_joint_that_turns_a_little_is_sent_and_no_other(robot, frames):
     assert [name for name, frame in frames.items() if frame.wxyz is not before[name]] == [
         name for name in frames if name.endswith("panda_joint1")
     ]
+
+
+ROWS = tuple(
+    PreviewRow(0.1 * i, m.PlanarPose(0.01 * i, 0.0, 0.0), (0.0, 0.0, 0.2 * i, *[0.0] * 6), (0.0, 0.0, 1.0))
+    for i in range(5)
+)
+
+
+def test_a_moment_between_two_rows_is_between_them():
+    q = configuration_at(ROWS, 0.15)
+    np.testing.assert_allclose((q[0], q[5]), (0.015, 0.3))
+
+
+def test_before_the_first_and_after_the_last_row_the_robot_stands():
+    np.testing.assert_allclose(configuration_at(ROWS, 0.0)[5], 0.0)
+    np.testing.assert_allclose(configuration_at(ROWS, 99.0)[5], 0.8)
+    np.testing.assert_allclose(configuration_at(ROWS[:1], 5.0)[5], 0.0)
+
+
+def drawn_by():
+    drawn = []
+    scene = SimpleNamespace(add_line_segments=lambda name, points, **looks: drawn.append((points, looks["colors"])))
+    return ToolTrail(SimpleNamespace(scene=scene)), drawn
+
+
+def test_the_trail_grows_as_the_tool_goes_and_noise_adds_nothing():
+    trail, drawn = drawn_by()
+    assert trail.extend((0.0, 0.0, 1.0))
+    assert not trail.extend((0.001, 0.0, 1.0)) and drawn == []
+    assert trail.extend((0.02, 0.0, 1.0))
+    points, colors = drawn[-1]
+    assert np.allclose(points, [[[0.0, 0.0, 1.0], [0.02, 0.0, 1.0]]])
+    assert colors.shape == (1, 2, 3) and colors[0, 1].sum() > colors[0, 0].sum(), "the newest is the brightest"
+
+
+def test_what_is_long_ago_goes():
+    trail, drawn = drawn_by()
+    for step in range(500):
+        trail.extend((0.02 * step, 0.0, 1.0))
+    points, _ = drawn[-1]
+    assert len(points) < 250 and points[-1, 1, 0] > 9.9 and points[0, 0, 0] > 4.0

@@ -6,7 +6,7 @@ import pytest
 from rolling_panda import messages as m
 from rolling_panda.messages import page as p
 from rolling_panda.messages.supervision import StopState
-from server.robots.summary import Glance, glance
+from server.robots.summary import RobotSummary, summarize
 from tests.rolling_panda.test_misuse import control
 from tests.support.fake_wire import bridge_state, controller_state, pruning_point
 
@@ -17,8 +17,8 @@ CALM = p.PageState(
 )  # fmt: skip
 
 
-def seen(points: p.PagePoints | None = None, **changes: object) -> Glance:
-    return glance("panda-1", "/robots/panda-1/", msgspec.structs.replace(CALM, **changes), points, "me")
+def seen(points: p.PagePoints | None = None, **changes: object) -> RobotSummary:
+    return summarize("panda-1", "/robots/panda-1/", msgspec.structs.replace(CALM, **changes), points, "me")
 
 
 def gone(process: str, age_s: float | None = 0.05, present: bool = False) -> tuple[p.ProcessPresence, ...]:
@@ -40,7 +40,7 @@ def test_a_calm_robot_has_no_alarm() -> None:
 
 
 def test_before_its_first_state_that_itself_is_the_alarm() -> None:
-    assert glance("panda-1", "/robots/panda-1/", None, None, "me").severity == "error"
+    assert summarize("panda-1", "/robots/panda-1/", None, None, "me").severity == "error"
     assert seen(controller=None, processes=gone("controller")).alarm == "controller is silent"
 
 
@@ -78,4 +78,4 @@ def test_who_holds_control_is_told_by_name_and_to_themselves() -> None:
     assert (seen(control=held).holder, seen(control=held).yours) == ("Ann", True)
     other = msgspec.structs.replace(held, holder="her")
     assert (seen(control=other).holder, seen(control=other).yours) == ("Ann", False)
-    assert not glance("a", "/", msgspec.structs.replace(CALM, control=control("")), None, "").yours
+    assert not summarize("a", "/", msgspec.structs.replace(CALM, control=control("")), None, "").yours

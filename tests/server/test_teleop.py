@@ -6,7 +6,7 @@ from rolling_panda import messages as m
 from rolling_panda.errors import InputError
 from rolling_panda.messages.supervision import BaseVelocity
 from server.config import ServerConfig
-from server.robots.teleop import Aim, TeleopHold
+from server.robots.teleop import TeleopCommand, TeleopHold
 
 HERE = m.Pose((0.1, 0.2, 0.3), (0.0, 0.0, 0.0, 1.0))
 _ACTIONS = st.sampled_from(["hold", "drew", "aim", "release"])
@@ -15,17 +15,17 @@ THERE = m.Pose((0.4, 0.2, 0.3), (0.0, 0.0, 0.0, 1.0))
 
 def holding(now=10.0):
     teleop = TeleopHold(ServerConfig())
-    teleop.drew("a", now, now)
-    teleop.aim("a", HERE)
+    teleop.view_rendered("a", now, now)
+    teleop.set_target("a", HERE)
     teleop.hold("a", "ann", now)
     return teleop
 
 
 def test_the_newest_target_is_published_with_a_growing_sequence():
     teleop = holding()
-    first = teleop.due(10.0)
-    teleop.aim("a", THERE)
-    second = teleop.due(10.03)
+    first = teleop.next_message(10.0)
+    teleop.set_target("a", THERE)
+    second = teleop.next_message(10.03)
     assert (first.hold, first.target, first.user) == (True, HERE, "ann")
     assert (second.hold, second.target) == (True, THERE)
     assert second.sequence > first.sequence
@@ -33,23 +33,23 @@ def test_the_newest_target_is_published_with_a_growing_sequence():
 
 def test_nothing_is_published_before_anybody_holds():
     teleop = TeleopHold(ServerConfig())
-    teleop.drew("a", 10.0, 10.0)
-    teleop.aim("a", HERE)
-    assert teleop.due(10.0) is None
+    teleop.view_rendered("a", 10.0, 10.0)
+    teleop.set_target("a", HERE)
+    assert teleop.next_message(10.0) is None
 
 
 def test_letting_go_ends_it_in_the_next_message_and_says_so_several_times():
     teleop = holding()
     assert teleop.release("a")
-    ends = [teleop.due(10.01) for _ in range(8)]
+    ends = [teleop.next_message(10.01) for _ in range(8)]
     assert [end is not None and end.hold is False for end in ends] == [True] * 5 + [False] * 3
-    assert teleop.due(10.02) is None
+    assert teleop.next_message(10.02) is None
 
 
 def test_silence_of_150_ms_ends_the_hold():
     teleop = holding()
-    assert teleop.due(10.149).hold
-    assert teleop.due(10.151).hold is False
+    assert teleop.next_message(10.149).hold
+    assert teleop.next_message(10.151).hold is False
     assert teleop.holder is None
 
 
@@ -62,35 +62,35 @@ def test_a_page_that_no_longer_draws_the_robot_ends_the_hold():
         except InputError:
             break
     assert 10.5 <= now < 10.6
-    assert teleop.due(now).hold is False
+    assert teleop.next_message(now).hold is False
 
 
 def test_the_first_holder_wins():
     teleop = holding()
-    teleop.drew("b", 10.0, 10.0)
-    teleop.aim("b", THERE)
+    teleop.view_rendered("b", 10.0, 10.0)
+    teleop.set_target("b", THERE)
     with pytest.raises(InputError, match="ann is holding"):
         teleop.hold("b", "bob", 10.1)
-    assert teleop.due(10.1).target == HERE
+    assert teleop.next_message(10.1).target == HERE
     teleop.release("a")
     teleop.hold("b", "bob", 10.12)
-    assert teleop.due(10.12).user == "bob"
+    assert teleop.next_message(10.12).user == "bob"
 
 
 def test_somebody_else_cannot_let_go_or_aim_for_the_holder():
     teleop = holding()
     assert not teleop.release("b")
-    teleop.aim("b", THERE)
-    assert teleop.due(10.01).target == HERE
+    teleop.set_target("b", THERE)
+    assert teleop.next_message(10.01).target == HERE
 
 
 def test_a_hold_needs_a_target_and_an_eye_on_the_robot():
     teleop = TeleopHold(ServerConfig())
-    teleop.aim("a", HERE)
+    teleop.set_target("a", HERE)
     with pytest.raises(InputError, match="view"):
         teleop.hold("a", "ann", 10.0)
     teleop = TeleopHold(ServerConfig())
-    teleop.drew("a", 10.0, 10.0)
+    teleop.view_rendered("a", 10.0, 10.0)
     with pytest.raises(InputError, match="gizmo"):
         teleop.hold("a", "ann", 10.0)
 
@@ -112,10 +112,10 @@ def test_a_target_goes_out_only_while_somebody_holds_with_a_fresh_view(steps):
     for action, who, pause in steps:
         now += pause
         if action == "drew":
-            teleop.drew(who, now, now)
+            teleop.view_rendered(who, now, now)
             drawn[who] = now
         elif action == "aim":
-            teleop.aim(who, HERE)
+            teleop.set_target(who, HERE)
         elif action == "release":
             teleop.release(who)
             renewed.pop(who, None)
@@ -125,7 +125,7 @@ def test_a_target_goes_out_only_while_somebody_holds_with_a_fresh_view(steps):
                 renewed[who] = now
             except InputError:
                 pass
-        message = teleop.due(now)
+        message = teleop.next_message(now)
         if message is not None and message.hold:
             assert now - renewed[message.user] <= 0.1501
             assert now - drawn[message.user] <= 0.5001
@@ -133,83 +133,83 @@ def test_a_target_goes_out_only_while_somebody_holds_with_a_fresh_view(steps):
 
 def test_a_page_holds_by_what_it_shows_itself_and_not_by_another_page_of_the_same_person():
     teleop = TeleopHold(ServerConfig())
-    teleop.aim("ann", HERE)
-    teleop.drew("page 1", 10.0, 10.0)
+    teleop.set_target("ann", HERE)
+    teleop.view_rendered("page 1", 10.0, 10.0)
     with pytest.raises(InputError, match="view"):
         teleop.hold("ann", "ann", 10.0, view="page 2")
     teleop.hold("ann", "ann", 10.0, view="page 1", client="c1")
-    teleop.drew("page 2", 10.45, 10.5)
+    teleop.view_rendered("page 2", 10.45, 10.5)
     for now in (10.1, 10.2, 10.3, 10.4, 10.5):
         teleop.hold("ann", "ann", now, view="page 1", client="c1")
-    assert teleop.due(10.51).hold is False
+    assert teleop.next_message(10.51).hold is False
 
 
 def test_how_late_the_holders_view_is_goes_out_with_the_target():
     teleop = TeleopHold(ServerConfig())
-    teleop.aim("ann", HERE)
-    teleop.drew("page 1", 10.0, 10.21)
-    teleop.drew("page 2", 10.0, 10.05)
+    teleop.set_target("ann", HERE)
+    teleop.view_rendered("page 1", 10.0, 10.21)
+    teleop.view_rendered("page 2", 10.0, 10.05)
     teleop.hold("ann", "ann", 10.25, view="page 1", client="c1")
-    target = teleop.due(10.25)
+    target = teleop.next_message(10.25)
     assert target.client == "c1"
     assert target.round_trip_s == pytest.approx(0.21)
     # The same state said again says nothing new.
-    teleop.drew("page 1", 10.0, 10.4)
-    assert teleop.due(10.26).round_trip_s == pytest.approx(0.21)
+    teleop.view_rendered("page 1", 10.0, 10.4)
+    assert teleop.next_message(10.26).round_trip_s == pytest.approx(0.21)
 
 
 def test_while_the_base_is_held_the_gizmo_leads_nothing():
     teleop = holding()
-    drive = Aim(base=BaseVelocity(0.2, 0.0))
-    teleop.want("a", drive)
+    drive = TeleopCommand(base=BaseVelocity(0.2, 0.0))
+    teleop.set_command("a", drive)
     teleop.hold("a", "ann", 10.0)
-    teleop.aim("a", THERE)
-    sent = teleop.due(10.01)
+    teleop.set_target("a", THERE)
+    sent = teleop.next_message(10.01)
     assert (sent.target, sent.base) == (None, drive.base)
-    assert not teleop.leads_gizmo
+    assert not teleop.follows_gizmo
     teleop.release("a")
-    teleop.aim("a", THERE)
+    teleop.set_target("a", THERE)
     teleop.hold("a", "ann", 10.02)
-    assert teleop.due(10.03).target == THERE and teleop.leads_gizmo
+    assert teleop.next_message(10.03).target == THERE and teleop.follows_gizmo
 
 
 def test_the_share_of_the_speed_goes_out_and_is_that_of_the_newest_renewal():
     teleop = holding()
-    assert teleop.due(10.0).share == 1.0
+    assert teleop.next_message(10.0).share == 1.0
     teleop.hold("a", "ann", 10.01, share=0.25)
-    teleop.aim("a", THERE)
-    assert teleop.due(10.02).share == 0.25
+    teleop.set_target("a", THERE)
+    assert teleop.next_message(10.02).share == 0.25
 
 
 def test_after_a_short_silence_the_next_word_goes_on():
     teleop = holding()
-    assert teleop.due(10.5).hold is False
-    teleop.drew("a", 10.9, 10.9)
-    teleop.aim("a", HERE)
+    assert teleop.next_message(10.5).hold is False
+    teleop.view_rendered("a", 10.9, 10.9)
+    teleop.set_target("a", HERE)
     teleop.hold("a", "ann", 10.9)
-    assert teleop.due(10.9).hold
+    assert teleop.next_message(10.9).hold
 
 
 def test_after_a_long_silence_only_a_new_hold_moves_anything():
     teleop = holding()
-    assert teleop.due(10.5).hold is False
-    teleop.drew("a", 11.1, 11.1)
-    teleop.aim("a", HERE)
+    assert teleop.next_message(10.5).hold is False
+    teleop.view_rendered("a", 11.1, 11.1)
+    teleop.set_target("a", HERE)
     # The first may have waited in a server that stood still.
     for word in (11.1, 11.13):
         with pytest.raises(InputError, match="more than 1.0 s have passed: let go, then hold again"):
             teleop.hold("a", "ann", word)
         assert teleop.holder is None
     teleop.release("a")
-    teleop.aim("a", HERE)
+    teleop.set_target("a", HERE)
     teleop.hold("a", "ann", 11.15)
-    assert teleop.due(11.15).hold
+    assert teleop.next_message(11.15).hold
 
 
 def test_a_hold_that_lapsed_is_not_another_holders():
     teleop = holding()
     teleop.expire(12.0)
-    teleop.drew("b", 12.0, 12.0)
-    teleop.aim("b", THERE)
+    teleop.view_rendered("b", 12.0, 12.0)
+    teleop.set_target("b", THERE)
     teleop.hold("b", "bea", 12.0)
-    assert teleop.due(12.0).user == "bea"
+    assert teleop.next_message(12.0).user == "bea"

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from viser import _messages
 from viser.infra._messages import wire_field_names
 
-from server.scene.viser_filter import Admitted, admit, kind
+from server.scene.viser_filter import Admitted, admit, message_type
 
 CAMERA = {
     "type": "ViewerCameraMessage", "wxyz": [1, 0, 0, 0], "position": [0, 0, 1.5], "fov": 1.0, "near": 0.01,
@@ -99,7 +99,7 @@ def test_a_second_value_for_a_key_cannot_hide_behind_the_first():
 @given(st.binary(max_size=300))
 def test_noise_is_dropped_and_can_be_named(data):
     assert admit(data, may_operate=True) is None
-    assert isinstance(kind(data), str)
+    assert isinstance(message_type(data), str)
 
 
 def test_the_fields_are_those_of_this_viser():
@@ -109,4 +109,4 @@ def test_the_fields_are_those_of_this_viser():
 
 
 def test_a_dropped_frame_says_what_it_was():
-    assert kind(frame(FORGED)) == "GuiUpdateMessage"
+    assert message_type(frame(FORGED)) == "GuiUpdateMessage"

@@ -360,7 +360,7 @@ def test_the_client_waits_for_the_pages_own_file_and_does_without_it_where_it_do
     page.add_init_script("""new MutationObserver((_, looking) => {
       if (!document.querySelector("#root > *")) return;
       window.beganWith = location.search;
-      looking.disconnect();
+      scene_updater.disconnect();
     }).observe(document, { childList: true, subtree: true });""")
     page.goto("/viser/")
     page.wait_for_function("window.beganWith !== undefined", timeout=1000 * PATIENCE_S)

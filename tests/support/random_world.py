@@ -24,7 +24,7 @@ from rolling_panda.config import RobotConfig
 from rolling_panda.messages import commands as intents
 from rolling_panda.messages.perception import Obstacles
 from rolling_panda.messages.supervision import BaseVelocity, Person, Presence, TeleopTarget
-from server.robots.presence import HEARD_S
+from server.robots.presence import PRESENT_S
 from tests.support.fake_wire import as_received
 from tests.support.random_judge import Judge
 from tests.support.random_parts import MODEL, CutDisk, Movement, Robot
@@ -139,7 +139,7 @@ class World:
         return tuple(
             Person(name, name, PEOPLE[name], age, 0.0 if self.steps >= person.blind_until else 1e6)
             for name, person in self.people.items()
-            if (age := self.now - person.said_at) <= HEARD_S
+            if (age := self.now - person.said_at) <= PRESENT_S
         )
 
     def write(self, records):

@@ -11,7 +11,7 @@ from playwright.sync_api import Browser, Page, expect
 from rolling_panda import messages as m
 from rolling_panda.messages import page as p
 from rolling_panda.resources import resource
-from server.api.page_files import as_sent
+from server.api.page_files import minified
 from tests.support.page_parts import held
 from tests.support.played_page import box_of, until
 from tests.support.played_server import ORIGIN, PlayedServer, bridge, controller, point
@@ -221,7 +221,7 @@ def test_the_log_follows_its_newest_line_when_the_screen_is_turned(page: Page, s
 def test_the_page_is_small_and_keeps_to_its_own_files() -> None:
     folder = resource("web/index.html").parent.resolve()
     scripts = [*folder.rglob("*.js")]
-    sent = {script: as_sent(script.read_text(encoding="utf-8")) for script in scripts}
+    sent = {script: minified(script.read_text(encoding="utf-8")) for script in scripts}
     first, waiting = set[Path](), [folder / "js" / "app.js"]
     while waiting:
         script = waiting.pop()

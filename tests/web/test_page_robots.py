@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import Page, Route, expect
 
 from rolling_panda.resources import resource
-from server.robots.summary import Glance
+from server.robots.summary import RobotSummary
 from tests.support.axe import axe, grave
 from tests.support.played_page import opened, until
 from tests.support.played_server import ORIGIN, PlayedServer, controller, point
@@ -36,7 +36,7 @@ class PlayedHall:
     def serve(self, route: Route) -> None:
         path = route.request.url.removeprefix(ORIGIN)
         if path == "/api/robots" and self.online:
-            route.fulfill(json=[self.glance(name, robot).model_dump() for name, robot in self.robots.items()])
+            route.fulfill(json=[self.summarize(name, robot).model_dump() for name, robot in self.robots.items()])
         elif path == "/api/stop":
             self.stops.append(route.request.post_data_json)
             route.fulfill(json={"ok": True, "reason": ""})
@@ -45,10 +45,10 @@ class PlayedHall:
         else:
             route.abort()
 
-    def glance(self, name: str, robot: PlayedServer) -> Glance:
+    def summarize(self, name: str, robot: PlayedServer) -> RobotSummary:
         severity, alarm = self.alarms.get(name, ("", ""))
         mode = None if robot.controller is None else robot.controller.mode
-        return Glance.model_validate(
+        return RobotSummary.model_validate(
             {
                 "name": name,
                 "path": f"{robot.base}/",

@@ -1,0 +1,67 @@
+"""FastAPI dependencies of the routes: the caller's session with the role that the route needs, and activity.
+
+The role is part of a route, so that it is checked before the body is validated.
+"""
+
+import time
+from collections.abc import Awaitable, Callable
+from typing import Annotated
+
+from fastapi import Depends, HTTPException, Request
+
+from server.api import bodies as body
+from server.auth.sessions import Session
+from server.robots.context import RobotContext
+
+PointId = Annotated[str, body.POINT_ID]
+
+
+def _session(request: Request) -> Session | None:
+    session: Session | None = request.state.session
+    return session
+
+
+#: The caller's session; None for a visitor who is not signed in.
+Visitor = Annotated[Session | None, Depends(_session)]
+
+
+def _caller(session: Visitor) -> Session:
+    if session is None:
+        raise HTTPException(401, "sign in first")
+    return session
+
+
+#: Every role.
+Caller = Annotated[Session, Depends(_caller)]
+
+
+def _operator(session: Caller) -> Session:
+    if not session.may_operate:
+        raise HTTPException(403, f"a {session.role} may look and stop, not operate")
+    return session
+
+
+#: Roles that may move the robot and decide on its work.
+Operator = Annotated[Session, Depends(_operator)]
+
+
+def _supervisor(session: Caller) -> Session:
+    if session.role != "supervisor":
+        raise HTTPException(403, f"only a supervisor may do this, not a {session.role}")
+    return session
+
+
+#: The role that resets stops and invites others.
+Supervisor = Annotated[Session, Depends(_supervisor)]
+
+
+def activity(robot: RobotContext) -> Callable[[Request], Awaitable[None]]:
+    """A dependency that counts a request as activity of its session, by which a script shows its presence."""
+
+    # A coroutine, so that it runs on the server's loop; FastAPI runs plain functions on a thread pool.
+    async def record(request: Request) -> None:
+        session = _session(request)
+        if session is not None:
+            robot.on_activity(session, time.monotonic())
+
+    return record

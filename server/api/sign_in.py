@@ -1,0 +1,127 @@
+"""Sign-in, sign-out, invitations, and the public routes: the same for all robots of the server."""
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+from fastapi import APIRouter, Depends, Header, Request, Response
+from fastapi.responses import FileResponse, JSONResponse, RedirectResponse
+
+from rolling_panda.cli.about import about
+from server.api import bodies as body
+from server.api.dependencies import Caller, Supervisor, Visitor
+from server.api.page_files import PageFiles
+from server.api.responses import COMMAND, SIGN_IN, SIGN_OUT, SIGNED_IN, answer
+from server.auth.sessions import Session, SignInError
+from server.robots.app_state import AppState
+from server.robots.context import Result
+
+
+def _address(request: Request) -> str:
+    return "" if request.client is None else request.client.host
+
+
+Origin = Annotated[str, Header(include_in_schema=False)]
+Address = Annotated[str, Depends(_address)]
+
+
+def page_router(web: Path, files: PageFiles, redirect: str = "") -> APIRouter:
+    """The operator's page and the sign-in page, from the folder `web`.
+
+    A signed-in session is redirected to `redirect`, where that is given.
+    """
+    router = APIRouter(include_in_schema=False)
+
+    @router.get("/")
+    async def page(request: Request, visitor: Visitor) -> Response:
+        if visitor is None:
+            return FileResponse(web / "sign-in.html")
+        return RedirectResponse(redirect) if redirect else files.cached("index.html", request.scope)
+
+    @router.get("/sign-in")
+    def sign_in_page() -> Response:
+        # The page alone: a browser that prefetches links must not use up the token.
+        return FileResponse(web / "sign-in.html")
+
+    return router
+
+
+def sign_in_router(app_state: AppState) -> APIRouter:
+    """Sessions, health and version."""
+    router = APIRouter()
+
+    async def _session_of(request: body.SignIn, address: str) -> Session:
+        if request.token is not None:
+            return app_state.sessions.sign_in(request.token, time.monotonic(), address)
+        if app_state.passwords is None:
+            raise SignInError("this server has no users file: sign in with the link that it printed")
+        user = await app_state.passwords.enter(request.user or "", request.password or "", address)
+        return app_state.sessions.open(user.name, user.role, time.monotonic(), user.fingerprint)
+
+    @router.post("/api/sign-in", tags=["sessions"], responses=SIGN_IN)
+    async def sign_in(visitor: Visitor, request: body.SignIn, address: Address, origin: Origin) -> Response:
+        """Sign in with name and password, or with the single-use token of a link; sets the session cookie."""
+        try:
+            session = await _session_of(request, address)
+        except SignInError as error:
+            name = f" as {request.user!r}" if request.user is not None else ""
+            app_state.note("warning", f"sign-in{name} from {address} refused: {error}", f"sign-in {address}")
+            if error.wait_s > 0:
+                refused = answer(Result(429, False, str(error)))
+                refused.headers["Retry-After"] = str(max(1, round(error.wait_s)))
+                return refused
+            return answer(Result(401, False, str(error)))
+        if visitor is not None:
+            app_state.sign_out(visitor)
+        app_state.note("info", f"{session.user} signed in ({session.role})")
+        signed_in = JSONResponse({"ok": True, "reason": ""})
+        signed_in.set_cookie(
+            app_state.cookie,
+            session.session_id,
+            httponly=True,
+            samesite="strict",
+            # True behind a TLS proxy too; the middleware has checked that this is one of the server's own origins.
+            secure=origin.startswith("https:"),
+            path="/",
+        )
+        return signed_in
+
+    @router.get("/api/sign-in", tags=["sessions"])
+    async def sign_in_method() -> body.SignInMethod:
+        """How to sign in."""
+        return body.SignInMethod(password=app_state.passwords is not None)
+
+    @router.post("/api/sign-out", tags=["sessions"], responses=SIGN_OUT)
+    async def sign_out(visitor: Visitor) -> Response:
+        """End this session; its pages close at once."""
+        if visitor is not None:
+            app_state.sign_out(visitor)
+        signed_out = JSONResponse({"ok": True, "reason": ""})
+        signed_out.delete_cookie(app_state.cookie, path="/", httponly=True, samesite="strict")
+        return signed_out
+
+    @router.get("/api/health", tags=["server"])
+    async def health() -> dict[str, str]:
+        """The server answers."""
+        return {"status": "ok"}
+
+    running = msgspec.to_builtins(about())
+
+    @router.get("/version", tags=["server"])
+    async def version() -> dict[str, str]:
+        """Version, source revision, Python, and a digest of the installed packages."""
+        return dict(running)
+
+    @router.get("/api/me", tags=["sessions"], responses=SIGNED_IN)
+    async def me(session: Caller) -> body.Me:
+        """The caller's user and role."""
+        return body.Me(user=session.user, role=session.role)
+
+    @router.post("/api/invite", tags=["sessions"], responses=COMMAND | {200: {"model": body.Invited}})
+    async def invite(session: Supervisor, request: body.Invite) -> Response:
+        """A single-use sign-in link for somebody else or for a script. Supervisors only."""
+        made = app_state.invite(session, request.user, request.role)
+        return JSONResponse({"ok": True, "reason": "", "link": made.reason}) if made.ok else answer(made)
+
+    return router

@@ -1,0 +1,129 @@
+"""Queries over REST: the robot's state, points, plan, log, report, constants and camera image."""
+
+import csv
+import io
+import time
+from datetime import UTC, datetime
+from typing import Annotated
+
+import msgspec
+from fastapi import APIRouter, Depends, Query, Response
+from pydantic import BaseModel, Field
+
+from rolling_panda.messages.page import PageEvents, PagePoints, PageState
+from rolling_panda.messages.supervision import CutReport, SessionPlan, SessionReport
+from server.api.dependencies import Caller, activity
+from server.api.responses import INVALID, NOT_FOUND, SIGNED_IN, UNAVAILABLE, answer, message, query
+from server.robots.context import Result, RobotContext
+from server.robots.page_view import addressed
+
+_CUT_COLUMNS = tuple(field.name for field in msgspec.structs.fields(CutReport))
+
+
+class RobotFacts(BaseModel):
+    """Constants of the robot: the lower and upper limit of each joint of the arm, from its base on (rad)."""
+
+    arm_limits: list[Annotated[list[float], Field(min_length=2, max_length=2)]]
+
+
+def state_router(robot: RobotContext) -> APIRouter:
+    """Everything under `/api` that a script reads."""
+    router = APIRouter(prefix="/api", dependencies=[Depends(activity(robot))])
+
+    @router.get("/state", tags=["state"], responses=query(PageState, UNAVAILABLE))
+    async def state(session: Caller) -> Response:
+        """The newest state of the robot: what the page gets 10 times a second."""
+        if robot.state is None:
+            return answer(Result(503, False, "The server is starting; ask again."))
+        robot.on_state_fetched(session, time.monotonic())
+        return message(addressed(robot.state, session))
+
+    @router.get("/points", tags=["state"], responses=query(PagePoints))
+    async def points(session: Caller) -> Response:
+        """Every pruning point in the order of work, with its life in the queue."""
+        return message(robot.points if robot.points is not None else robot.view.points(time.monotonic()))
+
+    @router.get("/plan", tags=["state"], responses=query(SessionPlan, UNAVAILABLE))
+    async def plan(session: Caller) -> Response:
+        """The plan: order and approach of each accepted point that can be cut, and why the others cannot."""
+        received = robot.link.plan.peek()
+        if received is None:
+            return answer(Result(503, False, "The controller has not said its plan yet; ask again."))
+        return message(received.message)
+
+    @router.get("/events", tags=["state"], responses=query(PageEvents, INVALID))
+    async def events(session: Caller, after: Annotated[int, Query(ge=0)] = 0) -> Response:
+        """Log lines after line number `after`, oldest first."""
+        return message(PageEvents(events=robot.log.after(after, robot.config.log_lines)))
+
+    @router.get("/report", tags=["state"], responses=query(SessionReport, UNAVAILABLE))
+    async def report(session: Caller) -> Response:
+        """What has happened since the controller started: cuts, vines, refusals, changes of control."""
+        received = robot.link.report.peek()
+        if received is None:
+            return _no_report()
+        return message(received.message)
+
+    @router.get("/report.csv", tags=["state"], response_class=Response, responses=query("text/csv", UNAVAILABLE))
+    async def cuts(session: Caller) -> Response:
+        """One row a cut; times in ISO 8601, UTC."""
+        received = robot.link.report.peek()
+        if received is None:
+            return _no_report()
+        headers = {"Content-Disposition": 'attachment; filename="cuts.csv"'}
+        return Response(cuts_csv(received.message.cuts), media_type="text/csv", headers=headers)
+
+    @router.get("/robot", tags=["state"], responses=SIGNED_IN)
+    async def facts(session: Caller) -> RobotFacts:
+        """Constants of the robot, which a page fetches once."""
+        return RobotFacts(arm_limits=[list(limits) for limits in robot.view.arm_limits])
+
+    return router
+
+
+def camera_router(robot: RobotContext) -> APIRouter:
+    """`/camera/color.jpg`."""
+    router = APIRouter()
+
+    @router.get(
+        "/camera/color.jpg",
+        tags=["state"],
+        response_class=Response,
+        responses=query("image/jpeg", NOT_FOUND, INVALID),
+    )
+    async def camera(n: Annotated[int, Query(ge=0)] | None = None) -> Response:
+        """The newest image of the eye-in-hand camera, JPEG; with `n` that of frame `n`, one of the newest few."""
+        frame = robot.link.camera.peek()
+        if frame is None:
+            return answer(Result(404, False, "no camera image has come yet"))
+        # `images` is filled on another thread, and may lack the newest frame for a moment.
+        images = {**robot.link.images, frame.message.sequence: frame.message.color_jpeg}
+        image = images.get(frame.message.sequence if n is None else n)
+        if image is None:
+            return answer(Result(404, False, f"frame {n} is not among the newest ones; {frame.message.sequence} is"))
+        return Response(image, media_type="image/jpeg")
+
+    return router
+
+
+def cuts_csv(cuts: tuple[CutReport, ...]) -> str:
+    """Cuts as CSV with a heading."""
+    out = io.StringIO()
+    writer = csv.writer(out)
+    writer.writerow(_CUT_COLUMNS)
+    for cut in cuts:
+        row = msgspec.to_builtins(cut)
+        row["ended_at"] = (
+            datetime.fromtimestamp(cut.ended_at, UTC).isoformat(timespec="seconds") if cut.ended_at else ""
+        )
+        # A spreadsheet would evaluate a text with such a first character as a formula.
+        writer.writerow([_escape_formula(row[name]) for name in _CUT_COLUMNS])
+    return out.getvalue()
+
+
+def _escape_formula(value: object) -> object:
+    return f"'{value}" if isinstance(value, str) and value[:1] in ("=", "+", "-", "@", "\t", "\r") else value
+
+
+def _no_report() -> Response:
+    return answer(Result(503, False, "The controller has not reported yet; ask again."))

@@ -1,0 +1,205 @@
+"""Cameras, layers and measures of the 3-D view, each for the session that asked, through the real viser."""
+
+import json
+import time
+
+import msgspec
+import numpy as np
+import pytest
+
+from rolling_panda import topics
+from server.config import ServerConfig
+from tests.server.test_camera_view import HEIGHT, WIDTH, frame
+from tests.server.test_viser_filter import CAMERA, CLICK, DRAG, GRAB, POINTER
+from tests.server.test_viser_proxy import (
+    enables_clicks,
+    hear,
+    hear_kind,
+    is_gizmo,
+    open_socket,
+    open_view,
+    replayed,
+    say,
+)
+from tests.support.fake_wire import FakeWire, joints, odometry, pruning_point, pruning_points, telling
+from tests.support.running_server import PATIENCE_S, running_server
+
+
+@pytest.fixture(scope="module")
+def server():
+    wire = FakeWire()
+    with running_server(wire) as running:
+        wire.deliver(topics.JOINTS, joints())
+        wire.deliver(topics.ODOMETRY, odometry())
+        yield running
+
+
+def shows(name, visible):
+    return lambda message: (
+        (message["type"], message.get("name"), message.get("visible"))
+        == (
+            "SetSceneNodeVisibilityMessage",
+            name,
+            visible,
+        )
+    )
+
+
+def test_layers_are_those_of_one_session_and_stay_for_its_next_view(server):
+    with (
+        server.client(user="ann") as client,
+        server.client(user="bob") as other,
+        open_socket(server, client, "/ws") as page,
+        open_view(server, other) as other_view,
+    ):
+        hear(other_view, replayed)
+        say(other_view, CAMERA)
+        hear(other_view, shows("/row", True))
+        with open_view(server, client) as view:
+            hear(view, replayed)
+            say(view, CAMERA)
+            hear(view, shows("/row", True))
+            page.send('{"type":"ShowLayers","layers":["points"]}')
+            heard = hear(view, shows("/row", False))
+            assert any(map(shows("/plant", False), heard)) and any(map(shows("/points", True), heard))
+            with pytest.raises(TimeoutError):
+                hear(other_view, shows("/row", False), patience_s=0.4)
+        with open_view(server, client) as view:
+            hear(view, replayed)
+            say(view, CAMERA)
+            hear(view, shows("/row", False))
+
+
+def test_a_preset_moves_the_cameras_of_who_asked_alone_and_viewers_may_too(server):
+    def placed(message):
+        return message["type"] == "SetCameraPositionMessage"
+
+    with (
+        telling(server.wire),
+        server.client(role="viewer", user="vera") as client,
+        server.client(user="bob") as other,
+        open_socket(server, client, "/ws") as page,
+        open_view(server, client) as view,
+        open_view(server, other) as other_view,
+    ):
+        for each in (view, other_view):
+            hear(each, replayed)
+            say(each, CAMERA)
+        hear(view, shows("/row", True))
+        page.send('{"type":"PlaceCamera","preset":"top"}')
+        (put,) = [message for message in hear(view, placed) if placed(message)]
+        assert put["position"][2] > 3.0
+        with pytest.raises(TimeoutError):
+            hear(other_view, placed, patience_s=0.4)
+
+
+def test_a_chosen_point_brings_the_cameras_of_who_chose_it_alone(server):
+    def placed(message):
+        return message["type"] == "SetCameraPositionMessage"
+
+    def looks_at(x):
+        return lambda told: told["type"] == "SetCameraLookAtMessage" and np.allclose(told["look_at"], (x, 0.75, 1.0))
+
+    far = msgspec.structs.replace(pruning_point("far"), position=(1.0, 0.75, 1.0))
+    server.wire.deliver(topics.POINTS, pruning_points(far))
+    with (
+        telling(server.wire),
+        server.client(user="ann") as client,
+        server.client(user="bob") as other,
+        open_socket(server, client, "/ws") as page,
+        open_view(server, client) as view,
+        open_view(server, other) as other_view,
+    ):
+        for each in (view, other_view):
+            hear(each, replayed)
+            say(each, CAMERA)
+        hear(view, shows("/row", True))
+        page.send('{"type":"Select","point_id":"far"}')
+        hear(view, looks_at(1.0))
+        # Chosen before it is drawn, as where somebody has placed it: brought there once it is.
+        page.send('{"type":"Select","point_id":"new"}')
+        new = msgspec.structs.replace(pruning_point("new"), position=(2.0, 0.75, 1.0))
+        server.wire.deliver(topics.POINTS, pruning_points(far, new))
+        hear(view, looks_at(2.0))
+        # A click onto its marker does the same, and tells the page.
+        say(view, CLICK | {"name": "/points/far"})
+        assert hear_kind(page, "Selected")["point_id"] == "far"
+        with pytest.raises(TimeoutError):
+            hear(other_view, placed, patience_s=0.4)
+
+
+def test_two_clicks_are_measured_for_the_session_that_measures(server):
+    down = POINTER | {"ray_origin": [0.0, -3.0, 2.0], "ray_direction": [0.0, 0.0, -1.0]}
+    with (
+        telling(server.wire),
+        server.client() as client,
+        open_socket(server, client, "/ws") as page,
+        open_view(server, client) as view,
+    ):
+        hear(view, replayed)
+        say(view, CAMERA)
+        page.send('{"type":"Measure","active":true}')
+        hear(view, enables_clicks)
+        say(view, down)
+        say(view, down | {"ray_origin": [0.5, -3.0, 2.0]})
+        told = hear_kind(page, "Measured")
+        assert told["offset"] == pytest.approx([0.5, 0.0, 0.0]) and told["between"] == ["ground", "ground"]
+        hear(view, lambda message: message.get("name") == "/measure/label")
+        page.send('{"type":"Measure","active":false}')
+        hear(view, lambda message: message["type"] == "RemoveSceneNodeMessage" and message["name"] == "/measure/label")
+
+
+def test_a_picture_of_the_camera_is_drawn_for_who_wants_it(server):
+    with (
+        server.client(user="ann") as client,
+        server.client(user="bob") as other,
+        open_socket(server, client, "/ws") as page,
+        open_view(server, client) as view,
+        open_view(server, other) as other_view,
+    ):
+        for each in (view, other_view):
+            hear(each, replayed)
+            say(each, CAMERA)
+            hear(each, shows("/row", True))
+        page.send('{"type":"ShowLayers","layers":["camera","cloud"]}')
+        hear(view, shows("/plant", False))
+        server.wire.deliver(topics.CAMERA, frame(np.full((HEIGHT, WIDTH), 900)))
+        heard = hear(view, lambda message: message.get("name") == "/cloud")
+        assert "/camera" in {message.get("name") for message in heard}
+        with pytest.raises(TimeoutError):
+            hear(other_view, lambda message: message.get("name") in ("/camera", "/cloud"), patience_s=0.4)
+        page.send('{"type":"ShowLayers","layers":[]}')
+        hear(view, lambda message: message["type"] == "RemoveSceneNodeMessage" and message["name"] == "/cloud")
+
+
+def test_a_drag_while_holding_does_not_wait_for_the_loops_turn_and_many_drags_are_not_all_told():
+    wire = FakeWire()
+    sent = wire.sent[topics.TELEOP.name]
+    with (
+        # After its first turn the loop takes none any more.
+        running_server(wire, ServerConfig(teleop_rate_hz=1e-4)) as server,
+        telling(wire),
+        server.client(user="ann") as client,
+        open_socket(server, client, "/ws") as page,
+        open_view(server, client) as view,
+    ):
+        hear(view, replayed)
+        say(view, CAMERA)
+        page.send('{"type":"ShowGizmo","visible":true}')
+        (gizmo,) = [each for each in hear(view, is_gizmo) if is_gizmo(each)]
+        say(view, GRAB | {"owner": gizmo["owner"]})
+        sequence, drags, until = 0, 0, time.monotonic() + PATIENCE_S
+        while not any(each.hold for each in sent):
+            assert time.monotonic() < until
+            message = json.loads(page.recv(timeout=PATIENCE_S))
+            if message["type"] not in ("PageState", "HoldEnded"):
+                continue
+            sequence += 1
+            page.send(json.dumps({"type": "Ping", "number": sequence, "rendered": message.get("number", 0)}))
+            page.send(json.dumps({"type": "Hold", "sequence": sequence, "hold": message["type"] == "PageState"}))
+            for k in range(20):
+                drags += 1
+                say(view, DRAG | {"owner": gizmo["owner"], "position": [0.3 + 0.001 * k, 0.5, 0.9]})
+    told = [each.target.position for each in sent if each.hold]
+    assert told[0][1:] == (0.5, 0.9) and 0.3 <= told[0][0] < 0.32
+    assert len(told) < drags / 2
