@@ -28,7 +28,7 @@ class BridgeLoop:
         self._commanded = threading.Event()
         transport.subscribe(topics.MOTION, self._command)
         self._cuts, self._tokens = transport.feed(topics.CUT, 32), transport.feed(topics.TOKEN, 32)
-        self._pictures = transport.feed(topics.PICTURE, 8)
+        self._pictures = transport.feed(topics.CLOSE_UP_REQUEST, 8)
         transport.subscribe(topics.STOP, self._stop)
         transport.serve(topics.RELEASE, self._release)
         self._joints = transport.publisher(topics.JOINTS)

@@ -31,7 +31,7 @@ from rolling_panda.bounds import wider
 from rolling_panda.config import RobotConfig
 from rolling_panda.errors import ControlError
 from rolling_panda.messages import commands as intents
-from rolling_panda.messages.perception import PictureRequest
+from rolling_panda.messages.perception import CloseUpRequest
 from rolling_panda.messages.supervision import StopRecord
 
 _STATE_S, _STOPS_S = 0.05, 0.5
@@ -77,8 +77,8 @@ class Controller:
         self._inputs, self._stale_filter = StepInputs(), StaleMessageFilter()
         self._points_seen: object = None
         self._state_due = self._stops_due = -math.inf
-        self._wider = (*wider("controller", config), *wider("robot", robot_config))
-        for line in self._wider:
+        self._relaxed_limits = (*wider("controller", config), *wider("robot", robot_config))
+        for line in self._relaxed_limits:
             self._event_log.say("warning", f"set wider than usual: {line}")
 
     @property
@@ -234,12 +234,12 @@ class Controller:
             epoch=token.epoch, token=token.nonce, echo=joints.message.sequence, cut_id=cut_id, point_id=point_id
         )
 
-    def _picture(self, now: float) -> PictureRequest | None:
+    def _picture(self, now: float) -> CloseUpRequest | None:
         token = self._supervisor.fencing.token
         due = None if token is None else self._movement.sequence.picture(now)
         if token is None or due is None:
             return None
-        return PictureRequest(epoch=token.epoch, number=due[0], point_id=due[1])
+        return CloseUpRequest(epoch=token.epoch, number=due[0], point_id=due[1])
 
     def _situation(self, now: float, intent: intents.Intent | None = None) -> Situation:
         refused = self._previews.start_refused()
@@ -271,7 +271,7 @@ class Controller:
             movement.go_home()
             supervisor.remark("the arm is being brought home")
             return ""
-        if isinstance(intent, intents.TurnApproach) and intent.point_id == movement.sequence.active:
+        if isinstance(intent, intents.SetApproach) and intent.point_id == movement.sequence.active:
             return f"{intent.point_id} is being worked on: pause first"
         if isinstance(intent, ABOUT_PREVIEWS):
             return self._previews.do(intent, now)
@@ -326,6 +326,6 @@ class Controller:
             nearest=movement.body.surroundings.model.nearest,
             order=self._queue.order.state,
             interrupted=self._supervisor.interrupted,
-            wider=self._wider,
+            relaxed_limits=self._relaxed_limits,
             now=now,
         )

@@ -5,7 +5,7 @@ from typing import Generic, TypeVar
 
 from controller.ledger.journal import LedgerState
 from rolling_panda import messages as m
-from rolling_panda.messages.perception import CloseLook, Obstacles
+from rolling_panda.messages.perception import CloseUpResult, Obstacles
 from rolling_panda.messages.supervision import Presence, TeleopTarget
 
 Msg = TypeVar("Msg", bound=m.Message)
@@ -56,7 +56,7 @@ class Inputs:
     stops: tuple[m.StopRequest, ...] = ()
     wall_time: float = 0.0
     ledger: LedgerState = LedgerState()
-    look: Sample[CloseLook] | None = None
+    look: Sample[CloseUpResult] | None = None
     tick_s: float = 0.0
     ticks: int = 0
     late_ticks: int = 0

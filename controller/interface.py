@@ -7,7 +7,7 @@ from controller.ledger.journal import Record
 from controller.planning.preview_plan import Preview, PreviewRequest
 from controller.planning.work_plan import PlanRequest, WorkPlan
 from rolling_panda import messages as m
-from rolling_panda.messages.perception import PictureRequest
+from rolling_panda.messages.perception import CloseUpRequest
 from rolling_panda.messages.supervision import ControlState, PreviewMotion, PreviewState, SessionPlan, StopState
 
 
@@ -41,7 +41,7 @@ class Outputs:
     plan: SessionPlan | None = None
     request: PlanRequest | None = None
     records: tuple[Record, ...] = ()
-    picture: PictureRequest | None = None
+    picture: CloseUpRequest | None = None
     control: ControlState | None = None
     stops: StopState | None = None
     preview: PreviewState | None = None

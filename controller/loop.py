@@ -23,6 +23,8 @@ from rolling_panda.messages.supervision import StopState
 from rolling_panda.runtime.loop_clock import LoopClock
 from rolling_panda.topics import (
     BRIDGE,
+    CLOSE_UP,
+    CLOSE_UP_REQUEST,
     CONTROL,
     CONTROLLER,
     CUT,
@@ -30,11 +32,9 @@ from rolling_panda.topics import (
     HEARTBEAT,
     INTENT,
     JOINTS,
-    LOOK,
     MOTION,
     OBSTACLES,
     ODOMETRY,
-    PICTURE,
     PLAN,
     POINTS,
     PRESENCE,
@@ -111,7 +111,7 @@ class Loop:
         transport.on_reject = lambda topic, reason: self._said.put(f"refused on {topic}: {reason}")
         transport.serve(INTENT, self._commands.ask)
         self._log_events = transport.feed(EVENT, 1000)
-        self._look, self._picture = self._newest(LOOK), transport.publisher(PICTURE)
+        self._look, self._picture = self._newest(CLOSE_UP), transport.publisher(CLOSE_UP_REQUEST)
         self._motion, self._cut = transport.publisher(MOTION), transport.publisher(CUT)
         self._token, self._stop = transport.publisher(TOKEN), transport.publisher(STOP)
         self._state, self._event = transport.publisher(CONTROLLER), transport.publisher(EVENT)

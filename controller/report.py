@@ -26,7 +26,7 @@ def controller_state(
     nearest: Clearance | None,
     order: m.QueueOrder,
     interrupted: m.Interrupted,
-    wider: tuple[str, ...],
+    relaxed_limits: tuple[str, ...],
     now: float,
 ) -> m.ControllerState:
     """The message of what the controller does and sees now.
@@ -45,7 +45,7 @@ def controller_state(
         nearest: What the last step's method found nearest to the robot.
         order: Whose order that is.
         interrupted: What a pause or a protective stop has ended.
-        wider: What the configuration sets less strictly than usual.
+        relaxed_limits: What the configuration sets less strictly than usual.
         now: Monotonic time (s).
     """
     omega = 0.0
@@ -74,13 +74,13 @@ def controller_state(
         ticks=inputs.ticks,
         late_ticks=inputs.late_ticks,
         queue=queue,
-        held_by="" if tracking is None else tracking.reason[:500],
-        near=None if tracking is None or nearest is None else _nearness(nearest),
+        limited_by="" if tracking is None else tracking.reason[:500],
+        proximity=None if tracking is None or nearest is None else _proximity(nearest),
         order=order,
         interrupted=interrupted,
-        wider=wider,
+        relaxed_limits=relaxed_limits,
     )
 
 
-def _nearness(nearest: Clearance) -> m.Nearness:
-    return m.Nearness(nearest.distance, " and ".join(nearest.pair)[:500])
+def _proximity(nearest: Clearance) -> m.Proximity:
+    return m.Proximity(nearest.distance, " and ".join(nearest.pair)[:500])

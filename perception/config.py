@@ -16,7 +16,7 @@ class RuleConfig(Struct, frozen=True, forbid_unknown_fields=True):
         system: Training system of the vines: `spur` (cordon) or `guyot`.
         nodes_kept: Count nodes left on the new spur; the basal bud is not counted.
         fruiting_nodes: Count nodes left on the fruiting cane of a Guyot vine.
-        keeper_diameter: The lowest cane at least this thick becomes the new spur, else the thickest (m).
+        preferred_diameter: The lowest cane at least this thick becomes the new spur, else the thickest (m).
         offset: Distance of the cut past the last kept node (m).
         max_shift: Longest shift of the cut along the cane to clear other wood (m).
         short_internode: The cut is midway to the next node where that is nearer than this (m).
@@ -46,7 +46,7 @@ class RuleConfig(Struct, frozen=True, forbid_unknown_fields=True):
     system: Literal["spur", "guyot"] = "spur"
     nodes_kept: Annotated[int, Meta(ge=1, le=5)] = 2
     fruiting_nodes: Annotated[int, Meta(ge=3, le=20)] = 8
-    keeper_diameter: Positive = 0.006
+    preferred_diameter: Positive = 0.006
     offset: Positive = 0.020
     max_shift: Positive = 0.0085
     short_internode: Positive = 0.040

@@ -15,7 +15,7 @@ from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.errors import RollingPandaError
 from rolling_panda.messages.commands import PlantRequest
-from rolling_panda.messages.perception import CloseLook, Obstacles, PointCrop
+from rolling_panda.messages.perception import CloseUpResult, Obstacles, PointCrop
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.transport.zenoh import Received, Transport
 
@@ -114,7 +114,7 @@ class Loop:
         self._crops = transport.publisher(topics.CROPS)
         self._heartbeat = transport.publisher(topics.HEARTBEAT)
         self._events = transport.publisher(topics.EVENT)
-        checks = transport.publisher(topics.LOOK)
+        checks = transport.publisher(topics.CLOSE_UP)
         # The controller waits for a close-up check: it is published before the rest of the frame is processed.
         self._worker: Worker[CameraFrame | _Request, _Output] = Worker(lambda job: _work(perception, job, checks.put))
         self._requests: queue.SimpleQueue[_Request] = queue.SimpleQueue()
@@ -230,7 +230,7 @@ class Loop:
         self._events.put(m.LogEvent(header=m.Header(now), process="perception", severity=severity, text=text[:500]))
 
 
-def _work(perception: Perception, job: CameraFrame | _Request, publish: Callable[[CloseLook], None]) -> _Output:
+def _work(perception: Perception, job: CameraFrame | _Request, publish: Callable[[CloseUpResult], None]) -> _Output:
     if isinstance(job, _Request):
         # A request that timed out is not executed.
         if job.answer.set_running_or_notify_cancel():

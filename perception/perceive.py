@@ -72,7 +72,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 1
     print(f"{len(result.cuts)} points on {result.spurs} spurs; scale: {result.scale}")
     for text in result.undecided:
-        print(f"abstained: {text}")
+        print(f"undecided: {text}")
     return 0
 
 
@@ -106,7 +106,7 @@ def _write(out: Path, image: Path, photograph: Photograph, labels: Labels, resul
         "spurs": result.spurs,
         "canes": result.canes,
         "points": [_point(cut, photograph, scale) for cut in result.cuts],
-        "abstained": list(result.undecided),
+        "undecided": list(result.undecided),
     }
     (out / "points.json").write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
 

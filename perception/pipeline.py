@@ -13,7 +13,7 @@ from perception.plant.capsules import CapsuleSet
 from perception.plant.map import PlantMap
 from perception.plant.model import Spur
 from perception.plant.numbering import SpurNumber, SpurNumbering
-from perception.plant.undecided_sites import NeedsAnotherLook, UndecidedSites, abstention
+from perception.plant.undecided_sites import NeedsAnotherLook, UndecidedSites, undecided_site
 from perception.rules.keep_out import frame_keep_out, map_keep_out
 from perception.rules.manual import move_cut, place_cut
 from perception.rules.pruning import Decision, apply_rule
@@ -30,13 +30,13 @@ from rolling_panda.errors import InputError
 from rolling_panda.messages.commands import (
     AddPoint,
     AddPointInImage,
+    EvaluateRule,
     MovePoint,
     PlantRequest,
     SetRule,
-    TakeRuleBack,
-    TryRule,
+    UndoRule,
 )
-from rolling_panda.messages.perception import Capsule, CloseLook, PointCrop
+from rolling_panda.messages.perception import Capsule, CloseUpResult, PointCrop
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.model.robot import RobotModel
 
@@ -61,7 +61,7 @@ class _RuleSnapshot:
     rule: RuleConfig
     tracker: Tracker
     undecided: UndecidedSites
-    abstained: tuple[m.Abstention, ...]
+    undecided_sites: tuple[m.UndecidedSite, ...]
     severed: int
 
 
@@ -84,7 +84,7 @@ class Perception:
         self._frames = 0
         self._stamp = 0.0
         self._undecided = UndecidedSites()
-        self._abstained: tuple[m.Abstention, ...] = ()
+        self._site_messages: tuple[m.UndecidedSite, ...] = ()
         self._cane_lines: tuple[tuple[m.Vector3, ...], ...] = ()
         self._obstacle_map = ObstacleMap(config.obstacles)
         self._retained_canes = RetainedCanes(config.obstacles)
@@ -118,7 +118,7 @@ class Perception:
         try:
             labels = self.segmenter.segment(view)
         except InputError as error:
-            self._abstained = (abstention(str(error)),)
+            self._site_messages = (undecided_site(str(error)),)
             return replace(self.points(), canes=())
         cylinders = self._obstacle_map.update(view, labels)
         self._frames += 1
@@ -128,9 +128,9 @@ class Perception:
             # Too near or too far to read whole spurs, but it may show that wood is gone.
             self._apply(self._tracker.update(view, labels, []))
             self._update_obstacles(view, labels, cylinders, ())
-            self._abstained = (abstention(self._no_survey()),)
+            self._site_messages = (undecided_site(self._no_survey()),)
             if self.plant_map.spurs:
-                self._abstained = self._undecided_sites()
+                self._site_messages = self._undecided_sites()
         return self.points()
 
     def _survey(self, view: View, labels: Labels, cylinders: tuple[Capsule, ...]) -> None:
@@ -151,9 +151,9 @@ class Perception:
         self._apply(self._tracker.update(view, labels, proposals, observations))
         self._update_obstacles(view, labels, cylinders, numbers)
         self._cane_lines = self.plant_map.cane_lines()
-        self._abstained = self._undecided_sites()
+        self._site_messages = self._undecided_sites()
 
-    def check_close_up(self, frame: CameraFrame) -> CloseLook:
+    def check_close_up(self, frame: CameraFrame) -> CloseUpResult:
         """Check the point of a close-up frame, and refine its position.
 
         Args:
@@ -184,9 +184,9 @@ class Perception:
         self.withdrawn = ()
         if isinstance(request, SetRule):
             return self._set_rule(request)
-        if isinstance(request, TryRule):
+        if isinstance(request, EvaluateRule):
             return self._try_rule(request)
-        if isinstance(request, TakeRuleBack):
+        if isinstance(request, UndoRule):
             return self._undo_rule(request)
         if isinstance(request, MovePoint):
             return self._move(request)
@@ -206,7 +206,7 @@ class Perception:
             segmenter=self.segmenter.name,
             frames=self._frames,
             points=self._with_distances(self._tracker.points()),
-            abstained=self._abstained,
+            undecided_sites=self._site_messages,
             canes=self._cane_lines,
             rule=_rule_message(self._config.rule),
         )
@@ -276,7 +276,7 @@ class Perception:
             self._config.rule,
             self._tracker.copy(),
             copy.deepcopy(self._undecided),
-            self._abstained,
+            self._site_messages,
             len(self._severed),
         )
         self._undo = [*self._undo, snapshot][-_MAX_UNDO:]
@@ -288,10 +288,10 @@ class Perception:
         proposals = _proposals(decisions)
         self._tracker.reset(proposals)
         self._retained_canes.select(self.plant_map.spurs, self._tracker.published_cuts(), rule)
-        self._abstained = self._undecided_sites()
+        self._site_messages = self._undecided_sites()
         return m.Answer(ok=True, reason=f"{len(proposals)} points by the new rule")
 
-    def _try_rule(self, request: TryRule) -> m.Answer:
+    def _try_rule(self, request: EvaluateRule) -> m.Answer:
         """The effect of a rule, on a copy."""
         rule = _with_numbers(self._config.rule, request.rule)
         now = {point.point_id: point.digest for point in self._tracker.points()}
@@ -300,13 +300,13 @@ class Perception:
             tracker.reset(_proposals(self._decide(rule)))
         then = {point.point_id: point.digest for point in tracker.points()}
         effect = m.RuleEffect(
-            moved=tuple(name for name in now if name in then and then[name] != now[name]),
-            gone=tuple(name for name in now if name not in then),
+            changed=tuple(name for name in now if name in then and then[name] != now[name]),
+            removed=tuple(name for name in now if name not in then),
             added=len(then.keys() - now.keys()),
         )
         return m.Answer(ok=True, reason=f"{len(then)} points by that rule", effect=effect)
 
-    def _undo_rule(self, request: TakeRuleBack) -> m.Answer:
+    def _undo_rule(self, request: UndoRule) -> m.Answer:
         if request.rule != _rule_message(self._config.rule):
             return _refused("the rule has been changed since; look again")
         if not self._undo:
@@ -315,7 +315,7 @@ class Perception:
         self._config = replace(self._config, rule=before.rule)
         cuts = self._severed[before.severed :]
         self._tracker.restore(before.tracker, lambda number, position: self._stands(number, position, cuts))
-        self._undecided, self._abstained = before.undecided, before.abstained
+        self._undecided, self._site_messages = before.undecided, before.undecided_sites
         self._retained_canes.select(self.plant_map.spurs, self._tracker.published_cuts(), before.rule)
         return m.Answer(ok=True, reason=f"{len(self._tracker.points())} points by the rule before")
 
@@ -346,8 +346,8 @@ class Perception:
         reasons = list(decision.undecided)
         self._undecided.update(number, bool(decision.cuts), reasons, vector3(spur.position), in_front)
 
-    def _undecided_sites(self) -> tuple[m.Abstention, ...]:
-        return self._undecided.abstentions({SpurNumber(point.vine, point.spur) for point in self._tracker.points()})
+    def _undecided_sites(self) -> tuple[m.UndecidedSite, ...]:
+        return self._undecided.remaining({SpurNumber(point.vine, point.spur) for point in self._tracker.points()})
 
     def _apply(self, update: TrackerUpdate) -> None:
         self.withdrawn = update.withdrawn

@@ -25,6 +25,8 @@ _CHUNK_SIZE = 256 * 1024
 #: Header of an MCAP record: opcode and length.
 _RECORD_HEADER = struct.Struct("<BQ")
 _TOPICS: dict[str, Topic[Any]] = {f"/{topic.name}": topic for topic in TOPICS}
+#: Schema version of the wire, in the metadata of a channel; recordings of version 1 have none.
+_VERSION_KEY = "schema_version"
 _JSON_TYPES = ("boolean", "integer", "number", "string")
 
 
@@ -81,7 +83,7 @@ class RecordingWriter:
     def _topic_channel(self, topic: Topic[Any], robot_id: str) -> int:
         schema = json.dumps(schema_of(topic.message)).encode()
         schema_id = self._writer.register_schema(f"rolling_panda.{topic.message.__name__}", "jsonschema", schema)
-        metadata = {"robot_id": robot_id, "about": topic.about}
+        metadata = {"robot_id": robot_id, "about": topic.about, _VERSION_KEY: str(m.SCHEMA_VERSION)}
         channel_id: int = self._writer.register_channel(f"/{topic.name}", "json", schema_id, metadata)
         return channel_id
 
@@ -135,7 +137,8 @@ def read_recording(path: Path) -> Recording:
     """Read a recording; an incomplete last record is ignored.
 
     Raises:
-        InputError: The file cannot be read, is not an MCAP file, or has no message of Rolling Panda.
+        InputError: The file cannot be read, is not an MCAP file, is of another schema version of the wire, or has no
+            message of Rolling Panda.
     """
     try:
         data = path.read_bytes()
@@ -151,6 +154,7 @@ def read_recording(path: Path) -> Recording:
         ):
             topic = _TOPICS.get(channel.topic)
             if topic is not None:
+                _check_version(path, channel.metadata.get(_VERSION_KEY, "1"))
                 messages.append(RecordedMessage(topic, 1e-9 * message.log_time, message.data))
     except McapError:
         # No footer: the recorder was killed.
@@ -158,6 +162,14 @@ def read_recording(path: Path) -> Recording:
     if not messages:
         raise InputError(f"{path} holds no message of Rolling Panda")
     return Recording(tuple(sorted(messages, key=lambda each: each.at)), complete)
+
+
+def _check_version(path: Path, version: str) -> None:
+    if version != str(m.SCHEMA_VERSION):
+        raise InputError(
+            f"{path} has schema version {version} of the wire, and this version of Rolling Panda replays version "
+            f"{m.SCHEMA_VERSION} only. Replay it with the version that recorded it, or open it in Foxglove"
+        )
 
 
 def _complete_records(data: bytes) -> bytes:

@@ -1,6 +1,6 @@
 """The one table of what is on the wire: publishers, subscribers, staleness and `docs/wire.md` derive from it.
 
-A key is `rp/<robot_id>/v1/<topic>`.
+A key is `rp/<robot_id>/v2/<topic>`.
 """
 
 from dataclasses import dataclass
@@ -12,8 +12,8 @@ from rolling_panda import messages as m
 from rolling_panda.messages import commands as commands_messages
 from rolling_panda.messages import commands as intents
 from rolling_panda.messages import commands as plant_requests
+from rolling_panda.messages import perception as close_up_messages
 from rolling_panda.messages import perception as crop_messages
-from rolling_panda.messages import perception as look_messages
 from rolling_panda.messages import perception as row_messages
 from rolling_panda.messages import robot as camera_messages
 from rolling_panda.messages import supervision as control_messages
@@ -101,9 +101,9 @@ CUT = Topic(
     "command/cut", m.CutCommand, "controller", "bridge", 0, "REAL_TIME", "BLOCK",
     "close the blades once, repeated until seen", express=True,
 )
-PICTURE = Topic(
-    "command/picture", look_messages.PictureRequest, "controller", "bridge", 0, "REAL_TIME", "DROP",
-    "take a picture of a point now, repeated until taken", express=True,
+CLOSE_UP_REQUEST = Topic(
+    "command/close-up", close_up_messages.CloseUpRequest, "controller", "bridge", 0, "REAL_TIME", "DROP",
+    "take a close-up of a point now, repeated until taken", express=True,
 )
 STOP = Topic(
     "command/stop", m.StopRequest, "any", "bridge, controller", 0, "REAL_TIME", "BLOCK",
@@ -181,9 +181,9 @@ CROPS = Topic(
     "perception/crops", crop_messages.PointCrop, "perception", "server", 2, "BACKGROUND", "DROP",
     "a point's picture, at once when it is new, then one after the other", latched=True,
 )
-LOOK = Topic(
-    "perception/look", look_messages.CloseLook, "perception", "controller", 0, "INTERACTIVE_HIGH", "DROP",
-    "what a picture that was asked for shows of its point", express=True,
+CLOSE_UP = Topic(
+    "perception/close-up", close_up_messages.CloseUpResult, "perception", "controller", 0, "INTERACTIVE_HIGH", "DROP",
+    "what a close-up shows of its point", express=True,
 )
 OBSTACLES = Topic(
     "perception/obstacles", row_messages.Obstacles, "perception", "controller, server", 1, "DATA_LOW", "DROP",
@@ -199,9 +199,9 @@ REPLAY = Topic(
 )
 
 TOPICS: tuple[Topic[Any], ...] = (
-    MOTION, TOKEN, CUT, PICTURE, STOP, TELEOP, JOINTS, ODOMETRY, BRIDGE, CONTROLLER, PLAN, REPORT, HEARTBEAT, EVENT,
-    CAMERA, PREVIEW, PREVIEW_MOTION, POINTS, CROPS, LOOK, OBSTACLES, SCENERY, PRESENCE, CONTROL, STOPS, HARDWARE_STOP,
-    REPLAY,
+    MOTION, TOKEN, CUT, CLOSE_UP_REQUEST, STOP, TELEOP, JOINTS, ODOMETRY, BRIDGE, CONTROLLER, PLAN, REPORT, HEARTBEAT,
+    EVENT, CAMERA, PREVIEW, PREVIEW_MOTION, POINTS, CROPS, CLOSE_UP, OBSTACLES, SCENERY, PRESENCE, CONTROL, STOPS,
+    HARDWARE_STOP, REPLAY,
 )
 
 
@@ -210,8 +210,8 @@ INTENT: Service[intents.Intent] = Service(
     (
         intents.Arm, intents.AcceptPoint, intents.RejectPoint, intents.ReconsiderPoint,
         intents.RestoreAccepted, intents.ResolvePoint,
-        intents.AcceptAll, intents.MoveInQueue, intents.PlannersOrder, intents.TurnApproach,
-        intents.AskPreview, intents.ApprovePreview, intents.RequirePreview, intents.Start, intents.Survey,
+        intents.AcceptAll, intents.MoveInQueue, intents.ResetOrder, intents.SetApproach,
+        intents.RequestPreview, intents.ApprovePreview, intents.RequirePreview, intents.Start, intents.Survey,
         intents.Pause, intents.Resume, intents.Home, intents.Acknowledge, intents.Reset, intents.TakeControl,
         intents.RequestControl, intents.GrantControl, intents.ReturnControl,
     ),
@@ -223,7 +223,7 @@ RELEASE: Service[m.ReleaseStop] = Service(
 PLANT: Service[plant_requests.PlantRequest] = Service(
     "service/plant",
     (
-        plant_requests.SetRule, plant_requests.TryRule, plant_requests.TakeRuleBack, plant_requests.AddPoint,
+        plant_requests.SetRule, plant_requests.EvaluateRule, plant_requests.UndoRule, plant_requests.AddPoint,
         plant_requests.AddPointInImage, plant_requests.MovePoint,
     ),
     "perception", 2.0, "another pruning rule, what one would change, or a point by hand, or moved by hand",

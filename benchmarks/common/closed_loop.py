@@ -29,7 +29,7 @@ from perception.segmentation.segmenter import choose_segmenter
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig, load_section
 from rolling_panda.messages import commands as intents
-from rolling_panda.messages.perception import CloseLook, Obstacles
+from rolling_panda.messages.perception import CloseUpResult, Obstacles
 from rolling_panda.messages.supervision import Person, Presence
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import RobotModel
@@ -93,7 +93,7 @@ class ClosedLoop:
         self.state: m.ControllerState | None = None
         self.events: list[m.LogEvent] = []
         self._ticks = 0
-        self._looked: tuple[float, CloseLook] | None = None
+        self._looked: tuple[float, CloseUpResult] | None = None
         self._seen: tuple[float, m.PruningPoints] | None = None
 
     def tick(self) -> None:

@@ -12,7 +12,7 @@ from controller.interface import Outputs, StepInputs
 from controller.ledger.journal import LedgerState
 from rolling_panda import messages as m
 from rolling_panda.messages import commands as intents
-from rolling_panda.messages.perception import Capsule, CloseLook, Obstacles, PictureRequest
+from rolling_panda.messages.perception import Capsule, CloseUpRequest, CloseUpResult, Obstacles
 from rolling_panda.messages.supervision import Person, Presence, TeleopTarget
 from rolling_panda.model.differential_drive import NXI, Array
 from rolling_panda.model.robot import ARM_Q, RobotModel
@@ -78,7 +78,7 @@ class KinematicRobot:
         self._points: Sample[m.PruningPoints] | None = None
         self._told: Sample[Obstacles] | None = None
         self._stops: tuple[m.StopRequest, ...] = ()
-        self._look: Sample[CloseLook] | None = None
+        self._look: Sample[CloseUpResult] | None = None
         self._joints: Sample[m.JointState] | None = None
         self._odometry: Sample[m.Odometry] | None = None
 
@@ -177,12 +177,12 @@ class KinematicRobot:
         for _ in range(round(seconds / self.dt)):
             self.step()
 
-    def _looked(self, request: PictureRequest) -> Sample[CloseLook]:
+    def _looked(self, request: CloseUpRequest) -> Sample[CloseUpResult]:
         """A camera that always sees the point: where it was shown, and off once its cut is done."""
         shown = () if self._points is None else self._points.message.points
         point = next((each for each in shown if each.point_id == request.point_id), None)
         off = self.outcome == "DONE" and any(cut[0] == request.point_id for cut in self.cuts)
-        look = CloseLook(
+        look = CloseUpResult(
             header=m.Header(self.now, "odom"),
             point_id=request.point_id,
             number=request.number,

@@ -38,7 +38,7 @@ from rolling_panda.messages import commands as intents
 from rolling_panda.resources import resource
 
 #: A point in another state than these has ended: cut, given up, or void after a closer look.
-_OPEN: tuple[m.PointState, ...] = ("ACCEPTED", "INTENT")
+_OPEN: tuple[m.PointState, ...] = ("ACCEPTED", "CUTTING")
 _SURVEY_S = 6.0
 _LOOK_S, _LIMIT_S = 3.0, 120.0
 #: Periods between two looks at what touches a cane.

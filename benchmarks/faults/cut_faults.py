@@ -294,7 +294,7 @@ def _ended(trial: CutTrial, rig: CutRig) -> CutTrial:
     states = [
         body["state"] for number, name, body in rig.rows("ticket") if name == trial.point_id and number > trial.row
     ]
-    ended = next((state for state in states if state != "INTENT"), "") or rig.ticket(trial.point_id)
+    ended = next((state for state in states if state != "CUTTING"), "") or rig.ticket(trial.point_id)
     return replace(trial, ended=ended, cut=trial.point_id in rig.bitten())
 
 
@@ -350,7 +350,7 @@ class _Instant(AbstractContextManager[Callable[[], None]]):
                 # A state is held back until all that it tells is in the ledger: none comes, so the intent waits.
                 _until(lambda: time.monotonic() - rig.controller_at > _PENDING_S, _PATIENCE_S)
         elif self._instant == INSTANTS[1]:
-            _until(lambda: rig.ticket(point) == "INTENT", _PATIENCE_S, nap_s=0.0005)
+            _until(lambda: rig.ticket(point) == "CUTTING", _PATIENCE_S, nap_s=0.0005)
         elif self._instant == INSTANTS[2]:
             _until(lambda: _closing(rig, point), _PATIENCE_S)
         else:

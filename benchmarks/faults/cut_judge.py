@@ -76,7 +76,7 @@ def _lost(left: Records) -> Iterator[Finding]:
         yield Finding("lost row", f"{point} was told to be {state}, which is in no row")
     intents = {(body["cut_id"], body["state"]) for _, _, body in left.tickets}
     for cut_id in sorted({event["cut_id"] for event in left.blades}):
-        if (cut_id, "INTENT") not in intents:
+        if (cut_id, "CUTTING") not in intents:
             yield Finding("lost row", f"cut {cut_id} has no intent")
     granted = Counter(left.told.granted)
     recorded = Counter(
@@ -106,7 +106,7 @@ def _certain(left: Records) -> Iterator[Finding]:
         rows[name].append(body)
     for point, those in sorted(rows.items()):
         for before, after in zip(those, those[1:], strict=False):
-            if before["state"] != "INTENT" or after["state"] not in ("DONE", "FAILED_NOT_CUT", "ACCEPTED"):
+            if before["state"] != "CUTTING" or after["state"] not in ("DONE", "FAILED_NOT_CUT", "ACCEPTED"):
                 continue
             cut_id = before["cut_id"]
             if cut_id not in left.told.outcomes and cut_id in left.told.ordered:

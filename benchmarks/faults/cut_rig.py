@@ -28,7 +28,7 @@ from rolling_panda import topics
 from rolling_panda.config import TransportConfig
 from rolling_panda.errors import RollingPandaError, ServiceError
 from rolling_panda.messages import commands as intents
-from rolling_panda.messages.perception import CloseLook, Obstacles, PictureRequest, point_digest
+from rolling_panda.messages.perception import CloseUpRequest, CloseUpResult, Obstacles, point_digest
 from rolling_panda.messages.supervision import Person, Presence, StopState
 from rolling_panda.runtime.launch import child_environment, python_command
 from rolling_panda.transport import certificates
@@ -43,7 +43,7 @@ _USER = "ada"
 #: Points shown at a time, and the places that they are at in turn.
 _SHOWN, _PLACES = 3, 12
 #: States of a point that its ledger must have when somebody was told of them.
-TOLD: frozenset[str] = frozenset({"ACCEPTED", "INTENT", "DONE", "FAILED_NOT_CUT", "UNKNOWN", "REJECTED"})
+TOLD: frozenset[str] = frozenset({"ACCEPTED", "CUTTING", "DONE", "FAILED_NOT_CUT", "UNKNOWN", "REJECTED"})
 
 
 @dataclass
@@ -223,9 +223,9 @@ class CutRig:
         hears.subscribe(topics.CUT, self._on_cut)
         hears.subscribe(topics.STOPS, self._on_stops)
         hears.subscribe(topics.JOINTS, self._on_joints)
-        hears.subscribe(topics.PICTURE, self._on_picture)
+        hears.subscribe(topics.CLOSE_UP_REQUEST, self._on_picture)
         self._stop = self._server.publisher(topics.STOP)
-        self._look = self._perception.publisher(topics.LOOK)
+        self._look = self._perception.publisher(topics.CLOSE_UP)
         threading.Thread(target=self._play, name="everybody else", daemon=True).start()
 
     def _on_controller(self, state: m.ControllerState, at: float) -> None:
@@ -248,7 +248,7 @@ class CutRig:
     def _on_joints(self, joints: m.JointState, at: float) -> None:
         self._joints, self.joints_at = joints, at
 
-    def _on_picture(self, request: PictureRequest, at: float) -> None:
+    def _on_picture(self, request: CloseUpRequest, at: float) -> None:
         """A camera that always sees the point: standing, or off once the blades have bitten."""
         point, joints = self._shown.get(request.point_id), self._joints
         if joints is None:
@@ -256,7 +256,7 @@ class CutRig:
         off = request.point_id in self.bitten()
         seen = point is not None and not off
         self._look.put(
-            CloseLook(
+            CloseUpResult(
                 header=m.Header(joints.header.stamp, "odom"),
                 point_id=request.point_id,
                 number=request.number,
@@ -428,7 +428,7 @@ class CutRig:
     def decided(self, point_id: str, row: int) -> bool:
         """Whether the ledger says, after this row, how a cut ended, or that the point still waits for one."""
         states = [body["state"] for number, name, body in self.rows("ticket") if name == point_id and number > row]
-        return self.ticket(point_id) != "INTENT" and (bool(states) or self.states().get(point_id) == "ACCEPTED")
+        return self.ticket(point_id) != "CUTTING" and (bool(states) or self.states().get(point_id) == "ACCEPTED")
 
     def newest_row(self) -> int:
         """Number of the newest row."""

@@ -130,8 +130,8 @@ def _why_not(robot: FaultyRobot) -> str:
         return str(error)
     if not controller:
         return "no controller"
-    near = controller["near"] and f"near {controller['near']}"
-    return ", ".join(filter(None, (controller["mode"], controller["reason"], controller["held_by"], near)))
+    near = controller["proximity"] and f"near {controller['proximity']}"
+    return ", ".join(filter(None, (controller["mode"], controller["reason"], controller["limited_by"], near)))
 
 
 def _moves(robot: FaultyRobot, by_hand: bool) -> bool:

@@ -79,7 +79,7 @@ def _preview(page: Any, album: Keeps) -> None:
 def _work(page: Any, album: Keeps) -> None:
     _press(page, "#start")
     _mode(page, "AUTO")
-    page.locator('rp-point[data-state="INTENT"], rp-point[data-state="DONE"]').first.wait_for()
+    page.locator('rp-point[data-state="CUTTING"], rp-point[data-state="DONE"]').first.wait_for()
     album.take(page, "live-running")
     _mode(page, "READY")
 

@@ -23,7 +23,7 @@ from perception.segmentation.segmenter import Segmenter
 from perception.tracking.close_up import check_close_up
 from rolling_panda import messages as m
 from rolling_panda.errors import InputError
-from rolling_panda.messages.perception import CloseLook
+from rolling_panda.messages.perception import CloseUpResult
 from rolling_panda.model.robot import RobotModel, configuration
 
 #: Numbers of the pictures, far from those of the survey, so that their noise is another.
@@ -59,7 +59,7 @@ class CloseCamera:
         self._base, self._position = m.PlanarPose(), msgspec.convert((0.0, 0.0, *survey_arm()), m.Actuated)
         self._taken = _FIRST
 
-    def look(self, row: Row, T_odom_camera: Array, point: m.PruningPoint) -> CloseLook:
+    def look(self, row: Row, T_odom_camera: Array, point: m.PruningPoint) -> CloseUpResult:
         """What a picture from a place (4×4) shows of a point."""
         self._taken += 1
         image = self._camera.render(row, T_odom_camera, self._taken)

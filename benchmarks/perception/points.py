@@ -62,7 +62,7 @@ class Score:
     along: list[float] = field(default_factory=list)
     off_axis: list[float] = field(default_factory=list)
     frame_ms: list[float] = field(default_factory=list)
-    abstained: list[str] = field(default_factory=list)
+    undecided_sites: list[str] = field(default_factory=list)
 
     def add(self, other: "Score") -> None:
         """Take another score in."""
@@ -142,7 +142,7 @@ def evaluate(seed: int, x: float = 0.0, frames: int = 4, model: RobotModel | Non
         began = time.thread_time()
         result = perception.process(frame)
         score.frame_ms.append(1000 * (time.thread_time() - began))
-        points, score.abstained = result.points, [each.reason for each in result.abstained]
+        points, score.undecided_sites = result.points, [each.reason for each in result.undecided_sites]
     truths = {(truth.vine, truth.spur): truth for truth in judge(row)}
     k = camera.intrinsics
     for truth in truths.values():

@@ -1,7 +1,7 @@
 """`rolling-panda bench perception`: surveys of rows that nobody has seen, and the judge's opinion of every point.
 
 The robot drives along rows of up to three vines in its survey posture; every frame goes through perception as it would
-on the wire. All figures are on accepted points, that is, on every point shown; what perception abstained from is told
+on the wire. All figures are on accepted points, that is, on every point shown; what perception left undecided is told
 apart.
 """
 
@@ -57,14 +57,14 @@ class Survey:
         spurs: Spurs in view: seed, vine, spur, how visible, what is in the blades' way wherever the right cut may be
             made (empty for nothing), and whether they got a point, and a right one.
         frame_ms: Time of each frame through segmentation, plant model and rule, on a wall clock.
-        abstained: What every row left open at the end.
+        undecided_sites: What every row left open at the end.
         confusion: Pixels by true class and by the class told.
     """
 
     points: list[JudgedPoint] = field(default_factory=list)
     spurs: list[dict[str, int | bool | str]] = field(default_factory=list)
     frame_ms: list[float] = field(default_factory=list)
-    abstained: list[m.Abstention] = field(default_factory=list)
+    undecided_sites: list[m.UndecidedSite] = field(default_factory=list)
     confusion: NDArray[np.int64] = field(default_factory=no_counts)
 
 
@@ -101,7 +101,7 @@ def survey_row(
     first = config.first_vine_x - config.vine_spacing / 2
     last = first + vines * config.vine_spacing
     points: tuple[m.PruningPoint, ...] = ()
-    left_open: tuple[m.Abstention, ...] = ()
+    left_open: tuple[m.UndecidedSite, ...] = ()
     for sequence, x in enumerate(np.arange(first, last + step, step) - _CAMERA_AHEAD):
         base = m.PlanarPose(float(x), 0.0, 0.0)
         place = model.pose(configuration(base, position), model.camera_id).homogeneous
@@ -112,7 +112,7 @@ def survey_row(
         result = perception.process(frame)
         into.frame_ms.append(1000 * (time.perf_counter() - began))
         points = result.points
-        left_open = result.abstained
+        left_open = result.undecided_sites
     judged = [opinion.point(point) for point in points]
     for point, verdict in zip(points, judged, strict=True):
         if gallery is not None and not verdict.right:
@@ -125,7 +125,7 @@ def survey_row(
         eye = CloseCamera(camera, perception.segmenter, perception.config, model)
         look_again(points, row, eye, opinion, looks)
     into.points += judged
-    into.abstained += left_open
+    into.undecided_sites += left_open
     for vine, spur in opinion.spurs():
         own = [p for p in judged if (p.vine, p.spur, p.kind) == (vine, spur, opinion.kind(spur))]
         into.spurs.append(
@@ -161,10 +161,10 @@ def summarise(survey: Survey, visibility: str | None = None) -> dict[str, Figure
         "plane_within_15_deg": share(sum((p.plane_error or 0.0) <= 15.0 for p in on_cane), len(on_cane)),
         "right": share(sum(p.right for p in cuts), len(cuts)),
         "renewal_right": share(sum(p.right for p in renewals), len(renewals)),
-        "abstained": share(sum(not s["point"] for s in visible), len(visible)),
+        "undecided": share(sum(not s["point"] for s in visible), len(visible)),
         "recall": share(sum(bool(s["right"]) for s in visible), len(visible)),
         "blocked": share(len(visible) - len(free), len(visible)),
-        "abstained_unblocked": share(sum(not s["point"] for s in free), len(free)),
+        "undecided_unblocked": share(sum(not s["point"] for s in free), len(free)),
         "recall_unblocked": share(sum(bool(s["right"]) for s in free), len(free)),
         "frame_ms_median": quantile(survey.frame_ms, 0.5),
     } | _by_kind(spurs)
@@ -231,7 +231,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     for name, figure in summary.items():
         print(_line(name, figure))
     for need in get_args(m.Need):
-        print(f"{f'open for {need}':24} {sum(each.needs == need for each in survey.abstained):8}")
+        print(f"{f'open for {need}':24} {sum(each.needs == need for each in survey.undecided_sites):8}")
     if words.json is not None:
         document = {
             "machine": machine(),
@@ -252,8 +252,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             "confusion": shares(survey.confusion),
             "results": [asdict(point) for point in survey.points],
             "spurs": survey.spurs,
-            "open": {need: sum(a.needs == need for a in survey.abstained) for need in get_args(m.Need)},
-            "abstained": [msgspec.to_builtins(each) for each in survey.abstained],
+            "open": {need: sum(a.needs == need for a in survey.undecided_sites) for need in get_args(m.Need)},
+            "undecided": [msgspec.to_builtins(each) for each in survey.undecided_sites],
         }
         words.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
     return 0

@@ -26,12 +26,12 @@ from bridge.core.time_ratio import TimeRatio
 from bridge.core.validator import CommandValidator
 from bridge.core.watchdog import Watchdog
 from rolling_panda import messages as m
-from rolling_panda.messages.perception import Capsule, PictureRequest, Scenery
+from rolling_panda.messages.perception import Capsule, CloseUpRequest, Scenery
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.messages.supervision import StopState
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import Limits
-from rolling_panda.topics import BRIDGE, CUT, MOTION, ODOMETRY, PICTURE, STOPS, TOKEN
+from rolling_panda.topics import BRIDGE, CLOSE_UP_REQUEST, CUT, MOTION, ODOMETRY, STOPS, TOKEN
 from rolling_panda.transport.zenoh import Rejections
 
 TICK_S = 0.001
@@ -85,7 +85,7 @@ class BridgeCore:
         rejections: Rejections | None = None,
         cuts: CutMemory | None = None,
         memory: Memory | None = None,
-        wider: tuple[str, ...] = (),
+        relaxed_limits: tuple[str, ...] = (),
     ) -> None:
         """Start with the watchdog tripped, at rest, without a stop.
 
@@ -99,7 +99,7 @@ class BridgeCore:
             rejections: Table of refusals shared with the transport.
             cuts: Remembers cuts through restarts; None for as long as this lives.
             memory: What survives a restart; None forgets.
-            wider: What the configuration sets less strictly than usual, to be told.
+            relaxed_limits: What the configuration sets less strictly than usual, to be told.
         """
         self.robot = robot
         self.refusals = Refusals(rejections)
@@ -135,8 +135,10 @@ class BridgeCore:
         self._odometer.follow(self._measured.position[:2])
         self._cut_id = ""
         self._outcome: m.Outcome = ""
-        self._wider = wider
-        self._events: list[tuple[m.Severity, str]] = [("warning", f"set wider than usual: {line}") for line in wider]
+        self._relaxed_limits = relaxed_limits
+        self._events: list[tuple[m.Severity, str]] = [
+            ("warning", f"set wider than usual: {line}") for line in relaxed_limits
+        ]
         self._state_due = True
 
     @property
@@ -157,7 +159,7 @@ class BridgeCore:
     def on_token(self, request: m.TokenRequest, now: float) -> None:
         """Give the fencing token out, let its holder keep it, or take it back."""
         epoch = self._fence.epoch
-        if request.gives_way:
+        if request.releases:
             if self._fence.give_way(request.token):
                 self._halt()
                 self._token_changed(f"the controller that held epoch {epoch} has given way")
@@ -196,10 +198,10 @@ class BridgeCore:
         elif verdict == "refuse" and reason in (inhibited, FORGETFUL):
             self._begin_cut(command.cut_id, "FAILED_NOT_CUT")
 
-    def on_picture(self, request: PictureRequest) -> None:
+    def on_picture(self, request: CloseUpRequest) -> None:
         """Take a picture as soon as the camera is free; only for the controller whose commands are taken."""
         if request.epoch != self._fence.epoch:
-            self.refusals.add(PICTURE.name, "not the controller's that commands the robot")
+            self.refusals.add(CLOSE_UP_REQUEST.name, "not the controller's that commands the robot")
             return
         self._shutter.want(request)
 
@@ -379,7 +381,7 @@ class BridgeCore:
             round_trip_worst_s=self._round_trip.worst,
             rejections=self.refusals.counts(),
             battery=self._measured.battery,
-            wider=self._wider,
+            relaxed_limits=self._relaxed_limits,
             holder=self._fence.holder if self._fence_kept else "",
             sequence=max(0, self._gate.sequence),
             moving=moving,

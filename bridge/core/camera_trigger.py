@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from bridge.core.picture import Picture
 from rolling_panda import messages as m
-from rolling_panda.messages.perception import PictureRequest
+from rolling_panda.messages.perception import CloseUpRequest
 from rolling_panda.messages.robot import CameraFrame
 
 # After motion or a cut the plant model wants some more pictures before the camera rests (s).
@@ -33,9 +33,9 @@ class CameraTrigger:
         self._awake = round(_AWAKE_S / tick_s)
         self._awake_until = self._awake
         self._last = -self._resting
-        self._waiting: tuple[Posture, PictureRequest | None] | None = None
+        self._waiting: tuple[Posture, CloseUpRequest | None] | None = None
         self._postures: deque[Posture] = deque()
-        self._wanted: PictureRequest | None = None
+        self._wanted: CloseUpRequest | None = None
         self._taken = (-1, -1)
         self._sequence = 0
 
@@ -43,7 +43,7 @@ class CameraTrigger:
         """Something moves or has changed."""
         self._awake_until = ticks + self._awake
 
-    def want(self, request: PictureRequest) -> None:
+    def want(self, request: CloseUpRequest) -> None:
         """A picture is wanted as soon as the camera is free; a request that was done or overtaken changes nothing."""
         if (request.epoch, request.number) > self._taken:
             self._wanted, self._taken = request, (request.epoch, request.number)

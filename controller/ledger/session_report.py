@@ -97,7 +97,7 @@ class SessionReportBuilder:
 
     def _cut(self, row: TicketRow, when: float) -> None:
         known = self._cuts.get(row.cut_id)
-        if row.state == "INTENT":
+        if row.state == "CUTTING":
             point = row.point
             cut = CutReport(cut_id=row.cut_id, point_id=point.point_id, vine=point.vine, spur=point.spur, user=row.user)
             self._cuts[row.cut_id] = cut

@@ -3,7 +3,7 @@
 import hashlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import msgspec
 
@@ -78,7 +78,7 @@ def _newest(ledger: Ledger, kind: str, row: type[Row]) -> list[Row]:
     found = []
     for name, body in ledger.newest(kind):
         try:
-            found.append(msgspec.json.decode(body, type=row))
+            found.append(msgspec.convert(_upgraded(kind, msgspec.json.decode(body)), row))
         except msgspec.MsgspecError as error:
             raise LedgerError(
                 f"the ledger {ledger.path} tells of {kind} {name} what this version, {__version__}, does not "
@@ -86,6 +86,13 @@ def _newest(ledger: Ledger, kind: str, row: type[Row]) -> list[Row]:
                 f"folder and give another one with --state"
             ) from error
     return found
+
+
+def _upgraded(kind: str, body: Any) -> Any:
+    """A decoded row with the names of this schema version."""
+    if kind == "ticket" and isinstance(body, dict) and body.get("state") == "CUTTING":
+        body["state"] = "CUTTING"
+    return body
 
 
 def _written_by(ledger: Ledger) -> str:

@@ -29,8 +29,9 @@ SCHEMA = (
     "CREATE TRIGGER no_update BEFORE UPDATE ON audit BEGIN SELECT RAISE(ABORT, 'rows are never changed'); END",
     "CREATE TRIGGER no_delete BEFORE DELETE ON audit BEGIN SELECT RAISE(ABORT, 'rows are never deleted'); END",
 )
-#: Which tables these are, as `PRAGMA user_version` of the file; 0 is how the first ones were marked.
-SCHEMA_VERSION = 1
+#: Form of tables and rows, as `PRAGMA user_version` of the file; the first files have 0. Up to 1 the state CUTTING of a
+#: point was called INTENT.
+SCHEMA_VERSION = 2
 #: What reading a file raises that has been changed from outside.
 UNREADABLE = (sqlite3.Error, UnicodeDecodeError, TypeError)
 _COLUMNS = "number, at, kind, name, body, hash"
@@ -149,6 +150,7 @@ class Ledger:
         if not self._database.execute("SELECT 1 FROM sqlite_schema").fetchone():
             for statement in SCHEMA:
                 self._database.execute(statement)
+        if self._database.execute("PRAGMA user_version").fetchone() != (SCHEMA_VERSION,):
             self._database.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
         self._database.execute("COMMIT")
 

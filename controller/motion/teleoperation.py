@@ -69,7 +69,7 @@ class Teleoperation:
         """One period of what is held."""
         message = self._message
         assert message is not None
-        xi, speed_scale = np.zeros(NXI), message.share * latency_speed_scale(message.round_trip_s)
+        xi, speed_scale = np.zeros(NXI), message.speed_scale * latency_speed_scale(message.round_trip_s)
         if message.joints is not None:
             xi[ARM_XI] = speed_scale * np.array(message.joints)
             return self._follower.jog(xi, robot)

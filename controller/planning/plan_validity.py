@@ -26,7 +26,7 @@ _LOOK = 20
 #: Places along an obstacle's axis that are compared, as shares of its length.
 _SHARES = np.linspace(0.0, 1.0, 9)
 #: What became of a point by the work itself leaves the plan for the others as it is.
-_WORKED: frozenset[PointState] = frozenset({"INTENT", "DONE", "FAILED_NOT_CUT", "UNKNOWN"})
+_WORKED: frozenset[PointState] = frozenset({"CUTTING", "DONE", "FAILED_NOT_CUT", "UNKNOWN"})
 
 
 def points_changed(plan: WorkPlan, tickets: Iterable[Ticket], order: tuple[str, ...] = ()) -> str:

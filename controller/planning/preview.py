@@ -22,7 +22,7 @@ from rolling_panda.messages.supervision import PreviewMotion, PreviewPhase, Prev
 from rolling_panda.model.differential_drive import Array
 
 #: Intents about previews.
-ABOUT_PREVIEWS: Final = (intents.AskPreview, intents.ApprovePreview, intents.RequirePreview)
+ABOUT_PREVIEWS: Final = (intents.RequestPreview, intents.ApprovePreview, intents.RequirePreview)
 #: A preview shows so many points at most.
 MOST = 10
 #: It is repeated this often for those who come later (s).
@@ -69,7 +69,7 @@ class PreviewManager:
             self.required, self._fresh = intent.required, True
             self._journal.add("preview", "preview", PreviewRow(required=intent.required, user=intent.user))
             return ""
-        if isinstance(intent, intents.AskPreview):
+        if isinstance(intent, intents.RequestPreview):
             return self._want(intent.point_id, now)
         if isinstance(intent, intents.ApprovePreview):
             return self._approve(intent.preview_hash, intent.user)
@@ -107,7 +107,7 @@ class PreviewManager:
             return f"the approved preview shows {name} as {shown.result}"[:300]
         for before in names[: names.index(name)]:
             earlier = self._queue.get(before)
-            if earlier is None or earlier.state not in ("INTENT", "DONE"):
+            if earlier is None or earlier.state not in ("CUTTING", "DONE"):
                 return f"{before} was left, so that the way to {name} is another one than was approved"
         return ""
 
@@ -250,7 +250,7 @@ class PreviewManager:
         """The point that is worked on now, or next."""
         for cut in preview.cuts:
             ticket = self._queue.get(cut.point_id)
-            if ticket is not None and ticket.state in ("ACCEPTED", "INTENT"):
+            if ticket is not None and ticket.state in ("ACCEPTED", "CUTTING"):
                 return cut.point_id
         return preview.cuts[-1].point_id if preview.cuts else ""
 
@@ -259,7 +259,7 @@ class PreviewManager:
             ticket = self._queue.get(point.point_id)
             if ticket is not None and ticket.state == "UNREACHABLE":
                 return f"{point.point_id} cannot be reached any more"
-            if ticket is None or ticket.state not in ("ACCEPTED", "INTENT", "DONE", "FAILED_NOT_CUT", "UNKNOWN"):
+            if ticket is None or ticket.state not in ("ACCEPTED", "CUTTING", "DONE", "FAILED_NOT_CUT", "UNKNOWN"):
                 return f"{point.point_id} is no longer accepted"
             if ticket.state == "ACCEPTED" and ticket.accepted != point:
                 return f"{point.point_id} was revised"

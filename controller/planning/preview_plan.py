@@ -116,7 +116,7 @@ def state_message(
         position=(a, b, c, d, e, f, g, h, i),
         duration_s=preview.duration,
         cuts=preview.cuts,
-        left=left,
+        remaining=left,
     )
 
 

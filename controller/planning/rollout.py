@@ -28,7 +28,7 @@ from controller.work.posture_search import CutPlan, Unreachable
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
 from rolling_panda.errors import ControlError
-from rolling_panda.messages.perception import CloseLook, Obstacles
+from rolling_panda.messages.perception import CloseUpResult, Obstacles
 from rolling_panda.messages.supervision import PreviewedCut, PreviewRow
 from rolling_panda.mode_table import Event
 from rolling_panda.model.differential_drive import NXI, Array, DifferentialDrive
@@ -78,8 +78,8 @@ class _Run:
         self._log = CutLog(robot.limits, self._movement.body.surroundings.model, self._queue)
         self._obstacles = Sample(Obstacles(header=m.Header(0.0, "odom"), capsules=request.obstacles), 0.0)
         self._asked: set[int] = set()
-        self._coming: deque[tuple[float, CloseLook]] = deque()
-        self._look: Sample[CloseLook] | None = None
+        self._coming: deque[tuple[float, CloseUpResult]] = deque()
+        self._look: Sample[CloseUpResult] | None = None
         self._closing: tuple[str, str, float] | None = None
         self._cut: set[str] = set()
         self._plans: dict[str, CutPlan] = {}
@@ -169,13 +169,13 @@ class _Run:
             real_time_factor=1.0,
         )
 
-    def _shown(self, number: int, point_id: str) -> CloseLook:
+    def _shown(self, number: int, point_id: str) -> CloseUpResult:
         """A picture that shows what is expected."""
         ticket, header = self._queue.get(point_id), m.Header(0.0, "odom")
         if ticket is None or point_id in self._cut:
-            return CloseLook(header=header, point_id=point_id, number=number, finding="severed")
+            return CloseUpResult(header=header, point_id=point_id, number=number, finding="severed")
         point = ticket.point
-        return CloseLook(
+        return CloseUpResult(
             header=header,
             point_id=point_id,
             number=number,
@@ -267,7 +267,7 @@ class CutLog:
     def _cut(self, least: _Least, ends: float, why: str) -> PreviewedCut:
         ticket = self._queue.get(least.point_id)
         done = least.closed is not None
-        reason = why if ticket is None or ticket.state in ("ACCEPTED", "INTENT") else ticket.reason
+        reason = why if ticket is None or ticket.state in ("ACCEPTED", "CUTTING") else ticket.reason
         return PreviewedCut(
             point_id=least.point_id,
             revision=0 if ticket is None else ticket.point.revision,

@@ -110,9 +110,9 @@ class Authority:
             expires_s=lease.left(now),
             requested_by="" if requested is None else requested.user,
             requested_key="" if requested is None else requested.key,
-            coming="" if coming is None else coming.user,
-            told=lease.told[:500],
-            told_number=lease.told_number,
+            next_user="" if coming is None else coming.user,
+            notice=lease.notice[:500],
+            notice_number=lease.notice_number,
             supervised=not self.unwatched(now),
         )
 

@@ -76,7 +76,7 @@ class FencingToken:
 
     def give_way(self) -> m.TokenRequest:
         """What gives the token back: this controller ends, or trusts it no more and asks for another one."""
-        self._given = m.TokenRequest(token=self._nonce, gives_way=True)
+        self._given = m.TokenRequest(token=self._nonce, releases=True)
         self._former, self._nonce, self.token = self._mine, self._draw(), None
         self._mine, self._due = m.fingerprint(self._nonce), -math.inf
         return self._given

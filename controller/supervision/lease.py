@@ -21,8 +21,8 @@ class Lease:
         self.holder: Client | None = None
         self.coming: Client | None = None
         self.requested: Client | None = None
-        self.told = self._lost = ""
-        self.told_number = 0
+        self.notice = self._lost = ""
+        self.notice_number = 0
 
     def held_by(self, client: Client) -> bool:
         """Whether this client holds control and nobody is about to take it."""
@@ -119,4 +119,4 @@ class Lease:
         self._tell(told)
 
     def _tell(self, told: str) -> None:
-        self.told, self.told_number = told, self.told_number + 1
+        self.notice, self.notice_number = told, self.notice_number + 1

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from rolling_panda import messages as m
-from rolling_panda.messages.perception import CloseLook, Finding
+from rolling_panda.messages.perception import CloseUpResult, Finding
 
 #: A request is repeated this often until its picture has come (s).
 _REPEAT_S = 0.05
@@ -23,7 +23,7 @@ class _Asked:
     begun: float
     since: float
     sent_at: float = -math.inf
-    answer: CloseLook | None = None
+    answer: CloseUpResult | None = None
 
 
 class CloseUpClient:
@@ -52,7 +52,7 @@ class CloseUpClient:
         """What a look at this point shows is not wanted any more."""
         self._asked.pop(point_id, None)
 
-    def take(self, look: CloseLook, now: float) -> None:
+    def take(self, look: CloseUpResult, now: float) -> None:
         """What a picture shows; one that nobody waits for changes nothing."""
         asked = self._asked.get(look.point_id)
         # One that was taken for lost may be late: on a slow machine each of them is.
@@ -75,14 +75,14 @@ class CloseUpClient:
                 return asked.number, point_id
         return None
 
-    def answer(self, point_id: str, now: float) -> CloseLook | None:
+    def answer(self, point_id: str, now: float) -> CloseUpResult | None:
         """What the look at a point came to; None while it goes on or where there is none."""
         asked = self._asked.get(point_id)
         if asked is None:
             return None
         if asked.answer is None and now - asked.begun > self._timeout_s:
             reason = f"no picture of it came within {self._timeout_s:g} s"
-            asked.answer = CloseLook(
+            asked.answer = CloseUpResult(
                 header=m.Header(), point_id=point_id, number=asked.number, finding="unseen", reason=reason
             )
         return asked.answer

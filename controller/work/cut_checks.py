@@ -13,7 +13,7 @@ from controller.motion.follower import Measured
 from controller.motion.tool_motion import ToolMotion
 from controller.work.close_up import CloseUpClient
 from controller.work.point_queue import PointQueue, Ticket
-from rolling_panda.messages.perception import CloseLook, PruningPoint
+from rolling_panda.messages.perception import CloseUpResult, PruningPoint
 from rolling_panda.messages.types import Outcome, PointState
 
 #: An ended cut that no look is begun for within this time (s) ends by the cutter's word.
@@ -105,7 +105,7 @@ class PostCutCheck:
 _BASE_NEAR = 0.1
 
 
-def not_as_accepted(look: CloseLook, ticket: Ticket | None, tolerance: float) -> str:
+def not_as_accepted(look: CloseUpResult, ticket: Ticket | None, tolerance: float) -> str:
     """Why a point is not cut after a closer look, in words; empty when it is.
 
     Args:

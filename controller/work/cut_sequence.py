@@ -28,7 +28,7 @@ from controller.work.stages import PHASES, Stage, StepResult
 from controller.work.survey import Survey
 from rolling_panda import messages as m
 from rolling_panda.messages import commands as intents
-from rolling_panda.messages.perception import CloseLook
+from rolling_panda.messages.perception import CloseUpResult
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_XI
 
@@ -137,7 +137,7 @@ class CutSequence:
         """Leave the work; a cut under way is still watched, an accepted point stays accepted."""
         self._forget()
 
-    def watch(self, bridge: m.BridgeState, look: CloseLook | None, now: float) -> tuple[str, ...]:
+    def watch(self, bridge: m.BridgeState, look: CloseUpResult | None, now: float) -> tuple[str, ...]:
         """Take in how a cut ended and what the newest look showed, in every mode; returns what happened, in words."""
         if look is not None:
             self._close_ups.take(look, now)
@@ -155,9 +155,9 @@ class CutSequence:
             now: Monotonic time (s).
         """
         self._events = []
-        if self._stage in (Stage.SEARCH, Stage.TRAVEL, Stage.LOOK, Stage.ADVANCE):
+        if self._stage in (Stage.SEARCH, Stage.TRAVEL, Stage.CLOSE_UP, Stage.ADVANCE):
             self._check_acceptance(robot)
-        if self._ending and self._stage in (Stage.SEARCH, Stage.TRAVEL, Stage.LOOK, Stage.SURVEY):
+        if self._ending and self._stage in (Stage.SEARCH, Stage.TRAVEL, Stage.CLOSE_UP, Stage.SURVEY):
             return StepResult(self._saturation.ramp(robot.sent), pause=self._ending)
         if self._ending and self._stage is Stage.ADVANCE:
             self._retreat_from(robot)
@@ -226,7 +226,7 @@ class CutSequence:
         elif last and camera_ready(robot, self._motion, self._config):
             self._close_ups.ask(self._point_id, "seen", now)
             self._timeout.again()
-            self._stage = Stage.LOOK
+            self._stage = Stage.CLOSE_UP
         elif not (self._config.confirm and self._timeout.over(tracking, now, 0.0)) and self._timeout.late(now):
             return self._fail(robot, missed("the stand-off", tracking))
         return StepResult(tracking.xi, tracking)
@@ -392,7 +392,7 @@ _STEPS: dict[Stage, Callable[[CutSequence, Measured, float], StepResult]] = {
     Stage.ESCAPE: CutSequence._escape,
     Stage.SEARCH: CutSequence._find,
     Stage.TRAVEL: CutSequence._travel,
-    Stage.LOOK: CutSequence._look,
+    Stage.CLOSE_UP: CutSequence._look,
     Stage.ADVANCE: CutSequence._advance,
     Stage.CUT: CutSequence._cutting,
     Stage.RETREAT: CutSequence._retreat,

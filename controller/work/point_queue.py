@@ -206,7 +206,7 @@ class PointQueue:
         ticket = self._tickets.get(point_id)
         if ticket is None:
             return f"there is no point {point_id!r}"
-        if ticket.state in ("INTENT", "DONE", "UNKNOWN"):
+        if ticket.state in ("CUTTING", "DONE", "UNKNOWN"):
             return f"{point_id} is {ticket.state}"
         self._put(point_id, replace(ticket, state="REJECTED", reason=reason or "rejected", user=user, accepted=None))
         return ""
@@ -310,8 +310,8 @@ class PointQueue:
             self.sort()
 
     def intend(self, point_id: str, cut_id: str) -> int:
-        """ACCEPTED → INTENT: the blades are about to move. Returns the number of its record."""
-        self._put(point_id, replace(self._tickets[point_id], state="INTENT", cut_id=cut_id, reason="cutting"))
+        """ACCEPTED → CUTTING: the blades are about to move. Returns the number of its record."""
+        self._put(point_id, replace(self._tickets[point_id], state="CUTTING", cut_id=cut_id, reason="cutting"))
         return self._journal.number
 
     def recorded(self, number: int) -> bool:
@@ -323,7 +323,7 @@ class PointQueue:
         self._put(point_id, replace(self._tickets[point_id], state=state, reason=reason))
 
     def again(self, point_id: str, reason: str) -> None:
-        """INTENT → ACCEPTED: it stands after a cut, and is cut once more as it was accepted."""
+        """CUTTING → ACCEPTED: it stands after a cut, and is cut once more as it was accepted."""
         self._put(point_id, replace(self._tickets[point_id], state="ACCEPTED", reason=reason))
 
     def void(self, point_id: str, why: str) -> None:
@@ -340,7 +340,7 @@ class PointQueue:
                 row.point, row.state, row.reason, row.user, row.accepted, row.hash, row.cut_id, seen=False
             )
             self._order.append(point_id)
-            if row.state == "INTENT":
+            if row.state == "CUTTING":
                 self.resolve(point_id, "UNKNOWN", _INTERRUPTED)
             elif row.state in BOUND and (row.accepted is None or point_digest(row.accepted) != row.hash):
                 self._put(point_id, replace(self._tickets[point_id], state="REJECTED", reason=_UNBOUND, accepted=None))
@@ -402,7 +402,7 @@ class PointQueue:
         ticket = self._tickets.get(point_id)
         if ticket is None:
             return f"there is no point {point_id!r}"
-        if ticket.state in ("INTENT", "DONE", "UNKNOWN"):
+        if ticket.state in ("CUTTING", "DONE", "UNKNOWN"):
             return f"{point_id} is {ticket.state}"
         self._entries = None
         why = self.approaches.turn(point_id, azimuth, user)
@@ -461,7 +461,7 @@ def _rule_words(rule: PruningRule) -> str:
     """A rule's numbers for people."""
     count = f"{rule.nodes_kept} + {rule.fruiting_nodes}" if rule.system == "guyot" else f"{rule.nodes_kept}"
     nodes = "1 node" if count == "1" else f"{count} nodes"
-    thick, past = 1e3 * rule.keeper_diameter, 1e3 * rule.offset
+    thick, past = 1e3 * rule.preferred_diameter, 1e3 * rule.offset
     return f"{rule.system.capitalize()}, {nodes}, from {thick:g} mm, {past:.0f} mm past"
 
 

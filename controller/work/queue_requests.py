@@ -34,9 +34,9 @@ class QueueRequests:
             return self._accept_all(intent)
         if isinstance(intent, intents.MoveInQueue):
             return self._queue.move(intent.point_id, intent.before, intent.revision, intent.user)
-        if isinstance(intent, intents.TurnApproach):
+        if isinstance(intent, intents.SetApproach):
             return self._queue.turn(intent.point_id, intent.azimuth, intent.user)
-        if isinstance(intent, intents.PlannersOrder):
+        if isinstance(intent, intents.ResetOrder):
             return self._queue.order.give_back(intent.revision)
         return f"{type(intent).__name__} is not something this controller does"
 
@@ -64,12 +64,12 @@ class QueueRequests:
             return f"accepted {points} of confidence {intent.confidence:.2f} and more"
         if isinstance(intent, intents.MoveInQueue):
             return f"moved {intent.point_id} {f'before {intent.before}' if intent.before else 'to the end'}"
-        if isinstance(intent, intents.TurnApproach):
+        if isinstance(intent, intents.SetApproach):
             how = "as is found" if intent.azimuth is None else f"turned by {math.degrees(intent.azimuth):.0f}°"
             return f"wants {intent.point_id} approached {how}"
-        if isinstance(intent, intents.PlannersOrder):
+        if isinstance(intent, intents.ResetOrder):
             return "gave the order of work back to the plan"
-        if isinstance(intent, intents.AskPreview):
+        if isinstance(intent, intents.RequestPreview):
             return f"asked for a preview of {intent.point_id or 'the work'}"
         if isinstance(intent, intents.ApprovePreview):
             return f"approved the preview {intent.preview_hash[:8]}"

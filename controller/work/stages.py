@@ -15,7 +15,7 @@ class Stage(Enum):
     ESCAPE = "getting clear of the canes"
     SEARCH = "looking for a posture"
     TRAVEL = "on the way to the stand-off"
-    LOOK = "looking closely"
+    CLOSE_UP = "looking closely"
     ADVANCE = "straight in"
     CUT = "cutting"
     RETREAT = "straight back"
@@ -27,7 +27,7 @@ PHASES: dict[Stage, m.Phase] = {
     Stage.ESCAPE: "RETREAT",
     Stage.SEARCH: "APPROACH",
     Stage.TRAVEL: "APPROACH",
-    Stage.LOOK: "LOOK",
+    Stage.CLOSE_UP: "CLOSE_UP",
     Stage.ADVANCE: "ADVANCE",
     Stage.CUT: "CUT",
     Stage.RETREAT: "RETREAT",

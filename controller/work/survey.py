@@ -128,7 +128,7 @@ class Survey:
 
     def _unclear(self) -> int:
         perceived = self._queue.perceived
-        return 0 if perceived is None else sum(each.needs == "another look" for each in perceived.abstained)
+        return 0 if perceived is None else sum(each.needs == "another look" for each in perceived.undecided_sites)
 
     def _summary(self) -> str:
         perceived = self._queue.perceived
@@ -137,22 +137,22 @@ class Survey:
         if self._place is not None:
             return looked_again(perceived, self._place)
         named = [(point.vine, point.spur) for point in perceived.points]
-        named += [(each.vine, each.spur) for each in perceived.abstained if each.vine > 0]
+        named += [(each.vine, each.spur) for each in perceived.undecided_sites if each.vine > 0]
         vines, spurs = len({vine for vine, _ in named}), len(set(named))
-        asking = sum(each.needs == "operator" for each in perceived.abstained)
+        asking = sum(each.needs == "operator" for each in perceived.undecided_sites)
         found = f"{_counted(vines, 'vine')}, {_counted(spurs, 'spur')}, {_counted(len(perceived.points), 'point')}"
         left = f"{_counted(self._unclear(), 'place')} still unclear, {_counted(asking, 'place')} for you to decide"
         return f"surveyed: {found}; {left}"
 
 
-def open_place(perceived: m.PruningPoints | None, vine: int, spur: int) -> m.Abstention | None:
+def open_place(perceived: m.PruningPoints | None, vine: int, spur: int) -> m.UndecidedSite | None:
     """A place that is open and was seen somewhere, by its spur; None where there is none."""
-    left = () if perceived is None else perceived.abstained
+    left = () if perceived is None else perceived.undecided_sites
     found = [each for each in left if (each.vine, each.spur) == (vine, spur) and each.position is not None]
     return next((each for each in found if each.needs == "another look"), found[0] if found else None)
 
 
-def looked_again(perceived: m.PruningPoints, place: m.Abstention) -> str:
+def looked_again(perceived: m.PruningPoints, place: m.UndecidedSite) -> str:
     """What became of a place, in words."""
     where = f"looked again at vine {place.vine}, spur {place.spur}"
     left = open_place(perceived, place.vine, place.spur)

@@ -17,7 +17,7 @@ class NeedsAnotherLook(str):
     __slots__ = ()
 
 
-def abstention(reason: str, number: SpurNumber | None = None, position: m.Vector3 | None = None) -> m.Abstention:
+def undecided_site(reason: str, number: SpurNumber | None = None, position: m.Vector3 | None = None) -> m.UndecidedSite:
     """The message of a reason.
 
     Args:
@@ -25,7 +25,7 @@ def abstention(reason: str, number: SpurNumber | None = None, position: m.Vector
         number: Of the spur; None where it is about no spur in particular.
         position: Of the spur (m, odom).
     """
-    return m.Abstention(
+    return m.UndecidedSite(
         reason=reason[:500],
         needs="another look" if isinstance(reason, NeedsAnotherLook) else "operator",
         vine=0 if number is None else number.vine,
@@ -37,7 +37,7 @@ def abstention(reason: str, number: SpurNumber | None = None, position: m.Vector
 @dataclass(frozen=True)
 class _Site:
     has_cuts: bool
-    abstentions: tuple[m.Abstention, ...]
+    messages: tuple[m.UndecidedSite, ...]
     in_front: bool
 
 
@@ -76,19 +76,19 @@ class UndecidedSites:
         if not reasons:
             self._sites.pop(number, None)
         elif in_front or known is None or not known.in_front:
-            abstentions = tuple(abstention(reason, number, position) for reason in reasons)
-            self._sites[number] = _Site(has_cuts, abstentions, in_front)
+            messages = tuple(undecided_site(reason, number, position) for reason in reasons)
+            self._sites[number] = _Site(has_cuts, messages, in_front)
 
-    def abstentions(self, with_points: set[SpurNumber]) -> tuple[m.Abstention, ...]:
+    def remaining(self, with_points: set[SpurNumber]) -> tuple[m.UndecidedSite, ...]:
         """All reasons in order of the spurs; those without a cut are omitted for spurs with a published point."""
         return tuple(
             self._escalated(each, self._observations.get(number, 0))
             for number, site in sorted(self._sites.items())
             if site.has_cuts or number not in with_points
-            for each in site.abstentions
+            for each in site.messages
         )
 
-    def _escalated(self, site: m.Abstention, observations: int) -> m.Abstention:
+    def _escalated(self, site: m.UndecidedSite, observations: int) -> m.UndecidedSite:
         """Passed on to an operator after enough observations."""
         if site.needs != "another look" or observations < _MAX_OBSERVATIONS:
             return site

@@ -148,11 +148,11 @@ def choose_keeper(spur: Spur, config: RuleConfig) -> _Keeper | str:
     if len(canes) == 1:
         return _Keeper(canes[0], "the only cane on this spur")
     margin = config.diameter_error / np.sqrt(min(config.max_averaged, *(cane.observations for cane in canes)))
-    keeper = _pick(canes, config.keeper_diameter)
-    for limit in (config.keeper_diameter - margin, config.keeper_diameter + margin):
+    keeper = _pick(canes, config.preferred_diameter)
+    for limit in (config.preferred_diameter - margin, config.preferred_diameter + margin):
         if _pick(canes, limit) is not keeper:
             return "a low cane is too near the least thickness to tell which cane should stay"
-    thick = [cane for cane in canes if 2 * cane.radius >= config.keeper_diameter]
+    thick = [cane for cane in canes if 2 * cane.radius >= config.preferred_diameter]
     if keeper not in thick:
         rival = max(cane.radius for cane in canes if cane is not keeper)
         if 2 * (keeper.radius - rival) < margin:

@@ -16,7 +16,7 @@ from perception.skeleton.centreline import Centreline
 from perception.skeleton.topology import trace_canes
 from perception.tracking.presence import wood_presence
 from rolling_panda import messages as m
-from rolling_panda.messages.perception import CloseLook, Finding
+from rolling_panda.messages.perception import CloseUpResult, Finding
 from rolling_panda.messages.robot import CameraFrame
 
 #: Spacing of axis samples (m), and samples to either side in a tangent.
@@ -51,7 +51,7 @@ class _Cane:
 
 def check_close_up(
     view: View, segmenter: Segmenter, point: m.PruningPoint, number: int, config: PerceptionConfig
-) -> CloseLook:
+) -> CloseUpResult:
     """Check one point in a close-up frame.
 
     Args:
@@ -69,9 +69,9 @@ def check_close_up(
     u, v, z = view.pixels(position)[0]
     height, width = view.depth.shape
 
-    def result(finding: Finding, reason: str = "", cane: _Cane | None = None, shift: float = 0.0) -> CloseLook:
+    def result(finding: Finding, reason: str = "", cane: _Cane | None = None, shift: float = 0.0) -> CloseUpResult:
         confirmed = cane if finding == "seen" else None
-        return CloseLook(
+        return CloseUpResult(
             header=m.Header(view.stamp, "odom"),
             point_id=point.point_id,
             number=number,
@@ -119,9 +119,9 @@ def check_close_up(
     return result("seen", "the node before the cut was not seen", cane)
 
 
-def failed_check(frame: CameraFrame, reason: str) -> CloseLook:
+def failed_check(frame: CameraFrame, reason: str) -> CloseUpResult:
     """The result of a check that was not possible."""
-    return CloseLook(
+    return CloseUpResult(
         header=m.Header(frame.header.stamp, "odom"),
         point_id=frame.point_id,
         number=frame.number,

@@ -39,13 +39,13 @@ class SetRule(PlantRequest, frozen=True, kw_only=True):
     rule: PruningRule = PruningRule()
 
 
-class TryRule(PlantRequest, frozen=True, kw_only=True):
+class EvaluateRule(PlantRequest, frozen=True, kw_only=True):
     """Say what these numbers would change. Nothing changes; the answer has an `effect`."""
 
     rule: PruningRule = PruningRule()
 
 
-class TakeRuleBack(PlantRequest, frozen=True, kw_only=True):
+class UndoRule(PlantRequest, frozen=True, kw_only=True):
     """Prune as before `rule`, which is in force, was set, with the points as they were then.
 
     What was cut or placed by hand meanwhile stays so. The controller is asked for the acceptances afterwards.
@@ -92,7 +92,7 @@ class MovePoint(PlantRequest, frozen=True, kw_only=True):
     along: Annotated[float, Meta(ge=-0.1, le=0.1)]
 
 
-AnyPlantRequest = SetRule | TryRule | TakeRuleBack | AddPoint | AddPointInImage | MovePoint
+AnyPlantRequest = SetRule | EvaluateRule | UndoRule | AddPoint | AddPointInImage | MovePoint
 #: From this confidence on points are accepted all at once, where who asks names no other.
 SURE: Final = 0.8
 
@@ -169,20 +169,20 @@ class MoveInQueue(Intent, frozen=True, kw_only=True):
     revision: Count
 
 
-class TurnApproach(Intent, frozen=True, kw_only=True):
+class SetApproach(Intent, frozen=True, kw_only=True):
     """Approach a point with this turn about its cane (rad); 0 is straight from the robot's side, None as is found."""
 
     point_id: Name
     azimuth: Annotated[float, Meta(ge=-3.2, le=3.2)] | None = None
 
 
-class PlannersOrder(Intent, frozen=True, kw_only=True):
+class ResetOrder(Intent, frozen=True, kw_only=True):
     """Work in the plan's order again; `revision` is that of the order the operator saw."""
 
     revision: Count
 
 
-class AskPreview(Intent, frozen=True, kw_only=True):
+class RequestPreview(Intent, frozen=True, kw_only=True):
     """Show what the robot would do: all accepted points in their order, or one of them alone."""
 
     point_id: Annotated[str, Meta(max_length=64)] = ""
@@ -205,9 +205,9 @@ class Start(Intent, frozen=True, kw_only=True):
 
 
 class Survey(Start, frozen=True, kw_only=True):
-    """READY → AUTO along the row with the arm in its looking posture; nothing is cut. `distance` ahead (m).
+    """READY → AUTO along the row with the arm in its survey posture; nothing is cut. `distance` ahead (m).
 
-    With `vine` and `spur` of a place that was left open it is that place alone that is looked at, from both its sides.
+    With `vine` and `spur` of an undecided site, that site alone is surveyed, from both its sides.
     """
 
     distance: Annotated[float, Meta(ge=0.1, le=500.0)] = 4.0
@@ -268,9 +268,9 @@ AnyIntent = (
     | ResolvePoint
     | AcceptAll
     | MoveInQueue
-    | PlannersOrder
-    | TurnApproach
-    | AskPreview
+    | ResetOrder
+    | SetApproach
+    | RequestPreview
     | ApprovePreview
     | RequirePreview
     | Start

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
-from rolling_panda.messages.perception import Abstention, PruningPoint, PruningRule
+from rolling_panda.messages.perception import PruningPoint, PruningRule, UndecidedSite
 from rolling_panda.messages.robot import BridgeState, JointState
 from rolling_panda.messages.supervision import (
     ArmVelocities,
@@ -17,7 +17,7 @@ from rolling_panda.messages.supervision import (
     PreviewState,
     QueueEntry,
     ReplayState,
-    SpeedShare,
+    SpeedScale,
     StopState,
 )
 from rolling_panda.messages.types import (
@@ -74,9 +74,9 @@ class PageState(PageMessage, frozen=True, kw_only=True):
         client: The reader's own key, to be compared with the holder's.
         control: Who holds control of the robot's motion.
         stops: What bridge and controller hold latched.
-        speed_shares: Speed of each actuator in parts of its limit, wheels first; empty before the first joint state.
+        speed_ratios: Speed of each actuator in parts of its limit, wheels first; empty before the first joint state.
         replay: The recording that is played; None with a robot.
-        wider: Numbers of safety that a process's configuration sets less strictly than usual.
+        relaxed_limits: Safety limits that a process's configuration sets less strictly than usual.
         plain_wire: The robot's wire is not protected: every program on its machine can move it.
     """
 
@@ -95,9 +95,9 @@ class PageState(PageMessage, frozen=True, kw_only=True):
     client: ClientKey = ""
     control: ControlState | None = None
     stops: tuple[StopState, ...] = ()
-    speed_shares: tuple[NonNegative, ...] = ()
+    speed_ratios: tuple[NonNegative, ...] = ()
     replay: ReplayState | None = None
-    wider: tuple[Text, ...] = ()
+    relaxed_limits: tuple[Text, ...] = ()
     plain_wire: bool = False
 
 
@@ -126,10 +126,10 @@ class PagePlan(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class PagePoints(PageMessage, frozen=True, kw_only=True):
-    """Sent when it changed: every point in the order of work, and the places where perception abstained."""
+    """Sent when it changed: every point in the order of work, and the undecided sites."""
 
     points: tuple[PagePoint, ...]
-    abstained: tuple[Abstention, ...]
+    undecided_sites: tuple[UndecidedSite, ...]
     segmenter: Text
     frames: Count
     image_size: tuple[int, int]
@@ -165,7 +165,7 @@ class Selected(PageMessage, frozen=True, kw_only=True):
     point_id: str
 
 
-class Sightline(PageMessage, frozen=True, kw_only=True):
+class PickRay(PageMessage, frozen=True, kw_only=True):
     """A click into the 3-D view of a session that places points: from `origin` along `direction` (odom, m)."""
 
     origin: Vector3
@@ -206,14 +206,14 @@ class Hold(PageMessage, frozen=True, kw_only=True):
         hold: Whether they still hold.
         base: The base moves so, instead of the tool.
         joints: The arm's joints turn so (rad/s), instead of the tool.
-        share: Of the usual speed.
+        speed_scale: Of the usual speed.
     """
 
     sequence: Count
     hold: bool
     base: BaseVelocity | None = None
     joints: ArmVelocities | None = None
-    share: SpeedShare = 1.0
+    speed_scale: SpeedScale = 1.0
 
     def __post_init__(self) -> None:
         """Refuse both at once."""
@@ -229,7 +229,7 @@ class ShowGizmo(PageMessage, frozen=True, kw_only=True):
 
 
 class PlaceByHand(PageMessage, frozen=True, kw_only=True):
-    """From now on clicks into the 3-D view are meant for new points, each answered with a `Sightline`; or no more."""
+    """From now on clicks into the 3-D view are meant for new points, each answered with a `PickRay`; or no more."""
 
     active: bool
 
@@ -270,5 +270,5 @@ class Select(PageMessage, frozen=True, kw_only=True):
     follow: bool = False
 
 
-FromServer = PageState | PagePoints | PagePreview | PageEvents | Selected | Sightline | Measured | HoldEnded | Pong
+FromServer = PageState | PagePoints | PagePreview | PageEvents | Selected | PickRay | Measured | HoldEnded | Pong
 FromPage = Ping | Hold | ShowGizmo | PlaceByHand | PlaceCamera | ShowLayers | Measure | ShowPreview | Select

@@ -1,4 +1,4 @@
-"""What perception sees: pruning points, closer looks, crops, and what stands in the way."""
+"""What perception sees: pruning points, close-ups, crops, and what stands in the way."""
 
 import hashlib
 from typing import Annotated, Literal
@@ -74,16 +74,16 @@ class PruningPoint(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class PruningRule(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Nodes kept on a spur, and on a Guyot vine's new cane; least diameter of a keeper (m); past the last node (m)."""
+    """Nodes kept on a spur, and on a Guyot vine's new cane; least diameter preferred (m); past the last node (m)."""
 
     system: Literal["spur", "guyot"] = "spur"
     nodes_kept: Annotated[int, Meta(ge=1, le=5)] = 2
     fruiting_nodes: Annotated[int, Meta(ge=3, le=20)] = 8
-    keeper_diameter: Annotated[float, Meta(ge=0.003, le=0.015)] = 0.006
+    preferred_diameter: Annotated[float, Meta(ge=0.003, le=0.015)] = 0.006
     offset: Annotated[float, Meta(ge=0.005, le=0.05)] = 0.020
 
 
-class Abstention(Struct, frozen=True, forbid_unknown_fields=True):
+class UndecidedSite(Struct, frozen=True, forbid_unknown_fields=True):
     """A place without a point: why, and what it needs. Without vine and spur (0) it is about no spur in particular.
 
     `position` is where the spur was seen (m, odom).
@@ -104,7 +104,7 @@ class PruningPoints(Message, frozen=True, kw_only=True):
         segmenter: Name of the segmenter behind it.
         frames: Camera frames used so far.
         points: All points.
-        abstained: Places looked at without a point, over all frames.
+        undecided_sites: Places seen without a point, over all frames.
         canes: Axis of each cane as perceived: polylines in odom (m).
         rule: In force; None where nobody says.
     """
@@ -113,7 +113,7 @@ class PruningPoints(Message, frozen=True, kw_only=True):
     segmenter: Text
     frames: Count
     points: tuple[PruningPoint, ...]
-    abstained: tuple[Abstention, ...] = ()
+    undecided_sites: tuple[UndecidedSite, ...] = ()
     canes: tuple[tuple[Vector3, ...], ...] = ()
     rule: PruningRule | None = None
 
@@ -143,13 +143,13 @@ class PointCrop(Message, frozen=True, kw_only=True):
 Finding = Literal["seen", "changed", "severed", "unseen"]
 
 
-class PictureRequest(Message, frozen=True, kw_only=True):
-    """Controller → bridge: take a picture of a point now. Repeated until seen; the bridge acts on a `number` once.
+class CloseUpRequest(Message, frozen=True, kw_only=True):
+    """Controller → bridge: take a close-up of a point now. Repeated until seen; the bridge acts on a `number` once.
 
     Attributes:
         epoch: As in `MotionCommand`.
         number: Strictly increasing within an epoch.
-        point_id: What is looked at; the frame carries it.
+        point_id: The point; the frame carries it.
     """
 
     epoch: Epoch
@@ -157,8 +157,8 @@ class PictureRequest(Message, frozen=True, kw_only=True):
     point_id: Name
 
 
-class CloseLook(Message, frozen=True, kw_only=True):
-    """Perception → controller: what a picture that was asked for shows of its point.
+class CloseUpResult(Message, frozen=True, kw_only=True):
+    """Perception → controller: what a requested close-up shows of its point.
 
     Attributes:
         header: Stamp of the picture; `frame_id` is odom.

@@ -28,20 +28,20 @@ from rolling_panda.messages.types import (
 class TokenRequest(Message, frozen=True, kw_only=True):
     """Controller → bridge: give me the fencing token, let me keep it, or take it back.
 
-    Repeated by who holds the token too. Nobody else is given one before the holder gives way, or has been silent for a
+    Repeated by the holder of the token too. Nobody else is given one before the holder releases it, or is silent for a
     second; `BridgeState` says whose it is, and under which epoch.
 
     Attributes:
         token: Random part of the token, drawn by who asks and told to nobody but the bridge.
         echo: `sequence` of the newest `JointState`; judged as that of a motion command.
-        mode: Of the controller that asks; of no account where it gives way.
-        gives_way: It takes its token back: the next one who asks is given one.
+        mode: Of the controller that asks; of no account where it releases the token.
+        releases: The controller gives its token up: the next one who asks is given one.
     """
 
     token: Annotated[str, Meta(min_length=1, max_length=32)]
     echo: Count = 0
     mode: Mode = "IDLE"
-    gives_way: bool = False
+    releases: bool = False
 
 
 def fingerprint(token: str) -> str:
@@ -145,7 +145,7 @@ class BridgeState(Message, frozen=True, kw_only=True):
         round_trip_worst_s: The longest of them.
         rejections: Messages refused since the start, by reason.
         battery: Charge of the base; None where nobody tells, as in the simulation.
-        wider: Numbers of safety that its configuration sets less strictly than usual, within their hard bounds.
+        relaxed_limits: Safety limits that its configuration sets less strictly than usual, within their hard bounds.
     """
 
     header: Header
@@ -162,7 +162,7 @@ class BridgeState(Message, frozen=True, kw_only=True):
     round_trip_worst_s: NonNegative = 0.0
     rejections: tuple[RejectionCount, ...] = ()
     battery: Fraction | None = None
-    wider: tuple[Text, ...] = ()
+    relaxed_limits: tuple[Text, ...] = ()
     holder: Annotated[str, Meta(max_length=16)] = ""
     sequence: Count = 0
     moving: bool = False
@@ -200,8 +200,8 @@ class CameraFrame(Message, frozen=True, kw_only=True):
         depth_zlib: H×W uint16 little-endian, row-major, zlib; in units of `depth_unit`; 0 = no return.
         depth_unit: Metres a count.
         labels_zlib: H×W uint8 class indices (`WOOD_CLASSES`), zlib. Empty without a label camera (a real robot).
-        point_id: What the controller asked to look at; empty in a picture that nobody asked for.
-        number: Of that request.
+        point_id: Point of the requested close-up; empty in other pictures.
+        number: Of the request.
     """
 
     header: Header

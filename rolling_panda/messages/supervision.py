@@ -69,7 +69,7 @@ class QueueEntry(Struct, frozen=True, forbid_unknown_fields=True):
     azimuth: Angle | None = None
 
 
-class Nearness(Struct, frozen=True, forbid_unknown_fields=True):
+class Proximity(Struct, frozen=True, forbid_unknown_fields=True):
     """The least distance (m) between two things that must not touch, and which; negative where they overlap."""
 
     distance: Metre
@@ -103,11 +103,11 @@ class ControllerState(Message, frozen=True, kw_only=True):
         ticks: Control periods since the start.
         late_ticks: Those of them that lasted more than half as long again as they should.
         queue: Every point known, in the order of work.
-        held_by: What keeps the robot from doing all that is asked of it now, by name; empty where nothing does.
-        near: What it is nearest to touching while it moves; None where nothing is near.
+        limited_by: What keeps the robot from doing all that is asked of it now, by name; empty where nothing does.
+        proximity: What it is nearest to touching while it moves; None where nothing is near.
         order: Whose order that is.
         interrupted: What a pause or a protective stop has ended; empty once something is begun, or the robot disarmed.
-        wider: Numbers of safety that its configuration sets less strictly than usual, within their hard bounds.
+        relaxed_limits: Safety limits that its configuration sets less strictly than usual, within their hard bounds.
     """
 
     header: Header
@@ -127,11 +127,11 @@ class ControllerState(Message, frozen=True, kw_only=True):
     ticks: Count
     late_ticks: Count
     queue: tuple[QueueEntry, ...]
-    held_by: Text = ""
-    near: Nearness | None = None
+    limited_by: Text = ""
+    proximity: Proximity | None = None
     order: QueueOrder = QueueOrder()
     interrupted: Interrupted = ""
-    wider: tuple[Text, ...] = ()
+    relaxed_limits: tuple[Text, ...] = ()
 
 
 #: Who asks, as others may see it: a digest of a session, never the session itself. Empty = nobody.
@@ -181,9 +181,9 @@ class ControlState(Message, frozen=True, kw_only=True):
         expires_s: How long the lease still lives without a word of its holder (s).
         requested_by: Name of who asks for control, empty when nobody.
         requested_key: Their key.
-        coming: Name of who gets control as soon as the robot is at rest, empty when nobody.
-        told: What became of control last, in words.
-        told_number: Grows with each such change, so that a page tells each once.
+        next_user: Name of who gets control as soon as the robot is at rest, empty when nobody.
+        notice: What became of control last, in words.
+        notice_number: Grows with each such change, so that a page tells each once.
         supervised: Whether somebody who may operate sees the robot now.
     """
 
@@ -192,9 +192,9 @@ class ControlState(Message, frozen=True, kw_only=True):
     expires_s: NonNegative
     requested_by: Text
     requested_key: ClientKey
-    coming: Text
-    told: Text
-    told_number: Count
+    next_user: Text
+    notice: Text
+    notice_number: Count
     supervised: bool
 
 
@@ -365,7 +365,7 @@ class PreviewState(Message, frozen=True, kw_only=True):
         position: Actuated coordinates at the start (rad).
         duration_s: Of all of it (s).
         cuts: Points in their order.
-        left: Accepted points that come after those, and are not in it.
+        remaining: Accepted points that come after those, and are not in it.
     """
 
     header: Header
@@ -378,7 +378,7 @@ class PreviewState(Message, frozen=True, kw_only=True):
     position: Actuated | None = None
     duration_s: NonNegative = 0.0
     cuts: tuple[PreviewedCut, ...] = ()
-    left: Count = 0
+    remaining: Count = 0
 
 
 class PreviewRow(Struct, frozen=True, forbid_unknown_fields=True):
@@ -480,8 +480,8 @@ class SessionReport(Message, frozen=True, kw_only=True):
 
 
 JointVelocity = Annotated[float, Meta(ge=-10.0, le=10.0)]
-#: Share of the robot's usual speed by hand.
-SpeedShare = Annotated[float, Meta(ge=0.05, le=1.0)]
+#: Speed by hand, relative to the robot's usual one.
+SpeedScale = Annotated[float, Meta(ge=0.05, le=1.0)]
 ArmVelocities = tuple[
     JointVelocity, JointVelocity, JointVelocity, JointVelocity, JointVelocity, JointVelocity, JointVelocity
 ]
@@ -509,7 +509,7 @@ class TeleopTarget(Message, frozen=True, kw_only=True):
         base: Velocity of the base.
         joints: Velocities of the arm's joints (7, rad/s).
         client: Tells apart who has the same name, as in an intent.
-        share: Of the usual speed, for all of the above.
+        speed_scale: Of the usual speed, for all of the above.
         round_trip_s: From the holder's page to the server and back, as the server measured it (s).
     """
 
@@ -520,5 +520,5 @@ class TeleopTarget(Message, frozen=True, kw_only=True):
     base: BaseVelocity | None = None
     joints: ArmVelocities | None = None
     client: Annotated[str, Meta(max_length=64)] = ""
-    share: SpeedShare = 1.0
+    speed_scale: SpeedScale = 1.0
     round_trip_s: NonNegative = 0.0

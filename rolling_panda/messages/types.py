@@ -4,7 +4,7 @@ from typing import Annotated, Final, Literal, get_args
 
 from msgspec import Meta, Struct
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 Finite = Annotated[float, Meta(ge=-1e9, le=1e9)]
 Metre = Annotated[float, Meta(ge=-1e4, le=1e4)]
 Unit = Annotated[float, Meta(ge=-1.001, le=1.001)]
@@ -33,9 +33,9 @@ PROCESSES: tuple[Process, ...] = ("bridge", "controller", "perception", "server"
 Mode = Literal["IDLE", "READY", "TELEOP", "AUTO", "PAUSED", "PROTECTIVE_STOP", "FAULT", "ESTOP_LATCHED"]
 #: What a pause or a protective stop has ended, and nobody has begun again.
 Interrupted = Literal["", "work", "survey", "teleoperation"]
-Phase = Literal["", "APPROACH", "LOOK", "ADVANCE", "CUT", "RETREAT", "SURVEY"]
+Phase = Literal["", "APPROACH", "CLOSE_UP", "ADVANCE", "CUT", "RETREAT", "SURVEY"]
 #: UNREACHABLE: accepted by somebody, refused by the plan that holds; ACCEPTED again once a plan can reach it.
-PointState = Literal["PROPOSED", "ACCEPTED", "UNREACHABLE", "INTENT", "DONE", "FAILED_NOT_CUT", "UNKNOWN", "REJECTED"]
+PointState = Literal["PROPOSED", "ACCEPTED", "UNREACHABLE", "CUTTING", "DONE", "FAILED_NOT_CUT", "UNKNOWN", "REJECTED"]
 Severity = Literal["info", "warning", "error"]
 Outcome = Literal["", "DONE", "FAILED_NOT_CUT", "UNKNOWN"]
 Need = Literal["another look", "operator"]
@@ -97,13 +97,13 @@ class RuleEffect(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What another pruning rule would make of the points that are shown: nothing has changed yet.
 
     Attributes:
-        moved: Points of which it would cut something else: at another place, of another kind, or with other nodes kept.
-        gone: Points that it would not ask for.
+        changed: Points whose cut would be at another place, of another kind, or with other nodes kept.
+        removed: Points that it would not ask for.
         added: How many others it would ask for.
     """
 
-    moved: tuple[Name, ...] = ()
-    gone: tuple[Name, ...] = ()
+    changed: tuple[Name, ...] = ()
+    removed: tuple[Name, ...] = ()
     added: Count = 0
 
 

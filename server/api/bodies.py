@@ -113,13 +113,13 @@ class MoveInQueue(_Body):
     revision: Annotated[int, Field(ge=0, le=_MAX_INTEGER), _INTEGER]
 
 
-class TurnApproach(_Body):
+class SetApproach(_Body):
     """Angle of the approach about the cane (rad); null leaves it to the search."""
 
     azimuth: Annotated[float, Field(ge=-3.2, le=3.2)] | None = None
 
 
-class PlannersOrder(_Body):
+class ResetOrder(_Body):
     """The revision of the order in `GET /api/state`."""
 
     revision: Annotated[int, Field(ge=0, le=_MAX_INTEGER), _INTEGER]
@@ -132,7 +132,7 @@ class Place(_Body):
     spur: Annotated[int, Field(ge=0, le=100000), _INTEGER]
 
 
-class AskPreview(_Body):
+class RequestPreview(_Body):
     """The point to preview; empty for all accepted ones in their order."""
 
     point_id: Annotated[str, Field(max_length=64)] = ""
@@ -213,8 +213,8 @@ class Teleop(_JsonTuples):
     """Hold the robot to a command; with none of the three the last one stays.
 
     `target`: the tool goes there; its quaternion has length 1. With `base` too: the tool keeps to it while the base
-    moves. `base` alone: the base drives, the arm stands. `joints` alone (rad/s): joints turn, the base stands. `share`
-    scales the speed.
+    moves. `base` alone: the base drives, the arm stands. `joints` alone (rad/s): joints turn, the base stands.
+    `speed_scale` scales the speed.
     """
 
     model_config = ConfigDict(
@@ -227,7 +227,7 @@ class Teleop(_JsonTuples):
     )
 
     hold: bool
-    share: Annotated[float, Field(ge=0.05, le=1.0)] = 1.0
+    speed_scale: Annotated[float, Field(ge=0.05, le=1.0)] = 1.0
     target: Target | None = None
     base: BaseVelocity | None = None
     joints: (
@@ -283,15 +283,15 @@ class Rule(_Body):
     system: Literal["spur", "guyot"] = "spur"
     nodes_kept: Annotated[int, Field(ge=1, le=5), _INTEGER] = 2
     fruiting_nodes: Annotated[int, Field(ge=3, le=20), _INTEGER] = 8
-    keeper_diameter: Annotated[float, Field(ge=0.003, le=0.015)] = 0.006
+    preferred_diameter: Annotated[float, Field(ge=0.003, le=0.015)] = 0.006
     offset: Annotated[float, Field(ge=0.005, le=0.05)] = 0.020
 
 
 class RuleOutcome(Outcome):
     """How many points a rule would move, remove and add, and how many acceptances it would void."""
 
-    moved: int = 0
-    gone: int = 0
+    changed: int = 0
+    removed: int = 0
     added: int = 0
     voided: int = 0
 

@@ -60,15 +60,15 @@ def commands_router(robot: RobotContext) -> APIRouter:
         return await ask(session, wanted)
 
     @router.post("/points/{point_id}/approach", tags=["points"], responses=COMMAND)
-    async def approach(session: Operator, point_id: PointId, request: body.TurnApproach) -> Response:
+    async def approach(session: Operator, point_id: PointId, request: body.SetApproach) -> Response:
         """Turn the approach to a point about its cane; an accepted one is planned anew, which says what comes of it."""
-        wanted = intents.TurnApproach(user=session.user, point_id=point_id, azimuth=request.azimuth)
+        wanted = intents.SetApproach(user=session.user, point_id=point_id, azimuth=request.azimuth)
         return await ask(session, wanted)
 
     @router.post("/order/planners", tags=["points"], responses=COMMAND)
-    async def planners(session: Operator, request: body.PlannersOrder) -> Response:
+    async def planners(session: Operator, request: body.ResetOrder) -> Response:
         """Work in the plan's order again."""
-        return await ask(session, intents.PlannersOrder(user=session.user, revision=request.revision))
+        return await ask(session, intents.ResetOrder(user=session.user, revision=request.revision))
 
     @router.post("/arm", tags=["mode"], responses=COMMAND)
     async def arm(session: Operator) -> Response:
@@ -146,7 +146,7 @@ def commands_router(robot: RobotContext) -> APIRouter:
         )
         if command != TeleopCommand():
             robot.teleop.set_command(session.session_id, command)
-        return answer(robot.hold(session, time.monotonic(), share=request.share))
+        return answer(robot.hold(session, time.monotonic(), speed_scale=request.speed_scale))
 
     @router.post("/replay", tags=["replay"], responses=COMMAND)
     async def seek(session: Caller, request: body.Seek) -> Response:

@@ -19,6 +19,7 @@ from rolling_panda.messages.page import (
     PagePoints,
     PagePreview,
     PageState,
+    PickRay,
     Ping,
     PlaceByHand,
     PlaceCamera,
@@ -28,7 +29,6 @@ from rolling_panda.messages.page import (
     ShowGizmo,
     ShowLayers,
     ShowPreview,
-    Sightline,
 )
 from rolling_panda.messages.supervision import PreviewState
 from rolling_panda.messages.types import Pose
@@ -56,7 +56,7 @@ class PageSocket:
         self._pong: Pong | None = None
         self._selected: str | None = None
         self._hold_ended: HoldEnded | None = None
-        self._sightline: Sightline | None = None
+        self._pick_ray: PickRay | None = None
         self._measured: Measured | None = None
         self.placing = False
         self.measuring = False
@@ -100,9 +100,9 @@ class PageSocket:
         self._selected = point_id
         self.wake()
 
-    def send_sightline(self, line: Sightline) -> None:
+    def send_pick_ray(self, ray: PickRay) -> None:
         """This session has clicked into the 3-D view, to place a point there."""
-        self._sightline = line
+        self._pick_ray = ray
         self.wake()
 
     def send_measured(self, measured: Measured) -> None:
@@ -140,9 +140,9 @@ class PageSocket:
             return ended
         if robot.state is not None and self._throttle.is_due(robot.state, self.session.may_operate):
             return addressed(robot.state, self.session)
-        if self._sightline is not None:
-            line, self._sightline = self._sightline, None
-            return line
+        if self._pick_ray is not None:
+            ray, self._pick_ray = self._pick_ray, None
+            return ray
         if self._measured is not None:
             measured, self._measured = self._measured, None
             return measured
@@ -223,7 +223,7 @@ class PageSocket:
         command = command_of(message, self._robot.scene.gizmos.pose(self.session.session_id))
         if command is not None:
             self._robot.teleop.set_command(self.session.session_id, command)
-        held = self._robot.hold(self.session, now, self.view, message.share)
+        held = self._robot.hold(self.session, now, self.view, message.speed_scale)
         if held.ok:
             self._holding = True
         elif not self._holding:

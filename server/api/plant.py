@@ -29,7 +29,7 @@ def plant_router(robot: RobotContext) -> APIRouter:
     @router.post("/rule/what-if", responses=COMMAND | {200: {"model": body.RuleOutcome}})
     async def what_if(session: Operator, request: body.Rule) -> Response:
         """What a rule would change, without setting it. `voided` counts the acceptances that would become void."""
-        wanted = ask.TryRule(user=session.user, rule=PruningRule(**request.model_dump()))
+        wanted = ask.EvaluateRule(user=session.user, rule=PruningRule(**request.model_dump()))
         result = await robot.ask_perception(session, wanted)
         if not result.ok or result.effect is None:
             return answer(result)
@@ -43,7 +43,7 @@ def plant_router(robot: RobotContext) -> APIRouter:
         decisions and points by hand stay.
         """
         rule = PruningRule(**request.model_dump())
-        done = await robot.ask_perception(session, ask.TakeRuleBack(user=session.user, rule=rule))
+        done = await robot.ask_perception(session, ask.UndoRule(user=session.user, rule=rule))
         if not done.ok:
             return answer(done)
         restored = await robot.ask(session, ask.RestoreAccepted(user=session.user, rule=rule))
@@ -98,11 +98,11 @@ def rule_outcome(effect: RuleEffect, points: PagePoints | None) -> body.RuleOutc
     """The effect of a rule and the acceptances that it would void, as numbers and as text."""
     rows = () if points is None else points.points
     accepted = {row.point.point_id for row in rows if row.entry.state in ("ACCEPTED", "UNREACHABLE")}
-    voided = len(accepted & {*effect.moved, *effect.gone})
-    moved, gone, added = len(effect.moved), len(effect.gone), effect.added
-    parts = [f"{moved} {'moves' if moved == 1 else 'move'}"] if moved else []
-    parts += [f"{gone} {'goes' if gone == 1 else 'go'}"] if gone else []
+    voided = len(accepted & {*effect.changed, *effect.removed})
+    changed, removed, added = len(effect.changed), len(effect.removed), effect.added
+    parts = [f"{changed} {'changes' if changed == 1 else 'change'}"] if changed else []
+    parts += [f"{removed} {'goes' if removed == 1 else 'go'}"] if removed else []
     parts += [f"{added} {'comes' if added == 1 else 'come'}"] if added else []
     parts += [f"{voided} {'acceptance' if voided == 1 else 'acceptances'} would be void"] if voided else []
     reason = ", ".join(parts) or "nothing would change"
-    return body.RuleOutcome(ok=True, reason=reason, moved=moved, gone=gone, added=added, voided=voided)
+    return body.RuleOutcome(ok=True, reason=reason, changed=changed, removed=removed, added=added, voided=voided)

@@ -36,9 +36,9 @@ def preview_router(robot: RobotContext) -> APIRouter:
         return message(Previewed(state.message if state else None, motion.message if motion else None))
 
     @router.post("", responses=COMMAND)
-    async def ask(session: Operator, request: body.AskPreview) -> Response:
+    async def ask(session: Operator, request: body.RequestPreview) -> Response:
         """Make a preview of all accepted points in their order, or of one of them alone."""
-        return answer(await robot.ask(session, intents.AskPreview(user=session.user, point_id=request.point_id)))
+        return answer(await robot.ask(session, intents.RequestPreview(user=session.user, point_id=request.point_id)))
 
     @router.post("/approve", responses=COMMAND)
     async def approve(session: Operator, request: body.ApprovePreview) -> Response:

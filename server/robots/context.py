@@ -12,8 +12,8 @@ import msgspec
 from rolling_panda import messages as m
 from rolling_panda.errors import InputError, ServiceError
 from rolling_panda.messages import commands as intents
-from rolling_panda.messages.commands import PlantRequest, TryRule
-from rolling_panda.messages.page import GizmoAxes, Measured, PagePoints, PageState, Sightline
+from rolling_panda.messages.commands import EvaluateRule, PlantRequest
+from rolling_panda.messages.page import GizmoAxes, Measured, PagePoints, PageState, PickRay
 from server.auth.sessions import Session
 from server.config import ServerConfig
 from server.connections.token_bucket import TokenBuckets
@@ -57,7 +57,7 @@ class Page(Protocol):
     def send_measured(self, measured: Measured) -> None:
         """This page's session has picked the second of two points to measure."""
 
-    def send_sightline(self, line: Sightline) -> None:
+    def send_pick_ray(self, ray: PickRay) -> None:
         """This page's session has clicked into the 3-D view, to place a point there."""
 
     def send_selected(self, point_id: str) -> None:
@@ -148,7 +148,7 @@ class RobotContext:
         name = type(request).__name__
         result = await self._call(session, name, "perception", lambda: self.link.ask_perception(request))
         # Dragging a slider tries many rules, and changes nothing.
-        if result.status in (200, 409) and not isinstance(request, TryRule):
+        if result.status in (200, 409) and not isinstance(request, EvaluateRule):
             self.note(
                 "info",
                 f"{name} by {session.user}: {result.reason if result.ok else 'refused, ' + result.reason}",
@@ -189,7 +189,7 @@ class RobotContext:
         holder = "" if control is None else control.message.holder
         return session.may_operate and holder in ("", session.client)
 
-    def hold(self, session: Session, now: float, view: str = "", share: float = 1.0) -> Result:
+    def hold(self, session: Session, now: float, view: str = "", speed_scale: float = 1.0) -> Result:
         """Start or renew this session's hold on the robot; `view` is the page that holds, empty for a script."""
         key = session.session_id
         if not session.may_operate:
@@ -204,7 +204,7 @@ class RobotContext:
         self.end_lapsed_hold(now)
         was_holding = self.teleop.holder == key
         try:
-            self.teleop.hold(key, session.user, now, view or key, session.client, share)
+            self.teleop.hold(key, session.user, now, view or key, session.client, speed_scale)
         except InputError as error:
             return self._refuse_hold(session, str(error), 409)
         self._refused_holds.pop(key, None)
@@ -327,7 +327,7 @@ class RobotContext:
         """`owner` clicked into the 3-D view: the ray goes to the page that places a point, or else measures."""
         for page in self.pages:
             if page.placing and page.session.session_id == owner:
-                page.send_sightline(Sightline(origin=origin, direction=direction))
+                page.send_pick_ray(PickRay(origin=origin, direction=direction))
                 return
         measured = self.scene_updater.measure(owner, origin, direction)
         for page in self.pages:

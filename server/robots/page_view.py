@@ -25,17 +25,17 @@ class PageView:
     """Builds `PageState` and `PagePoints`. The last known state stays, with its age."""
 
     def __init__(
-        self, link: RobotLink, model: RobotModel, wider: tuple[str, ...] = (), plain_wire: bool = False
+        self, link: RobotLink, model: RobotModel, relaxed_limits: tuple[str, ...] = (), plain_wire: bool = False
     ) -> None:
         """Build messages from what comes over `link`.
 
         Args:
             link: To read from.
             model: Projects points into the image.
-            wider: Limits of the server that are set wider than usual.
+            relaxed_limits: Limits of the server that are set wider than usual.
             plain_wire: Whether the robot's wire is unencrypted.
         """
-        self._wider, self._plain_wire = wider, plain_wire
+        self._relaxed_limits, self._plain_wire = relaxed_limits, plain_wire
         self._link = link
         self._model = model
         self._seen: dict[str, m.PruningPoint] = {}
@@ -72,17 +72,17 @@ class PageView:
             replay=replay.message if replay else None,
             stops=tuple(self._link.stops[process].message for process in sorted(self._link.stops)),
             # Several processes may read the same section of one file.
-            wider=tuple(
+            relaxed_limits=tuple(
                 dict.fromkeys(
                     (
-                        *(bridge.message.wider if bridge else ()),
-                        *(controller.message.wider if controller else ()),
-                        *self._wider,
+                        *(bridge.message.relaxed_limits if bridge else ()),
+                        *(controller.message.relaxed_limits if controller else ()),
+                        *self._relaxed_limits,
                     )
                 )
             ),
             plain_wire=self._plain_wire,
-            speed_shares=() if joints is None else speed_shares(joints.message, self._model.limits),
+            speed_ratios=() if joints is None else speed_ratios(joints.message, self._model.limits),
         )
 
     def tool(self, now: float) -> m.Pose | None:
@@ -157,7 +157,7 @@ class PageView:
                 )
                 for (point, entry), pixel, next_pixel in zip(rows, pixels, ahead, strict=True)
             ),
-            abstained=perceived.abstained if perceived else (),
+            undecided_sites=perceived.undecided_sites if perceived else (),
             segmenter=perceived.segmenter if perceived else "",
             frames=perceived.frames if perceived else 0,
             image_size=(camera.intrinsics.width, camera.intrinsics.height) if camera else (0, 0),
@@ -204,6 +204,6 @@ def project(
     return pixels
 
 
-def speed_shares(joints: JointState, limits: Limits) -> tuple[float, ...]:
+def speed_ratios(joints: JointState, limits: Limits) -> tuple[float, ...]:
     """Speed of each actuator as a fraction of its limit, wheels first (9)."""
     return tuple(np.round(np.abs(joints.velocity) / limits.velocity, 3).tolist())

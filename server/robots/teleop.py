@@ -28,7 +28,7 @@ class _Hold:
     client: str
     renewed_at: float
     command: TeleopCommand
-    share: float = 1.0
+    speed_scale: float = 1.0
 
 
 class TeleopHold:
@@ -84,7 +84,9 @@ class TeleopHold:
         """Whether the robot is held to a target: then the gizmo stays where it was dragged."""
         return self._hold is not None and self._hold.command.target is not None
 
-    def hold(self, holder: str, user: str, now: float, view: str = "", client: str = "", share: float = 1.0) -> None:
+    def hold(
+        self, holder: str, user: str, now: float, view: str = "", client: str = "", speed_scale: float = 1.0
+    ) -> None:
         """Start or renew a hold.
 
         Args:
@@ -93,7 +95,7 @@ class TeleopHold:
             now: Monotonic time (s).
             view: The page that holds; empty for a script, which is its own view.
             client: The session's key at the controller.
-            share: Speed scale, 0…1.
+            speed_scale: Speed scale, 0…1.
 
         Raises:
             InputError: Somebody else holds, the view is stale, there is no target, or the last hold has lapsed and was
@@ -115,7 +117,7 @@ class TeleopHold:
             raise InputError("there is no target yet; show the gizmo first")
         if self._hold is None:
             self._hold = _Hold(holder, user, view, client, now, self._commands[holder])
-        self._hold.renewed_at, self._hold.view, self._hold.share = now, view, share
+        self._hold.renewed_at, self._hold.view, self._hold.speed_scale = now, view, speed_scale
         self._lapsed.pop(holder, None)
 
     def must_release(self, holder: str, now: float) -> bool:
@@ -176,6 +178,6 @@ class TeleopHold:
             base=command.base,
             joints=command.joints,
             client=hold.client,
-            share=hold.share,
+            speed_scale=hold.speed_scale,
             round_trip_s=min(self._latency_s.get(hold.view, 0.0), 1e3),
         )

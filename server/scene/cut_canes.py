@@ -39,7 +39,7 @@ def cut_points(points: Iterable[PagePoint], bridge: m.BridgeState | None) -> dic
     return {
         row.point.point_id: (row.point.position, row.point.tangent)
         for row in points
-        if row.entry.state == "DONE" or (row.entry.state == "INTENT" and reported and row.entry.cut_id == reported)
+        if row.entry.state == "DONE" or (row.entry.state == "CUTTING" and reported and row.entry.cut_id == reported)
     }
 
 

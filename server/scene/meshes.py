@@ -17,7 +17,7 @@ STATE_COLORS: dict[m.PointState, Color] = {
     "PROPOSED": (255, 176, 32),
     "ACCEPTED": (64, 148, 255),
     "UNREACHABLE": (0, 206, 209),
-    "INTENT": (255, 64, 200),
+    "CUTTING": (255, 64, 200),
     "DONE": (56, 200, 96),
     "FAILED_NOT_CUT": (240, 60, 50),
     "UNKNOWN": (160, 96, 255),

@@ -98,9 +98,9 @@ def test_the_summary_has_a_figure_an_interval_and_a_number_for_each_measure():
     survey.points = [RowJudge(ROW, 11).point(point(t.cut.best, t.cut.tangent)) for t in TRUTHS[:4]]
     summary = summarise(survey)
     assert summary["recall"].value == 0.9 and summary["recall"].n == 10
-    assert summary["abstained"].value == pytest.approx(0.1)
+    assert summary["undecided"].value == pytest.approx(0.1)
     assert summary["blocked"].value == pytest.approx(0.1) and summary["recall_unblocked"].value == 1.0
-    assert summary["recall_unblocked"].n == 9 and summary["abstained_unblocked"].value == 0.0
+    assert summary["recall_unblocked"].n == 9 and summary["undecided_unblocked"].value == 0.0
     assert summary["right_cane"].value == 1.0 and summary["right_cane"].low < 0.6 and summary["right_cane"].n == 4
 
 
@@ -127,7 +127,7 @@ def test_the_command_writes_what_it_measured(tmp_path, capsys):
         "along_error_median_m",
         "along_error_p95_m",
         "node_count_right",
-        "abstained",
+        "undecided",
         "recall",
         "frame_ms_median",
     } <= set(document["summary"])

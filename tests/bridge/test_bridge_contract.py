@@ -138,7 +138,7 @@ def test_another_controller_is_given_the_token_once_the_holder_is_silent_or_give
     assert (rig.state.epoch, rig.state.holder) == (2, m.fingerprint("b2"))
     rig.run(0.3, FORWARD)
     assert rig.at_rest() and "older" in rig.refusals
-    rig.core.on_token(m.TokenRequest(token="b2", gives_way=True), rig.now)
+    rig.core.on_token(m.TokenRequest(token="b2", releases=True), rig.now)
     rig.epoch = 3
     rig.run(0.2, REST)
     assert rig.until(lambda: not rig.at_rest(), FORWARD)

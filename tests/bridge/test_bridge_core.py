@@ -13,7 +13,7 @@ from bridge.core.odometer import Odometer
 from bridge.core.picture import Picture
 from bridge.core.state_memory import Memory, Remembered
 from rolling_panda import messages as m
-from rolling_panda.messages.perception import PictureRequest
+from rolling_panda.messages.perception import CloseUpRequest
 from rolling_panda.messages.supervision import StopState
 from rolling_panda.topics import TOKEN
 from rolling_panda.transport.codec import StrictDecoder, encode
@@ -482,7 +482,7 @@ def test_nothing_beyond_the_limits_is_ever_sent(script: list[tuple[str, list[flo
         elif act == "release":
             bench.core.on_release(release(bench.state.stop_id or "none"), bench.now)
         elif act == "other":
-            bench.core.on_token(m.TokenRequest(token=bench.token, gives_way=True), bench.now)
+            bench.core.on_token(m.TokenRequest(token=bench.token, releases=True), bench.now)
             bench.epoch += 1
             bench.token += "x"
             bench.run(0.3, REST)
@@ -500,7 +500,7 @@ def test_a_picture_is_taken_at_once_for_the_controller_whose_commands_are_taken_
 
     def look(epoch: int, number: int) -> list[tuple[str, int]]:
         before = len(bench.outputs)
-        bench.core.on_picture(PictureRequest(epoch=epoch, number=number, point_id="p4"))
+        bench.core.on_picture(CloseUpRequest(epoch=epoch, number=number, point_id="p4"))
         bench.run(0.05, REST)
         frames = [out.frame for out in bench.outputs[before:] if out.frame is not None]
         assert all(frame.header == m.Header(pytest.approx(bench.now, abs=0.06), "camera") for frame in frames)

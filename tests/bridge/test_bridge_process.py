@@ -153,7 +153,7 @@ def test_the_widest_deadline_that_can_be_set_still_stops_it_within_its_bound(tmp
     """The largest speed, deadline and fading that any configuration may have, from the last command that was sent."""
     fastest = (*RobotModel().drive.wheels(0.3, 0.0), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     with running_bridge(tmp_path, deadline_s=0.2, fade_s=0.1, wheel_acceleration=12.5) as bridge:
-        assert [line.split(",")[0] for line in bridge.newest().wider] == [
+        assert [line.split(",")[0] for line in bridge.newest().relaxed_limits] == [
             "[bridge] fade_s = 0.1",
             "[bridge] deadline_s = 0.2",
         ]

@@ -3,7 +3,7 @@ from dataclasses import replace
 from bridge.core.camera_trigger import CameraTrigger, Posture
 from bridge.core.picture import Picture
 from rolling_panda import messages as m
-from rolling_panda.messages.perception import PictureRequest
+from rolling_panda.messages.perception import CloseUpRequest
 from rolling_panda.messages.robot import Intrinsics
 
 PICTURE = Picture(Intrinsics(4, 4, 1.0, 1.0, 2.0, 2.0), b"c", b"d", b"l")
@@ -46,14 +46,14 @@ def test_never_two_exposures_at_once_and_the_posture_is_that_of_the_exposure() -
 def test_a_picture_that_is_asked_for_is_taken_at_once_and_once_and_carries_its_point() -> None:
     shutter = CameraTrigger(2.0, 0.5, 1e-3)
     assert exposures(shutter, 0, 10) == [0]
-    shutter.want(PictureRequest(epoch=1, number=4, point_id="p7"))
+    shutter.want(CloseUpRequest(epoch=1, number=4, point_id="p7"))
     assert shutter.due(20)
     shutter.exposed(20, posture(0.02))
-    shutter.want(PictureRequest(epoch=1, number=4, point_id="p7"))
+    shutter.want(CloseUpRequest(epoch=1, number=4, point_id="p7"))
     frame = shutter.frame(PICTURE)
     assert frame is not None and (frame.point_id, frame.number) == ("p7", 4)
     assert not shutter.due(30), "a repetition takes no second picture"
-    shutter.want(PictureRequest(epoch=1, number=3, point_id="p6"))
+    shutter.want(CloseUpRequest(epoch=1, number=3, point_id="p6"))
     assert not shutter.due(30), "an older request comes too late"
     shutter.exposed(600, posture(0.6))
     usual = shutter.frame(PICTURE)

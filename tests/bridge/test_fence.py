@@ -100,7 +100,7 @@ class Askers(RuleBasedStateMachine):
 
     @rule(token=SOMEBODY)
     def give_way(self, token: str) -> None:
-        self.core.on_token(m.TokenRequest(token=token, gives_way=True), self.now)
+        self.core.on_token(m.TokenRequest(token=token, releases=True), self.now)
         if token == self.holder:
             self.holder = ""
 

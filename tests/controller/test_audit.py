@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from controller.ledger.audit import main
-from controller.ledger.store import FILE, Entry, Ledger
+from controller.ledger.store import FILE, SCHEMA_VERSION, Entry, Ledger
 from rolling_panda.runtime.state_folder import usual_state_folder
 
 
@@ -51,7 +51,7 @@ def test_a_ledger_of_a_newer_version_is_not_called_changed(
 ) -> None:
     database = sqlite3.connect(folder / FILE, isolation_level=None)
     database.execute("ALTER TABLE audit ADD COLUMN signed_by TEXT")
-    database.execute("PRAGMA user_version = 2")
+    database.execute(f"PRAGMA user_version = {SCHEMA_VERSION + 1}")
     database.close()
     code, out, err = run(capsys, command, "--state", str(folder))
     assert (code, out) == (1, "")

@@ -100,12 +100,12 @@ def test_the_old_holder_is_told_before_and_after_control_goes_over():
     it.claim(ADA, 0.0)
     before = it.message(0.0)
     assert it.ask(intents.TakeControl(user="Bob", client="b", confirmed=True), 0.1) == ""
-    assert it.message(0.1).coming == "Bob" and it.message(0.1).holder == "a"
+    assert it.message(0.1).next_user == "Bob" and it.message(0.1).holder == "a"
     assert it.review(None, False, 0.1) == "Bob takes control"
     it.review(None, True, 0.2)
     after = it.message(0.2)
-    assert (after.holder, after.user, after.coming) == ("b", "Bob", "")
-    assert after.told_number > before.told_number and "Bob" in after.told
+    assert (after.holder, after.user, after.next_user) == ("b", "Bob", "")
+    assert after.notice_number > before.notice_number and "Bob" in after.notice
 
 
 def test_somebody_who_has_seen_nothing_yet_is_told_so():

@@ -160,7 +160,7 @@ def test_the_way_in_beside_a_cane_is_not_left():
         r.step()
         away = max(away, r.controller.tracking.position_error if r.controller.tracking else 0.0)
         assert r.now < began + 6.0
-    assert entry(r, "a").state in ("INTENT", "DONE"), entry(r, "a").reason
+    assert entry(r, "a").state in ("CUTTING", "DONE"), entry(r, "a").reason
     assert away < 0.008
 
 

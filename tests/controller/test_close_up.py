@@ -2,11 +2,11 @@
 
 from controller.work.close_up import CloseUpClient
 from rolling_panda import messages as m
-from rolling_panda.messages.perception import CloseLook, Finding
+from rolling_panda.messages.perception import CloseUpResult, Finding
 
 
-def look(number: int, finding: Finding = "seen", point_id: str = "a") -> CloseLook:
-    return CloseLook(header=m.Header(), point_id=point_id, number=number, finding=finding)
+def look(number: int, finding: Finding = "seen", point_id: str = "a") -> CloseUpResult:
+    return CloseUpResult(header=m.Header(), point_id=point_id, number=number, finding=finding)
 
 
 def test_the_request_is_repeated_until_the_picture_comes_and_no_longer() -> None:

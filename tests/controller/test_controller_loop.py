@@ -198,7 +198,7 @@ def test_a_heartbeat_that_stands_still_is_no_sign_of_life(rest):
 def test_what_is_no_intent_is_refused_and_logged(rest):
     rest.until(lambda: rest.mode() == "IDLE")
     bad = msgspec.msgpack.encode({"type": "Arm", "user": "ada", "and": "more"})
-    replies = rest.server._session.get("rp/rp1/v1/service/intent", payload=bad, timeout=2.0)
+    replies = rest.server._session.get("rp/rp1/v2/service/intent", payload=bad, timeout=2.0)
     answers = [msgspec.msgpack.decode(reply.ok.payload.to_bytes()) for reply in replies if reply.ok is not None]
     assert [answer["ok"] for answer in answers] == [False]
     rest.until(lambda: any("refused on service/intent" in received.message.text for received in rest.events.drain()))

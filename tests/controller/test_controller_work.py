@@ -205,9 +205,9 @@ def test_refusals_say_why_and_allowed_agrees_with_them():
     r = robot()
     r.run(0.1)
     assert "arm the robot first" in r.ask(intents.Start(user="ada")).reason
-    decisions = {"AcceptPoint", "RejectPoint", "ReconsiderPoint", "ResolvePoint", "AcceptAll", "TurnApproach"}
-    orders = {"MoveInQueue", "PlannersOrder", "RestoreAccepted"}
-    previews = {"AskPreview", "ApprovePreview", "RequirePreview"}
+    decisions = {"AcceptPoint", "RejectPoint", "ReconsiderPoint", "ResolvePoint", "AcceptAll", "SetApproach"}
+    orders = {"MoveInQueue", "ResetOrder", "RestoreAccepted"}
+    previews = {"RequestPreview", "ApprovePreview", "RequirePreview"}
     assert set(r.state.allowed) == {"Arm"} | decisions | orders | previews
     assert r.ask(intents.Arm(user="ada")).ok
     assert r.ask(intents.Start(user="ada")).reason == "no point is accepted"

@@ -7,7 +7,7 @@ from controller.work.close_up import CloseUpClient
 from controller.work.cut_checks import PostCutCheck, not_as_accepted
 from controller.work.point_queue import PointQueue, Ticket
 from rolling_panda import messages as m
-from rolling_panda.messages.perception import CloseLook, Finding
+from rolling_panda.messages.perception import CloseUpResult, Finding
 from tests.support.controller_at_work import CONFIG, entry, finish, point, run_until, working
 
 
@@ -25,13 +25,15 @@ class Work:
         """One try; the state afterwards."""
         self.queue.intend("a", "c")
         self.verification.begin("a", outcome, f"says {outcome}", self.now)
-        assert self.state in ("INTENT", outcome)
+        assert self.state in ("CUTTING", outcome)
         self.now += 0.5
         if finding is not None:
             self.verification.look("a", self.now)
             due = self.eye.due(self.now)
             if due is not None:
-                look = CloseLook(header=m.Header(), point_id="a", number=due[0], finding=finding, reason="it is hidden")
+                look = CloseUpResult(
+                    header=m.Header(), point_id="a", number=due[0], finding=finding, reason="it is hidden"
+                )
                 self.eye.take(look, self.now)
         else:
             self.now += 5.0
@@ -105,7 +107,7 @@ TICKET = Ticket(ACCEPTED, "ACCEPTED", accepted=ACCEPTED)
 
 def look(finding="seen", dx=0.0, reason=""):
     position = (0.5 + dx, 0.75, 1.0) if finding == "seen" else None
-    return CloseLook(
+    return CloseUpResult(
         header=m.Header(), point_id="a", number=1, finding=finding, reason=reason, position=position, tangent=(0, 0, 1)
     )
 
@@ -164,9 +166,9 @@ def test_within_five_millimetres_the_place_of_the_closer_look_is_cut():
 def test_the_phase_is_told_while_the_robot_looks_and_the_blades_stay_out_of_the_canes():
     r = working((point("a", (0.5, 0.75, 1.0)),))
     r._looked = lambda request: None
-    run_until(r, lambda s: s is not None and s.phase == "LOOK", 20.0)
+    run_until(r, lambda s: s is not None and s.phase == "CLOSE_UP", 20.0)
     for _ in range(150):
         r.step()
-    assert r.state.phase == "LOOK" and r.state.T_odom_tool.position[1] < 0.75 - 0.19
+    assert r.state.phase == "CLOSE_UP" and r.state.T_odom_tool.position[1] < 0.75 - 0.19
     finish(r, 40.0)
     assert not r.cuts and "no picture of it came" in entry(r, "a").reason

@@ -64,7 +64,7 @@ def test_taking_over_needs_a_confirmation_and_a_robot_at_rest():
     assert not it.held_by(BOB)
     it.review(True, 0.3)
     assert it.held_by(BOB)
-    assert it.told == "Bob holds control, before Ada"
+    assert it.notice == "Bob holds control, before Ada"
 
 
 def test_of_two_who_take_at_once_the_first_gets_it():

@@ -13,7 +13,7 @@ import pytest
 
 from controller.ledger.check import reading, verify
 from controller.ledger.start import restored
-from controller.ledger.store import FILE, HEAD, Entry, Ledger, read
+from controller.ledger.store import FILE, HEAD, SCHEMA_VERSION, Entry, Ledger, read
 from rolling_panda.errors import LedgerError
 from rolling_panda.runtime.launch import child_environment
 
@@ -35,7 +35,7 @@ def newer(folder: Path) -> None:
         ledger.append([Entry("t", "start", "controller", '{"program": {"version": "7.1.0"}, "robots": 2}')])
     database = sqlite3.connect(folder / FILE, isolation_level=None)
     database.execute("ALTER TABLE audit ADD COLUMN signed_by TEXT")
-    database.execute("PRAGMA user_version = 2")
+    database.execute(f"PRAGMA user_version = {SCHEMA_VERSION + 1}")
     database.close()
 
 
@@ -128,19 +128,24 @@ def test_a_ledger_of_a_newer_version_is_called_newer_and_left_alone(tmp_path: Pa
     newer(tmp_path)
     as_it_was = path.read_bytes()
     for attempt in (Ledger, verify):
-        with pytest.raises(LedgerError, match="is of a newer version.*its schema is 2.*Use that version") as refused:
+        with pytest.raises(
+            LedgerError, match=f"newer version.*its schema is {SCHEMA_VERSION + 1}.*Use that"
+        ) as refused:
             attempt(tmp_path)
         assert "changed" not in str(refused.value)
     assert path.read_bytes() == as_it_was
 
 
-def test_a_ledger_from_before_its_tables_had_a_number_is_whole_and_goes_on(tmp_path: Path) -> None:
+@pytest.mark.parametrize("version", range(SCHEMA_VERSION))
+def test_a_ledger_of_an_older_version_is_whole_and_goes_on(tmp_path: Path, version: int) -> None:
     database = sqlite3.connect(written(tmp_path), isolation_level=None)
-    database.execute("PRAGMA user_version = 0")
-    database.close()
+    database.execute(f"PRAGMA user_version = {version}")
     assert verify(tmp_path).problem == ""
     with Ledger(tmp_path) as ledger:
         assert ledger.append([entry(13)]) == 13
+    assert database.execute("PRAGMA user_version").fetchone() == (SCHEMA_VERSION,), "an older program refuses it"
+    database.close()
+    assert verify(tmp_path).problem == ""
 
 
 def test_rows_of_a_newer_version_are_refused_by_naming_the_version(tmp_path: Path) -> None:

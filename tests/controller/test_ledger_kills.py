@@ -132,7 +132,7 @@ class Operator:
 def lost(folder, operator):
     """What was acknowledged and is not in the ledger as that or as something later."""
     states = {row.point.point_id: row.state for row in restored(folder).tickets}
-    kept = ("ACCEPTED", "UNREACHABLE", "INTENT", "DONE", "UNKNOWN")
+    kept = ("ACCEPTED", "UNREACHABLE", "CUTTING", "DONE", "UNKNOWN")
     gone = {name for name in operator.accepted if states.get(name) not in kept}
     return gone | {name for name in operator.done if states.get(name) != "DONE"}
 

@@ -132,7 +132,7 @@ def azimuth_of(T):
 @pytest.mark.parametrize("degrees", [-40.0, 30.0])
 def test_a_cut_is_approached_from_where_somebody_wants_it(degrees):
     r = accepted(robot())
-    assert r.ask(intents.TurnApproach(user="ada", point_id="a", azimuth=math.radians(degrees))).ok
+    assert r.ask(intents.SetApproach(user="ada", point_id="a", azimuth=math.radians(degrees))).ok
     assert r.ask(intents.Start(user="ada")).ok
     finish(r, 40.0)
     assert entry(r, "a").state == "DONE"
@@ -153,13 +153,13 @@ def test_the_plan_says_at_once_what_a_turn_means():
 
 def test_what_cannot_be_turned_is_refused():
     r = accepted(robot())
-    too_far = r.ask(intents.TurnApproach(user="ada", point_id="a", azimuth=LARGEST + 0.1))
+    too_far = r.ask(intents.SetApproach(user="ada", point_id="a", azimuth=LARGEST + 0.1))
     assert not too_far.ok and "at most 75°" in too_far.reason
-    assert "no point" in r.ask(intents.TurnApproach(user="ada", point_id="b", azimuth=0.1)).reason
+    assert "no point" in r.ask(intents.SetApproach(user="ada", point_id="b", azimuth=0.1)).reason
     assert r.ask(intents.Start(user="ada")).ok
     r.run(1.5)
     assert r.state.active_point_id == "a"
-    assert "being worked on" in r.ask(intents.TurnApproach(user="ada", point_id="a", azimuth=0.1)).reason
+    assert "being worked on" in r.ask(intents.SetApproach(user="ada", point_id="a", azimuth=0.1)).reason
 
 
 def test_a_restart_keeps_it_and_taking_it_back_leaves_it_to_the_search():

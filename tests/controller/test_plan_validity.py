@@ -21,7 +21,7 @@ def ticket(shown, state="ACCEPTED", accepted=None):
 def test_what_was_planned_and_what_the_work_has_done_since_leave_it_valid() -> None:
     assert points_changed(PLAN, [ticket(A), ticket(B)]) == ""
     assert points_changed(PLAN, [ticket(A, "DONE"), ticket(B), ticket(point("c", 2.0), "PROPOSED")]) == ""
-    assert points_changed(PLAN, [ticket(A, "INTENT"), ticket(B, "FAILED_NOT_CUT")]) == ""
+    assert points_changed(PLAN, [ticket(A, "CUTTING"), ticket(B, "FAILED_NOT_CUT")]) == ""
 
 
 @pytest.mark.parametrize(

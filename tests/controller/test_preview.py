@@ -69,7 +69,7 @@ def test_a_preview_of_one_cut_allows_that_one_alone(p):
     required(p)
     p.ask(intents.AcceptAll)
     shown = p.again("a")
-    assert [cut.point_id for cut in shown.cuts] == ["a"] and shown.left == 1
+    assert [cut.point_id for cut in shown.cuts] == ["a"] and shown.remaining == 1
     assert p.ask(intents.ApprovePreview, preview_hash=shown.preview_hash) == ""
     p.worked()
     assert [name for name, _ in p.robot.cuts] == ["a"]
@@ -178,8 +178,8 @@ def test_an_approval_that_expires_under_way_keeps_the_blades_from_closing(p):
 
 
 def test_there_is_nothing_to_preview_without_an_accepted_point(p):
-    assert "no point is accepted" in p.ask(intents.AskPreview)
-    assert "accept it first" in p.ask(intents.AskPreview, point_id="a")
+    assert "no point is accepted" in p.ask(intents.RequestPreview)
+    assert "accept it first" in p.ask(intents.RequestPreview, point_id="a")
     assert "no preview to approve" in p.ask(intents.ApprovePreview, preview_hash="")
 
 
@@ -198,6 +198,6 @@ def test_a_preview_that_failed_says_why():
 
     p = Previewed(POINTS, roll=fail)
     p.ask(intents.AcceptAll)
-    p.ask(intents.AskPreview)
+    p.ask(intents.RequestPreview)
     p.robot.run(0.3)
     assert p.state.phase == "none" and "the planning process ended" in p.state.reason

@@ -39,12 +39,12 @@ def test_a_cut_takes_from_the_one_before_or_from_the_start_of_work():
     told = report(
         (0.0, asked(intents.Arm(user="ada"))),
         (10.0, asked(intents.Start(user="ada"))),
-        (13.0, ticket("a", "INTENT", user="ada")),
+        (13.0, ticket("a", "CUTTING", user="ada")),
         (14.0, ticket("a", "DONE")),
-        (17.0, ticket("b", "INTENT", vine=2, user="ada")),
+        (17.0, ticket("b", "CUTTING", vine=2, user="ada")),
         (17.5, ticket("b", "FAILED_NOT_CUT", vine=2, reason="the wood stands")),
         (60.0, asked(intents.Start(user="ada"))),
-        (63.0, ticket("c", "INTENT", vine=2, user="ada")),
+        (63.0, ticket("c", "CUTTING", vine=2, user="ada")),
     )
     assert told.began_at == BEGAN
     assert [(cut.point_id, cut.outcome, round(cut.seconds, 3)) for cut in told.cuts] == [
@@ -85,7 +85,7 @@ def test_a_point_that_is_given_up_at_its_second_try_leaves_the_first_cut_as_it_w
     told = report(
         (0.0, ticket("a", "ACCEPTED", user="ada")),
         (1.0, asked(intents.Start(user="ada"))),
-        (2.0, ticket("a", "INTENT", user="ada")),
+        (2.0, ticket("a", "CUTTING", user="ada")),
         (3.0, failed),
         (10.0, ticket("a", "ACCEPTED", user="ada")),
         (11.0, asked(intents.Start(user="ada"))),
@@ -101,7 +101,7 @@ def test_a_point_that_is_given_up_at_its_second_try_leaves_the_first_cut_as_it_w
 def test_who_says_later_how_a_cut_ended_takes_the_robot_no_time():
     told = report(
         (0.0, asked(intents.Start(user="ada"))),
-        (3.0, ticket("a", "INTENT", user="ada")),
+        (3.0, ticket("a", "CUTTING", user="ada")),
         (5.0, ticket("a", "UNKNOWN", user="ada")),
         (500.0, ticket("a", "DONE", user="bob", reason="seen by eye")),
     )
@@ -132,7 +132,7 @@ def test_points_out_of_reach_are_counted_by_vine_until_they_are_in_reach_or_take
         return replace(ticket(name, state, vine), cut_id="")
 
     rows = [(1.0, row(name, "UNREACHABLE", vine)) for name, vine in (("a", 1), ("b", 2), ("c", 2), ("d", 3))]
-    rows += [(2.0, row("b", "ACCEPTED", 2)), (3.0, row("d", "REJECTED", 3)), (4.0, ticket("e", "INTENT", 2))]
+    rows += [(2.0, row("b", "ACCEPTED", 2)), (3.0, row("d", "REJECTED", 3)), (4.0, ticket("e", "CUTTING", 2))]
     told = report((0.5, asked(intents.Start(user="ada"))), *rows, (5.0, ticket("e", "DONE", 2)))
     assert [(vine.vine, vine.done, vine.unreachable) for vine in told.vines] == [(1, 0, 1), (2, 1, 1)]
     assert told.cut_count == 1, "nothing was tried where nothing can be reached"

@@ -2,12 +2,16 @@
 
 import hashlib
 import json
+import sqlite3
 
 import msgspec
 
-from controller.ledger.journal import ApproachRow, OrderRow, PreviewRow, TicketRow
+from controller.config import ControllerConfig
+from controller.ledger.check import verify
+from controller.ledger.journal import ApproachRow, Journal, OrderRow, PreviewRow, TicketRow
 from controller.ledger.start import Restored, restored, start_record
-from controller.ledger.store import Entry, Ledger
+from controller.ledger.store import FILE, Entry, Ledger
+from controller.work.point_queue import PointQueue
 from tests.support.fake_wire import pruning_point
 
 
@@ -42,3 +46,18 @@ def test_the_newest_of_each_row_is_restored_and_nothing_of_an_empty_ledger(tmp_p
     assert found.tickets == (other, new)
     assert (found.order, found.preview) == (orders[-1], PreviewRow(required=False))
     assert found.approaches == (("p2", ApproachRow(azimuth=0.2)), ("p1", ApproachRow(azimuth=0.3)))
+
+
+def test_a_cut_under_way_in_a_ledger_of_schema_1_is_restored(tmp_path):
+    row = TicketRow(point=pruning_point("p1"), state="CUTTING", cut_id="run-1", user="ada")
+    body = msgspec.json.encode(row).decode().replace('"state":"CUTTING"', '"state":"CUTTING"')
+    with Ledger(tmp_path) as ledger:
+        ledger.append([Entry("t", "ticket", "p1", body)])
+    database = sqlite3.connect(tmp_path / FILE, isolation_level=None)
+    database.execute("PRAGMA user_version = 1")
+    database.close()
+    assert restored(tmp_path).tickets == (row,)
+    queue = PointQueue(ControllerConfig(), Journal())
+    queue.restore(restored(tmp_path).tickets)
+    assert queue.entries()[0].state == "UNKNOWN", "somebody has to look how it ended"
+    assert verify(tmp_path).problem == "", "the row itself is as it was written"

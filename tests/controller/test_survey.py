@@ -11,25 +11,25 @@ from rolling_panda.messages.perception import Capsule
 from rolling_panda.model.robot import ARM_Q, RobotModel
 from tests.support.controller_at_work import CONFIG, finish, point, robot, run_until
 
-UNCLEAR = m.Abstention("its base is hidden", "another look", 1, 2)
+UNCLEAR = m.UndecidedSite("its base is hidden", "another look", 1, 2)
 ROBOT = RobotModel()
-ASKING = m.Abstention("two canes are alike", "operator", 1, 3)
+ASKING = m.UndecidedSite("two canes are alike", "operator", 1, 3)
 
 
-def surveying(distance, *abstained, **changes):
+def surveying(distance, *undecided_sites, **changes):
     r = robot(**changes)
     r.step()
-    tell(r, *abstained)
+    tell(r, *undecided_sites)
     r.step()
     assert r.ask(intents.Arm(user="ada")).ok
     assert r.ask(intents.Survey(user="ada", distance=distance)).ok
     return r
 
 
-def tell(r, *abstained):
+def tell(r, *undecided_sites):
     """What perception says of the row from now on: one point, and what it left open."""
     shown = (point("a", (0.5, 0.75, 1.0), vine=1, spur=1),)
-    told = m.PruningPoints(header=m.Header(), segmenter="none", frames=1, points=shown, abstained=abstained)
+    told = m.PruningPoints(header=m.Header(), segmenter="none", frames=1, points=shown, undecided_sites=undecided_sites)
     r._points = Sample(told, r.now)
 
 
@@ -112,7 +112,7 @@ def test_what_holds_the_base_back_pauses_it_with_the_reason():
 
 
 def test_a_place_left_open_is_looked_at_from_both_sides_and_from_before_it():
-    place = m.Abstention("its base is hidden", "another look", 1, 2, position=(1.9, 0.8, 0.95))
+    place = m.UndecidedSite("its base is hidden", "another look", 1, 2, position=(1.9, 0.8, 0.95))
     r = robot()
     r.step()
     tell(r, place)
@@ -145,16 +145,16 @@ def tool_ahead(r):
 
 
 @pytest.mark.parametrize(
-    ("abstained", "points", "says"),
+    ("undecided_sites", "points", "says"),
     [
         ((), ("p7",), "looked again at vine 1, spur 2: p7 shown"),
         (("two canes are alike",), (), "looked again at vine 1, spur 2: for you to decide: two canes are alike"),
         ((), (), "looked again at vine 1, spur 2: nothing is left open"),
     ],
 )
-def test_what_came_of_the_look_is_told(abstained, points, says):
-    left = tuple(m.Abstention(why, "operator", 1, 2, position=(0.4, 0.8, 0.95)) for why in abstained)
+def test_what_came_of_the_look_is_told(undecided_sites, points, says):
+    left = tuple(m.UndecidedSite(why, "operator", 1, 2, position=(0.4, 0.8, 0.95)) for why in undecided_sites)
     shown = tuple(point(name, (0.4, 0.75, 1.0), vine=1, spur=2) for name in points)
-    told = m.PruningPoints(header=m.Header(), segmenter="none", frames=1, points=shown, abstained=left)
-    place = m.Abstention("hidden", "another look", 1, 2, position=(0.4, 0.8, 0.95))
+    told = m.PruningPoints(header=m.Header(), segmenter="none", frames=1, points=shown, undecided_sites=left)
+    place = m.UndecidedSite("hidden", "another look", 1, 2, position=(0.4, 0.8, 0.95))
     assert looked_again(told, place) == says

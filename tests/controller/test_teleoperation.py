@@ -68,15 +68,15 @@ def test_tool_turns_with_the_gizmo_about_each_axis_and_stays_where_it_is(about):
     assert np.linalg.norm(tool(r).translation - target.translation) < 0.003
 
 
-@pytest.mark.parametrize("share", [1.0, 0.3])
-def test_the_tool_keeps_to_its_share_of_the_speed(share):
+@pytest.mark.parametrize("speed_scale", [1.0, 0.3])
+def test_the_tool_keeps_to_the_speed_scale(speed_scale):
     r = robot()
     hold(r, moved(tool(r), 0.6, 0.0, 0.0))
-    r.teleop = msgspec.structs.replace(r.teleop, share=share)
+    r.teleop = msgspec.structs.replace(r.teleop, speed_scale=speed_scale)
     before = tool(r).translation
     r.run(1.5)
     way = float(np.linalg.norm(tool(r).translation - before))
-    assert 0.6 * share * 1.5 * CONFIG.teleop_speed < way <= 1.08 * share * 1.5 * CONFIG.teleop_speed
+    assert 0.6 * speed_scale * 1.5 * CONFIG.teleop_speed < way <= 1.08 * speed_scale * 1.5 * CONFIG.teleop_speed
 
 
 def test_a_hand_is_told_how_near_it_is_to_what_and_what_holds_it():
@@ -84,8 +84,8 @@ def test_a_hand_is_told_how_near_it_is_to_what_and_what_holds_it():
     here = tool(r).translation
     hold(r, moved(tool(r), 0.0, 0.0, 0.0))
     r.run(0.2)
-    assert r.state.near is None or r.state.near.distance > 0.03
-    assert r.state.held_by == ""
+    assert r.state.proximity is None or r.state.proximity.distance > 0.03
+    assert r.state.limited_by == ""
     ahead = here + tool(r).rotation @ np.array([0.0, 0.0, 0.25])
     bottom, top = ahead - [0.0, 0.0, 0.4], ahead + [0.0, 0.0, 0.4]
     r.obstacles = (Capsule("post", tuple(bottom.tolist()), tuple(top.tolist()), 0.04, 0.04),)
@@ -94,11 +94,11 @@ def test_a_hand_is_told_how_near_it_is_to_what_and_what_holds_it():
     r.teleop = TeleopTarget(sequence=2, hold=True, user="ada", target=pose_message(target))
     r.run(3.0)
     assert r.state.mode == "TELEOP"
-    assert "post 0" in r.state.near.what and 0.0 < r.state.near.distance < 0.05
-    assert "post 0" in r.state.held_by
+    assert "post 0" in r.state.proximity.what and 0.0 < r.state.proximity.distance < 0.05
+    assert "post 0" in r.state.limited_by
     r.teleop = TeleopTarget(sequence=3, hold=False, user="ada")
     r.run(0.2)
-    assert (r.state.near, r.state.held_by) == (None, ""), "nothing is said of what nobody moves"
+    assert (r.state.proximity, r.state.limited_by) == (None, ""), "nothing is said of what nobody moves"
 
 
 def test_base_comes_along_when_the_gizmo_goes_far_and_stays_parallel_to_the_row():

@@ -51,7 +51,7 @@ def test_the_blades_wait_for_the_record_of_their_intent():
     r, frozen, waited = working(SHOWN), None, 0
     while waited < 40:
         for record in r.step().records:
-            if record.kind == "ticket" and record.body.state == "INTENT":
+            if record.kind == "ticket" and record.body.state == "CUTTING":
                 frozen = LedgerState(record.number - 1)
         if frozen is not None:
             r.ledger, waited = frozen, waited + 1

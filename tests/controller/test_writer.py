@@ -117,7 +117,7 @@ def test_the_end_writes_what_waits_and_closes(writers):
 def test_the_report_tells_of_what_is_durable_and_of_no_more(writers):
     disk = Disk()
     writer = writers(lambda: disk)
-    cutting, cut = (TicketRow(point=pruning_point("p1"), state=state, cut_id="c1") for state in ("INTENT", "DONE"))
+    cutting, cut = (TicketRow(point=pruning_point("p1"), state=state, cut_id="c1") for state in ("CUTTING", "DONE"))
     writer.write([Record(1, "ticket", "p1", cutting)])
     eventually(lambda: writer.report.cuts)
     assert [each.outcome for each in writer.report.cuts] == [""]

@@ -26,7 +26,7 @@ def left(**changes):
     told = Told(
         ordered={"run-1": 1.0},
         outcomes={"run-1": "DONE"},
-        states={("p1", "ACCEPTED"), ("p1", "INTENT"), ("p1", "DONE")},
+        states={("p1", "ACCEPTED"), ("p1", "CUTTING"), ("p1", "DONE")},
         granted=[("AcceptPoint", "p1"), ("Start", "")],
     )
     values = {
@@ -34,7 +34,7 @@ def left(**changes):
         "tickets": [
             ticket(1, "PROPOSED"),
             ticket(2, "ACCEPTED"),
-            ticket(3, "INTENT", cut_id="run-1"),
+            ticket(3, "CUTTING", cut_id="run-1"),
             ticket(4, "DONE", cut_id="run-1"),
         ],
         "requests": [
@@ -64,7 +64,7 @@ def test_blades_that_close_twice_for_one_order_or_one_acceptance_are_found():
 
 def test_what_was_told_and_is_in_no_row_is_lost():
     whole = left()
-    told = whole.tickets[:2] + [ticket(3, "INTENT", cut_id="run-1"), ticket(4, "UNKNOWN", cut_id="run-1")]
+    told = whole.tickets[:2] + [ticket(3, "CUTTING", cut_id="run-1"), ticket(4, "UNKNOWN", cut_id="run-1")]
     assert kinds(left(tickets=told)) == ["lost row"]
     assert kinds(left(requests=whole.requests[:1])) == ["lost row"]
     refused = [(5, "ada", {"ok": False, "asked": {"type": "AcceptPoint", "point_id": "p1"}}), whole.requests[1]]
@@ -72,7 +72,7 @@ def test_what_was_told_and_is_in_no_row_is_lost():
 
 
 def test_a_cut_without_an_intent_is_a_lost_row():
-    tickets = [row for row in left().tickets if row[2]["state"] != "INTENT"]
+    tickets = [row for row in left().tickets if row[2]["state"] != "CUTTING"]
     assert "lost row" in kinds(left(tickets=tickets))
 
 

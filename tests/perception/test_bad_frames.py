@@ -109,7 +109,7 @@ def test_what_shows_nothing_makes_no_point_and_says_why(
     for _ in range(AGAIN):
         told = seen.process(bad(good, what))
     assert told.points == ()
-    assert told.abstained and all(each.reason for each in told.abstained)
+    assert told.undecided_sites and all(each.reason for each in told.undecided_sites)
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ from perception.segmentation.frame import View, decode_frame
 from perception.segmentation.segmenter import LabelImageSegmenter
 from perception.tracking.close_up import check_close_up
 from rolling_panda import messages as m
-from rolling_panda.messages.perception import CloseLook
+from rolling_panda.messages.perception import CloseUpResult
 from rolling_panda.model.robot import RobotModel, configuration
 
 SEED = 210
@@ -80,7 +80,7 @@ def view_from_clear(row: Row, cut: RightCut, clearance: float = 0.22) -> View:
     return replace(view, R=place[:3, :3], t=place[:3, 3])
 
 
-def look(view: View, seen: m.PruningPoint) -> CloseLook:
+def look(view: View, seen: m.PruningPoint) -> CloseUpResult:
     return check_close_up(view, SEES, seen, 7, PerceptionConfig())
 
 

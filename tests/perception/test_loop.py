@@ -10,7 +10,7 @@ from rolling_panda import messages as m
 from rolling_panda.errors import MessageError
 from rolling_panda.messages.commands import SetRule
 from rolling_panda.messages.perception import Capsule, PointCrop
-from rolling_panda.topics import CROPS, EVENT, HEARTBEAT, LOOK, OBSTACLES, PLANT, POINTS
+from rolling_panda.topics import CLOSE_UP, CROPS, EVENT, HEARTBEAT, OBSTACLES, PLANT, POINTS
 from rolling_panda.transport.zenoh import Slot
 
 pytestmark = pytest.mark.alone
@@ -29,7 +29,7 @@ class Wire:
 
     def __init__(self):
         self.frames = Slot()
-        self.out = {topic.name: Recorder() for topic in (POINTS, LOOK, CROPS, OBSTACLES, HEARTBEAT, EVENT)}
+        self.out = {topic.name: Recorder() for topic in (POINTS, CLOSE_UP, CROPS, OBSTACLES, HEARTBEAT, EVENT)}
 
     def slot(self, topic):
         return self.frames

@@ -101,7 +101,7 @@ def test_while_a_joint_is_jogged_nothing_is_taken_for_cut_or_left_open():
         base, position = m.PlanarPose(0.2), (0.0, 0.0, *arm.tolist())
         place = model.pose(configuration(base, position), model.camera_id).homogeneous
         points = seen.process(camera_frame(camera.render(row, place, number), camera, base, position, number))
-        told.append(({point.point_id for point in points.points}, len(points.abstained)))
+        told.append(({point.point_id for point in points.points}, len(points.undecided_sites)))
     assert told[5][0] and all(each == told[5] for each in told[6:])
 
 

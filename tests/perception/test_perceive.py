@@ -90,7 +90,7 @@ def test_a_picture_of_noise_gives_no_point(tmp_path):
     noise = np.random.default_rng(0).integers(0, 255, (480, 640, 3), dtype=np.uint8)
     Image.fromarray(noise).save(tmp_path / "vine.jpg")
     said = run(tmp_path, tmp_path / "out")
-    assert said["points"] == [] and said["abstained"]
+    assert said["points"] == [] and said["undecided"]
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from perception.skeleton.topology import perceive_plant
 from perception.tracking.tracker import TrackerUpdate
 from rolling_panda import messages as m
 from rolling_panda.errors import MessageError
-from rolling_panda.messages.commands import AddPoint, AddPointInImage, MovePoint, SetRule, TakeRuleBack, TryRule
+from rolling_panda.messages.commands import AddPoint, AddPointInImage, EvaluateRule, MovePoint, SetRule, UndoRule
 from rolling_panda.messages.perception import point_digest
 from rolling_panda.model.robot import RobotModel, configuration
 from rolling_panda.transport.codec import StrictDecoder, encode
@@ -81,10 +81,10 @@ def test_a_corrupt_frame_changes_nothing(model, frames):
     assert seen.process(frames[3]) == undisturbed.process(frames[3])
 
 
-def test_without_labels_it_abstains_with_the_reason(model, frames):
+def test_without_labels_a_site_stays_undecided_with_the_reason(model, frames):
     result = perception(model).process(msgspec.structs.replace(frames[0], labels_zlib=b""))
     assert not result.points
-    assert "label image" in result.abstained[0].reason
+    assert "label image" in result.undecided_sites[0].reason
 
 
 def test_an_empty_view_gives_no_points(model, frames):
@@ -251,7 +251,7 @@ RULES = st.builds(
     system=st.sampled_from(["spur", "guyot"]),
     nodes_kept=st.integers(1, 5),
     fruiting_nodes=st.integers(3, 20),
-    keeper_diameter=st.sampled_from([0.003, 0.006, 0.009, 0.015]),
+    preferred_diameter=st.sampled_from([0.003, 0.006, 0.009, 0.015]),
     offset=st.sampled_from([0.005, 0.012, 0.02, 0.024, 0.05]),
 )
 
@@ -262,20 +262,20 @@ def test_what_a_rule_would_change_is_what_it_changes_and_taken_back_all_is_as_it
     begun, stages = held(surveyed), []
     for rule in rules:
         before = {point.point_id: point.digest for point in surveyed.points().points}
-        told = surveyed.answer(TryRule(user="Ada", rule=rule)).effect
+        told = surveyed.answer(EvaluateRule(user="Ada", rule=rule)).effect
         assert held(surveyed) == (stages[-1][1] if stages else begun), "to ask changes nothing"
         former = surveyed.points().rule
         assert surveyed.answer(SetRule(user="Ada", rule=rule)).ok
         after = {point.point_id: point.digest for point in surveyed.points().points}
-        assert set(told.gone) == before.keys() - after.keys()
-        assert set(told.moved) == {name for name in before.keys() & after.keys() if before[name] != after[name]}
+        assert set(told.removed) == before.keys() - after.keys()
+        assert set(told.changed) == {name for name in before.keys() & after.keys() if before[name] != after[name]}
         assert told.added == len(after.keys() - before.keys())
         if rule != former:
             stages.append((rule, held(surveyed)))
     while stages:
         rule, there = stages.pop()
         assert held(surveyed) == there
-        assert surveyed.answer(TakeRuleBack(user="Ada", rule=rule)).ok
+        assert surveyed.answer(UndoRule(user="Ada", rule=rule)).ok
     assert held(surveyed) == begun
 
 
@@ -288,15 +288,15 @@ def test_a_revision_never_has_two_contents_though_a_rule_is_taken_back(model, fr
         for point in seen.points().points:
             assert contents.setdefault((point.point_id, point.revision), point.digest) == point.digest
         if kept != 2:
-            assert seen.answer(TakeRuleBack(user="Ada", rule=rule)).ok
+            assert seen.answer(UndoRule(user="Ada", rule=rule)).ok
 
 
 def test_a_rule_that_was_changed_since_or_never_cannot_be_taken_back(model, frames):
     seen, _ = shown(model, frames)
-    assert "knows of no rule before" in seen.answer(TakeRuleBack(user="Ada", rule=m.PruningRule())).reason
+    assert "knows of no rule before" in seen.answer(UndoRule(user="Ada", rule=m.PruningRule())).reason
     seen.answer(SetRule(user="Ada", rule=m.PruningRule(nodes_kept=1)))
     before = held(seen)
-    assert "changed since" in seen.answer(TakeRuleBack(user="Ada", rule=m.PruningRule(nodes_kept=3))).reason
+    assert "changed since" in seen.answer(UndoRule(user="Ada", rule=m.PruningRule(nodes_kept=3))).reason
     assert held(seen) == before
 
 
@@ -307,7 +307,7 @@ def test_frames_come_on_after_a_rule_was_taken_back_and_what_a_person_placed_sta
     moved = next(point for point in seen.points().points if point.kind == "spur cut")
     assert seen.answer(MovePoint(user="Ada", point_id=moved.point_id, along=0.005)).ok
     seen.process(frames[0])
-    assert seen.answer(TakeRuleBack(user="Ada", rule=rule)).ok
+    assert seen.answer(UndoRule(user="Ada", rule=rule)).ok
     back = {point.point_id: point for point in seen.points().points}
     assert back[moved.point_id].kind == "by hand"
     others = [point for point in before if point.point_id != moved.point_id and point.spur != moved.spur]
@@ -325,7 +325,7 @@ def test_what_was_cut_meanwhile_does_not_come_back_with_the_rule(model, frames):
     # As `process` does where it sees the wood beyond a point gone.
     seen._apply(TrackerUpdate((), (np.array(cut.position),)))
     seen.withdrawn = ("told with the frame",)
-    seen.answer(TakeRuleBack(user="Ada", rule=rule))
+    seen.answer(UndoRule(user="Ada", rule=rule))
     assert seen.withdrawn == (), "what a frame took away is told once"
     back = {point.point_id for point in seen.points().points}
     # One node higher on the same cane there is no wood any more; all other cuts are asked for as before.

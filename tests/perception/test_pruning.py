@@ -43,7 +43,7 @@ def test_an_unseen_basal_bud_changes_nothing():
     assert cut_arc(cane(nodes=(0.10, 0.18, 0.26)), RULE) == cut_arc(cane(), RULE)
 
 
-def test_it_abstains_where_it_has_not_seen_enough():
+def test_a_spur_that_was_not_seen_enough_stays_undecided():
     assert "only 1 of 2" in str(cut_arc(cane(nodes=(0.02, 0.1)), RULE))
     assert "not in view" in str(cut_arc(cane(nodes=(0.02, 0.1, 0.18), length=0.19), RULE))
     assert "pruned already" in str(cut_arc(cane(nodes=(0.02, 0.1, 0.18), length=0.2, end="free"), RULE))

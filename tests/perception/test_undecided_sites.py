@@ -1,14 +1,14 @@
 """What is left open is remembered per spur, with what it needs, until it is settled."""
 
 from perception.plant.numbering import SpurNumber
-from perception.plant.undecided_sites import NeedsAnotherLook, UndecidedSites, abstention
+from perception.plant.undecided_sites import NeedsAnotherLook, UndecidedSites, undecided_site
 
 FIRST, SECOND = SpurNumber(1, 1), SpurNumber(2, 1)
 
 
 def test_a_reason_says_whether_another_look_may_help_or_only_a_person():
-    assert abstention(NeedsAnotherLook("the place is hidden"), FIRST).needs == "another look"
-    for_a_person = abstention("two canes are alike", FIRST)
+    assert undecided_site(NeedsAnotherLook("the place is hidden"), FIRST).needs == "another look"
+    for_a_person = undecided_site("two canes are alike", FIRST)
     assert (for_a_person.needs, for_a_person.vine, for_a_person.spur) == ("operator", 1, 1)
 
 
@@ -16,23 +16,23 @@ def test_what_a_spur_lacked_stays_told_while_others_are_looked_at_and_ends_when_
     sites = UndecidedSites()
     sites.update(SECOND, False, ["two canes are alike"])
     sites.update(FIRST, False, [NeedsAnotherLook("hidden")])
-    open_sites = [(each.vine, each.reason) for each in sites.abstentions(set())]
+    open_sites = [(each.vine, each.reason) for each in sites.remaining(set())]
     assert open_sites == [
         (1, "hidden"),
         (2, "two canes are alike"),
     ]
     sites.update(FIRST, True, [])
-    assert [each.vine for each in sites.abstentions(set())] == [2]
+    assert [each.vine for each in sites.remaining(set())] == [2]
     sites.clear()
-    assert sites.abstentions(set()) == ()
+    assert sites.remaining(set()) == ()
 
 
 def test_a_look_that_saw_too_little_is_not_told_of_a_spur_that_has_its_point():
     sites = UndecidedSites()
     sites.update(FIRST, False, [NeedsAnotherLook("hidden")])
-    assert sites.abstentions({FIRST}) == () and len(sites.abstentions({SECOND})) == 1
+    assert sites.remaining({FIRST}) == () and len(sites.remaining({SECOND})) == 1
     sites.update(FIRST, True, ["the other cane is left for a person"])
-    assert len(sites.abstentions({FIRST})) == 1
+    assert len(sites.remaining({FIRST})) == 1
 
 
 def test_what_was_seen_from_before_a_place_is_not_taken_back_from_aside():
@@ -40,20 +40,20 @@ def test_what_was_seen_from_before_a_place_is_not_taken_back_from_aside():
     sites.update(FIRST, False, [NeedsAnotherLook("at the edge")], (1.0, 0.8, 0.9), in_front=False)
     sites.update(FIRST, False, ["two canes are alike"], (1.0, 0.8, 0.9))
     sites.update(FIRST, False, [NeedsAnotherLook("at the edge")], (1.0, 0.8, 0.9), in_front=False)
-    (told,) = sites.abstentions(set())
+    (told,) = sites.remaining(set())
     assert (told.reason, told.needs, told.position) == ("two canes are alike", "operator", (1.0, 0.8, 0.9))
     sites.update(FIRST, True, [], in_front=False)
-    assert sites.abstentions(set()) == ()
+    assert sites.remaining(set()) == ()
 
 
 def test_looks_enough_from_before_a_place_leave_it_to_a_person():
     sites = UndecidedSites()
     for looks in range(1, 15):
         sites.update(FIRST, False, [NeedsAnotherLook("its base is hidden")])
-        (told,) = sites.abstentions(set())
+        (told,) = sites.remaining(set())
         assert told.needs == ("another look" if looks < 12 else "operator")
     assert told.reason == "its base is hidden; 14 looks from the front have not shown more: check it yourself"
     aside = UndecidedSites()
     for _ in range(30):
         aside.update(FIRST, False, [NeedsAnotherLook("at the edge")], in_front=False)
-    assert aside.abstentions(set())[0].needs == "another look"
+    assert aside.remaining(set())[0].needs == "another look"

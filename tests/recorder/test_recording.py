@@ -6,8 +6,10 @@ import math
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 from mcap.reader import make_reader
+from mcap.writer import Writer
 
 from recorder.foxglove import CHANNELS
 from recorder.recording import RecordingWriter, read_recording, schema_of
@@ -124,3 +126,20 @@ def test_a_file_that_exists_stays_and_what_is_no_recording_is_refused(tmp_path: 
         read_recording(path)
     with pytest.raises(InputError, match="cannot read"):
         read_recording(tmp_path / "nowhere.mcap")
+
+
+def test_a_recording_of_another_version_of_the_wire_is_refused_in_words(tmp_path: Path) -> None:
+    writer = RecordingWriter(tmp_path / "a.mcap", "rp1")
+    writer.write(topics.ODOMETRY, odometry(1), BEGAN)
+    writer.close()
+    assert read_recording(tmp_path / "a.mcap").messages[0].message() == odometry(1)
+    old = tmp_path / "old.mcap"
+    with old.open("wb") as file:
+        version_1 = Writer(file)
+        version_1.start()
+        schema = version_1.register_schema("rolling_panda.Odometry", "jsonschema", b"{}")
+        channel = version_1.register_channel("/state/odometry", "json", schema, {"robot_id": "rp1", "about": "base"})
+        version_1.add_message(channel, BEGAN, msgspec.json.encode(odometry(1)), BEGAN)
+        version_1.finish()
+    with pytest.raises(InputError, match="version 1 of the wire.*replays version 2 only.*Replay it with the version"):
+        read_recording(old)

@@ -10,10 +10,10 @@ from rolling_panda.messages import commands as intents
 REACH = (0.2, 1.6)
 
 
-def unclear(told: m.PruningPoints) -> list[m.Abstention]:
+def unclear(told: m.PruningPoints) -> list[m.UndecidedSite]:
     return [
         each
-        for each in told.abstained
+        for each in told.undecided_sites
         if each.needs == "another look" and each.position is not None and REACH[0] < each.position[0] < REACH[1]
     ]
 
@@ -34,6 +34,6 @@ def test_what_was_unclear_is_settled_by_looking_again(seed: int) -> None:
         told = loop.inputs.points.message
         assert (place.vine, place.spur) not in {(each.vine, each.spur) for each in unclear(told)}
         shown = [point for point in told.points if (point.vine, point.spur) == (place.vine, place.spur)]
-        left = [each for each in told.abstained if (each.vine, each.spur) == (place.vine, place.spur)]
+        left = [each for each in told.undecided_sites if (each.vine, each.spur) == (place.vine, place.spur)]
         assert shown or all(each.needs == "operator" and each.reason for each in left)
         assert any(f"looked again at vine {place.vine}, spur {place.spur}" in event.text for event in loop.events)

@@ -22,8 +22,8 @@ def server():
 
 def control(holder):
     return ControlState(
-        holder=holder, user="", expires_s=1.0, requested_by="", requested_key="", coming="", told="",
-        told_number=0, supervised=True,
+        holder=holder, user="", expires_s=1.0, requested_by="", requested_key="", next_user="", notice="",
+        notice_number=0, supervised=True,
     )  # fmt: skip
 
 

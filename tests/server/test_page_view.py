@@ -9,7 +9,7 @@ from rolling_panda.messages.robot import CameraFrame, Intrinsics, JointState
 from rolling_panda.messages.supervision import PlannedPoint, PointPlan, SessionPlan
 from rolling_panda.model.robot import RobotModel, configuration
 from server.robots.link import RobotLink
-from server.robots.page_view import PageView, project, speed_shares
+from server.robots.page_view import PageView, project, speed_ratios
 from tests.support.fake_wire import (
     ARM,
     HEADER,
@@ -80,9 +80,13 @@ def test_what_any_process_has_set_wider_than_usual_is_shown_once(wire):
     link = RobotLink(wire)
     view = PageView(link, MODEL, ("[server] invite_s = 900, usually 600",))
     both = "[robot] wheel_acceleration = 17.9, usually 15"
-    wire.deliver(topics.BRIDGE, msgspec.structs.replace(bridge_state(), wider=("[bridge] fade_s = 0.1", both)))
-    wire.deliver(topics.CONTROLLER, msgspec.structs.replace(controller_state(), wider=(both,)))
-    assert view.state(1, 0, now=0.0).wider == ("[bridge] fade_s = 0.1", both, "[server] invite_s = 900, usually 600")
+    wire.deliver(topics.BRIDGE, msgspec.structs.replace(bridge_state(), relaxed_limits=("[bridge] fade_s = 0.1", both)))
+    wire.deliver(topics.CONTROLLER, msgspec.structs.replace(controller_state(), relaxed_limits=(both,)))
+    assert view.state(1, 0, now=0.0).relaxed_limits == (
+        "[bridge] fade_s = 0.1",
+        both,
+        "[server] invite_s = 900, usually 600",
+    )
     link.close()
 
 
@@ -94,7 +98,7 @@ def test_a_process_that_is_gone_is_shown_as_gone(wire, view):
 
 def test_points_come_in_the_order_of_work_and_new_ones_last(wire, view):
     wire.deliver(topics.POINTS, pruning_points(pruning_point("a"), pruning_point("b"), pruning_point("c")))
-    queue = (m.QueueEntry("c", "INTENT"), m.QueueEntry("a", "ACCEPTED"))
+    queue = (m.QueueEntry("c", "CUTTING"), m.QueueEntry("a", "ACCEPTED"))
     wire.deliver(topics.CONTROLLER, controller_state(queue))
     rows = view.points(0.0).points
     assert [row.point.point_id for row in rows] == ["c", "a", "b"]
@@ -179,5 +183,5 @@ def test_a_canes_direction_in_the_image_goes_with_its_point(wire, view, along, a
 def test_speeds_are_fractions_of_each_actuators_limit():
     velocity = (-5.6, 0.0, 0.0, 2.175, 0.0, 0.0, 0.0, 0.0, -1.305)
     state = JointState(header=HEADER, sequence=1, position=(50.0, -50.0, *ARM), velocity=velocity)
-    shares = speed_shares(state, RobotModel().limits)
+    shares = speed_ratios(state, RobotModel().limits)
     assert shares == pytest.approx((0.5, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.5), abs=1e-3)

@@ -8,11 +8,11 @@ from rolling_panda.errors import ServiceError
 from rolling_panda.messages.commands import (
     AddPoint,
     AddPointInImage,
+    EvaluateRule,
     MovePoint,
     RestoreAccepted,
     SetRule,
-    TakeRuleBack,
-    TryRule,
+    UndoRule,
 )
 from rolling_panda.messages.perception import PointCrop
 from tests.support.fake_wire import FakeWire, controller_state, pruning_point, pruning_points
@@ -38,11 +38,11 @@ def server(running):
         ("rule", {}, SetRule(user="ann")),
         (
             "rule",
-            {"system": "guyot", "nodes_kept": 1, "fruiting_nodes": 10, "keeper_diameter": 0.007, "offset": 0.015},
+            {"system": "guyot", "nodes_kept": 1, "fruiting_nodes": 10, "preferred_diameter": 0.007, "offset": 0.015},
             SetRule(
                 user="ann",
                 rule=m.PruningRule(
-                    system="guyot", nodes_kept=1, fruiting_nodes=10, keeper_diameter=0.007, offset=0.015
+                    system="guyot", nodes_kept=1, fruiting_nodes=10, preferred_diameter=0.007, offset=0.015
                 ),
             ),
         ),
@@ -106,7 +106,7 @@ def test_a_viewer_may_not_ask_and_a_refusal_or_silence_is_told(server):
         assert client.post("/api/rule", json={}).status_code == 503
 
 
-EFFECT = m.RuleEffect(moved=("r1", "r2", "r3"), gone=("r4",), added=2)
+EFFECT = m.RuleEffect(changed=("r1", "r2", "r3"), removed=("r4",), added=2)
 
 
 def queue_of(server, **states):
@@ -126,14 +126,14 @@ def test_what_a_rule_would_change_is_told_with_the_acceptances_and_nothing_is_lo
             200,
             {
                 "ok": True,
-                "reason": "3 move, 1 goes, 2 come, 3 acceptances would be void",
-                "moved": 3,
-                "gone": 1,
+                "reason": "3 change, 1 goes, 2 come, 3 acceptances would be void",
+                "changed": 3,
+                "removed": 1,
                 "added": 2,
                 "voided": 3,
             },
         )
-        assert server.wire.asked == [TryRule(user="ann", rule=m.PruningRule(nodes_kept=3))]
+        assert server.wire.asked == [EvaluateRule(user="ann", rule=m.PruningRule(nodes_kept=3))]
         assert len(client.get("/api/events").json()["events"]) == events
         server.wire.answer = lambda request: m.Answer(ok=True, effect=m.RuleEffect())
         assert client.post("/api/rule/what-if", json={}).json()["reason"] == "nothing would change"
@@ -144,15 +144,15 @@ def test_a_rule_is_taken_back_by_perception_first_and_then_its_acceptances_by_th
     with server.client(user="ann") as client:
         assert client.post("/api/rule/undo", json={"nodes_kept": 3}).status_code == 200
         first, second = server.wire.asked
-        assert first == TakeRuleBack(user="ann", rule=rule)
+        assert first == UndoRule(user="ann", rule=rule)
         assert isinstance(second, RestoreAccepted) and (second.user, second.rule) == ("ann", rule)
         # Where perception cannot, nobody's acceptance is touched.
         server.wire.asked.clear()
         server.wire.answer = lambda request: m.Answer(ok=False, reason="the rule has been changed since; look again")
         answer = client.post("/api/rule/undo", json={"nodes_kept": 3})
         assert (answer.status_code, answer.json()["reason"]) == (409, "the rule has been changed since; look again")
-        assert [type(each) for each in server.wire.asked] == [TakeRuleBack]
-        server.wire.answer = lambda request: m.Answer(ok=isinstance(request, TakeRuleBack), reason="it began since")
+        assert [type(each) for each in server.wire.asked] == [UndoRule]
+        server.wire.answer = lambda request: m.Answer(ok=isinstance(request, UndoRule), reason="it began since")
         answer = client.post("/api/rule/undo", json={"nodes_kept": 3})
         assert answer.json()["reason"] == "the rule is back, its acceptances are not: it began since"
 

@@ -80,9 +80,9 @@ def at_work(scene: Scene, state: m.PointState, outcome: m.Outcome = "") -> None:
 
 def test_what_the_blades_have_cut_off_falls_for_a_second_and_is_gone(scene: Scene) -> None:
     scene.show_canes((cane(0.2), cane(0.4)))
-    at_work(scene, "INTENT")
+    at_work(scene, "CUTTING")
     assert highest(scene, 0.2) == pytest.approx(1.8) and falling(scene, "plant") is None
-    at_work(scene, "INTENT", "DONE")
+    at_work(scene, "CUTTING", "DONE")
     assert highest(scene, 0.2) == pytest.approx(0.9), "perception still tells it at its full length"
     assert highest(scene, 0.4) == pytest.approx(1.8), "its neighbour stands"
     piece = falling(scene, "plant")
@@ -108,8 +108,8 @@ def test_what_was_cut_before_anybody_looked_is_gone_without_a_fall(scene: Scene)
 
 def test_a_cane_that_is_seen_to_stand_after_its_cut_is_drawn_again(scene: Scene) -> None:
     scene.show_canes((cane(0.2),))
-    at_work(scene, "INTENT")
-    at_work(scene, "INTENT", "DONE")
+    at_work(scene, "CUTTING")
+    at_work(scene, "CUTTING", "DONE")
     at_work(scene, "FAILED_NOT_CUT", "DONE")
     assert highest(scene, 0.2) == pytest.approx(1.8)
 

@@ -69,7 +69,7 @@ def test_the_worst_is_told(changes: dict[str, object], severity: str, alarm: str
 
 def test_a_cut_that_nobody_knows_the_end_of_waits_for_somebody() -> None:
     row = p.PagePoint(pruning_point(), m.QueueEntry("p1", "UNKNOWN"))
-    points = p.PagePoints(points=(row,), abstained=(), segmenter="", frames=1, image_size=(1, 1))
+    points = p.PagePoints(points=(row,), undecided_sites=(), segmenter="", frames=1, image_size=(1, 1))
     assert (seen(points).severity, seen(points).alarm) == ("warning", "A cut ended unknown")
 
 

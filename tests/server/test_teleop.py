@@ -175,10 +175,10 @@ def test_while_the_base_is_held_the_gizmo_leads_nothing():
 
 def test_the_share_of_the_speed_goes_out_and_is_that_of_the_newest_renewal():
     teleop = holding()
-    assert teleop.next_message(10.0).share == 1.0
-    teleop.hold("a", "ann", 10.01, share=0.25)
+    assert teleop.next_message(10.0).speed_scale == 1.0
+    teleop.hold("a", "ann", 10.01, speed_scale=0.25)
     teleop.set_target("a", THERE)
-    assert teleop.next_message(10.02).share == 0.25
+    assert teleop.next_message(10.02).speed_scale == 0.25
 
 
 def test_after_a_short_silence_the_next_word_goes_on():

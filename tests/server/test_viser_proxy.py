@@ -150,7 +150,7 @@ def test_clicks_into_the_view_are_lines_of_sight_while_a_page_places_points(serv
         page.send(json.dumps({"type": "PlaceByHand", "active": True}))
         assert hear_clicks(view)
         say(view, POINTER)
-        line = hear_kind(page, "Sightline")
+        line = hear_kind(page, "PickRay")
         assert (line["origin"], line["direction"]) == ([0.0, 0.0, 1.5], [0.0, 1.0, 0.0])
         page.send(json.dumps({"type": "PlaceByHand", "active": False}))
         assert not hear_clicks(view)
@@ -242,9 +242,9 @@ def test_a_page_holds_base_or_joints_at_a_share_of_the_speed(server):
                 if message["type"] in ("PageState", "HoldEnded"):
                     sequence += 1
                     page.send(json.dumps({"type": "Ping", "number": sequence, "rendered": message.get("number", 0)}))
-                    held = {"hold": message["type"] == "PageState", **wanted, "share": 0.5}
+                    held = {"hold": message["type"] == "PageState", **wanted, "speed_scale": 0.5}
                     page.send(json.dumps({"type": "Hold", "sequence": sequence, **held}))
-                newest = [each for each in sent if each.hold and each.share == 0.5][-1:]
+                newest = [each for each in sent if each.hold and each.speed_scale == 0.5][-1:]
                 return bool(newest) and msgspec.to_builtins(newest[0]).items() >= wanted.items()
 
             return once

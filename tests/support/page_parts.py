@@ -10,7 +10,7 @@ from rolling_panda.messages import page as p
 from rolling_panda.messages.supervision import ControlState, PointPlan, PreviewState
 from tests.support.played_server import PlayedServer, controller, point
 
-PLANNING = ("AskPreview", "ApprovePreview", "RequirePreview", "TurnApproach", "MoveInQueue", "PlannersOrder", "Survey")
+PLANNING = ("RequestPreview", "ApprovePreview", "RequirePreview", "SetApproach", "MoveInQueue", "ResetOrder", "Survey")
 
 
 def ready(**changes: Any) -> m.ControllerState:
@@ -73,7 +73,7 @@ def leave(page: Page, server: PlayedServer) -> None:
     """Back to where a page begins, as far as another state would be taken for this one; a stop stays pressed."""
     lost = not server.online
     new = PlayedServer()
-    for name in ("bridge", "abstained", "gone", "role", "control", "stopped", "replay", "rule", "online"):
+    for name in ("bridge", "undecided_sites", "gone", "role", "control", "stopped", "replay", "rule", "online"):
         setattr(server, name, getattr(new, name))
     if lost:
         expect(page.locator("rp-link-banner")).to_be_hidden(timeout=10_000)
@@ -85,7 +85,7 @@ def leave(page: Page, server: PlayedServer) -> None:
 
 
 FREE = ControlState(
-    holder="", user="", expires_s=0.0, requested_by="", requested_key="", coming="", told="", told_number=0,
+    holder="", user="", expires_s=0.0, requested_by="", requested_key="", next_user="", notice="", notice_number=0,
     supervised=True,
 )  # fmt: skip
 

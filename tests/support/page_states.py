@@ -42,7 +42,7 @@ def _starting(page: Page, server: PlayedServer) -> None:
 
 def _no_points(page: Page, server: PlayedServer) -> None:
     show_mode(page, server, controller("IDLE", reason="the program has just started"))
-    server.abstained = ()
+    server.undecided_sites = ()
     show(server)
     expect(page.locator("rp-point")).to_have_count(0)
 
@@ -127,13 +127,13 @@ def _by_hand(page: Page, server: PlayedServer) -> None:
 def _places(page: Page, server: PlayedServer) -> None:
     working(page, server)
     where = (1.4, 0.8, 0.9)
-    server.abstained = (
-        m.Abstention("no node seen above the cordon", "another look", 3, 1, where),
-        m.Abstention("leaves hide the cane", "another look", 3, 2, where),
-        m.Abstention("a wire passes 3 mm from where the cut would be", "operator", 3, 4, where),
+    server.undecided_sites = (
+        m.UndecidedSite("no node seen above the cordon", "another look", 3, 1, where),
+        m.UndecidedSite("leaves hide the cane", "another look", 3, 2, where),
+        m.UndecidedSite("a wire passes 3 mm from where the cut would be", "operator", 3, 4, where),
     )
     server.tell(server.page_points())
-    page.locator(".abstained summary").first.click()
+    page.locator(".undecided-sites summary").first.click()
     expect(page.locator("button.look-again").first).to_be_visible()
 
 
@@ -211,8 +211,10 @@ def _by_hand_joints(page: Page, server: PlayedServer) -> None:
 
 def _held_back(page: Page, server: PlayedServer) -> None:
     _by_hand_tool(page, server)
-    near = m.Nearness(0.021, "the blades and a wire")
-    server.controller = controller("TELEOP", held_by="link 6 is 20 mm from the cordon: it goes no further", near=near)
+    near = m.Proximity(0.021, "the blades and a wire")
+    server.controller = controller(
+        "TELEOP", limited_by="link 6 is 20 mm from the cordon: it goes no further", proximity=near
+    )
     page.locator("#hold").dispatch_event("pointerdown", {"button": 0, "isPrimary": True, "pointerId": 1})
     expect(page.locator("#hold")).to_contain_text("Moving")
 

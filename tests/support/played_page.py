@@ -31,9 +31,9 @@ def server() -> PlayedServer:
             point(2, "ACCEPTED", user="Ada", reason="accepted by Ada"),
             point(3, "DONE", spur=2, cut_id="c1"),
         ),
-        abstained=(
-            m.Abstention("no node seen above the cordon", "another look", 1, 3),
-            m.Abstention("a wire passes close to the cut", "operator", 1, 4),
+        undecided_sites=(
+            m.UndecidedSite("no node seen above the cordon", "another look", 1, 3),
+            m.UndecidedSite("a wire passes close to the cut", "operator", 1, 4),
         ),
     )
 

@@ -114,7 +114,7 @@ class PlayedServer:
     controller: m.ControllerState | None = field(default_factory=controller)
     bridge: m.BridgeState | None = field(default_factory=bridge)
     points: tuple[page_messages.PagePoint, ...] = ()
-    abstained: tuple[m.Abstention, ...] = ()
+    undecided_sites: tuple[m.UndecidedSite, ...] = ()
     gone: dict[str, float] = field(default_factory=dict)
     role: types_messages.Role = "supervisor"
     #: Path of its page, where there are several.
@@ -229,14 +229,14 @@ class PlayedServer:
             client="me",
             control=self.control,
             stops=self.stopped,
-            speed_shares=(0.2, 0.1, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0),
+            speed_ratios=(0.2, 0.1, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0),
             replay=self.replay,
         )
 
     def page_points(self) -> page_messages.PagePoints:
         return page_messages.PagePoints(
             points=self.points,
-            abstained=self.abstained,
+            undecided_sites=self.undecided_sites,
             segmenter="simulated labels",
             frames=12,
             image_size=(480, 360),

@@ -51,7 +51,7 @@ class Previewed:
         return self.again()
 
     def again(self, point_id=""):
-        assert self.ask(intents.AskPreview, point_id=point_id) == ""
+        assert self.ask(intents.RequestPreview, point_id=point_id) == ""
         for _ in range(200):
             if self.state.phase == "ready":
                 return self.state

@@ -72,7 +72,7 @@ class Judge:
         written = self.disk.get(point_id)
         # An order that is on its way when its controller is killed may come after a start has found the intent.
         assert written is not None and written.cut_id == cut_id, "a cut before its intent"
-        assert written.state in ("INTENT", "UNKNOWN"), f"a cut of what is {written.state}"
+        assert written.state in ("CUTTING", "UNKNOWN"), f"a cut of what is {written.state}"
         assert np.abs(self.last_xi).max() <= 0.04 + 1e-9, "a cut in motion"
         del self.accepted[point_id]
         self.bitten[point_id] = True
@@ -103,7 +103,7 @@ class Judge:
 
     # --- the controller ------------------------------------------------------------------------------------------
 
-    def controller_started(self, written, in_intent):
+    def controller_started(self, written, in_cutting):
         self.told["starts of the controller"] += 1
         for point, number in self.revoked.items():
             if number <= written:
@@ -112,7 +112,7 @@ class Judge:
         # What the last one sent is followed until the bridge misses it.
         self.started_by = self.reset_by = ""
         self.last_sent, self.may_at = np.zeros(9), -1.0
-        self.kills_in_intent += in_intent
+        self.kills_in_intent += in_cutting
         self.heard_at, self.held_at, self.shown_points = {}, {}, set()
 
     def restored(self, queue):
@@ -224,7 +224,7 @@ class Judge:
         seen = {point.point_id: point.position for point in points.message.points}
         for name, where in self.accepted.items():
             ticket = world.controller._queue.get(name)
-            if name in self.revoked or ticket is None or ticket.state in ("INTENT", "UNKNOWN"):
+            if name in self.revoked or ticket is None or ticket.state in ("CUTTING", "UNKNOWN"):
                 continue
             # After a start an acceptance waits until its point is seen again.
             vanished = name not in seen and name in self.shown_points

@@ -73,11 +73,11 @@ class World:
         self.judge.bridge_started(bool(self.bridge._latch.stop_id))
 
     def start_controller(self):
-        in_intent = self.starts > 0 and any(t.state == "INTENT" for t in self.controller._queue.tickets())
+        in_cutting = self.starts > 0 and any(t.state == "CUTTING" for t in self.controller._queue.tickets())
         self.starts += 1
         self.controller = Controller(ControllerConfig(), RobotConfig(), run_id=f"r{self.starts}")
         written = self.chance.randrange(len(self.rows) + 1) if self.rows else 0
-        self.judge.controller_started(self.rows[written - 1][0] if written else self.durable, in_intent)
+        self.judge.controller_started(self.rows[written - 1][0] if written else self.durable, in_cutting)
         for _, name, body in self.rows[:written]:
             self.disk[name] = body
         self.rows, self.durable = [], 0

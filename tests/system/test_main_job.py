@@ -47,7 +47,7 @@ def start(page: Page, robot: LiveRobot, condition: Callable[[], object], what: s
 def ended(robot: LiveRobot, chosen: list[str]) -> bool:
     """Whether no chosen point is still to be cut."""
     states = {row["entry"]["point_id"]: row["entry"]["state"] for row in robot.points()}
-    return not {states.get(point_id) for point_id in chosen} & {"ACCEPTED", "INTENT"}
+    return not {states.get(point_id) for point_id in chosen} & {"ACCEPTED", "CUTTING"}
 
 
 @dataclass

@@ -27,7 +27,7 @@ from tests.rolling_panda.test_demo import Demo, running_demo
 pytestmark = pytest.mark.alone
 
 DOCUMENT = (Path(__file__).resolve().parents[2] / "docs/wire.md").read_text()
-ROOT = "rp/rp1/v1"
+ROOT = "rp/rp1/v2"
 #: Long enough for an answer over loopback, and for ten of the bridge's states.
 LISTEN_S = 0.5
 

@@ -97,7 +97,7 @@ def test_what_is_set_wider_than_usual_is_an_alarm_for_as_long_as_it_is(
 ) -> None:
     usual = server.state
     line = "[bridge] deadline_s = 0.195, usually 0.19 (allowed: more than 0, at most 0.2)"
-    monkeypatch.setattr(server, "state", lambda: msgspec.structs.replace(usual(), wider=(line,)))
+    monkeypatch.setattr(server, "state", lambda: msgspec.structs.replace(usual(), relaxed_limits=(line,)))
     expect(page.locator("#alarms li strong")).to_have_text([f"Set wider than usual: {line}"])
     expect(page.locator("#alarms li .act")).to_contain_text("have the configuration changed back")
     monkeypatch.setattr(server, "state", usual)

@@ -80,7 +80,7 @@ def a_whole_job(page: Page, server: PlayedServer) -> None:
     for number, end in ends:
         name = f"p{number}"
         for phase in ("APPROACH", "ADVANCE", "CUT", "RETREAT"):
-            states[number - 1] = "INTENT" if phase == "CUT" else "ACCEPTED"
+            states[number - 1] = "CUTTING" if phase == "CUT" else "ACCEPTED"
             tell("AUTO", f"{phase.lower()} of {name}, vine 1, spur {number}", phase=phase, active_point_id=name)
         states[number - 1] = end
         tell("PAUSED", f"{name} is {end}; a person has to look at it before the work goes on")

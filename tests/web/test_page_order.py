@@ -9,7 +9,7 @@ from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer, controller, point
 
 pytestmark = pytest.mark.browser
-ALLOWED = ("MoveInQueue", "PlannersOrder", "TurnApproach")
+ALLOWED = ("MoveInQueue", "ResetOrder", "SetApproach")
 
 
 @pytest.fixture

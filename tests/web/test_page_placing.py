@@ -19,7 +19,7 @@ def click_image(page: Page, u: float, v: float) -> None:
 
 def test_a_click_into_the_view_asks_for_a_point_only_while_points_are_placed(page: Page, server: PlayedServer) -> None:
     server.answers["/api/points/by-hand"] = PLACED
-    line = p.Sightline(origin=(0.0, -0.5, 1.2), direction=(0.0, 1.0, 0.0))
+    line = p.PickRay(origin=(0.0, -0.5, 1.2), direction=(0.0, 1.0, 0.0))
     server.tell(line)
     expect(page.locator("rp-placing")).to_be_hidden()
     page.locator("#add-by-hand").click()
@@ -54,7 +54,7 @@ def test_where_no_point_can_be_the_page_says_why(page: Page, server: PlayedServe
     refusal = "no known cane within 25 mm of there; click on a cane that is drawn"
     server.answers["/api/points/by-hand"] = (409, {"ok": False, "reason": refusal})
     page.locator("#add-by-hand").click()
-    server.tell(p.Sightline(origin=(0.0, -0.5, 1.2), direction=(0.0, 1.0, 0.0)))
+    server.tell(p.PickRay(origin=(0.0, -0.5, 1.2), direction=(0.0, 1.0, 0.0)))
     expect(page.locator(".toast")).to_contain_text(refusal)
     server.role = "viewer"
     expect(page.locator("rp-placing")).to_be_hidden()

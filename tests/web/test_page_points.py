@@ -48,7 +48,7 @@ def test_a_picture_is_fetched_once_a_revision_and_again_until_it_has_come(page: 
     until(page, lambda: server.crops_fetched[-1].startswith("/api/points/p1/crop?revision=5"))
 
 
-ASKED = {"system": "spur", "nodes_kept": 2, "fruiting_nodes": 8, "keeper_diameter": 0.006, "offset": 0.025}
+ASKED = {"system": "spur", "nodes_kept": 2, "fruiting_nodes": 8, "preferred_diameter": 0.006, "offset": 0.025}
 WORDS = "17 move, 3 go, 5 come, 4 acceptances would be void"
 
 

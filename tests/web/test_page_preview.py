@@ -11,7 +11,7 @@ from tests.support.played_page import until
 from tests.support.played_server import PlayedServer, controller, point
 
 pytestmark = pytest.mark.browser
-ALLOWED = ("AskPreview", "ApprovePreview", "RequirePreview", "MoveInQueue")
+ALLOWED = ("RequestPreview", "ApprovePreview", "RequirePreview", "MoveInQueue")
 
 
 def cut(name: str, begins: float) -> PreviewedCut:
@@ -36,7 +36,7 @@ STATE = PreviewState(
     preview_hash="ab" * 32,
     duration_s=10.0,
     cuts=(cut("p1", 0.0), cut("p2", 5.0)),
-    left=1,
+    remaining=1,
 )
 
 

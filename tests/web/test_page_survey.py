@@ -25,10 +25,10 @@ def test_a_place_that_needs_another_look_has_a_button_for_it_and_one_for_a_perso
     page: Page, server: PlayedServer
 ) -> None:
     server.controller = controller("READY", allowed=("Survey",))
-    unclear, deciding = server.abstained
-    server.abstained = (msgspec.structs.replace(unclear, position=(1.0, 0.8, 0.9)), deciding)
+    unclear, deciding = server.undecided_sites
+    server.undecided_sites = (msgspec.structs.replace(unclear, position=(1.0, 0.8, 0.9)), deciding)
     server.tell(server.page_points())
-    for box in page.locator("details.abstained").all():
+    for box in page.locator("details.undecided-sites").all():
         box.locator("summary").click()
     button = page.locator("button.look-again")
     expect(button).to_have_count(1)

@@ -144,14 +144,14 @@ def test_a_joint_turns_while_its_button_is_held_and_its_range_is_drawn(page: Pag
     joints = page.locator("rp-joints .joint")
     expect(joints).to_have_count(7)
     expect(joints.nth(3).locator(".scale")).to_have_attribute("title", "-166° to 166°")
-    page.locator("#share").fill("30")
+    page.locator("#speed-scale").fill("30")
     page.mouse.move(*middle(page, '[aria-label="Joint 4 down"]'))
     page.mouse.down()
     until(page, lambda: held(server))
     hold = newest(server)
     assert hold is not None and hold.joints is not None
     assert [joint for joint, speed in enumerate(hold.joints, 1) if speed] == [4] and hold.joints[3] < 0.0
-    assert hold.share == pytest.approx(0.3)
+    assert hold.speed_scale == pytest.approx(0.3)
     page.mouse.up()
     until(page, lambda: not held(server))
     for button in page.locator("rp-joints button").all():
@@ -194,9 +194,9 @@ def test_while_somebody_holds_the_page_says_what_is_near_and_what_holds_the_robo
     page.keyboard.down("h")
     until(page, lambda: held(server))
     hint = page.locator("rp-teleoperation > .hint")
-    server.controller = controller("TELEOP", near=m.Nearness(0.048, "blades and wire 3"))
+    server.controller = controller("TELEOP", proximity=m.Proximity(0.048, "blades and wire 3"))
     expect(hint).to_have_text("48 mm between blades and wire 3.")
-    server.controller = msgspec.structs.replace(server.controller, held_by="joint 4 holds the tool back")
+    server.controller = msgspec.structs.replace(server.controller, limited_by="joint 4 holds the tool back")
     expect(hint).to_have_text("Joint 4 holds the tool back.")
     expect(hint).to_have_class("hint warned")
     page.keyboard.up("h")

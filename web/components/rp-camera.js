@@ -19,7 +19,7 @@ const SIGNS = Object.freeze({
   PROPOSED: "M0 -.5v1",
   ACCEPTED: "M-3 .2l2.2 2.2L3 -2.4",
   UNREACHABLE: "M-4.5 0h9",
-  INTENT: "M-3 -3l6 6M3 -3l-6 6M0 -4v8",
+  CUTTING: "M-3 -3l6 6M3 -3l-6 6M0 -4v8",
   DONE: "M-3 .2l2.2 2.2L3 -2.4M-4.5 5.5h9",
   FAILED_NOT_CUT: "M0 -3.6v4M0 2.8v.6",
   UNKNOWN: "M-1.8 -2a1.9 1.9 0 1 1 2.4 2.4l-.6 1M0 3.4v.3",

@@ -35,7 +35,7 @@ class RpLease extends HTMLElement {
     const { held, mine, user } = holder();
     const asked = control?.requested_by ?? "";
     const mineAsked = asked !== "" && control?.requested_key === state?.client;
-    const coming = control?.coming ?? "";
+    const coming = control?.next_user ?? "";
     this.hidden = control === null || !((held && !mine) || asked || coming || (state?.viewers ?? 0) > 1);
     const who = mine ? "You hold control" : held ? `${user} holds control` : "Nobody holds control";
     setText(words, coming ? `Control goes to ${coming}` : mine && asked ? `${asked} asks for control` : who);
@@ -51,7 +51,7 @@ class RpLease extends HTMLElement {
     const sure = performance.now() < this.armed;
     setText(this.take, !held ? "Take control" : sure ? "Really take it?" : "Take");
     this.take.title = held ? `Takes control from ${user}: the robot stops first, and they are told` : "";
-    this.announceLoss(mine, control?.told_number ?? 0, control?.told ?? "");
+    this.announceLoss(mine, control?.notice_number ?? 0, control?.notice ?? "");
   }
 
   /** Taking control from another person needs a second press. */

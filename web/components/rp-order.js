@@ -1,6 +1,6 @@
 // The order of work, changed by dragging or keys. Only rows in view exist, so that thousands are possible.
 
-import { moveTo, orderWords, plannersOrder, whyNoMove, whyNoPlannersOrder, workOrder } from "../js/control/order.js";
+import { moveTo, orderWords, resetOrder, whyNoMove, whyNoResetOrder, workOrder } from "../js/control/order.js";
 import { select, selectAndReveal } from "../js/control/selection.js";
 import { inWords } from "../js/state/format.js";
 import { link, now, pageState, points, revealCount, selected } from "../js/state/page-state.js";
@@ -46,7 +46,7 @@ class RpOrder extends HTMLElement {
       class: "quiet",
       text: "Plan's order",
       attributes: { type: "button" },
-      onclick: () => void plannersOrder(),
+      onclick: () => void resetOrder(),
     });
     this.space = element("div", { class: "order-space" });
     this.mark = element("div", { class: "order-mark" });
@@ -91,7 +91,7 @@ class RpOrder extends HTMLElement {
     drawOn([selected, revealCount], () => this.reveal(this.place(selected.get())));
     drawOn([points, pageState, link, now, selected], () => {
       setText(words, orderWords());
-      setEnabled(back, whyNoPlannersOrder(), "Work in the order that the plan finds the quickest");
+      setEnabled(back, whyNoResetOrder(), "Work in the order that the plan finds the quickest");
       this.order = workOrder();
       this.draw();
     });

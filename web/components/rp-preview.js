@@ -111,7 +111,7 @@ function wordsOf(state, at) {
   const cut = at === null ? undefined : cutAt(at);
   const approved = state.phase === "approved" ? `Approved by ${state.approved_by}. ` : "";
   if (cut) return `${approved}${cut.point_id}: ${inWords(cut.result)} · ${least([cut])}`;
-  const left = state.left > 0 ? ` of ${state.cuts.length + state.left}` : "";
+  const left = state.remaining > 0 ? ` of ${state.cuts.length + state.remaining}` : "";
   const done = state.cuts.filter((each) => each.cut_s !== null).length;
   return `${approved}${done}${left} ${done === 1 ? "cut" : "cuts"} in ${state.duration_s.toFixed(1)} s · ${least(state.cuts)}`;
 }

@@ -97,7 +97,7 @@ class RpQueue extends HTMLElement {
       this.order = inOrder(page?.points ?? []);
       setText(summary, summaryWords(this.order));
       empty.hidden = this.order.length > 0;
-      for (const each of open) each.show(page?.abstained ?? []);
+      for (const each of open) each.show(page?.undecided_sites ?? []);
       this.placeRows(list, groups, may);
       this.rows.get(this.active)?.mark(true);
       this.choose();

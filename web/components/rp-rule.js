@@ -30,11 +30,11 @@ async function applyRule(rule) {
 function ruleWords(rule) {
   const nodes = rule.system === "guyot" ? `${rule.nodes_kept} + ${rule.fruiting_nodes}` : `${rule.nodes_kept}`;
   const word = rule.system === "guyot" ? "Guyot" : "Spur";
-  const thick = Number((1000 * rule.keeper_diameter).toFixed(1));
+  const thick = Number((1000 * rule.preferred_diameter).toFixed(1));
   return `${word} · ${nodes} nodes · ≥ ${thick} mm · ${Math.round(1000 * rule.offset)} mm past`;
 }
 
-/** @typedef {"nodes_kept"|"fruiting_nodes"|"keeper_diameter"|"offset"} Quantity */
+/** @typedef {"nodes_kept"|"fruiting_nodes"|"preferred_diameter"|"offset"} Quantity */
 
 /** Debounce of the sliders, and of changed points (ms). */
 const SETTLE_MS = 150;
@@ -48,7 +48,7 @@ const APPLIED_TIMEOUT_MS = 2500;
 const QUANTITIES = Object.freeze([
   { name: "nodes_kept", label: "Nodes kept on a spur", unit: "", scale: 1, range: [1, 5, 1] },
   { name: "fruiting_nodes", label: "Nodes on the fruiting cane", unit: "", scale: 1, range: [3, 20, 1] },
-  { name: "keeper_diameter", label: "Least thickness preferred", unit: " mm", scale: 1000, range: [3, 15, 0.5] },
+  { name: "preferred_diameter", label: "Least thickness preferred", unit: " mm", scale: 1000, range: [3, 15, 0.5] },
   { name: "offset", label: "Cut past the last node", unit: " mm", scale: 1000, range: [5, 50, 1] },
 ]);
 

@@ -162,7 +162,7 @@ class RpTeleoperation extends HTMLElement {
       ["world", "world", "Arrows along the row, across it and up"],
     ]);
     const speed = element("input", {
-      id: "share",
+      id: "speed-scale",
       attributes: {
         type: "range",
         min: "10",
@@ -213,12 +213,12 @@ class RpTeleoperation extends HTMLElement {
       setText(holdWords, holding ? "Moving…" : "Hold to move");
       setText(percent, `${Math.round(100 * hold.speedScale.get())} %`);
       const controller = pageState.get()?.controller ?? null;
-      const held = (holding && controller?.held_by) || "";
+      const held = (holding && controller?.limited_by) || "";
       setText(
         words,
         held ? `${held[0]?.toUpperCase()}${held.slice(1)}.` : explanation(why, holding, part, nearWords(controller)),
       );
-      words.classList.toggle("warned", held !== "" || (controller?.near?.distance ?? 1) < NEAR);
+      words.classList.toggle("warned", held !== "" || (controller?.proximity?.distance ?? 1) < NEAR);
     });
   }
 }

@@ -41,8 +41,8 @@ export function whyNoMove() {
 }
 
 /** Why the order cannot be reset to the plan's. */
-export function whyNoPlannersOrder() {
-  return whyNot("PlannersOrder") || (orderedBy() ? "" : "It is the plan's order already");
+export function whyNoResetOrder() {
+  return whyNot("ResetOrder") || (orderedBy() ? "" : "It is the plan's order already");
 }
 
 /**
@@ -58,7 +58,7 @@ export async function moveTo(pointId, to) {
   return ask(`Moving ${pointId}`, `api/points/${encodeURIComponent(pointId)}/work-before`, { before, revision });
 }
 
-export async function plannersOrder() {
+export async function resetOrder() {
   const revision = pageState.get()?.controller?.order.revision ?? 0;
   return ask("The plan's order", "api/order/planners", { revision });
 }
@@ -69,8 +69,8 @@ export async function plannersOrder() {
  * @param {PagePoint} row
  */
 export function whyNotTurn(row) {
-  if (["INTENT", "DONE", "UNKNOWN"].includes(row.entry.state)) return "It is cut, or may be";
-  return whyNot("TurnApproach");
+  if (["CUTTING", "DONE", "UNKNOWN"].includes(row.entry.state)) return "It is cut, or may be";
+  return whyNot("SetApproach");
 }
 
 /**

@@ -44,7 +44,7 @@ export async function placePoint(path, body) {
 
 /** Handle clicks in the 3-D view; stop placing without a link or permission. */
 export function initPlacing() {
-  socket.onsightline = ({ origin, direction }) => {
+  socket.onpickray = ({ origin, direction }) => {
     if (placing.get()) void placePoint("api/points/by-hand", { origin, direction });
   };
   link.subscribe(({ status }) => {

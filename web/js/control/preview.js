@@ -23,7 +23,7 @@ export function hasPreview() {
 
 /** Why no preview can be requested. @param {number} accepted Number of accepted points. */
 export function whyNoPreview(accepted) {
-  return whyNot("AskPreview") || (accepted === 0 ? "Accept a point first" : "");
+  return whyNot("RequestPreview") || (accepted === 0 ? "Accept a point first" : "");
 }
 
 /** Why the preview cannot be approved. */

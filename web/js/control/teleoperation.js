@@ -85,7 +85,7 @@ class HoldToMove {
   tell(hold) {
     this.sequence += 1;
     const { base = null, joints = null } = hold ? this.wanted() : {};
-    this.send({ type: "Hold", sequence: this.sequence, hold, base, joints, share: this.speedScale.get() });
+    this.send({ type: "Hold", sequence: this.sequence, hold, base, joints, speed_scale: this.speedScale.get() });
   }
 }
 

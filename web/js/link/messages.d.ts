@@ -34,9 +34,9 @@ export type Outcome = ""|"DONE"|"FAILED_NOT_CUT"|"UNKNOWN";
 
 export type Interrupted = ""|"work"|"survey"|"teleoperation";
 
-export type Phase = ""|"APPROACH"|"LOOK"|"ADVANCE"|"CUT"|"RETREAT"|"SURVEY";
+export type Phase = ""|"APPROACH"|"CLOSE_UP"|"ADVANCE"|"CUT"|"RETREAT"|"SURVEY";
 
-export type PointState = "PROPOSED"|"ACCEPTED"|"UNREACHABLE"|"INTENT"|"DONE"|"FAILED_NOT_CUT"|"UNKNOWN"|"REJECTED";
+export type PointState = "PROPOSED"|"ACCEPTED"|"UNREACHABLE"|"CUTTING"|"DONE"|"FAILED_NOT_CUT"|"UNKNOWN"|"REJECTED";
 
 export type Process = "bridge"|"controller"|"perception"|"server";
 
@@ -135,7 +135,7 @@ export interface QueueEntry {
 }
 
 /** The least distance (m) between two things that must not touch, and which; negative where they overlap. */
-export interface Nearness {
+export interface Proximity {
   distance: number;
   what: string;
 }
@@ -183,15 +183,15 @@ export interface ControllerState {
   /** Every point known, in the order of work. */
   queue: QueueEntry[];
   /** What keeps the robot from doing all that is asked of it now, by name; empty where nothing does. */
-  held_by: string;
+  limited_by: string;
   /** What it is nearest to touching while it moves; None where nothing is near. */
-  near: Nearness|null;
+  proximity: Proximity|null;
   /** Whose order that is. */
   order: QueueOrder;
   /** What a pause or a protective stop has ended; empty once something is begun, or the robot disarmed. */
   interrupted: Interrupted;
-  /** Numbers of safety that its configuration sets less strictly than usual, within their hard bounds. */
-  wider: string[];
+  /** Safety limits that its configuration sets less strictly than usual, within their hard bounds. */
+  relaxed_limits: string[];
 }
 
 /** How many messages of a topic were refused for one reason. */
@@ -231,8 +231,8 @@ export interface BridgeState {
   rejections: RejectionCount[];
   /** Charge of the base; None where nobody tells, as in the simulation. */
   battery: number|null;
-  /** Numbers of safety that its configuration sets less strictly than usual, within their hard bounds. */
-  wider: string[];
+  /** Safety limits that its configuration sets less strictly than usual, within their hard bounds. */
+  relaxed_limits: string[];
   /** First 16 hexadecimal digits of the SHA-256 of its random part; empty when nobody holds it. */
   holder: string;
   /** Of the command that the robot follows, or followed last. */
@@ -271,11 +271,11 @@ export interface ControlState {
   /** Their key. */
   requested_key: string;
   /** Name of who gets control as soon as the robot is at rest, empty when nobody. */
-  coming: string;
+  next_user: string;
   /** What became of control last, in words. */
-  told: string;
+  notice: string;
   /** Grows with each such change, so that a page tells each once. */
-  told_number: number;
+  notice_number: number;
   /** Whether somebody who may operate sees the robot now. */
   supervised: boolean;
 }
@@ -356,11 +356,11 @@ export interface PageState {
   /** What bridge and controller hold latched. */
   stops: StopState[];
   /** Speed of each actuator in parts of its limit, wheels first; empty before the first joint state. */
-  speed_shares: number[];
+  speed_ratios: number[];
   /** The recording that is played; None with a robot. */
   replay: ReplayState|null;
-  /** Numbers of safety that a process's configuration sets less strictly than usual. */
-  wider: string[];
+  /** Safety limits that a process's configuration sets less strictly than usual. */
+  relaxed_limits: string[];
   /** The robot's wire is not protected: every program on its machine can move it. */
   plain_wire: boolean;
 }
@@ -405,7 +405,7 @@ export interface PagePoint {
 }
 
 /** A place without a point: why, and what it needs. Without vine and spur (0) it is about no spur in particular. `position` is where the spur was seen (m, odom). */
-export interface Abstention {
+export interface UndecidedSite {
   reason: string;
   needs: Need;
   vine: number;
@@ -421,20 +421,20 @@ export interface PagePlan {
   duration_s: number;
 }
 
-/** Nodes kept on a spur, and on a Guyot vine's new cane; least diameter of a keeper (m); past the last node (m). */
+/** Nodes kept on a spur, and on a Guyot vine's new cane; least diameter preferred (m); past the last node (m). */
 export interface PruningRule {
   system: "spur"|"guyot";
   nodes_kept: number;
   fruiting_nodes: number;
-  keeper_diameter: number;
+  preferred_diameter: number;
   offset: number;
 }
 
-/** Sent when it changed: every point in the order of work, and the places where perception abstained. */
+/** Sent when it changed: every point in the order of work, and the undecided sites. */
 export interface PagePoints {
   type: "PagePoints";
   points: PagePoint[];
-  abstained: Abstention[];
+  undecided_sites: UndecidedSite[];
   segmenter: string;
   frames: number;
   image_size: [number, number];
@@ -490,7 +490,7 @@ export interface PreviewState {
   /** Points in their order. */
   cuts: PreviewedCut[];
   /** Accepted points that come after those, and are not in it. */
-  left: number;
+  remaining: number;
 }
 
 /** Sent when the controller has said it: the preview, and whether it is approved. */
@@ -521,8 +521,8 @@ export interface Selected {
 }
 
 /** A click into the 3-D view of a session that places points: from `origin` along `direction` (odom, m). */
-export interface Sightline {
-  type: "Sightline";
+export interface PickRay {
+  type: "PickRay";
   origin: Vector3;
   direction: UnitVector3;
 }
@@ -571,7 +571,7 @@ export interface Hold {
   /** The arm's joints turn so (rad/s), instead of the tool. */
   joints?: ArmVelocities|null;
   /** Of the usual speed. */
-  share?: number;
+  speed_scale?: number;
 }
 
 /** Show or hide this session's gizmo in the 3-D view; shown, it starts at the tool, along these axes. */
@@ -581,7 +581,7 @@ export interface ShowGizmo {
   axes?: GizmoAxes;
 }
 
-/** From now on clicks into the 3-D view are meant for new points, each answered with a `Sightline`; or no more. */
+/** From now on clicks into the 3-D view are meant for new points, each answered with a `PickRay`; or no more. */
 export interface PlaceByHand {
   type: "PlaceByHand";
   active: boolean;
@@ -688,6 +688,6 @@ export interface SessionReport {
   control: ControlReport[];
 }
 
-export type FromServer = PageState|PagePoints|PagePreview|PageEvents|Selected|Sightline|Measured|HoldEnded|Pong;
+export type FromServer = PageState|PagePoints|PagePreview|PageEvents|Selected|PickRay|Measured|HoldEnded|Pong;
 
 export type FromPage = Ping|Hold|ShowGizmo|PlaceByHand|PlaceCamera|ShowLayers|Measure|ShowPreview|Select;

@@ -5,7 +5,7 @@ import { isSignedIn } from "./api.js";
 
 /** @typedef {import("./messages.js").FromPage} FromPage */
 /** @typedef {import("./messages.js").FromServer} FromServer */
-/** @typedef {import("./messages.js").Sightline} Sightline */
+/** @typedef {import("./messages.js").PickRay} PickRay */
 
 const PING_MS = 100;
 /**
@@ -25,8 +25,8 @@ class PageSocket {
     this.onclose = () => {};
     /** The server has ended or refused a hold. @type {(reason: string) => void} */
     this.onholdended = () => {};
-    /** A click in the 3-D view, to place a point. @type {(line: Sightline) => void} */
-    this.onsightline = () => {};
+    /** A click in the 3-D view, to place a point. @type {(line: PickRay) => void} */
+    this.onpickray = () => {};
     /** The distance of two clicked places. @type {(told: import("./messages.js").Measured) => void} */
     this.onmeasured = () => {};
     /** A point was clicked in the 3-D view. @type {(pointId: string) => void} */
@@ -131,8 +131,8 @@ class PageSocket {
       case "Selected":
         this.onselected(message.point_id);
         break;
-      case "Sightline":
-        this.onsightline(message);
+      case "PickRay":
+        this.onpickray(message);
         break;
       case "Measured":
         this.onmeasured(message);

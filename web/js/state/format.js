@@ -5,7 +5,7 @@ export const POINT_WORDS = Object.freeze({
   PROPOSED: "Proposed",
   ACCEPTED: "Accepted",
   UNREACHABLE: "Cannot reach",
-  INTENT: "Cutting",
+  CUTTING: "Cutting",
   DONE: "Done",
   FAILED_NOT_CUT: "Not cut",
   UNKNOWN: "Unknown",
@@ -28,7 +28,7 @@ export const MODE_WORDS = Object.freeze({
 export const PHASE_WORDS = Object.freeze({
   "": "",
   APPROACH: "approach",
-  LOOK: "closer look",
+  CLOSE_UP: "closer look",
   ADVANCE: "advance",
   CUT: "cut",
   RETREAT: "retreat",
@@ -54,7 +54,7 @@ export function inWords(text) {
  * @param {import("../link/messages.js").ControllerState|null} controller
  */
 export function nearWords(controller) {
-  const near = controller?.near ?? null;
+  const near = controller?.proximity ?? null;
   return near === null ? "" : `${(near.distance * 1000).toFixed(0)} mm between ${near.what}.`;
 }
 

@@ -136,7 +136,7 @@ function ofModes({ controller, bridge, stops }) {
  * @param {PageState} state
  * @returns {Alarm[]}
  */
-function ofWork({ controller, bridge, wider, plain_wire }) {
+function ofWork({ controller, bridge, relaxed_limits, plain_wire }) {
   const found = [];
   if (plain_wire) {
     found.push(
@@ -148,12 +148,12 @@ function ofWork({ controller, bridge, wider, plain_wire }) {
       ),
     );
   }
-  if (wider.length > 0) {
+  if (relaxed_limits.length > 0) {
     found.push(
       alarm(
         "wider",
         "warning",
-        `Set wider than usual: ${wider.join("; ")}`,
+        `Set wider than usual: ${relaxed_limits.join("; ")}`,
         "If nobody means that, have the configuration changed back.",
       ),
     );

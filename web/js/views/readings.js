@@ -152,7 +152,7 @@ export const READINGS = Object.freeze([
     fullScale: 100,
     warnAbove: 95,
     format: (/** @type {number} */ value) => value.toFixed(0),
-    read: (/** @type {PageState} */ state) => largest(state.speed_shares.slice(0, 2), 100),
+    read: (/** @type {PageState} */ state) => largest(state.speed_ratios.slice(0, 2), 100),
   },
   {
     id: "arm-speed",
@@ -163,7 +163,7 @@ export const READINGS = Object.freeze([
     fullScale: 100,
     warnAbove: 95,
     format: (/** @type {number} */ value) => value.toFixed(0),
-    read: (/** @type {PageState} */ state) => largest(state.speed_shares.slice(2), 100),
+    read: (/** @type {PageState} */ state) => largest(state.speed_ratios.slice(2), 100),
   },
   {
     id: "command-round-trip",

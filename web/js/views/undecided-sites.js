@@ -6,7 +6,7 @@ import { link, now, pageState } from "../state/page-state.js";
 import { drawOn } from "../state/signals.js";
 import { element, setEnabled, setText } from "./dom.js";
 
-/** @typedef {import("../link/messages.js").Abstention} Abstention */
+/** @typedef {import("../link/messages.js").UndecidedSite} UndecidedSite */
 
 const HINT = "Drive there and look at it from both its sides; nothing is cut";
 
@@ -19,7 +19,7 @@ const HINT = "Drive there and look at it from both its sides; nothing is cut";
 export function undecidedList(needs, title) {
   const summary = element("summary");
   const list = element("ul");
-  const box = element("details", { class: "abstained", attributes: { "data-needs": needs } }, summary, list);
+  const box = element("details", { class: "undecided-sites", attributes: { "data-needs": needs } }, summary, list);
   drawOn([pageState, link, now], () => {
     const buttons = /** @type {NodeListOf<HTMLButtonElement>} */ (list.querySelectorAll("button.look-again"));
     if (buttons.length === 0) return;
@@ -29,7 +29,7 @@ export function undecidedList(needs, title) {
   let shown = "";
   return {
     box,
-    /** @param {readonly Abstention[]} all */
+    /** @param {readonly UndecidedSite[]} all */
     show(all) {
       const sites = all.filter((each) => each.needs === needs);
       const lines = sites.map(siteWords);
@@ -43,13 +43,13 @@ export function undecidedList(needs, title) {
   };
 }
 
-/** @param {Abstention} site */
+/** @param {UndecidedSite} site */
 function siteWords(site) {
   return site.vine === 0 ? site.reason : `Vine ${site.vine} · spur ${site.spur}: ${site.reason}`;
 }
 
 /**
- * @param {Abstention} site
+ * @param {UndecidedSite} site
  * @returns {HTMLElement}
  */
 function siteItem(site) {
