@@ -11,7 +11,7 @@ from controller.planning.preview_plan import Preview, PreviewRequest
 from controller.planning.work_plan import PlanRequest, WorkPlan
 from rolling_panda.config import RobotConfig
 from rolling_panda.errors import RollingPandaError
-from rolling_panda.runtime.priority import take_priority
+from rolling_panda.runtime.scheduling import set_priority
 
 #: How long the process is waited for when it is told to end (s).
 _END_S = 2.0
@@ -67,7 +67,7 @@ class PlannerProcess:
 
     def _run(self) -> None:
         # Scheduling is a thread's own, and the process that it starts inherits it.
-        take_priority("background")
+        set_priority("background")
         connection = self._start()
         while (request := self._next()) is not None and connection is not None:
             try:

@@ -13,8 +13,8 @@ from typing import Any
 from recorder.recording import RecordingWriter
 from rolling_panda import messages as m
 from rolling_panda.errors import RollingPandaError
-from rolling_panda.runtime.priority import take_priority
 from rolling_panda.runtime.process import add_common_arguments, end_with_parent, stop_on_signals, wire_config
+from rolling_panda.runtime.scheduling import set_priority
 from rolling_panda.topics import TOPICS, Topic
 from rolling_panda.transport.access import RECORDER
 from rolling_panda.transport.zenoh import Onlooker
@@ -37,7 +37,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     stopping = stop_on_signals()
     if arguments.exit_with_parent:
         end_with_parent(stopping)
-    take_priority("background")
+    set_priority("background")
     try:
         with Onlooker(wire_config(arguments), arguments.robot_id, RECORDER) as wire:
             count, dropped = record(wire, arguments.out, stopping)

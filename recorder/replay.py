@@ -17,8 +17,8 @@ from recorder.player import Player, is_played
 from recorder.recording import read_recording
 from rolling_panda import messages as m
 from rolling_panda import topics
+from rolling_panda.cli.child_processes import ChildProcesses
 from rolling_panda.cli.demo import choose_router_port, write_secret
-from rolling_panda.cli.demo_supervisor import Supervisor
 from rolling_panda.config import TransportConfig
 from rolling_panda.errors import InputError, RollingPandaError
 from rolling_panda.messages.commands import SeekReplay
@@ -62,21 +62,21 @@ def _run(arguments: argparse.Namespace, stopping: threading.Event) -> int:
         router = replace(wire, mode="router", connect=(), listen=(endpoint,))
         stack.callback(Router(router).close)
         replay = stack.enter_context(Replay(wire, Player(recording, arguments.file.name, time.monotonic())))
-        supervisor = Supervisor(folder)
-        stack.callback(supervisor.end)
+        children = ChildProcesses(folder)
+        stack.callback(children.end)
         token, token_file = secrets.token_urlsafe(32), folder / "sign-in-token"
         write_secret(token_file, token)
         options = ["--connect", endpoint, "--certificates", certificates, "--port", str(arguments.port)]
         options += ["--sign-in-token-file", str(token_file), "--state", str(folder), "--exit-with-parent"]
-        supervisor.start("server", python_command("server", options))
+        children.start("server", python_command("server", options))
         page = f"http://127.0.0.1:{arguments.port}"
         print(f"{arguments.file}: {recording.duration_s:.0f} s, {len(recording.messages)} messages", flush=True)
         print(f"\nSign in once with this link, on this machine:\n\n    {page}/sign-in?token={token}\n", flush=True)
         while not stopping.wait(_PERIOD_S):
             replay.step(time.monotonic())
-            death = supervisor.death()
-            if death is not None:
-                raise InputError(f"the page's server ended {death.how}: {death.tail}")
+            exited = children.exited()
+            if exited is not None:
+                raise InputError(f"the page's server ended {exited.cause}: {exited.output}")
     return 0
 
 

@@ -18,8 +18,8 @@ from rolling_panda.bounds import wider
 from rolling_panda.config import load_section
 from rolling_panda.errors import InputError
 from rolling_panda.model.robot import RobotModel
-from rolling_panda.runtime.garbage import keep_what_is_there
 from rolling_panda.runtime.process import ProcessContext, wire_config
+from rolling_panda.runtime.scheduling import freeze_heap
 from rolling_panda.transport.settings import PLAIN_WARNING
 from rolling_panda.transport.zenoh import Transport
 from server.app import create_app
@@ -86,7 +86,7 @@ def run(context: ProcessContext) -> None:
             wires = {arguments.robot_id: context.transport}
             for name in arguments.also_robot_id:
                 wires[name] = others.enter_context(Transport(context.wire, "server", name))
-            asyncio.run(serve(config, wires, sessions, door, address, context.stopping, allowed, keep_what_is_there))
+            asyncio.run(serve(config, wires, sessions, door, address, context.stopping, allowed, freeze_heap))
 
 
 def listen(host: str, port: int) -> Listener:

@@ -36,8 +36,8 @@ def ordinary_scheduling(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     Otherwise every program that a later test starts would inherit real-time priority, a browser for instance, and keep
     the processor from the server that it waits for.
     """
-    for module in ("process", "router"):
-        monkeypatch.setattr(f"rolling_panda.runtime.{module}.take_priority", lambda role: None)
+    for module in ("runtime.process", "cli.router"):
+        monkeypatch.setattr(f"rolling_panda.{module}.set_priority", lambda priority: None)
     before = os.sched_getscheduler(0), os.getpriority(os.PRIO_PROCESS, 0)
     yield
     assert (os.sched_getscheduler(0), os.getpriority(os.PRIO_PROCESS, 0)) == before, "a test changed its own priority"

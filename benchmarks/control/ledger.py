@@ -20,7 +20,7 @@ from controller.ledger.store import Entry, Ledger
 from controller.ledger.writer import LedgerWriter
 from rolling_panda import messages as m
 from rolling_panda.messages import commands as intents
-from rolling_panda.runtime.priority import take_priority
+from rolling_panda.runtime.scheduling import set_priority
 
 _PERIOD_S = 0.01
 _SLOW_S = 0.2
@@ -121,7 +121,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if arguments.seconds <= 0.0:
         parser.error("--seconds must be positive")
     if arguments.real_time:
-        take_priority("control")
+        set_priority("control")
     steps = round(arguments.seconds / _PERIOD_S)
     durations: dict[str, list[float]] = {"no disk": [], "disk": [], "slow disk": []}
     with tempfile.TemporaryDirectory() as folder:

@@ -22,8 +22,8 @@ import zenoh
 
 from benchmarks.faults.lossy_link import BadWay, Parcel, WayFault
 from rolling_panda.config import TransportConfig
-from rolling_panda.runtime.priority import take_priority
 from rolling_panda.runtime.process import ROBOT_ID
+from rolling_panda.runtime.scheduling import set_priority
 from rolling_panda.topics import SERVICES, key
 from rolling_panda.transport.settings import wire_settings
 
@@ -173,7 +173,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--robot-id", default=ROBOT_ID)
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args(argv)
-    take_priority("control")
+    set_priority("control")
     router = FaultyRouter(dict(door.split("=", 1) for door in arguments.door), arguments.robot_id, arguments.seed)
     print("open", flush=True)
     for line in sys.stdin:

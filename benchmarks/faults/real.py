@@ -24,7 +24,7 @@ from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.config import TransportConfig
 from rolling_panda.model.robot import RobotModel
-from rolling_panda.runtime.priority import take_priority
+from rolling_panda.runtime.scheduling import set_priority
 from rolling_panda.transport.zenoh import Transport
 
 _REST: m.Actuated = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -256,7 +256,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     seconds = 60.0 * arguments.minutes
     with RealSite(arguments.address) as site:
         # As the controller, for which this stands.
-        take_priority("control")
+        set_priority("control")
         found = measure(site, seconds, arguments.seed)
     figures = summary(found, seconds)
     print(one_row_a_line(figures))

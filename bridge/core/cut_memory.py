@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal, Protocol
 
 from rolling_panda.errors import InputError
-from rolling_panda.runtime.priority import take_priority
+from rolling_panda.runtime.scheduling import set_priority
 from rolling_panda.runtime.state_folder import sync_folder
 
 FILE = "cuts"
@@ -94,7 +94,7 @@ class CutFile:
 
     def _run(self) -> None:
         # Scheduling is a thread's own: the disk comes after the control loop.
-        take_priority("interface")
+        set_priority("interface")
         while True:
             with self._some:
                 while not self._waiting and not self._closing:

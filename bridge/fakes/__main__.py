@@ -26,8 +26,8 @@ from rolling_panda.config import RobotConfig, TransportConfig, load_section
 from rolling_panda.errors import InputError, RollingPandaError
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.resources import resource
-from rolling_panda.runtime.priority import take_priority
 from rolling_panda.runtime.process import ROBOT_ID, stop_on_signals
+from rolling_panda.runtime.scheduling import set_priority
 from rolling_panda.transport.access import DEVICES
 from rolling_panda.transport.settings import add_wire_arguments
 from rolling_panda.transport.zenoh import ForeignWire, Onlooker
@@ -109,7 +109,7 @@ def _wire(arguments: argparse.Namespace) -> TransportConfig:
 def _run(arguments: argparse.Namespace) -> None:
     ended = stop_on_signals()
     # Real devices have computers of their own.
-    take_priority("control")
+    set_priority("control")
     # Shorter waits of the control box for other threads.
     sys.setswitchinterval(0.0005)
     if arguments.seed is not None and arguments.connect is None:

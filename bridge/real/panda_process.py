@@ -16,7 +16,7 @@ from bridge.real.arm_follower import ArmFollower
 from bridge.real.arm_link import ArmLink, ArmState
 from bridge.real.config import ArmConfig
 from rolling_panda.model.robot import Limits
-from rolling_panda.runtime.priority import take_priority
+from rolling_panda.runtime.scheduling import set_priority
 
 _RETRY_S = 1.0
 # How long the bridge may be silent before this process asks whether it still exists (s).
@@ -37,7 +37,7 @@ def run(config: ArmConfig, limits: Limits, link: ArmLink, moving: bool, parent: 
         moving: False only reads.
         parent: Process id of the bridge.
     """
-    take_priority("control")
+    set_priority("control")
     gc.freeze()
     gc.disable()
     session = _Session(config, limits, link, moving, parent)

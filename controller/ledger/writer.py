@@ -14,7 +14,7 @@ from controller.ledger.session_report import SessionReportBuilder
 from controller.ledger.store import Entry
 from rolling_panda import messages as m
 from rolling_panda.errors import LedgerError
-from rolling_panda.runtime.priority import take_priority
+from rolling_panda.runtime.scheduling import set_priority
 
 #: After a failure it tries again this often (s).
 _AGAIN_S = 0.5
@@ -99,7 +99,7 @@ class LedgerWriter:
 
     def _run(self) -> None:
         # Scheduling is a thread's own: the disk must not keep the control loop waiting.
-        take_priority("interface")
+        set_priority("interface")
         store: Store | None = None
         while True:
             batch = self._next()

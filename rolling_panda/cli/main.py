@@ -11,9 +11,8 @@ from importlib.util import find_spec
 from typing import Any
 
 from rolling_panda import __version__
-from rolling_panda.cli import demo, status
+from rolling_panda.cli import demo, router, status
 from rolling_panda.errors import RollingPandaError
-from rolling_panda.runtime import router
 from rolling_panda.runtime.launch import child_environment, python_command
 
 #: Commands that are another module's: what runs, and one line for people.

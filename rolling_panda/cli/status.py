@@ -1,20 +1,28 @@
-"""`rolling-panda status`: which processes are up, for a person or for a container's health check."""
+"""`rolling-panda status`: which processes are up, for people and for health checks of containers."""
 
 import argparse
 import time
+import urllib.error
+import urllib.request
+from types import TracebackType
+from typing import Self
+
+import msgspec
 
 from rolling_panda import messages as m
-from rolling_panda.cli.demo_readiness import Readiness
 from rolling_panda.config import TransportConfig
 from rolling_panda.errors import InputError, TransportError
 from rolling_panda.runtime.process import ROBOT_ID
+from rolling_panda.topics import BRIDGE, CONTROLLER, HEARTBEAT
 from rolling_panda.transport.settings import DEFAULT_ENDPOINT, PLAIN_ENDPOINT, add_wire_arguments
+from rolling_panda.transport.zenoh import Onlooker
 
 _POLL_S = 0.02
+_NO_PROXY = urllib.request.build_opener(urllib.request.ProxyHandler({}))
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of the question."""
+    """Options of the command."""
     parser.add_argument(
         "processes", nargs="*", metavar="PROCESS", help=f"of {', '.join(m.PROCESSES)} (default: all of them)"
     )
@@ -36,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
     unknown = sorted(set(arguments.processes) - set(m.PROCESSES))
     if unknown:
         raise InputError(f"there is no process {', '.join(unknown)}; known are {', '.join(m.PROCESSES)}")
-    asked = tuple(arguments.processes) or m.PROCESSES
+    processes = tuple(arguments.processes) or m.PROCESSES
     deadline = time.monotonic() + arguments.wait
     wire = TransportConfig(
         connect=(arguments.connect or (PLAIN_ENDPOINT if arguments.plain_wire else DEFAULT_ENDPOINT),),
@@ -50,9 +58,61 @@ def run(arguments: argparse.Namespace) -> int:
             f"{error} (the demo prints the whole command when it starts: --connect ENDPOINT --certificates DIR)"
         ) from error
     with readiness:
-        while not readiness.up().issuperset(asked) and time.monotonic() < deadline:
+        while not readiness.up().issuperset(processes) and time.monotonic() < deadline:
             time.sleep(_POLL_S)
         up = readiness.up()
-    for name in asked:
+    for name in processes:
         print(f"{name:<10} {'up' if name in up else 'silent'}")
-    return 0 if up.issuperset(asked) else 1
+    return 0 if up.issuperset(processes) else 1
+
+
+class Readiness:
+    """Which processes are up, as seen on the wire. Use as a context manager, or call `close`.
+
+    A process counts as up once its loop has sent a message, which is later than its connection.
+    """
+
+    def __init__(self, wire: TransportConfig, robot_id: str, page: str | None) -> None:
+        """Connect to the router.
+
+        `page` is the address of the page, which has to answer before the server counts as up; None skips that check.
+
+        Raises:
+            TransportError: The router does not answer.
+        """
+        self._page = page
+        self._up: set[str] = set()
+        self._onlooker = Onlooker(msgspec.structs.replace(wire, connect_timeout_s=3.0), robot_id)
+        self._onlooker.subscribe(BRIDGE, lambda message, at: self._up.add("bridge"))
+        self._onlooker.subscribe(CONTROLLER, lambda message, at: self._up.add("controller"))
+        self._onlooker.subscribe(HEARTBEAT, self._on_heartbeat)
+
+    def up(self) -> frozenset[str]:
+        """Processes that are up now."""
+        return frozenset(name for name in tuple(self._up) if name != "server" or self._page_answers())
+
+    def close(self) -> None:
+        """Stop watching."""
+        self._onlooker.close()
+
+    def __enter__(self) -> Self:
+        """Return itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close."""
+        self.close()
+
+    def _on_heartbeat(self, message: m.Heartbeat, at: float) -> None:
+        self._up.add(message.process)
+
+    def _page_answers(self) -> bool:
+        if self._page is None:
+            return True
+        try:
+            with _NO_PROXY.open(f"{self._page}/api/health", timeout=1.0) as reply:
+                return bool(reply.status == 200)
+        except (urllib.error.URLError, OSError):
+            return False

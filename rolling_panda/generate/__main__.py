@@ -1,40 +1,65 @@
-"""`python -m rolling_panda.generate --check | --write`: keep what is made from messages and modes current."""
+"""`python -m rolling_panda.generate --check | --write`: files that are generated from messages, topics and modes."""
 
 import argparse
+import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from rolling_panda.errors import RollingPandaError
-from rolling_panda.generate import bounds, modes
+from rolling_panda.generate import safety
 from rolling_panda.generate.javascript import messages_module, messages_types
 from rolling_panda.generate.markdown import fill
-from rolling_panda.generate.router import router_config
+from rolling_panda.transport.access import access_control
 
 ROOT = Path(__file__).resolve().parents[2]
+_ROUTER_HEADER = """\
+// Configuration of a Zenoh router (zenohd 1.x) for the robot's wire: mutual TLS, and everything refused that the table
+// of topics does not let a sender say. `rolling-panda router --certificates DIR` does the same without this file.
+// Made by `python -m rolling_panda.generate --write`; put the certificates where the paths say, or change the paths.
+"""
 
 
 def generated(root: Path = ROOT) -> dict[Path, str]:
-    """What each generated file of a checkout should contain."""
-    wire, safety = root / "docs" / "wire.md", root / "docs" / "safety.md"
+    """The text of each generated file of a checkout."""
+    wire, safety_page = root / "docs" / "wire.md", root / "docs" / "safety.md"
     return {
         root / "web" / "js" / "link" / "messages.js": messages_module(),
         root / "web" / "js" / "link" / "messages.d.ts": messages_types(),
         root / "assets" / "config" / "router.json5": router_config(),
         wire: fill(wire.read_text(encoding="utf-8")),
-        safety: fill(safety.read_text(encoding="utf-8"), modes.BLOCKS | bounds.BLOCKS, "docs/safety.md"),
+        safety_page: fill(safety_page.read_text(encoding="utf-8"), safety.BLOCKS, "docs/safety.md"),
     }
 
 
+def router_config() -> str:
+    """Text of `assets/config/router.json5`: mutual TLS, and access control from the topic table."""
+    folder = "/etc/rolling-panda/certificates"
+    tls = {
+        "root_ca_certificate": f"{folder}/ca.pem",
+        "listen_certificate": f"{folder}/router.pem",
+        "listen_private_key": f"{folder}/router.key",
+        "enable_mtls": True,
+    }
+    content = {
+        "mode": "router",
+        "listen": {"endpoints": ["tls/0.0.0.0:7447"]},
+        "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
+        "transport": {"link": {"tls": tls}},
+        "access_control": access_control(),
+    }
+    return f"{_ROUTER_HEADER}{json.dumps(content, indent=2)}\n"
+
+
 def stale(root: Path = ROOT) -> list[Path]:
-    """Generated files that differ from what they should contain, or are missing."""
+    """Generated files that are out of date or missing."""
     return [
         path for path, text in generated(root).items() if not path.exists() or path.read_text(encoding="utf-8") != text
     ]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Write the files, or say which are out of date. Returns the exit code."""
+    """Write the files, or report those that are out of date; returns the exit code."""
     parser = argparse.ArgumentParser(prog="python -m rolling_panda.generate", description=__doc__)
     choice = parser.add_mutually_exclusive_group(required=True)
     choice.add_argument("--check", action="store_true", help="exit with 1 when a file is out of date")

@@ -17,18 +17,17 @@ from rolling_panda import messages as m
 from rolling_panda.config import TransportConfig, load_section
 from rolling_panda.errors import ConfigError, RollingPandaError
 from rolling_panda.resources import resource
-from rolling_panda.runtime.garbage import keep_what_is_there
-from rolling_panda.runtime.priority import Role, take_priority
+from rolling_panda.runtime.scheduling import Priority, freeze_heap, set_priority
 from rolling_panda.runtime.state_folder import open_state_folder, usual_state_folder
 from rolling_panda.topics import ROBOT_ID as ROBOT_ID
 from rolling_panda.transport.settings import add_wire_arguments
 from rolling_panda.transport.zenoh import Transport
 
-_PRIORITY: dict[m.Process, Role] = {
+_PRIORITY: dict[m.Process, Priority] = {
     "bridge": "control",
     "controller": "control",
     "server": "interface",
-    "perception": "sight",
+    "perception": "perception",
 }
 
 
@@ -102,8 +101,8 @@ def run_process(
     try:
         wire = wire_config(arguments)
         check(arguments)
-        take_priority(_PRIORITY[process])
-        keep_what_is_there()
+        set_priority(_PRIORITY[process])
+        freeze_heap()
         with Transport(wire, process, arguments.robot_id) as transport:
             run(ProcessContext(arguments, arguments.config, transport, stopping))
     except RollingPandaError as error:

@@ -18,7 +18,7 @@ from controller.interface import StepInputs
 from rolling_panda.bounds import bound_of, numbers, wider
 from rolling_panda.config import RobotConfig, load_section
 from rolling_panda.errors import ConfigError
-from rolling_panda.generate.bounds import SECTIONS, section
+from rolling_panda.generate.safety import SECTIONS, section
 from rolling_panda.model.robot import ARM_Q, RobotModel
 from rolling_panda.resources import resource
 from server.config import ServerConfig

@@ -1,5 +1,6 @@
-"""The demo with its real processes: up, one link that works once, and nothing left however it ends."""
+"""The demo: its robots and their commands, and with real processes its start and its end."""
 
+import argparse
 import contextlib
 import os
 import re
@@ -7,6 +8,7 @@ import signal
 import socket
 import stat
 import subprocess
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,20 +17,15 @@ import httpx
 import psutil
 import pytest
 
+from rolling_panda.cli import demo
 from rolling_panda.cli import main as cli
-from rolling_panda.cli.demo import choose_router_port, write_secret
+from rolling_panda.cli.demo import _check_robots, choose_router_port, demo_robots, process_commands, write_secret
+from rolling_panda.errors import InputError
 from rolling_panda.runtime.launch import child_environment, python_command
-
-pytestmark = pytest.mark.alone
+from tests.support.live_robot import free_port
 
 STARTUP_S = 60.0
 CHILDREN = {"router", "bridge", "controller", "perception", "server"}
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 class Demo:
@@ -104,6 +101,7 @@ def running_demo(folder: Path, *more: str, limit_s: float = STARTUP_S) -> Iterat
         demo.close()
 
 
+@pytest.mark.alone
 def test_it_comes_up_with_a_link_that_works_once_and_ctrl_c_ends_it(tmp_path: Path) -> None:
     with running_demo(tmp_path) as demo:
         for name in CHILDREN:
@@ -130,8 +128,9 @@ def sign_in(page: str, token: str) -> int:
     ).status_code
 
 
-# One more start of everything; what it is made of is tested in `test_demo_supervisor.py`.
+# One more start of everything; what it is made of is tested in `test_child_processes.py`.
 @pytest.mark.slow
+@pytest.mark.alone
 def test_when_a_process_is_killed_it_says_which_and_ends_the_rest(tmp_path: Path) -> None:
     with running_demo(tmp_path) as demo:
         # The bridge has a process of its own for pictures, which must not be left either.
@@ -144,14 +143,16 @@ def test_when_a_process_is_killed_it_says_which_and_ends_the_rest(tmp_path: Path
         assert (folder / "bridge.log").exists()
 
 
-# Children that watch their parent are tested in test_demo_supervisor.py, which takes less time.
+# Children that watch their parent are tested in test_child_processes.py, which takes less time.
 @pytest.mark.slow
+@pytest.mark.alone
 def test_when_the_demo_itself_is_killed_nothing_outlives_it(tmp_path: Path) -> None:
     with running_demo(tmp_path) as demo:
         os.kill(demo.pid, signal.SIGKILL)
         assert demo.ends() == -signal.SIGKILL
 
 
+@pytest.mark.alone
 def test_a_process_that_cannot_start_is_told_with_its_reason(tmp_path: Path) -> None:
     config = tmp_path / "robot.toml"
     config.write_text("[bridge]\nwatchdogs = 1\n")
@@ -187,3 +188,105 @@ def test_a_secret_is_for_this_user_alone_and_never_written_over(tmp_path: Path) 
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
     with pytest.raises(FileExistsError):
         write_secret(path, "def")
+
+
+PROCESSES = ("bridge", "controller", "perception")
+
+
+def arguments(*argv: str) -> argparse.Namespace:
+    parser = argparse.ArgumentParser()
+    demo.add_arguments(parser)
+    return parser.parse_args(["--config", "c.toml", *argv])
+
+
+def words(command: list[str], option: str) -> list[str]:
+    return [command[index + 1] for index, word in enumerate(command) if word == option]
+
+
+def test_one_robot_is_started_as_ever() -> None:
+    given = arguments("--trace", "t.csv", "--seed", "3")
+    (robot,) = demo_robots(given, Path("/run"))
+    assert (robot.name, robot.seed, robot.state, robot.trace) == ("rp1", 3, Path("/run/state"), Path("t.csv").resolve())
+    started = process_commands((robot,), given, ["--connect", "tls/127.0.0.1:1"], Path("/run/token"))
+    assert set(started) == {"bridge", "controller", "perception", "server"}
+    assert all(words(command, "--robot-id") == ["rp1"] for command in started.values())
+    assert words(started["server"], "--also-robot-id") == []
+
+
+def test_each_of_several_has_a_name_a_row_a_folder_and_a_trace_of_its_own() -> None:
+    given = arguments("--robots", "3", "--state", "/kept", "--trace", "/kept/t.csv", "--seed", str(2**32 - 1))
+    robots = demo_robots(given, Path("/run"))
+    assert [robot.name for robot in robots] == ["panda-1", "panda-2", "panda-3"]
+    assert [robot.seed for robot in robots] == [2**32 - 1, 0, 1]
+    started = process_commands(robots, given, ["--connect", "tls/127.0.0.1:1"], Path("/run/token"))
+    assert len(started) == 10
+    for robot in robots:
+        for process in ("bridge", "controller", "perception"):
+            command = started[f"{robot.name}-{process}"]
+            assert process in command
+            assert words(command, "--robot-id") == [robot.name]
+            assert words(command, "--state") == [f"/kept/{robot.name}"]
+        assert words(started[f"{robot.name}-bridge"], "--trace") == [f"/kept/t-{robot.name}.csv"]
+    assert words(started["server"], "--robot-id") == ["panda-1"]
+    assert words(started["server"], "--also-robot-id") == ["panda-2", "panda-3"]
+
+
+@pytest.mark.parametrize(
+    "argv", [("--robots", "0"), ("--robots", "5"), ("--robots", "2", "--bridge", "real", "--fakes")]
+)
+def test_more_robots_than_can_be_are_refused(argv: tuple[str, ...]) -> None:
+    with pytest.raises(InputError, match=f"--robots {argv[1]}"):
+        _check_robots(arguments(*argv))
+
+
+class Played:
+    """Stands where child processes and the wire would be: every process is up at its second look."""
+
+    def __init__(self, *named: object) -> None:
+        self.started: list[str] = []
+        self.robot = named[1] if len(named) > 1 else ""
+        self.looks = 0
+
+    def start(self, name: str, command: list[str]) -> None:
+        self.started.append(name)
+
+    def exited(self) -> None:
+        return None
+
+    def end(self) -> None:
+        self.started.append("ended")
+
+    def up(self) -> frozenset[str]:
+        self.looks += 1
+        # The second robot hears of the server last.
+        needed = 4 if self.robot == "panda-2" else 2
+        there = {"bridge", "controller", "perception"} if self.looks > 1 else set()
+        return frozenset(there | ({"server"} if self.looks >= needed else set()))
+
+    def __enter__(self) -> "Played":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        return
+
+
+def test_the_demo_says_when_each_is_up_and_the_server_once_every_robot_hears_of_it(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    children = Played()
+    stopping = threading.Event()
+    monkeypatch.setattr(demo, "ChildProcesses", lambda folder: children)
+    monkeypatch.setattr(demo, "Readiness", Played)
+    monkeypatch.setattr(demo, "_is_listening", lambda port: True)
+    monkeypatch.setattr(demo, "_POLL_S", 0.001)
+    monkeypatch.setattr(demo, "stop_on_signals", lambda: stopping)
+    threading.Timer(0.5, stopping.set).start()
+    given = arguments("--robots", "2", "--port", str(free_port()))
+    given.config = None
+    assert demo.run(given) == 0
+    said = capsys.readouterr().out
+    order = [line.split()[0] for line in said.splitlines() if " up " in line]
+    assert order[0] == "router" and order[-1] == "server"
+    assert set(order[1:-1]) == {f"{name}-{each}" for name in ("panda-1", "panda-2") for each in PROCESSES}
+    assert "--robot-id panda-2" in said and said.count("/sign-in?token=") == 1
+    assert children.started[0] == "router" and children.started[-1] == "ended" and len(children.started) == 9

@@ -7,11 +7,12 @@ import pytest
 
 from rolling_panda import messages as m
 from rolling_panda.errors import MessageError
-from rolling_panda.generate import markdown
+from rolling_panda.generate import markdown, safety
 from rolling_panda.generate.__main__ import ROOT, generated, main, stale
 from rolling_panda.generate.description import describe, reachable
 from rolling_panda.generate.javascript import js_type, messages_module, messages_types
 from rolling_panda.messages import page
+from rolling_panda.mode_table import ROWS, SEVERITY, Event
 from rolling_panda.topics import SERVICES, TOPICS
 
 
@@ -94,3 +95,18 @@ def test_a_document_without_its_blocks_is_refused() -> None:
         markdown.fill("# The wire\n")
     with pytest.raises(MessageError, match="asks for the block colours"):
         markdown.fill("<!-- generated: colours -->\n<!-- end -->\n")
+
+
+def test_the_safety_document_shows_every_transition_and_who_may_cause_it() -> None:
+    text = (ROOT / "docs" / "safety.md").read_text(encoding="utf-8")
+    for row in ROWS:
+        if row.event not in (Event.STOP, Event.FAULT):
+            assert f"    {row.before} --> {row.after}: {row.event.value} ({row.who})\n" in text
+            assert f"| {row.before} → {row.after} | {row.event.value} | {row.who} |" in text
+    assert "| any but ESTOP_LATCHED → ESTOP_LATCHED | stop | anyone |" in text
+    assert "| any but FAULT, ESTOP_LATCHED → FAULT | fault | system |" in text
+
+
+def test_the_diagram_has_every_mode() -> None:
+    for mode in SEVERITY:
+        assert mode in safety.mode_diagram()

@@ -8,7 +8,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from rolling_panda import topics
 from rolling_panda.messages.supervision import StopRecord, StopState
-from tests.rolling_panda.test_misuse import control
+from tests.server.test_misuse import control
 from tests.server.test_page_socket import Page
 from tests.server.test_viser_proxy import drawn, open_socket
 from tests.support.fake_wire import FakeWire, bridge_state, controller_state, pruning_point, pruning_points, telling

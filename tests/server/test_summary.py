@@ -7,7 +7,7 @@ from rolling_panda import messages as m
 from rolling_panda.messages import page as p
 from rolling_panda.messages.supervision import StopState
 from server.robots.summary import RobotSummary, summarize
-from tests.rolling_panda.test_misuse import control
+from tests.server.test_misuse import control
 from tests.support.fake_wire import bridge_state, controller_state, pruning_point
 
 PROCESSES = tuple(p.ProcessPresence(name, True, 0.05) for name in m.PROCESSES)

@@ -177,7 +177,7 @@ def test_the_programs_know_the_options_that_they_are_started_with(file: dict[str
     for service in file["services"].values():
         name, *words = service["command"]
         source = {
-            "router": "rolling_panda/runtime/router.py",
+            "router": "rolling_panda/cli/router.py",
             "certificates": "rolling_panda/transport/certificates.py",
         }.get(name, f"{name}/__main__.py")
         known = set(re.findall(r"add_argument\(\s*\"(--[a-z-]+)\"", common + (ROOT / source).read_text()))

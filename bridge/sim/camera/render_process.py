@@ -12,7 +12,7 @@ from bridge.sim.camera.config import CameraConfig
 from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.row import Row
 from rolling_panda.model.differential_drive import Array
-from rolling_panda.runtime.priority import Role, take_priority
+from rolling_panda.runtime.scheduling import Priority, set_priority
 
 
 class CameraRenderer(Protocol):
@@ -59,15 +59,15 @@ class RenderProcess:
     A thread waits for that process. A process that dies is started again.
     """
 
-    def __init__(self, config: CameraConfig, seed: int, role: Role = "background") -> None:
+    def __init__(self, config: CameraConfig, seed: int, priority: Priority = "background") -> None:
         """Start the process. It ends when the pipe closes.
 
         Args:
             config: Lens and errors.
             seed: Of the noise.
-            role: Scheduling priority of the process.
+            priority: Of the process.
         """
-        self._config, self._seed, self._role = config, seed, role
+        self._config, self._seed, self._priority = config, seed, priority
         self._known: Row | None = None
         self._process, self._pipe = self._start()
         self._closing = False
@@ -106,7 +106,7 @@ class RenderProcess:
         ours, theirs = context.Pipe()
         process = context.Process(
             target=_render_until_closed,
-            args=(theirs, self._config, self._seed, self._role),
+            args=(theirs, self._config, self._seed, self._priority),
             name="camera-renderer",
             daemon=True,
         )
@@ -134,8 +134,8 @@ class RenderProcess:
         return None
 
 
-def _render_until_closed(pipe: Connection, config: CameraConfig, seed: int, role: Role) -> None:
-    take_priority(role)
+def _render_until_closed(pipe: Connection, config: CameraConfig, seed: int, priority: Priority) -> None:
+    set_priority(priority)
     renderer, row = InlineRenderer(config, seed), Row(())
     try:
         while True:

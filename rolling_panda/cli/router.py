@@ -3,8 +3,8 @@
 import argparse
 
 from rolling_panda.config import TransportConfig
-from rolling_panda.runtime.priority import take_priority
 from rolling_panda.runtime.process import end_with_parent, stop_on_signals
+from rolling_panda.runtime.scheduling import set_priority
 from rolling_panda.topics import ROBOT_ID
 from rolling_panda.transport.settings import DEFAULT_ENDPOINT, PLAIN_ENDPOINT, PLAIN_WARNING, add_wire_arguments
 from rolling_panda.transport.zenoh import Router
@@ -45,7 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.exit_with_parent:
         end_with_parent(stopping)
     endpoints = tuple(arguments.listen or (PLAIN_ENDPOINT if arguments.plain_wire else DEFAULT_ENDPOINT,))
-    take_priority("control")
+    set_priority("control")
     folder = "" if arguments.certificates is None else str(arguments.certificates)
     router = Router(
         TransportConfig(

@@ -1,4 +1,4 @@
-"""Child processes of the demo: started with a log each, watched, and ended to the last one."""
+"""Child processes: started with a log file each, watched, and all ended."""
 
 import os
 import signal
@@ -10,27 +10,27 @@ from pathlib import Path
 
 from rolling_panda.runtime.launch import child_environment
 
-#: A process that has not ended this long after being asked is killed (s).
-ASK_S = 3.0
-_TAIL_LINES = 12
+#: A process that has not ended this long after SIGTERM is killed (s).
+GRACE_S = 3.0
+_LAST_LINES = 12
 
 
 @dataclass(frozen=True)
-class Death:
-    """A child that ended by itself.
+class ChildExit:
+    """A child that has ended by itself.
 
     Attributes:
-        name: Which.
-        how: In words: exit code or signal.
-        tail: Last lines that it wrote.
+        name: Of the child.
+        cause: Exit code or signal, as text.
+        output: The last lines of its log.
     """
 
     name: str
-    how: str
-    tail: str
+    cause: str
+    output: str
 
 
-class Supervisor:
+class ChildProcesses:
     """Starts named children and leaves none behind."""
 
     def __init__(self, log_folder: Path) -> None:
@@ -41,8 +41,8 @@ class Supervisor:
     def start(self, name: str, command: Sequence[str]) -> None:
         """Start one child.
 
-        It gets a pipe as standard input, which closes when this process ends in whatever way, and a session of its
-        own, so that Ctrl-C in the terminal reaches this process alone and the children end in order.
+        Its standard input is a pipe, which closes when this process ends, even if it is killed. It has its own process
+        session, so that Ctrl-C reaches this process alone, which ends the children in order.
         """
         with self.log(name).open("wb") as log:
             self._children[name] = subprocess.Popen(
@@ -50,32 +50,32 @@ class Supervisor:
                 stdin=subprocess.PIPE,
                 stdout=log,
                 stderr=log,
-                # Unbuffered: the last words of a killed process must be in its log.
+                # Unbuffered, so that the last lines of a killed process are in its log.
                 env=child_environment() | {"PYTHONUNBUFFERED": "1"},
                 start_new_session=True,
             )
 
     def log(self, name: str) -> Path:
-        """Where a child's output goes."""
+        """The log file of a child."""
         return self._log_folder / f"{name}.log"
 
     def pids(self) -> dict[str, int]:
         """Process id of every child started."""
         return {name: child.pid for name, child in self._children.items()}
 
-    def death(self) -> Death | None:
-        """The first child found to have ended, or None while all run."""
+    def exited(self) -> ChildExit | None:
+        """A child that has ended; None while all run."""
         for name, child in self._children.items():
             code = child.poll()
             if code is not None:
-                return Death(name, _how(code), _tail(self.log(name)))
+                return ChildExit(name, _cause(code), _last_lines(self.log(name)))
         return None
 
     def end(self) -> None:
-        """End every child, and whatever each has started: ask, wait up to `ASK_S`, kill."""
+        """End all children and their own children: SIGTERM, then SIGKILL after `GRACE_S`."""
         for child in self._children.values():
             _signal(child, signal.SIGTERM)
-        deadline = time.monotonic() + ASK_S
+        deadline = time.monotonic() + GRACE_S
         for child in self._children.values():
             try:
                 child.wait(max(0.0, deadline - time.monotonic()))
@@ -90,14 +90,14 @@ class Supervisor:
 
 
 def _signal(child: subprocess.Popen[bytes], number: int) -> None:
-    """Signal a child's whole group; the group outlives a leader that has left children of its own."""
+    """Signal a child's process group, which may outlive its leader."""
     try:
         os.killpg(child.pid, number)
     except (ProcessLookupError, PermissionError):
         return
 
 
-def _how(code: int) -> str:
+def _cause(code: int) -> str:
     if code >= 0:
         return f"with exit code {code}"
     try:
@@ -106,6 +106,6 @@ def _how(code: int) -> str:
         return f"by signal {-code}"
 
 
-def _tail(log: Path) -> str:
+def _last_lines(log: Path) -> str:
     lines = log.read_text(encoding="utf-8", errors="replace").rstrip().splitlines()
-    return "\n".join(lines[-_TAIL_LINES:])
+    return "\n".join(lines[-_LAST_LINES:])

@@ -1,4 +1,4 @@
-"""Children of the demo: each has a log, a death is told in words, and nothing is left."""
+"""Children of the demo: each has a log, a exited is told in words, and nothing is left."""
 
 import os
 import signal
@@ -11,7 +11,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from rolling_panda.cli.demo_supervisor import Death, Supervisor
+from rolling_panda.cli.child_processes import ChildExit, ChildProcesses
 from rolling_panda.runtime.launch import child_environment
 
 pytestmark = pytest.mark.alone
@@ -21,8 +21,8 @@ STUBBORN = "import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN); print(
 
 
 @pytest.fixture
-def supervisor(tmp_path: Path) -> Iterator[Supervisor]:
-    made = Supervisor(tmp_path)
+def children(tmp_path: Path) -> Iterator[ChildProcesses]:
+    made = ChildProcesses(tmp_path)
     yield made
     made.end()
 
@@ -35,40 +35,40 @@ def until(condition: Callable[[], bool], limit_s: float = 10.0) -> float:
     return time.monotonic() - began
 
 
-def death_of(supervisor: Supervisor) -> Death:
-    until(lambda: supervisor.death() is not None)
-    death = supervisor.death()
-    assert death is not None
-    return death
+def exit_of(children: ChildProcesses) -> ChildExit:
+    until(lambda: children.exited() is not None)
+    exited = children.exited()
+    assert exited is not None
+    return exited
 
 
-def test_a_death_says_who_how_and_the_last_words(supervisor: Supervisor) -> None:
-    supervisor.start("patient", PATIENT)
+def test_a_death_says_who_how_and_the_last_words(children: ChildProcesses) -> None:
+    children.start("patient", PATIENT)
     code = "import sys; print('\\n'.join(map(str, range(50)))); sys.exit('the motor is on fire')"
-    supervisor.start("victim", [sys.executable, "-c", code])
-    death = death_of(supervisor)
-    assert (death.name, death.how) == ("victim", "with exit code 1")
-    lines = death.tail.splitlines()
+    children.start("victim", [sys.executable, "-c", code])
+    exited = exit_of(children)
+    assert (exited.name, exited.cause) == ("victim", "with exit code 1")
+    lines = exited.output.splitlines()
     assert lines[-1] == "the motor is on fire" and len(lines) <= 12
 
 
-def test_a_kill_is_told_by_its_name(supervisor: Supervisor) -> None:
-    supervisor.start("patient", PATIENT)
-    assert supervisor.death() is None
-    os.kill(supervisor.pids()["patient"], signal.SIGKILL)
-    assert death_of(supervisor).how == "by signal 9 (SIGKILL)"
+def test_a_kill_is_told_by_its_name(children: ChildProcesses) -> None:
+    children.start("patient", PATIENT)
+    assert children.exited() is None
+    os.kill(children.pids()["patient"], signal.SIGKILL)
+    assert exit_of(children).cause == "by signal 9 (SIGKILL)"
 
 
-def test_end_leaves_nothing_of_those_that_will_not_and_of_their_children(supervisor: Supervisor) -> None:
+def test_end_leaves_nothing_of_those_that_will_not_and_of_their_children(children: ChildProcesses) -> None:
     family = f"import subprocess, sys; subprocess.Popen([sys.executable, '-c', {STUBBORN + 'signal.pause()'!r}]); "
-    supervisor.start("patient", PATIENT)
-    supervisor.start("stubborn", [sys.executable, "-c", STUBBORN + family + "signal.pause()"])
-    until(lambda: supervisor.log("stubborn").read_text().count("deaf") == 2)
-    pids = list(supervisor.pids().values())
+    children.start("patient", PATIENT)
+    children.start("stubborn", [sys.executable, "-c", STUBBORN + family + "signal.pause()"])
+    until(lambda: children.log("stubborn").read_text().count("deaf") == 2)
+    pids = list(children.pids().values())
     pids += [child.pid for pid in pids for child in psutil.Process(pid).children(recursive=True)]
     assert len(pids) == 3
     began = time.monotonic()
-    supervisor.end()
+    children.end()
     until(lambda: not any(psutil.pid_exists(pid) and not _zombie(pid) for pid in pids), 1.0)
     assert time.monotonic() - began < 5.0
 
@@ -76,12 +76,12 @@ def test_end_leaves_nothing_of_those_that_will_not_and_of_their_children(supervi
 def test_children_that_watch_their_parent_end_when_it_is_killed(tmp_path: Path) -> None:
     code = (
         "import signal, sys, pathlib\n"
-        "from rolling_panda.cli.demo_supervisor import Supervisor\n"
+        "from rolling_panda.cli.child_processes import ChildProcesses\n"
         "from rolling_panda.runtime.launch import python_command\n"
-        f"supervisor = Supervisor(pathlib.Path({str(tmp_path)!r}))\n"
+        f"children = ChildProcesses(pathlib.Path({str(tmp_path)!r}))\n"
         "words = ['router', '--listen', 'tcp/127.0.0.1:0', '--plain-wire', '--exit-with-parent']\n"
-        "supervisor.start('router', python_command('rolling_panda', words))\n"
-        "print(supervisor.pids()['router'], flush=True)\n"
+        "children.start('router', python_command('rolling_panda', words))\n"
+        "print(children.pids()['router'], flush=True)\n"
         "signal.pause()\n"
     )
     parent = subprocess.Popen([sys.executable, "-c", code], env=child_environment(), stdout=subprocess.PIPE, text=True)

@@ -1,0 +1,71 @@
+"""Priority of a process, and its garbage collector."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+SHOW = """
+import os, sys
+from rolling_panda.runtime.scheduling import set_priority
+for priority in sys.argv[1:]:
+    set_priority(priority)
+print(os.sched_getscheduler(0), os.getpriority(os.PRIO_PROCESS, 0))
+"""
+
+
+def scheduling(*priorities: str) -> tuple[int, int]:
+    """Scheduling policy and niceness of a process after setting these priorities in turn."""
+    done = subprocess.run([sys.executable, "-c", SHOW, *priorities], capture_output=True, text=True, check=True)
+    policy, nice = done.stdout.split()
+    return int(policy), int(nice)
+
+
+def test_background_work_steps_back_even_when_its_parent_keeps_time() -> None:
+    for priorities in (("background",), ("control", "background")):
+        policy, nice = scheduling(*priorities)
+        assert policy == os.SCHED_OTHER
+        assert nice > 0
+
+
+def test_control_is_real_time_where_that_is_permitted() -> None:
+    try:
+        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
+    except PermissionError:
+        permitted = False
+    else:
+        permitted = True
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+    assert scheduling("control")[0] == (os.SCHED_RR if permitted else os.SCHED_OTHER)
+
+
+@pytest.mark.parametrize("priority", ["control", "interface", "perception", "background"])
+def test_no_priority_fails_without_permission(priority: str) -> None:
+    limited = "import resource; resource.setrlimit(resource.RLIMIT_NICE, (0, 0));" + SHOW
+    done = subprocess.run([sys.executable, "-c", limited, priority], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+GARBAGE = """
+import gc, weakref
+from rolling_panda.runtime.scheduling import freeze_heap
+
+class Ring: pass
+
+def ring():
+    one = Ring()
+    one.itself = one
+    return weakref.ref(one)
+
+before = ring()
+freeze_heap()
+after = ring()
+gc.collect()
+print(len(gc.get_objects()) < 1000, before() is None, after() is None)
+"""
+
+
+def test_what_is_there_is_left_alone_and_what_becomes_garbage_is_not() -> None:
+    done = subprocess.run([sys.executable, "-c", GARBAGE], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["True"] * 3
