@@ -1,4 +1,4 @@
-"""What can be set about the operator's server."""
+"""Configuration of the operator's server."""
 
 from typing import Annotated
 
@@ -11,30 +11,29 @@ class ServerConfig(Struct, frozen=True, forbid_unknown_fields=True):
     """Rates and limits of the operator's server.
 
     Attributes:
-        page_rate_hz: `PageState` messages a second to each page.
-        onlooker_rate_hz: The same to a page of somebody who may only look on; another mode or stop is told at once.
-        scene_rate_hz: Most updates a second of the 3-D view; nothing is sent while nothing moves.
-        teleop_rate_hz: `TeleopTarget` messages a second while the operator holds.
-        hold_timeout_s: A hold that is not renewed for this long moves nothing any more.
-        hold_resume_s: A page that paused for no longer than this, with the button still pressed, holds on, and so does
-            a script; after that only a new press starts a hold.
-        view_timeout_s: A page that has not drawn a state younger than this may not move the robot.
-        stop_confirm_s: How long a stop waits for bridge and controller to say that they have latched it.
-        unread_s: A page or a 3-D view that does not read what it is sent for this long is dropped; it may come again.
-        session_idle_s: A session unused for this long has ended.
-        invite_s: Life of a sign-in link that a supervisor makes for somebody else.
-        log_lines: Log lines kept in memory.
-        head_s: A TLS handshake may take so long, the first byte of a request may be awaited so long, and so long may
-            pass from it to the end of the request's head.
-        body_s: A request's body has to come within this long of its head.
-        connections: Open connections in all; the longest idle one makes room for a new one.
-        connections_per_address: Open connections of one address; two thirds of them may be WebSockets, of which a page
+        page_rate_hz: Rate of `PageState` messages to each page.
+        onlooker_rate_hz: The same for pages of viewers; another mode or stop is sent at once.
+        scene_rate_hz: Largest update rate of the 3-D view; nothing is sent while nothing moves.
+        teleop_rate_hz: Rate of `TeleopTarget` messages while the robot is held.
+        hold_timeout_s: A hold that is not renewed for this long lapses.
+        hold_resume_s: A lapsed hold that is renewed within this time continues; after that the button has to be
+            released first.
+        view_timeout_s: Largest age of the rendered state with which a page may move the robot.
+        stop_confirm_s: Time limit for bridge and controller to report a stop as latched.
+        unread_s: A page or a 3-D view that does not read for this long is disconnected; it may reconnect.
+        session_idle_s: A session unused for this long ends.
+        invite_s: Lifetime of a sign-in link that a supervisor makes.
+        log_lines: Log lines in memory.
+        head_s: Time limit for a TLS handshake, for the first byte of a request, and from it to the end of the head.
+        body_s: Time limit for a request's body after its head.
+        connections: Limit of open connections; a new one replaces the longest idle one.
+        connections_per_address: Limit of open connections of one address; two thirds may be WebSockets, of which a page
             has two.
-        socket_messages_hz: Messages a second through one WebSocket, twice as many at once; more closes it.
-        socket_bytes_hz: Bytes a second through one WebSocket; more closes it.
-        session_messages_hz: Messages a second of one session through all of its WebSockets.
+        socket_messages_hz: Rate limit of messages on one WebSocket, with a burst of twice as many; more closes it.
+        socket_bytes_hz: Rate limit of bytes on one WebSocket; more closes it.
+        session_messages_hz: Rate limit of messages on all WebSockets of a session.
         max_body_bytes: Longest request body, and longest WebSocket frame from a client.
-        origins: Further origins that the page may be served under, as `https://HOST`, beside the loopback ones.
+        origins: Permitted origins of the page beside the loopback ones, as `https://HOST`.
     """
 
     page_rate_hz: Annotated[float, at_least(2.0, 100.0)] = 10.0

@@ -1,4 +1,4 @@
-"""Puts the server together and runs it until the process is asked to end."""
+"""Assembles the server and runs it until the process has to stop."""
 
 import argparse
 import asyncio
@@ -42,12 +42,12 @@ from server.scene.robot_meshes import Part, robot_parts
 from server.scene.scene import Scene
 
 _POLL_S = 0.05
-#: Each connection is a file, and each 3-D view three.
-_FILES_EACH = 4
+#: File descriptors of a connection; a 3-D view has three.
+_FILES_PER_CONNECTION = 4
 
 
 def check(arguments: argparse.Namespace) -> Access:
-    """How people come in, as the command line asks for it.
+    """The checked access options of the command line.
 
     Raises:
         InputError: Options or files do not fit.
@@ -68,14 +68,14 @@ def run(context: ProcessContext) -> None:
         InputError: The port is taken, or a file cannot be used.
     """
     config = load_section(context.config_path, "server", ServerConfig)
-    _may_open(_FILES_EACH * config.connections)
+    _raise_file_limit(_FILES_PER_CONNECTION * config.connections)
     arguments = context.arguments
-    allowed = check(arguments)
-    with listen(arguments.host, arguments.port) as door:
-        port = int(door.getsockname()[1])
+    access_options = check(arguments)
+    with listen(arguments.host, arguments.port) as listener:
+        port = int(listener.getsockname()[1])
         sessions = Sessions(config.session_idle_s)
-        address = f"{allowed.scheme}://127.0.0.1:{port}"
-        if allowed.users is None:
+        address = f"{access_options.scheme}://127.0.0.1:{port}"
+        if access_options.users is None:
             token = _first_token(arguments.sign_in_token_file)
             sessions.admit(token, "supervisor", "supervisor")
             if arguments.sign_in_token_file is None:
@@ -86,7 +86,9 @@ def run(context: ProcessContext) -> None:
             wires = {arguments.robot_id: context.transport}
             for name in arguments.also_robot_id:
                 wires[name] = others.enter_context(Transport(context.wire, "server", name))
-            asyncio.run(serve(config, wires, sessions, door, address, context.stopping, allowed, freeze_heap))
+            asyncio.run(
+                serve(config, wires, sessions, listener, address, context.stopping, access_options, freeze_heap)
+            )
 
 
 def listen(host: str, port: int) -> Listener:
@@ -95,76 +97,76 @@ def listen(host: str, port: int) -> Listener:
     Raises:
         InputError: The port is taken or may not be used.
     """
-    door = Listener()
-    door.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    # Each connection has it from here. Without it the second part of an answer waits until the first is acknowledged,
-    # which takes the other side 40 ms; asyncio sets it only on sockets that name their protocol.
-    door.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    listener = Listener()
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    # Connections inherit it. Otherwise the second part of a response waits for the acknowledgement of the first, which
+    # takes 40 ms; asyncio sets it only on sockets that name their protocol.
+    listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     try:
-        door.bind((host, port))
-        # Listening, since only that shows a port that another program has bound with the same option.
-        door.listen(64)
+        listener.bind((host, port))
+        # Another program may have bound the port with the same option, which only listening detects.
+        listener.listen(64)
     except (OSError, OverflowError) as error:
-        door.close()
+        listener.close()
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(f"cannot listen on {host}:{port}: {reason}. Choose another with --port.") from error
-    return door
+    return listener
 
 
 async def serve(
     config: ServerConfig,
     wires: Mapping[str, Transport],
     sessions: Sessions,
-    door: Listener,
+    listener: Listener,
     address: str,
     stopping: threading.Event,
-    allowed: Access | None = None,
-    built: Callable[[], None] = lambda: None,
+    access_options: Access | None = None,
+    on_ready: Callable[[], None] = lambda: None,
 ) -> None:
-    """Serve the page on `door` until `stopping` is set.
+    """Serve the page on `listener` until `stopping` is set.
 
     Args:
         config: Rates and limits.
-        wires: The wire of each robot, by its name.
-        sessions: Who may come in.
-        door: Listening.
-        address: How the page is reached on this machine.
-        stopping: Ends it.
-        allowed: How people come in.
-        built: Called when everything is there, before anybody is served.
+        wires: The wire of each robot, by name.
+        sessions: Sign-in tokens and sessions.
+        listener: Listening socket.
+        address: Of the page on this machine.
+        stopping: Ends the server.
+        access_options: Users and TLS.
+        on_ready: Called before the first request is served.
     """
-    allowed = allowed or Access()
-    port = int(door.getsockname()[1])
+    access_options = access_options or Access()
+    port = int(listener.getsockname()[1])
     app_state = AppState(
         sessions,
         address,
-        # Cookies do not know ports: two servers on one machine must not sign each other's people out.
+        # Cookies ignore ports: two servers on one machine need different names.
         f"rolling_panda_{port}",
         config.invite_s,
         config.max_body_bytes,
-        None if allowed.users is None else Passwords(allowed.users),
+        None if access_options.users is None else Passwords(access_options.users),
     )
     model = RobotModel()
     parts = robot_parts(model.model)
     for name, wire in wires.items():
         app_state.robots[name] = _robot_context(config, wire, model, parts, app_state)
-    own = {f"{allowed.scheme}://{name}:{port}" for name in ("127.0.0.1", "localhost")}
+    own = {f"{access_options.scheme}://{name}:{port}" for name in ("127.0.0.1", "localhost")}
     origins = frozenset({*own, *config.origins})
     app = create_app(app_state, origins)
-    built()
+    on_ready()
     work = [watch_accounts(app_state), *(job for robot in app_state.robots.values() for job in Loop(robot).jobs())]
     jobs = [asyncio.create_task(job) for job in work]
     connections = Connections(config, lambda text, by: app_state.note("warning", text, f"connections of {by}"))
-    door.count(connections, allowed.tls is not None)
-    site = asyncio.create_task(_site(app, connections, door, stopping, allowed.tls))
+    listener.count(connections, access_options.tls is not None)
+    site = asyncio.create_task(_site(app, connections, listener, stopping, access_options.tls))
     try:
-        # A job that fails ends the server: a page that shows half the truth is worse than none.
+        # A failed job ends the server: an incomplete page would mislead.
         await asyncio.wait([*jobs, site], return_when=asyncio.FIRST_COMPLETED)
         for job in jobs:
             if job.done():
                 job.result()
     finally:
-        for session in sessions.everyone():
+        for session in sessions.active():
             session.ended.set()
         for job in jobs:
             job.cancel()
@@ -182,7 +184,7 @@ def _robot_context(
     loop = asyncio.get_running_loop()
 
     def call_soon(function: Callable[..., object], *arguments: object) -> None:
-        # Once the loop is closed, viser's thread has nobody left to tell.
+        # The loop may be closed before viser's thread ends.
         with contextlib.suppress(RuntimeError):
             loop.call_soon_threadsafe(function, *arguments)
 
@@ -190,23 +192,23 @@ def _robot_context(
         model.model,
         parts,
         call_soon,
-        # None is called before a page is served.
+        # Called only once a page is served, when `robot` is bound.
         on_select=lambda owner, point_id: robot.on_point_clicked(owner, point_id),
         on_ray=lambda owner, origin, direction: robot.on_click(owner, origin, direction),
         on_refusal=lambda: robot.note("warning", "refused a connection to the 3-D view from outside the page"),
     )
-    link, told = RobotLink(wire), wider("server", config)
+    link, widened = RobotLink(wire), wider("server", config)
     robot = RobotContext(
         config,
         link,
         scene,
-        PageView(link, model, told, wire.plain),
+        PageView(link, model, widened, wire.plain),
         EventLog(config.log_lines),
         TeleopHold(config),
         PresenceTracker(),
         held_elsewhere=lambda session: app_state.held_elsewhere(session, robot),
     )
-    for line in told:
+    for line in widened:
         robot.note("warning", f"set wider than usual: {line}")
     if wire.plain:
         robot.note("error", PLAIN_WARNING)
@@ -222,7 +224,7 @@ class _Site(uvicorn.Server):
 
 
 async def _site(
-    app: ASGIApp, connections: Connections, door: Listener, stopping: threading.Event, tls: Tls | None
+    app: ASGIApp, connections: Connections, listener: Listener, stopping: threading.Event, tls: Tls | None
 ) -> None:
     config = connections.limits
     site = _Site(
@@ -233,7 +235,7 @@ async def _site(
             access_log=False,
             lifespan="off",
             server_header=False,
-            # Whoever says in a header that they come from elsewhere is still who connects.
+            # Headers do not change the client's address.
             proxy_headers=False,
             ws_max_size=config.max_body_bytes,
             ws_per_message_deflate=False,
@@ -245,23 +247,23 @@ async def _site(
             ssl_keyfile=None if tls is None else str(tls.key),
         )
     )
-    serving = asyncio.create_task(site.serve(sockets=[door]))
+    serving = asyncio.create_task(site.serve(sockets=[listener]))
     while not stopping.is_set() and not serving.done():
         await asyncio.sleep(_POLL_S)
     site.should_exit = True
     await serving
 
 
-def _may_open(files: int) -> None:
-    """Let this process open so many files at once, as far as its user may."""
-    usual, most = resource.getrlimit(resource.RLIMIT_NOFILE)
-    if usual != resource.RLIM_INFINITY and usual < files:
-        may = files if most == resource.RLIM_INFINITY else min(files, most)
-        resource.setrlimit(resource.RLIMIT_NOFILE, (may, most))
+def _raise_file_limit(files: int) -> None:
+    """Raise the limit of open files to this number, as far as the user may."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if soft != resource.RLIM_INFINITY and soft < files:
+        limit = files if hard == resource.RLIM_INFINITY else min(files, hard)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (limit, hard))
 
 
 def _check_certificates(folder: Path, robots: list[str]) -> None:
-    """With one robot's certificate the router would drop what is said to another without a word."""
+    """With the certificate of one robot the router would silently drop messages to another."""
     for name in robots:
         if not (folder / name).is_dir():
             every = " ".join(f"--robot {each}" for each in robots)

@@ -87,7 +87,7 @@ def commands_router(robot: RobotContext) -> APIRouter:
 
     @router.post("/look-again", tags=["mode"], responses=COMMAND)
     async def look_again(session: Operator, request: body.Place) -> Response:
-        """Drive to a place that was left open and look at it from both its sides; cuts nothing."""
+        """Drive to a site without a decision and take images from both sides; cuts nothing."""
         return await ask(session, intents.Survey(user=session.user, vine=request.vine, spur=request.spur))
 
     @router.post("/pause", tags=["mode"], responses=COMMAND)

@@ -115,11 +115,11 @@ def minified(script: str) -> str:
     lines, inside = [], False
     for line in script.split("\n"):
         bare = line.strip()
-        begins = not inside and bare.startswith("/*")
-        if begins and "*/" in bare and not bare.endswith("*/"):
-            begins = False
-        comment = inside or begins or bare.startswith("//")
-        if inside or begins:
+        starts_comment = not inside and bare.startswith("/*")
+        if starts_comment and "*/" in bare and not bare.endswith("*/"):
+            starts_comment = False
+        comment = inside or starts_comment or bare.startswith("//")
+        if inside or starts_comment:
             inside = "*/" not in bare
         lines.append("" if comment else _TYPE.sub("", bare))
     return "\n".join(lines)

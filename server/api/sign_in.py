@@ -56,7 +56,7 @@ def sign_in_router(app_state: AppState) -> APIRouter:
             return app_state.sessions.sign_in(request.token, time.monotonic(), address)
         if app_state.passwords is None:
             raise SignInError("this server has no users file: sign in with the link that it printed")
-        user = await app_state.passwords.enter(request.user or "", request.password or "", address)
+        user = await app_state.passwords.check(request.user or "", request.password or "", address)
         return app_state.sessions.open(user.name, user.role, time.monotonic(), user.fingerprint)
 
     @router.post("/api/sign-in", tags=["sessions"], responses=SIGN_IN)
@@ -120,7 +120,7 @@ def sign_in_router(app_state: AppState) -> APIRouter:
 
     @router.post("/api/invite", tags=["sessions"], responses=COMMAND | {200: {"model": body.Invited}})
     async def invite(session: Supervisor, request: body.Invite) -> Response:
-        """A single-use sign-in link for somebody else or for a script. Supervisors only."""
+        """A single-use sign-in link for another user or a script. Supervisors only."""
         made = app_state.invite(session, request.user, request.role)
         return JSONResponse({"ok": True, "reason": "", "link": made.reason}) if made.ok else answer(made)
 

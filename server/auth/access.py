@@ -1,4 +1,4 @@
-"""Who gets in and how: with a password or a link that works once, over TLS or on this machine only."""
+"""Access options of the command line: sign-in by password or single-use link, over TLS or on this machine alone."""
 
 import argparse
 import ipaddress
@@ -20,11 +20,11 @@ class Tls:
 
 @dataclass(frozen=True)
 class Access:
-    """How people come in.
+    """The access to the server.
 
     Attributes:
-        users: Who signs in with a password; None where a link signs in.
-        tls: None serves plain HTTP.
+        users: Users who sign in with a password; None where sign-in is by link.
+        tls: None for plain HTTP.
     """
 
     users: UserFile | None = None
@@ -32,15 +32,15 @@ class Access:
 
     @property
     def scheme(self) -> str:
-        """Of the page's address."""
+        """URL scheme of the page."""
         return "http" if self.tls is None else "https"
 
 
 def access(arguments: argparse.Namespace) -> Access:
-    """What the command line asks for, checked.
+    """The checked access options of the command line.
 
     Raises:
-        InputError: Options or files do not fit, or a link would let in more than this machine.
+        InputError: Options or files do not fit, or sign-in by link would be open to other machines.
     """
     return Access(_users(arguments), _tls(arguments))
 
@@ -56,7 +56,7 @@ def _users(arguments: argparse.Namespace) -> UserFile | None:
     if arguments.sign_in_token_file is not None:
         raise InputError("--users and --sign-in-token-file exclude each other: with users, no link signs in")
     users = UserFile(arguments.users)
-    if not users.everyone():
+    if not users.all():
         raise InputError(
             f"nobody could sign in: {arguments.users} has no user; "
             f"run: rolling-panda user add NAME --role supervisor --file {arguments.users}"

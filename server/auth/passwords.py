@@ -1,4 +1,4 @@
-"""Signing in with name and password: one check at a time, and longer and longer waits for whoever guesses."""
+"""Sign-in with name and password: one check at a time, with exponential backoff of failures."""
 
 import asyncio
 import time
@@ -8,48 +8,48 @@ from server.auth.sessions import SignInError
 from server.auth.throttle import LoginThrottle
 from server.auth.users import User, UserFile
 
-#: A check takes 64 MiB and some 50 ms of a core; more than so many that wait are sent away.
-_WAITING = 20
+#: A check takes 64 MiB and some 50 ms of a core; further attempts than these are refused.
+_MAX_WAITING = 20
 
 
 class Passwords:
     """Checks passwords against a users file. Belongs to the server's event loop."""
 
     def __init__(self, users: UserFile, clock: Callable[[], float] = time.monotonic) -> None:
-        """Nobody has tried yet."""
+        """No attempt has failed."""
         self.users = users
         self._clock = clock
-        self._attempts = LoginThrottle()
-        self._one = asyncio.Lock()
+        self._throttle = LoginThrottle()
+        self._lock = asyncio.Lock()
         self._waiting = 0
 
-    async def enter(self, name: str, password: str, address: str) -> User:
-        """The user whose name and password these are.
+    async def check(self, name: str, password: str, address: str) -> User:
+        """The user with this name and password.
 
         Args:
             name: As given.
             password: As given.
-            address: Where the attempt comes from.
+            address: Of the client.
 
         Raises:
-            SignInError: Name or password is wrong, or too many bad attempts came before this one.
+            SignInError: Name or password is wrong, or too many attempts have failed.
             InputError: The users file cannot be read.
         """
-        if self._waiting >= _WAITING:
+        if self._waiting >= _MAX_WAITING:
             raise SignInError("many are signing in right now; try again in 1 s", 1.0)
         keys = (f"name {name}", f"address {address}")
         self._waiting += 1
         try:
-            # One at a time, so that a thousand guesses at once do not all come before the first has failed.
-            async with self._one:
-                wait = self._attempts.wait(keys, self._clock())
+            # One at a time, so that concurrent guesses do not bypass the backoff.
+            async with self._lock:
+                wait = self._throttle.wait(keys, self._clock())
                 if wait > 0.0:
                     raise SignInError(f"too many bad sign-ins; try again in {max(1.0, wait):.0f} s", wait)
                 user = await asyncio.to_thread(self.users.check, name, password)
                 if user is None:
-                    self._attempts.failed(keys, self._clock())
+                    self._throttle.failed(keys, self._clock())
                     raise SignInError("name or password is wrong")
-                self._attempts.succeeded(keys)
+                self._throttle.succeeded(keys)
                 return user
         finally:
             self._waiting -= 1

@@ -1,7 +1,4 @@
-"""Who is signed in: single-use sign-in tokens, sessions in memory, and a growing delay after bad attempts.
-
-No clock here: `now` is seconds of a monotonic clock, given by the caller.
-"""
+"""Single-use sign-in tokens, and sessions in memory. No clock here: `now` is given (s, monotonic)."""
 
 import asyncio
 import hashlib
@@ -17,26 +14,26 @@ _TOKEN_BYTES = 32
 
 
 class SignInError(InputError):
-    """A sign-in was refused; `wait_s` says for how long further ones are refused too."""
+    """A sign-in was refused; further attempts are refused for `wait_s`."""
 
     def __init__(self, reason: str, wait_s: float = 0.0) -> None:
-        """Keep the reason and the delay."""
+        """Store reason and delay."""
         super().__init__(reason)
         self.wait_s = wait_s
 
 
 @dataclass(eq=False)
 class Session:
-    """One signed-in person or script.
+    """A signed-in person or script.
 
     Attributes:
         session_id: The cookie's value; never logged.
         user: Name for logs.
-        role: What they may do.
+        role: Of the user.
         used_at: When the session was last used (s).
-        account: Fingerprint of the account that was signed in to with a password; empty for a link's session.
-        ended: Set when the session is over; its sockets close.
-        client: Tells this session from others of the same name, on the wire and on pages; says nothing of the cookie.
+        account: Fingerprint of the account, for sign-in by password; empty for sign-in by link.
+        ended: Set at the end of the session; its WebSockets close.
+        client: Public key of the session on the wire and on pages; reveals nothing of the cookie.
     """
 
     session_id: str
@@ -49,7 +46,7 @@ class Session:
 
     @property
     def may_operate(self) -> bool:
-        """True for roles that may move the robot."""
+        """Whether the role may move the robot."""
         return self.role in ("operator", "supervisor")
 
 
@@ -61,23 +58,23 @@ class _Invitation:
 
 
 class Sessions:
-    """Tokens and sessions. Only digests of tokens are kept."""
+    """Sign-in tokens and sessions. Only digests of tokens are stored."""
 
     def __init__(self, idle_s: float) -> None:
-        """Nobody is signed in; a session unused for `idle_s` ends."""
+        """No session exists; one that is unused for `idle_s` ends."""
         self._idle_s = idle_s
         self._invitations: dict[str, _Invitation] = {}
         self._sessions: dict[str, Session] = {}
         self._attempts = LoginThrottle()
 
     def invite(self, user: str, role: Role, expires_at: float = float("inf")) -> str:
-        """A new sign-in token of 256 bits, good for one sign-in until `expires_at` (s)."""
+        """A new sign-in token of 256 bits, valid for one sign-in until `expires_at` (s)."""
         token = secrets.token_urlsafe(_TOKEN_BYTES)
         self.admit(token, user, role, expires_at)
         return token
 
     def admit(self, token: str, user: str, role: Role, expires_at: float = float("inf")) -> None:
-        """Accept `token`, made elsewhere, for one sign-in.
+        """Register a given token for one sign-in.
 
         Raises:
             InputError: The token is too short to be a secret.
@@ -87,10 +84,10 @@ class Sessions:
         self._invitations[_digest(token)] = _Invitation(user, role, expires_at)
 
     def sign_in(self, token: str, now: float, address: str = "") -> Session:
-        """Use a token up and open a session; `address` is where the attempt comes from.
+        """Redeem a token and open a session; `address` is that of the client.
 
         Raises:
-            SignInError: Unknown, used or expired token, or too many bad attempts before this one.
+            SignInError: The token is unknown, used or expired, or too many attempts have failed.
         """
         wait = self._attempts.wait((address,), now)
         if wait > 0.0:
@@ -103,13 +100,13 @@ class Sessions:
         return self.open(invitation.user, invitation.role, now)
 
     def open(self, user: str, role: Role, now: float, account: str = "") -> Session:
-        """A new session for somebody who has shown who they are."""
+        """Open a session for an authenticated user."""
         session = Session(secrets.token_urlsafe(_TOKEN_BYTES), user, role, now, account)
         self._sessions[_digest(session.session_id)] = session
         return session
 
     def find(self, session_id: str, now: float) -> Session | None:
-        """The live session of a cookie value, marked as used now; None when there is none."""
+        """The session of a cookie value, marked as used now; None without one."""
         session = self._sessions.get(_digest(session_id))
         if session is None:
             return None
@@ -119,12 +116,12 @@ class Sessions:
         session.used_at = now
         return session
 
-    def everyone(self) -> tuple[Session, ...]:
-        """Every live session."""
+    def active(self) -> tuple[Session, ...]:
+        """All sessions."""
         return tuple(self._sessions.values())
 
     def void(self, accounts: Mapping[str, str]) -> tuple[Session, ...]:
-        """Sessions whose account is gone or has changed, given the fingerprint of each user's account by name."""
+        """Sessions of removed and changed accounts; `accounts` has the present fingerprints by user."""
         sessions = self._sessions.values()
         return tuple(each for each in sessions if each.account and accounts.get(each.user) != each.account)
 
@@ -135,5 +132,5 @@ class Sessions:
 
 
 def _digest(secret: str) -> str:
-    # Looking up a digest takes the same time whatever part of the secret was right.
+    # The time of a lookup by digest reveals nothing of the secret.
     return hashlib.sha256(secret.encode("utf-8", "surrogatepass")).hexdigest()

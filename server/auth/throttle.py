@@ -1,7 +1,6 @@
-"""How long whoever guesses has to wait: after five bad sign-ins a delay that doubles, for the name and for the address.
+"""Exponential backoff of failed sign-ins, by user name and by address, after five failures.
 
-No clock here: `now` is seconds of a monotonic clock, given by the caller. Only signing in waits; who is signed in can
-always stop the robot.
+No clock here: `now` is given (s, monotonic). Only sign-in is delayed; signed-in sessions can always stop the robot.
 """
 
 from collections import OrderedDict
@@ -10,8 +9,8 @@ from dataclasses import dataclass
 
 FREE = 5
 MAX_DELAY_S = 60.0
-#: Somebody who tries a million names makes the oldest ones be forgotten, not the memory full.
-_REMEMBERED = 10_000
+#: With more keys the oldest are forgotten, which bounds the memory.
+_MAX_KEYS = 10_000
 
 
 @dataclass
@@ -21,29 +20,29 @@ class _Failures:
 
 
 class LoginThrottle:
-    """Counts bad sign-ins by key: whatever stands for who tries, or for whom they say they are."""
+    """Counts failed sign-ins by key, which is a user name or an address."""
 
     def __init__(self) -> None:
-        """Nobody has tried."""
+        """No attempt has failed."""
         self._failures: OrderedDict[str, _Failures] = OrderedDict()
 
     def wait(self, keys: Iterable[str], now: float) -> float:
-        """For how long (s) an attempt under any of these keys is refused; 0 when it may be made."""
+        """Remaining delay (s) of an attempt with these keys; 0 when it is permitted."""
         known = (self._failures[key] for key in keys if key in self._failures)
         return max([0.0, *(failures.refuse_until - now for failures in known)])
 
     def failed(self, keys: Iterable[str], now: float) -> None:
-        """A bad attempt was made under all these keys."""
+        """An attempt with these keys has failed."""
         for key in keys:
             failures = self._failures.setdefault(key, _Failures())
             self._failures.move_to_end(key)
             failures.count += 1
             if failures.count >= FREE:
                 failures.refuse_until = now + min(2.0 ** min(failures.count - FREE, 30), MAX_DELAY_S)
-        while len(self._failures) > _REMEMBERED:
+        while len(self._failures) > _MAX_KEYS:
             self._failures.popitem(last=False)
 
     def succeeded(self, keys: Iterable[str]) -> None:
-        """A good attempt was made under all these keys: their count begins anew."""
+        """An attempt with these keys has succeeded: reset their counts."""
         for key in keys:
             self._failures.pop(key, None)

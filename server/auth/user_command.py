@@ -1,4 +1,4 @@
-"""`rolling-panda user`: who may sign in with a password."""
+"""`rolling-panda user`: the users who sign in with a password."""
 
 import argparse
 import getpass
@@ -11,7 +11,7 @@ from rolling_panda.errors import InputError, RollingPandaError
 from rolling_panda.messages.types import Role
 from rolling_panda.runtime.process import ROBOT_ID
 from rolling_panda.runtime.state_folder import usual_state_folder
-from server.auth.users import SHORTEST, UserFile
+from server.auth.users import MIN_LENGTH, UserFile
 
 FILE = "users.json"
 
@@ -21,29 +21,29 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = _parser().parse_args(argv)
     path: Path = arguments.file or (arguments.state or usual_state_folder(arguments.robot_id)) / FILE
     try:
-        told = arguments.run(UserFile(path), arguments)
+        output = arguments.run(UserFile(path), arguments)
     except RollingPandaError as error:
         print(f"rolling-panda user: {error}", file=sys.stderr)
         return 1
     except (KeyboardInterrupt, EOFError):
         print("rolling-panda user: nothing was changed", file=sys.stderr)
         return 1
-    print(told)
+    print(output)
     return 0
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="rolling-panda user",
-        description="Who may sign in with a password: `rolling-panda server --users FILE`. A change counts at once.",
+        description="Users who sign in with a password: `rolling-panda server --users FILE`. Changes apply at once.",
     )
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    add = commands.add_parser("add", help="let somebody sign in; asks for the password")
-    add.add_argument("--role", choices=get_args(Role), default="operator", help="what they may (default: %(default)s)")
+    add = commands.add_parser("add", help="add a user; prompts for the password")
+    add.add_argument("--role", choices=get_args(Role), default="operator", help="(default: %(default)s)")
     add.set_defaults(run=_add)
-    remove = commands.add_parser("remove", help="let somebody sign in no more; ends their sessions")
+    remove = commands.add_parser("remove", help="remove a user and end their sessions")
     remove.set_defaults(run=_remove)
-    password = commands.add_parser("password", help="set another password; ends that user's sessions")
+    password = commands.add_parser("password", help="change a user's password and end their sessions")
     password.set_defaults(run=_password)
     everyone = commands.add_parser("list", help="names and roles")
     everyone.set_defaults(run=_list)
@@ -75,14 +75,14 @@ def _password(users: UserFile, arguments: argparse.Namespace) -> str:
 
 
 def _list(users: UserFile, arguments: argparse.Namespace) -> str:
-    return "\n".join(f"{user.role:<12}{user.name}" for user in users.everyone()) or "nobody may sign in"
+    return "\n".join(f"{user.role:<12}{user.name}" for user in users.all()) or "nobody may sign in"
 
 
 def _new_password(from_stdin: bool) -> str:
     # Never an argument: those can be read by others on the machine and stay in the shell's history.
     if from_stdin:
         return sys.stdin.readline().rstrip("\n")
-    password = getpass.getpass(f"Password, at least {SHORTEST} characters: ")
+    password = getpass.getpass(f"Password, at least {MIN_LENGTH} characters: ")
     if getpass.getpass("Once more: ") != password:
         raise InputError("the two passwords differ; nothing was changed")
     return password

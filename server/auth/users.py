@@ -1,4 +1,4 @@
-"""The users file: who may sign in with a password, and as what. It holds argon2 hashes, never a password."""
+"""The users file: names, roles and argon2 hashes of the passwords."""
 
 import hashlib
 import re
@@ -14,14 +14,14 @@ from rolling_panda.errors import InputError
 from rolling_panda.messages.types import Role
 from rolling_panda.runtime.state_folder import replace_durably
 
-SHORTEST, LONGEST = 10, 200
+MIN_LENGTH, MAX_LENGTH = 10, 200
 _NAME = re.compile(r"[A-Za-z0-9_.\-][A-Za-z0-9_.\- ]{0,39}")
-#: Of no password: an unknown name takes as long to be refused as a wrong password.
-_NOBODY = PasswordHasher().hash("nobody has this password: \0")
+#: Checked for unknown names, so that their refusal takes as long as that of a wrong password.
+_DUMMY_HASH = PasswordHasher().hash("nobody has this password: \0")
 
 
 class User(Struct, frozen=True, forbid_unknown_fields=True):
-    """Somebody who may sign in; `password` is an argon2 hash with its own salt and cost."""
+    """A user; `password` is an argon2 hash with its own salt and cost."""
 
     name: Annotated[str, Meta(min_length=1, max_length=40)]
     role: Role
@@ -29,7 +29,7 @@ class User(Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def fingerprint(self) -> str:
-        """Changes with role and password; says nothing of either."""
+        """Digest that changes with role and password, and reveals neither."""
         return hashlib.sha256(msgspec.json.encode(self)).hexdigest()
 
 
@@ -38,18 +38,18 @@ class _Content(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class UserFile:
-    """Reads and changes a users file; every call sees the file as it is now."""
+    """Reads and changes a users file; every call reads it again."""
 
     def __init__(self, path: Path) -> None:
-        """Bind the file; it need not exist yet."""
+        """Bind the file, which need not exist yet."""
         self.path = path
         self._hasher = PasswordHasher()
 
-    def everyone(self) -> tuple[User, ...]:
-        """All users, by name; nobody where there is no file.
+    def all(self) -> tuple[User, ...]:
+        """All users, by name; empty without a file.
 
         Raises:
-            InputError: The file cannot be read, or is none.
+            InputError: The file cannot be read or is invalid.
         """
         try:
             content = msgspec.json.decode(self.path.read_bytes(), type=_Content)
@@ -64,42 +64,42 @@ class UserFile:
         return content.users
 
     def check(self, name: str, password: str) -> User | None:
-        """The user whose name and password these are; None where they fit nobody. Takes some 50 ms either way.
+        """The user with this name and password, else None. Takes some 50 ms either way.
 
         Raises:
             InputError: The file cannot be read.
         """
-        found = next((user for user in self.everyone() if user.name == name), None)
+        found = next((user for user in self.all() if user.name == name), None)
         try:
-            self._hasher.verify(_NOBODY if found is None else found.password, password)
+            self._hasher.verify(_DUMMY_HASH if found is None else found.password, password)
         except (Argon2Error, InvalidHashError, UnicodeEncodeError):
             return None
         return found
 
     def add(self, name: str, role: Role, password: str) -> None:
-        """Let somebody sign in.
+        """Add a user.
 
         Raises:
-            InputError: The name is taken or none, the password too short, or the file cannot be changed.
+            InputError: The name is taken or invalid, the password is too short, or the file cannot be changed.
         """
         if not _NAME.fullmatch(name):
             raise InputError(f"{name!r} is no name; give 1 to 40 letters, digits, spaces and `_.-`, no space first")
-        users = self.everyone()
+        users = self.all()
         if any(user.name == name for user in users):
             raise InputError(f"there is a user {name!r} already; `rolling-panda user password` sets another password")
         self._write((*users, User(name, role, self._hashed(password))))
 
     def set_password(self, name: str, password: str) -> None:
-        """Give somebody another password.
+        """Change a user's password.
 
         Raises:
             InputError: There is no such user, the password is too short, or the file cannot be changed.
         """
-        kept = self._known(name)
-        self._write((*self._others(name), User(name, kept.role, self._hashed(password))))
+        user = self._known(name)
+        self._write((*self._others(name), User(name, user.role, self._hashed(password))))
 
     def remove(self, name: str) -> None:
-        """Let somebody sign in no more.
+        """Remove a user.
 
         Raises:
             InputError: There is no such user, or the file cannot be changed.
@@ -108,7 +108,7 @@ class UserFile:
         self._write(self._others(name))
 
     def _known(self, name: str) -> User:
-        users = self.everyone()
+        users = self.all()
         for user in users:
             if user.name == name:
                 return user
@@ -116,11 +116,11 @@ class UserFile:
         raise InputError(f"there is no user {name!r} in {self.path}; there are {names}")
 
     def _others(self, name: str) -> tuple[User, ...]:
-        return tuple(user for user in self.everyone() if user.name != name)
+        return tuple(user for user in self.all() if user.name != name)
 
     def _hashed(self, password: str) -> str:
-        if not SHORTEST <= len(password) <= LONGEST:
-            raise InputError(f"a password has {SHORTEST} to {LONGEST} characters; this one has {len(password)}")
+        if not MIN_LENGTH <= len(password) <= MAX_LENGTH:
+            raise InputError(f"a password has {MIN_LENGTH} to {MAX_LENGTH} characters; this one has {len(password)}")
         return self._hasher.hash(password)
 
     def _write(self, users: tuple[User, ...]) -> None:

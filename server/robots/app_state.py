@@ -58,7 +58,7 @@ class AppState:
         if self.passwords is None:
             return
         try:
-            accounts = {user.name: user.fingerprint for user in self.passwords.users.everyone()}
+            accounts = {user.name: user.fingerprint for user in self.passwords.users.all()}
         except InputError as error:
             # Sessions stay signed in while the file cannot be read; nobody new can sign in.
             if str(error) != self._users_error:

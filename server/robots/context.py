@@ -35,7 +35,7 @@ MOTION_RATE_HZ, _MOTION_BURST = 60.0, 20.0
 
 @dataclass(frozen=True)
 class Result:
-    """How a request ended: the HTTP status that says so, and the reason in words."""
+    """The result of a request: HTTP status, success, and a message."""
 
     status: int
     ok: bool

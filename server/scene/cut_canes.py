@@ -112,11 +112,11 @@ def removed_capsules(old: Sequence[Capsule], after: Sequence[Capsule]) -> list[C
     new = {(capsule.kind, capsule.start): capsule for capsule in after}
     removed = []
     for capsule in old:
-        kept = new.get((capsule.kind, capsule.start))
-        if kept is None:
+        remaining = new.get((capsule.kind, capsule.start))
+        if remaining is None:
             removed.append(capsule)
-        elif kept.end != capsule.end:
-            removed.append(Capsule(capsule.kind, kept.end, capsule.end, kept.end_radius, capsule.end_radius))
+        elif remaining.end != capsule.end:
+            removed.append(Capsule(capsule.kind, remaining.end, capsule.end, remaining.end_radius, capsule.end_radius))
     return removed
 
 

@@ -1,4 +1,4 @@
-"""The robot's looks: triangles of each moving body, from the visuals of our URDFs and of the Panda's."""
+"""Meshes of the robot: triangles of each moving body, from the visuals of our URDFs and of the Panda's."""
 
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass

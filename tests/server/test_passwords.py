@@ -40,7 +40,7 @@ def users():
 
 async def refused(passwords, name="ada", password="wrong", address="1"):
     with pytest.raises(SignInError) as caught:
-        await passwords.enter(name, password, address)
+        await passwords.check(name, password, address)
     return caught.value
 
 
@@ -48,13 +48,13 @@ def test_a_crowd_is_checked_one_by_one_and_who_is_too_many_is_sent_away(users):
     async def crowd():
         passwords = Passwords(users, lambda: 0.0)
         users.go.clear()
-        waiting = [asyncio.create_task(passwords.enter("ada", "right", str(n))) for n in range(21)]
+        waiting = [asyncio.create_task(passwords.check("ada", "right", str(n))) for n in range(21)]
         await asyncio.sleep(0)
         users.go.set()
         *entered, away = await asyncio.gather(*waiting, return_exceptions=True)
         assert entered == [ADA] * 20 and users.most_at_once == 1
         assert isinstance(away, SignInError) and away.wait_s == 1.0 and "many are signing in" in str(away)
-        assert await passwords.enter("ada", "right", "late") == ADA
+        assert await passwords.check("ada", "right", "late") == ADA
 
     asyncio.run(crowd())
 
@@ -72,10 +72,10 @@ def test_who_guesses_waits_by_name_and_by_address_for_as_long_as_is_said(users):
         told = await refused(passwords, password="right")
         assert told.wait_s == pytest.approx(0.3) and "try again in 1 s" in str(told)
         now = 1.1
-        assert await passwords.enter("ada", "right", "1") == ADA
+        assert await passwords.check("ada", "right", "1") == ADA
         for _ in range(FREE - 1):
             assert (await refused(passwords)).wait_s == 0.0
-        assert await passwords.enter("ada", "right", "1") == ADA
+        assert await passwords.check("ada", "right", "1") == ADA
 
     asyncio.run(guesses())
 
@@ -86,8 +86,8 @@ def test_a_users_file_that_cannot_be_read_keeps_no_place(users):
         users.broken = True
         for _ in range(25):
             with pytest.raises(InputError, match="no users file"):
-                await passwords.enter("ada", "right", "1")
+                await passwords.check("ada", "right", "1")
         users.broken = False
-        assert await passwords.enter("ada", "right", "1") == ADA
+        assert await passwords.check("ada", "right", "1") == ADA
 
     asyncio.run(broken())

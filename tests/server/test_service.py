@@ -27,8 +27,8 @@ def test_a_port_that_is_no_port_is_one_clear_line():
 
 
 def test_no_part_of_an_answer_waits_for_the_other_side():
-    with listen("127.0.0.1", 0) as door, socket.create_connection(door.getsockname()):
-        answering, _ = door.accept()
+    with listen("127.0.0.1", 0) as listener, socket.create_connection(listener.getsockname()):
+        answering, _ = listener.accept()
         with answering:
             assert answering.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
 
@@ -46,7 +46,7 @@ def served(monkeypatch):
     """Instead of serving, hand over what would have been served."""
     seen = {}
 
-    async def serve(config, wires, sessions, door, address, stopping, allowed, built):
+    async def serve(config, wires, sessions, listener, address, stopping, allowed, built):
         seen.update(robots=list(wires), sessions=sessions, address=address, allowed=allowed)
 
     monkeypatch.setattr(service, "serve", serve)

@@ -67,7 +67,7 @@ def test_a_session_that_was_ended_is_gone():
     sessions.end(session)
     sessions.end(session)
     assert sessions.find(session.session_id, 0.0) is None
-    assert sessions.everyone() == ()
+    assert sessions.active() == ()
 
 
 def test_a_good_sign_in_makes_bad_ones_of_that_address_be_forgotten():

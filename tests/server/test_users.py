@@ -31,22 +31,22 @@ def test_the_file_holds_no_password_and_is_for_its_owner_alone(users):
     assert "correct" not in content and "$argon2id$" in content
     assert stat.S_IMODE(users.path.stat().st_mode) == 0o600
     users.add("bob", "viewer", PASSWORD)
-    hashes = {user.password for user in users.everyone()}
+    hashes = {user.password for user in users.all()}
     assert len(hashes) == 2
 
 
 def test_a_new_password_counts_at_once_and_the_old_one_no_more(users):
-    before = users.everyone()[0].fingerprint
+    before = users.all()[0].fingerprint
     users.set_password("ada", "another long one")
     assert users.check("ada", PASSWORD) is None and users.check("ada", "another long one")
-    assert users.everyone()[0].fingerprint != before
+    assert users.all()[0].fingerprint != before
 
 
 def test_who_is_removed_is_gone(users):
     users.add("bob", "viewer", PASSWORD)
     users.remove("ada")
     assert users.check("ada", PASSWORD) is None
-    assert [user.name for user in users.everyone()] == ["bob"]
+    assert [user.name for user in users.all()] == ["bob"]
 
 
 def test_what_cannot_be_is_refused_in_words(users):
@@ -61,7 +61,7 @@ def test_what_cannot_be_is_refused_in_words(users):
         users.remove("eve")
     users.path.write_text("{")
     with pytest.raises(InputError, match="is no users file"):
-        users.everyone()
+        users.all()
 
 
 def run(monkeypatch, capsys, *words, typed=""):

@@ -65,10 +65,10 @@ def running_server(wire, config=None, access=None, **others):
     parts()
     sessions = Sessions(3600.0)
     stopping = threading.Event()
-    with listen("127.0.0.1", 0) as door, patch("server.service.robot_parts", lambda model: parts()):
+    with listen("127.0.0.1", 0) as listener, patch("server.service.robot_parts", lambda model: parts()):
         access = access or Access()
-        address = f"{access.scheme}://127.0.0.1:{door.getsockname()[1]}"
-        work = serve(config or ServerConfig(), {"rp1": wire, **others}, sessions, door, address, stopping, access)
+        address = f"{access.scheme}://127.0.0.1:{listener.getsockname()[1]}"
+        work = serve(config or ServerConfig(), {"rp1": wire, **others}, sessions, listener, address, stopping, access)
         failure = []
 
         def run():
