@@ -5,12 +5,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 TYPESCRIPT := typescript@5.9.3
 
-.PHONY: help demo test fast check format bench mutation clean lock materials browser
+.PHONY: help demo test test-training fast check format bench mutation clean lock materials browser drivers training
 .DEFAULT_GOAL := help
 
 help:
 	@echo "make demo    start everything in simulation; prints a link to sign in with   (ARGS='--port 8001 --seed 3')"
 	@echo "make test    make check, then every test"
+	@echo "make test-training  the tests of the training, with PyTorch"
 	@echo "make fast    tests that only compute: no browser, no processes"
 	@echo "make format  format the code, write the generated files anew"
 	@echo "make check   formatting, types, import contracts, generated files"
@@ -23,19 +24,25 @@ help:
 demo: $(VENV)/.project
 	@exec $(BIN)/rolling-panda demo $(ARGS)
 
-# First the tests that only compute, one on each core; then those that time would disturb, one after the other.
-test: check browser
+# First the tests that only compute, one on each core; then those that time would disturb, one after the other. Training
+# has its own target, since nothing else needs PyTorch.
+WITHOUT_TRAINING := --ignore tests/perception/test_training.py
+test: check browser drivers
 ifdef ARGS
 	$(BIN)/pytest $(ARGS)
 else
-	$(BIN)/pytest -n auto -m "not alone and not slow"
-	$(BIN)/pytest -m "alone and not slow"
+	$(BIN)/pytest -n auto -m "not alone and not slow" $(WITHOUT_TRAINING)
+	$(BIN)/pytest -m "alone and not slow" $(WITHOUT_TRAINING)
+	@echo "make test-training runs the tests of the training; it installs PyTorch"
 endif
+
+test-training: training
+	$(BIN)/pytest tests/perception/test_training.py
 
 # Fewer random examples than `make test` has.
 fast: $(VENV)/.project
 	HYPOTHESIS_PROFILE=fast $(BIN)/pytest -n auto -m "not alone and not slow and not browser" \
-		tests/bridge tests/controller tests/perception tests/recorder tests/rolling_panda tests/server
+		$(WITHOUT_TRAINING) tests/bridge tests/controller tests/perception tests/recorder tests/rolling_panda tests/server
 
 format: $(VENV)/.project
 	$(BIN)/ruff check --fix .
@@ -89,6 +96,18 @@ $(VENV)/.locked: requirements.lock
 	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
 	@touch $@
 
+# The real robot's drivers, for their tests: both bridges are held to the same contract.
+drivers: $(VENV)/.drivers
+$(VENV)/.drivers: $(VENV)/.project requirements-real.lock
+	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-real.lock
+	@touch $@
+
+# PyTorch's build without CUDA, which is on PyTorch's own package index: give that one to pip (PIP_EXTRA_INDEX_URL).
+training: $(VENV)/.training
+$(VENV)/.training: $(VENV)/.project requirements-training.lock
+	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-training.lock
+	@touch $@
+
 # The control code becomes machine code when it is first imported: better here than at the first start.
 $(VENV)/.project: $(VENV)/.locked pyproject.toml
 	@$(BIN)/python -c 'import ctypes; ctypes.CDLL("libgomp.so.1")' 2>/dev/null || \
@@ -117,6 +136,8 @@ lock:
 	$(COMPILE) --extra dev --output-file requirements.lock pyproject.toml
 	$(COMPILE) --constraint requirements.lock --output-file requirements-run.lock pyproject.toml
 	$(COMPILE) --constraint requirements.lock --extra real --output-file requirements-real.lock pyproject.toml
+	$(BIN)/python -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["training"], sep="\n")' \
+		| $(COMPILE) --constraint requirements.lock --output-file requirements-training.lock -
 
 clean:
 	rm -rf $(VENV) build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

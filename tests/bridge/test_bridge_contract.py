@@ -17,6 +17,7 @@ from rolling_panda import messages as m
 from rolling_panda.config import load_section
 from rolling_panda.resources import resource
 from tests.support.bridge_rig import FORWARD, MODEL, REST, NoCamera, Parts, Rig, SimulatedPlant
+from tests.support.extras import need
 
 
 def simulated() -> Parts:
@@ -30,8 +31,7 @@ def simulated() -> Parts:
 
 
 def real() -> Parts:
-    for driver in ("panda_py", "rosbags"):
-        pytest.importorskip(driver, reason="the extra `real` is not installed: pip install '.[real]'")
+    need("real")
     from tests.support.real_rig import RealPlant
 
     plant = RealPlant()
@@ -68,11 +68,15 @@ def test_telemetry_comes_at_its_rates_with_growing_sequences(rig: Rig) -> None:
 
 
 def test_base_and_arm_follow_and_the_telemetry_says_what_they_do(rig: Rig) -> None:
+    def told() -> bool:
+        joints = next(out.joints for out in reversed(rig.outputs) if out.joints)
+        odometry = next(out.odometry for out in reversed(rig.outputs) if out.odometry)
+        told = joints.velocity == pytest.approx(FORWARD, abs=0.1)
+        return told and odometry.linear == pytest.approx(0.2, abs=0.02)
+
     rig.drive_on()
-    joints = next(out.joints for out in reversed(rig.outputs) if out.joints)
+    assert rig.until(told, FORWARD)
     odometry = next(out.odometry for out in reversed(rig.outputs) if out.odometry)
-    assert joints.velocity == pytest.approx(FORWARD, abs=0.1)
-    assert odometry.linear == pytest.approx(0.2, abs=0.02)
     assert odometry.pose.x > 0.1
     assert not rig.state.watchdog
     assert rig.plant.breaches() == []

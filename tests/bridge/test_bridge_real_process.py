@@ -11,19 +11,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rolling_panda import messages as m
+from rolling_panda import topics
+from rolling_panda.config import TransportConfig
+from rolling_panda.model.robot import RobotModel
+from rolling_panda.resources import resource
+from rolling_panda.runtime.launch import child_environment
+from rolling_panda.transport.zenoh import Router, Transport
+from tests.support.device_process import DeviceProcess
+from tests.support.extras import need
 from tests.support.live_robot import free_port
 
-for driver in ("panda_py", "pyrealsense2", "rosbags"):
-    pytest.importorskip(driver, reason="the extra `real` is not installed: pip install '.[real]'")
-
-from rolling_panda import messages as m  # noqa: E402
-from rolling_panda import topics  # noqa: E402
-from rolling_panda.config import TransportConfig  # noqa: E402
-from rolling_panda.model.robot import RobotModel  # noqa: E402
-from rolling_panda.resources import resource  # noqa: E402
-from rolling_panda.runtime.launch import child_environment  # noqa: E402
-from rolling_panda.transport.zenoh import Router, Transport  # noqa: E402
-from tests.support.device_process import DeviceProcess  # noqa: E402
+need("real")
 
 pytestmark = pytest.mark.alone
 

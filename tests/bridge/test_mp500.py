@@ -6,17 +6,14 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
+from bridge.real import mp500
+from bridge.real.config import BaseConfig
+from bridge.real.mp500 import Mp500
+from rolling_panda.config import TransportConfig
+from rolling_panda.model.robot import RobotModel
+from rolling_panda.transport.zenoh import ForeignWire, Router
+from tests.support.device_process import DeviceProcess
 from tests.support.live_robot import free_port
-
-pytest.importorskip("rosbags", reason="the extra `real` is not installed: pip install '.[real]'")
-
-from bridge.real import mp500  # noqa: E402
-from bridge.real.config import BaseConfig  # noqa: E402
-from bridge.real.mp500 import Mp500  # noqa: E402
-from rolling_panda.config import TransportConfig  # noqa: E402
-from rolling_panda.model.robot import RobotModel  # noqa: E402
-from rolling_panda.transport.zenoh import ForeignWire, Router  # noqa: E402
-from tests.support.device_process import DeviceProcess  # noqa: E402
 
 pytestmark = pytest.mark.alone
 

@@ -14,13 +14,14 @@ from typing import Self
 import numpy as np
 import pytest
 
-pytest.importorskip("panda_py", reason="the extra `real` is not installed: pip install '.[real]'")
+from bridge.real.config import ArmConfig
+from bridge.real.panda import Panda
+from rolling_panda.model.robot import RobotModel
+from rolling_panda.runtime.launch import child_environment
+from tests.support.device_process import DeviceProcess
+from tests.support.extras import need
 
-from bridge.real.config import ArmConfig  # noqa: E402
-from bridge.real.panda import Panda  # noqa: E402
-from rolling_panda.model.robot import RobotModel  # noqa: E402
-from rolling_panda.runtime.launch import child_environment  # noqa: E402
-from tests.support.device_process import DeviceProcess  # noqa: E402
+need("real")
 
 pytestmark = pytest.mark.alone
 

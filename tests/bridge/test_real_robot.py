@@ -6,15 +6,15 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-for driver in ("panda_py", "rosbags"):
-    pytest.importorskip(driver, reason="the extra `real` is not installed: pip install '.[real]'")
+from bridge.core.bridge import TICK_S
+from bridge.core.robot_time import RealTime
+from bridge.real import mp500
+from rolling_panda import messages as m
+from tests.support.bridge_rig import FORWARD, REST, Parts, Rig
+from tests.support.extras import need
+from tests.support.real_rig import RealPlant
 
-from bridge.core.bridge import TICK_S  # noqa: E402
-from bridge.core.robot_time import RealTime  # noqa: E402
-from bridge.real import mp500  # noqa: E402
-from rolling_panda import messages as m  # noqa: E402
-from tests.support.bridge_rig import FORWARD, REST, Parts, Rig  # noqa: E402
-from tests.support.real_rig import RealPlant  # noqa: E402
+need("real")
 
 pytestmark = pytest.mark.alone
 

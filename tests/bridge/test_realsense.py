@@ -10,7 +10,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-rs = pytest.importorskip("pyrealsense2", reason="the extra `real` is not installed: pip install '.[real]'")
+from tests.support.extras import need
+
+need("real")
+
+import pyrealsense2 as rs
 
 from bridge.core.picture import DEPTH_UNIT, Picture
 from bridge.real.config import CameraConfig

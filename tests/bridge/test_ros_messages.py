@@ -5,11 +5,9 @@ import struct
 import numpy as np
 import pytest
 
-pytest.importorskip("rosbags", reason="the extra `real` is not installed: pip install '.[real]'")
-
-from bridge.fakes.mp500 import battery  # noqa: E402
-from bridge.real import ros_messages as ros  # noqa: E402
-from rolling_panda.errors import MessageError  # noqa: E402
+from bridge.fakes.mp500 import battery
+from bridge.real import ros_messages as ros
+from rolling_panda.errors import MessageError
 
 LITTLE_ENDIAN = bytes([0, 1, 0, 0])
 # Stamp 7 s 8 ns, then a string of four letters and its end: 17 bytes.

@@ -4,8 +4,11 @@
 import numpy as np
 import pytest
 
-torch = pytest.importorskip("torch", reason="the extra `training` is not installed: pip install '.[training]'")
-pytest.importorskip("onnx", reason="the extra `training` is not installed: pip install '.[training]'")
+from tests.support.extras import need
+
+need("training")
+
+import torch
 
 from perception.segmentation.network_segmenter import NetworkSegmenter, network_input
 from perception.training.compact import CompactLabeller

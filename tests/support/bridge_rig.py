@@ -126,7 +126,8 @@ class Rig(Commander):
         """Come to a steady velocity of base and arm, and see it in the plant."""
         self.run(0.2, REST)
         self.run(1.0, FORWARD)
-        np.testing.assert_allclose(self.plant.velocity(), FORWARD, atol=0.06)
+        # A real robot's fakes run beside this process; on a busy machine they now and then miss a command.
+        assert self.until(lambda: np.allclose(self.plant.velocity(), FORWARD, rtol=0.0, atol=0.06), FORWARD)
 
     def cut(self, cut_id: str, epoch: int | None = None) -> None:
         self.core.on_cut(

@@ -6,15 +6,12 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
+from bridge.real import ros_messages as ros
+from bridge.real.config import CutterConfig
+from bridge.real.cutter import Cutter
+from rolling_panda.config import TransportConfig
+from rolling_panda.transport.zenoh import ForeignWire, Router
 from tests.support.live_robot import free_port
-
-pytest.importorskip("rosbags", reason="the extra `real` is not installed: pip install '.[real]'")
-
-from bridge.real import ros_messages as ros  # noqa: E402
-from bridge.real.config import CutterConfig  # noqa: E402
-from bridge.real.cutter import Cutter  # noqa: E402
-from rolling_panda.config import TransportConfig  # noqa: E402
-from rolling_panda.transport.zenoh import ForeignWire, Router  # noqa: E402
 
 pytestmark = pytest.mark.alone
 

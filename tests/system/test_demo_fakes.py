@@ -6,14 +6,13 @@ from typing import Any
 
 import pytest
 
+from benchmarks.page.demo_under_test import Demo
+from bridge.sim.robot import trace
+from rolling_panda.resources import resource
+from tests.support.extras import need
 from tests.support.live_robot import free_port
 
-for driver in ("panda_py", "pyrealsense2", "rosbags"):
-    pytest.importorskip(driver, reason="the extra `real` is not installed: pip install '.[real]'")
-
-from benchmarks.page.demo_under_test import Demo  # noqa: E402
-from bridge.sim.robot import trace  # noqa: E402
-from rolling_panda.resources import resource  # noqa: E402
+need("real")
 
 # Eight processes for minutes, half of them at a kilohertz.
 pytestmark = [pytest.mark.alone, pytest.mark.slow]

@@ -18,6 +18,7 @@ RUN = PROJECT["dependencies"]
     [
         ("requirements-run.lock", RUN),
         ("requirements-real.lock", RUN + PROJECT["optional-dependencies"]["real"]),
+        ("requirements-training.lock", PROJECT["optional-dependencies"]["training"]),
         ("requirements.lock", RUN + PROJECT["optional-dependencies"]["dev"]),
     ],
 )
@@ -31,7 +32,9 @@ def test_every_declared_dependency_is_locked_at_an_allowed_version(lock: str, de
         assert wanted.specifier.contains(version), f"{lock} has {wanted.name} {version}; run `make lock`"
 
 
-@pytest.mark.parametrize("lock", ["requirements-run.lock", "requirements-real.lock", "requirements.lock"])
+@pytest.mark.parametrize(
+    "lock", ["requirements-run.lock", "requirements-real.lock", "requirements-training.lock", "requirements.lock"]
+)
 def test_a_lock_has_hashes_and_no_index_address(lock: str) -> None:
     text = (ROOT / lock).read_text()
     assert text.count("--hash=sha256:") >= len(re.findall(r"^\S+==", text, re.MULTILINE))
