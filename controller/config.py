@@ -117,12 +117,12 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         cut_timeout_s: A cut without outcome for this long is UNKNOWN (s).
         largest_radius: Canes thicker than this are refused (m).
         survey_speed: Of the base on a survey (m/s).
-        confirm: Whether each point is looked at from near before it is cut.
-        verify: Whether each cut is looked at afterwards; else the cutter's word is taken for it.
-        look_within: The look before a cut is taken this near to the place clear of the canes (m).
-        look_speed: The tool is slower than this meanwhile (m/s).
-        look_from: The look afterwards is taken when the tool is this far from the cut (m).
-        look_timeout_s: A look without a picture ends after this time (s).
+        pre_cut_check: Whether a close-up checks each point before it is cut.
+        post_cut_check: Whether a close-up checks each cut; else the cutter's report counts.
+        close_up_within: Largest distance from the place clear of the canes at the close-up before a cut (m).
+        close_up_speed: Largest speed of the tool at the close-up before a cut (m/s).
+        close_up_from: Distance of the tool from the cut at the close-up afterwards (m).
+        close_up_timeout_s: Time limit of a close-up (s).
         moved_tolerance: A point that moved further than this after acceptance is not cut (m).
         base_lag_s: Time constant with which the wheels follow their command (s).
         arm_lag_s: By which the arm's servos follow late (s); half a period comes on top.
@@ -193,12 +193,12 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
     cut_timeout_s: Annotated[float, at_most(5.0)] = 3.0
     largest_radius: Annotated[float, at_most(0.0125)] = 0.0075
     survey_speed: Annotated[float, at_most(0.3)] = 0.15
-    confirm: Annotated[bool, usually_on()] = True
-    verify: Annotated[bool, usually_on()] = True
-    look_within: Annotated[float, at_most(0.2)] = 0.08
-    look_speed: Annotated[float, at_most(0.5)] = 0.25
-    look_from: Annotated[float, at_most(0.5)] = 0.15
-    look_timeout_s: Annotated[float, at_most(20.0)] = 8.0
+    pre_cut_check: Annotated[bool, usually_on()] = True
+    post_cut_check: Annotated[bool, usually_on()] = True
+    close_up_within: Annotated[float, at_most(0.2)] = 0.08
+    close_up_speed: Annotated[float, at_most(0.5)] = 0.25
+    close_up_from: Annotated[float, at_most(0.5)] = 0.15
+    close_up_timeout_s: Annotated[float, at_most(20.0)] = 8.0
     moved_tolerance: Annotated[float, at_most(0.005)] = 0.005
     gain_position: Gain = 5.0
     gain_rotation: Gain = 5.0

@@ -149,7 +149,7 @@ class Controller:
         if supervisor.stops.changed or now >= self._stops_due:
             self._stops_due, stops = now + _STOPS_S, supervisor.stops.message()
         picture = self._picture(now)
-        events, records = self._event_log.take(), self._journal.take()
+        events, records = self._event_log.drain(), self._journal.drain()
         return Outputs(
             motion=motion,
             token=token,
@@ -197,12 +197,12 @@ class Controller:
         self._inputs = inputs
         self._journal.observe(inputs.ledger, now)
         self._journal.stops(inputs.stops)
-        self._movement.take(inputs)
-        self._supervisor.take(inputs, self._journal.trouble(now, self._config.ledger_max_age_s), now)
+        self._movement.update(inputs)
+        self._supervisor.update(inputs, self._journal.trouble(now, self._config.ledger_max_age_s), now)
         sequence = self._movement.sequence
         if inputs.bridge is not None:
-            look = None if inputs.look is None else inputs.look.message
-            for text in sequence.watch(inputs.bridge.message, look, now):
+            close_up = None if inputs.close_up is None else inputs.close_up.message
+            for text in sequence.watch(inputs.bridge.message, close_up, now):
                 self._event_log.say("info", text)
         if inputs.points is not None and inputs.points is not self._points_seen:
             self._points_seen = inputs.points
@@ -264,8 +264,8 @@ class Controller:
             rights = supervisor.authority.rights(client, intent.role)
             refused = supervisor.event(event, now, f"{type(intent).__name__.lower()} by {intent.user}", rights)
             if isinstance(intent, intents.Start) and not refused:
-                self._previews.begin()
-                movement.sequence.begin(intent if isinstance(intent, intents.Survey) else None)
+                self._previews.start()
+                movement.sequence.start(intent if isinstance(intent, intents.Survey) else None)
             return refused
         if isinstance(intent, intents.Home):
             movement.go_home()
@@ -306,7 +306,7 @@ class Controller:
             cuts=self._plans.cuts,
             at_rest=not movement.homing and self.mode != "TELEOP" and movement.at_rest,
             working=self.mode == "AUTO",
-            look_s=movement.sequence.look_s,
+            close_up_s=movement.sequence.close_up_s,
             now=now,
         )
 

@@ -37,7 +37,7 @@ class Inputs:
         stops: Stop requests that came in since the last step.
         wall_time: Now (s since 1970), for people alone.
         ledger: How much of what was recorded is durable.
-        look: What the newest picture that was asked for shows.
+        close_up: Result of the newest requested close-up.
         tick_s: Median time of one control step, measured by the loop (s).
         ticks: Control periods, counted by the loop.
         late_ticks: Those of them that lasted more than half as long again as they should.
@@ -56,7 +56,7 @@ class Inputs:
     stops: tuple[m.StopRequest, ...] = ()
     wall_time: float = 0.0
     ledger: LedgerState = LedgerState()
-    look: Sample[CloseUpResult] | None = None
+    close_up: Sample[CloseUpResult] | None = None
     tick_s: float = 0.0
     ticks: int = 0
     late_ticks: int = 0

@@ -111,7 +111,7 @@ class Loop:
         transport.on_reject = lambda topic, reason: self._said.put(f"refused on {topic}: {reason}")
         transport.serve(INTENT, self._commands.ask)
         self._log_events = transport.feed(EVENT, 1000)
-        self._look, self._picture = self._newest(CLOSE_UP), transport.publisher(CLOSE_UP_REQUEST)
+        self._close_up, self._picture = self._newest(CLOSE_UP), transport.publisher(CLOSE_UP_REQUEST)
         self._motion, self._cut = transport.publisher(MOTION), transport.publisher(CUT)
         self._token, self._stop = transport.publisher(TOKEN), transport.publisher(STOP)
         self._state, self._event = transport.publisher(CONTROLLER), transport.publisher(EVENT)
@@ -144,7 +144,7 @@ class Loop:
             plan=None if self._planner is None else self._planner.newest,
             preview=None if self._planner is None else self._planner.newest_preview,
             ledger=self._recorded(),
-            look=self._look.sample(),
+            close_up=self._close_up.sample(),
             tick_s=self._tick_s,
             ticks=self._count,
             late_ticks=self._late,

@@ -76,7 +76,7 @@ class ClosedLoop:
         if method is not None:
             config = msgspec.structs.replace(config, method=method)
         if not looks:
-            config = msgspec.structs.replace(config, confirm=False, verify=False)
+            config = msgspec.structs.replace(config, pre_cut_check=False, post_cut_check=False)
         self.controller = Controller(config, robot)
         self._drive = RobotModel(robot).drive
         self._control_ticks = max(1, round(1.0 / (config.rate_hz * TICK_S)))
@@ -184,7 +184,7 @@ class ClosedLoop:
         if outputs.frame is not None and outputs.frame.point_id:
             self._looked = self.now + _LOOK_S, self.perception.check_close_up(outputs.frame)
         if self._looked is not None and self.now >= self._looked[0]:
-            self.inputs, self._looked = replace(self.inputs, look=Sample(self._looked[1], self.now)), None
+            self.inputs, self._looked = replace(self.inputs, close_up=Sample(self._looked[1], self.now)), None
         if outputs.frame is not None:
             self._seen = self.now + _PERCEPTION_S, self.perception.process(outputs.frame)
         if self._seen is not None and self.now >= self._seen[0]:

@@ -78,7 +78,7 @@ class KinematicRobot:
         self._points: Sample[m.PruningPoints] | None = None
         self._told: Sample[Obstacles] | None = None
         self._stops: tuple[m.StopRequest, ...] = ()
-        self._look: Sample[CloseUpResult] | None = None
+        self._close_up: Sample[CloseUpResult] | None = None
         self._joints: Sample[m.JointState] | None = None
         self._odometry: Sample[m.Odometry] | None = None
 
@@ -114,7 +114,7 @@ class KinematicRobot:
             present=present,
             stops=stops,
             ledger=self.ledger,
-            look=self._look,
+            close_up=self._close_up,
         )
 
     def _renewed(self, teleop: TeleopTarget) -> TeleopTarget:
@@ -141,7 +141,7 @@ class KinematicRobot:
         if out.token is not None:
             self._fence.ask(out.token.token, self.now, not self._moving)
         if out.picture is not None:
-            self._look = self._looked(out.picture)
+            self._close_up = self._looked(out.picture)
         if out.cut is not None and out.cut.cut_id != self._cut_id:
             self._cut_id, self._cut_at = out.cut.cut_id, self.now
             self.cuts.append((out.cut.point_id, self.model.kinematics(self.q).T_odom_tool.homogeneous.copy()))

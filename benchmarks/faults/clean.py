@@ -57,7 +57,7 @@ class EndlessRow(World):
     def __init__(self, seed: int) -> None:
         """At work on the first points. There is no camera, so that nothing is looked at from near."""
         super().__init__(seed)
-        self.config = msgspec.structs.replace(self.config, confirm=False, verify=False)
+        self.config = msgspec.structs.replace(self.config, pre_cut_check=False, post_cut_check=False)
         self.controller = self.new_controller()
         self.cut_ids: set[str] = set()
         self._shown = 0

@@ -111,7 +111,7 @@ class Journal:
                 self._stops.append(stop.stop_id)
                 self.add("stop", stop.user or stop.source, stop)
 
-    def take(self) -> tuple[Record, ...]:
+    def drain(self) -> tuple[Record, ...]:
         """What was added since the last time, for the ledger."""
         records, self._waiting = tuple(self._waiting), []
         return records
@@ -152,7 +152,7 @@ class EventLogger:
         self._events.append(event)
         self._journal.add("event", "controller", event)
 
-    def take(self) -> tuple[m.LogEvent, ...]:
+    def drain(self) -> tuple[m.LogEvent, ...]:
         """What was said since the last time."""
         events, self._events = tuple(self._events), []
         return events

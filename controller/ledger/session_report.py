@@ -37,7 +37,7 @@ class SessionReportBuilder:
         self._control: deque[ControlReport] = deque(maxlen=_MOST_CHANGES)
         self._refused = 0
 
-    def take(self, at: str, body: msgspec.Struct) -> bool:
+    def add(self, at: str, body: msgspec.Struct) -> bool:
         """A row was written at a time (ISO 8601). Returns whether it is one that the report tells of."""
         when = datetime.fromisoformat(at).timestamp()
         first = self._began == 0.0

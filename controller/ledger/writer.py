@@ -118,7 +118,7 @@ class LedgerWriter:
             with self._some:
                 for _ in batch:
                     self._waiting.popleft()
-            if any([self._account.take(at, record.body) for at, record in batch]):
+            if any([self._account.add(at, record.body) for at, record in batch]):
                 self.report = self._account.report()
             self._state = LedgerState(max([self._state.durable, *(record.number for _, record in batch)]))
         if store is not None:

@@ -47,10 +47,10 @@ class Body:
         self.tracking_error = TrackingErrorMonitor()
         self.measured: Measured | None = None
 
-    def take(self, inputs: Inputs) -> None:
+    def update(self, inputs: Inputs) -> None:
         """Take in what was measured and what stands around."""
         if inputs.joints is not None:
-            self.tracking_error.take(inputs.joints.message, self.setpoints.sent)
+            self.tracking_error.update(inputs.joints.message, self.setpoints.sent)
         if inputs.joints is not None and inputs.odometry is not None:
             sent = self.setpoints.sent
             q = self._base.configuration(inputs.joints.message, inputs.odometry.message)
@@ -59,5 +59,5 @@ class Body:
             measured = np.array(inputs.joints.message.velocity[:2])
             wheels = wheels_ahead(measured, sent[:2], ahead, self._config.base_lag_s)
             self.measured = Measured(q, self.robot.kinematics(q), sent)
-            self._method.begin(sent, self.setpoints.before, wheels)
-        self.surroundings.take(inputs.obstacles)
+            self._method.start_period(sent, self.setpoints.before, wheels)
+        self.surroundings.update(inputs.obstacles)

@@ -29,7 +29,7 @@ class Surroundings:
         self._names: tuple[str, ...] = ()
         self._axes = Axes(())
 
-    def take(self, obstacles: Sample[Obstacles] | None) -> None:
+    def update(self, obstacles: Sample[Obstacles] | None) -> None:
         """Take the newest message; one that was taken before costs nothing."""
         if obstacles is None or obstacles is self._seen:
             return

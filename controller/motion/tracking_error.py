@@ -25,7 +25,7 @@ class TrackingErrorMonitor:
         self._behind: Array = np.zeros(NXI)
         self._stamp = -math.inf
 
-    def take(self, joints: m.JointState, sent: Array) -> None:
+    def update(self, joints: m.JointState, sent: Array) -> None:
         """Take in a joint state and the ξ̇ (9, rad/s) sent before it; the same one again changes nothing."""
         passed = joints.header.stamp - self._stamp
         self._stamp = joints.header.stamp

@@ -67,7 +67,7 @@ class CutPlanner:
         if not np.isfinite(request.q).all():
             raise ControlError(f"a plan from {request.q.tolist()} was asked for; every coordinate must be finite")
         self._collision.set_obstacles(obstacles_of(request.obstacles))
-        self._clearance.take(Sample(Obstacles(header=Header(), capsules=request.obstacles), 0.0))
+        self._clearance.update(Sample(Obstacles(header=Header(), capsules=request.obstacles), 0.0))
         refused: dict[str, str] = {}
         cuts: dict[str, CutPlan] = {}
         targets = []

@@ -177,7 +177,7 @@ class PathPlanner:
 
         A start that is too near may get 2 mm nearer while it gets away.
         """
-        looks, row, last = plan.looks(), 0, len(plan.t) - 1
+        travel, row, last = plan.travel(), 0, len(plan.t) - 1
         needed = self._limits.clearance - _BETWEEN
         been_clear = False
         start = self._collision.least(plan.q[0]).distance
@@ -188,20 +188,20 @@ class PathPlanner:
                 return least
             if row == last:
                 return None
-            row = min(last, looks.after(row, least.distance - needed))
+            row = min(last, travel.next_row(row, least.distance - needed))
 
     def _least(self, plan: Plan) -> Clearance:
         """The least distance of a plan that was looked over, to a few millimetres."""
-        looks, row, last = plan.looks(), 0, len(plan.t) - 1
+        travel, row, last = plan.travel(), 0, len(plan.t) - 1
         needed = self._limits.clearance - _BETWEEN
         least: Clearance | None = None
         while row < last:
             here = self._collision.least(plan.q[row])
             if least is None and here.distance < needed:
-                row = looks.after(row, needed - here.distance)
+                row = travel.next_row(row, needed - here.distance)
                 continue
             # Rows from which the least so far cannot be undercut by more than _BETWEEN are skipped.
             least = here if least is None else min(least, here, key=lambda clearance: clearance.distance)
-            row = looks.after(row, here.distance - least.distance + _BETWEEN)
+            row = travel.next_row(row, here.distance - least.distance + _BETWEEN)
         end = self._collision.least(plan.q[last])
         return end if least is None else min(least, end, key=lambda clearance: clearance.distance)

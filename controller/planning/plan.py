@@ -42,22 +42,22 @@ class Plan:
         """Time from the first row to the last (s)."""
         return float(self.t[-1])
 
-    def looks(self) -> "Looks":
-        """Bounds of how far anything moves between rows."""
+    def travel(self) -> "Travel":
+        """Bound of the motion of every point of the robot."""
         steps = np.abs(np.diff(self.q, axis=0))
         moved = np.hypot(steps[:, 0], steps[:, 1]) + _BASE_LEVER * steps[:, 2] + steps[:, ARM_Q] @ _LEVERS
-        return Looks(np.concatenate([[0.0], np.cumsum(moved)]))
+        return Travel(np.concatenate([[0.0], np.cumsum(moved)]))
 
 
 @dataclass(frozen=True)
-class Looks:
-    """Upper bound of the way of any point of the robot up to each row (T, m)."""
+class Travel:
+    """Upper bound of the distance travelled by any point of the robot up to each row (T, m)."""
 
-    moved: Array
+    bound: Array
 
-    def after(self, row: int, gap: float) -> int:
-        """The next row that has to be looked at when at `row` there was this much room (m)."""
-        return max(row + 1, int(np.searchsorted(self.moved, self.moved[row] + max(gap, 0.0), side="right")) - 1)
+    def next_row(self, row: int, gap: float) -> int:
+        """The next row to check after a `row` with this gap (m)."""
+        return max(row + 1, int(np.searchsorted(self.bound, self.bound[row] + max(gap, 0.0), side="right")) - 1)
 
 
 def arm_samples(path: ArmPath, limits: PlanLimits) -> Array:

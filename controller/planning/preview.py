@@ -85,7 +85,7 @@ class PreviewManager:
             return f"the preview has expired: {self._reason}; ask for another one"
         return "a preview before each cut is required: ask for one and approve it"
 
-    def begin(self) -> None:
+    def start(self) -> None:
         """Work begins."""
         self._begun = self._phase == "approved"
 
@@ -126,7 +126,7 @@ class PreviewManager:
         cuts: dict[str, CutPlan] | None,
         at_rest: bool,
         working: bool,
-        look_s: float,
+        close_up_s: float,
         now: float,
     ) -> PreviewRequest | None:
         """Take a new preview, judge the one there is, and ask for the one that is wanted.
@@ -138,7 +138,7 @@ class PreviewManager:
             cuts: What the session's plan says of points; None while one is being made.
             at_rest: Whether the robot stands still.
             working: Whether it works off the queue.
-            look_s: From asking for a picture to knowing what it shows, as it was last (s).
+            close_up_s: From asking for a picture to knowing what it shows, as it was last (s).
             now: Monotonic time (s).
 
         Returns:
@@ -171,7 +171,9 @@ class PreviewManager:
         # Until it is of no use any more, only people change the order that it shows.
         self._order = names if following is not None and following.point.point_id == names[0] else ()
         turned = self._queue.approaches.turned
-        self._asked = PreviewRequest(self._number, q.copy(), points, tuple(obstacles), dict(cuts or {}), look_s, turned)
+        self._asked = PreviewRequest(
+            self._number, q.copy(), points, tuple(obstacles), dict(cuts or {}), close_up_s, turned
+        )
         self._say("rolling", "")
         return self._asked
 

@@ -43,7 +43,7 @@ class PreviewRequest:
         obstacles: What stands in the way.
         cuts: What the session's plan says of points, by id; the others are searched for as in work.
         turned: Points of which somebody has said the turn of the approach about the cane, and that (rad).
-        look_s: From asking for a picture to knowing what it shows (s).
+        close_up_s: From asking for a picture to knowing what it shows (s).
     """
 
     number: int
@@ -51,7 +51,7 @@ class PreviewRequest:
     points: tuple[PruningPoint, ...]
     obstacles: tuple[Capsule, ...] = ()
     cuts: dict[str, CutPlan] = field(default_factory=dict)
-    look_s: float = 0.5
+    close_up_s: float = 0.5
     turned: tuple[tuple[str, float], ...] = ()
 
 

@@ -78,8 +78,8 @@ class _Run:
         self._log = CutLog(robot.limits, self._movement.body.surroundings.model, self._queue)
         self._obstacles = Sample(Obstacles(header=m.Header(0.0, "odom"), capsules=request.obstacles), 0.0)
         self._asked: set[int] = set()
-        self._coming: deque[tuple[float, CloseUpResult]] = deque()
-        self._look: Sample[CloseUpResult] | None = None
+        self._pending: deque[tuple[float, CloseUpResult]] = deque()
+        self._close_up: Sample[CloseUpResult] | None = None
         self._closing: tuple[str, str, float] | None = None
         self._cut: set[str] = set()
         self._plans: dict[str, CutPlan] = {}
@@ -92,14 +92,14 @@ class _Run:
         way: list[Array] = []
         every = max(1, round(ROW_S / self._dt))
         longest = math.ceil(_LONGEST_S * len(self._request.points) / self._dt)
-        self._movement.sequence.begin()
+        self._movement.sequence.start()
         why = f"it takes longer than {_LONGEST_S:.0f} s a point"
         now = 0.0
         for number in range(longest):
             now = number * self._dt
             moved = self._period(number, now)
             if number % every == 0 or moved.event is not None:
-                rows.append(self._look_at(now))
+                rows.append(self._sample_at(now))
             times.append(now)
             way.append(self._actuators.q.copy())
             self._hash.update(np.ascontiguousarray(way[-1], dtype="<f8").tobytes())
@@ -115,12 +115,12 @@ class _Run:
         """One control period, and what the robot does of it."""
         movement, sequence = self._movement, self._movement.sequence
         inputs = self._inputs(number, now)
-        self._journal.take()
+        self._journal.drain()
         self._journal.observe(LedgerState(self._journal.number), now)
-        movement.take(inputs)
-        look = None if inputs.look is None else inputs.look.message
+        movement.update(inputs)
+        close_up = None if inputs.close_up is None else inputs.close_up.message
         assert inputs.bridge is not None
-        sequence.watch(inputs.bridge.message, look, now)
+        sequence.watch(inputs.bridge.message, close_up, now)
         moved = movement.step("AUTO", True, now)
         command = movement.send(moved.xi, _TOKEN, inputs.joints, latched=False)
         if moved.cut is not None and (self._closing is None or self._closing[0] != moved.cut[0]):
@@ -130,7 +130,7 @@ class _Run:
         if due is not None and due[0] not in self._asked:
             # Of two points at the same time, too: of the cut before, and of the next one.
             self._asked.add(due[0])
-            self._coming.append((now + self._request.look_s, self._shown(*due)))
+            self._pending.append((now + self._request.close_up_s, self._shown(*due)))
         if command is not None:
             self._actuators.step(np.array(command.xi))
         return moved
@@ -146,10 +146,12 @@ class _Run:
         )
         base = _planar(self._actuators.q)
         odometry = m.Odometry(header=header, sequence=number, pose=base, linear=linear, angular=angular)
-        if self._coming and now >= self._coming[0][0]:
-            self._look = Sample(self._coming.popleft()[1], now)
+        if self._pending and now >= self._pending[0][0]:
+            self._close_up = Sample(self._pending.popleft()[1], now)
         bridge = Sample(self._bridge(now), now)
-        return Inputs(Sample(joints, now), Sample(odometry, now), bridge, obstacles=self._obstacles, look=self._look)
+        return Inputs(
+            Sample(joints, now), Sample(odometry, now), bridge, obstacles=self._obstacles, close_up=self._close_up
+        )
 
     def _bridge(self, now: float) -> m.BridgeState:
         cut_id, point_id, since = self._closing or ("", "", now)
@@ -187,10 +189,10 @@ class _Run:
     def _known(self, ticket: Ticket) -> CutPlan | Unreachable | None:
         return self._request.cuts.get(ticket.point.point_id)
 
-    def _look_at(self, now: float) -> PreviewRow:
+    def _sample_at(self, now: float) -> PreviewRow:
         measured, sequence = self._movement.body.measured, self._movement.sequence
         assert measured is not None
-        self._log.look(measured, sequence.active, now)
+        self._log.sample(measured, sequence.active, now)
         if sequence.active and sequence.plan is not None:
             self._plans[sequence.active] = sequence.plan
         q = measured.q
@@ -201,7 +203,7 @@ class _Run:
     def _digest(self) -> str:
         encode = msgspec.msgpack.Encoder(order="deterministic").encode
         request, out = self._request, self._hash
-        for part in (*self._configs, request.points, request.obstacles, request.turned, request.look_s):
+        for part in (*self._configs, request.points, request.obstacles, request.turned, request.close_up_s):
             out.update(encode(part))
         out.update(np.ascontiguousarray(request.q, dtype="<f8").tobytes())
         return out.hexdigest()
@@ -226,7 +228,7 @@ class _Least:
 
 
 class CutLog:
-    """`look` at the robot now and then; `cuts` at the end."""
+    """`sample` the robot now and then; `cuts` at the end."""
 
     def __init__(self, limits: Limits, collision: CollisionModel, queue: PointQueue) -> None:
         """Nothing has been worked on.
@@ -239,7 +241,7 @@ class CutLog:
         self._limits, self._collision, self._queue = limits, collision, queue
         self._points: list[_Least] = []
 
-    def look(self, robot: Measured, active: str, now: float) -> None:
+    def sample(self, robot: Measured, active: str, now: float) -> None:
         """The robot is on the way to, at, or from the `active` point; empty: of the last one still."""
         if active and (not self._points or self._points[-1].point_id != active):
             begins = now if self._points else 0.0

@@ -40,7 +40,7 @@ class FencingToken:
         #: This controller keeps silent: another one commands, or the bridge has not said yet who does.
         self.waits = True
 
-    def take(self, bridge: m.BridgeState | None, now: float) -> str:
+    def update(self, bridge: m.BridgeState | None, now: float) -> str:
         """Take in whose the token is. Returns what has changed, in words; empty when nothing has.
 
         Args:

@@ -47,7 +47,7 @@ class StopLatch:
         stops = tuple(reversed(self._pending.values()))[:_MOST]
         return StopState(process="controller", stops=stops, released_by=self._released_by)
 
-    def take(self, stops: tuple[m.StopRequest, ...], bridge: m.BridgeState | None, wall_time: float = 0.0) -> str:
+    def update(self, stops: tuple[m.StopRequest, ...], bridge: m.BridgeState | None, wall_time: float = 0.0) -> str:
         """Latch what is new; returns why the robot is stopped, empty when nothing new was latched.
 
         A request is sent several times with one id: once released, its echoes latch nothing. What the bridge holds

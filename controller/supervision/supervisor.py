@@ -70,7 +70,7 @@ class Supervisor:
         self.stops = StopLatch(tuple(stops))
         self.state = modes.boot(self.stops.latched)
 
-    def take(self, inputs: Inputs, trouble: str, now: float) -> None:
+    def update(self, inputs: Inputs, trouble: str, now: float) -> None:
         """Take in how fresh everything is.
 
         Args:
@@ -79,7 +79,7 @@ class Supervisor:
             now: Monotonic time (s).
         """
         self._inputs = inputs
-        if changed := self.fencing.take(self.bridge, now):
+        if changed := self.fencing.update(self.bridge, now):
             self._event_log.say("warning" if self.fencing.overruled else "info", changed)
         tracking_error = self._movement.body.tracking_error.reason
         self.health = safety.health(inputs, self.fencing.overruled, now, trouble, tracking_error)
@@ -89,7 +89,7 @@ class Supervisor:
         self._review_token(now)
         inputs, bridge = self._inputs, self.bridge
         stops = (*inputs.stops, *self._review_motion())
-        latched = self.stops.take(stops, bridge, inputs.wall_time)
+        latched = self.stops.update(stops, bridge, inputs.wall_time)
         if latched:
             self.event(Event.STOP, now, latched)
         elif self.stops.released(bridge):

@@ -113,7 +113,7 @@ class Hierarchy:
         at = 0
         for task in tasks:
             rows = slice(at, at + task.rows)
-            task.begin(self._T[rows])
+            task.prepare(self._T[rows])
             places.append((task, self._T[rows], self._t[rows]))
             at += task.rows
         self._tasks = tuple(places)

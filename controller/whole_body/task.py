@@ -193,7 +193,7 @@ class SecondaryTask(Protocol):
     name: str
     rows: int
 
-    def begin(self, jacobian: Array) -> None:
+    def prepare(self, jacobian: Array) -> None:
         """Write what is the same in every period. Called once, with all zeros."""
         ...
 

@@ -36,7 +36,7 @@ class TwoRates:
         self._before = np.zeros(NXI)
         self._wheels: Array | None = None
 
-    def begin(self, sent: Array, before: Array, wheels: Array | None) -> None:
+    def start_period(self, sent: Array, before: Array, wheels: Array | None) -> None:
         """A new period.
 
         Args:

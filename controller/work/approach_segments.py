@@ -21,9 +21,9 @@ class ApproachSegments:
         self._config, self._flows = config, flows
 
     def to(self, plan: CutPlan, T_odom_tool: Any, q: Array) -> tuple[Leg, ...]:
-        """From a pose of the tool (pin.SE3) at q (12) to a cut; where a look comes first, to where it is taken."""
+        """From a pose of the tool (pin.SE3) at q (12) to a cut; where a close-up comes first, to where it is taken."""
         there = self.there(plan, T_odom_tool, q)
-        return there if self._config.confirm else (*there, self.into(plan))
+        return there if self._config.pre_cut_check else (*there, self.into(plan))
 
     def there(self, plan: CutPlan, T_odom_tool: Any, q: Array) -> tuple[Leg, ...]:
         """From a pose of the tool (pin.SE3) at q (12) to clear of the canes before a cut."""

@@ -53,7 +53,7 @@ class Blades:
         """Whether a cut has been asked for and how it ends is not known yet: the blades may be closing."""
         return self._cut is not None
 
-    def begin(self, point_id: str, now: float) -> None:
+    def start(self, point_id: str, now: float) -> None:
         """Intend a cut at a point; no command is sent before that intent is durable."""
         self._cuts += 1
         cut_id = f"{self._run_id}-{self._cuts}"

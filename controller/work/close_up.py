@@ -14,7 +14,7 @@ _LOST_S = 1.5
 
 @dataclass
 class _Asked:
-    """A look under way: what it should show, the newest request and the first that counts, how many more may follow."""
+    """A close-up under way: expected finding, newest request, first request that counts, retries left."""
 
     expected: Finding
     number: int
@@ -30,40 +30,40 @@ class CloseUpClient:
     """Requests close-up pictures, several points at a time. The newest request for a point counts."""
 
     def __init__(self, timeout_s: float, pictures: int) -> None:
-        """Look at nothing.
+        """Start without requests.
 
         Args:
-            timeout_s: A look ends after this time, whatever has come (s).
-            pictures: Of one look at most that come; another one is taken where the last
-                did not show what was expected.
+            timeout_s: Time limit of one close-up, retries included (s).
+            pictures: Largest number of pictures of one close-up. Another one is taken where the last did not show
+                what was expected.
         """
         self._timeout_s, self._pictures = timeout_s, pictures
         self._asked: dict[str, _Asked] = {}
         self._number = 0
-        #: From asking for the last picture that came to knowing what it showed (s).
+        #: Time from the request to the result, of the last picture that came (s).
         self.took_s = 0.5
 
     def ask(self, point_id: str, expected: Finding, now: float) -> None:
-        """Look at a point from now on; what is not as expected is looked at once more before it is believed."""
+        """Request a close-up of a point. A result that is not as expected is checked with another picture."""
         self._number += 1
         self._asked[point_id] = _Asked(expected, self._number, self._number, self._pictures - 1, now, now)
 
     def forget(self, point_id: str) -> None:
-        """What a look at this point shows is not wanted any more."""
+        """Drop the close-up of this point."""
         self._asked.pop(point_id, None)
 
-    def take(self, look: CloseUpResult, now: float) -> None:
-        """What a picture shows; one that nobody waits for changes nothing."""
-        asked = self._asked.get(look.point_id)
-        # One that was taken for lost may be late: on a slow machine each of them is.
-        if asked is None or not asked.first <= look.number <= asked.number or asked.answer is not None:
+    def update(self, result: CloseUpResult, now: float) -> None:
+        """Take in the result of a picture. One that was not requested changes nothing."""
+        asked = self._asked.get(result.point_id)
+        # A late result counts too: on a slow machine each picture is late.
+        if asked is None or not asked.first <= result.number <= asked.number or asked.answer is not None:
             return
-        if look.finding != asked.expected and asked.more > 0:
+        if result.finding != asked.expected and asked.more > 0:
             asked.more -= 1
             self._again(asked, now)
             asked.first = asked.number
         else:
-            asked.answer, self.took_s = look, now - asked.since
+            asked.answer, self.took_s = result, now - asked.since
 
     def due(self, now: float) -> tuple[int, str] | None:
         """Number and point of the request to send in this period; None when none is due."""
@@ -76,7 +76,7 @@ class CloseUpClient:
         return None
 
     def answer(self, point_id: str, now: float) -> CloseUpResult | None:
-        """What the look at a point came to; None while it goes on or where there is none."""
+        """The result for a point; None while it is pending, and where none was requested."""
         asked = self._asked.get(point_id)
         if asked is None:
             return None

@@ -16,32 +16,32 @@ from controller.work.point_queue import PointQueue, Ticket
 from rolling_panda.messages.perception import CloseUpResult, PruningPoint
 from rolling_panda.messages.types import Outcome, PointState
 
-#: An ended cut that no look is begun for within this time (s) ends by the cutter's word.
-_LOOK_WITHIN_S = 4.0
+#: An ended cut for which no close-up is requested within this time (s) ends by the cutter's word.
+_REQUEST_WITHIN_S = 4.0
 
 
 @dataclass
 class _Ended:
-    """A cut that ended: the cutter's word, since when, and whether a look has begun."""
+    """A cut that ended: the cutter's word, since when, and whether a close-up was requested."""
 
     outcome: Outcome
     word: str
     since: float
-    looking: bool = False
+    requested: bool = False
 
 
 class PostCutCheck:
     """Settles cuts whose outcome the cutter knows. Pure but for the queue: time is an argument."""
 
-    def __init__(self, queue: PointQueue, close_ups: CloseUpClient, looks: bool) -> None:
+    def __init__(self, queue: PointQueue, close_ups: CloseUpClient, check: bool) -> None:
         """Bind the parts.
 
         Args:
             queue: Takes the result.
-            close_ups: Looks.
-            looks: False takes the cutter's word for it at once.
+            close_ups: Client for the pictures.
+            check: False takes the cutter's word for it at once.
         """
-        self._queue, self._close_ups, self._looks = queue, close_ups, looks
+        self._queue, self._close_ups, self._check = queue, close_ups, check
         self._ended: dict[str, _Ended] = {}
         self._tried: dict[str, PruningPoint | None] = {}
 
@@ -50,29 +50,29 @@ class PostCutCheck:
         """Whether a cut is still to be settled."""
         return bool(self._ended)
 
-    def begin(self, point_id: str, outcome: Outcome, word: str, now: float) -> None:
+    def start(self, point_id: str, outcome: Outcome, word: str, now: float) -> None:
         """The cutter has said how a cut ended: DONE or FAILED_NOT_CUT; UNKNOWN is settled with that."""
-        if not self._looks or outcome == "UNKNOWN":
+        if not self._check or outcome == "UNKNOWN":
             self._end(point_id, outcome or "UNKNOWN", word)
             return
         self._ended[point_id] = _Ended(outcome, word, now)
 
-    def look(self, point_id: str, now: float) -> None:
-        """The camera sees the place now; begins one look."""
+    def request_close_up(self, point_id: str, now: float) -> None:
+        """The camera sees the place now; requests one close-up."""
         ended = self._ended.get(point_id)
-        if ended is not None and not ended.looking:
-            ended.looking = True
+        if ended is not None and not ended.requested:
+            ended.requested = True
             self._close_ups.ask(point_id, "severed", now)
 
     def step(self, now: float) -> list[str]:
         """Settle what can be settled; what became of it, in words."""
         said = []
         for point_id, ended in list(self._ended.items()):
-            look = self._close_ups.answer(point_id, now) if ended.looking else None
-            if look is not None:
-                said.append(self._settle(point_id, ended, look.finding, look.reason))
-            elif not ended.looking and now - ended.since > _LOOK_WITHIN_S:
-                said.append(self._settle(point_id, ended, "unseen", "the robot left before it was looked at"))
+            close_up = self._close_ups.answer(point_id, now) if ended.requested else None
+            if close_up is not None:
+                said.append(self._settle(point_id, ended, close_up.finding, close_up.reason))
+            elif not ended.requested and now - ended.since > _REQUEST_WITHIN_S:
+                said.append(self._settle(point_id, ended, "unseen", "the robot left before the close-up"))
         return said
 
     def _settle(self, point_id: str, ended: _Ended, finding: str, reason: str) -> str:
@@ -81,7 +81,7 @@ class PostCutCheck:
         done = ended.outcome == "DONE"
         if finding == "severed":
             if done:
-                return self._end(point_id, "DONE", "cut, and seen to be off")
+                return self._end(point_id, "DONE", "cut, and the wood is off")
             return self._end(point_id, "UNKNOWN", f"{ended.word}, but the wood beyond is gone: look")
         if finding == "unseen":
             return self._end(point_id, ended.outcome or "UNKNOWN", f"{ended.word}; not seen afterwards: {reason}")
@@ -89,11 +89,11 @@ class PostCutCheck:
         accepted = None if ticket is None else ticket.accepted
         if self._tried.get(point_id) is None or self._tried[point_id] is not accepted:
             self._tried[point_id] = accepted
-            self._queue.again(point_id, f"{ended.word}, but it is seen to stand: cut once more")
-            return f"{point_id}: {ended.word}, but it is seen to stand: it is cut once more"
+            self._queue.again(point_id, f"{ended.word}, but it still stands: cut once more")
+            return f"{point_id}: {ended.word}, but it still stands: it is cut once more"
         if done:
-            return self._end(point_id, "UNKNOWN", f"{ended.word} twice, but it is seen to stand: look")
-        return self._end(point_id, "FAILED_NOT_CUT", f"{ended.word} twice, and it is seen to stand")
+            return self._end(point_id, "UNKNOWN", f"{ended.word} twice, but it still stands: look")
+        return self._end(point_id, "FAILED_NOT_CUT", f"{ended.word} twice, and it still stands")
 
     def _end(self, point_id: str, state: PointState, reason: str) -> str:
         self._tried.pop(point_id, None)
@@ -105,25 +105,25 @@ class PostCutCheck:
 _BASE_NEAR = 0.1
 
 
-def not_as_accepted(look: CloseUpResult, ticket: Ticket | None, tolerance: float) -> str:
-    """Why a point is not cut after a closer look, in words; empty when it is.
+def not_as_accepted(close_up: CloseUpResult, ticket: Ticket | None, tolerance: float) -> str:
+    """Why a point is not cut after its close-up, in words; empty when it is.
 
     Args:
-        look: What was seen.
+        close_up: What was seen.
         ticket: Of the point.
         tolerance: It may have moved so far since it was accepted (m).
     """
     if ticket is None or ticket.accepted is None:
         return "it is not accepted any more"
-    if look.finding == "severed":
-        return "on a closer look its cane is off already"
-    if look.finding == "changed":
-        return f"on a closer look {look.reason}: accept it again if it is right"
-    if look.finding == "unseen" or look.position is None:
-        return f"a closer look did not show it: {look.reason}"
-    moved = float(np.linalg.norm(np.subtract(look.position, ticket.accepted.position)))
+    if close_up.finding == "severed":
+        return "its cane is off already, as the close-up shows"
+    if close_up.finding == "changed":
+        return f"in the close-up {close_up.reason}: accept it again if it is right"
+    if close_up.finding == "unseen" or close_up.position is None:
+        return f"the close-up did not show it: {close_up.reason}"
+    moved = float(np.linalg.norm(np.subtract(close_up.position, ticket.accepted.position)))
     if moved > tolerance:
-        return f"moved {1e3 * moved:.0f} mm on a closer look: accept it again"
+        return f"moved {1e3 * moved:.0f} mm in the close-up: accept it again"
     return ""
 
 
@@ -138,4 +138,4 @@ def camera_ready(robot: Measured, motion: ToolMotion, config: ControllerConfig) 
     away = robot.kinematics.T_odom_tool.translation - motion.goal.translation
     speed = float(np.linalg.norm(robot.kinematics.J_xi[:3] @ robot.sent))
     base = float(np.linalg.norm(robot.q[:2] - motion.q_goal[:2]))
-    return float(np.linalg.norm(away)) < config.look_within and base < _BASE_NEAR and speed < config.look_speed
+    return float(np.linalg.norm(away)) < config.close_up_within and base < _BASE_NEAR and speed < config.close_up_speed

@@ -30,9 +30,9 @@ class CutClearance:
         #: What it lacks, in words; empty where nothing was refused.
         self.lacking = ""
 
-    def take(self, obstacles: Sample[Obstacles] | None) -> None:
+    def update(self, obstacles: Sample[Obstacles] | None) -> None:
         """Take the newest message; one that was taken before costs nothing."""
-        self._surroundings.take(obstacles)
+        self._surroundings.update(obstacles)
 
     def admits(self, plan: CutPlan) -> bool:
         """Whether the robot is far enough from itself and all else at the cut, the stand-off and clear of the canes.

@@ -34,7 +34,7 @@ from rolling_panda.model.robot import ARM_XI
 
 #: A point that perception has refined by less than this is aimed at as it was (m).
 _REFINED = 0.0003
-#: A look that does not show what was expected is taken once more.
+#: Pictures of one close-up at most.
 _PICTURES = 2
 #: Between motions without an end to hold: near enough to go on (m).
 _NEAR = 0.02
@@ -71,14 +71,14 @@ class CutSequence:
         self._survey = Survey(config, follower, saturation, queue)
         self._places: tuple[Array, ...] = ()
         self._segments = ApproachSegments(config, follower.flows)
-        self._close_ups = CloseUpClient(config.look_timeout_s, _PICTURES)
-        self._post_cut_check = PostCutCheck(queue, self._close_ups, config.verify)
-        self._blades = Blades(config, queue, run_id, self._post_cut_check.begin)
-        self._coming = NextCut(search, queue, config.search_steps_each, known, permit)
+        self._close_ups = CloseUpClient(config.close_up_timeout_s, _PICTURES)
+        self._post_cut_check = PostCutCheck(queue, self._close_ups, config.post_cut_check)
+        self._blades = Blades(config, queue, run_id, self._post_cut_check.start)
+        self._next_cut = NextCut(search, queue, config.search_steps_each, known, permit)
         #: Where the blades closed last (m, odom), and on which point.
         self._cut_at: Array = np.zeros(3)
-        #: Where perception had the point when it was looked at closely, which shows it better.
-        self._looked_at: m.Vector3 | None = None
+        #: Where perception had the point at the time of the close-up, which locates it better.
+        self._close_up_of: m.Vector3 | None = None
         self._ending = self._cut_point = ""
         self._forget()
 
@@ -108,7 +108,7 @@ class CutSequence:
         return self._places
 
     @property
-    def look_s(self) -> float:
+    def close_up_s(self) -> float:
         """From asking for a picture to knowing what it shows, as it was last (s)."""
         return self._close_ups.took_s
 
@@ -121,11 +121,11 @@ class CutSequence:
         """Whether a cut has been asked for and how it ends is not known yet: the blades may be closing."""
         return self._blades.busy
 
-    def begin(self, survey: intents.Survey | None = None) -> None:
+    def start(self, survey: intents.Survey | None = None) -> None:
         """Start with getting the tool clear of the canes, or a survey."""
         self._forget()
         # Since a plan was made the robot may have been moved by hand.
-        self._coming.forget()
+        self._next_cut.forget()
         self._stage = Stage.SURVEY if survey is not None else Stage.ESCAPE
         self._survey = Survey(self._config, self._follower, self._saturation, self._queue, survey)
 
@@ -137,10 +137,10 @@ class CutSequence:
         """Leave the work; a cut under way is still watched, an accepted point stays accepted."""
         self._forget()
 
-    def watch(self, bridge: m.BridgeState, look: CloseUpResult | None, now: float) -> tuple[str, ...]:
-        """Take in how a cut ended and what the newest look showed, in every mode; returns what happened, in words."""
-        if look is not None:
-            self._close_ups.take(look, now)
+    def watch(self, bridge: m.BridgeState, close_up: CloseUpResult | None, now: float) -> tuple[str, ...]:
+        """Take in the end of a cut and the newest close-up, in every mode; returns what happened, in words."""
+        if close_up is not None:
+            self._close_ups.update(close_up, now)
         return *self._blades.watch(bridge, now), *self._post_cut_check.step(now)
 
     def picture(self, now: float) -> tuple[int, str] | None:
@@ -161,15 +161,15 @@ class CutSequence:
             return StepResult(self._saturation.ramp(robot.sent), pause=self._ending)
         if self._ending and self._stage is Stage.ADVANCE:
             self._retreat_from(robot)
-        if self._stage is Stage.ADVANCE or (self._stage is Stage.TRAVEL and not self._config.confirm):
+        if self._stage is Stage.ADVANCE or (self._stage is Stage.TRAVEL and not self._config.pre_cut_check):
             self._refine()
         if self._stage in (Stage.RETREAT, Stage.TRAVEL):
             away = robot.kinematics.T_odom_tool.translation - self._cut_at
-            if float(np.linalg.norm(away)) > self._config.look_from:
+            if float(np.linalg.norm(away)) > self._config.close_up_from:
                 # On the way out, without a stop: a picture of the moment is enough to see that wood is gone.
-                self._post_cut_check.look(self._cut_point, now)
+                self._post_cut_check.request_close_up(self._cut_point, now)
         work = _STEPS[self._stage](self, robot, now)
-        onwards = self._coming.found if self._stage is Stage.RETREAT else None
+        onwards = self._next_cut.found if self._stage is Stage.RETREAT else None
         plans = [plan for plan in (self._plan, onwards) if isinstance(plan, CutPlan)]
         if plans:
             # While the tool is got clear of the canes there is no plan, and it is still where the last one led.
@@ -194,19 +194,20 @@ class CutSequence:
         return StepResult(tracking.xi, tracking)
 
     def _next(self, robot: Measured) -> StepResult:
-        """Choose the next point and look for a posture; stand still while looking."""
+        """Choose the next point and search for a posture; the robot stands still meanwhile."""
         self._forget()
-        if not self._coming.look(robot.q):
+        if not self._next_cut.search(robot.q):
             # The last cut may still have to be made once more.
             beyond = self._queue.count("UNREACHABLE")
-            summary = self._coming.refused or f"{StepResult.summary}{f'; {beyond} cannot be reached' if beyond else ''}"
+            unreachable = f"; {beyond} cannot be reached" if beyond else ""
+            summary = self._next_cut.refused or f"{StepResult.summary}{unreachable}"
             finished = not self._post_cut_check.pending
             return StepResult(self._saturation.ramp(robot.sent), finished=finished, summary=summary)
-        self._point_id, self._accepted, self._stage = self._coming.point_id, self._coming.accepted, Stage.SEARCH
+        self._point_id, self._accepted, self._stage = self._next_cut.point_id, self._next_cut.accepted, Stage.SEARCH
         return StepResult(self._saturation.ramp(robot.sent))
 
     def _find(self, robot: Measured, now: float) -> StepResult:
-        xi, coming = self._saturation.ramp(robot.sent), self._coming
+        xi, coming = self._saturation.ramp(robot.sent), self._next_cut
         coming.step()
         if isinstance(coming.found, Unreachable):
             return self._fail(robot, f"not reachable: {coming.found.reason}")
@@ -221,36 +222,36 @@ class CutSequence:
         tracking = self._track(robot)
         assert self._motion is not None
         last = self._motion.leg == self._motion.legs - 1
-        if last and not self._config.confirm:
+        if last and not self._config.pre_cut_check:
             self._stage = Stage.ADVANCE
         elif last and camera_ready(robot, self._motion, self._config):
             self._close_ups.ask(self._point_id, "seen", now)
             self._timeout.again()
             self._stage = Stage.CLOSE_UP
-        elif not (self._config.confirm and self._timeout.over(tracking, now, 0.0)) and self._timeout.late(now):
+        elif not (self._config.pre_cut_check and self._timeout.over(tracking, now, 0.0)) and self._timeout.late(now):
             return self._fail(robot, missed("the stand-off", tracking))
         return StepResult(tracking.xi, tracking)
 
-    def _look(self, robot: Measured, now: float) -> StepResult:
-        """A closer look on the way, before the canes are entered; what it shows is cut, or not."""
-        tracking, look = self._track(robot), self._close_ups.answer(self._point_id, now)
-        if look is None:
+    def _close_up(self, robot: Measured, now: float) -> StepResult:
+        """Wait for the close-up before the canes are entered; its result decides whether the point is cut."""
+        tracking, close_up = self._track(robot), self._close_ups.answer(self._point_id, now)
+        if close_up is None:
             return StepResult(tracking.xi, tracking)
         self._close_ups.forget(self._point_id)
         ticket = self._queue.get(self._point_id)
         assert self._motion is not None and self._plan is not None
-        why = not_as_accepted(look, ticket, self._config.moved_tolerance)
+        why = not_as_accepted(close_up, ticket, self._config.moved_tolerance)
         if why:
             self._queue.void(self._point_id, why)
             # The next period leaves it.
             return StepResult(tracking.xi, tracking)
         assert ticket is not None
-        self._looked_at = ticket.point.position
+        self._close_up_of = ticket.point.position
         self._motion.extend(self._segments.into(self._plan))
-        moved = np.array(look.position) - self._motion.goal.translation
+        moved = np.array(close_up.position) - self._motion.goal.translation
         if float(np.linalg.norm(moved)) > _REFINED:
             self._motion.shift(moved)
-        self._timeout.begin(self._motion.duration)
+        self._timeout.start(self._motion.duration)
         self._stage = Stage.ADVANCE
         return StepResult(tracking.xi, tracking)
 
@@ -264,7 +265,7 @@ class CutSequence:
             self._motion.settle(robot.q)
             rests = False
         if rests:
-            self._blades.begin(self._point_id, now)
+            self._blades.start(self._point_id, now)
             self._stage = Stage.CUT
         elif self._timeout.late(now):
             reason = missed("the cut", tracking)
@@ -277,8 +278,8 @@ class CutSequence:
         tracking = self._track(robot)
         if not self._blades.busy:
             self._retreat_from(robot)
-        elif self._coming.look(robot.q):
-            self._coming.step()
+        elif self._next_cut.search(robot.q):
+            self._next_cut.step()
         return StepResult(tracking.xi, tracking, cut=self._blades.command(now))
 
     def _retreat(self, robot: Measured, now: float) -> StepResult:
@@ -286,11 +287,11 @@ class CutSequence:
             return self._withdraw(self._withdrawal, robot, now)
         tracking = self._track(robot)
         assert self._motion is not None and self._plan is not None
-        plan = self._coming.found
+        plan = self._next_cut.found
         if self._motion.leg > 0 and isinstance(plan, CutPlan):
             # Out of the canes, and the way to the next one has begun.
             self._plan, self._stage = plan, Stage.TRAVEL
-            self._point_id, self._accepted = self._coming.point_id, self._coming.accepted
+            self._point_id, self._accepted = self._next_cut.point_id, self._next_cut.accepted
             return StepResult(tracking.xi, tracking)
         if self._timeout.over(tracking, now, _NEAR):
             return self._out(robot, tracking)
@@ -317,7 +318,7 @@ class CutSequence:
         self._stage = Stage.REST
         self._point_id = ""
         self._accepted = None
-        self._looked_at = None
+        self._close_up_of = None
         self._motion = self._plan = self._withdrawal = None
         self._timeout.again()
 
@@ -325,7 +326,7 @@ class CutSequence:
         ticket = self._queue.get(self._point_id)
         if ticket is not None and ticket.state == "ACCEPTED":
             # The plan is for one acceptance: of what was accepted anew it knows nothing.
-            why = self._coming.permit(ticket) if ticket.accepted is self._accepted else "it was accepted anew"
+            why = self._next_cut.permit(ticket) if ticket.accepted is self._accepted else "it was accepted anew"
             if not why:
                 return
         else:
@@ -340,7 +341,7 @@ class CutSequence:
     def _refine(self) -> None:
         """Lead the motion to where perception now sees the point, which is still where it was accepted, but better."""
         ticket = self._queue.get(self._point_id)
-        if ticket is None or self._motion is None or ticket.point.position == self._looked_at:
+        if ticket is None or self._motion is None or ticket.point.position == self._close_up_of:
             return
         moved = np.array(ticket.point.position) - self._motion.goal.translation
         if float(np.linalg.norm(moved)) > _REFINED:
@@ -351,12 +352,12 @@ class CutSequence:
         self._stage, self._withdrawal = Stage.RETREAT, None
         self._cut_at, self._cut_point = robot.kinematics.T_odom_tool.translation.copy(), self._point_id
         back = self._segments.out(self._plan, robot.q)
-        ticket, plan = self._queue.get(self._point_id), self._coming.found
+        ticket, plan = self._queue.get(self._point_id), self._next_cut.found
         unsure = ticket is not None and ticket.state == "UNKNOWN"
-        stands = isinstance(plan, CutPlan) and self._coming.stands and not unsure and not self._ending
+        stands = isinstance(plan, CutPlan) and self._next_cut.stands and not unsure and not self._ending
         onwards = self._segments.to(plan, back.goal, back.q_goal) if stands and isinstance(plan, CutPlan) else ()
         if not onwards:
-            self._coming.forget()
+            self._next_cut.forget()
         self._go(robot, back, *onwards, to_cut=bool(onwards))
 
     def _fail(self, robot: Measured, reason: str) -> StepResult:
@@ -368,17 +369,17 @@ class CutSequence:
 
     def _go(self, robot: Measured, *legs: Leg, to_cut: bool = False) -> None:
         # From where the tool is, not from where it should be: a motion begins at rest.
-        looks = self._config.confirm
+        check = self._config.pre_cut_check
         self._motion = ToolMotion(
             self._config,
             robot.kinematics.T_odom_tool,
             robot.q,
             legs,
-            slow_end=to_cut and not looks,
+            slow_end=to_cut and not check,
             flows=self._follower.flows,
-            waits=to_cut and looks,
+            waits=to_cut and check,
         )
-        self._timeout.begin(self._motion.duration)
+        self._timeout.start(self._motion.duration)
 
     def _track(self, robot: Measured) -> Tracking:
         assert self._motion is not None
@@ -392,7 +393,7 @@ _STEPS: dict[Stage, Callable[[CutSequence, Measured, float], StepResult]] = {
     Stage.ESCAPE: CutSequence._escape,
     Stage.SEARCH: CutSequence._find,
     Stage.TRAVEL: CutSequence._travel,
-    Stage.CLOSE_UP: CutSequence._look,
+    Stage.CLOSE_UP: CutSequence._close_up,
     Stage.ADVANCE: CutSequence._advance,
     Stage.CUT: CutSequence._cutting,
     Stage.RETREAT: CutSequence._retreat,

@@ -76,7 +76,7 @@ class Withdrawal:
         self._goal = q_clear[ARM_Q].copy()
         self._motion = ArmMotion(config, q[ARM_Q].copy(), self._goal)
         self._timeout = MotionTimeout(config.reach_timeout_s, self._dt)
-        self._timeout.begin(self._motion.duration)
+        self._timeout.start(self._motion.duration)
         #: Whether the arm is there, and whether waiting for it is of no use any longer.
         self.done = self.late = False
 

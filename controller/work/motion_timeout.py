@@ -21,9 +21,9 @@ class MotionTimeout:
             dt: Control period (s).
         """
         self._timeout_s, self._dt = timeout_s, dt
-        self.begin(0.0)
+        self.start(0.0)
 
-    def begin(self, duration: float) -> None:
+    def start(self, duration: float) -> None:
         """A new motion of this planned duration (s)."""
         self._duration = duration
         self.again()

@@ -96,11 +96,11 @@ class Movement:
         """Whether the bridge moves the robot by a command that is none of this controller's, or was one to rest."""
         return bridge.moving and bridge.sequence > self._setpoints.moved
 
-    def take(self, inputs: Inputs) -> None:
+    def update(self, inputs: Inputs) -> None:
         """Take in what was measured and what stands around."""
-        self.body.take(inputs)
+        self.body.update(inputs)
         self.body.surroundings.work_at(self.sequence.places)
-        self._clearance.take(inputs.obstacles)
+        self._clearance.update(inputs.obstacles)
 
     def go_home(self) -> None:
         """Begin to bring the arm home."""

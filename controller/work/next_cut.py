@@ -15,7 +15,7 @@ Permit = Callable[[Ticket], str]
 
 
 class NextCut:
-    """The search for one point's plan. `look` for the next point, `step` each period, read `found`."""
+    """The search for one point's plan. `search` for the next point, `step` each period, read `found`."""
 
     def __init__(
         self,
@@ -25,7 +25,7 @@ class NextCut:
         known: Known = lambda _: None,
         permit: Permit = lambda _: "",
     ) -> None:
-        """Look at nothing yet.
+        """Start without a point.
 
         Args:
             search: Of postures.
@@ -41,23 +41,23 @@ class NextCut:
         self.forget()
 
     def forget(self) -> None:
-        """Drop what was looked at."""
+        """Drop the point and its search."""
         self._ticket: Ticket | None = None
         self._finding: Generator[None, None, CutPlan | Unreachable] | None = None
         self.found: CutPlan | Unreachable | None = None
 
     @property
     def point_id(self) -> str:
-        """The point looked at; empty when none."""
+        """Id of the point; empty without one."""
         return "" if self._ticket is None else self._ticket.point.point_id
 
     @property
     def accepted(self) -> PruningPoint | None:
-        """The point looked at as it was accepted, which is what the plan is for; None when none."""
+        """The point as accepted, which the plan is for; None without one."""
         return None if self._ticket is None else self._ticket.accepted
 
-    def look(self, q: Array) -> bool:
-        """Begin with the next accepted point, from configuration q (12), unless it is looked at already.
+    def search(self, q: Array) -> bool:
+        """Search for the next accepted point from configuration q (12), unless its search is under way.
 
         Returns:
             False when no point is accepted, or the next one may not be gone to.
@@ -78,7 +78,7 @@ class NextCut:
 
     @property
     def stands(self) -> bool:
-        """Whether what is looked at is still the next point, accepted as it was."""
+        """Whether the point is still the next one, with the same acceptance."""
         ticket, following = self._ticket, self._queue.next()
         return ticket is not None and following is not None and following.accepted is ticket.accepted
 

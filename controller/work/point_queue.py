@@ -132,13 +132,13 @@ class PointQueue:
             return None
         return None if points.rule == before.rule else (before.rule, points.rule)
 
-    def take_rule_back(self, rule: PruningRule) -> str:
+    def undo_rule(self, rule: PruningRule) -> str:
         """Accept again what the change to `rule` made void, now or as soon as perception prunes by the former one.
 
         Returns:
             Why that cannot be; empty when it is done or will be.
         """
-        back = self._rules.take_back(rule, None if self.perceived is None else self.perceived.rule)
+        back = self._rules.undo(rule, None if self.perceived is None else self.perceived.rule)
         if isinstance(back, str):
             return back
         self._restore(back)

@@ -27,7 +27,7 @@ class QueueRequests:
         if isinstance(intent, intents.ReconsiderPoint):
             return self._queue.reconsider(intent.point_id, intent.user)
         if isinstance(intent, intents.RestoreAccepted):
-            return self._queue.take_rule_back(intent.rule)
+            return self._queue.undo_rule(intent.rule)
         if isinstance(intent, intents.ResolvePoint):
             return self._queue.decide(intent.point_id, intent.outcome, intent.user, intent.reason)
         if isinstance(intent, intents.AcceptAll):

@@ -39,7 +39,7 @@ class RuleHistory(Generic[Acceptance]):
         self._changes = [*self._changes, Change(former, rule, voided)][-_MOST:]
         return None
 
-    def take_back(self, rule: PruningRule, now: PruningRule | None) -> dict[str, Acceptance] | None | str:
+    def undo(self, rule: PruningRule, now: PruningRule | None) -> dict[str, Acceptance] | None | str:
         """Somebody takes the change to `rule` back while `now` is in force.
 
         Returns:

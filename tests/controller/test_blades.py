@@ -32,7 +32,7 @@ class Queue:
 def test_the_command_is_repeated_with_one_id_until_the_outcome_comes():
     queue = Queue()
     blades = Blades(ControllerConfig(), queue, "run")
-    blades.begin("p1", 0.0)
+    blades.start("p1", 0.0)
     asked = [blades.command(0.01 * tick) for tick in range(20)]
     told = [command for command in asked if command is not None]
     assert 3 <= len(told) <= 5 and set(told) == {("run-1", "p1")}
@@ -46,12 +46,12 @@ def test_the_command_is_repeated_with_one_id_until_the_outcome_comes():
 def test_without_a_word_the_cut_is_unknown_and_no_other_is_taken_for_it():
     config, queue = ControllerConfig(), Queue()
     blades = Blades(config, queue, "run")
-    blades.begin("p1", 5.0)
+    blades.start("p1", 5.0)
     assert blades.command(5.0)
     assert blades.watch(Bridge(), 5.0 + config.cut_timeout_s) == ()
     (text,) = blades.watch(Bridge(), 5.1 + config.cut_timeout_s)
     assert "UNKNOWN" in text and queue.resolved[0][1] == "UNKNOWN"
-    blades.begin("p2", 20.0)
+    blades.start("p2", 20.0)
     # The late outcome of the first is not that of the second.
     assert blades.watch(Bridge("run-1", "DONE"), 20.1) == () and blades.busy
     assert blades.command(20.1) == ("run-2", "p2")
@@ -60,7 +60,7 @@ def test_without_a_word_the_cut_is_unknown_and_no_other_is_taken_for_it():
 def test_no_order_is_given_before_the_intent_is_durable():
     queue = Queue(durable=0)
     blades = Blades(ControllerConfig(), queue, "run")
-    blades.begin("p1", 0.0)
+    blades.start("p1", 0.0)
     assert all(blades.command(0.01 * tick) is None for tick in range(50))
     queue.durable = 1
     assert blades.command(0.5) == ("run-1", "p1")
@@ -69,7 +69,7 @@ def test_no_order_is_given_before_the_intent_is_durable():
 def test_a_cut_that_was_never_ordered_is_no_unknown_one():
     config, queue = ControllerConfig(), Queue(durable=0)
     blades = Blades(config, queue, "run")
-    blades.begin("p1", 0.0)
+    blades.start("p1", 0.0)
     assert blades.command(0.1) is None
     (text,) = blades.watch(Bridge(), config.cut_timeout_s + 0.1)
     assert "no order was given" in text and queue.resolved[0][1] == "FAILED_NOT_CUT"

@@ -10,75 +10,75 @@ def look(number: int, finding: Finding = "seen", point_id: str = "a") -> CloseUp
 
 
 def test_the_request_is_repeated_until_the_picture_comes_and_no_longer() -> None:
-    eye = CloseUpClient(2.0, 2)
-    eye.ask("a", "seen", 0.0)
-    sent = [request for tick in range(20) if (request := eye.due(0.01 * tick)) is not None]
+    client = CloseUpClient(2.0, 2)
+    client.ask("a", "seen", 0.0)
+    sent = [request for tick in range(20) if (request := client.due(0.01 * tick)) is not None]
     assert 3 <= len(sent) <= 5 and set(sent) == {(1, "a")}
-    assert eye.answer("a", 0.2) is None
-    eye.take(look(1), 0.2)
-    answer = eye.answer("a", 0.2)
+    assert client.answer("a", 0.2) is None
+    client.update(look(1), 0.2)
+    answer = client.answer("a", 0.2)
     assert answer is not None and answer.finding == "seen"
-    assert eye.due(0.5) is None
+    assert client.due(0.5) is None
 
 
 def test_a_picture_that_shows_nothing_is_taken_once_more_under_a_new_number() -> None:
-    eye = CloseUpClient(2.0, 2)
-    eye.ask("a", "seen", 0.0)
-    eye.due(0.0)
-    eye.take(look(1, "unseen"), 0.1)
-    assert eye.due(0.11) == (2, "a") and eye.answer("a", 0.11) is None
-    eye.take(look(1, "seen"), 0.15)
-    assert eye.answer("a", 0.15) is None, "the first request's picture comes too late"
-    eye.take(look(2, "unseen"), 0.2)
-    answer = eye.answer("a", 0.2)
+    client = CloseUpClient(2.0, 2)
+    client.ask("a", "seen", 0.0)
+    client.due(0.0)
+    client.update(look(1, "unseen"), 0.1)
+    assert client.due(0.11) == (2, "a") and client.answer("a", 0.11) is None
+    client.update(look(1, "seen"), 0.15)
+    assert client.answer("a", 0.15) is None, "the first request's picture comes too late"
+    client.update(look(2, "unseen"), 0.2)
+    answer = client.answer("a", 0.2)
     assert answer is not None and answer.finding == "unseen"
 
 
 def test_a_lost_picture_is_asked_for_anew_and_a_look_ends_whatever_comes() -> None:
-    eye = CloseUpClient(5.0, 1)
-    eye.ask("a", "seen", 0.0)
-    numbers = {request[0] for tick in range(490) if (request := eye.due(0.01 * tick)) is not None}
+    client = CloseUpClient(5.0, 1)
+    client.ask("a", "seen", 0.0)
+    numbers = {request[0] for tick in range(490) if (request := client.due(0.01 * tick)) is not None}
     assert numbers == {1, 2, 3, 4}
-    assert eye.answer("a", 4.9) is None
-    answer = eye.answer("a", 5.1)
+    assert client.answer("a", 4.9) is None
+    answer = client.answer("a", 5.1)
     assert answer is not None and answer.finding == "unseen" and "no picture" in answer.reason
 
 
 def test_two_points_are_looked_at_at_once_and_what_nobody_asked_for_is_nobodys() -> None:
-    eye = CloseUpClient(2.0, 1)
-    eye.ask("a", "seen", 0.0)
-    eye.ask("b", "severed", 0.0)
-    assert {eye.due(0.0), eye.due(0.001)} == {(1, "a"), (2, "b")}
-    eye.take(look(2, "severed", "b"), 0.1)
-    eye.take(look(9, "seen", "c"), 0.1)
-    assert eye.answer("c", 0.1) is None and eye.answer("a", 0.1) is None
-    answer = eye.answer("b", 0.1)
+    client = CloseUpClient(2.0, 1)
+    client.ask("a", "seen", 0.0)
+    client.ask("b", "severed", 0.0)
+    assert {client.due(0.0), client.due(0.001)} == {(1, "a"), (2, "b")}
+    client.update(look(2, "severed", "b"), 0.1)
+    client.update(look(9, "seen", "c"), 0.1)
+    assert client.answer("c", 0.1) is None and client.answer("a", 0.1) is None
+    answer = client.answer("b", 0.1)
     assert answer is not None and answer.finding == "severed"
-    eye.forget("b")
-    assert eye.answer("b", 0.1) is None
+    client.forget("b")
+    assert client.answer("b", 0.1) is None
 
 
 def test_what_is_not_as_expected_is_believed_after_a_second_picture_only() -> None:
-    eye = CloseUpClient(2.0, 2)
-    eye.ask("a", "severed", 0.0)
-    eye.take(look(1, "seen"), 0.1)
-    assert eye.answer("a", 0.1) is None and eye.due(0.1) == (2, "a")
-    eye.take(look(2, "severed"), 0.2)
-    answer = eye.answer("a", 0.2)
+    client = CloseUpClient(2.0, 2)
+    client.ask("a", "severed", 0.0)
+    client.update(look(1, "seen"), 0.1)
+    assert client.answer("a", 0.1) is None and client.due(0.1) == (2, "a")
+    client.update(look(2, "severed"), 0.2)
+    answer = client.answer("a", 0.2)
     assert answer is not None and answer.finding == "severed"
 
 
 def test_a_picture_that_was_taken_for_lost_still_counts_when_it_comes_late() -> None:
-    eye = CloseUpClient(8.0, 2)
-    eye.ask("a", "seen", 0.0)
-    sent = [request[0] for tick in range(400) if (request := eye.due(0.01 * tick)) is not None]
+    client = CloseUpClient(8.0, 2)
+    client.ask("a", "seen", 0.0)
+    sent = [request[0] for tick in range(400) if (request := client.due(0.01 * tick)) is not None]
     assert sent[-1] > sent[0] == 1
-    eye.take(look(1, "unseen"), 4.0)
-    assert eye.answer("a", 4.0) is None, "not as expected: one more, taken from now on"
-    eye.take(look(2), 4.1)
-    assert eye.answer("a", 4.1) is None, "taken before that"
-    request = eye.due(4.2)
+    client.update(look(1, "unseen"), 4.0)
+    assert client.answer("a", 4.0) is None, "not as expected: one more, taken from now on"
+    client.update(look(2), 4.1)
+    assert client.answer("a", 4.1) is None, "taken before that"
+    request = client.due(4.2)
     assert request is not None
-    eye.take(look(request[0]), 5.0)
-    answer = eye.answer("a", 5.0)
+    client.update(look(request[0]), 5.0)
+    answer = client.answer("a", 5.0)
     assert answer is not None and answer.finding == "seen"

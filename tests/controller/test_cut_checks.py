@@ -15,8 +15,8 @@ class Work:
     """A queue with one accepted point that has been cut."""
 
     def __init__(self) -> None:
-        self.queue, self.eye = PointQueue(CONFIG), CloseUpClient(2.0, 1)
-        self.verification = PostCutCheck(self.queue, self.eye, True)
+        self.queue, self.client = PointQueue(CONFIG), CloseUpClient(2.0, 1)
+        self.check = PostCutCheck(self.queue, self.client, True)
         self.queue.update(m.PruningPoints(header=m.Header(), segmenter="", frames=1, points=(point("a", (0, 0, 1)),)))
         assert self.queue.accept("a", 1, "ada") == ""
         self.now, self.number = 0.0, 0
@@ -24,20 +24,20 @@ class Work:
     def cut(self, outcome: m.Outcome, finding: Finding | None) -> str:
         """One try; the state afterwards."""
         self.queue.intend("a", "c")
-        self.verification.begin("a", outcome, f"says {outcome}", self.now)
+        self.check.start("a", outcome, f"says {outcome}", self.now)
         assert self.state in ("CUTTING", outcome)
         self.now += 0.5
         if finding is not None:
-            self.verification.look("a", self.now)
-            due = self.eye.due(self.now)
+            self.check.request_close_up("a", self.now)
+            due = self.client.due(self.now)
             if due is not None:
                 look = CloseUpResult(
                     header=m.Header(), point_id="a", number=due[0], finding=finding, reason="it is hidden"
                 )
-                self.eye.take(look, self.now)
+                self.client.update(look, self.now)
         else:
             self.now += 5.0
-        self.verification.step(self.now)
+        self.check.step(self.now)
         return self.state
 
     @property
@@ -73,7 +73,7 @@ def test_it_says_whether_the_result_was_seen() -> None:
     seen, told = Work(), Work()
     seen.cut("DONE", "severed")
     told.cut("DONE", "unseen")
-    assert "seen to be off" in seen.ticket.reason
+    assert "the wood is off" in seen.ticket.reason
     assert "not seen afterwards: it is hidden" in told.ticket.reason
 
 
@@ -89,7 +89,7 @@ def test_what_stands_is_cut_once_more_and_no_third_time(second: m.Outcome, state
 def test_an_unknown_outcome_is_never_tried_again_and_not_even_looked_at() -> None:
     work = Work()
     work.cut("UNKNOWN", "seen")
-    assert work.state == "UNKNOWN" and not work.verification.pending
+    assert work.state == "UNKNOWN" and not work.check.pending
 
 
 def test_after_a_new_acceptance_there_is_a_second_try_again() -> None:
@@ -116,7 +116,7 @@ def look(finding="seen", dx=0.0, reason=""):
     ("seen", "words"),
     [
         (look(dx=0.0049), ""),
-        (look(dx=0.007), "moved 7 mm on a closer look: accept it again"),
+        (look(dx=0.007), "moved 7 mm in the close-up: accept it again"),
         (look("changed", reason="a node is seen 3 mm from the cut"), "a node is seen 3 mm from the cut"),
         (look("severed"), "off already"),
         (look("unseen", reason="its cane is hidden"), "its cane is hidden"),
@@ -152,7 +152,7 @@ def test_a_point_that_moved_is_not_cut_says_why_and_the_work_goes_on():
     r = looking(working((point("a", (0.5, 0.75, 1.0)), point("b", (0.8, 0.75, 1.05)))), dx=0.007)
     finish(r, 60.0)
     assert [cut[0] for cut in r.cuts] == ["b"]
-    assert entry(r, "a").state == "PROPOSED" and "moved 7 mm on a closer look" in entry(r, "a").reason
+    assert entry(r, "a").state == "PROPOSED" and "moved 7 mm in the close-up" in entry(r, "a").reason
     assert entry(r, "b").state == "DONE"
 
 

@@ -26,7 +26,7 @@ def find(*capsules):
     """A plan for the point, among these."""
     clearance = CutClearance(RobotModel(), CONFIG)
     message = Obstacles(header=m.Header(0.0, "odom"), capsules=capsules)
-    clearance.take(Sample(message, 0.0))
+    clearance.update(Sample(message, 0.0))
     q = np.zeros(12)
     q[ARM_Q] = CONFIG.home
     search = PostureSearch(RobotModel(), CONFIG, clearance.admits).find(POINT, np.array([0.0, 0.1, 1.0]), q)
@@ -106,7 +106,7 @@ def test_clear_of_the_canes_there_is_room_for_a_plan_to_lead_on():
     x, y, z = free.poses.clear.translation.tolist()
     beside = Capsule("wire", (x + 0.047, y, z - 0.03), (x + 0.047, y, z + 0.03), 0.002, 0.002)
     clearance = CutClearance(RobotModel(), CONFIG)
-    clearance.take(Sample(Obstacles(header=m.Header(0.0, "odom"), capsules=(beside,)), 0.0))
+    clearance.update(Sample(Obstacles(header=m.Header(0.0, "odom"), capsules=(beside,)), 0.0))
     near, far = free.q_clear.copy(), free.q_clear.copy()
     far[0] += 1.0
     assert clearance.admits(replace(free, q_clear=far, q_stand_off=far, q_cut=near))

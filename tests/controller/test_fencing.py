@@ -28,34 +28,34 @@ def test_it_is_asked_for_five_times_a_second_and_at_once_in_another_mode():
 
 def test_it_is_held_when_the_bridge_says_so_and_lost_when_that_names_another_one():
     it = drawn()
-    assert it.take(bridge(), 0.0) == "" and it.token is None and not it.waits
-    assert it.take(bridge("t0", 4), 0.1) == "this controller commands the robot: epoch 4"
+    assert it.update(bridge(), 0.0) == "" and it.token is None and not it.waits
+    assert it.update(bridge("t0", 4), 0.1) == "this controller commands the robot: epoch 4"
     assert (it.token.epoch, it.token.nonce) == (4, "t0")
-    assert it.take(bridge("t0", 4), 0.2) == ""
-    assert "this one waits" in it.take(bridge("other", 5), 0.3)
+    assert it.update(bridge("t0", 4), 0.2) == ""
+    assert "this one waits" in it.update(bridge("other", 5), 0.3)
     assert it.token is None and it.overruled and it.waits
-    assert it.take(bridge("other", 5), 0.4) == ""
-    assert "epoch 6" in it.take(bridge("t0", 6), 0.5) and not it.waits
+    assert it.update(bridge("other", 5), 0.4) == ""
+    assert "epoch 6" in it.update(bridge("t0", 6), 0.5) and not it.waits
 
 
 def test_before_the_bridge_has_said_who_commands_a_controller_keeps_silent_for_a_second():
     it = drawn()
     for now in (7.0, 7.9):
-        it.take(None, now)
+        it.update(None, now)
         assert it.waits and not it.overruled
-    it.take(None, 8.0)
+    it.update(None, 8.0)
     assert not it.waits
 
 
 def test_who_gives_it_back_says_so_at_once_asks_under_another_one_and_is_not_overruled_by_the_former():
     it = drawn()
-    it.take(bridge("t0"), 0.0)
+    it.update(bridge("t0"), 0.0)
     assert it.request(1, "READY", 0.0) is not None
     given = it.give_way()
     assert given == m.TokenRequest(token="t0", releases=True) and it.token is None
     assert it.request(1, "READY", 0.01) == given
     assert it.request(1, "READY", 0.02).token == "t1"
-    it.take(bridge("t0"), 0.03)
+    it.update(bridge("t0"), 0.03)
     assert it.token is None and not it.overruled
-    it.take(bridge("t1", 2), 0.05)
+    it.update(bridge("t1", 2), 0.05)
     assert it.token.epoch == 2

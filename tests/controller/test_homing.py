@@ -41,7 +41,7 @@ def test_a_post_in_the_way_stops_it_before_it_is_met_and_is_named() -> None:
     x, y, _ = at.model.kinematics(at.q).T_odom_tool.translation
     post = Capsule("post", (float(x), float(y), 0.0), (float(x), float(y), 1.9), 0.04, 0.04)
     judge = Surroundings(CollisionModel(RobotModel()))
-    judge.take(Sample(Obstacles(header=m.Header(0.0, "odom"), capsules=(post,)), 0.0))
+    judge.update(Sample(Obstacles(header=m.Header(0.0, "odom"), capsules=(post,)), 0.0))
     robot, least = homing(post), 1.0
     for _ in range(1200):
         robot.step()

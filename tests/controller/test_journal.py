@@ -9,8 +9,8 @@ BODY = m.Header()
 def test_records_are_numbered_in_order_and_taken_once():
     journal = Journal()
     numbers = [journal.add("event", "x", BODY) for _ in range(3)]
-    assert [record.number for record in journal.take()] == numbers == [1, 2, 3]
-    assert journal.take() == () and journal.add("event", "x", BODY) == 4
+    assert [record.number for record in journal.drain()] == numbers == [1, 2, 3]
+    assert journal.drain() == () and journal.add("event", "x", BODY) == 4
 
 
 def test_a_record_is_held_when_the_ledger_says_so():
@@ -56,7 +56,7 @@ def test_a_stop_that_is_sent_several_times_is_one_record():
     stops = [m.StopRequest(stop_id=name, source="server", user="eve", reason="r") for name in ("a", "a", "b", "a")]
     for stop in stops:
         journal.stops((stop,))
-    assert [(record.kind, record.name, record.body.stop_id) for record in journal.take()] == [
+    assert [(record.kind, record.name, record.body.stop_id) for record in journal.drain()] == [
         ("stop", "eve", "a"),
         ("stop", "eve", "b"),
     ]
@@ -67,7 +67,7 @@ def test_what_is_said_is_told_once_and_recorded():
     lines = EventLogger(journal)
     lines.now = 3.0
     lines.say("warning", "x" * 600)
-    (told,) = lines.take()
+    (told,) = lines.drain()
     assert (told.header.stamp, told.severity, len(told.text)) == (3.0, "warning", 500)
-    assert lines.take() == ()
-    assert [record.body for record in journal.take()] == [told]
+    assert lines.drain() == ()
+    assert [record.body for record in journal.drain()] == [told]

@@ -73,7 +73,7 @@ class Desk:
         state = m.ControllerState(header=m.Header(), mode="READY", phase="", reason="", allowed=(), active_point_id="",
             method="test", T_odom_tool=None, T_odom_tool_desired=None, position_error=0.0, rotation_error=0.0,
             manipulability=0.0, joint_margin=0.0, tick_s=0.0, ticks=0, late_ticks=0, queue=self.queue.entries())
-        return Outputs(state=state, records=self.journal.take())
+        return Outputs(state=state, records=self.journal.drain())
 
 folder = Path(sys.argv[1])
 desk = Desk(restored(folder).tickets)

@@ -15,53 +15,53 @@ def tracking(scale=1.0, reason="", done=False, error=0.0, turn=0.0):
     return Tracking(np.zeros(9), None, error, turn, 0.05, not reason, reason, done, scale)
 
 
-def noted(patience, seconds, **how):
+def noted(timeout, seconds, **how):
     for _ in range(round(seconds / DT)):
-        patience.note(tracking(**how))
+        timeout.note(tracking(**how))
 
 
 @pytest.fixture
-def patience():
+def timeout():
     out = MotionTimeout(TIMEOUT, DT)
-    out.begin(2.0)
+    out.start(2.0)
     return out
 
 
-def test_over_is_what_has_run_out_and_is_in_place(patience):
-    assert patience.over(tracking(done=True, error=0.001), 0.0, 0.0015)
-    assert not patience.over(tracking(done=True, error=0.002), 0.0, 0.0015)
-    assert not patience.over(tracking(done=True, turn=0.3), 0.0, 0.0015)
-    assert not patience.over(tracking(error=0.001), 0.0, 0.0015)
+def test_over_is_what_has_run_out_and_is_in_place(timeout):
+    assert timeout.over(tracking(done=True, error=0.001), 0.0, 0.0015)
+    assert not timeout.over(tracking(done=True, error=0.002), 0.0, 0.0015)
+    assert not timeout.over(tracking(done=True, turn=0.3), 0.0, 0.0015)
+    assert not timeout.over(tracking(error=0.001), 0.0, 0.0015)
 
 
-def test_late_is_what_takes_much_longer_than_planned(patience):
-    patience.over(tracking(), 10.0, 0.0)
-    assert not patience.late(10.0 + 2.5 * 2.0 + TIMEOUT)
-    assert patience.late(10.1 + 2.5 * 2.0 + TIMEOUT)
-    patience.begin(4.0)
-    patience.over(tracking(), 30.0, 0.0)
-    assert not patience.late(40.0)
+def test_late_is_what_takes_much_longer_than_planned(timeout):
+    timeout.over(tracking(), 10.0, 0.0)
+    assert not timeout.late(10.0 + 2.5 * 2.0 + TIMEOUT)
+    assert timeout.late(10.1 + 2.5 * 2.0 + TIMEOUT)
+    timeout.start(4.0)
+    timeout.over(tracking(), 30.0, 0.0)
+    assert not timeout.late(40.0)
 
 
-def test_what_is_held_back_without_a_pause_is_late_soon(patience):
+def test_what_is_held_back_without_a_pause_is_late_soon(timeout):
     held = {"scale": 0.0, "reason": "the distance of blades to post 0 holds the tool back"}
-    noted(patience, 2.9, **held)
-    assert not patience.late(2.9)
-    noted(patience, 0.2, **held)
-    assert patience.late(3.1)
+    noted(timeout, 2.9, **held)
+    assert not timeout.late(2.9)
+    noted(timeout, 0.2, **held)
+    assert timeout.late(3.1)
     # It went on: counting begins anew.
-    noted(patience, 0.01, scale=0.5, reason=held["reason"])
-    noted(patience, 2.9, **held)
-    assert not patience.late(6.0)
-    patience.again()
-    noted(patience, 2.9, **held)
-    assert not patience.late(9.0)
+    noted(timeout, 0.01, scale=0.5, reason=held["reason"])
+    noted(timeout, 2.9, **held)
+    assert not timeout.late(6.0)
+    timeout.again()
+    noted(timeout, 2.9, **held)
+    assert not timeout.late(9.0)
 
 
 @pytest.mark.parametrize("how", [{"scale": 0.0}, {"scale": 0.0, "reason": "near", "done": True}])
-def test_a_clock_that_stands_for_no_reason_or_has_run_out_is_not_held(patience, how):
-    noted(patience, 20.0, **how)
-    assert not patience.late(20.0)
+def test_a_clock_that_stands_for_no_reason_or_has_run_out_is_not_held(timeout, how):
+    noted(timeout, 20.0, **how)
+    assert not timeout.late(20.0)
 
 
 def test_what_is_missing_is_said_with_the_reason():

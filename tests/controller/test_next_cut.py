@@ -34,7 +34,7 @@ def queue():
 def test_what_a_plan_knows_is_not_searched_for() -> None:
     search, known = Searches(), Unreachable("the plan says so")
     coming = NextCut(search, queue(), 10, lambda ticket: known if ticket.point.point_id == "a" else None)
-    assert coming.look(np.zeros(12))
+    assert coming.search(np.zeros(12))
     assert coming.point_id == "a" and coming.found is known and search.begun == 0
     coming.step()
     assert coming.found is known
@@ -44,7 +44,7 @@ def test_what_it_does_not_know_is_searched_for_and_its_order_is_followed() -> No
     search, points = Searches(), queue()
     points.arrange(("b", "a"))
     coming = NextCut(search, points, 10, lambda ticket: None)
-    assert coming.look(np.zeros(12))
+    assert coming.search(np.zeros(12))
     assert coming.point_id == "b" and coming.found is None and search.begun == 1
     coming.step()
     assert coming.found.reason == "searched in vain"
@@ -53,9 +53,9 @@ def test_what_it_does_not_know_is_searched_for_and_its_order_is_followed() -> No
 def test_a_new_order_is_looked_at_anew() -> None:
     search, points = Searches(), queue()
     coming = NextCut(search, points, 10)
-    coming.look(np.zeros(12))
+    coming.search(np.zeros(12))
     assert coming.point_id == "a" and coming.stands
     points.arrange(("b", "a"))
     assert not coming.stands
-    coming.look(np.zeros(12))
+    coming.search(np.zeros(12))
     assert coming.point_id == "b" and search.begun == 2

@@ -86,7 +86,7 @@ def test_a_restart_keeps_the_order_and_its_count():
     journal = Journal()
     before = WorkOrder(journal)
     before.move("d", "a", 0, "ada", NAMES)
-    (record,) = journal.take()
+    (record,) = journal.drain()
     assert (record.kind, record.name) == ("order", "order")
     row = msgspec.json.decode(msgspec.json.encode(record.body), type=OrderRow)
     after = WorkOrder(Journal())
@@ -168,7 +168,7 @@ def test_a_restart_keeps_it_and_taking_it_back_leaves_it_to_the_search():
     before.turn("a", 0.4, "ada")
     before.turn("b", 0.2, "ada")
     before.turn("b", None, "ada")
-    rows = tuple((record.name, record.body) for record in journal.take())
+    rows = tuple((record.name, record.body) for record in journal.drain())
     assert [kind.azimuth for _, kind in rows] == [0.4, 0.2, None]
     after = Approaches(Journal())
     after.restore(rows)

@@ -32,7 +32,7 @@ class Life:
 
     def rows(self):
         newest = dict(self.before)
-        for record in self.journal.take():
+        for record in self.journal.drain():
             if record.kind == "ticket":
                 newest.pop(record.name, None)
                 newest[record.name] = msgspec.json.encode(record.body)
@@ -154,4 +154,4 @@ def test_only_what_matters_is_recorded():
     life.rows()
     for step in range(50):
         life.queue.update(shown(point(confidence=0.5 + step / 200)))
-    assert life.journal.take() == ()
+    assert life.journal.drain() == ()

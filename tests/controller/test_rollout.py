@@ -86,5 +86,5 @@ def test_a_robot_that_is_nowhere_has_no_preview():
 def test_where_pictures_take_long_a_look_back_does_not_keep_the_next_one_from_being_answered():
     """The cut before is still being looked at when the tool is at the next place."""
     near = (POINTS[0], point("b", (0.4, 0.77, 1.1)))
-    made = ROLLOUT.roll(PreviewRequest(1, START, near, look_s=1.2))
+    made = ROLLOUT.roll(PreviewRequest(1, START, near, close_up_s=1.2))
     assert [cut.result for cut in made.cuts] == ["cut", "cut"]

@@ -64,14 +64,14 @@ def test_a_rule_is_taken_back_with_its_acceptances_whoever_is_heard_first():
         if perception_first:
             q.update(shown(A, B, C))
             assert q.count("ACCEPTED") == 0, "nobody has said so yet"
-            assert q.take_rule_back(SHORT) == ""
+            assert q.undo_rule(SHORT) == ""
         else:
-            assert q.take_rule_back(SHORT) == ""
+            assert q.undo_rule(SHORT) == ""
             assert q.count("ACCEPTED") == 0, "the points are not back yet"
             q.update(shown(A, B, C))
         assert {ticket.point.point_id: ticket for ticket in q.tickets()} == before
         assert q.restored() == "a, b" and q.restored() == ""
-        assert "knows of no acceptance" in q.take_rule_back(SHORT), "once"
+        assert "knows of no acceptance" in q.undo_rule(SHORT), "once"
 
 
 def test_setting_the_former_numbers_is_not_taking_back():
@@ -85,7 +85,7 @@ def test_what_somebody_has_decided_since_or_is_elsewhere_stays_as_it_is():
     q = accepted("a", "b", "c")
     q.update(shown(A_SHORT, rule=SHORT))
     assert q.reject("a", "eve", "wrong cane") == ""
-    assert q.take_rule_back(SHORT) == ""
+    assert q.undo_rule(SHORT) == ""
     q.update(shown(A, revised("b", 2.006, 4)))
     assert [state(q, name) for name in "abc"] == ["REJECTED", "PROPOSED", "PROPOSED"]
     assert q.restored() == ""
@@ -97,7 +97,7 @@ def test_perception_that_starts_anew_is_no_change_of_the_rule():
     q.update(shown(rule=SHORT, frames=1))
     assert "perception does not see it" in q.get("a").reason
     q.update(shown(A, rule=SHORT, frames=2))
-    assert "knows of no" in q.take_rule_back(SHORT) and state(q) == "PROPOSED"
+    assert "knows of no" in q.undo_rule(SHORT) and state(q) == "PROPOSED"
 
 
 def test_the_ledger_has_the_acceptance_again_as_it_was(tmp_path):
@@ -105,10 +105,10 @@ def test_the_ledger_has_the_acceptance_again_as_it_was(tmp_path):
     q.update(shown(A, B, C))
     q.accept("a", 3, "ada")
     q.update(shown(A_SHORT, B, C, rule=SHORT))
-    q.take_rule_back(SHORT)
+    q.undo_rule(SHORT)
     q.update(shown(A, B, C))
     with Ledger(tmp_path) as ledger:
-        ledger.append(_entry("2026-11-22T08:00:00+00:00", record) for record in journal.take())
+        ledger.append(_entry("2026-11-22T08:00:00+00:00", record) for record in journal.drain())
     rows = {row.point.point_id: row for row in restored(tmp_path).tickets}
     assert (rows["a"].state, rows["a"].user, rows["a"].accepted) == ("ACCEPTED", "ada", A)
     anew = PointQueue(ControllerConfig())
@@ -143,6 +143,6 @@ def test_whatever_is_accepted_taking_rules_back_leaves_it_as_before(names, rules
         rule = stack.pop()
         if early:
             see(stack[-1])
-        assert q.take_rule_back(rule) == ""
+        assert q.undo_rule(rule) == ""
         see(stack[-1])
     assert {t.point.point_id: t for t in q.tickets()} == begun

@@ -26,7 +26,7 @@ def demand(arm=CONFIG.home, sent=None, posture=None):
 
 def written(task, problem):
     J, t = np.zeros((task.rows, 9)), np.zeros(task.rows)
-    task.begin(J)
+    task.prepare(J)
     task.write(problem, J, t)
     return J, t
 

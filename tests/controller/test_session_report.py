@@ -30,7 +30,7 @@ def asked(intent, reason=""):
 def report(*rows):
     account = SessionReportBuilder()
     for seconds, row in rows:
-        account.take(at(seconds), row)
+        account.add(at(seconds), row)
     # As it comes to the server.
     return StrictDecoder(SessionReport).decode(encode(account.report()))
 
@@ -121,9 +121,9 @@ def test_refusals_and_changes_of_control_are_told_and_the_newest_go_over_the_wir
 
 def test_points_without_a_cut_and_lines_of_the_log_are_not_in_it():
     account = SessionReportBuilder()
-    assert account.take(at(0.0), Answer(ok=True)), "it began then"
+    assert account.add(at(0.0), Answer(ok=True)), "it began then"
     accepted = replace(ticket("a", "ACCEPTED", user="ada"), cut_id="")
-    assert not account.take(at(1.0), accepted) and not account.take(at(2.0), Answer(ok=True))
+    assert not account.add(at(1.0), accepted) and not account.add(at(2.0), Answer(ok=True))
     assert account.report().cuts == () and account.report().began_at == BEGAN
 
 
@@ -137,4 +137,4 @@ def test_points_out_of_reach_are_counted_by_vine_until_they_are_in_reach_or_take
     assert [(vine.vine, vine.done, vine.unreachable) for vine in told.vines] == [(1, 0, 1), (2, 1, 1)]
     assert told.cut_count == 1, "nothing was tried where nothing can be reached"
     account = SessionReportBuilder()
-    assert account.take(at(1.0), row("a", "UNREACHABLE", 1)) and account.take(at(2.0), row("a", "ACCEPTED", 1))
+    assert account.add(at(1.0), row("a", "UNREACHABLE", 1)) and account.add(at(2.0), row("a", "ACCEPTED", 1))

@@ -29,17 +29,17 @@ def bridge(stop_id):
 
 def test_a_stop_latches_once_and_says_who_and_why():
     latch = StopLatch()
-    assert latch.take((stop("a"),), BRIDGE) == "software stop by eve: dog in the row"
-    assert latch.take((stop("a"),), bridge("a")) == ""
+    assert latch.update((stop("a"),), BRIDGE) == "software stop by eve: dog in the row"
+    assert latch.update((stop("a"),), bridge("a")) == ""
 
 
 def test_a_stop_that_only_the_bridge_has_seen_latches_too():
-    assert "dog in the row" in StopLatch().take((), bridge("a"))
+    assert "dog in the row" in StopLatch().update((), bridge("a"))
 
 
 def test_reset_ends_only_when_the_bridge_shows_the_release():
     latch = StopLatch()
-    latch.take((stop("a"),), bridge("a"))
+    latch.update((stop("a"),), bridge("a"))
     assert not latch.released(bridge("a"))
     assert latch.ask_release(RESET, bridge("a"), 1.0) == ""
     assert latch.release_due().stop_id == "a"
@@ -58,19 +58,19 @@ def test_a_reset_where_nothing_is_latched_releases_nothing():
 
 def test_echoes_of_a_released_stop_latch_nothing_but_the_bridges_latch_always_counts():
     latch = StopLatch()
-    latch.take((stop("a"),), bridge("a"))
+    latch.update((stop("a"),), bridge("a"))
     latch.ask_release(RESET, bridge("a"), 1.0)
     latch.release_due()
     assert latch.released(BRIDGE)
-    assert latch.take((stop("a"),), BRIDGE) == ""
-    assert latch.take((), bridge("a")) != ""
+    assert latch.update((stop("a"),), BRIDGE) == ""
+    assert latch.update((), bridge("a")) != ""
 
 
 def test_every_stop_is_kept_with_who_pressed_it_and_when_and_survives_a_restart():
     latch = StopLatch()
     assert latch.changed
-    latch.take((stop("a"),), BRIDGE, 100.0)
-    latch.take((stop("b"), stop("a")), bridge("a"), 101.0)
+    latch.update((stop("a"),), BRIDGE, 100.0)
+    latch.update((stop("b"), stop("a")), bridge("a"), 101.0)
     assert latch.changed
     told = latch.message()
     assert [(each.stop_id, each.user, each.wall_time) for each in told.stops] == [
@@ -81,13 +81,13 @@ def test_every_stop_is_kept_with_who_pressed_it_and_when_and_survives_a_restart(
     again = StopLatch(told.stops)
     assert "dog in the row" in again.latched
     assert again.message().stops == told.stops
-    assert again.take((stop("b"),), BRIDGE) == ""
+    assert again.update((stop("b"),), BRIDGE) == ""
 
 
 def test_a_reset_of_a_stop_that_is_not_the_newest_any_more_is_refused():
     latch = StopLatch()
-    latch.take((stop("a"),), bridge("a"))
-    latch.take((stop("b"),), bridge("b"))
+    latch.update((stop("a"),), bridge("a"))
+    latch.update((stop("b"),), bridge("b"))
     looked_at_a = intents.Reset(user="ada", role="supervisor", reason="looked at it", stop_id="a")
     assert "another stop was pressed" in latch.ask_release(looked_at_a, bridge("b"), 1.0)
     assert latch.release_due() is None
@@ -100,7 +100,7 @@ def test_a_reset_of_a_stop_that_is_not_the_newest_any_more_is_refused():
 
 def test_before_the_bridge_has_said_what_it_holds_a_reset_is_refused_and_later_it_is_not_lost():
     latch = StopLatch()
-    latch.take((stop("a"),), None)
+    latch.update((stop("a"),), None)
     assert "the bridge has not said" in latch.ask_release(RESET, None, 1.0)
     assert not latch.released(None) and not latch.released(BRIDGE)
     assert latch.ask_release(RESET, bridge("a"), 1.1) == ""
@@ -109,8 +109,8 @@ def test_before_the_bridge_has_said_what_it_holds_a_reset_is_refused_and_later_i
 
 def test_of_two_stops_the_one_that_the_bridge_holds_is_released():
     latch = StopLatch()
-    latch.take((stop("a"),), bridge("a"))
-    latch.take((stop("b"),), bridge("a"))
+    latch.update((stop("a"),), bridge("a"))
+    latch.update((stop("b"),), bridge("a"))
     latch.ask_release(RESET, bridge("a"), 1.0)
     assert latch.release_due().stop_id == "a"
     assert latch.released(BRIDGE)
@@ -118,16 +118,16 @@ def test_of_two_stops_the_one_that_the_bridge_holds_is_released():
 
 def test_a_stop_during_the_reset_undoes_it():
     latch = StopLatch()
-    latch.take((stop("a"),), bridge("a"))
+    latch.update((stop("a"),), bridge("a"))
     latch.ask_release(RESET, bridge("a"), 1.0)
-    assert latch.take((stop("b"),), bridge("a")) != ""
+    assert latch.update((stop("b"),), bridge("a")) != ""
     assert latch.release_due() is None
     assert not latch.released(BRIDGE)
 
 
 def test_asking_again_is_possible_when_the_bridge_did_not_answer():
     latch = StopLatch()
-    latch.take((stop("a"),), bridge("a"))
+    latch.update((stop("a"),), bridge("a"))
     latch.ask_release(RESET, bridge("a"), 1.0)
     assert latch.ask_release(RESET, bridge("a"), 1.5) == "the reset is under way"
     assert latch.ask_release(RESET, bridge("a"), 2.1) == ""

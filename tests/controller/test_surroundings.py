@@ -31,10 +31,10 @@ def post(x: float, y: float, radius: float = 0.04) -> Capsule:
 def test_what_perception_tells_is_what_distances_are_kept_to() -> None:
     around = Surroundings(CollisionModel(RobotModel()))
     free = around.model.least(HOME).distance
-    around.take(told(post(0.5, 0.25)))
+    around.update(told(post(0.5, 0.25)))
     near = around.model.least(HOME)
     assert near.distance < free and any("post" in side for side in near.pair)
-    around.take(told())
+    around.update(told())
     assert around.model.least(HOME).distance == free
 
 
@@ -49,7 +49,7 @@ def parts_near(around: Surroundings, q: np.ndarray, name: str) -> set[str]:
 def test_the_blades_may_touch_the_spur_that_is_cut_and_nothing_else_may() -> None:
     around = Surroundings(CollisionModel(RobotModel()))
     first, second = "cane 0 of vine 1, spur 2", "cane 2 of vine 1, spur 3"
-    around.take(told(cane(1.0), post(1.0, 0.5), cane(1.04, spur=3), cane(1.0, low=1.2, high=1.3)))
+    around.update(told(cane(1.0), post(1.0, 0.5), cane(1.04, spur=3), cane(1.0, low=1.2, high=1.3)))
     everything = parts_near(around, HOME, first)
     assert {"blades", "cutter", "camera", "link5", "base"} <= everything
     around.work_at((np.array([1.0, 0.0, 1.22]),))
@@ -65,9 +65,9 @@ def test_the_blades_may_touch_the_spur_that_is_cut_and_nothing_else_may() -> Non
 def test_what_is_cut_stays_known_when_canes_are_told_anew_under_other_numbers() -> None:
     around = Surroundings(CollisionModel(RobotModel()))
     around.work_at((np.array([1.0, 0.0, 1.22]),))
-    around.take(told(cane(1.0)))
+    around.update(told(cane(1.0)))
     assert "blades" not in parts_near(around, HOME, "cane 0 of vine 1, spur 2")
-    around.take(told(cane(2.0, spur=5), cane(1.0)))
+    around.update(told(cane(2.0, spur=5), cane(1.0)))
     assert "blades" in parts_near(around, HOME, "cane 0 of vine 1, spur 5")
     assert "blades" not in parts_near(around, HOME, "cane 1 of vine 1, spur 2")
 
@@ -75,7 +75,7 @@ def test_what_is_cut_stays_known_when_canes_are_told_anew_under_other_numbers() 
 def test_beside_a_cut_the_blades_may_push_aside_what_may_yet_be_cut_off() -> None:
     around = Surroundings(CollisionModel(RobotModel()))
     open_choice = [msgspec.structs.replace(cane(x, spur=spur), undecided=True) for x, spur in ((1.02, 3), (1.08, 4))]
-    around.take(told(cane(1.0), *open_choice))
+    around.update(told(cane(1.0), *open_choice))
     beside, away = "cane 1 of vine 1, spur 3", "cane 2 of vine 1, spur 4"
     assert "blades" in parts_near(around, HOME, beside)
     around.work_at((np.array([1.0, 0.0, 1.22]),))
@@ -85,7 +85,7 @@ def test_beside_a_cut_the_blades_may_push_aside_what_may_yet_be_cut_off() -> Non
 
 def test_a_cut_far_from_every_cane_exempts_none() -> None:
     around = Surroundings(CollisionModel(RobotModel()))
-    around.take(told(cane(1.0)))
+    around.update(told(cane(1.0)))
     around.work_at((np.array([1.06, 0.0, 1.0]),))
     assert "blades" in parts_near(around, HOME, "cane 0 of vine 1, spur 2")
 
@@ -104,7 +104,7 @@ def test_a_post_in_the_way_of_the_held_tool_is_not_met(method: str) -> None:
     target = pose_message(pin.SE3(tool.rotation, behind))
     robot.teleop = TeleopTarget(sequence=1, hold=True, user="ada", target=target)
     judge = Surroundings(CollisionModel(RobotModel()))
-    judge.take(told(*robot.obstacles))
+    judge.update(told(*robot.obstacles))
     least, said = 1.0, set()
     for _ in range(500):
         robot.step()

@@ -8,16 +8,16 @@ from tests.support.controller_at_work import point, working
 
 
 def run(velocity_of, seconds=2.0, sent=None, step=0.01):
-    following, now = TrackingErrorMonitor(), 0.0
+    monitor, now = TrackingErrorMonitor(), 0.0
     sent = np.full(9, 0.5) if sent is None else sent
     for number in range(round(seconds / step)):
         now += step
         joints = m.JointState(
             header=m.Header(now), sequence=number, position=(0.0,) * 9, velocity=tuple(velocity_of(sent, now))
         )
-        following.take(joints, sent)
-        following.take(joints, sent)
-    return following.reason
+        monitor.update(joints, sent)
+        monitor.update(joints, sent)
+    return monitor.reason
 
 
 def test_a_robot_that_follows_with_a_lag_is_not_astray():

@@ -67,7 +67,7 @@ class Robot:
         self.record()
 
     def record(self):
-        records = self.journal.take()
+        records = self.journal.drain()
         if records:
             self.ledger.append(Entry("t", r.kind, r.name, msgspec.json.encode(r.body).decode()) for r in records)
         self.journal.observe(LedgerState(self.journal.number), 0.0)

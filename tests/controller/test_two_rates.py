@@ -67,7 +67,7 @@ def test_a_speed_that_is_no_number_brakes_the_robot():
     drive = DrivenBase(1000.0, 50.0)
     drive.sent = drive.before = np.full(9, 0.01)
     robot = drive.observed()
-    drive.method.begin(drive.sent, drive.before, np.array([np.nan, 0.0]))
+    drive.method.start_period(drive.sent, drive.before, np.array([np.nan, 0.0]))
     problem = IkProblem(robot.q, robot.kinematics, robot.sent, ActuatorTask(np.full(9, 0.01)), Posture(robot.q), "free")
     out = drive.method.solve(problem)
     assert not out.feasible

@@ -186,9 +186,9 @@ def test_what_is_stricter_is_taken_without_a_word_and_what_is_wider_is_said(tmp_
         "[bridge] deadline_s = 0.195, usually 0.19 (allowed: more than 0, at most 0.2)",
         "[bridge] joint_margin = 0.006, usually 0.01 (allowed: from 0.005 to 0.2)",
     )
-    path = write(tmp_path, "controller", {"verify": False})
+    path = write(tmp_path, "controller", {"post_cut_check": False})
     assert wider("controller", load_section(path, "controller", ControllerConfig)) == (
-        "[controller] verify = false, usually true (allowed: true or false)",
+        "[controller] post_cut_check = false, usually true (allowed: true or false)",
     )
     assert wider("server", ServerConfig(invite_s=3600.0)) == (
         "[server] invite_s = 3600, usually 600 (allowed: more than 0, at most 3600)",

@@ -47,7 +47,7 @@ class DrivenBase:
             wheels = None
         elif self.knows != "truth":
             q, wheels = self.from_odometry()
-        self.method.begin(self.sent, self.before, wheels)
+        self.method.start_period(self.sent, self.before, wheels)
         return Measured(q, ROBOT.kinematics(q), self.sent)
 
     def from_odometry(self):

@@ -39,7 +39,7 @@ class Sequence:
     """Drives for some periods, stands, cuts, and goes on, with the product's own blades."""
 
     def __init__(self, config, queue, run_id, chance, permit):
-        self._queue, self._chance, self._permit, self.look_s = queue, chance, permit, 0.0
+        self._queue, self._chance, self._permit, self.close_up_s = queue, chance, permit, 0.0
         self.blades = Blades(config, queue, run_id)
         self.phase, self.places, self.ending = "", (), ""
         self.abort()
@@ -51,7 +51,7 @@ class Sequence:
     def abort(self):
         self.active, self.in_canes, self._left, self._accepted = "", "", 0, None
 
-    def begin(self, survey=0.0):
+    def start(self, survey=0.0):
         self.abort()
         self._survey = 20 if survey else 0
 
@@ -92,7 +92,7 @@ class Sequence:
             return MotionResult(WHEELS)
         if not sent.any() and self._left < -3:
             self.in_canes = self.active
-            self.blades.begin(self.active, now)
+            self.blades.start(self.active, now)
         return MotionResult(rest)
 
 

@@ -24,7 +24,7 @@ class ArmPosture:
         """
         self._gain, self._share = gain, weight**0.5 / speed[ARM_XI]
 
-    def begin(self, jacobian: Array) -> None:
+    def prepare(self, jacobian: Array) -> None:
         """Each joint has a row of its own."""
         jacobian[:, ARM_XI] = np.diag(self._share)
 

@@ -34,7 +34,7 @@ class BaseReference:
         self._limits = float(speed[0]), float(speed[1])
         self._shares = place**0.5 / self._limits[0], heading**0.5 / self._limits[1]
 
-    def begin(self, jacobian: Array) -> None:
+    def prepare(self, jacobian: Array) -> None:
         """Nothing is the same in every mode."""
 
     def write(self, problem: IkProblem, jacobian: Array, target: Array) -> None:

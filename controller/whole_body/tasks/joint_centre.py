@@ -26,7 +26,7 @@ class JointCentre:
         self._low, self._high = limits.lower[ARM_Q] + zone, limits.upper[ARM_Q] - zone
         self._scale = weight**0.5 / speed[ARM_XI] / zone
 
-    def begin(self, jacobian: Array) -> None:
+    def prepare(self, jacobian: Array) -> None:
         """Nothing is the same in every posture."""
 
     def write(self, problem: IkProblem, jacobian: Array, target: Array) -> None:

@@ -32,7 +32,7 @@ class ClimbManipulability:
         #: Of the arm in this period; the method sets it before `write`.
         self.now: Manipulability | None = None
 
-    def begin(self, jacobian: Array) -> None:
+    def prepare(self, jacobian: Array) -> None:
         """Nothing is the same in every posture."""
 
     def write(self, problem: IkProblem, jacobian: Array, target: Array) -> None:

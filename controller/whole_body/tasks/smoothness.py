@@ -18,7 +18,7 @@ class Smoothness:
         """Scale by the largest speeds `speed` (9, ν)."""
         self._share, self._actuation = weight**0.5 / speed, actuation
 
-    def begin(self, jacobian: Array) -> None:
+    def prepare(self, jacobian: Array) -> None:
         """Each actuator has a row of its own."""
         jacobian[:] = np.diag(self._share)
 
