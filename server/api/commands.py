@@ -5,10 +5,12 @@ header with the server's own address on every POST. `POST /api/invite` makes the
 """
 
 import time
+from collections.abc import Awaitable, Callable
 
 from fastapi import APIRouter, Depends, Request, Response
 
 from rolling_panda import messages as m
+from rolling_panda import topics
 from rolling_panda.errors import ServiceError
 from rolling_panda.messages import commands as intents
 from rolling_panda.messages.supervision import BaseVelocity
@@ -19,6 +21,19 @@ from server.auth.sessions import Session
 from server.robots.context import MOTION_RATE_HZ, Result, RobotContext
 from server.robots.teleop import TeleopCommand
 
+#: Commands without parameters: path, tag, intent, description.
+_PLAIN: tuple[tuple[str, str, Callable[..., intents.Intent], str], ...] = (
+    ("/arm", "mode", intents.Arm, "IDLE to READY."),
+    ("/start", "mode", intents.Start, "Start automatic work on the accepted points."),
+    ("/pause", "mode", intents.Pause, "Pause; nothing resumes by itself."),
+    ("/resume", "mode", intents.Resume, "PAUSED to READY; starting again is separate."),
+    ("/home", "mode", intents.Home, "Bring the arm back to its survey posture."),
+    ("/acknowledge", "mode", intents.Acknowledge, "Acknowledge a protective stop or a fault whose cause has gone."),
+    ("/control/request", "control", intents.RequestControl, "Request control from its holder."),
+    ("/control/grant", "control", intents.GrantControl, "Grant control to who has requested it, after a stop."),
+    ("/control/return", "control", intents.ReturnControl, "Return control; motion is paused."),
+)
+
 
 def commands_router(robot: RobotContext) -> APIRouter:
     """Decisions on points, modes, teleoperation and replay."""
@@ -27,6 +42,16 @@ def commands_router(robot: RobotContext) -> APIRouter:
     async def ask(session: Session, intent: intents.Intent) -> Response:
         return answer(await robot.ask(session, intent))
 
+    def plain(intent: Callable[..., intents.Intent]) -> Callable[[Session], Awaitable[Response]]:
+        async def command(session: Operator) -> Response:
+            return await ask(session, intent(user=session.user))
+
+        return command
+
+    for path, tag, kind, about in _PLAIN:
+        name = path.strip("/").replace("/", "_")
+        router.post(path, name=name, tags=[tag], responses=COMMAND, description=about)(plain(kind))
+
     @router.post("/points/accept-all", tags=["points"], responses=COMMAND)
     async def accept_all(session: Operator, request: body.AcceptAll) -> Response:
         """Accept every proposed point with at least this confidence."""
@@ -34,81 +59,48 @@ def commands_router(robot: RobotContext) -> APIRouter:
 
     @router.post("/points/{point_id}/accept", tags=["points"], responses=COMMAND)
     async def accept(session: Operator, point_id: PointId, request: body.AcceptPoint) -> Response:
-        """Accept a point as it was seen: with the revision that `GET /api/points` showed."""
-        accepted = request.model_dump()
-        return await ask(session, intents.AcceptPoint(user=session.user, point_id=point_id, **accepted))
+        """Accept a point in the revision that `GET /api/points` showed."""
+        return await ask(session, intents.AcceptPoint(user=session.user, point_id=point_id, **request.model_dump()))
 
     @router.post("/points/{point_id}/reject", tags=["points"], responses=COMMAND)
     async def reject(session: Operator, point_id: PointId, request: body.RejectPoint) -> Response:
-        """Take a point off the queue."""
+        """Remove a point from the queue."""
         return await ask(session, intents.RejectPoint(user=session.user, point_id=point_id, reason=request.reason))
 
     @router.post("/points/{point_id}/reconsider", tags=["points"], responses=COMMAND)
     async def reconsider(session: Operator, point_id: PointId) -> Response:
-        """Take back what was decided: an accepted or rejected point is proposed again."""
+        """Undo a decision: an accepted or rejected point is proposed again."""
         return await ask(session, intents.ReconsiderPoint(user=session.user, point_id=point_id))
 
     @router.post("/points/{point_id}/resolve", tags=["points"], responses=COMMAND)
     async def resolve(session: Operator, point_id: PointId, request: body.ResolvePoint) -> Response:
-        """Say how an UNKNOWN cut ended, after looking; it is never cut again by itself."""
+        """Report how an UNKNOWN cut ended, after an inspection; it is never cut again automatically."""
         return await ask(session, intents.ResolvePoint(user=session.user, point_id=point_id, **request.model_dump()))
 
     @router.post("/points/{point_id}/work-before", tags=["points"], responses=COMMAND)
     async def work_before(session: Operator, point_id: PointId, request: body.MoveInQueue) -> Response:
         """Work on an accepted point before another one, or last."""
-        wanted = intents.MoveInQueue(user=session.user, point_id=point_id, **request.model_dump())
-        return await ask(session, wanted)
+        return await ask(session, intents.MoveInQueue(user=session.user, point_id=point_id, **request.model_dump()))
 
     @router.post("/points/{point_id}/approach", tags=["points"], responses=COMMAND)
     async def approach(session: Operator, point_id: PointId, request: body.SetApproach) -> Response:
-        """Turn the approach to a point about its cane; an accepted one is planned anew, which says what comes of it."""
-        wanted = intents.SetApproach(user=session.user, point_id=point_id, azimuth=request.azimuth)
-        return await ask(session, wanted)
+        """Set the angle of the approach about the cane; an accepted point is planned again."""
+        return await ask(session, intents.SetApproach(user=session.user, point_id=point_id, azimuth=request.azimuth))
 
     @router.post("/order/planners", tags=["points"], responses=COMMAND)
     async def planners(session: Operator, request: body.ResetOrder) -> Response:
-        """Work in the plan's order again."""
+        """Restore the order of the plan."""
         return await ask(session, intents.ResetOrder(user=session.user, revision=request.revision))
-
-    @router.post("/arm", tags=["mode"], responses=COMMAND)
-    async def arm(session: Operator) -> Response:
-        """IDLE to READY."""
-        return await ask(session, intents.Arm(user=session.user))
-
-    @router.post("/start", tags=["mode"], responses=COMMAND)
-    async def start(session: Operator) -> Response:
-        """Start automatic work on the accepted points."""
-        return await ask(session, intents.Start(user=session.user))
 
     @router.post("/survey", tags=["mode"], responses=COMMAND)
     async def survey(session: Operator, request: body.Survey) -> Response:
-        """Drive along the row with the camera on the vines; cuts nothing. Ends with what was found."""
+        """Drive along the row with the camera on the vines; cuts nothing."""
         return await ask(session, intents.Survey(user=session.user, distance=request.distance))
 
     @router.post("/look-again", tags=["mode"], responses=COMMAND)
     async def look_again(session: Operator, request: body.Place) -> Response:
         """Drive to a site without a decision and take images from both sides; cuts nothing."""
         return await ask(session, intents.Survey(user=session.user, vine=request.vine, spur=request.spur))
-
-    @router.post("/pause", tags=["mode"], responses=COMMAND)
-    async def pause(session: Operator) -> Response:
-        """Pause; nothing resumes by itself."""
-        return await ask(session, intents.Pause(user=session.user))
-
-    @router.post("/resume", tags=["mode"], responses=COMMAND)
-    async def resume(session: Operator) -> Response:
-        """PAUSED to READY; starting again is separate."""
-        return await ask(session, intents.Resume(user=session.user))
-
-    @router.post("/home", tags=["mode"], responses=COMMAND)
-    async def home(session: Operator) -> Response:
-        """Bring the arm back to its survey posture."""
-        return await ask(session, intents.Home(user=session.user))
-
-    @router.post("/acknowledge", tags=["mode"], responses=COMMAND)
-    async def acknowledge(session: Operator) -> Response:
-        """Acknowledge a protective stop or a fault whose cause has gone."""
-        return await ask(session, intents.Acknowledge(user=session.user))
 
     @router.post("/stop", tags=["mode"], responses=COMMAND, openapi_extra=STOP_BODY)
     async def stop(session: Caller, request: Request) -> Response:
@@ -154,7 +146,9 @@ def commands_router(robot: RobotContext) -> APIRouter:
         if robot.link.replay.peek() is None:
             return answer(Result(409, False, "this is no recording but a robot"))
         try:
-            result = await robot.link.seek(intents.SeekReplay(position_s=request.position_s, playing=request.playing))
+            result = await robot.link.call(
+                topics.SEEK, intents.SeekReplay(position_s=request.position_s, playing=request.playing)
+            )
         except ServiceError as error:
             return answer(Result(503, False, str(error)))
         return answer(Result(200, result.ok, result.reason))

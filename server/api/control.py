@@ -18,7 +18,7 @@ class Control(ControlState, frozen=True, kw_only=True, tag="ControlState"):
 
 
 def control_router(robot: RobotContext) -> APIRouter:
-    """Everything under `/api/control`."""
+    """`/api/control`; commands without parameters are in `commands.py`."""
     router = APIRouter(prefix="/api/control", tags=["control"], dependencies=[Depends(activity(robot))])
 
     @router.get("", responses=query(Control, UNAVAILABLE))
@@ -38,20 +38,5 @@ def control_router(robot: RobotContext) -> APIRouter:
     async def take(session: Operator, request: body.TakeControl) -> Response:
         """Take control; from its holder only with `confirm`, after a stop of the robot."""
         return answer(await robot.ask(session, intents.TakeControl(user=session.user, confirmed=request.confirm)))
-
-    @router.post("/request", responses=COMMAND)
-    async def request_it(session: Operator) -> Response:
-        """Request control from its holder."""
-        return answer(await robot.ask(session, intents.RequestControl(user=session.user)))
-
-    @router.post("/grant", responses=COMMAND)
-    async def grant(session: Operator) -> Response:
-        """Grant control to who has requested it; the robot stops first."""
-        return answer(await robot.ask(session, intents.GrantControl(user=session.user)))
-
-    @router.post("/return", responses=COMMAND)
-    async def give_back(session: Operator) -> Response:
-        """Return control; motion is paused."""
-        return answer(await robot.ask(session, intents.ReturnControl(user=session.user)))
 
     return router

@@ -3,13 +3,14 @@
 import asyncio
 import time
 from collections import deque
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 import msgspec
 
 from rolling_panda import messages as m
+from rolling_panda import topics
 from rolling_panda.errors import InputError, ServiceError
 from rolling_panda.messages import commands as intents
 from rolling_panda.messages.commands import EvaluateRule, PlantRequest
@@ -141,12 +142,12 @@ class RobotContext:
         # The age of the view goes with the intent, since the presence message may arrive later.
         view_age_s = self.presence.view_age_s(session, time.monotonic())
         complete = msgspec.structs.replace(intent, role=session.role, client=session.client, view_age_s=view_age_s)
-        return await self._call(session, type(intent).__name__, "the controller", lambda: self.link.ask(complete))
+        return await self._call(session, "the controller", topics.INTENT, complete)
 
     async def ask_perception(self, session: Session, request: PlantRequest) -> Result:
         """Send a request to perception, and log the answer."""
         name = type(request).__name__
-        result = await self._call(session, name, "perception", lambda: self.link.ask_perception(request))
+        result = await self._call(session, "perception", topics.PLANT, request)
         # Dragging a slider tries many rules, and changes nothing.
         if result.status in (200, 409) and not isinstance(request, EvaluateRule):
             self.note(
@@ -156,12 +157,13 @@ class RobotContext:
             )
         return result
 
-    async def _call(self, session: Session, name: str, process: str, ask: Callable[[], Awaitable[m.Answer]]) -> Result:
-        """Call a service; status 503 where it does not answer."""
+    async def _call(
+        self, session: Session, process: str, service: topics.Service[Any], request: msgspec.Struct
+    ) -> Result:
         try:
-            answer = await ask()
+            answer = await self.link.call(service, request)
         except ServiceError as error:
-            self.note("error", f"{name} by {session.user}: no answer from {process}", session.client)
+            self.note("error", f"{type(request).__name__} by {session.user}: no answer from {process}", session.client)
             return Result(503, False, f"{process[0].upper()}{process[1:]} does not answer: {error}")
         return Result(200 if answer.ok else 409, answer.ok, answer.reason, answer.effect)
 

@@ -14,8 +14,6 @@ from typing import Any
 
 from rolling_panda import messages as m
 from rolling_panda import topics
-from rolling_panda.messages import commands as intents
-from rolling_panda.messages.commands import PlantRequest, SeekReplay
 from rolling_panda.messages.page import ProcessPresence
 from rolling_panda.messages.perception import PointCrop
 from rolling_panda.messages.robot import CameraFrame
@@ -81,31 +79,12 @@ class RobotLink:
         self.refused: deque[tuple[str, str]] = deque(maxlen=100)
         transport.on_reject = lambda topic, reason: self.refused.append((topic, reason))
 
-    async def ask(self, intent: intents.Intent) -> m.Answer:
-        """Ask the controller.
+    async def call(self, service: topics.Service[Any], request: object) -> m.Answer:
+        """Call a service of another process.
 
         Raises:
             ServiceError: It did not answer in time.
         """
-        return await self._call(topics.INTENT, intent)
-
-    async def ask_perception(self, request: PlantRequest) -> m.Answer:
-        """Ask perception.
-
-        Raises:
-            ServiceError: It did not answer in time.
-        """
-        return await self._call(topics.PLANT, request)
-
-    async def seek(self, request: SeekReplay) -> m.Answer:
-        """Ask the player of a recording.
-
-        Raises:
-            ServiceError: There is none.
-        """
-        return await self._call(topics.SEEK, request)
-
-    async def _call(self, service: topics.Service[Any], request: object) -> m.Answer:
         loop = asyncio.get_running_loop()
         return await loop.run_in_executor(self._callers, self._transport.call, service, request)
 

@@ -8,6 +8,11 @@ from rolling_panda import topics
 from tests.support.fake_wire import FakeWire, bridge_state, controller_state, pruning_point, pruning_points, telling
 from tests.support.running_server import running_server
 
+# Warnings of hypothesis about the strategies of schemathesis: `random` in them, and large values in messages.
+pytestmark = [
+    pytest.mark.filterwarnings("ignore:Do not use the `random` module"),
+    pytest.mark.filterwarnings("ignore:Generating overly large repr"),
+]
 #: What the server answers without a session.
 PUBLIC = {"/api/health", "/version", "/api/sign-in", "/api/sign-out"}
 OPERATIONS = 56

@@ -33,6 +33,11 @@ from tests.support.fake_wire import (
 )
 from tests.support.running_server import running_server
 
+# Warnings of hypothesis about the strategies of schemathesis: `random` in them, and large values in messages.
+pytestmark = [
+    pytest.mark.filterwarnings("ignore:Do not use the `random` module"),
+    pytest.mark.filterwarnings("ignore:Generating overly large repr"),
+]
 FRAME = CameraFrame(
     header=HEADER, sequence=7, intrinsics=Intrinsics(64, 48, 60.0, 60.0, 31.5, 23.5), base=PlanarPose(0.0, 0.0, 0.0),
     position=joints().position, color_jpeg=b"jpeg", depth_zlib=b"", depth_unit=0.001,
