@@ -1,4 +1,4 @@
-"""Which program this is: for `/version`, for the ledger, and for whoever asks what was running then."""
+"""Version and environment of the program, for `/version` and the ledger."""
 
 import hashlib
 import os
@@ -9,16 +9,16 @@ import msgspec
 
 from rolling_panda import __version__
 
-#: Which state of the source it was made from; the container image sets it.
+#: Environment variable with the source revision; the container image sets it.
 REVISION = "ROLLING_PANDA_REVISION"
 
 
 class About(msgspec.Struct, frozen=True, kw_only=True):
-    """A program as it runs here."""
+    """The running program."""
 
     name: str = "rolling-panda"
     version: str = __version__
-    #: Commit that it was made from, empty where nobody said.
+    #: Source revision; empty where it is unknown.
     revision: str
     python: str
     #: SHA-256 over `name==version` of every installed package, sorted, a line each.
@@ -26,7 +26,7 @@ class About(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def about() -> About:
-    """What runs here."""
+    """Version and environment of this process."""
     installed = sorted({f"{each.name.lower()}=={each.version}" for each in metadata.distributions()})
     return About(
         revision=os.environ.get(REVISION, ""),

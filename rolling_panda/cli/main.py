@@ -1,6 +1,6 @@
 """The `rolling-panda` command.
 
-The processes are started by name and replace this program, so that nothing here imports them.
+The processes are started by module name in place of this program, which imports none of them.
 """
 
 import argparse
@@ -15,7 +15,7 @@ from rolling_panda.cli import demo, router, status
 from rolling_panda.errors import RollingPandaError
 from rolling_panda.runtime.launch import child_environment, python_command
 
-#: Commands that are another module's: what runs, and one line for people.
+#: Commands of other modules: the module, and its help text.
 FORWARDED = {
     "bridge": ("bridge", "the robot: simulated, with its own watchdog and limits"),
     "controller": ("controller", "whole-body control and the supervision state machine"),
@@ -43,7 +43,7 @@ _OWN: dict[str, tuple[Any, str, str]] = {
     ),
     "router": (
         router,
-        "the place on the network where the processes meet",
+        "the router that the processes connect to",
         "Run the router that the processes connect to, until Ctrl-C.",
     ),
     "status": (
@@ -56,16 +56,16 @@ _OWN: dict[str, tuple[Any, str, str]] = {
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit code."""
-    words = list(sys.argv[1:] if argv is None else argv)
-    if words and words[0] in FORWARDED:
-        module = FORWARDED[words[0]][0]
+    argv = list(sys.argv[1:] if argv is None else argv)
+    if argv and argv[0] in FORWARDED:
+        module = FORWARDED[argv[0]][0]
         if module == "benchmarks" and find_spec(module) is None:
             print("rolling-panda bench: needs a checkout; the installed package has no benchmarks", file=sys.stderr)
             return 1
-        command = python_command(module, words[1:])
+        command = python_command(module, argv[1:])
         sys.stdout.flush()
         os.execve(command[0], command, child_environment())
-    arguments = _parser().parse_args(words)
+    arguments = _parser().parse_args(argv)
     try:
         return int(arguments.run(arguments))
     except RollingPandaError as error:

@@ -1,4 +1,4 @@
-"""`rolling-panda router`: the place on the network where the processes meet."""
+"""`rolling-panda router`: the Zenoh router that the processes connect to."""
 
 import argparse
 

@@ -1,4 +1,4 @@
-"""The message definitions as data: names, fields, bounds and the words of their docstrings."""
+"""The message definitions as data: names, fields, bounds and docstrings."""
 
 import inspect
 import re
@@ -17,7 +17,7 @@ _ATTRIBUTE = re.compile(r"^ {4}(\w+): (.*)$")
 
 @dataclass(frozen=True)
 class FieldDescription:
-    """One field: its `hint` is the Python annotation, with bounds; `about` is what the docstring says of it."""
+    """One field: its `hint` is the Python annotation, with bounds; `about` is from the docstring."""
 
     name: str
     hint: Any
@@ -37,7 +37,7 @@ class StructDescription:
 
 
 def describe(struct: type[msgspec.Struct]) -> StructDescription:
-    """Fields of a struct in order, with the words of its docstring."""
+    """Fields of a struct in order, with its docstring."""
     about, attributes = _docstring(struct)
     fields = tuple(
         FieldDescription(

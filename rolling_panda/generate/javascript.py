@@ -1,6 +1,6 @@
-"""`web/js/link/messages.js` and `.d.ts`: the words that messages to the page may contain, and their types.
+"""`web/js/link/messages.js` and `.d.ts`: constants and types of the page's messages.
 
-Types stand apart, since a browser has no use for them and would fetch them all the same.
+Types are in a separate file, which browsers do not fetch.
 """
 
 from typing import Annotated, Any, Literal, get_args, get_origin
@@ -59,8 +59,8 @@ def messages_types() -> str:
     parts.append("export const OF_HOLDER: readonly string[];\n")
     parts.append("export const TEXT_MAX_LENGTH: number;\nexport const SURE: number;\n")
     parts.extend(_type(name, _spelled_out(hint)) for name, hint in aliases().items() if _is_worth_a_name(hint))
-    said = union_members(page_messages.FromPage)
-    parts.extend(_interface(describe(struct), struct in said) for struct in structs)
+    from_page = union_members(page_messages.FromPage)
+    parts.extend(_interface(describe(struct), struct in from_page) for struct in structs)
     for name, union in (("FromServer", page_messages.FromServer), ("FromPage", page_messages.FromPage)):
         parts.append(_type(name, "|".join(struct.__name__ for struct in union_members(union))))
     return "\n".join(parts)
@@ -106,16 +106,16 @@ def _type(name: str, spelled_out: str) -> str:
     return f"export type {name} = {spelled_out};\n"
 
 
-def _interface(struct: StructDescription, said_by_page: bool) -> str:
+def _interface(struct: StructDescription, from_page: bool) -> str:
     lines = [f"/** {struct.about} */", f"export interface {struct.name} {{"]
     if struct.tag is not None:
         lines.append(f'  type: "{struct.tag}";')
     for field in struct.fields:
         if field.about:
             lines.append(f"  /** {field.about} */")
-        # The server writes defaults out, so that every property is there; the page leaves them to the server.
-        may_miss = "?" if said_by_page and not field.required else ""
-        lines.append(f"  {field.name}{may_miss}: {js_type(field.hint)};")
+        # The server sends defaults, so that every property is present; the page may omit them.
+        optional = "?" if from_page and not field.required else ""
+        lines.append(f"  {field.name}{optional}: {js_type(field.hint)};")
     return "\n".join([*lines, "}", ""])
 
 

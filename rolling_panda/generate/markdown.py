@@ -1,4 +1,4 @@
-"""The tables of `docs/wire.md`, filled in between markers; the words around them are written by hand."""
+"""The generated blocks of `docs/wire.md`, between markers."""
 
 import re
 from collections.abc import Callable, Iterable, Mapping
@@ -24,7 +24,7 @@ _PLAIN: dict[Any, str] = {
 
 
 def fill(document: str, blocks: Mapping[str, Callable[[], str]] | None = None, path: str = "docs/wire.md") -> str:
-    """The document with every marked block made anew.
+    """The document with every marked block generated again.
 
     Args:
         document: Text with blocks between markers.
@@ -51,11 +51,11 @@ def fill(document: str, blocks: Mapping[str, Callable[[], str]] | None = None, p
 
 
 def topics_table() -> str:
-    """One row a topic."""
+    """One row for each topic."""
     rows = []
     for topic in TOPICS:
         rate = f"{topic.rate_hz:g} Hz" if topic.rate_hz else "on event"
-        notes = [word for word, on in (("express", topic.express), ("latched", topic.latched)) if on]
+        notes = [name for name, on in (("express", topic.express), ("latched", topic.latched)) if on]
         rows.append(
             (
                 f"`{topic.name}`",
@@ -75,7 +75,7 @@ def topics_table() -> str:
 
 
 def services_table() -> str:
-    """One row a service."""
+    """One row for each service."""
     rows = [
         (
             f"`{service.name}`",
@@ -90,7 +90,7 @@ def services_table() -> str:
 
 
 def types_table() -> str:
-    """One row a named type that is not a message."""
+    """One row for each named type that is not a message."""
     rows = [(f"`{name}`", spelled_out(hint)) for name, hint in aliases().items()]
     return table(("name", "values"), rows)
 
@@ -110,10 +110,10 @@ def page_message_sections() -> str:
 
 
 def spelled_out(hint: Any) -> str:
-    """An annotation in words: base type, bounds, length, pattern.
+    """An annotation as text: base type, bounds, length, pattern.
 
     Raises:
-        MessageError: This generator does not know the annotation.
+        MessageError: The annotation is not supported.
     """
     if hint in _PLAIN:
         return _PLAIN[hint]
@@ -133,7 +133,7 @@ def spelled_out(hint: Any) -> str:
         if len(kinds) == 1:
             return f"array of {len(arguments)} {kinds.pop()}"
         return f"array of ({', '.join(_named(argument) for argument in arguments)})"
-    raise MessageError(f"no words for {hint}; teach rolling_panda/generate/markdown.py")
+    raise MessageError(f"cannot describe {hint}; extend rolling_panda/generate/markdown.py")
 
 
 def _named(hint: Any) -> str:

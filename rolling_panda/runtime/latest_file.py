@@ -1,18 +1,18 @@
-"""Keeps the newest of something small on disk without making anybody wait for the disk."""
+"""Writes the newest content of a small file in the background."""
 
 import threading
 from pathlib import Path
 
 from rolling_panda.runtime.state_folder import replace_durably
 
-#: What the disk has refused is tried again this often (s).
-_AGAIN_S = 0.5
+#: Time between attempts after a failed write (s).
+_RETRY_S = 0.5
 
 
 class LatestFileWriter:
-    """Writes the newest content of one file on a thread of its own. What is older than the newest may be left out.
+    """Writes the newest content of one file on its own thread; older content may be skipped.
 
-    What the disk refuses is tried again until it takes it.
+    A failed write is retried until it succeeds.
     """
 
     def __init__(self, path: Path) -> None:
@@ -21,7 +21,7 @@ class LatestFileWriter:
         self._waiting: bytes | None = None
         self._changed = threading.Condition()
         self._ended = False
-        #: Why the newest content is not on disk, in words; empty when it is, or is on its way.
+        #: Error of the last write; empty after a success.
         self.failure = ""
         self._thread = threading.Thread(target=self._write, name=f"keep {path.name}", daemon=True)
         self._thread.start()
@@ -38,7 +38,7 @@ class LatestFileWriter:
             self._changed.notify()
 
     def close(self) -> None:
-        """Write what waits, if the disk takes it, and end; safe to call twice."""
+        """Try to write the pending content, and end; safe to call twice."""
         with self._changed:
             self._ended = True
             self._changed.notify()
@@ -58,7 +58,7 @@ class LatestFileWriter:
                 with self._changed:
                     if self._ended:
                         return
-                    self._changed.wait(_AGAIN_S)
+                    self._changed.wait(_RETRY_S)
                 continue
             with self._changed:
                 self.failure = ""

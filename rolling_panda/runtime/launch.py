@@ -1,4 +1,4 @@
-"""How one Python program of Rolling Panda starts another: by module name, never by importing it."""
+"""Start of other Python modules of Rolling Panda as processes, by name and without an import."""
 
 import os
 import sys
@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 _ROOT = Path(__file__).resolve().parents[2]
-# Libraries of linear algebra start a thread a core by default; for 12×12 matrices that only costs, and the processes
-# then take the cores from each other.
+# By default, libraries of linear algebra start one thread for each core, which slows down 12×12 matrices and the other
+# processes.
 _ONE_THREAD = (
     "OPENBLAS_NUM_THREADS",
     "OMP_NUM_THREADS",
@@ -21,16 +21,13 @@ _ONE_THREAD = (
 def python_command(module: str, arguments: Sequence[str]) -> list[str]:
     """Command line that runs `module` with this interpreter.
 
-    `-P` keeps a folder of the same name in the user's working directory from being started instead.
+    `-P` excludes a folder of the same name in the working directory.
     """
     return [sys.executable, "-P", "-m", module, *arguments]
 
 
 def child_environment() -> dict[str, str]:
-    """This environment, with linear algebra on one thread, and the checkout on the path where there is one.
-
-    A value that the user has set stays.
-    """
+    """This environment with linear algebra on one thread, and a checkout on the path; set variables are kept."""
     out = dict(os.environ)
     for name in _ONE_THREAD:
         out.setdefault(name, "1")

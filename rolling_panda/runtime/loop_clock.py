@@ -1,19 +1,18 @@
-"""Time as a loop has lived it: the monotonic clock without the loop's own standstills."""
+"""A monotonic clock for a loop that leaves out the loop's own stalls."""
 
-#: What may be left out at once (s), and how fast that comes back (share of the time that passes).
-_MOST_S, _BACK = 1.0, 0.25
+#: Largest time that is left out at once (s), and the fraction of the elapsed time that it recovers by.
+_BUDGET_S, _RECOVERY = 1.0, 0.25
 
 
 class LoopClock:
-    """Tells how old things are to a loop that may itself have stood still.
+    """Measures ages for a loop that may itself stall.
 
-    A process that gets no processor for a while, like everything on a machine that is suspended for a moment, finds
-    every input as old as its own absence. That says nothing about the senders, whose messages wait to be read. So the
-    time that a loop has missed beyond `longest_s` does not count. What the robot did meanwhile is for the bridge's
-    watchdog to judge, on its own clock.
+    After a stall, for instance without processor time or on a suspended machine, every input seems as old as the stall,
+    although its sender is alive and newer messages wait to be read. So the time of a period beyond `longest_s` does not
+    count. The bridge's watchdog judges the robot's motion meanwhile, on its own clock.
 
-    No more than a second is left out at once and a quarter of the time in the long run: a loop that is always slow, or
-    was away for long, must not take old things for fresh.
+    At most a second is left out at once, and a quarter of the time in the long run: a loop that is always slow, or has
+    stalled for long, must not take stale inputs for fresh ones.
     """
 
     def __init__(self, now: float, longest_s: float) -> None:
@@ -21,22 +20,22 @@ class LoopClock:
 
         Args:
             now: Monotonic time (s).
-            longest_s: Time between two turns that is no standstill (s).
+            longest_s: Longest period that is no stall (s).
         """
-        # One object, so that other threads always see three that belong together: the last turn on the machine's clock
-        # and on this one, and what may still be left out.
-        self._turned = (now, now, _MOST_S)
+        # One tuple, so that other threads read consistent values: the last period's start on the machine's clock and on
+        # this one, and the remaining budget.
+        self._turned = (now, now, _BUDGET_S)
         self._longest = longest_s
 
     def turn(self, now: float) -> float:
-        """Begin a turn of the loop at `now` (s, monotonic); returns the time on this clock (s)."""
+        """Start a period of the loop at `now` (s, monotonic); returns the time on this clock (s)."""
         turned, time, budget = self._turned
         passed, counted = now - turned, self.of(now) - time
-        self._turned = (now, time + counted, min(_MOST_S, budget - (passed - counted) + _BACK * passed))
+        self._turned = (now, time + counted, min(_BUDGET_S, budget - (passed - counted) + _RECOVERY * passed))
         return time + counted
 
     def of(self, at: float) -> float:
-        """When something happened (s, monotonic), on this clock (s). Any thread may ask."""
+        """Convert a monotonic time (s) to this clock (s). Thread-safe."""
         turned, time, budget = self._turned
         passed = at - turned
         return time + passed - min(max(passed - self._longest, 0.0), budget)

@@ -1,4 +1,4 @@
-"""How a process starts and ends: arguments, configuration, transport, signals, and errors as one clear line."""
+"""Start and end of a process: arguments, configuration, transport, signals, and errors as one line."""
 
 import argparse
 import os
@@ -33,13 +33,13 @@ _PRIORITY: dict[m.Process, Priority] = {
 
 @dataclass(frozen=True)
 class ProcessContext:
-    """What a process is given when it starts.
+    """The context that a process runs in.
 
     Attributes:
         arguments: Parsed command line.
         config_path: The TOML file.
         transport: Open session on the robot's wire.
-        stopping: Set when the process should end; loops watch it.
+        stopping: Set when the process has to end.
     """
 
     arguments: argparse.Namespace
@@ -49,24 +49,24 @@ class ProcessContext:
 
     @property
     def wire(self) -> TransportConfig:
-        """The robot's wire, as configuration and command line have it together."""
+        """Settings of the robot's wire, from configuration and command line."""
         return wire_config(self.arguments)
 
     @property
     def state_folder(self) -> Path:
-        """Where this robot's processes keep what must survive a restart; made when first asked for.
+        """Folder of the robot's state that survives a restart; created on first use.
 
         Raises:
-            InputError: It cannot be made.
+            InputError: It cannot be created.
         """
         return state_folder(self.arguments)
 
 
 def state_folder(arguments: argparse.Namespace) -> Path:
-    """The state folder that a command line means; made where it is missing.
+    """The state folder of a command line; created where it is missing.
 
     Raises:
-        InputError: It cannot be made.
+        InputError: It cannot be created.
     """
     return open_state_folder(arguments.state or usual_state_folder(arguments.robot_id))
 
@@ -82,13 +82,13 @@ def run_process(
     """Parse, configure, connect, run until SIGINT or SIGTERM, close. Returns the exit code.
 
     Args:
-        process: Which of the processes this is.
+        process: Name of the process.
         description: For `--help`.
         run: Does the work; returns when `context.stopping` is set.
         add_arguments: Adds the process's own options.
         argv: Command line without the program's name; None takes `sys.argv`.
-        check: Raises where the command line or the configuration is wrong. It is asked before anything else, so that a
-            wire that is not there hides no mistake.
+        check: Raises where the command line or the configuration is wrong. It runs before the connection, whose
+            failure would hide such an error.
     """
     parser = argparse.ArgumentParser(prog=f"rolling-panda {process}", description=description)
     add_common_arguments(parser)
@@ -112,7 +112,7 @@ def run_process(
 
 
 def wire_config(arguments: argparse.Namespace) -> TransportConfig:
-    """Section `[transport]`, with the command line's own words where it has any.
+    """Section `[transport]`, overridden by the command line.
 
     Raises:
         ConfigError: The section is wrong.
@@ -150,8 +150,8 @@ def add_common_arguments(parser: argparse.ArgumentParser) -> None:
 def stop_on_signals() -> threading.Event:
     """An event that SIGINT and SIGTERM set.
 
-    Another thread sets it: a handler runs in the middle of whatever the main thread does, and where that is
-    `Event.wait`, setting the same event there waits forever for the lock that the main thread holds.
+    Another thread sets it, since a handler interrupts the main thread. Where that is in `Event.wait`, setting the same
+    event in the handler would deadlock.
     """
     stopping = threading.Event()
     caught: queue.SimpleQueue[int] = queue.SimpleQueue()
@@ -167,13 +167,13 @@ def stop_on_signals() -> threading.Event:
 
 
 def end_with_parent(stopping: threading.Event, grace_s: float = 2.0) -> None:
-    """End this process when its standard input closes, which happens even when the parent is killed."""
+    """End this process when its standard input closes, as it does when the parent ends or is killed."""
 
     def watch() -> None:
         while os.read(0, 4096):
             pass
         stopping.set()
-        # A loop that hangs must not outlive the demo that started it.
+        # A hung loop must not outlive the parent.
         threading.Event().wait(grace_s)
         os._exit(1)
 

@@ -1,4 +1,4 @@
-"""Where a process keeps what must survive a restart, and how a small file there is replaced whole or not at all."""
+"""The folder of the state that survives a restart, and the atomic replacement of files in it."""
 
 import fcntl
 import os
@@ -16,17 +16,17 @@ Kept = TypeVar("Kept")
 
 def usual_state_folder(robot_id: str) -> Path:
     """`rolling-panda/ROBOT` in the user's folder for programs' state (XDG base directories)."""
-    told = os.environ.get("XDG_STATE_HOME", "")
-    # The specification has a relative path ignored.
-    root = Path(told) if Path(told).is_absolute() else Path.home() / ".local" / "state"
+    configured = os.environ.get("XDG_STATE_HOME", "")
+    # The specification demands that a relative path is ignored.
+    root = Path(configured) if Path(configured).is_absolute() else Path.home() / ".local" / "state"
     return root / "rolling-panda" / robot_id
 
 
 def open_state_folder(folder: Path) -> Path:
-    """The folder, made for this user alone where it is missing.
+    """The folder, created for this user alone where it is missing.
 
     Raises:
-        InputError: It cannot be made, or is something else.
+        InputError: It cannot be created, or is no folder.
     """
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -39,10 +39,10 @@ def open_state_folder(folder: Path) -> Path:
 
 @contextmanager
 def alone(folder: Path, process: str) -> Iterator[None]:
-    """Be the only process of its kind that works with a folder; however it ends, the next one may.
+    """Hold an exclusive lock of a folder for one kind of process; the kernel releases it when the process ends.
 
     Raises:
-        InputError: Another one is at work.
+        InputError: Another process holds it.
     """
     path = folder / f"{process}.lock"
     try:
@@ -70,17 +70,17 @@ def read_kept(
     what: str,
     remedy: str = "look whether the robot may move, then remove it",
 ) -> Kept:
-    """What `replace_durably` last wrote as JSON; `nothing` where it has never written.
+    """Read a JSON file that `replace_durably` wrote; `nothing` where it does not exist.
 
     Args:
         path: Of the file.
-        kind: What it must decode to.
-        nothing: What there is before the first time.
-        what: What it says, in words, for the error.
-        remedy: What to do when it cannot be read.
+        kind: Type of the content.
+        nothing: Content before the first write.
+        what: Description of the content, for the error.
+        remedy: What to do on an error.
 
     Raises:
-        InputError: It cannot be read: a program that does not know what was stopped must not start.
+        InputError: It cannot be read: a process that does not know its latched stops must not start.
     """
     try:
         return msgspec.json.decode(path.read_bytes(), type=kind) if path.exists() else nothing
@@ -89,7 +89,7 @@ def read_kept(
 
 
 def replace_durably(path: Path, content: bytes) -> None:
-    """Replace a file by `content`; after any interruption there is the old one or the new one, whole.
+    """Replace a file atomically and durably; an interruption leaves the old content or the new.
 
     Raises:
         OSError: The content is not on disk.
@@ -105,15 +105,15 @@ def replace_durably(path: Path, content: bytes) -> None:
     except OSError:
         beside.unlink(missing_ok=True)
         raise
-    # The new name is durable only once the folder is.
+    # The new name is durable only after the folder is synced.
     sync_folder(path.parent)
 
 
 def sync_folder(folder: Path) -> None:
-    """Make the names in a folder durable.
+    """Sync a folder, which makes the names in it durable.
 
     Raises:
-        OSError: They are not.
+        OSError: The sync failed.
     """
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:

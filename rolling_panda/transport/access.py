@@ -1,8 +1,7 @@
-"""Who may say and hear what on the robot's wire: the router's access control, made from the tables of topics.
+"""The router's access control, derived from the tables of topics and services.
 
-Everything that is not listed is refused by the router. A process of a robot is known by the common name of its
-certificate, so this needs mutual TLS (`rolling_panda.transport.certificates`); with the certificate of one robot
-nothing can be said to another at the same router.
+The router denies whatever is not listed. It identifies a process of a robot by the common name of its certificate,
+which needs mutual TLS (`rolling_panda.transport.certificates`). A certificate of one robot gives no access to another.
 """
 
 from collections.abc import Sequence
@@ -11,22 +10,22 @@ from typing import Any
 from rolling_panda import messages as m
 from rolling_panda.topics import ROBOT_ID, SERVICES, TOPICS, key
 
-#: Sees who is up, and says nothing: `rolling-panda status`.
+#: Reads which processes are up: `rolling-panda status`.
 ONLOOKER = "onlooker"
-#: Hears every topic, and says nothing: `rolling-panda record`.
+#: Reads every topic: `rolling-panda record`.
 RECORDER = "recorder"
-#: Whoever stands behind the drivers on the robot's own router: the fakes of the devices.
+#: The devices behind the drivers on the robot's own router, or their fakes.
 DEVICES = "devices"
-#: Everybody who has a certificate of a robot.
+#: Names of all certificates of a robot.
 BEARERS = (*m.PROCESSES, RECORDER, ONLOOKER, DEVICES)
-#: Who may ask each service.
+#: Processes that may call each service.
 CALLERS: dict[str, tuple[m.Process, ...]] = {
     "service/intent": ("server",),
     "service/release": ("controller",),
     "service/plant": ("server",),
     "service/seek": ("server",),
 }
-_SAID = ("put", "delete")
+_PUBLISHED = ("put", "delete")
 _DECLARED = (
     "declare_subscriber",
     "query",
@@ -36,26 +35,26 @@ _DECLARED = (
     "liveliness_query",
     "declare_liveliness_subscriber",
 )
-_EVERYTHING = (*_SAID, *_DECLARED)
+_EVERYTHING = (*_PUBLISHED, *_DECLARED)
 
 
 def common_name(name: str, robot_id: str) -> str:
-    """What the certificate of a robot's process, or of its onlooker, says its bearer is."""
+    """Common name of a certificate of a robot."""
     return f"{name}.{robot_id}"
 
 
 def access_control(robots: Sequence[str] = (ROBOT_ID,), field: Sequence[str] = ()) -> dict[str, Any]:
-    """Zenoh's `access_control` for a router: default deny, one policy for each bearer of a certificate of each robot.
+    """Zenoh's `access_control` for a router: default deny, one policy for each certificate of each robot.
 
     Args:
         robots: Their ids.
-        field: Keys of the devices, carried between the bridge and the devices; empty where they have their own router.
+        field: Keys of the devices, routed between the bridge and the devices; empty where they have their own router.
     """
     rules: list[dict[str, Any]] = []
     policies: list[dict[str, Any]] = []
     for robot in robots:
         shared = [
-            # Who is sent a question or an answer was let in by the rules for what is declared and asked.
+            # Ingress rules decide on queries and declarations; their egress is always permitted.
             _rule(f"{robot}: hear", "egress", _DECLARED, [key(robot, "**")]),
             _rule(
                 f"{robot}: who is there",
@@ -71,8 +70,8 @@ def access_control(robots: Sequence[str] = (ROBOT_ID,), field: Sequence[str] = (
         for bearer in BEARERS:
             own = _own(bearer, robot)
             rules += own
-            told = [*shared, *own, *(devices if bearer in ("bridge", DEVICES) else [])]
-            policies.append({"rules": [rule["id"] for rule in told], "subjects": [common_name(bearer, robot)]})
+            applied = [*shared, *own, *(devices if bearer in ("bridge", DEVICES) else [])]
+            policies.append({"rules": [rule["id"] for rule in applied], "subjects": [common_name(bearer, robot)]})
     names = [common_name(bearer, robot) for robot in robots for bearer in BEARERS]
     return {
         "enabled": True,
@@ -84,12 +83,12 @@ def access_control(robots: Sequence[str] = (ROBOT_ID,), field: Sequence[str] = (
 
 
 def _own(bearer: str, robot: str) -> list[dict[str, Any]]:
-    """Rules for what is a bearer's own to say, hear, answer and ask."""
+    """Rules for what a certificate may publish, subscribe to, answer and query."""
     process = next((each for each in m.PROCESSES if each == bearer), None)
     read = [topic.name for topic in TOPICS if topic.read_by(bearer)]
     own: list[tuple[str, str, tuple[str, ...], list[str]]] = [
         ("read", "ingress", ("declare_subscriber",), read),
-        ("be told", "egress", _SAID, read),
+        ("be told", "egress", _PUBLISHED, read),
     ]
     if process is not None:
         own += [

@@ -1,6 +1,6 @@
-"""`rolling-panda certificates`: an authority of one's own and a certificate for each process, to begin with.
+"""`rolling-panda certificates`: a new certificate authority, and a certificate for each process.
 
-Whoever has an authority already makes these with it instead: what counts is the common name, PROCESS.ROBOT.
+An existing authority can issue them instead; access control needs the common name PROCESS.ROBOT.
 """
 
 import argparse
@@ -23,17 +23,17 @@ from rolling_panda.transport.access import BEARERS, ONLOOKER, RECORDER, common_n
 
 ROUTER = "router"
 NAMES = (ROUTER, *BEARERS)
-#: Who has a folder of their own where each has one.
+#: Names with a separate folder under `--apart`.
 APART = (ROUTER, *m.PROCESSES, RECORDER)
 #: Names that the router is reached by on this machine and in compose.yaml.
 _HOSTS = ("127.0.0.1", "localhost", ROUTER)
 _DAYS = 365
-#: A clock that has lost its battery begins at 1970: no reason to lock a robot out.
-_BEGIN = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC)
-#: What has no end, as RFC 5280 has it.
+#: Valid from 1970 on, so that a clock that was reset locks no robot out.
+_NOT_BEFORE = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC)
+#: No expiry, as in RFC 5280.
 _NEVER = datetime.datetime(9999, 12, 31, 23, 59, 59, tzinfo=datetime.UTC)
-#: What is good for less than this is made anew.
-_KEPT = datetime.timedelta(days=7)
+#: Certificates that expire within this time are issued again.
+_RENEWAL = datetime.timedelta(days=7)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -78,16 +78,16 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def make(folder: Path, hosts: Sequence[str], days: int | None, robots: Sequence[str] = (ROBOT_ID,)) -> None:
-    """Write ca.pem and a certificate with its key for each of `NAMES`; of several robots each in a folder of its id.
+    """Write ca.pem and a certificate with its key for each of `NAMES`; each robot of several has a folder of its id.
 
     Args:
-        folder: Is made, for this user alone; must not exist yet.
-        hosts: Names and addresses by which the router is reached.
-        days: How long they are good for; None has no end, for those that are removed after a run.
-        robots: Ids of the robots whose processes they are for.
+        folder: A new folder, for this user alone.
+        hosts: Names and addresses of the router.
+        days: Validity; None for no expiry, for certificates that are removed after a run.
+        robots: Ids of the robots.
 
     Raises:
-        InputError: The folder is there already or cannot be made, or a value makes no sense.
+        InputError: The folder exists or cannot be made, or a value is invalid.
     """
     _check(days)
     try:
@@ -106,26 +106,26 @@ def make(folder: Path, hosts: Sequence[str], days: int | None, robots: Sequence[
 def make_apart(
     folder: Path, hosts: Sequence[str], days: int, robots: Sequence[str] = (ROBOT_ID,)
 ) -> datetime.datetime | None:
-    """A folder NAME for the router and each process, with what it needs and no more; for containers.
+    """A folder NAME for the router and each process, with its own files alone; for containers.
 
     Args:
-        folder: Where; the folders in it may be there already, as volumes are, and are emptied of old certificates.
-        hosts: Names and addresses by which the router is reached.
-        days: How long they are good for.
-        robots: The one robot whose processes they are for.
+        folder: Parent of the folders, which may exist, as volumes do; old certificates in them are removed.
+        hosts: Names and addresses of the router.
+        days: Validity.
+        robots: Id of the one robot.
 
     Returns:
-        Until when those are good that were there already and are kept; None when all were made anew.
+        Expiry of the existing certificates, when they are kept; None when new ones were issued.
 
     Raises:
-        InputError: A folder cannot be written, or a value makes no sense.
+        InputError: A folder cannot be written, or a value is invalid.
     """
     _check(days)
     if len(robots) != 1:
         raise InputError(f"--apart is for one robot; got {', '.join(robots)}")
-    kept = _good_until(folder)
-    if kept is not None and kept > datetime.datetime.now(datetime.UTC) + _KEPT:
-        return kept
+    expiry = _expiry(folder)
+    if expiry is not None and expiry > datetime.datetime.now(datetime.UTC) + _RENEWAL:
+        return expiry
     authority = _Authority(days)
     for name in APART:
         own = folder / name
@@ -148,8 +148,8 @@ def _check(days: int | None) -> None:
         raise InputError(f"--days {days} is out of range; give 1 to 3650")
 
 
-def _good_until(folder: Path) -> datetime.datetime | None:
-    """The first end of the certificates there; None where one is missing, cannot be read or is not of one authority."""
+def _expiry(folder: Path) -> datetime.datetime | None:
+    """The first expiry of the certificates; None where one is missing or unreadable, or the authorities differ."""
     ends, authorities = [], set()
     try:
         for name in APART:
@@ -165,7 +165,7 @@ def _good_until(folder: Path) -> datetime.datetime | None:
 
 
 def out_of_date(folder: Path, name: str) -> str:
-    """Why the certificate of `name` in a folder does not count by this machine's clock; empty where it does."""
+    """Why the certificate of `name` in a folder is not valid by this machine's clock; empty where it is."""
     now = datetime.datetime.now(datetime.UTC)
     for file in (folder / "ca.pem", folder / f"{name}.pem"):
         try:
@@ -182,7 +182,7 @@ def out_of_date(folder: Path, name: str) -> str:
 
 
 class _Authority:
-    """Issues certificates; its key is never on disk and ends with it."""
+    """Issues certificates; its key is never stored."""
 
     def __init__(self, days: int | None) -> None:
         self._key = ec.generate_private_key(ec.SECP256R1())
@@ -225,7 +225,7 @@ def _certificate(
     subject: x509.Name, issuer: x509.Name, key: ec.EllipticCurvePublicKey, end: datetime.datetime
 ) -> x509.CertificateBuilder:
     builder = x509.CertificateBuilder().subject_name(subject).issuer_name(issuer).public_key(key)
-    return builder.serial_number(x509.random_serial_number()).not_valid_before(_BEGIN).not_valid_after(end)
+    return builder.serial_number(x509.random_serial_number()).not_valid_before(_NOT_BEFORE).not_valid_after(end)
 
 
 def _name(common: str) -> x509.Name:

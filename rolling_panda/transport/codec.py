@@ -1,4 +1,4 @@
-"""Messages to bytes and back: msgpack in map form, strict in both directions."""
+"""Encoding of messages: msgpack maps, decoded strictly."""
 
 from typing import Any, Generic, TypeVar
 
@@ -11,7 +11,7 @@ _ENCODER = msgspec.msgpack.Encoder()
 
 
 class _Nothing(msgspec.Struct, frozen=True, tag="", forbid_unknown_fields=True):
-    """Makes a union of a single type, as only in a union does msgspec insist on the tag."""
+    """Turns a single type into a union, since msgspec requires the tag only in unions."""
 
 
 def encode(message: msgspec.Struct) -> bytes:
@@ -20,7 +20,7 @@ def encode(message: msgspec.Struct) -> bytes:
 
 
 class StrictDecoder(Generic[T]):
-    """Decodes one message type, or a tagged union of them, and refuses everything else whole."""
+    """Decodes one message type, or a tagged union of them, and rejects everything else."""
 
     def __init__(self, *types: type[T]) -> None:
         """Prepare for any of `types`."""

@@ -1,4 +1,4 @@
-"""How Zenoh is set: where to connect, nothing found by itself, mutual TLS, a plain wire only where it is asked for."""
+"""Zenoh's configuration: explicit endpoints, no scouting, and mutual TLS or a plain wire on the loopback address."""
 
 import argparse
 import ipaddress
@@ -10,17 +10,17 @@ from rolling_panda.config import TransportConfig
 from rolling_panda.errors import TransportError
 from rolling_panda.transport.access import access_control
 
-#: Where the router is unless somebody says otherwise.
+#: Default endpoint of the router.
 DEFAULT_ENDPOINT = "tls/127.0.0.1:7447"
 PLAIN_ENDPOINT = "tcp/127.0.0.1:7447"
-#: For people, wherever a plain wire is.
+#: Shown wherever a plain wire is used.
 PLAIN_WARNING = (
     "The wire is plain: every program on this machine can move the robot. Leave out --plain-wire to close it."
 )
 
 
 def add_wire_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options that say how the wire is protected."""
+    """Options of the wire's protection."""
     parser.add_argument(
         "--certificates",
         type=Path,
@@ -38,14 +38,13 @@ def wire_settings(config: TransportConfig, name: str, robot_id: str = "", foreig
     """Zenoh's settings, by path.
 
     Args:
-        config: Where, and by which certificates.
-        name: Whose certificate is shown.
-        robot_id: Of the robot whose wire it is; what lies in a folder of that name comes first.
-        foreign: The wire of the devices behind the drivers, which may be plain anywhere; it carries no key of a robot.
+        config: Endpoints and certificates.
+        name: Of the certificate to present.
+        robot_id: Of the robot; certificates in a folder of that name take precedence.
+        foreign: The wire of the devices behind the drivers, which may be plain anywhere; it has no keys of a robot.
 
     Raises:
-        TransportError: There is no certificate and nobody asked for a plain wire, one is missing, or an endpoint does
-            not fit.
+        TransportError: No certificates are given without `plain_wire`, a file is missing, or an endpoint is invalid.
     """
     settings = {
         "mode": config.mode,
@@ -64,7 +63,7 @@ def wire_settings(config: TransportConfig, name: str, robot_id: str = "", foreig
 
 
 def _check_plain(config: TransportConfig) -> None:
-    """Refuse a plain wire that nobody asked for, or that another machine would reach."""
+    """Refuse a plain wire without `plain_wire`, or beyond the loopback address."""
     if not config.plain_wire:
         raise TransportError(
             "no certificates for the robot's wire: give --certificates DIR, the folder that the demo prints or that "
@@ -93,14 +92,14 @@ def _on_loopback(endpoint: str) -> bool:
 
 
 def certificate_folder(config: TransportConfig, robot_id: str = "") -> Path:
-    """Where the certificates of a robot are: in a folder of its name, where there is one."""
+    """The folder of a robot's certificates: the one of its name, where it exists."""
     folder = Path(config.certificates).resolve()
     own = folder / robot_id
     return own if robot_id and own.is_dir() else folder
 
 
 def _secure(config: TransportConfig, name: str, robot_id: str) -> dict[str, Any]:
-    """Mutual TLS with the files of `name`; a router refuses what the table of topics does not let a sender say."""
+    """Mutual TLS with the files of `name`; a router also gets its access control."""
     if config.plain_wire:
         raise TransportError("--plain-wire and --certificates were given: give one of the two")
     folder = certificate_folder(config, robot_id)

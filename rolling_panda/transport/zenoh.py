@@ -1,6 +1,6 @@
-"""The wire: publishers, newest-wins slots, bounded feeds, services and presence over Zenoh.
+"""The wire: publishers, newest-wins slots, bounded feeds, services and liveliness over Zenoh.
 
-Zenoh is imported here alone. Ages are measured on the receiver's monotonic clock.
+No other module imports Zenoh. Ages are measured on the receiver's monotonic clock.
 """
 
 import json
@@ -31,7 +31,7 @@ _MAX_MESSAGE_BYTES = 8 << 20
 
 @dataclass(frozen=True)
 class Received(Generic[Msg]):
-    """A message and when it came in (s, this process's monotonic clock)."""
+    """A message and its time of arrival (s, this process's monotonic clock)."""
 
     message: Msg
     at: float
@@ -50,7 +50,7 @@ class Publisher(Generic[Msg]):
 
 
 class Slot(Generic[Msg]):
-    """Holds the newest message of a topic; older ones are gone, never queued."""
+    """Holds the newest message of a topic; older ones are dropped."""
 
     def __init__(self) -> None:
         """Start empty."""
@@ -58,7 +58,7 @@ class Slot(Generic[Msg]):
         self._taken: Received[Msg] | None = None
 
     def store(self, message: Msg, at: float) -> None:
-        """Replace what is held."""
+        """Replace the message."""
         self._newest = Received(message, at)
 
     def peek(self) -> Received[Msg] | None:
@@ -74,7 +74,7 @@ class Slot(Generic[Msg]):
         return newest
 
     def age(self, now: float) -> float:
-        """Seconds since the newest message came in; infinite before the first."""
+        """Time since the arrival of the newest message (s); infinite before the first."""
         newest = self._newest
         return float("inf") if newest is None else now - newest.at
 
@@ -94,7 +94,7 @@ class Feed(Generic[Msg]):
         self._queue.append(Received(message, at))
 
     def drain(self) -> list[Received[Msg]]:
-        """Everything waiting, oldest first."""
+        """Remove and return all messages, oldest first."""
         out = []
         while self._queue:
             out.append(self._queue.popleft())
@@ -102,7 +102,7 @@ class Feed(Generic[Msg]):
 
 
 class Rejections:
-    """Counts refused messages by topic and reason."""
+    """Counts rejected messages by topic and reason."""
 
     def __init__(self) -> None:
         """Start at zero."""
@@ -110,7 +110,7 @@ class Rejections:
         self._lock = threading.Lock()
 
     def add(self, topic: str, reason: str) -> None:
-        """Count one refusal; a reason is cut to its first clause so that counts stay few."""
+        """Count one rejection; the reason is truncated."""
         with self._lock:
             self._counts[topic, reason[:200]] += 1
 
@@ -122,16 +122,16 @@ class Rejections:
 
 
 class Onlooker:
-    """A read-only session on the wire of one robot that announces nobody. Use as a context manager, or call `close`."""
+    """A read-only session on the wire of one robot, without liveliness. Use as a context manager, or call `close`."""
 
     def __init__(self, config: TransportConfig, robot_id: str, name: str = ONLOOKER) -> None:
-        """Open the session; `name` is whose certificate shows who this is, where there is one.
+        """Open the session; `name` is that of the certificate to present, where there is one.
 
         Raises:
             TransportError: The router cannot be reached or an endpoint is wrong.
         """
         self.robot_id = robot_id
-        #: Whether every program on this machine can say everything here.
+        #: Whether the wire is unencrypted and open to every program on this machine.
         self.plain = config.plain_wire
         self.rejections = Rejections()
         self.on_reject: Callable[[str, str], None] = lambda topic, reason: None
@@ -172,7 +172,7 @@ class Onlooker:
         self._session.declare_subscriber(key(self.robot_id, topic.name), receive)
 
     def present(self) -> frozenset[str]:
-        """Processes of this robot that are connected now. For display and as an early warning, never as a watchdog."""
+        """Processes of this robot that are connected. For display and as an early warning, never as a watchdog."""
         return frozenset(self._present)
 
     def close(self) -> None:
@@ -203,10 +203,10 @@ class Onlooker:
 
 
 class Transport(Onlooker):
-    """One process's session on the wire of one robot: it announces the process, publishes, serves and asks."""
+    """A process's session on the wire of one robot: it declares liveliness, publishes, serves and calls."""
 
     def __init__(self, config: TransportConfig, process: m.Process, robot_id: str) -> None:
-        """Open the session and announce the process.
+        """Open the session and declare the process's liveliness.
 
         Raises:
             TransportError: The router cannot be reached or an endpoint is wrong.
@@ -227,7 +227,7 @@ class Transport(Onlooker):
         )
 
     def serve(self, service: Service[Req], answer: Callable[[Req], m.Answer | None]) -> None:
-        """Answer requests with `answer(request)`, on a thread of the transport; None leaves it to somebody else."""
+        """Answer requests with `answer(request)`, on a thread of the transport; None leaves it to another server."""
         decoder = StrictDecoder(*service.requests)
 
         def reply(query: zenoh.Query) -> None:
@@ -246,10 +246,10 @@ class Transport(Onlooker):
         self._session.declare_queryable(key(self.robot_id, service.name), reply)
 
     def call(self, service: Service[Req], request: Req) -> m.Answer:
-        """Ask a service and wait for its answer; blocks up to the service's timeout.
+        """Call a service and wait for its answer; blocks up to the service's timeout.
 
         Raises:
-            ServiceError: Nobody answered in time, or not with an `Answer`.
+            ServiceError: No answer came in time, or not an `Answer`.
         """
         if not isinstance(request, service.requests):
             names = ", ".join(t.__name__ for t in service.requests)
@@ -274,10 +274,10 @@ class Transport(Onlooker):
 
 
 class ForeignWire:
-    """A session for keys and bytes that are not this program's own: a base that speaks ROS 2 through a Zenoh bridge."""
+    """A session for keys and bytes of other programs, such as a base that speaks ROS 2 through a Zenoh bridge."""
 
     def __init__(self, config: TransportConfig, name: str = "bridge") -> None:
-        """Open the session; `name` is whose certificate shows who this is, where there is one.
+        """Open the session; `name` is that of the certificate to present, where there is one.
 
         Raises:
             TransportError: The router cannot be reached or an endpoint is wrong.
@@ -285,11 +285,11 @@ class ForeignWire:
         self._session = _open(config, name, foreign=True)
 
     def publisher(self, name: str, lossless: bool = False) -> Callable[[bytes], None]:
-        """What sends bytes under this key, at once and newest first.
+        """A function that sends bytes under this key.
 
         Args:
             name: The key.
-            lossless: Wait where the way is full, for some seconds at most, in place of leaving samples out.
+            lossless: On congestion wait, for some seconds at most, instead of dropping samples.
         """
         full = zenoh.CongestionControl.BLOCK if lossless else zenoh.CongestionControl.DROP
         publisher = self._session.declare_publisher(
@@ -298,7 +298,7 @@ class ForeignWire:
         return publisher.put
 
     def subscribe(self, name: str, store: Callable[[bytes, float], None]) -> None:
-        """Call `store(bytes, received_at)` on a thread of the transport; too large samples are left out."""
+        """Call `store(bytes, received_at)` on a thread of the transport; samples that are too large are dropped."""
 
         def receive(sample: zenoh.Sample) -> None:
             if len(sample.payload) <= _MAX_MESSAGE_BYTES:
@@ -316,10 +316,10 @@ class ForeignWire:
         self._session.declare_queryable(name, reply)
 
     def ask(self, name: str, request: bytes, timeout_s: float) -> bytes:
-        """Ask a service and wait for its reply.
+        """Call a service and wait for its reply.
 
         Raises:
-            ServiceError: Nobody answered in time.
+            ServiceError: No reply came in time.
         """
         for item in self._session.get(name, payload=zenoh.ZBytes(request), timeout=timeout_s):
             if item.ok is not None:
@@ -333,13 +333,13 @@ class ForeignWire:
 
 
 class Router:
-    """The Zenoh router that the processes meet at, run inside this process."""
+    """The Zenoh router of the wire, run inside this process."""
 
     def __init__(self, config: TransportConfig) -> None:
-        """Listen on `config.listen`; with certificates, whoever is not known is refused, and so is what is not theirs.
+        """Listen on `config.listen`; with certificates, access control applies.
 
         Raises:
-            TransportError: An endpoint is taken or wrong, or the router's own certificate does not count now.
+            TransportError: An endpoint is taken or wrong, or the router's own certificate is not valid now.
         """
         if cause := _out_of_date(config, "router"):
             raise TransportError(f"nobody could come in: {cause}")
@@ -366,17 +366,17 @@ def _open(config: TransportConfig, name: str, robot_id: str = "", foreign: bool 
 
 
 def _out_of_date(config: TransportConfig, name: str, robot_id: str = "") -> str:
-    """Why the certificate that is shown does not count now; empty where it does, or where there is none."""
+    """Why the presented certificate is not valid now; empty where it is, or where there is none."""
     if not config.certificates:
         return ""
-    # Here and not above: only a connection that failed needs to read certificates itself.
+    # Imported here, since only a failed connection needs it.
     from rolling_panda.transport.certificates import out_of_date
 
     return out_of_date(certificate_folder(config, robot_id), name)
 
 
 def _plain(error: zenoh.ZError) -> str:
-    """Zenoh's own words, without the places in its source that it appends."""
+    """Zenoh's error message without its source locations."""
     return re.sub(r" at /\S+\.rs:\d+\.?", "", str(error)).rstrip(". ")
 
 
