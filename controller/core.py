@@ -1,7 +1,7 @@
-"""The controller without wires: newest inputs and intents in, commands and state out. No clock, no thread.
+"""Core of the controller: newest inputs and intents in, commands and state out. No clock, no thread, no wire.
 
-Supervision (`controller/supervision/supervisor.py`) says whether the robot may move, `controller/work/movement.py` how
-it does, the queue what is cut; here one period and one request pass through them in their order.
+Supervision (`controller/supervision/supervisor.py`) decides whether the robot may move, `controller/work/movement.py`
+how it moves, the queue what is cut. `Controller` calls them in order for each period and each request.
 """
 
 import math
@@ -55,7 +55,7 @@ class Controller:
         Args:
             config: Section `[controller]`.
             robot_config: Section `[robot]`.
-            run_id: Makes this start's cut ids unlike any other's; letters, digits, `_.:-`.
+            run_id: Prefix that makes the cut ids of this start unique; letters, digits, `_.:-`.
             method: Whole-body method in place of the configured one.
 
         Raises:
@@ -88,21 +88,21 @@ class Controller:
 
     @property
     def waits(self) -> bool:
-        """Whether another controller commands the robot: this one tells nothing and is asked nothing."""
+        """Whether another controller commands the robot. This one publishes nothing and refuses intents."""
         return self._supervisor.fencing.waits
 
-    def give_way(self) -> m.TokenRequest:
-        """What gives the robot to the next controller, when this one ends."""
-        return self._supervisor.fencing.give_way()
+    def release_token(self) -> m.TokenRequest:
+        """The message that releases the fencing token when this controller ends."""
+        return self._supervisor.fencing.release_token()
 
     @property
     def recorded(self) -> int:
-        """Number of the newest record: what was done is durable when the ledger has that one."""
+        """Number of the newest record. Everything up to now is durable once the ledger has it."""
         return self._journal.number
 
     @property
     def tracking(self) -> Tracking | None:
-        """Of the motion that the last step followed; None while nothing was followed."""
+        """Tracking of the last step's motion; None without a motion."""
         return self._movement.tracking
 
     def restore(
@@ -113,7 +113,7 @@ class Controller:
         preview: PreviewRow | None = None,
         approaches: tuple[tuple[str, ApproachRow], ...] = (),
     ) -> None:
-        """Take up the queue, its order and the latched stops of an earlier start; nothing resumes by itself."""
+        """Restore the queue, its order and the latched stops of an earlier start. Nothing resumes by itself."""
         if order is not None:
             self._queue.order.restore(order)
         if preview is not None:
@@ -126,7 +126,7 @@ class Controller:
         """One control period.
 
         Args:
-            inputs: Newest of everything.
+            inputs: Newest inputs.
             now: Monotonic time (s), the clock of the inputs' arrival times.
         """
         self._event_log.now = now
@@ -170,10 +170,10 @@ class Controller:
         )
 
     def answer(self, intent: intents.Intent, now: float) -> m.Answer:
-        """Do what an operator asks, or say why not.
+        """Handle an intent. The answer has the reason of a refusal.
 
         Args:
-            intent: What is asked.
+            intent: The intent.
             now: Monotonic time (s).
         """
         self._event_log.now = now
@@ -209,10 +209,10 @@ class Controller:
             for text in self._queue.update(inputs.points.message, sequence.in_canes):
                 self._event_log.say("warning", text)
         if back := self._queue.restored():
-            self._event_log.say("info", f"accepted again, as the rule was taken back: {back}"[:500])
+            self._event_log.say("info", f"accepted again after the rule was undone: {back}"[:500])
 
     def _move(self, now: float) -> MotionResult:
-        """What moves the robot in this period, and what that changes."""
+        """The motion of this period, and its effect on the mode."""
         supervisor = self._supervisor
         try:
             moved = self._movement.step(self.mode, supervisor.authority.held, now)
@@ -246,13 +246,13 @@ class Controller:
         return self._supervisor.situation(self._queue.waits, refused, now, intent)
 
     def _do(self, intent: intents.Intent, now: float) -> str:
-        """Do what was not refused; returns what the content itself is refused for."""
+        """Handle a permitted intent. Returns why its content is refused; empty when done."""
         supervisor, movement = self._supervisor, self._movement
         if isinstance(intent, intents.Reset):
             return supervisor.stops.ask_release(intent, supervisor.bridge, now)
         if isinstance(intent, intents.Pause) and movement.homing:
             movement.stay()
-            supervisor.remark(f"bringing the arm home was stopped by {intent.user}")
+            supervisor.remark(f"homing stopped by {intent.user}")
             self._event_log.say("info", supervisor.state.reason)
             return ""
         if isinstance(intent, intents.Survey) and (unknown := self._queue_requests.unknown_place(intent)):
@@ -269,7 +269,7 @@ class Controller:
             return refused
         if isinstance(intent, intents.Home):
             movement.go_home()
-            supervisor.remark("the arm is being brought home")
+            supervisor.remark("homing")
             return ""
         if isinstance(intent, intents.SetApproach) and intent.point_id == movement.sequence.active:
             return f"{intent.point_id} is being worked on: pause first"
@@ -278,7 +278,7 @@ class Controller:
         return self._queue_requests.points(intent)
 
     def _review(self, now: float) -> PlanRequest | None:
-        """Look after the session's plan."""
+        """Update the session's plan; returns the next request to the planner."""
         obstacles, movement = self._inputs.obstacles, self._movement
         measured = movement.body.measured
         return self._plans.review(
@@ -292,11 +292,11 @@ class Controller:
         )
 
     def _known(self, ticket: Ticket) -> Found:
-        """What is known of how to make a cut: as an approved preview has shown it, else as the plan says."""
+        """The known plan of a cut: that of the approved preview, else that of the session's plan."""
         return self._previews.known(ticket) or self._plans.known(ticket)
 
     def _review_preview(self, now: float) -> PreviewRequest | None:
-        """Look after the preview."""
+        """Update the preview; returns the next request to the planner."""
         obstacles, movement = self._inputs.obstacles, self._movement
         measured = movement.body.measured
         return self._previews.review(

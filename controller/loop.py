@@ -181,7 +181,7 @@ class Loop:
             self._barrier.hold(self._controller.recorded, now, lambda _: self._state.put(state))
             self._tick_s = statistics.median(self._ticks) if self._ticks else 0.0
         if outputs.stops is not None:
-            self._stop_file.keep(outputs.stops)
+            self._stop_file.write(outputs.stops)
             self._stops_told = outputs.stops
         # What is told to be latched is so after a restart as well; where the disk does not take it, there is a fault.
         if self._stops_told is not None and (self._stop_file.kept or self._stop_file.failure):
@@ -230,7 +230,7 @@ class Loop:
                 time.sleep(wait)
             else:
                 due += int(-wait / self._period) * self._period
-        self._token.put(self._controller.give_way())
+        self._token.put(self._controller.release_token())
 
     def _newest(self, topic: Topic[Msg]) -> "_Newest[Msg]":
         return _Newest(self._transport.slot(topic), self._clock)

@@ -12,35 +12,35 @@ _NAME = "controller-stops.json"
 
 
 class StopFile:
-    """Keeps the newest latch; without a keeper it keeps nothing beyond the process."""
+    """Writes the newest latched stops; without a writer nothing outlives the process."""
 
-    def __init__(self, stops: tuple[StopRecord, ...] = (), keeper: LatestFileWriter | None = None) -> None:
-        """Begin with what was latched before, the newest first."""
+    def __init__(self, stops: tuple[StopRecord, ...] = (), writer: LatestFileWriter | None = None) -> None:
+        """Start with the stops of an earlier start, the newest first."""
         self.stops = stops
-        self._keeper = keeper
+        self._writer = writer
 
     @property
     def kept(self) -> bool:
-        """Whether the newest would be latched after a kill at this moment."""
-        return self._keeper is None or self._keeper.kept
+        """Whether the newest stops are on disk."""
+        return self._writer is None or self._writer.kept
 
     @property
     def failure(self) -> str:
-        """Why the newest is not on disk; empty when it is, or is on its way."""
-        return "" if self._keeper is None else self._keeper.failure
+        """Why the newest stops are not on disk; empty when they are, or are being written."""
+        return "" if self._writer is None else self._writer.failure
 
-    def keep(self, state: StopState) -> None:
-        """Keep what is latched now; returns at once."""
+    def write(self, state: StopState) -> None:
+        """Write the latched stops in the background."""
         if state.stops == self.stops:
             return
         self.stops = state.stops
-        if self._keeper is not None:
-            self._keeper.keep(msgspec.json.encode(state.stops))
+        if self._writer is not None:
+            self._writer.keep(msgspec.json.encode(state.stops))
 
     def close(self) -> None:
-        """Have everything on disk."""
-        if self._keeper is not None:
-            self._keeper.close()
+        """Finish writing and close."""
+        if self._writer is not None:
+            self._writer.close()
 
 
 def open_stop_file(folder: Path) -> StopFile:

@@ -29,17 +29,17 @@ TARGETS = {
         ("controller/ledger/*",),
         _tests(
             "controller",
-            "ledger writer journal audit session_report start unwritable_ledger queue_restored controller_session",
+            "ledger writer journal audit session_report start core_unwritable_ledger point_queue_restored core_session",
         ),
     ),
     "controller.supervision": Target(
         ("controller/supervision/*",),
         _tests(
             "controller",
-            "authority fencing modes permission supervisor health stale_messages stop_latch lease controller_control "
-            "two_operators controller_interruptions queue_requests tracking_error "
-            "controller_work",
-        ),
+            "authority fencing modes permission supervisor health stale_messages stop_latch lease core_control "
+            "core_interruptions queue_requests tracking_error core_work",
+        )
+        + _tests("system", "two_operators"),
     ),
     "bridge.core": Target(
         ("bridge/core/*",),
@@ -60,7 +60,7 @@ TARGETS = {
     ),
     "controller.work": Target(
         ("controller/work/point_queue.py", "controller/work/blades.py"),
-        _tests("controller", "point_queue queue_restored queue_requests rule_taken_back blades"),
+        _tests("controller", "point_queue point_queue_restored queue_requests rule_history blades"),
     ),
     "teleoperation": Target(
         (

@@ -16,13 +16,13 @@ ABOUT_CONTROL: Final = (intents.TakeControl, intents.RequestControl, intents.Gra
 
 
 class Authority:
-    """Keeps the lease by what the server says of who is there."""
+    """Renews the lease from the presence messages of the server."""
 
     def __init__(self, supervision_s: float) -> None:
-        """Nobody is there.
+        """Start without a holder.
 
         Args:
-            supervision_s: Automatic work goes on for so long without anybody who sees the robot (s).
+            supervision_s: Automatic work continues for this long without anybody who sees the robot (s).
         """
         self._lease = Lease()
         self._supervision_s = supervision_s
@@ -31,20 +31,20 @@ class Authority:
 
     @property
     def held(self) -> bool:
-        """Whether somebody holds control, and keeps it."""
-        return self._lease.holder is not None and self._lease.coming is None
+        """Whether somebody holds control and no transfer is pending."""
+        return self._lease.holder is not None and self._lease.next_holder is None
 
     def review(self, presence: Sample[Presence] | None, at_rest: bool, now: float) -> str:
-        """Take in who is there. Returns why the robot must stop; empty when nobody lost control.
+        """Update the lease. Returns why the robot must stop; empty when nobody lost control.
 
         Args:
-            presence: Newest word of the server.
+            presence: Newest presence message.
             at_rest: Whether the robot stands still.
             now: Monotonic time (s).
         """
         last = self._newest
         if presence is not None and presence is not last:
-            # A number that does not grow is a repetition, unless the server was away for longer than a lease lives.
+            # A sequence that does not grow is a repetition, unless the server restarted: longer silence than the lease.
             if last is None or presence.message.sequence > last.message.sequence or presence.at - last.at > 1.0:
                 self._newest = presence
                 people = presence.message.people
@@ -52,16 +52,16 @@ class Authority:
                 for person in people:
                     self._watch(person.role, person.view_age_s, presence.at)
         lost = self._lease.review(at_rest, now)
-        if self._lease.coming is not None:
-            lost = lost or f"{self._lease.coming.user} takes control"
+        if self._lease.next_holder is not None:
+            lost = lost or f"{self._lease.next_holder.user} takes control"
         return lost
 
     def saw(self, intent: intents.Intent, now: float) -> None:
-        """Who asks has looked; the server's next word of who is there may come after what they ask."""
+        """Count the view age of an intent; the next presence message may arrive after the intent."""
         self._watch(intent.role, intent.view_age_s, now)
 
     def unwatched(self, now: float) -> str:
-        """Why automatic work may not go on; empty while somebody who may operate has seen the robot lately."""
+        """Why automatic work must pause; empty while an operator has seen the robot recently."""
         age = now - self._seen
         if age <= self._supervision_s:
             return ""
@@ -69,7 +69,7 @@ class Authority:
         return f"nobody who may operate has seen the robot {since}, allowed are {self._supervision_s} s"
 
     def rights(self, client: Client, role: Role) -> Rights:
-        """What a client counts as to the machine of modes. Control that nobody holds is anybody's to have."""
+        """Rights of a client in the mode table. Without a holder every operator counts as the holder."""
         out: set[Who] = {"anyone"}
         if role != "viewer":
             out.add("operator")
@@ -84,11 +84,11 @@ class Authority:
         return "a viewer may look and stop, not operate" if role == "viewer" else self._lease.refusal(client)
 
     def claim(self, client: Client, now: float) -> None:
-        """Who moves a robot that nobody controls gets control of it."""
+        """Give control to a client that moves a robot without a holder."""
         self._lease.claim(client, now)
 
     def ask(self, intent: intents.Intent, now: float) -> str:
-        """Take, request, grant or return control; why not, empty when done."""
+        """Take, request, grant or return control. Returns why it is refused; empty when done."""
         client, lease = client_of(intent), self._lease
         if intent.role == "viewer":
             return "a viewer may look and stop, not operate"
@@ -101,16 +101,16 @@ class Authority:
         return lease.give_back(client)
 
     def message(self, now: float) -> ControlState:
-        """For the wire."""
+        """The message of the lease."""
         lease = self._lease
-        holder, requested, coming = lease.holder, lease.requested, lease.coming
+        holder, requested, following = lease.holder, lease.requested, lease.next_holder
         return ControlState(
             holder="" if holder is None else holder.key,
             user="" if holder is None else holder.user,
             expires_s=lease.left(now),
             requested_by="" if requested is None else requested.user,
             requested_key="" if requested is None else requested.key,
-            next_user="" if coming is None else coming.user,
+            next_user="" if following is None else following.user,
             notice=lease.notice[:500],
             notice_number=lease.notice_number,
             supervised=not self.unwatched(now),
@@ -122,5 +122,5 @@ class Authority:
 
 
 def client_of(intent: intents.Intent) -> Client:
-    """Who asks; where nothing else tells clients apart, the name does."""
+    """The client of an intent. Without a client key the name identifies it."""
     return Client(intent.client or intent.user, intent.user)

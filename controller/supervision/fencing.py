@@ -1,4 +1,4 @@
-"""The controller's side of the fencing token: asked of the bridge, kept, lost or given back. Pure: `now` is given."""
+"""Fencing token of the controller: request, renewal, loss and release. Pure: `now` is an argument."""
 
 import math
 import secrets
@@ -9,7 +9,7 @@ from controller.identity import Token
 from rolling_panda import messages as m
 from rolling_panda.topics import TOKEN
 
-#: Without a word of the bridge for so long after the start (s), this controller tells its state all the same.
+#: Without a bridge state for this long after the start (s), the controller publishes its state all the same.
 _UNHEARD_S: Final = 1.0
 
 
@@ -19,13 +19,13 @@ def draw_nonce() -> str:
 
 
 class FencingToken:
-    """Asks for the token until the bridge shows that it is given, and goes on asking to keep it."""
+    """Requests the token until the bridge grants it, and repeats the request to keep it."""
 
     def __init__(self, draw: Callable[[], str] = draw_nonce) -> None:
-        """Ask under a new random part.
+        """Draw a random part; no token is held yet.
 
         Args:
-            draw: Gives the random part of a token.
+            draw: Draws the random part of a token.
         """
         self._draw = draw
         self._nonce, self._former = draw(), ""
@@ -33,18 +33,18 @@ class FencingToken:
         self._began = self._due = -math.inf
         self._mode: m.Mode | None = None
         self._given: m.TokenRequest | None = None
-        #: Of the commands; None while the bridge has not given it.
+        #: Token of the commands; None while the bridge has not granted it.
         self.token: Token | None = None
         #: Another controller commands the robot.
         self.overruled = False
-        #: This controller keeps silent: another one commands, or the bridge has not said yet who does.
+        #: This controller is silent: another one commands, or no bridge state has arrived yet.
         self.waits = True
 
     def update(self, bridge: m.BridgeState | None, now: float) -> str:
-        """Take in whose the token is. Returns what has changed, in words; empty when nothing has.
+        """Update the holder of the token. Returns what changed, in words; empty when nothing did.
 
         Args:
-            bridge: Newest word of the bridge.
+            bridge: Newest bridge state.
             now: Monotonic time (s).
         """
         if self._began == -math.inf:
@@ -61,11 +61,11 @@ class FencingToken:
         return ""
 
     def request(self, echo: int, mode: m.Mode, now: float) -> m.TokenRequest | None:
-        """What to ask of the bridge now; None when nothing is due.
+        """The request that is due; None when none is.
 
         Args:
             echo: Of the newest joint state.
-            mode: Of the machine, which the bridge is told at once when it changes.
+            mode: Of the controller; a change is sent at once.
             now: Monotonic time (s).
         """
         given, self._given = self._given, None
@@ -74,8 +74,8 @@ class FencingToken:
         self._due, self._mode = now + 1.0 / TOKEN.rate_hz, mode
         return m.TokenRequest(token=self._nonce, echo=echo, mode=mode)
 
-    def give_way(self) -> m.TokenRequest:
-        """What gives the token back: this controller ends, or trusts it no more and asks for another one."""
+    def release_token(self) -> m.TokenRequest:
+        """The message that releases the token: this controller ends, or requests a new token."""
         self._given = m.TokenRequest(token=self._nonce, releases=True)
         self._former, self._nonce, self.token = self._mine, self._draw(), None
         self._mine, self._due = m.fingerprint(self._nonce), -math.inf

@@ -19,19 +19,19 @@ class Lease:
         """Nobody holds control."""
         self._renewed = self._asked = -math.inf
         self.holder: Client | None = None
-        self.coming: Client | None = None
+        self.next_holder: Client | None = None
         self.requested: Client | None = None
         self.notice = self._lost = ""
         self.notice_number = 0
 
     def held_by(self, client: Client) -> bool:
         """Whether this client holds control and nobody is about to take it."""
-        return self.coming is None and self.holder is not None and self.holder.key == client.key
+        return self.next_holder is None and self.holder is not None and self.holder.key == client.key
 
     def refusal(self, client: Client) -> str:
         """Why a client may neither move the robot nor get control by the way; empty when it may."""
-        if self.coming is not None:
-            return f"control goes over to {self.coming.user}; wait until the robot is at rest"
+        if self.next_holder is not None:
+            return f"control goes over to {self.next_holder.user}; wait until the robot is at rest"
         if self.holder is None or self.holder.key == client.key:
             return ""
         return f"{self.holder.user} holds control of this robot; ask for it, or take it"
@@ -45,11 +45,11 @@ class Lease:
         """Take control, from somebody else only on purpose; why not, empty when it comes."""
         if self.held_by(client):
             return ""
-        if self.coming is not None and self.coming.key != client.key:
-            return f"{self.coming.user} is taking control already"
+        if self.next_holder is not None and self.next_holder.key != client.key:
+            return f"{self.next_holder.user} is taking control already"
         if self.holder is not None and not confirmed:
             return f"{self.holder.user} holds control; confirm to take it from them: the robot stops first"
-        self.coming = client
+        self.next_holder = client
         return ""
 
     def request(self, client: Client, now: float) -> str:
@@ -70,7 +70,7 @@ class Lease:
             return "only who holds control can grant it"
         if self.requested is None:
             return "nobody asks for control"
-        self.coming = self.requested
+        self.next_holder = self.requested
         return ""
 
     def give_back(self, client: Client) -> str:
@@ -99,8 +99,8 @@ class Lease:
         if self.holder is not None and self.left(now) <= 0.0:
             lost = f"control by {self.holder.user} has ended: nothing was heard from them for {LIFE_S:.0f} s"
             self._drop(lost)
-        if self.coming is not None and at_rest:
-            before, client = self.holder, self.coming
+        if self.next_holder is not None and at_rest:
+            before, client = self.holder, self.next_holder
             self._give(client, now, f"{client.user} holds control{f', before {before.user}' if before else ''}")
         return lost
 
@@ -109,7 +109,7 @@ class Lease:
         return 0.0 if self.holder is None else max(0.0, self._renewed + LIFE_S - now)
 
     def _give(self, client: Client, now: float, told: str) -> None:
-        self.holder, self.coming, self._renewed = client, None, now
+        self.holder, self.next_holder, self._renewed = client, None, now
         if self.requested is not None and self.requested.key == client.key:
             self.requested = None
         self._tell(told)

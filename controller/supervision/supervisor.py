@@ -164,7 +164,7 @@ class Supervisor:
             if now - self._obeyed < _ANEW_S or not self._movement.at_rest:
                 return
             if health.refused > self._refused:
-                self.fencing.give_way()
+                self.fencing.release_token()
                 self._event_log.say(
                     "warning", f"the bridge refused every command for {_ANEW_S:.0f} s: another token is asked for"
                 )
@@ -184,7 +184,7 @@ class Supervisor:
         stop = m.StopRequest(stop_id=f"motion-{secrets.token_hex(8)}", source="controller", user="", reason=reason)
         self.stop_due = stop
         # Whoever sends them knows this token.
-        self.fencing.give_way()
+        self.fencing.release_token()
         return (stop,)
 
     def _pause(self, reason: str, now: float) -> None:

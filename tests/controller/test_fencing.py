@@ -51,7 +51,7 @@ def test_who_gives_it_back_says_so_at_once_asks_under_another_one_and_is_not_ove
     it = drawn()
     it.update(bridge("t0"), 0.0)
     assert it.request(1, "READY", 0.0) is not None
-    given = it.give_way()
+    given = it.release_token()
     assert given == m.TokenRequest(token="t0", releases=True) and it.token is None
     assert it.request(1, "READY", 0.01) == given
     assert it.request(1, "READY", 0.02).token == "t1"

@@ -4,7 +4,7 @@ from controller.work.next_cut import NextCut
 from controller.work.point_queue import PointQueue
 from controller.work.posture_search import Unreachable
 from rolling_panda import messages as m
-from tests.controller.test_controller_work import CONFIG, point
+from tests.controller.test_core_work import CONFIG, point
 
 
 class Searches:

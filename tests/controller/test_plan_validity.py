@@ -7,7 +7,7 @@ from controller.planning.plan_validity import ObstacleWatch, place_changed, poin
 from controller.planning.work_plan import PlanRequest, WorkPlan
 from controller.work.point_queue import Ticket
 from rolling_panda.messages.perception import Capsule
-from tests.controller.test_cut_planner import PLANNER, point, request
+from tests.controller.test_cuts import PLANNER, point, request
 
 A, B = point("a", 0.3), point("b", 0.9)
 PLAN = WorkPlan(PlanRequest(1, np.zeros(12), (A, B)))

@@ -15,7 +15,7 @@ from controller.planning.preview_plan import PreviewRequest
 from controller.planning.rollout import Rollout
 from rolling_panda.config import RobotConfig
 from rolling_panda.generate.__main__ import ROOT
-from tests.controller.test_cut_planner import CONFIG, PLANNER, POST, point, request
+from tests.controller.test_cuts import CONFIG, PLANNER, POST, point, request
 
 pytestmark = pytest.mark.alone
 

@@ -1,7 +1,7 @@
 """What the controller's log says of what operators ask."""
 
 from rolling_panda.messages import commands as intents
-from tests.controller.test_controller_work import point, robot
+from tests.controller.test_core_work import point, robot
 
 
 def test_each_request_is_one_line_of_the_log():

@@ -5,16 +5,18 @@ import pytest
 
 from controller.planning import preview as preview_module
 from controller.planning.preview_plan import PreviewRequest
-from controller.planning.rollout import Rollout
+from controller.planning.rollout import ActuatorLag, Rollout
 from rolling_panda.config import RobotConfig
 from rolling_panda.errors import ControlError
 from rolling_panda.messages import commands as intents
 from rolling_panda.messages.perception import Capsule
-from rolling_panda.model.robot import ARM_Q
+from rolling_panda.model.differential_drive import NXI
+from rolling_panda.model.robot import ARM_Q, RobotModel
 from tests.support.controller_at_work import CONFIG, entry, point
 from tests.support.previewed import ROLLOUT, Previewed
 
 POINTS = (point("a", (0.45, 0.75, 1.05)), point("b", (0.75, 0.75, 1.1), (0.1, 0.0, 0.995)))
+DRIVE = RobotModel(RobotConfig()).drive
 START = np.zeros(12)
 START[ARM_Q] = CONFIG.home
 
@@ -88,3 +90,22 @@ def test_where_pictures_take_long_a_look_back_does_not_keep_the_next_one_from_be
     near = (POINTS[0], point("b", (0.4, 0.77, 1.1)))
     made = ROLLOUT.roll(PreviewRequest(1, START, near, close_up_s=1.2))
     assert [cut.result for cut in made.cuts] == ["cut", "cut"]
+
+
+def test_a_joint_ends_behind_its_command_by_the_lag_times_its_speed():
+    servos = ActuatorLag(DRIVE, np.zeros(12), 0.05, 0.02, 0.01)
+    command = np.zeros(NXI)
+    command[4] = 0.5
+    for _ in range(100):
+        servos.step(command)
+    assert servos.xi[4] == pytest.approx(0.5)
+    assert servos.q[3 + 4] == pytest.approx(0.5 * (1.0 - 0.02), abs=1e-6)
+
+
+def test_equal_wheels_drive_straight_on_and_without_lag_at_once():
+    servos = ActuatorLag(DRIVE, np.zeros(12), 0.0, 0.0, 0.01)
+    command = np.zeros(NXI)
+    command[:2] = 1.0
+    for _ in range(100):
+        servos.step(command)
+    np.testing.assert_allclose(servos.q[:3], (DRIVE.wheel_radius, 0.0, 0.0), atol=1e-9)

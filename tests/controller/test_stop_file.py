@@ -9,7 +9,7 @@ def test_latched_stops_are_known_after_a_restart(tmp_path):
     stops = (StopRecord("b", "server", "eve", "dog", 2.0), StopRecord("a", "server", "ada", "", 1.0))
     file = open_stop_file(tmp_path)
     assert file.stops == ()
-    file.keep(StopState(process="controller", stops=stops))
+    file.write(StopState(process="controller", stops=stops))
     file.close()
     again = open_stop_file(tmp_path)
     assert again.stops == stops

@@ -29,7 +29,7 @@ def test_a_lost_server_ends_the_way_home_without_a_change_of_mode():
     r.run(0.1)
     r.server = False
     r.run(3.0)
-    assert any("bringing the arm home was stopped" in text for text in r.events), r.events
+    assert any("homing stopped by" in text for text in r.events), r.events
     assert not r.controller._movement.homing
 
 

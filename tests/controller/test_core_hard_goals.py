@@ -9,7 +9,7 @@ from rolling_panda.messages import commands as intents
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
 from rolling_panda.model.robot import ARM_Q, RobotModel, pose_message
-from tests.controller.test_controller_work import (
+from tests.controller.test_core_work import (
     CONFIG,
     LIMITS,
     assert_limits_kept,

@@ -11,7 +11,7 @@ from rolling_panda.messages import commands as intents
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
 from rolling_panda.model.robot import ARM_Q
-from tests.controller.test_controller_work import CONFIG, entry, finish, point, robot
+from tests.controller.test_core_work import CONFIG, entry, finish, point, robot
 
 PLANNER = CutPlanner(CONFIG, RobotConfig())
 POST = Capsule("post", (0.5, 0.75, 0.0), (0.5, 0.75, 2.0), 0.05, 0.05)
