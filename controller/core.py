@@ -252,7 +252,7 @@ class Controller:
             return supervisor.stops.ask_release(intent, supervisor.bridge, now)
         if isinstance(intent, intents.Pause) and movement.homing:
             movement.stay()
-            supervisor.remark(f"homing stopped by {intent.user}")
+            supervisor.remark(f"homing was stopped by {intent.user}")
             self._event_log.say("info", supervisor.state.reason)
             return ""
         if isinstance(intent, intents.Survey) and (unknown := self._queue_requests.unknown_place(intent)):
@@ -269,7 +269,7 @@ class Controller:
             return refused
         if isinstance(intent, intents.Home):
             movement.go_home()
-            supervisor.remark("homing")
+            supervisor.remark("homing the arm")
             return ""
         if isinstance(intent, intents.SetApproach) and intent.point_id == movement.sequence.active:
             return f"{intent.point_id} is being worked on: pause first"

@@ -61,7 +61,7 @@ def _go_on(loop: ClosedLoop, distance: float) -> None:
     if loop.ask(intents.Home(user=_USER)).ok:
         loop.run(0.1)
         loop.run_until(lambda: loop.state is not None and "home" in loop.state.reason, _PATIENCE_S)
-        loop.run_until(lambda: loop.state is not None and "being brought" not in loop.state.reason, _PATIENCE_S)
+        loop.run_until(lambda: loop.state is not None and loop.state.reason != "homing the arm", _PATIENCE_S)
     begin, goal = loop.now, _place(loop) + distance
     while _place(loop) < goal and loop.now - begin < _PATIENCE_S:
         left = goal - _place(loop)

@@ -193,7 +193,7 @@ class Supervisor:
             self.event(Event.LOST, now, reason)
         elif self._movement.homing:
             self._movement.stay()
-            self._event_log.say("warning", f"bringing the arm home was stopped: {reason}")
+            self._event_log.say("warning", f"homing was stopped: {reason}")
 
     def _review_hold(self, now: float) -> None:
         hand = self._movement.teleoperation

@@ -186,7 +186,7 @@ class Movement:
             return self.ramp()
         xi = homing.step(robot)
         if homing.blocked:
-            self._event_log.say("warning", f"bringing the arm home was stopped: {homing.blocked}")
+            self._event_log.say("warning", f"homing was stopped: {homing.blocked}")
             self._homing = None
         elif homing.done:
             self._homing = None

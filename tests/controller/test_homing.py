@@ -47,6 +47,6 @@ def test_a_post_in_the_way_stops_it_before_it_is_met_and_is_named() -> None:
         robot.step()
         least = min(least, judge.model.least(robot.q).distance)
     assert least > 0.0
-    assert any("home was stopped" in event and "post" in event for event in robot.events), robot.events
+    assert any("homing was stopped" in event and "post" in event for event in robot.events), robot.events
     assert np.abs(robot.xi).max() < 1e-3
     assert robot.controller.mode == "READY"

@@ -16,7 +16,7 @@ def test_what_ends_a_mode_ends_what_moved_in_it():
     r = ready()
     assert r.ask(intents.Home(user="ada")).ok
     r.run(0.1)
-    assert "home" in r.state.reason
+    assert r.state.reason == "homing the arm"
     r.stop()
     r.run(0.2)
     assert r.state.mode == "ESTOP_LATCHED"
@@ -29,7 +29,7 @@ def test_a_lost_server_ends_the_way_home_without_a_change_of_mode():
     r.run(0.1)
     r.server = False
     r.run(3.0)
-    assert any("homing stopped by" in text for text in r.events), r.events
+    assert any("homing was stopped" in text for text in r.events), r.events
     assert not r.controller._movement.homing
 
 
