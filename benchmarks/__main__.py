@@ -2,8 +2,11 @@
 
 import argparse
 import importlib
+import signal
 import sys
 from collections.abc import Sequence
+
+from rolling_panda.errors import RollingPandaError
 
 #: Benchmarks: name, module with `main(argv) -> int`, and one line for people.
 BENCHMARKS = {
@@ -32,7 +35,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the benchmark that the first argument names, with the rest as its arguments. Returns the exit code."""
     words = list(sys.argv[1:] if argv is None else argv)
     if words and words[0] in BENCHMARKS:
-        code: int = importlib.import_module(BENCHMARKS[words[0]][0]).main(words[1:])
+        try:
+            code: int = importlib.import_module(BENCHMARKS[words[0]][0]).main(words[1:])
+        except RollingPandaError as error:
+            print(f"rolling-panda bench {words[0]}: {error}", file=sys.stderr)
+            return 1
         return code
     lines = "\n".join(f"  {name:<12}{about}" for name, (_, about) in BENCHMARKS.items())
     parser = argparse.ArgumentParser(
@@ -47,4 +54,6 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
+    # The processes that a benchmark starts are ended in its `finally` blocks, which SIGTERM alone would not run.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     sys.exit(main())
