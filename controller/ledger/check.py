@@ -17,6 +17,7 @@ from controller.ledger.store import (
     check_version,
     head_problem,
     read,
+    read_head,
 )
 from rolling_panda.errors import LedgerError
 
@@ -71,6 +72,8 @@ def verify(folder: Path, expected: bytes | None = None) -> Verdict:
     count, head, met = 0, ORIGIN, expected is None or expected == ORIGIN
     with reading(folder) as database:
         try:
+            # Before the rows, so that a row that is added meanwhile is not missed.
+            newest = read_head(folder / HEAD)
             # One view of the ledger, whatever is added meanwhile.
             database.execute("BEGIN")
             check_version(database, folder / FILE)
@@ -80,7 +83,7 @@ def verify(folder: Path, expected: bytes | None = None) -> Verdict:
                     return Verdict(count, head, problem)
                 count, head = count + 1, row.hash
                 met = met or head == expected
-            problem = _file_problem(database, count, folder)
+            problem = _file_problem(database, count, newest)
         except UNREADABLE as error:
             problem = f"after row {count}: {error}"
     if not problem and not met and expected is not None:
@@ -99,7 +102,7 @@ def _row_problem(row: Row, number: int, previous: bytes) -> str:
     return ""
 
 
-def _file_problem(database: sqlite3.Connection, count: int, folder: Path) -> str:
+def _file_problem(database: sqlite3.Connection, count: int, head: str | OSError | ValueError) -> str:
     statements = {sql for (sql,) in database.execute("SELECT sql FROM sqlite_schema WHERE sql IS NOT NULL")}
     if statements - {"CREATE TABLE sqlite_sequence(name,seq)"} != set(SCHEMA):
         return "its tables are not those of a ledger"
@@ -109,4 +112,4 @@ def _file_problem(database: sqlite3.Connection, count: int, folder: Path) -> str
     found = [str(line) for (line,) in database.execute("PRAGMA integrity_check(3)")]
     if found != ["ok"]:
         return f"the file is damaged: {'; '.join(found)}"
-    return head_problem(database, folder / HEAD)
+    return head_problem(database, head)

@@ -167,7 +167,7 @@ class Ledger:
                 before = rows[1].hash if len(rows) > 1 else ORIGIN
                 if chained(before, rows[0].number, rows[0].entry) != rows[0].hash:
                     problem = f"row {rows[0].number} is not as it was written"
-            problem = problem or head_problem(self._database, self._head)
+            problem = problem or head_problem(self._database, read_head(self._head))
         if problem:
             raise LedgerError(
                 f"{self.path} has been changed from outside: {problem}. See `rolling-panda audit verify`; "
@@ -201,19 +201,34 @@ def check_version(database: sqlite3.Connection, path: Path) -> None:
         )
 
 
-def head_problem(database: sqlite3.Connection, head: Path) -> str:
-    """Why the row that the head names is not in the ledger; empty when it is, or nothing was ever written."""
+def read_head(head: Path) -> str | OSError | ValueError:
+    """Text of the head, or why there is none."""
     try:
-        number, hashed = head.read_text(encoding="ascii").split()
+        return head.read_text(encoding="ascii")
+    except (OSError, ValueError) as error:
+        return error
+
+
+def head_problem(database: sqlite3.Connection, head: str | OSError | ValueError) -> str:
+    """Why the row that the head names is not in the ledger; empty when it is, or nothing was ever written.
+
+    Args:
+        database: The ledger.
+        head: From `read_head`, read before the rows are: a ledger that is being written gets its row first.
+    """
+    if isinstance(head, FileNotFoundError):
+        return "" if database.execute("SELECT 1 FROM audit").fetchone() is None else f"{HEAD} is missing"
+    try:
+        if not isinstance(head, str):
+            raise head
+        number, hashed = head.split()
         if int(number) == 0:
-            return "" if bytes.fromhex(hashed) == ORIGIN else f"{head.name} is not as it was written"
+            return "" if bytes.fromhex(hashed) == ORIGIN else f"{HEAD} is not as it was written"
         found = database.execute("SELECT hash FROM audit WHERE number = ?", (int(number),)).fetchone()
         same = found is not None and bytes(found[0]) == bytes.fromhex(hashed)
-    except FileNotFoundError:
-        return "" if database.execute("SELECT 1 FROM audit").fetchone() is None else f"{head.name} is missing"
     except (OSError, ValueError, TypeError, OverflowError) as error:
-        return f"{head.name} cannot be read: {error}"
-    return "" if same else f"row {int(number)}, which {head.name} names as the newest, is not in it"
+        return f"{HEAD} cannot be read: {error}"
+    return "" if same else f"row {int(number)}, which {HEAD} names as the newest, is not in it"
 
 
 @contextlib.contextmanager

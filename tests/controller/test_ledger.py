@@ -7,13 +7,15 @@ import signal
 import sqlite3
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from controller.ledger import check
 from controller.ledger.check import reading, verify
 from controller.ledger.start import restored
-from controller.ledger.store import FILE, HEAD, SCHEMA_VERSION, Entry, Ledger, read
+from controller.ledger.store import FILE, HEAD, SCHEMA_VERSION, Entry, Ledger, Row, read
 from rolling_panda.errors import LedgerError
 from rolling_panda.runtime.launch import child_environment
 
@@ -75,6 +77,19 @@ def test_it_can_be_read_and_checked_while_it_is_written(tmp_path: Path) -> None:
             before = list(read(database))
             ledger.append([entry(2)])
         assert len(before) == 1 and verify(tmp_path).rows == 2
+
+
+def test_a_row_added_during_a_check_is_no_damage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    written(tmp_path)
+    with Ledger(tmp_path) as ledger:
+
+        def read_slowly(database: sqlite3.Connection) -> Iterator[Row]:
+            yield from read(database)
+            ledger.append([entry(99)])
+
+        monkeypatch.setattr(check, "read", read_slowly)
+        verdict = check.verify(tmp_path)
+    assert (verdict.problem, verdict.rows) == ("", 12)
 
 
 def test_every_changed_byte_is_found_or_changes_nothing(tmp_path: Path) -> None:
