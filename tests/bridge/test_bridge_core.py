@@ -507,7 +507,7 @@ def test_a_picture_is_taken_at_once_for_the_controller_whose_commands_are_taken_
         return [(frame.point_id, frame.number) for frame in frames if frame.point_id]
 
     assert look(bench.epoch + 1, 1) == []
-    assert any("picture" in refusal.topic for refusal in bench.core.refusals.counts())
+    assert any("close-up" in refusal.topic for refusal in bench.core.refusals.counts())
     assert look(bench.epoch, 2) == [("p4", 2)]
 
 

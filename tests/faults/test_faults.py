@@ -139,7 +139,7 @@ def test_a_second_controller_does_not_put_the_first_into_a_fault_that_stays():
     world.alive = True
     world.run(1.0)
     assert world.controller.mode == "FAULT" and world.controller.waits and not other.waits
-    world.bridge.on_token(other.give_way(), world.now)
+    world.bridge.on_token(other.release_token(), world.now)
     world.intruder = lambda world: None
     world.run(2.0)
     assert not world.controller.waits

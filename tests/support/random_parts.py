@@ -119,7 +119,7 @@ class Movement:
     def at_rest(self):
         return self._setpoints.at_rest
 
-    def take(self, inputs):
+    def update(self, inputs):
         pass
 
     def go_home(self):
