@@ -111,7 +111,7 @@ class BridgeCore:
         self._memory = memory or Memory()
         before = self._memory.remembered
         self._fence = Fence(before.epoch, before.token)
-        self._gate = CommandValidator(limits.velocity, config.max_age_s, self._fence)
+        self._validator = CommandValidator(limits.velocity, config.max_age_s, self._fence)
         #: Whether a restart would know who holds the token; only then they are told.
         self._fence_kept = True
         self._mode: tuple[m.Mode | None, float] = None, 0.0
@@ -121,7 +121,7 @@ class BridgeCore:
         self._limiter = Limiter(limits, config.wheel_acceleration, config.joint_margin, TICK_S)
         self._faults = RobotFaults()
         self._orders = CutOrders(cuts)
-        self._shutter = CameraTrigger(config.camera_moving_hz, config.camera_resting_hz, TICK_S)
+        self._camera_trigger = CameraTrigger(config.camera_moving_hz, config.camera_resting_hz, TICK_S)
         self._pace = TimeRatio()
         self._ticks = 0
         self._joint_ticks = round(1 / config.joints_hz / TICK_S)
@@ -148,7 +148,7 @@ class BridgeCore:
 
     def on_motion(self, command: m.MotionCommand, now: float, clock: float | None = None) -> None:
         """Take a motion command received at `now`; a refused one is counted and changes nothing."""
-        reason = self._gate.refuse(command, now)
+        reason = self._validator.refuse(command, now)
         if reason is not None:
             self.refusals.add(MOTION.name, reason)
             return
@@ -164,7 +164,7 @@ class BridgeCore:
                 self._halt()
                 self._token_changed(f"the controller that held epoch {epoch} has given way")
             return
-        reason = self._gate.ask(request, now, not np.any(self._limiter.sent))
+        reason = self._validator.ask(request, now, not np.any(self._limiter.sent))
         if reason is not None:
             self.refusals.add(TOKEN.name, reason)
             return
@@ -185,9 +185,9 @@ class BridgeCore:
             inhibited = "the software stop is latched"
         elif self._faults.current:
             inhibited = self._faults.current
-        elif self._watchdog.tripped(now) or self._gate.must_rest:
+        elif self._watchdog.tripped(now) or self._validator.must_rest:
             inhibited = "no valid setpoint keeps the cutter enabled"
-        wrong = self._gate.refuse_cut(command, now) or self._unsteady()
+        wrong = self._validator.refuse_cut(command, now) or self._unsteady()
         verdict, reason = self._orders.judge(command, wrong, self._measured.cutter == "open", inhibited)
         if verdict == "refuse":
             self.refusals.add(CUT.name, reason)
@@ -203,7 +203,7 @@ class BridgeCore:
         if request.epoch != self._fence.epoch:
             self.refusals.add(CLOSE_UP_REQUEST.name, "not the controller's that commands the robot")
             return
-        self._shutter.want(request)
+        self._camera_trigger.want(request)
 
     def _unsteady(self) -> str | None:
         speed = np.abs(self._measured.velocity)
@@ -255,7 +255,7 @@ class BridgeCore:
         xi = self._limiter.step(share * self._desired, self._measured.position[2:])
         blades = not (stopped or tripped)
         releases = self._faults.releases
-        self.robot.write(Setpoint(xi, blades, self._fence.epoch, self._gate.sequence, self._clock, releases))
+        self.robot.write(Setpoint(xi, blades, self._fence.epoch, self._validator.sequence, self._clock, releases))
         self._measured = self.robot.read()
         self._ticks += 1
         self._follow_cut()
@@ -288,7 +288,7 @@ class BridgeCore:
 
     def _halt(self) -> None:
         self._desired = np.zeros_like(self._desired)
-        self._gate.require_rest()
+        self._validator.require_rest()
 
     def _remember(self) -> None:
         latch = self._latch
@@ -304,7 +304,7 @@ class BridgeCore:
             self._outcome = measured.outcome
             severity: m.Severity = "info" if measured.outcome == "DONE" else "warning"
             self._say(severity, f"cut {self._cut_id}: {measured.outcome}, {measured.detail}")
-            self._shutter.wake(self._ticks)
+            self._camera_trigger.wake(self._ticks)
             self._state_due = True
 
     def _say(self, severity: m.Severity, text: str) -> None:
@@ -316,7 +316,7 @@ class BridgeCore:
         if ticks % self._joint_ticks == 0:
             self._odometer.follow(self._measured.position[:2])
             joints = self._joint_state(now)
-            self._gate.sent(joints.sequence, now)
+            self._validator.sent(joints.sequence, now)
             self._round_trip.out(joints.sequence, self._clock)
             frame = self._frame(now)
             if ticks % _ODOMETRY_TICKS == 0:
@@ -383,7 +383,7 @@ class BridgeCore:
             battery=self._measured.battery,
             relaxed_limits=self._relaxed_limits,
             holder=self._fence.holder if self._fence_kept else "",
-            sequence=max(0, self._gate.sequence),
+            sequence=max(0, self._validator.sequence),
             moving=moving,
         )
 
@@ -400,14 +400,14 @@ class BridgeCore:
     def _frame(self, now: float) -> CameraFrame | None:
         measured: Measurement = self._measured
         if bool(np.abs(measured.velocity).max() > _MOVING):
-            self._shutter.wake(self._ticks)
+            self._camera_trigger.wake(self._ticks)
         posture = Posture(self._clock, m.Header(now, "camera"), self._odometer.pose, actuated(measured.position))
-        self._shutter.follow(posture)
-        expose = self._shutter.due(self._ticks)
+        self._camera_trigger.follow(posture)
+        expose = self._camera_trigger.due(self._ticks)
         if expose:
-            self._shutter.exposed(self._ticks, posture)
+            self._camera_trigger.exposed(self._ticks, posture)
         picture = self.robot.capture(expose)
-        return None if picture is None else self._shutter.frame(picture)
+        return None if picture is None else self._camera_trigger.frame(picture)
 
     def _scenery_is_due(self) -> bool:
         if self._scenery is None:

@@ -25,8 +25,8 @@ _ROUNDING = 1.0 + 1e-9
 class CommandValidator:
     """Judges what the controller sends. A refused command changes nothing.
 
-    After a standstill that the bridge itself enforced (start, watchdog, stop) the gate waits for a setpoint at rest, so
-    that nothing that was under way before wakes moving.
+    After a standstill that the bridge itself enforced (start, watchdog, stop) the validator waits for a setpoint at
+    rest, so that nothing that was under way before wakes moving.
     """
 
     def __init__(self, velocity_limit: Array, max_age_s: float, fence: Fence) -> None:

@@ -21,7 +21,7 @@ from rolling_panda import topics
 from rolling_panda.config import TransportConfig
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.resources import resource
-from rolling_panda.transport.zenoh import Feed, Publisher, Router, Slot, Transport
+from rolling_panda.transport.zenoh import Feed, ForeignWire, Publisher, Router, Slot, Transport
 
 pytestmark = pytest.mark.alone
 
@@ -41,6 +41,7 @@ class Live:
     events: Feed[m.LogEvent]
     motion: Publisher[m.MotionCommand]
     tokens: Publisher[m.TokenRequest]
+    send: Callable[[bytes], None]
     sequence: int = 0
 
     def drive(self, seconds: float, xi: tuple[float, ...]) -> float:
@@ -119,7 +120,8 @@ def running_bridge(folder: Path, **changes: float) -> Iterator[Live]:
 def _running(folder: Path, endpoint: str, config: Path) -> Iterator[Live]:
     trace = folder / "trace"
     process = started(folder, endpoint, config, "--trace", str(trace))
-    transport = Transport(TransportConfig(connect=(endpoint,), plain_wire=True), "controller", "rp1")
+    settings = TransportConfig(connect=(endpoint,), plain_wire=True)
+    transport, raw = Transport(settings, "controller", "rp1"), ForeignWire(settings)
     try:
         bridge = Live(
             transport,
@@ -129,12 +131,14 @@ def _running(folder: Path, endpoint: str, config: Path) -> Iterator[Live]:
             transport.feed(topics.EVENT, 200),
             transport.publisher(topics.MOTION),
             transport.publisher(topics.TOKEN),
+            raw.publisher(topics.key("rp1", topics.MOTION.name)),
         )
         until(lambda: bridge.joints.peek() is not None and bridge.state.peek() is not None)
         yield bridge
     finally:
         process.send_signal(signal.SIGINT)
         assert process.wait(10) == 0
+        raw.close()
         transport.close()
 
 
@@ -208,7 +212,7 @@ def test_rubbish_on_the_command_topic_is_counted_and_said(live: Live) -> None:
     def noticed() -> bool:
         # Commands may be dropped on a full wire, so rubbish may be as well.
         for data in (b"", b"rubbish", b"\x81\xa4type\xadMotionCommand"):
-            live.motion._publisher.put(data)
+            live.send(data)
         texts.extend(received.message.text for received in live.events.drain())
         new = [row for row in live.newest().rejections if row not in before and row.topic == "command/motion"]
         return len(new) >= 3 and any("refused on command/motion" in text for text in texts)

@@ -1,6 +1,7 @@
 """Who may command the robot: one controller at a time, by the word of the bridge; no kept number locks it out."""
 
 import tempfile
+import time
 from pathlib import Path
 from typing import Any
 
@@ -30,10 +31,10 @@ FILE = "bridge.json"
 DAMAGED = (b"", b"{", b"\x00" * 64, b'{"epoch": 4611686018427387904}', b'{"epoch": -1}', b'{"epoch": 1e9, "stops": 1}')
 
 
-def core(memory: Memory) -> BridgeCore:
+def core(memory: Memory, robot: IdealRobot | None = None) -> BridgeCore:
     config = BridgeConfig(joints_hz=1000.0)
     odometer = Odometer(MODEL.drive, OdometryConfig(), TICK_S)
-    return BridgeCore(IdealRobot(), config, MODEL.limits, odometer, "sim", memory=memory)
+    return BridgeCore(robot or IdealRobot(), config, MODEL.limits, odometer, "sim", memory=memory)
 
 
 class Askers(RuleBasedStateMachine):
@@ -44,12 +45,14 @@ class Askers(RuleBasedStateMachine):
         self.folder = Path(tempfile.mkdtemp())
         self.now, self.holder, self.epoch, self.heard = 0.0, "", 0, 0.0
         self.sequence = 0
+        self.told = 0, ""
         self.memory: Memory | None = None
         self.start()
 
     def start(self) -> None:
         self.memory = open_memory(self.folder)
-        self.core = core(self.memory)
+        self.robot = IdealRobot()
+        self.core = core(self.memory, self.robot)
         #: Unknown until somebody asks: then the holder from before has its time.
         self.heard = -1.0
         self.tick()
@@ -64,6 +67,8 @@ class Askers(RuleBasedStateMachine):
         out = self.core.step(self.now)
         assert out.joints is not None
         self.echo = out.joints.sequence
+        if out.state is not None:
+            self.told = out.state.epoch, out.state.holder
 
     def asks(self, token: str) -> None:
         self.tick()
@@ -92,7 +97,8 @@ class Askers(RuleBasedStateMachine):
             self.heard = self.now
 
     def taken(self) -> int:
-        return self.core._gate.sequence
+        self.tick()
+        return self.robot.sent[-1].sequence
 
     @rule(seconds=st.sampled_from([0.1, 0.5, 1.1]))
     def silence(self, seconds: float) -> None:
@@ -119,15 +125,23 @@ class Askers(RuleBasedStateMachine):
         begin_anew(self.folder)
         self.holder, self.epoch = "", 0
         self.start()
-        (stop,) = self.core._latch.stops
+        assert self.memory is not None
+        (stop,) = self.memory.remembered.stops
         assert "begins anew" in stop.reason
         assert self.core.on_release(m.ReleaseStop(stop_id=stop.stop_id, user="ada", reason="looked"), self.now).ok
 
     @invariant()
-    def the_bridge_names_one_holder_and_an_epoch_that_grew_by_one(self) -> None:
-        fence = self.core._fence
-        assert (fence.epoch, fence.token or "") == (self.epoch, self.holder)
-        assert fence.holder == (m.fingerprint(self.holder) if self.holder else "")
+    def one_holder_is_remembered_and_an_epoch_that_grew_by_one(self) -> None:
+        if self.memory is None:
+            return
+        # The holder is named once it is on disk.
+        end = time.monotonic() + 10.0
+        while not self.memory.kept:
+            assert time.monotonic() < end
+            time.sleep(0.0005)
+        self.tick()
+        assert (self.memory.remembered.epoch, self.memory.remembered.token or "") == (self.epoch, self.holder)
+        assert self.told == (self.epoch, m.fingerprint(self.holder) if self.holder else "")
 
     @precondition(lambda self: self.memory is not None)
     @rule(token=SOMEBODY)
@@ -136,7 +150,7 @@ class Askers(RuleBasedStateMachine):
         self.now += SILENT_S
         self.asks(token)
         assert self.holder == token
-        self.the_bridge_names_one_holder_and_an_epoch_that_grew_by_one()
+        self.one_holder_is_remembered_and_an_epoch_that_grew_by_one()
 
     def teardown(self) -> None:
         self.stop()

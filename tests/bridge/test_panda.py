@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from multiprocessing import active_children
 from pathlib import Path
 from typing import Self
 
@@ -157,7 +158,7 @@ def test_a_reflex_stops_it_until_a_person_releases_it(arm: Panda, box: DevicePro
 def test_a_stalled_process_is_stopped_by_the_control_box_and_stays_stopped(arm: Panda, box: DeviceProcess) -> None:
     with Hand(arm, box, TURN) as hand:
         until(turns(box, TURN))
-        process = arm._process.pid
+        (process,) = [child.pid for child in active_children() if child.name == "rolling-panda-arm"]
         assert process is not None
         os.kill(process, signal.SIGSTOP)
         until(lambda: "no state" in arm.read().fault)
