@@ -100,7 +100,7 @@ def test_when_nobody_watches_no_further_cut_begins_the_tool_comes_out_and_work_p
     assert r.state.mode == "PAUSED" and np.abs(r.xi[2:]).max() < 1e-3
 
 
-def test_work_does_not_begin_unwatched():
+def ready_and_unwatched():
     r = robot()
     r.watching = False
     r.step()
@@ -108,30 +108,23 @@ def test_work_does_not_begin_unwatched():
     r.step()
     assert r.ask(intents.Arm(user="ada")).ok
     assert r.ask(intents.AcceptAll(user="ada")).ok
+    return r
+
+
+def test_work_does_not_begin_unwatched():
+    r = ready_and_unwatched()
     assert "seen the robot" in r.ask(intents.Start(user="ada")).reason
 
 
 @pytest.mark.parametrize(("age_s", "begins"), [(1.9, True), (2.1, False)])
 def test_what_who_asks_has_seen_comes_with_what_they_ask(age_s, begins):
-    r = robot()
-    r.watching = False
-    r.step()
-    r.show((point("a", (0.4, 0.75, 1.0)),))
-    r.step()
-    assert r.ask(intents.Arm(user="ada")).ok
-    assert r.ask(intents.AcceptAll(user="ada")).ok
+    r = ready_and_unwatched()
     answer = r.ask(intents.Start(user="ada", view_age_s=age_s))
     assert answer.ok == begins and ("seen the robot" in answer.reason) != begins
 
 
 def test_what_a_viewer_has_seen_lets_nothing_begin():
-    r = robot()
-    r.watching = False
-    r.step()
-    r.show((point("a", (0.4, 0.75, 1.0)),))
-    r.step()
-    assert r.ask(intents.Arm(user="ada")).ok
-    assert r.ask(intents.AcceptAll(user="ada")).ok
+    r = ready_and_unwatched()
     assert not r.ask(intents.Arm(user="eve", role="viewer", view_age_s=0.1)).ok
     assert "seen the robot" in r.ask(intents.Start(user="ada")).reason
 

@@ -3,19 +3,9 @@ import msgspec
 from controller.supervision.stop_latch import StopLatch
 from rolling_panda import messages as m
 from rolling_panda.messages import commands as intents
+from tests.support.fake_wire import bridge_state
 
-BRIDGE = m.BridgeState(
-    header=m.Header(),
-    kind="sim",
-    epoch=1,
-    watchdog=False,
-    stop_id="",
-    stopped_by="",
-    cutter="open",
-    cut_id="",
-    outcome="",
-    real_time_factor=1.0,
-)
+BRIDGE = bridge_state()
 RESET = intents.Reset(user="ada", role="supervisor", reason="looked at it")
 
 

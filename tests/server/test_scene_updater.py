@@ -20,6 +20,7 @@ from tests.server.test_viser_proxy import (
     open_view,
     replayed,
     say,
+    two_views,
 )
 from tests.support.fake_wire import FakeWire, joints, odometry, pruning_point, pruning_points, telling
 from tests.support.running_server import PATIENCE_S, running_server
@@ -102,17 +103,7 @@ def test_a_chosen_point_brings_the_cameras_of_who_chose_it_alone(server):
 
     far = msgspec.structs.replace(pruning_point("far"), position=(1.0, 0.75, 1.0))
     server.wire.deliver(topics.POINTS, pruning_points(far))
-    with (
-        telling(server.wire),
-        server.client(user="ann") as client,
-        server.client(user="bob") as other,
-        open_socket(server, client, "/ws") as page,
-        open_view(server, client) as view,
-        open_view(server, other) as other_view,
-    ):
-        for each in (view, other_view):
-            hear(each, replayed)
-            say(each, CAMERA)
+    with telling(server.wire), two_views(server) as (page, view, other_view):
         hear(view, shows("/row", True))
         page.send('{"type":"Select","point_id":"far"}')
         hear(view, looks_at(1.0))
@@ -150,16 +141,8 @@ def test_two_clicks_are_measured_for_the_session_that_measures(server):
 
 
 def test_a_picture_of_the_camera_is_drawn_for_who_wants_it(server):
-    with (
-        server.client(user="ann") as client,
-        server.client(user="bob") as other,
-        open_socket(server, client, "/ws") as page,
-        open_view(server, client) as view,
-        open_view(server, other) as other_view,
-    ):
+    with two_views(server) as (page, view, other_view):
         for each in (view, other_view):
-            hear(each, replayed)
-            say(each, CAMERA)
             hear(each, shows("/row", True))
         page.send('{"type":"ShowLayers","layers":["camera","cloud"]}')
         hear(view, shows("/plant", False))

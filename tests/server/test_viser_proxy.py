@@ -1,5 +1,6 @@
 import json
 import time
+from contextlib import contextmanager
 
 import msgspec
 import psutil
@@ -78,6 +79,22 @@ def replayed(message):
 
 def say(view, message):
     view.send(msgspec.msgpack.encode(message))
+
+
+@contextmanager
+def two_views(server):
+    """Ann's page, her view and Bob's, both drawn."""
+    with (
+        server.client(user="ann") as client,
+        server.client(user="bob") as other,
+        open_socket(server, client, "/ws") as page,
+        open_view(server, client) as view,
+        open_view(server, other) as other_view,
+    ):
+        for each in (view, other_view):
+            hear(each, replayed)
+            say(each, CAMERA)
+        yield page, view, other_view
 
 
 def test_the_view_shows_the_robot_and_the_points(server):
@@ -174,17 +191,7 @@ def test_a_viewer_takes_no_clicks(server):
 
 def test_the_gizmo_is_on_the_holders_view_alone_and_its_drags_become_targets(server):
     sent = server.wire.sent[topics.TELEOP.name]
-    with (
-        telling(server.wire),
-        server.client(user="ann") as client,
-        server.client(user="bob") as other,
-        open_socket(server, client, "/ws") as page,
-        open_view(server, client) as view,
-        open_view(server, other) as other_view,
-    ):
-        for each in (view, other_view):
-            hear(each, replayed)
-            say(each, CAMERA)
+    with telling(server.wire), two_views(server) as (page, view, other_view):
         page.send('{"type":"ShowGizmo","visible":true}')
         (gizmo,) = [each for each in hear(view, is_gizmo) if is_gizmo(each)]
         with pytest.raises(TimeoutError):

@@ -15,6 +15,7 @@ from rolling_panda.messages import page as page_messages
 from rolling_panda.messages import types as types_messages
 from rolling_panda.messages.supervision import ControlState, ReplayState, SessionReport, StopState
 from rolling_panda.resources import resource
+from tests.support.fake_wire import bridge_state
 
 ORIGIN = "http://panda.test"
 POLICY = (
@@ -65,19 +66,7 @@ def controller(mode: m.Mode = "READY", **changes: Any) -> m.ControllerState:
 
 
 def bridge(**changes: Any) -> m.BridgeState:
-    state = m.BridgeState(
-        header=m.Header(),
-        kind="sim",
-        epoch=1,
-        watchdog=False,
-        stop_id="",
-        stopped_by="",
-        cutter="open",
-        cut_id="",
-        outcome="",
-        real_time_factor=0.99,
-    )
-    return msgspec.structs.replace(state, **changes)
+    return msgspec.structs.replace(bridge_state(), **{"real_time_factor": 0.99, **changes})
 
 
 def point(number: int, state: m.PointState, vine: int = 1, spur: int = 1, **changes: Any) -> page_messages.PagePoint:
