@@ -9,7 +9,7 @@ from pathlib import Path
 from bridge.config import BridgeConfig
 from bridge.core.bridge import BridgeCore
 from bridge.core.cut_memory import CutFile
-from bridge.core.state_memory import Memory, begin_anew, open_memory
+from bridge.core.state_memory import Remembered, begin_anew, open_memory
 from bridge.loop import BridgeLoop
 from bridge.real.config import RealConfig
 from bridge.sim.camera.config import CameraConfig
@@ -17,6 +17,7 @@ from bridge.sim.vineyard.config import VineyardConfig
 from rolling_panda.config import RobotConfig, load_section
 from rolling_panda.errors import RollingPandaError
 from rolling_panda.resources import resource
+from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.runtime.process import ProcessContext, add_common_arguments, run_process, state_folder
 from rolling_panda.runtime.state_folder import alone
 
@@ -108,7 +109,7 @@ def _work(context: ProcessContext) -> None:
         memory.close()
 
 
-def _core(context: ProcessContext, cuts: CutFile, memory: Memory) -> BridgeCore:
+def _core(context: ProcessContext, cuts: CutFile, memory: KeptValue[Remembered]) -> BridgeCore:
     arguments, rejections = context.arguments, context.transport.rejections
     # Here and not above: a bridge to a real robot must not need the simulator, nor the other way round.
     if arguments.kind == "real":

@@ -16,10 +16,11 @@ from controller.interface import Outputs, StepInputs
 from controller.ledger.journal import LedgerState
 from controller.ledger.writer import LedgerWriter
 from controller.planner_process import PlannerProcess
-from controller.stop_file import StopFile
+from controller.stop_file import Stops
 from rolling_panda import messages as m
 from rolling_panda.errors import ServiceError
 from rolling_panda.messages.supervision import StopState
+from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.runtime.loop_clock import LoopClock
 from rolling_panda.topics import (
     BRIDGE,
@@ -83,7 +84,7 @@ class Loop:
         rate_hz: float,
         ledger: LedgerWriter,
         planner: PlannerProcess | None = None,
-        stop_file: StopFile | None = None,
+        stop_file: KeptValue[Stops] | None = None,
     ) -> None:
         """Subscribe and announce; nothing runs before `run`.
 
@@ -118,7 +119,7 @@ class Loop:
         self._plan, self._control = transport.publisher(PLAN), transport.publisher(CONTROL)
         self._preview = transport.publisher(PREVIEW)
         self._preview_motion = transport.publisher(PREVIEW_MOTION)
-        self._latched, self._stop_file = transport.publisher(STOPS), stop_file or StopFile()
+        self._latched, self._stop_file = transport.publisher(STOPS), stop_file or KeptValue(())
         self._stops_told: StopState | None = None
         self._report, self._report_due = transport.publisher(REPORT), 0.0
         self._ticks: deque[float] = deque(maxlen=min(round(rate_hz), _TIMED))
@@ -181,7 +182,7 @@ class Loop:
             self._barrier.hold(self._controller.recorded, now, lambda _: self._state.put(state))
             self._tick_s = statistics.median(self._ticks) if self._ticks else 0.0
         if outputs.stops is not None:
-            self._stop_file.write(outputs.stops)
+            self._stop_file.keep(outputs.stops.stops)
             self._stops_told = outputs.stops
         # What is told to be latched is so after a restart as well; where the disk does not take it, there is a fault.
         if self._stops_told is not None and (self._stop_file.kept or self._stop_file.failure):

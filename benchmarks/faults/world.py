@@ -17,7 +17,7 @@ from bridge.core.bridge import TICK_S, BridgeCore
 from bridge.core.interface import Measurement, Setpoint
 from bridge.core.odometer import Odometer
 from bridge.core.picture import Picture
-from bridge.core.state_memory import Memory
+from bridge.core.state_memory import Remembered
 from bridge.sim.robot.trace import ROW, Trace
 from controller.config import ControllerConfig
 from controller.core import Controller
@@ -30,6 +30,7 @@ from rolling_panda.messages import commands as intents
 from rolling_panda.messages.perception import Obstacles
 from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
 from rolling_panda.model.robot import RobotModel, configuration, pose_message
+from rolling_panda.runtime.latest_file import KeptValue
 from server.auth.sessions import Session
 from server.robots.presence import PresenceTracker
 
@@ -122,7 +123,7 @@ class World:
         if hand_speed is not None:
             self.config = msgspec.structs.replace(self.config, teleop_base_speed=hand_speed)
         self.robot = LaggedRobot(self.config.home)
-        self.memory = Memory()
+        self.memory = KeptValue(Remembered())
         self.bridge = self.new_bridge()
         self.controller = self.new_controller()
         self.motion, self.state, self.odometry = (Link(self.rng) for _ in range(3))

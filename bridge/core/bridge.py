@@ -21,7 +21,7 @@ from bridge.core.odometer import Odometer
 from bridge.core.refusals import Refusals
 from bridge.core.robot_faults import RobotFaults
 from bridge.core.round_trip import RoundTrip
-from bridge.core.state_memory import Memory, Remembered
+from bridge.core.state_memory import Remembered
 from bridge.core.time_ratio import TimeRatio
 from bridge.core.validator import CommandValidator
 from bridge.core.watchdog import Watchdog
@@ -31,6 +31,7 @@ from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.messages.supervision import StopState
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import Limits
+from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.topics import BRIDGE, CLOSE_UP_REQUEST, CUT, MOTION, ODOMETRY, STOPS, TOKEN
 from rolling_panda.transport.zenoh import Rejections
 
@@ -84,7 +85,7 @@ class BridgeCore:
         scenery: SceneryOf | None = None,
         rejections: Rejections | None = None,
         cuts: CutMemory | None = None,
-        memory: Memory | None = None,
+        memory: KeptValue[Remembered] | None = None,
         relaxed_limits: tuple[str, ...] = (),
     ) -> None:
         """Start with the watchdog tripped, at rest, without a stop.
@@ -108,8 +109,8 @@ class BridgeCore:
         self._scenery = scenery
         self._scenery_ticks = round(config.scenery_s / TICK_S)
         self._scenery_revision = -1
-        self._memory = memory or Memory()
-        before = self._memory.remembered
+        self._memory = memory or KeptValue(Remembered())
+        before = self._memory.value
         self._fence = Fence(before.epoch, before.token)
         self._validator = CommandValidator(limits.velocity, config.max_age_s, self._fence)
         #: Whether a restart would know who holds the token; only then they are told.

@@ -8,7 +8,7 @@ import msgspec
 
 from rolling_panda.messages.supervision import StopRecord
 from rolling_panda.messages.types import Epoch
-from rolling_panda.runtime.latest_file import LatestFileWriter
+from rolling_panda.runtime.latest_file import KeptValue, LatestFileWriter
 from rolling_panda.runtime.state_folder import read_kept, replace_durably
 
 _NAME = "bridge.json"
@@ -32,39 +32,7 @@ class Remembered(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     released_by: str = ""
 
 
-class Memory:
-    """Keeps the newest `Remembered`; with a keeper also beyond the process."""
-
-    def __init__(self, remembered: Remembered | None = None, keeper: LatestFileWriter | None = None) -> None:
-        """Begin with what was remembered."""
-        self.remembered = remembered or Remembered()
-        self._keeper = keeper
-
-    @property
-    def failure(self) -> str:
-        """Why the newest is not on disk; empty when it is, or is on its way."""
-        return "" if self._keeper is None else self._keeper.failure
-
-    @property
-    def kept(self) -> bool:
-        """Whether the newest would be remembered after a kill at this moment."""
-        return self._keeper is None or self._keeper.kept
-
-    def keep(self, remembered: Remembered) -> None:
-        """Remember; returns at once."""
-        if remembered == self.remembered:
-            return
-        self.remembered = remembered
-        if self._keeper is not None:
-            self._keeper.keep(msgspec.json.encode(remembered))
-
-    def close(self) -> None:
-        """Have everything on disk."""
-        if self._keeper is not None:
-            self._keeper.close()
-
-
-def open_memory(folder: Path) -> Memory:
+def open_memory(folder: Path) -> KeptValue[Remembered]:
     """The memory kept in a folder.
 
     Raises:
@@ -73,7 +41,7 @@ def open_memory(folder: Path) -> Memory:
     path = folder / _NAME
     remedy = f"look whether the robot may move, then give: rolling-panda bridge --begin-anew --state {folder}"
     remembered = read_kept(path, Remembered, Remembered(), "what the bridge remembers", remedy)
-    return Memory(remembered, LatestFileWriter(path))
+    return KeptValue(remembered, LatestFileWriter(path))
 
 
 def begin_anew(folder: Path) -> str:

@@ -12,7 +12,7 @@ from bridge.config import BridgeConfig
 from bridge.core.bridge import TICK_S, BridgeCore
 from bridge.core.cut_memory import CutMemory
 from bridge.core.odometer import Odometer
-from bridge.core.state_memory import Memory
+from bridge.core.state_memory import Remembered
 from bridge.real.config import CameraConfig, CutterConfig, RealConfig
 from bridge.real.cutter import Cutter, CutterStatus
 from bridge.real.mp500 import Mp500
@@ -24,6 +24,7 @@ from rolling_panda.config import RobotConfig, TransportConfig, load_section
 from rolling_panda.errors import InputError
 from rolling_panda.messages.types import BridgeKind
 from rolling_panda.model.robot import RobotModel
+from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.transport.zenoh import ForeignWire, Rejections
 
 _FIRST_STATE_S = 15.0
@@ -120,7 +121,7 @@ def real_bridge(
     moving: bool = True,
     rejections: Rejections | None = None,
     cuts: CutMemory | None = None,
-    memory: Memory | None = None,
+    memory: KeptValue[Remembered] | None = None,
     fakes: bool = False,
 ) -> BridgeCore:
     """A bridge with the real robot.

@@ -7,7 +7,7 @@ from bridge.config import BridgeConfig
 from bridge.core.bridge import TICK_S, BridgeCore
 from bridge.core.cut_memory import CutMemory
 from bridge.core.odometer import Odometer
-from bridge.core.state_memory import Memory
+from bridge.core.state_memory import Remembered
 from bridge.sim.camera.config import CameraConfig
 from bridge.sim.camera.render_process import CameraRenderer, InlineRenderer, RenderProcess
 from bridge.sim.robot.robot import SimulatedRobot
@@ -19,6 +19,7 @@ from rolling_panda.bounds import wider
 from rolling_panda.config import RobotConfig, load_section
 from rolling_panda.messages.supervision import HardwareStop
 from rolling_panda.model.robot import RobotModel
+from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.transport.zenoh import Onlooker, Rejections
 
 
@@ -29,7 +30,7 @@ def simulated_bridge(
     camera: Literal["inline", "process"] = "inline",
     rejections: Rejections | None = None,
     cuts: CutMemory | None = None,
-    memory: Memory | None = None,
+    memory: KeptValue[Remembered] | None = None,
 ) -> BridgeCore:
     """Bridge core with the simulated robot beside a row grown from `seed`.
 

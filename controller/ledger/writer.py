@@ -9,12 +9,13 @@ from typing import Protocol
 
 import msgspec
 
-from controller.ledger.journal import Kind, LedgerState, Record
+from controller.ledger.journal import LedgerState, Record
 from controller.ledger.session_report import SessionReportBuilder
 from controller.ledger.store import Entry
 from rolling_panda import messages as m
 from rolling_panda.errors import LedgerError
 from rolling_panda.runtime.scheduling import set_priority
+from rolling_panda.runtime.token_bucket import TokenBucket
 
 #: After a failure it tries again this often (s).
 _AGAIN_S = 0.5
@@ -58,7 +59,7 @@ class LedgerWriter:
         self._account = SessionReportBuilder()
         #: Of what is durable; made anew on the writer's thread when something in it changes.
         self.report = self._account.report()
-        self._tokens, self._filled_at, self._left_out = _LINES_AT_ONCE, clock(), 0
+        self._lines, self._left_out = TokenBucket(_LINES_A_SECOND, _LINES_AT_ONCE), 0
         self._thread = threading.Thread(target=self._run, name="ledger", daemon=True)
         self._thread.start()
 
@@ -77,18 +78,14 @@ class LedgerWriter:
 
     def note(self, line: m.LogEvent) -> None:
         """Record a line of another process's log; returns at once. Too many are counted instead."""
-        now = self._clock()
-        self._tokens = min(_LINES_AT_ONCE, self._tokens + (now - self._filled_at) * _LINES_A_SECOND)
-        self._filled_at = now
-        if self._tokens < 1.0:
+        if not self._lines.take(self._clock()):
             self._left_out += 1
             return
-        self._tokens -= 1.0
         if self._left_out:
             text = f"{self._left_out} lines of other processes' logs came too fast to be recorded"
-            self.write([_unnumbered("event", "controller", LeftOut(text, self._left_out))])
+            self.write([Record(0, "event", "controller", LeftOut(text, self._left_out))])
             self._left_out = 0
-        self.write([_unnumbered("event", line.process, line)])
+        self.write([Record(0, "event", line.process, line)])
 
     def close(self) -> None:
         """Write what waits, if that is possible soon, and close the ledger."""
@@ -134,10 +131,6 @@ class LedgerWriter:
 
 def _now() -> str:
     return datetime.now(UTC).isoformat(timespec="microseconds")
-
-
-def _unnumbered(kind: Kind, name: str, body: msgspec.Struct) -> Record:
-    return Record(0, kind, name, body)
 
 
 def _entry(at: str, record: Record) -> Entry:

@@ -1,12 +1,17 @@
-"""Writes the newest content of a small file in the background."""
+"""Writes the newest content of a small file in the background, and keeps the newest value of a type in one."""
 
 import threading
 from pathlib import Path
+from typing import Generic, TypeVar
+
+import msgspec
 
 from rolling_panda.runtime.state_folder import replace_durably
 
 #: Time between attempts after a failed write (s).
 _RETRY_S = 0.5
+
+Value = TypeVar("Value")
 
 
 class LatestFileWriter:
@@ -64,3 +69,39 @@ class LatestFileWriter:
                 self.failure = ""
                 if self._waiting is content:
                     self._waiting = None
+
+
+class KeptValue(Generic[Value]):
+    """The newest value; with a writer it outlives the process.
+
+    Attributes:
+        value: The newest, whether or not it is on disk.
+    """
+
+    def __init__(self, value: Value, writer: LatestFileWriter | None = None) -> None:
+        """Start with the value of an earlier start."""
+        self.value = value
+        self._writer = writer
+
+    @property
+    def failure(self) -> str:
+        """Why the newest value is not on disk; empty when it is, or is being written."""
+        return "" if self._writer is None else self._writer.failure
+
+    @property
+    def kept(self) -> bool:
+        """Whether a restart would find the newest value."""
+        return self._writer is None or self._writer.kept
+
+    def keep(self, value: Value) -> None:
+        """Write the value as JSON in the background; returns at once."""
+        if value == self.value:
+            return
+        self.value = value
+        if self._writer is not None:
+            self._writer.keep(msgspec.json.encode(value))
+
+    def close(self) -> None:
+        """Finish writing."""
+        if self._writer is not None:
+            self._writer.close()

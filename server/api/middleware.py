@@ -13,8 +13,8 @@ from starlette.datastructures import MutableHeaders
 from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from rolling_panda.runtime.token_bucket import TokenBuckets
 from server.auth.sessions import Session, Sessions
-from server.connections.token_bucket import TokenBuckets
 
 _PUBLIC_PATHS = frozenset({"/api/sign-in", "/api/health", "/api/openapi.json"})
 #: Requests with an optional body: one that is too long or too late (s) is ignored, and the request proceeds.

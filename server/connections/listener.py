@@ -15,8 +15,8 @@ from weakref import WeakKeyDictionary
 
 import msgspec
 
+from rolling_panda.runtime.token_bucket import TokenBucket
 from server.config import ServerConfig
-from server.connections.token_bucket import TokenBucket
 
 #: WebSockets may be so much of what an address, or everybody, may have open: the rest is for requests, as the stop is.
 _SOCKETS_SHARE = 2 / 3

@@ -12,8 +12,8 @@ from uvicorn._types import ASGIReceiveEvent, ASGISendEvent
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from uvicorn.server import ServerState
 
+from rolling_panda.runtime.token_bucket import TokenBucket
 from server.connections.http_protocol import LINGER_S, SiteConfig
-from server.connections.token_bucket import TokenBucket
 
 _ENDED = "ended"
 _POLICY, _TRY_AGAIN = 1008, 1013

@@ -15,9 +15,9 @@ from rolling_panda.errors import InputError, ServiceError
 from rolling_panda.messages import commands as intents
 from rolling_panda.messages.commands import EvaluateRule, PlantRequest
 from rolling_panda.messages.page import GizmoAxes, Measured, PagePoints, PageState, PickRay
+from rolling_panda.runtime.token_bucket import TokenBuckets
 from server.auth.sessions import Session
 from server.config import ServerConfig
-from server.connections.token_bucket import TokenBuckets
 from server.robots.event_log import EventLog, LogRateLimiter
 from server.robots.link import RobotLink
 from server.robots.page_view import PageView

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from rolling_panda import messages as m
 from rolling_panda.messages.page import PageEvent
-from server.connections.token_bucket import TokenBucket
+from rolling_panda.runtime.token_bucket import TokenBucket
 
 #: Lines of one source: at once, and per second after that.
 BURST, RATE_HZ = 20.0, 1.0

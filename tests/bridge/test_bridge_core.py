@@ -11,10 +11,11 @@ from bridge.core.cut_memory import ForLife
 from bridge.core.interface import Measurement, Setpoint
 from bridge.core.odometer import Odometer
 from bridge.core.picture import Picture
-from bridge.core.state_memory import Memory, Remembered
+from bridge.core.state_memory import Remembered
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import CloseUpRequest
 from rolling_panda.messages.supervision import StopState
+from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.topics import TOKEN
 from rolling_panda.transport.codec import StrictDecoder, encode
 from rolling_panda.transport.zenoh import Rejections
@@ -172,7 +173,7 @@ def test_the_software_stop_latches_and_release_moves_nothing(bench: Bench) -> No
 
 
 def test_a_latched_stop_survives_a_restart_of_the_bridge(bench: Bench) -> None:
-    memory = Memory()
+    memory = KeptValue(Remembered())
     bench.core = BridgeCore(bench.robot, BridgeConfig(), MODEL.limits, odometer(), "sim", memory=memory)
     bench.drive_on()
     bench.core.on_stop(stop(), bench.now, 5.0)
@@ -191,14 +192,14 @@ def test_a_latched_stop_survives_a_restart_of_the_bridge(bench: Bench) -> None:
     assert third.state.stop_id == ""
 
 
-class Disk(Memory):
+class Disk(KeptValue[Remembered]):
     """A memory whose disk is slow or broken."""
 
     kept, failure = True, ""  # type: ignore[assignment]
 
 
 def test_a_stop_is_told_to_be_latched_once_a_restart_would_find_it(bench: Bench) -> None:
-    disk = Disk()
+    disk = Disk(Remembered())
     bench.core = BridgeCore(bench.robot, BridgeConfig(), MODEL.limits, odometer(), "sim", memory=disk)
     bench.drive_on()
     disk.kept = False  # type: ignore[misc]
@@ -213,7 +214,7 @@ def test_a_stop_is_told_to_be_latched_once_a_restart_would_find_it(bench: Bench)
 
 
 def test_a_bridge_that_cannot_remember_holds_the_robot_and_says_why(bench: Bench) -> None:
-    disk = Disk()
+    disk = Disk(Remembered())
     bench.core = BridgeCore(bench.robot, BridgeConfig(), MODEL.limits, odometer(), "sim", memory=disk)
     bench.drive_on()
     disk.failure, disk.kept = "bridge.json cannot be written: Read-only file system", False  # type: ignore[misc]
@@ -311,7 +312,7 @@ def test_no_cut_before_any_motion_command_or_in_motion_or_from_an_old_view(bench
 
 
 def test_after_a_restart_an_older_token_moves_nothing_and_the_newest_one_goes_on(bench: Bench) -> None:
-    memory = Memory(Remembered(epoch=6, token="before"))
+    memory = KeptValue(Remembered(epoch=6, token="before"))
 
     def started(token: str, epoch: int) -> Bench:
         out = Bench()
@@ -327,7 +328,7 @@ def test_after_a_restart_an_older_token_moves_nothing_and_the_newest_one_goes_on
     assert bench.moved_within(0.4) == 0.0
     bench.run(1.0, REST)
     bench.run(0.2, FORWARD)
-    assert bench.moved_within(0.2) > 0.0 and memory.remembered.epoch == bench.state.epoch == 7
+    assert bench.moved_within(0.2) > 0.0 and memory.value.epoch == bench.state.epoch == 7
     again = started("before", 6)
     assert again.moved_within(0.4) == 0.0
     assert any("older" in row.reason for row in again.state.rejections)
@@ -335,10 +336,10 @@ def test_after_a_restart_an_older_token_moves_nothing_and_the_newest_one_goes_on
 
 
 def test_who_holds_the_token_is_told_once_a_restart_would_know_it(bench: Bench) -> None:
-    class SlowDisk(Memory):
+    class SlowDisk(KeptValue[Remembered]):
         kept = False
 
-    disk = SlowDisk()
+    disk = SlowDisk(Remembered())
     bench.core = BridgeCore(bench.robot, BridgeConfig(), MODEL.limits, odometer(), "sim", memory=disk)
     bench.run(0.2, REST)
     assert bench.state.holder == ""

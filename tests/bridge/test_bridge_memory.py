@@ -8,11 +8,11 @@ from rolling_panda.messages.supervision import StopRecord
 def test_what_is_kept_is_known_after_a_restart(tmp_path):
     kept = Remembered(epoch=9, token="ab", stops=(StopRecord("s1", "server", "ada", "dog", 1.0),), released=("s0",))
     memory = open_memory(tmp_path)
-    assert memory.remembered == Remembered()
+    assert memory.value == Remembered()
     memory.keep(kept)
     memory.close()
     again = open_memory(tmp_path)
-    assert again.remembered == kept and again.failure == ""
+    assert again.value == kept and again.failure == ""
     again.close()
 
 

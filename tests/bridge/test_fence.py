@@ -16,10 +16,11 @@ from bridge.core import fence as f
 from bridge.core.bridge import TICK_S, BridgeCore
 from bridge.core.fence import SILENT_S, Fence
 from bridge.core.odometer import Odometer
-from bridge.core.state_memory import Memory, begin_anew, open_memory
+from bridge.core.state_memory import Remembered, begin_anew, open_memory
 from rolling_panda import messages as m
 from rolling_panda.errors import InputError, MessageError
 from rolling_panda.messages.types import MOST_EPOCHS
+from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.transport.codec import StrictDecoder, encode
 from tests.bridge.test_bridge_core import IdealRobot
 from tests.support.bridge_rig import MODEL, REST
@@ -31,7 +32,7 @@ FILE = "bridge.json"
 DAMAGED = (b"", b"{", b"\x00" * 64, b'{"epoch": 4611686018427387904}', b'{"epoch": -1}', b'{"epoch": 1e9, "stops": 1}')
 
 
-def core(memory: Memory, robot: IdealRobot | None = None) -> BridgeCore:
+def core(memory: KeptValue[Remembered], robot: IdealRobot | None = None) -> BridgeCore:
     config = BridgeConfig(joints_hz=1000.0)
     odometer = Odometer(MODEL.drive, OdometryConfig(), TICK_S)
     return BridgeCore(robot or IdealRobot(), config, MODEL.limits, odometer, "sim", memory=memory)
@@ -46,7 +47,7 @@ class Askers(RuleBasedStateMachine):
         self.now, self.holder, self.epoch, self.heard = 0.0, "", 0, 0.0
         self.sequence = 0
         self.told = 0, ""
-        self.memory: Memory | None = None
+        self.memory: KeptValue[Remembered] | None = None
         self.start()
 
     def start(self) -> None:
@@ -126,7 +127,7 @@ class Askers(RuleBasedStateMachine):
         self.holder, self.epoch = "", 0
         self.start()
         assert self.memory is not None
-        (stop,) = self.memory.remembered.stops
+        (stop,) = self.memory.value.stops
         assert "begins anew" in stop.reason
         assert self.core.on_release(m.ReleaseStop(stop_id=stop.stop_id, user="ada", reason="looked"), self.now).ok
 
@@ -140,7 +141,7 @@ class Askers(RuleBasedStateMachine):
             assert time.monotonic() < end
             time.sleep(0.0005)
         self.tick()
-        assert (self.memory.remembered.epoch, self.memory.remembered.token or "") == (self.epoch, self.holder)
+        assert (self.memory.value.epoch, self.memory.value.token or "") == (self.epoch, self.holder)
         assert self.told == (self.epoch, m.fingerprint(self.holder) if self.holder else "")
 
     @precondition(lambda self: self.memory is not None)
@@ -161,7 +162,7 @@ TestAskers.settings = settings(max_examples=25, stateful_step_count=25, deadline
 
 
 def test_an_epoch_of_ones_own_is_not_accepted_nor_kept() -> None:
-    memory = Memory()
+    memory = KeptValue(Remembered())
     bridge = core(memory)
     for number in range(1, 4):
         bridge.step(number * TICK_S)
@@ -171,7 +172,7 @@ def test_an_epoch_of_ones_own_is_not_accepted_nor_kept() -> None:
             bridge.on_motion(command, number * TICK_S)
     refused = {row.reason: row.count for row in bridge.refusals.counts() if row.topic == "command/motion"}
     assert refused == {f.UNKNOWN_EPOCH: 6}
-    assert (memory.remembered.epoch, memory.remembered.token) == (1, "aa")
+    assert (memory.value.epoch, memory.value.token) == (1, "aa")
 
 
 @pytest.mark.parametrize("epoch", [2**62, MOST_EPOCHS + 1, -1])
@@ -190,7 +191,7 @@ def test_an_absurd_epoch_on_disk_is_told_with_its_cause_and_one_command_ends_it(
     assert main(line.split()[2:]) == 0
     assert "a stop is latched, which a supervisor has to reset" in capsys.readouterr().out
     memory = open_memory(tmp_path)
-    assert memory.remembered.epoch == 0 and len(memory.remembered.stops) == 1
+    assert memory.value.epoch == 0 and len(memory.value.stops) == 1
     memory.close()
     assert (tmp_path / "bridge.aside").read_text().startswith('{"epoch": 46')
 

@@ -2,17 +2,17 @@ import pytest
 
 from controller.stop_file import open_stop_file
 from rolling_panda.errors import InputError
-from rolling_panda.messages.supervision import StopRecord, StopState
+from rolling_panda.messages.supervision import StopRecord
 
 
 def test_latched_stops_are_known_after_a_restart(tmp_path):
     stops = (StopRecord("b", "server", "eve", "dog", 2.0), StopRecord("a", "server", "ada", "", 1.0))
     file = open_stop_file(tmp_path)
-    assert file.stops == ()
-    file.write(StopState(process="controller", stops=stops))
+    assert file.value == ()
+    file.keep(stops)
     file.close()
     again = open_stop_file(tmp_path)
-    assert again.stops == stops
+    assert again.value == stops
     again.close()
 
 

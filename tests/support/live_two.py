@@ -10,7 +10,6 @@ from benchmarks.faults.world import LaggedRobot
 from bridge.config import BridgeConfig, OdometryConfig
 from bridge.core.bridge import TICK_S, BridgeCore
 from bridge.core.odometer import Odometer
-from bridge.core.state_memory import Memory
 from bridge.loop import BridgeLoop
 from controller.config import ControllerConfig
 from controller.core import Controller
@@ -42,7 +41,7 @@ class LiveTwo:
     @contextmanager
     def bridge(self):
         odometer = Odometer(MODEL.drive, OdometryConfig(), TICK_S)
-        core = BridgeCore(self.robot, BridgeConfig(), MODEL.limits, odometer, "sim", memory=Memory())
+        core = BridgeCore(self.robot, BridgeConfig(), MODEL.limits, odometer, "sim")
         with self.transport("bridge") as transport:
             loop, stopping = BridgeLoop(core, transport), threading.Event()
             with running(loop.run, stopping):

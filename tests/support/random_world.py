@@ -13,7 +13,7 @@ import numpy as np
 from bridge.config import BridgeConfig, OdometryConfig
 from bridge.core.bridge import BridgeCore
 from bridge.core.odometer import Odometer
-from bridge.core.state_memory import Memory
+from bridge.core.state_memory import Remembered
 from controller.config import ControllerConfig
 from controller.core import Controller
 from controller.inputs import Sample
@@ -24,6 +24,7 @@ from rolling_panda.config import RobotConfig
 from rolling_panda.messages import commands as intents
 from rolling_panda.messages.perception import Obstacles
 from rolling_panda.messages.supervision import BaseVelocity, Person, Presence, TeleopTarget
+from rolling_panda.runtime.latest_file import KeptValue
 from server.robots.presence import PRESENT_S
 from tests.support.fake_wire import as_received
 from tests.support.random_judge import Judge
@@ -49,7 +50,7 @@ class World:
         self.chance = Movement.chance = random.Random(seed)
         self.judge = Judge()
         self.robot = Robot(self.judge, self.chance)
-        self.memory, self.cut_disk = Memory(), CutDisk(self.chance)
+        self.memory, self.cut_disk = KeptValue(Remembered()), CutDisk(self.chance)
         self.now, self.steps, self.starts, self.number = 0.0, 0, 0, 0
         self.people = {name: Somebody() for name in PEOPLE}
         self.names, self.offsets, self.revision = ["p0", "p1", "p2"], [0.0] * 3, 1

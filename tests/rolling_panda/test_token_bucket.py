@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.connections.token_bucket import TokenBucket, TokenBuckets
+from rolling_panda.runtime.token_bucket import TokenBucket, TokenBuckets
 
 
 def test_a_page_at_work_is_never_refused():
