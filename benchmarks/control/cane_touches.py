@@ -2,8 +2,7 @@
 
 from collections.abc import Collection, Iterable
 
-from bridge.sim.vineyard.row import Rod, Row
-from bridge.sim.vineyard.truth import judge
+from bridge.sim.vineyard.row import Rod
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.collision_geometry import BLADES
 from controller.whole_body.obstacle import Obstacle
@@ -59,17 +58,6 @@ class CaneTouches:
                 self.touched.setdefault(self._canes[b], set()).add(a)
                 if b in self._staying:
                     self.touched_staying.setdefault(self._canes[b], set()).add(a)
-
-
-def staying_rods(row: Row) -> frozenset[int]:
-    """Rods of the canes that the judge keeps, below the one that is cut through; `row` has not been cut yet."""
-    truth = {(spur.vine, spur.spur): spur for spur in judge(row)}
-    out = set()
-    for number, rod in row.standing():
-        spur = truth.get((rod.vine, rod.spur))
-        if spur is not None and spur.cut is not None and rod.cane == spur.keeper and number < spur.cut.rod:
-            out.add(number)
-    return frozenset(out)
 
 
 def _point(at: Array) -> tuple[float, float, float]:

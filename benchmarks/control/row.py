@@ -19,7 +19,7 @@ from msgspec.structs import replace
 
 from benchmarks.common.closed_loop import ClosedLoop
 from benchmarks.common.documents import machine, one_row_a_line
-from benchmarks.control.cane_touches import Cane, CaneTouches, staying_rods
+from benchmarks.control.cane_touches import Cane, CaneTouches
 from benchmarks.control.cut_truth import true_cut
 from benchmarks.control.row_report import Cut, RowRun, mean_stages, summarise, tell, tell_stages
 from benchmarks.control.row_stages import StageClock
@@ -27,7 +27,7 @@ from benchmarks.control.row_walk import walk
 from bridge.sim.robot import trace
 from bridge.sim.robot.robot import SimulatedRobot
 from bridge.sim.vineyard.row import Row
-from bridge.sim.vineyard.truth import judge
+from bridge.sim.vineyard.truth import judge, staying_rods
 from controller.config import ControllerConfig
 from controller.motion.follower import Tracking
 from controller.whole_body.registry import METHODS

@@ -6,17 +6,15 @@ Run `rolling-panda bench perception --growth --vines 30 --segmenter labels`.
 import time
 from dataclasses import dataclass
 
-import msgspec
 import numpy as np
 
-from benchmarks.perception.points import camera_frame, survey_arm
 from bridge.sim.camera.config import CameraConfig
+from bridge.sim.camera.frame import survey_frame
 from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from perception.pipeline import Perception
-from rolling_panda import messages as m
-from rolling_panda.model.robot import RobotModel, configuration
+from rolling_panda.model.robot import RobotModel
 
 #: The camera stands so far ahead of the base in the survey posture (m).
 _CAMERA_AHEAD = 0.5
@@ -55,15 +53,12 @@ def grow_long(seed: int, vines: int, step: float, perception: Perception, model:
     """
     config = VineyardConfig(vines=vines)
     row, camera = grow(config, seed), Camera(CameraConfig(), seed)
-    position = msgspec.convert((0.0, 0.0, *survey_arm()), m.Actuated)
     sequence, out = 0, []
     for vine in range(vines):
         start = config.first_vine_x + (vine - 0.5) * config.vine_spacing - _CAMERA_AHEAD
         times, points = [], 0
         for x in np.arange(start, start + config.vine_spacing - step / 2, step):
-            base = m.PlanarPose(float(x), 0.0, 0.0)
-            place = model.pose(configuration(base, position), model.camera_id).homogeneous
-            frame = camera_frame(camera.render(row, place, sequence), camera, base, position, sequence)
+            frame = survey_frame(camera, row, model, sequence, float(x))
             began = time.process_time()
             points = len(perception.process(frame).points)
             times.append(1000 * (time.process_time() - began))

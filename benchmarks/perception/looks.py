@@ -8,8 +8,8 @@ import numpy as np
 
 from benchmarks.common.intervals import Figure, quantile, share
 from benchmarks.perception.judge import JudgedPoint, RowJudge
-from benchmarks.perception.points import camera_frame, survey_arm
 from bridge.config import BridgeConfig
+from bridge.sim.camera.frame import camera_frame, survey_place
 from bridge.sim.camera.renderer import Camera
 from bridge.sim.robot.cutter import close_blades
 from bridge.sim.vineyard.row import Array, Row
@@ -56,7 +56,7 @@ class CloseCamera:
     def __init__(self, camera: Camera, segmenter: Segmenter, config: PerceptionConfig, model: RobotModel) -> None:
         """Bind the camera of a row; `config` as perception has it, with the segmenter's width bias."""
         self._camera, self._segmenter, self._config, self._model = camera, segmenter, config, model
-        self._base, self._position = m.PlanarPose(), msgspec.convert((0.0, 0.0, *survey_arm()), m.Actuated)
+        self._base, self._position = survey_place()
         self._taken = _FIRST
 
     def look(self, row: Row, T_odom_camera: Array, point: m.PruningPoint) -> CloseUpResult:

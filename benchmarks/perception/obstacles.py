@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from benchmarks.common.documents import machine
 from benchmarks.common.intervals import quantile
 from benchmarks.perception.obstacle_judge import KINDS, ObstacleJudge, Verdict
-from benchmarks.perception.points import camera_frame, survey_arm
 from bridge.sim.camera.config import CameraConfig
+from bridge.sim.camera.frame import camera_frame, camera_pose, survey_place
 from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
@@ -35,7 +35,7 @@ from perception.segmentation.frame import View, decode_frame
 from perception.segmentation.segmenter import SEGMENTERS, Segmenter, choose_segmenter
 from rolling_panda import messages as m
 from rolling_panda.errors import RollingPandaError
-from rolling_panda.model.robot import RobotModel, configuration
+from rolling_panda.model.robot import RobotModel
 
 CONDITIONS = ("standing", "survey", "work")
 #: Two that were seen to go wrong, and eight that nobody had looked at.
@@ -94,7 +94,7 @@ def places_of(condition: str, number: int, seconds: float) -> list[Place]:
         number: Of the row in this run.
         seconds: Simulated.
     """
-    position = msgspec.convert((0.0, 0.0, *survey_arm()), m.Actuated)
+    _, position = survey_place()
     if condition == "standing":
         return [Place(m.PlanarPose(_PLACES[number % len(_PLACES)]), position)] * round(seconds * _RESTING_HZ)
     frames = round(seconds * _MOVING_HZ)
@@ -172,8 +172,7 @@ def run(
 def _camera(place: Place, model: RobotModel) -> Array:
     if place.camera:
         return np.array(place.camera).reshape(4, 4)
-    out: Array = model.pose(configuration(place.base, place.position), model.camera_id).homogeneous
-    return out
+    return camera_pose(model, place.base, place.position)
 
 
 def summarise(outcomes: Sequence[Outcome]) -> dict[str, float | int | None]:

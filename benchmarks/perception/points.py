@@ -7,18 +7,15 @@ import argparse
 import json
 import statistics
 import time
-import tomllib
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-import msgspec
 import numpy as np
-from msgspec import Struct
 
-from bridge.core.picture import encode_picture
 from bridge.sim.camera.config import CameraConfig
-from bridge.sim.camera.renderer import Camera, RgbdImage
+from bridge.sim.camera.frame import camera_frame, camera_pose, survey_place
+from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from bridge.sim.vineyard.row import Array, Row
@@ -27,9 +24,7 @@ from perception.config import PerceptionConfig
 from perception.pipeline import Perception
 from perception.segmentation.segmenter import LabelImageSegmenter
 from rolling_panda import messages as m
-from rolling_panda.messages.robot import CameraFrame
-from rolling_panda.model.robot import RobotModel, configuration
-from rolling_panda.resources import resource
+from rolling_panda.model.robot import RobotModel
 
 #: A spur is in view when its stub and its cut are this far inside the image (px).
 _MARGIN = 12.0
@@ -89,36 +84,6 @@ class Score:
         }
 
 
-def camera_frame(
-    image: RgbdImage, camera: Camera, base: m.PlanarPose, position: m.Actuated, sequence: int
-) -> CameraFrame:
-    """What the bridge would send for an image."""
-    picture = encode_picture(camera.intrinsics, image.color, image.depth, image.labels)
-    return CameraFrame(
-        header=m.Header(float(sequence), "camera"),
-        sequence=sequence,
-        intrinsics=camera.intrinsics,
-        base=base,
-        position=position,
-        color_jpeg=picture.color_jpeg,
-        depth_zlib=picture.depth_zlib,
-        depth_unit=picture.depth_unit,
-        labels_zlib=picture.labels_zlib,
-    )
-
-
-class _Home(Struct, frozen=True):
-    """The one key of the controller's section that is needed here."""
-
-    home: tuple[float, ...]
-
-
-def survey_arm() -> tuple[float, ...]:
-    """The controller's survey posture (7, rad)."""
-    document = tomllib.loads(resource("assets/config/sim.toml").read_text(encoding="utf-8"))
-    return msgspec.convert(document["controller"], _Home).home
-
-
 def evaluate(seed: int, x: float = 0.0, frames: int = 4, model: RobotModel | None = None) -> Score:
     """Look at one row from one place and compare with the judge.
 
@@ -132,9 +97,8 @@ def evaluate(seed: int, x: float = 0.0, frames: int = 4, model: RobotModel | Non
     row = grow(VineyardConfig(), seed)
     camera = Camera(CameraConfig(), seed)
     perception = Perception(PerceptionConfig(), LabelImageSegmenter(), model)
-    base = m.PlanarPose(x, 0.0, 0.0)
-    position = msgspec.convert((0.0, 0.0, *survey_arm()), m.Actuated)
-    T_odom_camera = model.pose(configuration(base, position), model.camera_id).homogeneous
+    base, position = survey_place(x)
+    T_odom_camera = camera_pose(model, base, position)
     score = Score(views=1)
     points: tuple[m.PruningPoint, ...] = ()
     for sequence in range(frames):

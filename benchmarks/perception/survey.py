@@ -27,8 +27,8 @@ from benchmarks.perception.growth import grow_long, table
 from benchmarks.perception.guyot_judge import GuyotJudge
 from benchmarks.perception.judge import JudgedPoint, RowJudge
 from benchmarks.perception.looks import CloseCamera, Looks, look_again, summarise_looks
-from benchmarks.perception.points import camera_frame, survey_arm
 from bridge.sim.camera.config import CameraConfig
+from bridge.sim.camera.frame import camera_frame, camera_pose, survey_place
 from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
@@ -38,7 +38,7 @@ from perception.segmentation.frame import decode_frame
 from perception.segmentation.segmenter import SEGMENTERS, choose_segmenter
 from rolling_panda import messages as m
 from rolling_panda.errors import RollingPandaError
-from rolling_panda.model.robot import RobotModel, configuration
+from rolling_panda.model.robot import RobotModel
 
 #: Vines of a row, and the way between two frames (m): the survey drives at 0.15 m/s, and the camera takes two a second.
 ROW_VINES, STEP = 3, 0.075
@@ -97,14 +97,13 @@ def survey_row(
     row = grow(config, seed)
     camera = Camera(camera_config, seed)
     opinion = GuyotJudge(row, seed) if guyot else RowJudge(row, seed)
-    position = msgspec.convert((0.0, 0.0, *survey_arm()), m.Actuated)
     first = config.first_vine_x - config.vine_spacing / 2
     last = first + vines * config.vine_spacing
     points: tuple[m.PruningPoint, ...] = ()
     left_open: tuple[m.UndecidedSite, ...] = ()
     for sequence, x in enumerate(np.arange(first, last + step, step) - _CAMERA_AHEAD):
-        base = m.PlanarPose(float(x), 0.0, 0.0)
-        place = model.pose(configuration(base, position), model.camera_id).homogeneous
+        base, position = survey_place(float(x))
+        place = camera_pose(model, base, position)
         image = camera.render(row, place, sequence)
         frame = camera_frame(image, camera, base, position, sequence)
         opinion.look(image, camera.intrinsics, place)
@@ -116,8 +115,8 @@ def survey_row(
     judged = [opinion.point(point) for point in points]
     for point, verdict in zip(points, judged, strict=True):
         if gallery is not None and not verdict.right:
-            base = m.PlanarPose(point.position[0] - _CAMERA_AHEAD, 0.0, 0.0)
-            place = model.pose(configuration(base, position), model.camera_id).homogeneous
+            base, position = survey_place(point.position[0] - _CAMERA_AHEAD)
+            place = camera_pose(model, base, position)
             image = camera.render(row, place, 10**6)
             view = decode_frame(camera_frame(image, camera, base, position, 0), model)
             save_failure(gallery, verdict, point, row, camera, place, perception.segmenter.segment(view), image.color)

@@ -7,15 +7,14 @@ import pytest
 
 from benchmarks.perception.obstacle_judge import ObstacleJudge
 from benchmarks.perception.obstacles import CONDITIONS, main, pictured, places_of
-from benchmarks.perception.points import survey_arm
 from bridge.sim.camera.config import CameraConfig
+from bridge.sim.camera.frame import camera_pose, survey_place
 from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from perception.config import ObstacleConfig
-from rolling_panda import messages as m
 from rolling_panda.messages.perception import Capsule
-from rolling_panda.model.robot import RobotModel, configuration
+from rolling_panda.model.robot import RobotModel
 
 NEAR = {"standing": 1e-9, "survey": 0.16, "work": 0.4}
 FRAMES = {"standing": 300, "survey": 1200, "work": 1200}
@@ -35,7 +34,7 @@ def test_ten_minutes_have_as_many_frames_as_the_camera_takes_and_no_more_picture
 def judged(*capsules):
     row, config = grow(VineyardConfig(), 1), ObstacleConfig()
     judge, camera, model = ObstacleJudge(row, config), Camera(CameraConfig(), 1), RobotModel()
-    place = model.pose(configuration(m.PlanarPose(), (0.0, 0.0, *survey_arm())), model.camera_id).homogeneous
+    place = camera_pose(model, *survey_place())
     for number in range(config.min_hits):
         judge.see(camera.render(row, place, number), camera.intrinsics, place)
     judge.judge(capsules, final=True)

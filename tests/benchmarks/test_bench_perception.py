@@ -7,6 +7,7 @@ import pytest
 from PIL import Image
 
 from benchmarks.perception.judge import RowJudge
+from benchmarks.perception.points import evaluate
 from benchmarks.perception.survey import STEP, Survey, main, summarise
 from bridge.config import BridgeConfig
 from bridge.sim.camera.config import CameraConfig
@@ -150,3 +151,12 @@ def test_wrong_points_are_pictured(tmp_path, monkeypatch):
         half = picture.shape[1] // 2
         colors = [len(np.unique(side.reshape(-1, 3), axis=0)) for side in (picture[:, :half], picture[:, half:])]
         assert colors[1] < 15 < colors[0]
+
+
+@pytest.mark.parametrize("seed", [3, 101])
+def test_points_of_a_rendered_row_are_where_a_grower_would_cut(seed):
+    score = evaluate(seed)
+    assert score.points >= 4
+    assert score.right_place >= 0.8 * score.points
+    assert np.median(np.abs(score.along)) < 0.003
+    assert np.median(score.off_axis) < 0.003

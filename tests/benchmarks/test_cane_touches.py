@@ -1,10 +1,10 @@
 import numpy as np
 
-from benchmarks.control.cane_touches import CaneTouches, staying_rods
+from benchmarks.control.cane_touches import CaneTouches
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from bridge.sim.vineyard.row import Rod
-from bridge.sim.vineyard.truth import judge
+from bridge.sim.vineyard.truth import judge, staying_rods
 from controller.config import ControllerConfig
 from rolling_panda.model.robot import ARM_Q, RobotModel
 

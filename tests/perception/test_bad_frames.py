@@ -8,18 +8,17 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from benchmarks.perception.points import camera_frame, survey_arm
 from bridge.sim.camera.config import CameraConfig
+from bridge.sim.camera.frame import survey_frame
 from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from perception.config import CloseUpConfig, PerceptionConfig
 from perception.pipeline import Perception
 from perception.segmentation.segmenter import choose_segmenter
-from rolling_panda import messages as m
 from rolling_panda.errors import MessageError
 from rolling_panda.messages.robot import CameraFrame
-from rolling_panda.model.robot import RobotModel, configuration
+from rolling_panda.model.robot import RobotModel
 
 #: So many of the same frame show a point where the frame is good.
 AGAIN = 4
@@ -48,9 +47,7 @@ def model() -> RobotModel:
 @pytest.fixture(scope="module")
 def good(model: RobotModel) -> CameraFrame:
     camera = Camera(CameraConfig(), 1)
-    base, position = m.PlanarPose(), msgspec.convert((0.0, 0.0, *survey_arm()), m.Actuated)
-    place = model.pose(configuration(base, position), model.camera_id).homogeneous
-    return camera_frame(camera.render(grow(VineyardConfig(), 1), place, 0), camera, base, position, 0)
+    return survey_frame(camera, grow(VineyardConfig(), 1), model, 0)
 
 
 def perception(model: RobotModel, name: str) -> Perception:

@@ -2,12 +2,11 @@
 
 from dataclasses import dataclass, replace
 
-import msgspec
 import numpy as np
 import pytest
 
-from benchmarks.perception.points import camera_frame, survey_arm
 from bridge.sim.camera.config import CameraConfig
+from bridge.sim.camera.frame import camera_frame, survey_place
 from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
@@ -24,8 +23,7 @@ from rolling_panda.model.robot import RobotModel, configuration
 
 SEED = 210
 MODEL = RobotModel()
-BASE = m.PlanarPose()
-POSTURE = msgspec.convert((0.0, 0.0, *survey_arm()), m.Actuated)
+BASE, POSTURE = survey_place()
 Q = configuration(BASE, POSTURE)
 T_TOOL_CAMERA = MODEL.pose(Q, MODEL.tool_id).inverse() * MODEL.pose(Q, MODEL.camera_id)
 SEES = LabelImageSegmenter()

@@ -3,8 +3,8 @@ import math
 import numpy as np
 import pytest
 
-from benchmarks.perception.points import camera_frame, survey_arm
 from bridge.sim.camera.config import CameraConfig
+from bridge.sim.camera.frame import survey_arm, survey_frame
 from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
@@ -13,9 +13,8 @@ from perception.obstacles.obstacle_map import ObstacleMap
 from perception.pipeline import Perception
 from perception.segmentation.frame import decode_frame
 from perception.segmentation.segmenter import LabelImageSegmenter, choose_segmenter
-from rolling_panda import messages as m
 from rolling_panda.messages.perception import Capsule
-from rolling_panda.model.robot import RobotModel, configuration
+from rolling_panda.model.robot import RobotModel
 
 
 def distance(point, start, end):
@@ -32,11 +31,8 @@ def seen(request):
     camera, known = Camera(CameraConfig(), request.param), ObstacleMap(ObstacleConfig())
     capsules: tuple[Capsule, ...] = ()
     for x in (-0.4, 0.4):
-        base, position = m.PlanarPose(x), (0.0, 0.0, *survey_arm())
-        place = model.pose(configuration(base, position), model.camera_id).homogeneous
         for k in range(4):
-            frame = camera_frame(camera.render(row, place, k), camera, base, position, k)
-            view = decode_frame(frame, model)
+            view = decode_frame(survey_frame(camera, row, model, k, x), model)
             capsules = known.update(view, LabelImageSegmenter().segment(view))
     return row, capsules
 
@@ -73,11 +69,9 @@ def elbow(angle):
 def test_what_the_network_takes_for_wood_near_by_or_turned_over_is_nothing_in_the_way(after):
     model, row, camera = RobotModel(), grow(VineyardConfig(), 0), Camera(CameraConfig(), 0)
     seen, number = Perception(PerceptionConfig(), choose_segmenter("network", threads=1), model), 0
-    for base, arm, frames in ((m.PlanarPose(), survey_arm(), 5), (m.PlanarPose(0.0615), after, 8)):
-        position = (0.0, 0.0, *arm)
-        place = model.pose(configuration(base, position), model.camera_id).homogeneous
+    for x, arm, frames in ((0.0, survey_arm(), 5), (0.0615, after, 8)):
         for _ in range(frames):
-            seen.process(camera_frame(camera.render(row, place, number), camera, base, position, number))
+            seen.process(survey_frame(camera, row, model, number, x, arm))
             number += 1
         if frames == 5:
             points = {point.point_id for point in seen.points().points}
@@ -98,9 +92,7 @@ def test_while_a_joint_is_jogged_nothing_is_taken_for_cut_or_left_open():
     told = []
     for number, turned in enumerate([0.0] * 6 + [0.9, 1.0, 1.1, 1.2, 1.2, 1.2, 1.2, 1.2]):
         arm = np.array(survey_arm()) + [0.0, 0.0, 0.0, turned, 0.0, 0.0, 0.0]
-        base, position = m.PlanarPose(0.2), (0.0, 0.0, *arm.tolist())
-        place = model.pose(configuration(base, position), model.camera_id).homogeneous
-        points = seen.process(camera_frame(camera.render(row, place, number), camera, base, position, number))
+        points = seen.process(survey_frame(camera, row, model, number, 0.2, tuple(arm.tolist())))
         told.append(({point.point_id for point in points.points}, len(points.undecided_sites)))
     assert told[5][0] and all(each == told[5] for each in told[6:])
 
@@ -111,19 +103,15 @@ def test_nothing_seen_is_nothing_known():
 
 def blank_view():
     camera = Camera(CameraConfig(width=64, height=48), 0)
-    model, base, position = RobotModel(), m.PlanarPose(), (0.0, 0.0, *survey_arm())
-    place = model.pose(configuration(base, position), model.camera_id).homogeneous
-    empty = grow(VineyardConfig(first_vine_x=500.0), 0)
-    return decode_frame(camera_frame(camera.render(empty, place, 0), camera, base, position, 0), model)
+    model, empty = RobotModel(), grow(VineyardConfig(first_vine_x=500.0), 0)
+    return decode_frame(survey_frame(camera, empty, model, 0), model)
 
 
 def test_of_too_many_rods_the_nearest_are_told():
-    camera, model = Camera(CameraConfig(), 1), RobotModel()
-    row, base, position = grow(VineyardConfig(), 1), m.PlanarPose(), (0.0, 0.0, *survey_arm())
-    place = model.pose(configuration(base, position), model.camera_id).homogeneous
+    camera, model, row = Camera(CameraConfig(), 1), RobotModel(), grow(VineyardConfig(), 1)
     every, few = ObstacleMap(ObstacleConfig()), ObstacleMap(ObstacleConfig(max_capsules=8))
     for k in range(4):
-        view = decode_frame(camera_frame(camera.render(row, place, k), camera, base, position, k), model)
+        view = decode_frame(survey_frame(camera, row, model, k), model)
         labels = LabelImageSegmenter().segment(view)
         known, told = every.update(view, labels), few.update(view, labels)
     assert len(told) == 6 < len(known) and set(told) <= set(known)

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.perception.points import camera_frame, survey_arm
 from bridge.sim.camera.config import CameraConfig
+from bridge.sim.camera.frame import camera_frame, camera_pose, survey_place
 from bridge.sim.camera.renderer import Camera
 from bridge.sim.camera.sensors import depth_sensor
 from bridge.sim.vineyard.config import VineyardConfig
@@ -17,9 +17,8 @@ from perception.obstacles.cylinder_fit import fit_cylinders
 from perception.obstacles.obstacle_map import ObstacleMap
 from perception.obstacles.occupancy import OccupiedCells
 from perception.segmentation.frame import decode_frame
-from rolling_panda import messages as m
 from rolling_panda.messages.types import WOOD_CLASSES
-from rolling_panda.model.robot import RobotModel, configuration
+from rolling_panda.model.robot import RobotModel
 
 POST, TRUNK, CORDON = (WOOD_CLASSES.index(kind) for kind in ("post", "trunk", "cordon"))
 
@@ -31,9 +30,8 @@ class Standing:
         self.row, self.config, model = grow(VineyardConfig(), seed), CameraConfig(), RobotModel()
         self.row = replace(self.row, rods=tuple(None if rod.kind == without else rod for rod in self.row.rods))
         camera = Camera(self.config.ideal(), seed)
-        base, position = m.PlanarPose(x), (0.0, 0.0, *survey_arm())
-        place = model.pose(configuration(base, position), model.camera_id).homogeneous
-        image = camera.render(self.row, place, 0)
+        base, position = survey_place(x)
+        image = camera.render(self.row, camera_pose(model, base, position), 0)
         self.view = decode_frame(camera_frame(image, camera, base, position, 0), model)
         self.labels, self._rng = image.labels, np.random.default_rng(seed)
         thick = np.array([0.0 if rod is None else rod.start_radius + rod.end_radius for rod in self.row.rods])

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.perception.points import camera_frame, evaluate, survey_arm
 from bridge.sim.camera.config import CameraConfig
+from bridge.sim.camera.frame import survey_frame
 from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
@@ -21,7 +21,7 @@ from rolling_panda import messages as m
 from rolling_panda.errors import MessageError
 from rolling_panda.messages.commands import AddPoint, AddPointInImage, EvaluateRule, MovePoint, SetRule, UndoRule
 from rolling_panda.messages.perception import point_digest
-from rolling_panda.model.robot import RobotModel, configuration
+from rolling_panda.model.robot import RobotModel
 from rolling_panda.transport.codec import StrictDecoder, encode
 
 
@@ -34,23 +34,11 @@ def model():
 def frames(model):
     row = grow(VineyardConfig(), 1)
     camera = Camera(CameraConfig(), 1)
-    base = m.PlanarPose()
-    position = msgspec.convert((0.0, 0.0, *survey_arm()), m.Actuated)
-    place = model.pose(configuration(base, position), model.camera_id).homogeneous
-    return [camera_frame(camera.render(row, place, k), camera, base, position, k) for k in range(4)]
+    return [survey_frame(camera, row, model, k) for k in range(4)]
 
 
 def perception(model):
     return Perception(PerceptionConfig(), LabelImageSegmenter(), model)
-
-
-@pytest.mark.parametrize("seed", [3, 101])
-def test_points_of_a_rendered_row_are_where_a_grower_would_cut(model, seed):
-    score = evaluate(seed, model=model)
-    assert score.points >= 4
-    assert score.right_place >= 0.8 * score.points
-    assert np.median(np.abs(score.along)) < 0.003
-    assert np.median(score.off_axis) < 0.003
 
 
 def test_points_show_after_they_were_seen_often_enough_and_keep_their_names(model, frames):

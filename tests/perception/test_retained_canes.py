@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.control.cane_touches import staying_rods
-from benchmarks.perception.points import camera_frame, survey_arm
 from bridge.sim.camera.config import CameraConfig
+from bridge.sim.camera.frame import survey_frame
 from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
+from bridge.sim.vineyard.truth import staying_rods
 from perception.config import ObstacleConfig, PerceptionConfig, RuleConfig
 from perception.pipeline import Perception
 from perception.plant.map import PlantMap
@@ -27,7 +27,7 @@ from perception.tracking.tracker import Proposal
 from rolling_panda import messages as m
 from rolling_panda.messages.commands import SetRule
 from rolling_panda.messages.robot import Intrinsics
-from rolling_panda.model.robot import RobotModel, configuration
+from rolling_panda.model.robot import RobotModel
 
 CONFIG, RULE = ObstacleConfig(), RuleConfig()
 GUYOT = RuleConfig(system="guyot")
@@ -190,10 +190,8 @@ def surveyed():
     """A row as it grew, and perception after five frames from the start posture."""
     model, row, camera = RobotModel(), grow(VineyardConfig(), 3), Camera(CameraConfig(), 3)
     seen = Perception(PerceptionConfig(), LabelImageSegmenter(), model)
-    base, position = m.PlanarPose(), (0.0, 0.0, *survey_arm())
-    place = model.pose(configuration(base, position), model.camera_id).homogeneous
     for k in range(5):
-        seen.process(camera_frame(camera.render(row, place, k), camera, base, position, k))
+        seen.process(survey_frame(camera, row, model, k))
     return row, seen
 
 
@@ -231,11 +229,9 @@ def test_a_new_rule_leaves_other_wood(surveyed):
     model, camera = RobotModel(), Camera(CameraConfig(), 3)
     before = max(c.end[2] for c in canes(seen))
     assert seen.answer(SetRule(user="ada", rule=m.PruningRule(nodes_kept=3))).ok
-    base, position = m.PlanarPose(), (0.0, 0.0, *survey_arm())
-    place = model.pose(configuration(base, position), model.camera_id).homogeneous
     # The canes need not be in view for that.
     elsewhere = grow(VineyardConfig(first_vine_x=500.0), 0)
-    seen.process(camera_frame(camera.render(elsewhere, place, 9), camera, base, position, 9))
+    seen.process(survey_frame(camera, elsewhere, model, 9))
     assert max(c.end[2] for c in canes(seen)) > before + 0.04, "a node more stays"
 
 
@@ -244,10 +240,8 @@ def test_without_canes_rods_alone_are_told(surveyed):
     config = PerceptionConfig(obstacles=ObstacleConfig(canes=False))
     model, camera = RobotModel(), Camera(CameraConfig(), 3)
     seen = Perception(config, LabelImageSegmenter(), model)
-    base, position = m.PlanarPose(), (0.0, 0.0, *survey_arm())
-    place = model.pose(configuration(base, position), model.camera_id).homogeneous
     for k in range(4):
-        seen.process(camera_frame(camera.render(row, place, k), camera, base, position, k))
+        seen.process(survey_frame(camera, row, model, k))
     assert seen.obstacles and not canes(seen)
 
 

@@ -94,6 +94,17 @@ def judge(row: Row) -> tuple[SpurTruth, ...]:
     return tuple(_judge_spur(row, stubs[place], place, chains[place]) for place in sorted(chains) if place in stubs)
 
 
+def staying_rods(row: Row) -> frozenset[int]:
+    """Rods of the canes that the judge keeps, below the one that is cut through; `row` has not been cut yet."""
+    truth = {(spur.vine, spur.spur): spur for spur in judge(row)}
+    out = set()
+    for number, rod in row.standing():
+        spur = truth.get((rod.vine, rod.spur))
+        if spur is not None and spur.cut is not None and rod.cane == spur.keeper and number < spur.cut.rod:
+            out.add(number)
+    return frozenset(out)
+
+
 def _judge_spur(
     row: Row, stub_index: int, place: tuple[int, int], chains: dict[int, list[tuple[int, Rod]]]
 ) -> SpurTruth:
