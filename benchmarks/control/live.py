@@ -19,9 +19,9 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.common.documents import machine
-from benchmarks.page.demo_under_test import Demo
 from benchmarks.page.load import cores_between, processor_times
 from rolling_panda.resources import resource
+from tests.support.processes.demo import Demo
 
 #: How far a held target swings to either side of where the tool was (m), and how fast it goes round (s).
 _SWING, _ROUND_S = 0.08, 6.0

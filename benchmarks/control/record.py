@@ -22,7 +22,6 @@ import psutil
 
 from benchmarks.common.documents import machine
 from benchmarks.control.live import configured, watch
-from benchmarks.page.demo_under_test import Demo
 from rolling_panda import messages as m
 from rolling_panda.config import TransportConfig
 from rolling_panda.errors import InputError
@@ -31,6 +30,7 @@ from rolling_panda.runtime.process import ROBOT_ID
 from rolling_panda.topics import JOINTS, MOTION
 from rolling_panda.transport.access import RECORDER
 from rolling_panda.transport.zenoh import Onlooker
+from tests.support.processes.demo import Demo
 
 #: What recording may add to the 99th percentile of the answers (s).
 LIMIT_S = 0.002

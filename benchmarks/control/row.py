@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace
 
-from benchmarks.common.closed_loop import ClosedLoop
 from benchmarks.common.documents import machine, one_row_a_line
 from benchmarks.control.cane_touches import Cane, CaneTouches
 from benchmarks.control.cut_truth import true_cut
@@ -36,6 +35,7 @@ from rolling_panda import messages as m
 from rolling_panda.config import load_section
 from rolling_panda.messages import commands as intents
 from rolling_panda.resources import resource
+from tests.support.worlds.closed_loop import ClosedLoop
 
 #: A point in another state than these has ended: cut, given up, or void after a closer look.
 _OPEN: tuple[m.PointState, ...] = ("ACCEPTED", "CUTTING")

@@ -5,12 +5,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from benchmarks.common.closed_loop import ClosedLoop
 from controller.config import ControllerConfig
 from controller.motion.follower import Tracking
 from rolling_panda.config import RobotConfig
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_XI, RobotModel
+from tests.support.worlds.closed_loop import ClosedLoop
 
 #: Stages in the order of a cut.
 STAGES = ("standing", "transfer", "advance", "slow", "settle", "blades", "retreat")

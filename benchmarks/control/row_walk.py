@@ -3,10 +3,10 @@
 import math
 from dataclasses import replace
 
-from benchmarks.common.closed_loop import ClosedLoop
 from controller.inputs import Sample
 from rolling_panda.messages import commands as intents
 from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
+from tests.support.worlds.closed_loop import ClosedLoop
 
 _USER = "bench"
 #: How often the operator looks at what was found (s), and how long they let the camera look at a new place (s).

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.common.documents import machine, one_row_a_line
-from benchmarks.common.kinematic_robot import KinematicRobot
 from benchmarks.control.tick_parts import Recorder, Times, measure_parts, obstacles
 from benchmarks.peers.run import run_peers
 from controller.config import ControllerConfig
@@ -22,6 +21,7 @@ from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
 from rolling_panda.messages import commands as intents
 from rolling_panda.model.robot import RobotModel
+from tests.support.worlds.kinematic_robot import KinematicRobot
 
 #: Places along the row (m) worked on, one after the other; enough for the steps asked for, again and again.
 _SPACING, _COUNT = 0.25, 8

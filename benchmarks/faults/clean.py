@@ -15,11 +15,11 @@ import msgspec
 import numpy as np
 
 from benchmarks.faults.judge import Rows, replays, violations
-from benchmarks.faults.world import World
 from controller.inputs import Sample
 from controller.interface import Outputs
 from rolling_panda import messages as m
 from rolling_panda.messages import commands as intents
+from tests.support.worlds.faulty_world import FaultyWorld
 
 _USER = "ada"
 _FIRST_M, _SPACING_M, _AHEAD = 0.6, 0.12, 4
@@ -51,7 +51,7 @@ class CleanWork:
     beyond: int
 
 
-class EndlessRow(World):
+class EndlessRow(FaultyWorld):
     """A world in which there is always one more point to cut, and somebody who accepts it."""
 
     def __init__(self, seed: int) -> None:
@@ -61,7 +61,7 @@ class EndlessRow(World):
         self.controller = self.new_controller()
         self.cut_ids: set[str] = set()
         self._shown = 0
-        self._people = (_USER,)
+        self.people = (_USER,)
         self.run(0.3)
         self.ask(intents.Arm(user=_USER))
         self.offer()

@@ -19,8 +19,8 @@ from pathlib import Path
 from benchmarks.faults.cut_judge import Finding, judge_cuts, records
 from benchmarks.faults.cut_rig import CLOSE_S, CutRig
 from benchmarks.faults.state_disk import StateDisk
-from benchmarks.faults.wall_clock import WallClock
 from rolling_panda.errors import RollingPandaError
+from tests.support.processes.wall_clock import WallClock
 
 #: The instants, in the order of a cut.
 INSTANTS = ("intent unwritten", "intent written", "blades closing", "result unwritten")

@@ -19,9 +19,7 @@ from typing import Any, Self
 
 import msgspec
 
-from benchmarks.faults.live_robot import free_port
 from benchmarks.faults.state_disk import StateDisk
-from benchmarks.faults.wall_clock import WallClock, together
 from controller.ledger.store import FILE
 from rolling_panda import messages as m
 from rolling_panda import topics
@@ -34,6 +32,8 @@ from rolling_panda.runtime.launch import child_environment, python_command
 from rolling_panda.transport import certificates
 from rolling_panda.transport.access import RECORDER
 from rolling_panda.transport.zenoh import Onlooker, Transport
+from tests.support.processes.live_robot import free_port
+from tests.support.processes.wall_clock import WallClock, together
 
 PROCESSES = ("router", "plant", "bridge", "controller")
 #: Blades close in this time (s).

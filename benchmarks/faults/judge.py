@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.faults.world import MODEL
 from bridge.config import BridgeConfig
 from rolling_panda.model.robot import ARM_Q, ARM_XI
+from tests.support.worlds.faulty_world import MODEL
 
 Rows = NDArray[Any]
 #: Slower than this (rad/s) is nothing.

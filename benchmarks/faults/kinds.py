@@ -5,12 +5,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-from benchmarks.faults.world import World
 from controller.config import ControllerConfig
 from rolling_panda import messages as m
 from rolling_panda.messages import commands as intents
+from tests.support.worlds.faulty_world import FaultyWorld
 
-Inject = Callable[[World], None]
+Inject = Callable[[FaultyWorld], None]
 _GO_ON = math.inf
 #: The configured speed by hand, and the most that the robot's own limits allow the base (m/s).
 _HAND, _FULL = ControllerConfig().teleop_base_speed, ControllerConfig().base_speed
@@ -49,11 +49,11 @@ class Fault:
 def _later(seconds: float, first: Inject, then: Inject) -> Inject:
     """One thing now and another one after some time."""
 
-    def inject(world: World) -> None:
+    def inject(world: FaultyWorld) -> None:
         first(world)
         due = world.now + seconds
 
-        def wait(world: World) -> None:
+        def wait(world: FaultyWorld) -> None:
             if world.now >= due:
                 world.intruder = lambda _: None
                 then(world)
@@ -64,7 +64,7 @@ def _later(seconds: float, first: Inject, then: Inject) -> Inject:
 
 
 def _set(**changes: object) -> Inject:
-    def inject(world: World) -> None:
+    def inject(world: FaultyWorld) -> None:
         for name, value in changes.items():
             setattr(world, name, value)
 
@@ -72,29 +72,29 @@ def _set(**changes: object) -> Inject:
 
 
 def _link(name: str, **changes: object) -> Inject:
-    def inject(world: World) -> None:
+    def inject(world: FaultyWorld) -> None:
         for key, value in changes.items():
             setattr(getattr(world, name), key, value)
 
     return inject
 
 
-def _restart_bridge(world: World) -> None:
+def _restart_bridge(world: FaultyWorld) -> None:
     world.robot.begun.append(len(world.robot.rows))
     world.bridge = world.new_bridge()
 
 
-def _stop_and_restart_both(world: World) -> None:
+def _stop_and_restart_both(world: FaultyWorld) -> None:
     world.stop()
     _restart_bridge(world)
     world.restart_controller()
 
 
-def _garbage(world: World) -> None:
+def _garbage(world: FaultyWorld) -> None:
     """Another sender with the right token and numbers far ahead, and nothing but wrong velocities."""
     values = (math.nan, math.inf, -math.inf, 1e308, 50.0)
 
-    def send(world: World) -> None:
+    def send(world: FaultyWorld) -> None:
         real = world.commanded
         if world.ticks % 5 or real is None:
             return
@@ -109,8 +109,8 @@ def _garbage(world: World) -> None:
 def _commands(ahead: int, token: str = "") -> Inject:
     """Another sender, whose epoch is so far ahead, with a token of its own or the robot's."""
 
-    def inject(world: World) -> None:
-        def send(world: World) -> None:
+    def inject(world: FaultyWorld) -> None:
+        def send(world: FaultyWorld) -> None:
             real = world.commanded
             if world.ticks % 10 or real is None:
                 return
@@ -128,23 +128,23 @@ def _commands(ahead: int, token: str = "") -> Inject:
     return inject
 
 
-def _stuck_wheel(world: World) -> None:
+def _stuck_wheel(world: FaultyWorld) -> None:
     world.robot.follows[world.rng.randrange(2)] = 0.0
 
 
-def _taken_over(world: World) -> None:
-    world._people = (*world._people, "bob")
+def _taken_over(world: FaultyWorld) -> None:
+    world.people = (*world.people, "bob")
     world.ask(intents.TakeControl(user="bob", confirmed=True))
 
 
-def _bad_link(world: World) -> None:
+def _bad_link(world: FaultyWorld) -> None:
     """Every way between bridge and controller loses, repeats, delays and reorders, each by its own share."""
     for link in (world.motion, world.state, world.odometry):
         link.loss, link.twice = world.rng.uniform(0.0, 0.2), world.rng.uniform(0.0, 0.5)
         link.delay, link.jitter = world.rng.uniform(0.0, 0.03), world.rng.uniform(0.0, 0.05)
 
 
-def _stop_and_another(world: World) -> None:
+def _stop_and_another(world: FaultyWorld) -> None:
     """The stop, and in the same moment something less severe, drawn by the world's seed."""
     others = (
         _set(perception=False),
@@ -164,11 +164,11 @@ FAULTS: tuple[Fault, ...] = (
     Fault("controller killed", "R2", 0.2, _set(alive=False), since="setpoint"),
     Fault("controller killed, base at full speed", "R2", 0.2, _set(alive=False), "base", _FULL, "setpoint"),
     Fault("motion commands lost", "R2", 0.2, _link("motion", loss=1.0), since="setpoint"),
-    Fault("software stop", "R3", 0.2, World.stop, "base", _FULL),
-    Fault("software stop in automatic work", "R3", 0.2, World.stop),
+    Fault("software stop", "R3", 0.2, FaultyWorld.stop, "base", _FULL),
+    Fault("software stop in automatic work", "R3", 0.2, FaultyWorld.stop),
     Fault("stop, then both restart", "R4", 0.2, _stop_and_restart_both, "base"),
-    Fault("base from 0.3 m/s", "R5", 0.5, World.stop, "base", _FULL),
-    Fault("arm and base in automatic work", "R5", 0.3, World.stop),
+    Fault("base from 0.3 m/s", "R5", 0.5, FaultyWorld.stop, "base", _FULL),
+    Fault("arm and base in automatic work", "R5", 0.3, FaultyWorld.stop),
     Fault("commands 300 ms late", "R6", 0.4, _link("motion", delay=0.3)),
     Fault("states lost", "R6", 0.4, _link("state", loss=1.0)),
     Fault(
@@ -191,7 +191,7 @@ FAULTS: tuple[Fault, ...] = (
     Fault("release of the tool", "R15", 0.15, _set(holds=False), "tool"),
     Fault("nobody sees the robot", "R16", 2.5, _set(watched=False)),
     Fault("server gone", "R16", 2.5, _set(server=False)),
-    Fault("controller restarts", "R17", 0.3, World.restart_controller),
+    Fault("controller restarts", "R17", 0.3, FaultyWorld.restart_controller),
     Fault("bridge restarts", "R17", 0.3, _restart_bridge),
     Fault(
         "controller stopped for 2 s, then continues",

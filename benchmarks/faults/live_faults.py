@@ -13,10 +13,10 @@ import numpy as np
 from benchmarks.faults.judge import Rows, Trial, braking_after, judge, last_taken
 from benchmarks.faults.live_fault_kinds import LiveFault
 from benchmarks.faults.live_world import FaultyRobot, Hand
-from benchmarks.faults.world import MODEL
 from bridge.sim.robot import trace
 from controller.config import ControllerConfig
 from rolling_panda.errors import RollingPandaError
+from tests.support.worlds.faulty_world import MODEL
 
 #: A base driven by hand moves at least this fast (rad/s of a wheel) before a fault, and base or arm at work.
 _DRIVEN = 0.95 * ControllerConfig().teleop_base_speed / MODEL.drive.wheel_radius

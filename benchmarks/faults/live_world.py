@@ -11,11 +11,11 @@ from typing import Any, Self
 
 import httpx
 
-from benchmarks.faults.live_robot import PROCESSES, LiveRobot, free_port
-from benchmarks.faults.wall_clock import WallClock
 from benchmarks.page.crowd import looked_at
 from rolling_panda.errors import RollingPandaError
 from rolling_panda.runtime.launch import child_environment, python_command
+from tests.support.processes.live_robot import PROCESSES, LiveRobot, free_port
+from tests.support.processes.wall_clock import WallClock
 
 #: How often a hand renews its hold (s).
 _RENEW_S = 0.04

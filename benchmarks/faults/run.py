@@ -28,18 +28,18 @@ from benchmarks.faults.judge import Trial, braking_after, judge, last_taken, sum
 from benchmarks.faults.kinds import FAULTS, Fault
 from benchmarks.faults.live_fault_kinds import LIVE_FAULTS, LiveFault
 from benchmarks.faults.live_faults import run_live
-from benchmarks.faults.world import World
 from rolling_panda.resources import resource
+from tests.support.worlds.faulty_world import FaultyWorld
 
 
-def start(fault: Fault) -> World:
+def start(fault: Fault) -> FaultyWorld:
     """A world in the motion in which the fault is to happen."""
-    world = World(0, fault.speed)
+    world = FaultyWorld(0, fault.speed)
     {"work": world.work, "base": world.drive, "tool": world.lead}[fault.moving]()
     return world
 
 
-def run_trial(fault: Fault, world: World, seed: int) -> Trial:
+def run_trial(fault: Fault, world: FaultyWorld, seed: int) -> Trial:
     """Let a random time pass and the fault happen."""
     world.rng.seed(seed)
     world.run(world.rng.uniform(0.0, 0.5))

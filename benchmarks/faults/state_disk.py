@@ -7,7 +7,7 @@ the folder fails with EROFS: also through files that are open already, which per
 import struct
 from pathlib import Path
 
-from benchmarks.faults.wall_clock import build
+from tests.support.processes.wall_clock import build
 
 _FLAG, _FOLDER = "ROLLING_PANDA_READ_ONLY", "ROLLING_PANDA_READ_ONLY_FOLDER"
 _SOURCE = """

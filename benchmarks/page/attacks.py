@@ -23,10 +23,10 @@ from urllib.parse import urlsplit
 import httpx
 
 from benchmarks.common.documents import machine
-from benchmarks.page.demo_under_test import Demo
 from benchmarks.page.latencies import Spread, spread
 from rolling_panda.errors import InputError
 from rolling_panda.runtime.launch import child_environment, python_command
+from tests.support.processes.demo import Demo
 
 #: Name in the results: kind and number of the attackers.
 ATTACKS = {

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from benchmarks.page.demo_under_test import Demo
-from benchmarks.page.gizmo_hand import GizmoHand
 from benchmarks.page.latencies import ANSWER_S, onset, times_of_stamps
 from benchmarks.page.probe import SCRIPT, Noted, Probe
 from bridge.sim.robot import trace
+from tests.support.gizmo_hand import GizmoHand
+from tests.support.processes.demo import Demo
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Page

@@ -19,10 +19,10 @@ import psutil
 from benchmarks.common.documents import machine
 from benchmarks.page.browser import chromium, put_first
 from benchmarks.page.crowd import looked_at
-from benchmarks.page.demo_under_test import Demo
 from benchmarks.page.hands import Drags, Heap, drag, first_paints, open_page, press_stop, signed_in, watch_screen
 from benchmarks.page.latencies import Spread, ages, spread
 from rolling_panda.errors import InputError, RollingPandaError
+from tests.support.processes.demo import Demo
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page

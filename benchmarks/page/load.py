@@ -19,8 +19,8 @@ from typing import Any
 import psutil
 
 from benchmarks.common.documents import machine
-from benchmarks.page.browser import FLAGS
-from benchmarks.page.demo_under_test import Demo
+from tests.support.chromium import FLAGS
+from tests.support.processes.demo import Demo
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from typing import Any, Protocol
 
-from benchmarks.page.demo_under_test import Demo
+from tests.support.processes.demo import Demo
 
 #: So many points are accepted: enough to see the work, and soon done.
 FEW = 4

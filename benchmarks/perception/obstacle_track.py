@@ -6,13 +6,13 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from benchmarks.common.closed_loop import ClosedLoop
 from benchmarks.control.row_walk import walk
 from benchmarks.perception.obstacles import Place, Track
 from bridge.core.bridge import BridgeOutputs
 from bridge.sim.robot.robot import SimulatedRobot
 from rolling_panda.messages import commands as intents
 from rolling_panda.resources import resource
+from tests.support.worlds.closed_loop import ClosedLoop
 
 #: Places that are kept, evenly in time, and how far the base goes along the row (m).
 _KEPT, _END = 160, 3.4

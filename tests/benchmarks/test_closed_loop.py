@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.common.closed_loop import ClosedLoop
 from bridge.sim.robot import trace
 from rolling_panda import messages as m
 from rolling_panda.messages import commands as intents
+from tests.support.worlds.closed_loop import ClosedLoop
 
 
 def surveyed(seed: int, path: Path) -> ClosedLoop:

@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
 
-from benchmarks.common.kinematic_robot import KinematicRobot
 from benchmarks.control.row_stages import LIMITS, STAGES, StageClock
 from controller.config import ControllerConfig
 from controller.core import Controller
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
 from rolling_panda.messages import commands as intents
+from tests.support.worlds.kinematic_robot import KinematicRobot
 
 
 def point(number):

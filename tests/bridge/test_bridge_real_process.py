@@ -18,9 +18,9 @@ from rolling_panda.model.robot import RobotModel
 from rolling_panda.resources import resource
 from rolling_panda.runtime.launch import child_environment
 from rolling_panda.transport.zenoh import Router, Transport
-from tests.support.device_process import DeviceProcess
 from tests.support.extras import need
-from tests.support.live_robot import free_port
+from tests.support.processes.device_process import DeviceProcess
+from tests.support.processes.live_robot import free_port
 
 need("real")
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from rolling_panda.runtime.launch import child_environment
-from tests.support.device_process import DeviceProcess
+from tests.support.processes.device_process import DeviceProcess
 
 pytestmark = pytest.mark.alone
 

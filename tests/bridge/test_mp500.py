@@ -12,8 +12,8 @@ from bridge.real.mp500 import Mp500
 from rolling_panda.config import TransportConfig
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.transport.zenoh import ForeignWire, Router
-from tests.support.device_process import DeviceProcess
-from tests.support.live_robot import free_port
+from tests.support.processes.device_process import DeviceProcess
+from tests.support.processes.live_robot import free_port
 
 pytestmark = pytest.mark.alone
 

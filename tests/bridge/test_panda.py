@@ -19,8 +19,8 @@ from bridge.real.config import ArmConfig
 from bridge.real.panda import Panda
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.runtime.launch import child_environment
-from tests.support.device_process import DeviceProcess
 from tests.support.extras import need
+from tests.support.processes.device_process import DeviceProcess
 
 need("real")
 

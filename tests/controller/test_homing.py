@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from benchmarks.common.kinematic_robot import KinematicRobot
 from controller.config import ControllerConfig
 from controller.core import Controller
 from controller.inputs import Sample
@@ -13,6 +12,7 @@ from rolling_panda.config import RobotConfig
 from rolling_panda.messages import commands as intents
 from rolling_panda.messages.perception import Capsule, Obstacles
 from rolling_panda.model.robot import ARM_Q, RobotModel
+from tests.support.worlds.kinematic_robot import KinematicRobot
 
 CONFIG = ControllerConfig()
 #: Turned away from the row, with the tool to the right of the base.

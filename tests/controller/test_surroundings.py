@@ -3,7 +3,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from benchmarks.common.kinematic_robot import KinematicRobot
 from controller.config import ControllerConfig
 from controller.core import Controller
 from controller.inputs import Sample
@@ -15,6 +14,7 @@ from rolling_panda.messages import commands as intents
 from rolling_panda.messages.perception import Capsule, Obstacles
 from rolling_panda.messages.supervision import TeleopTarget
 from rolling_panda.model.robot import RobotModel, pose_message
+from tests.support.worlds.kinematic_robot import KinematicRobot
 
 CONFIG = ControllerConfig()
 HOME = np.concatenate([np.zeros(5), CONFIG.home])

@@ -5,7 +5,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from benchmarks.common.kinematic_robot import KinematicRobot
 from controller.config import ControllerConfig
 from controller.core import Controller
 from controller.inputs import Sample
@@ -15,6 +14,7 @@ from rolling_panda.messages import commands as intents
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
 from rolling_panda.model.robot import pose_message
+from tests.support.worlds.kinematic_robot import KinematicRobot
 
 CONFIG = ControllerConfig()
 

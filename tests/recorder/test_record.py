@@ -14,7 +14,7 @@ from rolling_panda import topics
 from rolling_panda.config import TransportConfig
 from rolling_panda.runtime.launch import child_environment, python_command
 from rolling_panda.transport.zenoh import Router, Transport
-from tests.support.live_robot import free_port
+from tests.support.processes.live_robot import free_port
 
 pytestmark = pytest.mark.alone
 

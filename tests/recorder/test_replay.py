@@ -13,7 +13,7 @@ from rolling_panda.messages import commands as intents
 from rolling_panda.messages.commands import SeekReplay
 from rolling_panda.transport.zenoh import Router, Transport
 from tests.recorder.test_player import event, joints, recording
-from tests.support.live_robot import free_port
+from tests.support.processes.live_robot import free_port
 
 pytestmark = pytest.mark.alone
 

@@ -1,11 +1,11 @@
 """A controller with a robot that has no mass, put to work on points."""
 
-from benchmarks.common.kinematic_robot import KinematicRobot
 from controller.config import ControllerConfig
 from controller.core import Controller
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
 from rolling_panda.messages import commands as intents
+from tests.support.worlds.kinematic_robot import KinematicRobot
 
 CONFIG = ControllerConfig()
 

@@ -6,11 +6,11 @@ from contextlib import ExitStack, contextmanager
 
 import numpy as np
 
-from benchmarks.faults.world import LaggedRobot
 from bridge.config import BridgeConfig, OdometryConfig
 from bridge.core.bridge import TICK_S, BridgeCore
 from bridge.core.odometer import Odometer
 from bridge.loop import BridgeLoop
+from bridge.sim.robot.lagged import LaggedRobot
 from controller.config import ControllerConfig
 from controller.core import Controller
 from controller.ledger.start import restored

@@ -6,9 +6,7 @@ from contextlib import contextmanager
 
 from playwright.sync_api import Page, Request, sync_playwright
 
-from benchmarks.page.browser import FLAGS, FLAT_FLAGS
-
-__all__ = ["FLAGS", "FLAT_FLAGS", "operator_page"]
+from tests.support.chromium import FLAGS
 
 
 @contextmanager

@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Error, FloatRect, Locator, Page, expect, sync_playwright
 
 from rolling_panda import messages as m
-from tests.support.operator_page import FLAT_FLAGS
+from tests.support.chromium import FLAT_FLAGS
 from tests.support.played_server import ORIGIN, PlayedServer, point
 
 #: Keys that a test may leave pressed.

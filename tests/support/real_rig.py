@@ -18,8 +18,8 @@ from rolling_panda.config import TransportConfig
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.transport.zenoh import ForeignWire, Router
 from tests.support.bridge_rig import MODEL, PICTURE
-from tests.support.device_process import DeviceProcess
-from tests.support.live_robot import free_port
+from tests.support.processes.device_process import DeviceProcess
+from tests.support.processes.live_robot import free_port
 
 ADDRESS = f"127.0.{os.getpid() % 250 + 1}.8"
 SERVICE = "cutter/close"

@@ -13,7 +13,7 @@ import zenoh
 from bridge.sim.robot import trace
 from rolling_panda.runtime.process import ROBOT_ID
 from rolling_panda.topics import MOTION, key
-from tests.support.live_robot import LiveRobot
+from tests.support.processes.live_robot import LiveRobot
 
 pytestmark = pytest.mark.alone
 

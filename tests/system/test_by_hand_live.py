@@ -9,8 +9,8 @@ import pytest
 from PIL import Image
 from playwright.sync_api import Page
 
-from tests.support.live_robot import LiveRobot
 from tests.support.operator_page import operator_page
+from tests.support.processes.live_robot import LiveRobot
 
 pytestmark = [pytest.mark.browser, pytest.mark.alone, pytest.mark.slow]
 #: Of the lines that show which canes are known, in the 3-D view.

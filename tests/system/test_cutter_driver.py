@@ -11,7 +11,7 @@ from bridge.real.config import CutterConfig
 from bridge.real.cutter import Cutter
 from rolling_panda.config import TransportConfig
 from rolling_panda.transport.zenoh import ForeignWire, Router
-from tests.support.live_robot import free_port
+from tests.support.processes.live_robot import free_port
 
 pytestmark = pytest.mark.alone
 

@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-from benchmarks.page.demo_under_test import Demo
 from bridge.sim.robot import trace
 from rolling_panda.resources import resource
 from tests.support.extras import need
-from tests.support.live_robot import free_port
+from tests.support.processes.demo import Demo
+from tests.support.processes.live_robot import free_port
 
 need("real")
 

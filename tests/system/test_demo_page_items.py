@@ -24,8 +24,8 @@ import pytest
 from PIL import Image
 from playwright.sync_api import Locator, Page, expect
 
-from tests.support.live_robot import LiveRobot
 from tests.support.operator_page import operator_page
+from tests.support.processes.live_robot import LiveRobot
 from tests.web.test_page_preview_live import asked
 
 # Two minutes each, mostly of drawing the view in software.

@@ -7,7 +7,7 @@ import pytest
 
 from bridge.sim.robot import trace
 from controller.ledger.check import verify
-from tests.support.live_robot import LiveRobot
+from tests.support.processes.live_robot import LiveRobot
 from tests.system.test_lost_processes import drive
 
 pytestmark = pytest.mark.alone

@@ -2,9 +2,9 @@
 
 import pytest
 
-from benchmarks.common.closed_loop import ClosedLoop
 from rolling_panda import messages as m
 from rolling_panda.messages import commands as intents
+from tests.support.worlds.closed_loop import ClosedLoop
 
 #: Far enough from the end of the row for the base to come before it (m, odom).
 REACH = (0.2, 1.6)

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from bridge.sim.robot import trace
-from tests.support.live_robot import LiveRobot
+from tests.support.processes.live_robot import LiveRobot
 
 pytestmark = pytest.mark.alone
 

@@ -10,8 +10,8 @@ import pytest
 from playwright.sync_api import Page
 
 from bridge.sim.robot import trace
-from tests.support.live_robot import LiveRobot
 from tests.support.operator_page import operator_page
+from tests.support.processes.live_robot import LiveRobot
 
 pytestmark = [pytest.mark.browser, pytest.mark.alone]
 

@@ -8,7 +8,7 @@ import httpx
 import psutil
 import pytest
 
-from tests.support.live_robot import LiveRobot
+from tests.support.processes.live_robot import LiveRobot
 
 # What the planner answers is tested in test_planner_process.py, what the page shows in test_page_plan.py.
 pytestmark = [pytest.mark.alone, pytest.mark.slow]

@@ -5,8 +5,8 @@ from unittest.mock import patch
 
 import pytest
 
-from tests.support.random_parts import Movement
-from tests.support.random_world import World
+from tests.support.worlds.random_parts import Movement
+from tests.support.worlds.random_world import RandomWorld
 
 
 def lived(steps, seed, **changes):
@@ -17,7 +17,7 @@ def lived(steps, seed, **changes):
             stack.enter_context(patch(f"bridge.core.bridge.{name}", ticks))
         stack.enter_context(patch("controller.core.Movement", Movement))
         stack.enter_context(patch("controller.core.controller_state", lambda **_: None))
-        world = World(seed, **changes)
+        world = RandomWorld(seed, **changes)
         for _ in range(steps):
             world.step()
     return world

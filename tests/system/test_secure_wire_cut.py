@@ -6,7 +6,7 @@ import pytest
 
 from bridge.sim.robot.trace import read
 from rolling_panda.transport.certificates import make
-from tests.support.live_robot import LiveRobot
+from tests.support.processes.live_robot import LiveRobot
 
 pytestmark = [pytest.mark.alone, pytest.mark.slow]
 

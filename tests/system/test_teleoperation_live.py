@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page
 
-from benchmarks.page.gizmo_hand import FirstView
 from bridge.sim.robot import trace
 from server.scene.gizmo import GIZMO_PX
-from tests.support.live_robot import LiveRobot
+from tests.support.gizmo_hand import FirstView
 from tests.support.operator_page import operator_page
+from tests.support.processes.live_robot import LiveRobot
 
 pytestmark = pytest.mark.alone
 

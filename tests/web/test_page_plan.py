@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import Page, expect, sync_playwright
 
 from rolling_panda.messages.supervision import PointPlan
-from tests.support.operator_page import FLAGS
+from tests.support.chromium import FLAGS
 from tests.support.played_page import until
 from tests.support.played_server import ORIGIN, PlayedServer, controller, point
 

@@ -9,8 +9,8 @@ import pytest
 from playwright.sync_api import Page
 
 from bridge.sim.robot import trace
-from tests.support.live_robot import LiveRobot
 from tests.support.operator_page import operator_page
+from tests.support.processes.live_robot import LiveRobot
 from tests.system.test_main_job import arm_and_accept, ended, start
 
 pytestmark = [pytest.mark.browser, pytest.mark.alone, pytest.mark.slow]

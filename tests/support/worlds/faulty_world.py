@@ -10,15 +10,12 @@ from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
 import msgspec
-import numpy as np
 
 from bridge.config import BridgeConfig, OdometryConfig
 from bridge.core.bridge import TICK_S, BridgeCore
-from bridge.core.interface import Measurement, Setpoint
 from bridge.core.odometer import Odometer
-from bridge.core.picture import Picture
 from bridge.core.state_memory import Remembered
-from bridge.sim.robot.trace import ROW, Trace
+from bridge.sim.robot.lagged import LaggedRobot
 from controller.config import ControllerConfig
 from controller.core import Controller
 from controller.inputs import Sample
@@ -39,50 +36,6 @@ _USER = "ada"
 _CONTROL_TICKS = 10
 #: A page speaks, and the server tells who is there, each in so many periods of 1 ms.
 _PAGE_TICKS, _PRESENCE_TICKS = 50, 200
-
-
-class LaggedRobot:
-    """Velocity servos with a first-order lag; every step is recorded as the simulator's trace records it."""
-
-    def __init__(self, arm: tuple[float, ...]) -> None:
-        """Stand at rest with the arm in this posture (7, rad)."""
-        self.now = Measurement(np.array([0.0, 0.0, *arm]), np.zeros(9), "open", "", "", "")
-        self.rows: list[tuple[float, np.ndarray[Any, Any], np.ndarray[Any, Any], int, int]] = []
-        #: Where in the record a bridge began: from one to the next nobody keeps acceleration.
-        self.begun: list[int] = []
-        #: Share of what is sent that each actuator does.
-        self.follows = np.ones(9)
-        self._share = TICK_S / np.array([0.05] * 2 + [0.02] * 7)
-
-    def read(self) -> Measurement:
-        """What was measured last."""
-        return self.now
-
-    def write(self, setpoint: Setpoint) -> None:
-        """One step of 1 ms."""
-        velocity = self.now.velocity + (self.follows * setpoint.xi - self.now.velocity) * self._share
-        self.now = replace(self.now, velocity=velocity, position=self.now.position + velocity * TICK_S)
-        self.rows.append((setpoint.at, setpoint.xi, velocity, setpoint.epoch, setpoint.sequence))
-
-    def cut(self, cut_id: str, point_id: str) -> None:
-        """Cuts at once."""
-        self.now = replace(self.now, cut_id=cut_id, outcome="DONE")
-
-    def capture(self, expose: bool) -> Picture | None:
-        """There is no camera."""
-        return None
-
-    def close(self) -> None:
-        """Nothing to close."""
-
-    def trace(self) -> Trace:
-        """The record."""
-        rows = np.zeros(len(self.rows), ROW)
-        clocks, sent, velocity, epochs, sequences = zip(*self.rows, strict=True)
-        rows["time"] = rows["clock"] = clocks
-        rows["setpoint"], rows["velocity"] = np.array(sent), np.array(velocity)
-        rows["epoch"], rows["sequence"] = epochs, sequences
-        return Trace(rows, ())
 
 
 @dataclass
@@ -113,7 +66,7 @@ class Link:
         return [message for _, message in due]
 
 
-class World:
+class FaultyWorld:
     """Bridge, controller and what the server and perception say, stepped by milliseconds."""
 
     def __init__(self, seed: int, hand_speed: float | None = None) -> None:
@@ -135,8 +88,8 @@ class World:
         self.holds = True
         self.modes: list[str] = []
         self.commanded: m.MotionCommand | None = None
-        self.intruder: Callable[[World], None] = lambda world: None
-        self._people: tuple[str, ...] = ()
+        self.intruder: Callable[[FaultyWorld], None] = lambda world: None
+        self.people: tuple[str, ...] = ()
         self._there = PresenceTracker()
 
     def new_bridge(self) -> BridgeCore:
@@ -193,7 +146,7 @@ class World:
 
     def work(self) -> None:
         """Automatic work on a point that is far away, until base and arm move."""
-        self._people = (_USER,)
+        self.people = (_USER,)
         self.run(0.3)
         far = m.PruningPoint(
             point_id="p", revision=1, position=(2.5, 0.75, 1.0), tangent=(0.0, 0.0, 1.0), radius=0.004, confidence=0.9,
@@ -208,34 +161,34 @@ class World:
             intents.Start(user=_USER),
         ):
             self.ask(intent)
-        self._until_it_moves(1.2)
+        self.until_it_moves(1.2)
 
     def drive(self) -> None:
         """An operator drives the base by hand at its greatest speed."""
-        self._armed()
+        self.arm()
         self.held = BaseVelocity(self.config.base_speed, 0.0)
         wheel = self.config.teleop_base_speed / MODEL.drive.wheel_radius
-        self._until_it_moves(0.95 * wheel)
+        self.until_it_moves(0.95 * wheel)
 
     def lead(self) -> None:
         """An operator leads the tool along the row, far ahead of it."""
-        self._armed()
+        self.arm()
         joints, odometry = self.inputs.joints, self.inputs.odometry
         assert joints is not None and odometry is not None
         q = configuration(odometry.message.pose, joints.message.position)
         here = MODEL.pose(q, MODEL.tool_id)
         here.translation[0] += 2.0
         self.held = pose_message(here)
-        self._until_it_moves(0.6)
+        self.until_it_moves(0.6)
 
-    def _armed(self) -> None:
-        self._people = (_USER,)
+    def arm(self) -> None:
+        self.people = (_USER,)
         self.run(0.3)
         self.ask(intents.Arm(user=_USER))
         # A hold from before arming would count for nothing.
         self.run(0.05)
 
-    def _until_it_moves(self, wheel: float) -> None:
+    def until_it_moves(self, wheel: float) -> None:
         for _ in range(600):
             self.run(0.01)
             if abs(self.robot.now.velocity[:2]).min() > wheel:
@@ -274,7 +227,7 @@ class World:
 
     def _pages_speak(self) -> None:
         """Each page says that it is there, and which state it has drawn."""
-        for name in self._people:
+        for name in self.people:
             session = Session("", name, "supervisor", 0.0, client=name)
             self._there.on_activity(session, self.now)
             if self.watched:

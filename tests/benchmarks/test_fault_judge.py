@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from benchmarks.faults.judge import Trial, braking_after, judge, last_taken, quiet_after, replays, summary, violations
-from benchmarks.faults.world import MODEL
 from bridge.sim.robot.trace import ROW
+from tests.support.worlds.faulty_world import MODEL
 
 
 def rows(*setpoints, epoch=1):

@@ -11,10 +11,10 @@ from msgspec.structs import replace as replace_field
 from benchmarks.faults.forked_trials import apart
 from benchmarks.faults.kinds import FAULTS
 from benchmarks.faults.run import deal, main, run_trial, start
-from benchmarks.faults.world import World
 from rolling_panda import messages as m
 from rolling_panda.messages import commands as intents
 from rolling_panda.messages.supervision import BaseVelocity
+from tests.support.worlds.faulty_world import FaultyWorld
 
 NAMED = {fault.name: fault for fault in FAULTS}
 SHORT = ("software stop", "controller killed, base at full speed", "an older controller's commands")
@@ -27,21 +27,21 @@ def test_the_most_important_ones_hold(name):
 
 
 def test_who_was_silent_and_has_lost_control_moves_the_robot_by_holding_anew():
-    world = World(0)
-    world._armed()
+    world = FaultyWorld(0)
+    world.arm()
     world.heard = False
     world.run(1.5)
     assert world.controller._supervisor.authority.held is False
     world.heard, world.held = True, BaseVelocity(0.1, 0.0)
     world.modes.clear()
-    world._until_it_moves(0.5)
+    world.until_it_moves(0.5)
     assert set(world.modes) == {"TELEOP"}
 
 
 @pytest.mark.parametrize("held_by", ["a stop", "a fault of the robot"])
 def test_a_robot_that_something_else_keeps_still_stays_under_its_token(held_by):
-    world = World(0)
-    world._armed()
+    world = FaultyWorld(0)
+    world.arm()
     if held_by == "a stop":
         world.stop()
     else:
@@ -55,7 +55,7 @@ def test_a_robot_that_something_else_keeps_still_stays_under_its_token(held_by):
 
 
 def test_a_spoiled_number_that_was_accepted_does_not_keep_the_robot_still_for_good():
-    world = World(0)
+    world = FaultyWorld(0)
     world.drive()
     # A flipped bit far up in the number; all else is in order, so that the bridge believes it.
     world.bridge.on_motion(replace_field(world.commanded, sequence=world.commanded.sequence + 2**40), world.now)
@@ -68,11 +68,11 @@ def test_a_spoiled_number_that_was_accepted_does_not_keep_the_robot_still_for_go
     world.run(0.5)
     assert abs(world.robot.now.velocity).max() < 1e-3, "nothing wakes by itself"
     world.held = BaseVelocity(0.1, 0.0)
-    world._until_it_moves(0.5)
+    world.until_it_moves(0.5)
 
 
 def test_who_was_overruled_gets_the_token_back_when_the_other_has_ended_and_its_fault_can_be_acknowledged():
-    world = World(0)
+    world = FaultyWorld(0)
     world.drive()
     world.held = None
     world.run(1.0)
@@ -111,7 +111,7 @@ def second_controller(world):
 
 
 def test_a_second_controller_waits_while_the_first_works_and_takes_over_when_that_one_is_gone():
-    world = World(0)
+    world = FaultyWorld(0)
     world.drive()
     other = second_controller(world)
     world.modes.clear()
@@ -130,8 +130,8 @@ def test_a_second_controller_waits_while_the_first_works_and_takes_over_when_tha
 
 
 def test_a_second_controller_does_not_put_the_first_into_a_fault_that_stays():
-    world = World(0)
-    world._armed()
+    world = FaultyWorld(0)
+    world.arm()
     other = second_controller(world)
     # The first one hangs for so long that the second takes over, and goes on.
     world.alive = False
@@ -149,7 +149,7 @@ def test_a_second_controller_does_not_put_the_first_into_a_fault_that_stays():
 
 @pytest.mark.parametrize("mode", ["IDLE", "TELEOP"])
 def test_commands_by_somebody_else_under_the_robots_own_token_are_seen_stopped_and_told(mode):
-    world = World(0)
+    world = FaultyWorld(0)
     if mode == "IDLE":
         world.run(0.5)
     else:
@@ -166,7 +166,7 @@ def test_commands_by_somebody_else_under_the_robots_own_token_are_seen_stopped_a
     assert told == (["the robot is commanded to move, though the controller's mode is IDLE"] if mode == "IDLE" else [])
     # The token that is known to others is worth nothing any more.
     (stop,) = world.bridge._latch.stops
-    world._people = ("ada",)
+    world.people = ("ada",)
     world.run(0.3)
     world.ask(intents.Reset(user="ada", role="supervisor", reason="looked", stop_id=stop.stop_id))
     assert world.bridge.on_release(m.ReleaseStop(stop_id=stop.stop_id, user="ada", reason="looked"), world.now).ok
@@ -174,7 +174,7 @@ def test_commands_by_somebody_else_under_the_robots_own_token_are_seen_stopped_a
     assert world.controller.mode == "IDLE" and abs(world.robot.now.velocity).max() < 1e-3
     world.intruder = lambda world: None
     world.run(0.5)
-    world._armed()
+    world.arm()
 
 
 def thief(stolen, world):

@@ -27,8 +27,8 @@ from rolling_panda.messages.supervision import BaseVelocity, Person, Presence, T
 from rolling_panda.runtime.latest_file import KeptValue
 from server.robots.presence import PRESENT_S
 from tests.support.fake_wire import as_received
-from tests.support.random_judge import Judge
-from tests.support.random_parts import MODEL, CutDisk, Movement, Robot
+from tests.support.worlds.random_judge import Judge
+from tests.support.worlds.random_parts import MODEL, CutDisk, Movement, Robot
 
 PEOPLE = {"ada": "supervisor", "bob": "operator", "vic": "viewer"}
 DT = 0.01
@@ -44,7 +44,7 @@ class Somebody:
     said_at: float = float("-inf")
 
 
-class World:
+class RandomWorld:
     def __init__(self, seed, kill_in_intent=False):
         self.kill_in_intent = kill_in_intent
         self.chance = Movement.chance = random.Random(seed)

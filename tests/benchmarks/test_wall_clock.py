@@ -6,8 +6,8 @@ import time
 
 import pytest
 
-from benchmarks.faults.wall_clock import WallClock
 from rolling_panda.runtime.launch import child_environment
+from tests.support.processes.wall_clock import WallClock
 
 _ASK = "import sys, time\nfor _ in sys.stdin: print(time.time(), time.monotonic(), flush=True)"
 

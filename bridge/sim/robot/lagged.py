@@ -1,0 +1,55 @@
+"""A simulated robot without mass or contact: velocity servos with a first-order lag. For tests and benchmarks."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from bridge.core.bridge import TICK_S
+from bridge.core.interface import Measurement, Setpoint
+from bridge.core.picture import Picture
+from bridge.sim.robot.trace import ROW, Trace
+
+
+class LaggedRobot:
+    """Velocity servos with a first-order lag; every step is recorded as the simulator's trace records it."""
+
+    def __init__(self, arm: tuple[float, ...]) -> None:
+        """Stand at rest with the arm in this posture (7, rad)."""
+        self.now = Measurement(np.array([0.0, 0.0, *arm]), np.zeros(9), "open", "", "", "")
+        self.rows: list[tuple[float, np.ndarray[Any, Any], np.ndarray[Any, Any], int, int]] = []
+        #: Where in the record a bridge began: from one to the next nobody keeps acceleration.
+        self.begun: list[int] = []
+        #: Share of what is sent that each actuator does.
+        self.follows = np.ones(9)
+        self._share = TICK_S / np.array([0.05] * 2 + [0.02] * 7)
+
+    def read(self) -> Measurement:
+        """What was measured last."""
+        return self.now
+
+    def write(self, setpoint: Setpoint) -> None:
+        """One step of 1 ms."""
+        velocity = self.now.velocity + (self.follows * setpoint.xi - self.now.velocity) * self._share
+        self.now = replace(self.now, velocity=velocity, position=self.now.position + velocity * TICK_S)
+        self.rows.append((setpoint.at, setpoint.xi, velocity, setpoint.epoch, setpoint.sequence))
+
+    def cut(self, cut_id: str, point_id: str) -> None:
+        """Cuts at once."""
+        self.now = replace(self.now, cut_id=cut_id, outcome="DONE")
+
+    def capture(self, expose: bool) -> Picture | None:
+        """There is no camera."""
+        return None
+
+    def close(self) -> None:
+        """Nothing to close."""
+
+    def trace(self) -> Trace:
+        """The record."""
+        rows = np.zeros(len(self.rows), ROW)
+        clocks, sent, velocity, epochs, sequences = zip(*self.rows, strict=True)
+        rows["time"] = rows["clock"] = clocks
+        rows["setpoint"], rows["velocity"] = np.array(sent), np.array(velocity)
+        rows["epoch"], rows["sequence"] = epochs, sequences
+        return Trace(rows, ())
