@@ -48,10 +48,13 @@ def test_a_socket_is_opened_by_few() -> None:
         ("server", "import zenoh", "zenoh behind rolling_panda.transport.zenoh"),
         ("server", "import mujoco", "MuJoCo behind bridge.sim"),
         ("controller", "import viser", "viser behind the server's scene"),
+        ("bridge", "import tests.support.chromium", "nothing that is shipped to run imports benchmarks or tests"),
+        ("tests/support", "import benchmarks.page", "only the tests of the benchmarks import them"),
+        ("benchmarks", "import tests.web.test_page", "benchmarks import nothing of the tests but their support"),
     ],
 )
 def test_a_breach_is_noticed(tmp_path: Path, package: str, breach: str, contract: str) -> None:
-    for name in PACKAGES:
+    for name in (*PACKAGES, "tests"):
         for file in (ROOT / name).rglob("*.py"):
             copy = tmp_path / file.relative_to(ROOT)
             copy.parent.mkdir(parents=True, exist_ok=True)
