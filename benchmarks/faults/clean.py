@@ -80,10 +80,11 @@ class EndlessRow(FaultyWorld):
         self.run(0.02)
         self.ask(intents.AcceptAll(user=_USER, confidence=0.0))
 
-    def _send(self, out: Outputs) -> None:
+    def send(self, out: Outputs) -> None:
+        """Note the cut that is ordered."""
         if out.cut is not None:
             self.cut_ids.add(out.cut.cut_id)
-        super()._send(out)
+        super().send(out)
 
 
 def _point(number: int) -> m.PruningPoint:

@@ -26,13 +26,13 @@ class _Watched(ClosedLoop):
         super().__init__(seed, trace, resource("assets/config/sim.toml"), segmenter="labels")
         self.places: list[Place] = []
 
-    def _receive(self, outputs: BridgeOutputs) -> None:
+    def receive(self, outputs: BridgeOutputs) -> None:
         frame, robot = outputs.frame, self.bridge.robot
         assert isinstance(robot, SimulatedRobot)
         if frame is not None:
             camera = tuple(np.round(robot.true_camera(), 6).ravel().tolist())
             self.places.append(Place(frame.base, frame.position, camera))
-        super()._receive(outputs)
+        super().receive(outputs)
 
 
 def record(seed: int, path: Path) -> str:

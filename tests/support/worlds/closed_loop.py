@@ -1,24 +1,19 @@
-"""The whole robot in one thread: bridge, controller and perception on one simulated clock, without sockets or sleeping.
-
-What the processes exchange over the wire is handed over directly, at the rates they have there, so that the same seed
-and the same operator give the same trace, faster than real time.
-"""
+"""The whole robot in one thread: the simulator, perception and the planner beside bridge and controller."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import msgspec
 
-from bridge.core.bridge import TICK_S, BridgeOutputs
+from bridge.core.bridge import BridgeOutputs
 from bridge.sim.build import simulated_bridge
 from bridge.sim.robot.robot import SimulatedRobot
 from controller.config import ControllerConfig
 from controller.core import Controller
 from controller.inputs import Sample
-from controller.interface import Outputs, StepInputs
-from controller.ledger.journal import LedgerState
+from controller.interface import Outputs
 from controller.motion.base_estimate import BaseEstimate
 from controller.motion.follower import Tracking
 from controller.planning.cuts import CutPlanner
@@ -34,6 +29,7 @@ from rolling_panda.messages.supervision import Person, Presence
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.resources import resource
+from tests.support.worlds.world import World
 
 # A frame takes perception about this long, so its points come later by as much.
 _PERCEPTION_S = 0.15
@@ -43,7 +39,7 @@ _LOOK_S = 0.08
 _PLANNING_S = 1.0
 
 
-class ClosedLoop:
+class ClosedLoop(World):
     """A simulated robot with an operator who is always present. `now` is simulated time (s)."""
 
     def __init__(
@@ -70,16 +66,14 @@ class ClosedLoop:
             watch: Called after each control period in which the tool follows a trajectory.
         """
         path = config_path or resource("assets/config/sim.toml")
-        self.bridge = simulated_bridge(path, seed, trace)
         robot = load_section(path, "robot", RobotConfig)
         config = load_section(path, "controller", ControllerConfig)
         if method is not None:
             config = msgspec.structs.replace(config, method=method)
         if not looks:
             config = msgspec.structs.replace(config, pre_cut_check=False, post_cut_check=False)
-        self.controller = Controller(config, robot)
+        super().__init__(simulated_bridge(path, seed, trace), Controller(config, robot), config.rate_hz)
         self._drive = RobotModel(robot).drive
-        self._control_ticks = max(1, round(1.0 / (config.rate_hz * TICK_S)))
         self._control_hz = config.rate_hz
         self._people: tuple[str, ...] = ()
         self._watch = watch
@@ -88,43 +82,19 @@ class ClosedLoop:
         seeing = load_section(path, "perception", PerceptionConfig)
         weights = Path(seeing.weights) if seeing.weights else None
         self.perception = Perception(seeing, choose_segmenter(segmenter or seeing.segmenter, weights))
-        self.now = 0.0
-        self.inputs = StepInputs(present=frozenset(m.PROCESSES))
         self.state: m.ControllerState | None = None
         self.events: list[m.LogEvent] = []
-        self._ticks = 0
         self._looked: tuple[float, CloseUpResult] | None = None
         self._seen: tuple[float, m.PruningPoints] | None = None
 
-    def tick(self) -> None:
-        """Advance one millisecond."""
-        self._ticks += 1
-        self.now = self._ticks * TICK_S
-        self._receive(self.bridge.step(self.now))
-        if self._ticks % self._control_ticks == 0:
-            self.inputs = replace(
-                self.inputs, server_seen=self.now, perception_seen=self.now, presence=Sample(self._present(), self.now)
-            )
-            self._send(self.controller.step(self.inputs, self.now))
-            tracking = self.controller.tracking
-            if self._watch is not None and tracking is not None and tracking.desired is not None:
-                self._watch(self, tracking)
-            self.inputs = replace(self.inputs, stops=(), ledger=LedgerState(self.controller.recorded))
-
-    def run(self, seconds: float) -> None:
-        """Advance by simulated seconds."""
-        for _ in range(round(seconds / TICK_S)):
-            self.tick()
-
-    def run_until(self, condition: Callable[[], bool], limit_s: float) -> bool:
-        """Advance until `condition()` holds; False when it does not within `limit_s` simulated seconds."""
-        end = self.now + limit_s
-        while self.now < end:
-            for _ in range(10):
-                self.tick()
-            if condition():
-                return True
-        return False
+    def control(self, **heard: Any) -> None:
+        """One control period, for which everybody is there."""
+        people = tuple(Person(name, name, "supervisor", 0.0, 0.0) for name in self._people)
+        presence = Sample(Presence(sequence=self.ticks, people=people), self.now)
+        super().control(server_seen=self.now, perception_seen=self.now, presence=presence, **heard)
+        tracking = self.controller.tracking
+        if self._watch is not None and tracking is not None and tracking.desired is not None:
+            self._watch(self, tracking)
 
     def ask(self, intent: intents.Intent) -> m.Answer:
         """What an operator asks for, answered at once."""
@@ -133,12 +103,6 @@ class ClosedLoop:
             self._people = (*self._people, intent.user)
             self.run(1.0 / self._control_hz)
         return self.controller.answer(intent, self.now)
-
-    def stop(self, reason: str) -> None:
-        """Press the software stop."""
-        request = m.StopRequest(stop_id=f"stop-{self._ticks}", source="server", user="operator", reason=reason)
-        self.bridge.on_stop(request, self.now)
-        self.inputs = replace(self.inputs, stops=(request,))
 
     def queue(self, *states: m.PointState) -> Iterator[m.QueueEntry]:
         """Entries of the queue in these states, in the order of work; all without states."""
@@ -170,17 +134,9 @@ class ClosedLoop:
         """Close the trace."""
         self.close()
 
-    def _present(self) -> Presence:
-        people = tuple(Person(name, name, "supervisor", 0.0, 0.0) for name in self._people)
-        return Presence(sequence=self._ticks, people=people)
-
-    def _receive(self, outputs: BridgeOutputs) -> None:
-        if outputs.joints is not None:
-            self.inputs = replace(self.inputs, joints=Sample(outputs.joints, self.now))
-        if outputs.odometry is not None:
-            self.inputs = replace(self.inputs, odometry=Sample(outputs.odometry, self.now))
-        if outputs.state is not None:
-            self.inputs = replace(self.inputs, bridge=Sample(outputs.state, self.now))
+    def receive(self, outputs: BridgeOutputs) -> None:
+        """What the bridge sends, and what perception makes of its pictures."""
+        super().receive(outputs)
         if outputs.frame is not None and outputs.frame.point_id:
             self._looked = self.now + _LOOK_S, self.perception.check_close_up(outputs.frame)
         if self._looked is not None and self.now >= self._looked[0]:
@@ -194,19 +150,9 @@ class ClosedLoop:
             self._seen = None
         self.events.extend(outputs.events)
 
-    def _send(self, outputs: Outputs) -> None:
-        if outputs.motion is not None:
-            self.bridge.on_motion(outputs.motion, self.now)
-        if outputs.token is not None:
-            self.bridge.on_token(outputs.token, self.now)
-        if outputs.stop is not None:
-            self.bridge.on_stop(outputs.stop, self.now)
-        if outputs.cut is not None:
-            self.bridge.on_cut(outputs.cut, self.now)
-        if outputs.picture is not None:
-            self.bridge.on_picture(outputs.picture)
-        if outputs.release is not None:
-            self.bridge.on_release(outputs.release, self.now)
+    def send(self, outputs: Outputs) -> None:
+        """What the controller sends, and what the planner answers."""
+        super().send(outputs)
         if outputs.state is not None:
             self.state = outputs.state
         if outputs.request is not None and self._planner is not None:

@@ -12,7 +12,7 @@ from typing import Any, cast
 import msgspec
 
 from bridge.config import BridgeConfig, OdometryConfig
-from bridge.core.bridge import TICK_S, BridgeCore
+from bridge.core.bridge import TICK_S, BridgeCore, BridgeOutputs
 from bridge.core.odometer import Odometer
 from bridge.core.state_memory import Remembered
 from bridge.sim.robot.lagged import LaggedRobot
@@ -20,7 +20,6 @@ from controller.config import ControllerConfig
 from controller.core import Controller
 from controller.inputs import Sample
 from controller.interface import Outputs, StepInputs
-from controller.ledger.journal import LedgerState
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
 from rolling_panda.messages import commands as intents
@@ -30,10 +29,10 @@ from rolling_panda.model.robot import RobotModel, configuration, pose_message
 from rolling_panda.runtime.latest_file import KeptValue
 from server.auth.sessions import Session
 from server.robots.presence import PresenceTracker
+from tests.support.worlds.world import World
 
 MODEL = RobotModel()
 _USER = "ada"
-_CONTROL_TICKS = 10
 #: A page speaks, and the server tells who is there, each in so many periods of 1 ms.
 _PAGE_TICKS, _PRESENCE_TICKS = 50, 200
 
@@ -66,7 +65,7 @@ class Link:
         return [message for _, message in due]
 
 
-class FaultyWorld:
+class FaultyWorld(World):
     """Bridge, controller and what the server and perception say, stepped by milliseconds."""
 
     def __init__(self, seed: int, hand_speed: float | None = None) -> None:
@@ -77,12 +76,8 @@ class FaultyWorld:
             self.config = msgspec.structs.replace(self.config, teleop_base_speed=hand_speed)
         self.robot = LaggedRobot(self.config.home)
         self.memory = KeptValue(Remembered())
-        self.bridge = self.new_bridge()
-        self.controller = self.new_controller()
+        super().__init__(self.new_bridge(), self.new_controller(), self.config.rate_hz)
         self.motion, self.state, self.odometry = (Link(self.rng) for _ in range(3))
-        self.now = 0.0
-        self.ticks = 0
-        self.inputs = StepInputs(present=frozenset(m.PROCESSES))
         self.alive = self.server = self.heard = self.watched = self.perception = True
         self.held: BaseVelocity | m.Pose | None = None
         self.holds = True
@@ -106,43 +101,20 @@ class FaultyWorld:
         self.controller = self.new_controller()
         self.inputs = StepInputs(present=self.inputs.present)
 
-    def tick(self) -> None:
-        """One millisecond."""
-        self.ticks += 1
-        self.now = self.ticks * TICK_S
-        out = self.bridge.step(self.now)
-        for message in (out.joints, out.state):
+    def receive(self, out: BridgeOutputs) -> None:
+        """What the bridge sends goes its way; what has come over a way by now arrives."""
+        for link, message in ((self.state, out.joints), (self.state, out.state), (self.odometry, out.odometry)):
             if message is not None:
-                self.state.push(message, self.now)
-        if out.odometry is not None:
-            self.odometry.push(out.odometry, self.now)
-        for message in (*self.state.arrived(self.now), *self.odometry.arrived(self.now)):
-            self._hear(Sample(message, self.now))
-        for command in self.motion.arrived(self.now):
-            if isinstance(command, m.TokenRequest):
-                self.bridge.on_token(command, self.now)
-            else:
-                self.bridge.on_motion(command, self.now)
+                link.push(message, self.now)
+        self.to_controller(*self.state.arrived(self.now), *self.odometry.arrived(self.now))
+        self.to_bridge(*self.motion.arrived(self.now))
         self.intruder(self)
-        if self.ticks % _CONTROL_TICKS == 0 and self.alive:
-            self._control()
-
-    def run(self, seconds: float) -> None:
-        """Let time pass."""
-        for _ in range(round(seconds / TICK_S)):
-            self.tick()
 
     def ask(self, intent: intents.Intent) -> None:
         """What the operator asks must be granted here."""
         answer = self.controller.answer(intent, self.now)
         if not answer.ok:
             raise RuntimeError(f"{type(intent).__name__}: {answer.reason}")
-
-    def stop(self) -> None:
-        """Somebody presses the software stop; it takes the way of a message to both."""
-        request = m.StopRequest(stop_id=f"s{self.ticks}", source="server", user=_USER, reason="trial")
-        self.bridge.on_stop(request, self.now)
-        self.inputs = replace(self.inputs, stops=(request,))
 
     def work(self) -> None:
         """Automatic work on a point that is far away, until base and arm move."""
@@ -195,15 +167,10 @@ class FaultyWorld:
                 return
         raise RuntimeError(f"the robot does not move: {self.controller.mode}")
 
-    def _hear(self, sample: Sample[Any]) -> None:
-        if isinstance(sample.message, m.JointState):
-            self.inputs = replace(self.inputs, joints=sample)
-        elif isinstance(sample.message, m.BridgeState):
-            self.inputs = replace(self.inputs, bridge=sample)
-        else:
-            self.inputs = replace(self.inputs, odometry=sample)
-
-    def _control(self) -> None:
+    def control(self, **heard: Any) -> None:
+        """One control period, for which those say something who are there."""
+        if not self.alive:
+            return
         changes: dict[str, Any] = {}
         if self.server:
             changes["server_seen"] = self.now
@@ -220,9 +187,7 @@ class FaultyWorld:
             stamp = m.Header(self.now, "odom")
             changes["perception_seen"] = self.now
             changes["obstacles"] = Sample(Obstacles(header=stamp, capsules=()), self.now)
-        self.inputs = replace(self.inputs, **changes)
-        self._send(self.controller.step(self.inputs, self.now))
-        self.inputs = replace(self.inputs, stops=(), ledger=LedgerState(self.controller.recorded))
+        super().control(**changes, **heard)
         self.modes.append(self.controller.mode)
 
     def _pages_speak(self) -> None:
@@ -233,15 +198,10 @@ class FaultyWorld:
             if self.watched:
                 self._there.on_seen(session, self.now)
 
-    def _send(self, out: Outputs) -> None:
-        if out.motion is not None:
-            self.commanded = out.motion
-            self.motion.push(out.motion, self.now)
-        if out.token is not None:
-            self.motion.push(out.token, self.now)
-        if out.stop is not None:
-            self.bridge.on_stop(out.stop, self.now)
-        if out.cut is not None:
-            self.bridge.on_cut(out.cut, self.now)
-        if out.release is not None:
-            self.bridge.on_release(out.release, self.now)
+    def send(self, out: Outputs) -> None:
+        """Motion and token go their way; the rest arrives at once."""
+        self.commanded = out.motion or self.commanded
+        for message in (out.motion, out.token):
+            if message is not None:
+                self.motion.push(message, self.now)
+        super().send(replace(out, motion=None, token=None))
