@@ -1,6 +1,6 @@
-"""The supervision machine as one table: what happens in which mode, where it leads, and who may cause it.
+"""The supervision state machine as one table of transitions.
 
-`controller/supervision/modes.py` steps it; the diagram and the table in `docs/safety.md` are made from it.
+`controller/supervision/modes.py` executes it. The diagram and the table in `docs/safety.md` are generated from it.
 """
 
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from typing import Final, Literal
 
 from rolling_panda.messages.types import Mode
 
-#: Who may cause a transition. `holder` holds the lease on the robot's motion, `system` is the program itself.
+#: Who may cause a transition. `holder` has the lease on the robot's motion, `system` is the program itself.
 Who = Literal["system", "anyone", "operator", "holder", "supervisor"]
 
 SEVERITY: Final[tuple[Mode, ...]] = (
@@ -22,12 +22,12 @@ SEVERITY: Final[tuple[Mode, ...]] = (
     "FAULT",
     "ESTOP_LATCHED",
 )
-#: Modes in which somebody has told the robot to move.
+#: Modes in which the robot moves by command of a person.
 MOVING: Final[tuple[Mode, ...]] = ("TELEOP", "AUTO")
 
 
 class Event(Enum):
-    """What can happen to the machine; the value is how a person would say it."""
+    """An event of the state machine; the value is its name in texts."""
 
     ARM = "arm"
     HOLD = "hold to move the tool"
@@ -35,7 +35,7 @@ class Event(Enum):
     START = "start"
     FINISHED = "end of the work"
     PAUSE = "pause"
-    LOST = "loss of lease, supervisor or certainty"
+    LOST = "loss of lease, operator or certainty"
     RESUME = "resume"
     PROTECT = "protective stop"
     ACKNOWLEDGE = "acknowledge"
@@ -46,14 +46,14 @@ class Event(Enum):
 
 @dataclass(frozen=True)
 class Row:
-    """One transition that is taken; whatever is in no row is refused.
+    """One allowed transition; every other one is refused.
 
     Attributes:
-        before: Mode in which it is possible.
-        event: What causes it.
-        after: Mode that it leads to.
+        before: Mode before it.
+        event: Its trigger.
+        after: Mode after it.
         who: Who may cause it.
-        when: What it takes beside that, in words.
+        when: Further condition, as text.
     """
 
     before: Mode
@@ -63,32 +63,32 @@ class Row:
     when: str = ""
 
 
-_PROTECT = "a limit, stale data, the link, or a robot that does not follow"
-_CLEAR = "the cause is gone for 1 s"
+_PROTECT = "limit violated, data stale, connection lost, or tracking error too large"
+_CLEAR = "the cause has been gone for 1 s"
 
 ROWS: Final[tuple[Row, ...]] = (
-    Row("IDLE", Event.ARM, "READY", "holder", "the robot's own data are fresh and the bridge follows"),
-    Row("READY", Event.HOLD, "TELEOP", "holder", "pressed anew, with a view of the robot that is fresh"),
-    Row("TELEOP", Event.RELEASE, "READY", "system", "let go, or silence"),
-    Row("READY", Event.START, "AUTO", "holder", "a point is accepted and in reach, a supervisor is present"),
-    Row("AUTO", Event.FINISHED, "READY", "system", "no accepted point in reach is left"),
+    Row("IDLE", Event.ARM, "READY", "holder", "joint states and odometry are fresh, and the bridge follows"),
+    Row("READY", Event.HOLD, "TELEOP", "holder", "pressed again, and the page's view of the robot is fresh"),
+    Row("TELEOP", Event.RELEASE, "READY", "system", "released, or not renewed"),
+    Row("READY", Event.START, "AUTO", "holder", "an accepted point is in reach, and an operator is present"),
+    Row("AUTO", Event.FINISHED, "READY", "system", "no accepted point is left in reach"),
     Row("AUTO", Event.PAUSE, "PAUSED", "operator"),
     Row("TELEOP", Event.PAUSE, "PAUSED", "operator"),
-    Row("AUTO", Event.LOST, "PAUSED", "system", "lease, supervisor, server or perception lost, or a cut is UNKNOWN"),
+    Row("AUTO", Event.LOST, "PAUSED", "system", "lease, operator, server or perception lost, or a cut is UNKNOWN"),
     Row("TELEOP", Event.LOST, "PAUSED", "system", "lease or server lost"),
-    Row("PAUSED", Event.RESUME, "READY", "holder", "starting is separate"),
-    # READY moves too, while the arm is brought home.
+    Row("PAUSED", Event.RESUME, "READY", "holder", "work does not start"),
+    # The robot also moves in READY, during homing.
     Row("READY", Event.PROTECT, "PROTECTIVE_STOP", "system", _PROTECT),
     Row("TELEOP", Event.PROTECT, "PROTECTIVE_STOP", "system", _PROTECT),
     Row("AUTO", Event.PROTECT, "PROTECTIVE_STOP", "system", _PROTECT),
     Row("PROTECTIVE_STOP", Event.ACKNOWLEDGE, "PAUSED", "holder", _CLEAR),
     Row("FAULT", Event.ACKNOWLEDGE, "IDLE", "supervisor", _CLEAR),
-    Row("ESTOP_LATCHED", Event.RESET, "IDLE", "supervisor", "with a reason; the bridge has released it"),
-    *(Row(mode, Event.FAULT, "FAULT", "system", "something that must hold does not") for mode in SEVERITY[:-2]),
+    Row("ESTOP_LATCHED", Event.RESET, "IDLE", "supervisor", "with a reason; the bridge has released the stop"),
+    *(Row(mode, Event.FAULT, "FAULT", "system", "an invariant is violated") for mode in SEVERITY[:-2]),
     *(Row(mode, Event.STOP, "ESTOP_LATCHED", "anyone") for mode in SEVERITY[:-1]),
 )
 
-#: In a mode where something is not possible: what would have to come first.
+#: For a command that a mode does not allow: the step that has to come first.
 FIRST: Final[dict[Mode, str]] = {
     "IDLE": "arm the robot first",
     "READY": "",

@@ -1,4 +1,4 @@
-"""The one table of what is on the wire: publishers, subscribers, staleness and `docs/wire.md` derive from it.
+"""The topic table. Publishers, subscribers, staleness limits and `docs/wire.md` derive from it.
 
 A key is `rp/<robot_id>/v2/<topic>`.
 """
@@ -23,7 +23,7 @@ from rolling_panda.messages import supervision as report_messages
 from rolling_panda.messages import supervision as supervision_messages
 from rolling_panda.messages import supervision as teleop_messages
 
-#: A robot that nobody has named otherwise.
+#: The default robot id.
 ROBOT_ID = "rp1"
 
 Priority = Literal["REAL_TIME", "INTERACTIVE_HIGH", "DATA_LOW", "BACKGROUND"]
@@ -34,19 +34,19 @@ Req = TypeVar("Req", bound=Struct)
 
 @dataclass(frozen=True)
 class Topic(Generic[Msg]):
-    """One row: what is published where, how often, and how it is carried.
+    """A topic: message type, sender, readers, rate and transport options.
 
     Attributes:
         name: Last part of the key.
         message: The only type accepted on it.
-        sender: Process that publishes, several with commas between, or "any".
-        readers: Processes and other programs that it is carried to. A recorder is sent every topic.
-        rate_hz: Nominal rate; 0 = when something happens.
+        sender: Publishing processes, separated by commas, or "any".
+        readers: Processes and other programs that receive it. A recorder receives every topic.
+        rate_hz: Nominal rate; 0 = on event.
         priority: Zenoh priority.
-        congestion: What happens to a message when the wire is full.
+        congestion: Zenoh congestion control: whether a message is dropped or blocks when the connection is full.
         express: Sent at once, never batched.
-        latched: The sender repeats the newest one at `rate_hz`, so that late joiners get it.
-        about: One line for people.
+        latched: The sender repeats the newest message at `rate_hz`, so that late joiners get it.
+        about: Description for the documentation.
     """
 
     name: str
@@ -65,20 +65,20 @@ class Topic(Generic[Msg]):
         return self.sender == "any" or process in self.sender.split(", ")
 
     def read_by(self, name: str) -> bool:
-        """Whether it is carried to this process or program."""
+        """Whether this process or program receives it."""
         return name == "recorder" or name in self.readers.split(", ")
 
 
 @dataclass(frozen=True)
 class Service(Generic[Req]):
-    """One row of the request table; the reply is always `Answer`.
+    """A request-reply service; the reply is always `Answer`.
 
     Attributes:
         name: Last part of the key.
-        requests: The types accepted, told apart by their tag.
+        requests: The accepted types, distinguished by their tag.
         server: Process that answers.
-        timeout_s: How long a caller waits.
-        about: One line for people.
+        timeout_s: Time limit for the reply, at the caller.
+        about: Description for the documentation.
     """
 
     name: str
@@ -91,111 +91,111 @@ class Service(Generic[Req]):
 # fmt: off
 MOTION = Topic(
     "command/motion", m.MotionCommand, "controller", "bridge", 100, "REAL_TIME", "DROP",
-    "velocity of every actuator, newest wins", express=True,
+    "velocity of every actuator; newest wins", express=True,
 )
 TOKEN = Topic(
     "command/token", m.TokenRequest, "controller", "bridge", 5, "REAL_TIME", "DROP",
-    "who wants to command the robot, repeated for as long as it does", express=True,
+    "request for the fencing token, repeated while the controller wants to command the robot", express=True,
 )
 CUT = Topic(
     "command/cut", m.CutCommand, "controller", "bridge", 0, "REAL_TIME", "BLOCK",
-    "close the blades once, repeated until seen", express=True,
+    "close the blades once; repeated until the bridge reports it", express=True,
 )
 CLOSE_UP_REQUEST = Topic(
     "command/close-up", close_up_messages.CloseUpRequest, "controller", "bridge", 0, "REAL_TIME", "DROP",
-    "take a close-up of a point now, repeated until taken", express=True,
+    "take a close-up of a point now; repeated until it was taken", express=True,
 )
 STOP = Topic(
     "command/stop", m.StopRequest, "any", "bridge, controller", 0, "REAL_TIME", "BLOCK",
-    "software stop, sent several times", express=True,
+    "software stop; sent several times", express=True,
 )
 TELEOP = Topic(
     "operator/teleop", teleop_messages.TeleopTarget, "server", "controller", 30, "REAL_TIME", "DROP",
-    "where the held gizmo is", express=True,
+    "target of motion by hand while the operator holds", express=True,
 )
 JOINTS = Topic(
     "state/joints", m.JointState, "bridge", "controller, server", 100, "INTERACTIVE_HIGH", "DROP",
-    "measured wheels and arm", express=True,
+    "measured position and velocity of wheels and arm joints", express=True,
 )
 ODOMETRY = Topic(
     "state/odometry", m.Odometry, "bridge", "controller, server", 50, "INTERACTIVE_HIGH", "DROP",
-    "base pose and twist from the wheels", express=True,
+    "base pose in odom and twist, from the wheels", express=True,
 )
 BRIDGE = Topic(
     "state/bridge", m.BridgeState, "bridge", "controller, server, onlooker", 20, "INTERACTIVE_HIGH", "DROP",
-    "latch, watchdog, cutter, refusals",
+    "stop latch, watchdog, cutter, refused messages",
 )
 CONTROLLER = Topic(
     "state/controller", m.ControllerState, "controller", "bridge, server, onlooker", 20, "INTERACTIVE_HIGH", "DROP",
-    "mode, queue, tracking",
+    "mode, queue, tracking error",
 )
 PRESENCE = Topic(
     "operator/presence", control_messages.Presence, "server", "controller", 5, "REAL_TIME", "DROP",
-    "who is there; it renews the lease", express=True,
+    "people whose page or script is heard; renews the lease", express=True,
 )
 CONTROL = Topic(
     "state/control", control_messages.ControlState, "controller", "server", 20, "INTERACTIVE_HIGH", "DROP",
-    "who holds control of the robot's motion",
+    "holder of control of the robot's motion",
 )
 STOPS = Topic(
     "state/stops", control_messages.StopState, "bridge, controller", "server", 2, "INTERACTIVE_HIGH", "DROP",
-    "stops latched by the bridge and by the controller, at once when they change", latched=True,
+    "stops latched by bridge and controller; also at once on change", latched=True,
 )
 HARDWARE_STOP = Topic(
     "simulation/hardware-stop", control_messages.HardwareStop, "any", "bridge, devices", 0, "INTERACTIVE_HIGH", "BLOCK",
-    "the emergency stop button of the simulated robot",
+    "emergency stop button of the simulated robot",
 )
 PLAN = Topic(
     "controller/plan", plan_messages.SessionPlan, "controller", "server", 0.2, "DATA_LOW", "DROP",
-    "the session's plan, at once when it changes", latched=True,
+    "plan of the work; also at once on change", latched=True,
 )
 PREVIEW = Topic(
     "controller/preview", preview_messages.PreviewState, "controller", "server", 2, "DATA_LOW", "DROP",
-    "whether there is a preview of the work, and who has approved it, at once when it changes", latched=True,
+    "state and approval of the preview; also at once on change", latched=True,
 )
 PREVIEW_MOTION = Topic(
     "controller/preview-motion", preview_messages.PreviewMotion, "controller", "server", 0.2, "DATA_LOW", "DROP",
-    "the motion of the preview, at once when it is made", latched=True,
+    "motion of the preview; also at once on change", latched=True,
 )
 REPORT = Topic(
     "controller/report", report_messages.SessionReport, "controller", "server", 0.2, "BACKGROUND", "DROP",
-    "what was cut, refused and who held control since the controller started", latched=True,
+    "cuts, refusals and changes of control since the controller started", latched=True,
 )
 HEARTBEAT = Topic(
     "heartbeat", m.Heartbeat, "any", "controller, server, onlooker", 20, "INTERACTIVE_HIGH", "DROP",
-    "a process's loop is turning",
+    "the loop of a process runs",
 )
 EVENT = Topic(
     "event", m.LogEvent, "any", "controller, server", 0, "DATA_LOW", "BLOCK",
-    "what happened, and why something was refused",
+    "log line: an event, or a refusal with its reason",
 )
 CAMERA = Topic(
     "camera/frame", camera_messages.CameraFrame, "bridge", "perception, server", 2, "DATA_LOW", "DROP",
-    "RGB-D frame with the posture it was taken in",
+    "RGB-D frame with the measured posture at exposure",
 )
 POINTS = Topic(
     "perception/points", m.PruningPoints, "perception", "controller, server", 2, "DATA_LOW", "DROP",
-    "every pruning point held true now", latched=True,
+    "all current pruning points", latched=True,
 )
 CROPS = Topic(
     "perception/crops", crop_messages.PointCrop, "perception", "server", 2, "BACKGROUND", "DROP",
-    "a point's picture, at once when it is new, then one after the other", latched=True,
+    "picture of a point: at once when new, then one after the other", latched=True,
 )
 CLOSE_UP = Topic(
     "perception/close-up", close_up_messages.CloseUpResult, "perception", "controller", 0, "INTERACTIVE_HIGH", "DROP",
-    "what a close-up shows of its point", express=True,
+    "result of a close-up", express=True,
 )
 OBSTACLES = Topic(
     "perception/obstacles", row_messages.Obstacles, "perception", "controller, server", 1, "DATA_LOW", "DROP",
-    "posts, trunks, cordons and wires seen so far", latched=True,
+    "posts, trunks, cordons, wires and retained canes seen so far", latched=True,
 )
 SCENERY = Topic(
     "scenery", row_messages.Scenery, "bridge", "server", 0.5, "BACKGROUND", "DROP",
-    "the simulated row, for display only", latched=True,
+    "the simulated row; for display only", latched=True,
 )
 REPLAY = Topic(
     "replay/state", supervision_messages.ReplayState, "controller", "server", 10, "INTERACTIVE_HIGH", "DROP",
-    "a recording is played in the robot's place", latched=True,
+    "position in the recording that is replayed", latched=True,
 )
 
 TOPICS: tuple[Topic[Any], ...] = (
@@ -215,7 +215,7 @@ INTENT: Service[intents.Intent] = Service(
         intents.Pause, intents.Resume, intents.Home, intents.Acknowledge, intents.Reset, intents.TakeControl,
         intents.RequestControl, intents.GrantControl, intents.ReturnControl,
     ),
-    "controller", 1.0, "what an operator asks for",
+    "controller", 1.0, "command of an operator",
 )
 RELEASE: Service[m.ReleaseStop] = Service(
     "service/release", (m.ReleaseStop,), "bridge", 0.5, "release a latched stop",
@@ -226,10 +226,10 @@ PLANT: Service[plant_requests.PlantRequest] = Service(
         plant_requests.SetRule, plant_requests.EvaluateRule, plant_requests.UndoRule, plant_requests.AddPoint,
         plant_requests.AddPointInImage, plant_requests.MovePoint,
     ),
-    "perception", 2.0, "another pruning rule, what one would change, or a point by hand, or moved by hand",
+    "perception", 2.0, "set, evaluate or undo a pruning rule; add or move a point by hand",
 )
 SEEK: Service[commands_messages.SeekReplay] = Service(
-    "service/seek", (commands_messages.SeekReplay,), "controller", 1.0, "another place in the recording that is played",
+    "service/seek", (commands_messages.SeekReplay,), "controller", 1.0, "jump in, play or pause the recording",
 )
 SERVICES: tuple[Service[Any], ...] = (INTENT, RELEASE, PLANT, SEEK)
 # fmt: on

@@ -102,16 +102,16 @@ def alias_name(hint: Any) -> str | None:
 
 
 def _docstring(struct: type) -> tuple[str, dict[str, str]]:
-    """Description and attributes of a Google style docstring, each on one line."""
-    text = inspect.getdoc(struct) or ""
-    head, _, tail = text.partition("\nAttributes:\n")
-    attributes: dict[str, str] = {}
-    name = ""
-    for line in tail.splitlines():
-        match = _ATTRIBUTE.match(line)
-        if match:
-            name = match[1]
-            attributes[name] = match[2].strip()
-        elif line.strip() and name:
-            attributes[name] += " " + line.strip()
+    """Description and attributes of a Google style docstring, each on one line; attributes of the bases too."""
+    head, attributes = "", dict[str, str]()
+    for kind in reversed(struct.__mro__):
+        head, _, tail = inspect.cleandoc(kind.__doc__ or "").partition("\nAttributes:\n")
+        name = ""
+        for line in tail.splitlines():
+            match = _ATTRIBUTE.match(line)
+            if match:
+                name = match[1]
+                attributes[name] = match[2].strip()
+            elif line.strip() and name:
+                attributes[name] += " " + line.strip()
     return " ".join(head.split()), attributes

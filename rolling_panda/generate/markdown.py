@@ -121,7 +121,8 @@ def spelled_out(hint: Any) -> str:
     if isinstance(hint, type) and issubclass(hint, msgspec.Struct):
         return _link(hint)
     if origin is Annotated:
-        return ", ".join([spelled_out(arguments[0]), *_bounds(arguments[1:])])
+        unit = {str: "character", bytes: "byte"}.get(arguments[0], "item")
+        return ", ".join([spelled_out(arguments[0]), *_bounds(arguments[1:], unit)])
     if origin is Literal:
         return " \\| ".join(f'`"{value}"`' for value in arguments)
     if is_union(hint):
@@ -141,7 +142,7 @@ def _named(hint: Any) -> str:
     return spelled_out(hint) if name is None else f"`{name}`"
 
 
-def _bounds(metas: Iterable[Any]) -> list[str]:
+def _bounds(metas: Iterable[Any], unit: str) -> list[str]:
     out = []
     for meta in metas:
         if meta.ge is not None and meta.le is not None:
@@ -149,9 +150,9 @@ def _bounds(metas: Iterable[Any]) -> list[str]:
         elif meta.gt is not None and meta.le is not None:
             out.append(f"more than {_number(meta.gt)}, at most {_number(meta.le)}")
         if meta.min_length is not None:
-            out.append(f"at least {meta.min_length} character{'s' if meta.min_length > 1 else ''}")
+            out.append(f"at least {meta.min_length} {unit}{'s' if meta.min_length > 1 else ''}")
         if meta.max_length is not None:
-            out.append(f"at most {meta.max_length} characters")
+            out.append(f"at most {meta.max_length} {unit}s")
         if meta.pattern is not None:
             out.append(f"matching `{meta.pattern}`")
     return out

@@ -1,4 +1,4 @@
-"""What an operator may ask: of the controller, of perception, of a replay."""
+"""Commands of an operator: to the controller, to perception, to a replay."""
 
 from typing import Annotated, Final, Literal
 
@@ -21,45 +21,65 @@ from rolling_panda.messages.types import (
 
 
 class SeekReplay(Message, frozen=True, kw_only=True):
-    """Server → replay: go on from `position_s` (s from the beginning; None from where it is), or stand still there."""
+    """Server → replay: jump, play or pause.
+
+    Attributes:
+        position_s: New position from the beginning (s); None keeps the position.
+        playing: Whether to play or pause there.
+    """
 
     position_s: NonNegative | None = None
     playing: bool = True
 
 
 class PlantRequest(Struct, frozen=True, kw_only=True, tag=True, forbid_unknown_fields=True):
-    """Root of what an operator may ask of perception. `user` is who asks."""
+    """Base of the commands to perception.
+
+    Attributes:
+        user: Name of the operator.
+    """
 
     user: Text
 
 
 class SetRule(PlantRequest, frozen=True, kw_only=True):
-    """Prune by these numbers from now on; points of all that was seen change at once."""
+    """Use another pruning rule from now on. All points change at once.
+
+    Attributes:
+        rule: The new rule.
+    """
 
     rule: PruningRule = PruningRule()
 
 
 class EvaluateRule(PlantRequest, frozen=True, kw_only=True):
-    """Say what these numbers would change. Nothing changes; the answer has an `effect`."""
+    """Evaluate a pruning rule without using it. The answer has the `effect`.
+
+    Attributes:
+        rule: The rule.
+    """
 
     rule: PruningRule = PruningRule()
 
 
 class UndoRule(PlantRequest, frozen=True, kw_only=True):
-    """Prune as before `rule`, which is in force, was set, with the points as they were then.
+    """Restore the rule and the points from before the current `rule` was set.
 
-    What was cut or placed by hand meanwhile stays so. The controller is asked for the acceptances afterwards.
+    Points that were cut or placed by hand since then stay as they are. `RestoreAccepted` restores the acceptances.
+
+    Attributes:
+        rule: The current rule.
     """
 
     rule: PruningRule
 
 
 class AddPoint(PlantRequest, frozen=True, kw_only=True):
-    """Add a point on the known cane that a line of sight passes nearest, as from a click into the 3-D view.
+    """Add a point on the known cane nearest to a ray, as from a click in the 3-D view.
 
     Attributes:
-        origin: Where the line begins, in odom (m).
-        direction: Along it, in odom.
+        origin: Origin of the ray in odom (m).
+        direction: Unit direction of the ray in odom.
     """
 
     origin: Vector3
@@ -70,9 +90,9 @@ class AddPointInImage(PlantRequest, frozen=True, kw_only=True):
     """Add a point on the known cane under a pixel of a camera image.
 
     Attributes:
-        sequence: Of the frame that was clicked; one of the newest few that perception has worked on.
-        u: Column, as a share of the width.
-        v: Row, as a share of the height.
+        sequence: `sequence` of the clicked camera frame; perception keeps the newest few frames.
+        u: Column as a fraction of the width.
+        v: Row as a fraction of the height.
     """
 
     sequence: Count
@@ -81,11 +101,11 @@ class AddPointInImage(PlantRequest, frozen=True, kw_only=True):
 
 
 class MovePoint(PlantRequest, frozen=True, kw_only=True):
-    """Move a point along its cane; it is judged anew, and from now on it is where a person wants it.
+    """Move a point along its cane. The point is evaluated again and stays at this place.
 
     Attributes:
-        point_id: Of the point.
-        along: So far (m), away from the cordon; negative towards it.
+        point_id: The point.
+        along: Distance (m), away from the cordon; negative towards it.
     """
 
     point_id: Name
@@ -93,18 +113,18 @@ class MovePoint(PlantRequest, frozen=True, kw_only=True):
 
 
 AnyPlantRequest = SetRule | EvaluateRule | UndoRule | AddPoint | AddPointInImage | MovePoint
-#: From this confidence on points are accepted all at once, where who asks names no other.
+#: Default confidence from which `AcceptAll` accepts points.
 SURE: Final = 0.8
 
 
 class Intent(Struct, frozen=True, kw_only=True, tag=True, forbid_unknown_fields=True):
-    """Root of what an operator may ask of the controller.
+    """Base of the commands to the controller.
 
     Attributes:
-        user: Who asks.
-        role: What they may do.
-        client: Tells apart who has the same name; empty where none has.
-        view_age_s: Age of the newest state of the robot that they had drawn or fetched as they asked (s).
+        user: Name of the operator.
+        role: Role of the operator.
+        client: Key of the client, to distinguish clients of one user; may be empty.
+        view_age_s: Age of the newest state of the robot that the client had drawn or fetched when it asked (s).
     """
 
     user: Text
@@ -118,7 +138,13 @@ class Arm(Intent, frozen=True, kw_only=True):
 
 
 class AcceptPoint(Intent, frozen=True, kw_only=True):
-    """Put a proposed point on the queue; `revision` is the one the operator saw, `digest` its hash, if they say it."""
+    """Accept a proposed point.
+
+    Attributes:
+        point_id: The point.
+        revision: Revision that the operator saw.
+        digest: Hash of that revision, checked if given.
+    """
 
     point_id: Name
     revision: Count
@@ -126,29 +152,47 @@ class AcceptPoint(Intent, frozen=True, kw_only=True):
 
 
 class RejectPoint(Intent, frozen=True, kw_only=True):
-    """Take a point off the queue."""
+    """Reject a point.
+
+    Attributes:
+        point_id: The point.
+        reason: Reason, as text; may be empty.
+    """
 
     point_id: Name
     reason: Text = ""
 
 
 class ReconsiderPoint(Intent, frozen=True, kw_only=True):
-    """Take back what was decided about a point: accepted or rejected, it is proposed again."""
+    """Undo the decision about a point. An accepted or rejected point becomes a proposed one.
+
+    Attributes:
+        point_id: The point.
+    """
 
     point_id: Name
 
 
 class RestoreAccepted(Intent, frozen=True, kw_only=True):
-    """Accept again what the change to `rule` made void, as it was accepted; perception takes that rule back.
+    """Restore the acceptances that the change to `rule` made void. Perception undoes that rule.
 
-    A point that somebody has decided about since, or that is not as it was accepted, stays as it is.
+    A point with a later decision, or one that differs from the accepted one, stays as it is.
+
+    Attributes:
+        rule: The rule that perception undoes.
     """
 
     rule: PruningRule
 
 
 class ResolvePoint(Intent, frozen=True, kw_only=True):
-    """Say how a cut ended of which nobody knows (UNKNOWN): somebody has looked."""
+    """Report the outcome of an UNKNOWN cut after an inspection.
+
+    Attributes:
+        point_id: The point.
+        outcome: Whether it was cut.
+        reason: What the person saw, as text.
+    """
 
     point_id: Name
     outcome: Literal["DONE", "FAILED_NOT_CUT"]
@@ -156,13 +200,23 @@ class ResolvePoint(Intent, frozen=True, kw_only=True):
 
 
 class AcceptAll(Intent, frozen=True, kw_only=True):
-    """Accept every proposed point with at least this confidence; the others wait to be decided one by one."""
+    """Accept all proposed points from a confidence on.
+
+    Attributes:
+        confidence: Smallest confidence, 0 … 1.
+    """
 
     confidence: Fraction = SURE
 
 
 class MoveInQueue(Intent, frozen=True, kw_only=True):
-    """Work on an accepted point before another one, or last; `revision` is that of the order the operator saw."""
+    """Move an accepted point in the order of work.
+
+    Attributes:
+        point_id: The point.
+        before: Point that follows it; empty to move it to the end.
+        revision: Revision of the order that the operator saw.
+    """
 
     point_id: Name
     before: Annotated[str, Meta(max_length=64)] = ""
@@ -170,44 +224,68 @@ class MoveInQueue(Intent, frozen=True, kw_only=True):
 
 
 class SetApproach(Intent, frozen=True, kw_only=True):
-    """Approach a point with this turn about its cane (rad); 0 is straight from the robot's side, None as is found."""
+    """Set the direction of the approach to a point.
+
+    Attributes:
+        point_id: The point.
+        azimuth: Turn about the cane (rad); 0 is straight from the robot's side; None leaves it to the posture search.
+    """
 
     point_id: Name
     azimuth: Annotated[float, Meta(ge=-3.2, le=3.2)] | None = None
 
 
 class ResetOrder(Intent, frozen=True, kw_only=True):
-    """Work in the plan's order again; `revision` is that of the order the operator saw."""
+    """Return to the plan's order.
+
+    Attributes:
+        revision: Revision of the order that the operator saw.
+    """
 
     revision: Count
 
 
 class RequestPreview(Intent, frozen=True, kw_only=True):
-    """Show what the robot would do: all accepted points in their order, or one of them alone."""
+    """Compute a preview of the accepted points in the order of work.
+
+    Attributes:
+        point_id: Preview this point alone; empty for all.
+    """
 
     point_id: Annotated[str, Meta(max_length=64)] = ""
 
 
 class ApprovePreview(Intent, frozen=True, kw_only=True):
-    """The preview with this hash is what shall be done; work begins with `Start`."""
+    """Approve a preview. `Start` begins the work.
+
+    Attributes:
+        preview_hash: Hash of the preview that the operator saw.
+    """
 
     preview_hash: Digest
 
 
 class RequirePreview(Intent, frozen=True, kw_only=True):
-    """From now on no cut begins without its preview approved, or cuts begin without."""
+    """Set whether a cut needs an approved preview.
+
+    Attributes:
+        required: Whether it does.
+    """
 
     required: bool
 
 
 class Start(Intent, frozen=True, kw_only=True):
-    """READY → AUTO on the accepted points."""
+    """READY → AUTO: work on the accepted points."""
 
 
 class Survey(Start, frozen=True, kw_only=True):
-    """READY → AUTO along the row with the arm in its survey posture; nothing is cut. `distance` ahead (m).
+    """READY → AUTO: drive along the row with the arm in its survey posture. Nothing is cut.
 
-    With `vine` and `spur` of an undecided site, that site alone is surveyed, from both its sides.
+    Attributes:
+        distance: Length of the survey (m).
+        vine: With `spur`: number of the vine of an undecided site. Only this site is surveyed, from both sides.
+        spur: Number of the spur of that site.
     """
 
     distance: Annotated[float, Meta(ge=0.1, le=500.0)] = 4.0
@@ -220,21 +298,23 @@ class Pause(Intent, frozen=True, kw_only=True):
 
 
 class Resume(Intent, frozen=True, kw_only=True):
-    """PAUSED → READY; starting again is separate."""
+    """PAUSED → READY. Work does not start."""
 
 
 class Home(Intent, frozen=True, kw_only=True):
-    """READY: bring the arm back to its survey posture beside the row."""
+    """READY: move the arm to its survey posture beside the row."""
 
 
 class Acknowledge(Intent, frozen=True, kw_only=True):
-    """PROTECTIVE_STOP → PAUSED, FAULT → IDLE, once the cause is gone."""
+    """PROTECTIVE_STOP → PAUSED or FAULT → IDLE, after the cause is gone."""
 
 
 class Reset(Intent, frozen=True, kw_only=True):
-    """ESTOP_LATCHED → IDLE, with a reason. It moves nothing.
+    """ESTOP_LATCHED → IDLE. It moves nothing.
 
-    With `stop_id`, the newest stop that was looked at: one that was pressed since is not reset with it.
+    Attributes:
+        reason: Reason for the reset, as text.
+        stop_id: The newest stop that the supervisor saw, if given. A later stop stays latched.
     """
 
     reason: Annotated[str, Meta(min_length=1, max_length=500)]
@@ -242,21 +322,25 @@ class Reset(Intent, frozen=True, kw_only=True):
 
 
 class TakeControl(Intent, frozen=True, kw_only=True):
-    """Hold control of the robot's motion. From somebody else only with `confirmed`; the robot stops first."""
+    """Take control of the robot's motion. If somebody else has control, the robot stops first.
+
+    Attributes:
+        confirmed: Required to take control from somebody else.
+    """
 
     confirmed: bool = False
 
 
 class RequestControl(Intent, frozen=True, kw_only=True):
-    """Ask who holds control to grant it."""
+    """Ask the holder for control."""
 
 
 class GrantControl(Intent, frozen=True, kw_only=True):
-    """Give control to who has asked for it; the robot stops first."""
+    """Give control to the person who has asked for it. The robot stops first."""
 
 
 class ReturnControl(Intent, frozen=True, kw_only=True):
-    """Give control up; what moves is paused."""
+    """Give up control. Motion is paused."""
 
 
 AnyIntent = (
@@ -285,5 +369,5 @@ AnyIntent = (
     | GrantControl
     | ReturnControl
 )
-#: What moves the robot or leads to it: for who holds control, but for the end of a fault.
+#: Commands for the holder of control. A fault is acknowledged without control.
 OF_HOLDER: Final = (Arm, Start, Survey, Resume, Home, Acknowledge)

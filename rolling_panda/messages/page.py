@@ -1,4 +1,4 @@
-"""What the server and the page say to each other over `/ws`, as JSON; `web/js/link/messages.*` are made from it."""
+"""Messages between server and page over `/ws`, as JSON. `web/js/link/messages.*` are generated from them."""
 
 from typing import Annotated, Literal
 
@@ -35,20 +35,26 @@ from rolling_panda.messages.types import (
 )
 
 Age = Annotated[float, Meta(ge=0.0, le=1e9)]
-#: Whose axes the gizmo's arrows lie along.
+#: Frame whose axes the gizmo's arrows follow.
 GizmoAxes = Literal["tool", "base", "world"]
 CameraPreset = Literal["follow", "row", "tool", "top"]
-#: What the 3-D view can show: vines as perceived, pruning points, the tool's trail, the camera on the hand and what it
-#: sees, the points of its depth, and the simulated row as it really is.
+#: Layers of the 3-D view: perceived vines, pruning points, the tool's trail, the hand camera with its image, its depth
+#: as a point cloud, and the simulated row.
 Layer = Literal["plant", "points", "trail", "camera", "cloud", "simulated"]
 
 
 class PageMessage(Struct, frozen=True, kw_only=True, tag=True, forbid_unknown_fields=True):
-    """Root of the page's messages: an object with a `type`; unknown fields are refused."""
+    """Base of the page's messages: an object with a `type`; unknown fields are refused."""
 
 
 class ProcessPresence(Struct, frozen=True, forbid_unknown_fields=True):
-    """Is a process connected, and how old is its last word (s; None before the first)."""
+    """Connection of a process.
+
+    Attributes:
+        process: The process.
+        present: Whether it is connected.
+        age_s: Age of its last message (s); None before the first.
+    """
 
     process: Process
     present: bool
@@ -56,28 +62,29 @@ class ProcessPresence(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class PageState(PageMessage, frozen=True, kw_only=True):
-    """10 Hz: everything that changes all the time. The last known state stays, with its age.
+    """10 Hz: state of the robot. The last known state stays, with its age.
 
     Attributes:
-        number: Grows by one a message; the page echoes the last one it rendered.
-        user: Who is signed in on this page.
-        role: What they may do.
-        viewers: Pages open now.
-        processes: One row a process.
-        controller: Its newest state, None before the first. Without its queue, which is in `PagePoints`.
-        controller_age_s: Age of it (s).
-        bridge: Its newest state.
-        bridge_age_s: Age of it (s).
-        joints: Newest joint state: speeds for the gauges.
-        base: Base pose in odom.
+        number: Increases by one with each message; the page echoes the last one it rendered.
+        user: Name of the user of this page.
+        role: Role of the user.
+        viewers: Number of open pages.
+        processes: Connection of each process.
+        controller: Newest controller state, without its queue, which is in `PagePoints`; None before the first.
+        controller_age_s: Age of that state (s).
+        bridge: Newest bridge state; None before the first.
+        bridge_age_s: Age of that state (s).
+        joints: Newest joint state.
+        base: Pose of base_link in odom.
         camera_frame: Sequence of the newest camera frame, to fetch `/camera/color.jpg?n=…`.
-        client: The reader's own key, to be compared with the holder's.
-        control: Who holds control of the robot's motion.
-        stops: What bridge and controller hold latched.
-        speed_ratios: Speed of each actuator in parts of its limit, wheels first; empty before the first joint state.
-        replay: The recording that is played; None with a robot.
+        client: Key of this page, to be compared with the holder's.
+        control: Lease on the robot's motion.
+        stops: Latched stops of bridge and controller.
+        speed_ratios: Speed of each actuator as a fraction of its limit, wheels first; empty before the first joint
+            state.
+        replay: The recording that is replayed; None with a robot.
         relaxed_limits: Safety limits that a process's configuration sets less strictly than usual.
-        plain_wire: The robot's wire is not protected: every program on its machine can move it.
+        plain_wire: True if the wire has no TLS: every program on the robot's machine can move it.
     """
 
     number: Count
@@ -102,11 +109,14 @@ class PageState(PageMessage, frozen=True, kw_only=True):
 
 
 class PagePoint(Struct, frozen=True, forbid_unknown_fields=True):
-    """One row of the queue: the point as perceived and its life in the controller's queue.
+    """One row of the queue.
 
-    `pixel` is its place in the newest camera image (px, None when outside), `cane_angle` the direction of the cane in
-    that image (rad, from rightwards to downwards), for drawing. `plan` is what the session's plan says of it, None
-    where no plan that holds does.
+    Attributes:
+        point: The point as perceived.
+        entry: The point in the controller's queue.
+        pixel: Its position in the newest camera image (px, column and row); None outside the image.
+        cane_angle: Direction of the cane in that image (rad, from right to down).
+        plan: The plan for the point; None without a valid plan.
     """
 
     point: PruningPoint
@@ -117,7 +127,14 @@ class PagePoint(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class PagePlan(Struct, frozen=True, forbid_unknown_fields=True):
-    """The session's plan in brief: whether it holds or why not, its hash, and how long it takes (s)."""
+    """Summary of the plan.
+
+    Attributes:
+        state: As in `SessionPlan`.
+        reason: As in `SessionPlan`.
+        plan_hash: As in `SessionPlan`.
+        duration_s: Duration of the work, including the cuts (s).
+    """
 
     state: PlanState
     reason: Text
@@ -126,7 +143,17 @@ class PagePlan(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class PagePoints(PageMessage, frozen=True, kw_only=True):
-    """Sent when it changed: every point in the order of work, and the undecided sites."""
+    """Sent on change: all points in the order of work, and the undecided sites.
+
+    Attributes:
+        points: All points.
+        undecided_sites: Spurs without a point.
+        segmenter: Name of the segmenter.
+        frames: Number of camera frames used so far.
+        image_size: Width and height of the camera image (px).
+        plan: Summary of the plan.
+        rule: Current pruning rule.
+    """
 
     points: tuple[PagePoint, ...]
     undecided_sites: tuple[UndecidedSite, ...]
@@ -138,13 +165,25 @@ class PagePoints(PageMessage, frozen=True, kw_only=True):
 
 
 class PagePreview(PageMessage, frozen=True, kw_only=True):
-    """Sent when the controller has said it: the preview, and whether it is approved."""
+    """Sent on change: the preview and its approval.
+
+    Attributes:
+        preview: State of the preview.
+    """
 
     preview: PreviewState
 
 
 class PageEvent(Struct, frozen=True, forbid_unknown_fields=True):
-    """A line of the log: `number` grows; `wall_time` is the server's clock (s since 1970), for people."""
+    """A line of the log.
+
+    Attributes:
+        number: Increases by one with each line.
+        wall_time: Wall clock of the server (s since 1970).
+        process: Process that the line is from.
+        severity: Severity.
+        text: The line.
+    """
 
     number: Count
     wall_time: float
@@ -154,59 +193,90 @@ class PageEvent(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class PageEvents(PageMessage, frozen=True, kw_only=True):
-    """New lines of the log, oldest first; the last 200 at the start."""
+    """New lines of the log.
+
+    Attributes:
+        events: Lines, oldest first. A new page gets the last 200.
+    """
 
     events: tuple[PageEvent, ...]
 
 
 class Selected(PageMessage, frozen=True, kw_only=True):
-    """A point was clicked in the 3-D view of this session; empty = nothing."""
+    """A point was clicked in the 3-D view of this session.
+
+    Attributes:
+        point_id: The point; empty for none.
+    """
 
     point_id: str
 
 
 class PickRay(PageMessage, frozen=True, kw_only=True):
-    """A click into the 3-D view of a session that places points: from `origin` along `direction` (odom, m)."""
+    """A click in the 3-D view while points are placed by hand.
+
+    Attributes:
+        origin: Origin of the pick ray in odom (m).
+        direction: Unit direction of the pick ray in odom.
+    """
 
     origin: Vector3
     direction: UnitVector3
 
 
 class Measured(PageMessage, frozen=True, kw_only=True):
-    """Of two places that were clicked while this session measures: second less first (m, odom), what is there."""
+    """Result of a measurement between two clicks in the 3-D view.
+
+    Attributes:
+        offset: Second position minus the first, in odom (m).
+        between: Names of the clicked objects.
+    """
 
     offset: Vector3
     between: tuple[str, str]
 
 
 class HoldEnded(PageMessage, frozen=True, kw_only=True):
-    """The server has ended or refused what this page holds, and takes no more of it before the page lets go."""
+    """The server has ended or refused the hold of this page. The page has to release before it can hold again.
+
+    Attributes:
+        reason: Reason, as text.
+    """
 
     reason: Text
 
 
 class Pong(PageMessage, frozen=True, kw_only=True):
-    """Answer to a `Ping`, at once, for the round trip."""
+    """Immediate answer to a `Ping`, to measure the round trip.
+
+    Attributes:
+        number: `number` of the `Ping`.
+    """
 
     number: Count
 
 
 class Ping(PageMessage, frozen=True, kw_only=True):
-    """10 Hz: the page is alive, and `rendered` is the number of the last `PageState` it drew."""
+    """10 Hz: the page is alive.
+
+    Attributes:
+        number: Chosen by the page; the `Pong` repeats it.
+        rendered: `number` of the last `PageState` that the page drew.
+    """
 
     number: Count
     rendered: Count
 
 
 class Hold(PageMessage, frozen=True, kw_only=True):
-    """20 Hz while the operator holds: the tool may follow the gizmo. `hold` false, or silence, ends it.
+    """20 Hz while the operator holds a control. Without `base` and `joints` the tool follows the gizmo.
 
     Attributes:
-        sequence: Grows by one a message.
-        hold: Whether they still hold.
-        base: The base moves so, instead of the tool.
-        joints: The arm's joints turn so (rad/s), instead of the tool.
-        speed_scale: Of the usual speed.
+        sequence: Increases by one with each message.
+        hold: False ends the hold at once; a timeout ends it too.
+        base: Velocity of the base.
+        joints: Velocities of the arm's joints (7, rad/s).
+        speed_scale: Fraction of the usual speed.
     """
 
     sequence: Count
@@ -222,48 +292,73 @@ class Hold(PageMessage, frozen=True, kw_only=True):
 
 
 class ShowGizmo(PageMessage, frozen=True, kw_only=True):
-    """Show or hide this session's gizmo in the 3-D view; shown, it starts at the tool, along these axes."""
+    """Show or hide the gizmo of this session.
+
+    Attributes:
+        visible: Whether to show it. It appears at the tool.
+        axes: Frame whose axes it follows.
+    """
 
     visible: bool
     axes: GizmoAxes = "tool"
 
 
 class PlaceByHand(PageMessage, frozen=True, kw_only=True):
-    """From now on clicks into the 3-D view are meant for new points, each answered with a `PickRay`; or no more."""
+    """Switch placing of points by hand.
+
+    Attributes:
+        active: While true, each click in the 3-D view is answered with a `PickRay`.
+    """
 
     active: bool
 
 
 class ShowPreview(PageMessage, frozen=True, kw_only=True):
-    """Show this moment of the preview in the 3-D view (s from its start); None = nothing of it."""
+    """Show the preview in the 3-D view at one moment.
+
+    Attributes:
+        time: Time from the start of the preview (s); None hides it.
+    """
 
     time: NonNegative | None
 
 
 class PlaceCamera(PageMessage, frozen=True, kw_only=True):
-    """Put the camera of this session's 3-D views here; `follow` goes along with the base from then on."""
+    """Place the camera of this session's 3-D views.
+
+    Attributes:
+        preset: View; `follow` moves with the base.
+    """
 
     preset: CameraPreset
 
 
 class ShowLayers(PageMessage, frozen=True, kw_only=True):
-    """Show these layers on this session's 3-D views, and no others."""
+    """Choose the layers of this session's 3-D views.
+
+    Attributes:
+        layers: Layers to show; all others are hidden.
+    """
 
     layers: Annotated[tuple[Layer, ...], Meta(max_length=20)]
 
 
 class Measure(PageMessage, frozen=True, kw_only=True):
-    """From now on clicks into the 3-D view measure, each second one answered with `Measured`; or no more."""
+    """Switch measuring.
+
+    Attributes:
+        active: While true, every second click in the 3-D view is answered with `Measured`.
+    """
 
     active: bool
 
 
 class Select(PageMessage, frozen=True, kw_only=True):
-    """Highlight a point in the 3-D view and bring this session's cameras there; empty = none.
+    """Highlight a point in the 3-D view and move this session's cameras there.
 
     Attributes:
-        point_id: Of the point.
-        follow: The page follows the work, and nobody has chosen: who has just moved a camera keeps it for a while.
+        point_id: The point; empty for none.
+        follow: True if the page follows the work. A camera that a person has just moved then stays for a while.
     """
 
     point_id: Annotated[str, Meta(max_length=64)]

@@ -1,4 +1,4 @@
-"""What perception sees: pruning points, close-ups, crops, and what stands in the way."""
+"""Messages of perception: pruning points, close-ups, crops and obstacles."""
 
 import hashlib
 from typing import Annotated, Literal
@@ -28,27 +28,30 @@ from rolling_panda.messages.types import (
 
 
 class PruningPoint(Struct, frozen=True, forbid_unknown_fields=True):
-    """Where to cut, and why.
+    """A proposed cut: place, direction, reason and uncertainty.
 
     Attributes:
         point_id: Stable while the point is tracked from frame to frame.
-        revision: Grows when what is cut changes: its kind, the nodes kept, or by more than noise its place or tangent.
-        position: On the cane's axis, in odom (m).
-        tangent: Unit vector along the cane, pointing away from the cordon, in odom.
-        radius: Of the cane (m).
-        confidence: 0…1.
-        nodes_seen: Count nodes seen on the cane (the basal bud is not counted).
-        nodes_kept: Count nodes that stay below the cut.
+        revision: Increases when the cut changes: its kind, the nodes kept, or its place or tangent by more than noise.
+        position: Position on the cane's axis, in odom (m).
+        tangent: Unit vector along the cane in odom, pointing away from the cordon.
+        radius: Radius of the cane (m).
+        confidence: 0 … 1.
+        nodes_seen: Number of count nodes seen on the cane, without the basal bud.
+        nodes_kept: Number of count nodes that stay below the cut.
         vine: Number of the vine along the row, as perceived.
         spur: Number of the spur position on that vine, as perceived.
-        reason: Why here, in one sentence a grower understands.
-        kind: Shortens the cane that stays, takes the old stub off, tips the cane that will fruit, or is a person's.
-        offset: Past the last kept node, along the cane (m); None where no kept node is below the cut.
+        reason: Reason for the cut, in one sentence for a grower.
+        kind: `spur cut` shortens the cane that stays, `renewal cut` removes the old stub, `cane cut` shortens the
+            fruiting cane, `by hand` was placed by a person.
+        position_covariance: Covariance of the position (m²): xx, xy, xz, yy, yz, zz.
+        tangent_covariance: Covariance of the tangent in the same order.
+        offset: Distance past the last kept node along the cane (m); None without a kept node below the cut.
         force: Predicted cutting force (N).
-        wire_distance: To the surface of the nearest known wire (m); None while none is known.
+        wire_distance: Distance to the surface of the nearest known wire (m); None if none is known.
         cordon_distance: The same for cordons.
-        node_distance: To the nearest node that stays (m); None where none is known.
-        digest: Hash of what is cut and where, as `rolling_panda.point_digest` makes it; one for each revision.
+        node_distance: Distance to the nearest node that stays (m); None if none is known.
+        digest: Hash of the revision's place and kind, see `point_digest`.
     """
 
     point_id: Name
@@ -74,7 +77,15 @@ class PruningPoint(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class PruningRule(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Nodes kept on a spur, and on a Guyot vine's new cane; least diameter preferred (m); past the last node (m)."""
+    """Numbers from which the cuts follow.
+
+    Attributes:
+        system: Training system.
+        nodes_kept: Nodes kept on a spur.
+        fruiting_nodes: Nodes kept on the new cane of a Guyot vine.
+        preferred_diameter: Smallest diameter of a cane that is preferred to stay (m).
+        offset: Distance of the cut past the last kept node (m).
+    """
 
     system: Literal["spur", "guyot"] = "spur"
     nodes_kept: Annotated[int, Meta(ge=1, le=5)] = 2
@@ -84,9 +95,14 @@ class PruningRule(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
 
 
 class UndecidedSite(Struct, frozen=True, forbid_unknown_fields=True):
-    """A place without a point: why, and what it needs. Without vine and spur (0) it is about no spur in particular.
+    """A spur without a pruning point.
 
-    `position` is where the spur was seen (m, odom).
+    Attributes:
+        reason: Reason, as text.
+        needs: Another look by the camera, or a decision by the operator.
+        vine: Number of the vine; 0 for no particular spur.
+        spur: Number of the spur on that vine; 0 for no particular spur.
+        position: Position of the spur in odom (m), if known.
     """
 
     reason: Text
@@ -97,16 +113,16 @@ class UndecidedSite(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class PruningPoints(Message, frozen=True, kw_only=True):
-    """Perception → all: every point it holds true now.
+    """Perception → all: all current pruning points.
 
     Attributes:
         header: `frame_id` is odom.
-        segmenter: Name of the segmenter behind it.
-        frames: Camera frames used so far.
-        points: All points.
-        undecided_sites: Places seen without a point, over all frames.
-        canes: Axis of each cane as perceived: polylines in odom (m).
-        rule: In force; None where nobody says.
+        segmenter: Name of the segmenter.
+        frames: Number of camera frames used so far.
+        points: All current points.
+        undecided_sites: Spurs seen without a point, over all frames.
+        canes: Axis of each perceived cane, a polyline in odom (m).
+        rule: Current pruning rule; None if unknown.
     """
 
     header: Header
@@ -118,18 +134,18 @@ class PruningPoints(Message, frozen=True, kw_only=True):
     rule: PruningRule | None = None
 
 
-#: Largest picture (bytes).
+#: Size limit of a crop (bytes).
 CROP_BYTES = 8192
 
 
 class PointCrop(Message, frozen=True, kw_only=True):
-    """Perception → server: what the camera saw of a point's spur, the cut in the middle.
+    """Perception → server: camera image of a point's spur, centred on the cut.
 
     Attributes:
-        point_id: Of the point.
-        revision: That it shows.
-        sequence: Of the camera frame that it was taken from.
-        jpeg: The picture; black where the frame ended.
+        point_id: The point.
+        revision: Revision that the image shows.
+        sequence: `sequence` of the camera frame that it was cropped from.
+        jpeg: The image; black outside the frame.
     """
 
     point_id: Name
@@ -138,18 +154,20 @@ class PointCrop(Message, frozen=True, kw_only=True):
     jpeg: Annotated[bytes, Meta(max_length=CROP_BYTES)]
 
 
-#: `seen`: the cane stands and fits; `changed`: it stands but is not what was accepted; `severed`: the wood beyond the
-#: cut is gone; `unseen`: the picture does not tell.
+#: `seen`: the cane stands and matches; `changed`: it stands but differs from the accepted one; `severed`: the wood
+#: beyond the cut is gone; `unseen`: the picture is not conclusive.
 Finding = Literal["seen", "changed", "severed", "unseen"]
 
 
 class CloseUpRequest(Message, frozen=True, kw_only=True):
-    """Controller → bridge: take a close-up of a point now. Repeated until seen; the bridge acts on a `number` once.
+    """Controller → bridge: take a close-up of a point now.
+
+    It is repeated until the result is there. The bridge executes a `number` once.
 
     Attributes:
         epoch: As in `MotionCommand`.
         number: Strictly increasing within an epoch.
-        point_id: The point; the frame carries it.
+        point_id: The point; it is copied into the camera frame.
     """
 
     epoch: Epoch
@@ -158,18 +176,18 @@ class CloseUpRequest(Message, frozen=True, kw_only=True):
 
 
 class CloseUpResult(Message, frozen=True, kw_only=True):
-    """Perception → controller: what a requested close-up shows of its point.
+    """Perception → controller: result of a close-up.
 
     Attributes:
-        header: Stamp of the picture; `frame_id` is odom.
+        header: Stamp of the camera frame; `frame_id` is odom.
         point_id: The point.
-        number: Of the request.
-        finding: What it shows.
-        reason: Why it is unseen or has changed, in words.
-        position: Where its cut belongs as seen now (m, odom); None unless `seen`.
-        tangent: Of the cane there; None unless `seen`.
-        distance: Of the camera from the point (m).
-        nodes: Places along the cane where nodes were seen (m beyond the cut, negative before it).
+        number: `number` of the request.
+        finding: State of the cane.
+        reason: Reason for `unseen` or `changed`, as text.
+        position: Position of the cut by this picture in odom (m); None unless `seen`.
+        tangent: Unit tangent of the cane there in odom; None unless `seen`.
+        distance: Distance of the camera from the point (m).
+        nodes: Positions of the nodes seen along the cane (m beyond the cut, negative before it).
     """
 
     header: Header
@@ -183,15 +201,22 @@ class CloseUpResult(Message, frozen=True, kw_only=True):
     nodes: tuple[Finite, ...] = ()
 
 
-#: Number of a vine or a spur, -1 for none.
+#: Number of a vine or a spur; -1 for none.
 Number = Annotated[int, Meta(ge=-1, le=10**6)]
 
 
 class Capsule(Struct, frozen=True, forbid_unknown_fields=True):
-    """A rod with round ends: axis from `start` to `end` (m), radii at both (m).
+    """A capsule in odom.
 
-    `vine` and `spur`, numbers as pruning points have them, are of the spur that it grows from; -1 where there is none.
-    `undecided` wood may yet be cut off: which cane of that spur stays was left to a person.
+    Attributes:
+        kind: Class of the wood or object.
+        start: First end of the axis in odom (m).
+        end: Second end of the axis in odom (m).
+        start_radius: Radius at `start` (m).
+        end_radius: Radius at `end` (m).
+        vine: Number of the vine, as in pruning points; -1 for none.
+        spur: Number of the spur that it grows from; -1 for none.
+        undecided: True for canes of an undecided site, which may be cut later.
     """
 
     kind: WoodClass
@@ -205,9 +230,12 @@ class Capsule(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Scenery(Message, frozen=True, kw_only=True):
-    """Simulated bridge → server: the row as it stands, for display only. Perception and control never subscribe.
+    """Simulated bridge → server: the simulated row, for display only. Perception and control never subscribe to it.
 
-    `revision` grows whenever something was severed.
+    Attributes:
+        header: `frame_id` is odom.
+        revision: Increases when something is severed.
+        capsules: All parts of the row.
     """
 
     header: Header
@@ -216,12 +244,12 @@ class Scenery(Message, frozen=True, kw_only=True):
 
 
 class Obstacles(Message, frozen=True, kw_only=True):
-    """Perception → controller: what stands in the way of base and arm, as far as it was seen.
+    """Perception → controller: obstacles for base and arm, as far as seen.
 
     Attributes:
         header: `frame_id` is odom.
-        capsules: Posts, trunks, cordons, wires, and of the canes what stays once the row is pruned, each with its vine
-            and spur. What is to be cut off is not among them: it gives way.
+        capsules: Posts, trunks, cordons, wires and retained canes. Wood that will be cut off is not an obstacle: it
+            gives way.
     """
 
     header: Header
@@ -229,11 +257,11 @@ class Obstacles(Message, frozen=True, kw_only=True):
 
 
 def point_digest(point: PruningPoint) -> str:
-    """What is cut and where, as 32 hexadecimal digits.
+    """Hash of a point's place and kind of cut: 32 hexadecimal digits.
 
-    They are the first half of SHA-256 over the MessagePack array [point_id, revision, kind, position, tangent,
-    nodes_kept, vine, spur] with numbers of position and tangent as 64-bit floats. What perception goes on measuring
-    without changing the cut (radius, confidence, distances) is left out, so that a revision has one hash.
+    It is the first half of the SHA-256 of the MessagePack array [point_id, revision, kind, position, tangent,
+    nodes_kept, vine, spur], with position and tangent as 64-bit floats. Values that change without changing the cut
+    (radius, confidence, distances) are left out, so that a revision has one hash.
     """
     content = (
         point.point_id,

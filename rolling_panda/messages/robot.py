@@ -1,4 +1,4 @@
-"""What the robot is told and what it tells: motion, cuts, stops, joints, odometry, camera frames."""
+"""Messages to and from the robot: motion, cuts, stops, joints, odometry, camera frames."""
 
 import hashlib
 from typing import Annotated, Literal
@@ -26,16 +26,16 @@ from rolling_panda.messages.types import (
 
 
 class TokenRequest(Message, frozen=True, kw_only=True):
-    """Controller → bridge: give me the fencing token, let me keep it, or take it back.
+    """Controller → bridge: request, keep or release the fencing token.
 
-    Repeated by the holder of the token too. Nobody else is given one before the holder releases it, or is silent for a
-    second; `BridgeState` says whose it is, and under which epoch.
+    The holder repeats the request to keep its token. Another controller gets a token when the holder releases it, or is
+    silent for a second. `BridgeState` reports the holder and the epoch.
 
     Attributes:
-        token: Random part of the token, drawn by who asks and told to nobody but the bridge.
-        echo: `sequence` of the newest `JointState`; judged as that of a motion command.
-        mode: Of the controller that asks; of no account where it releases the token.
-        releases: The controller gives its token up: the next one who asks is given one.
+        token: Random part of the token, drawn by the requesting controller and sent to the bridge only.
+        echo: `sequence` of the newest `JointState`; its age is checked as in `MotionCommand`.
+        mode: Mode of the requesting controller; ignored in a release.
+        releases: The controller releases its token. The next one that requests a token gets it.
     """
 
     token: Annotated[str, Meta(min_length=1, max_length=32)]
@@ -45,20 +45,20 @@ class TokenRequest(Message, frozen=True, kw_only=True):
 
 
 def fingerprint(token: str) -> str:
-    """What may be told of a token: who has drawn it knows it again, and nobody else can use it."""
+    """Public digest of a token. Its holder recognises it; nobody can command the robot with it."""
     return hashlib.sha256(token.encode()).hexdigest()[:16]
 
 
 class MotionCommand(Message, frozen=True, kw_only=True):
-    """Controller → bridge: the velocity of every actuator, newest wins.
+    """Controller → bridge: the velocity of every actuator; newest wins.
 
     Attributes:
-        epoch: Of the token, as the bridge has given it out; any other one is refused.
+        epoch: Epoch of the token that the bridge has issued; any other is refused.
         sequence: Strictly increasing within an epoch.
         echo: `sequence` of the newest `JointState` the command was computed from. The bridge knows when it sent that
             state, so it judges the command's age on its own clock.
         xi: [θ̇_l, θ̇_r, q̇₁…q̇₇] in rad/s.
-        token: Random part of the token; any other one is refused.
+        token: Random part of the token; any other is refused.
     """
 
     epoch: Epoch
@@ -69,9 +69,16 @@ class MotionCommand(Message, frozen=True, kw_only=True):
 
 
 class CutCommand(Message, frozen=True, kw_only=True):
-    """Controller → bridge: close the blades once. Repeated until seen; the bridge acts on a `cut_id` once.
+    """Controller → bridge: close the blades once.
 
-    `epoch`, `token` and `echo` are judged as those of a motion command, and the robot has to be at rest.
+    It is repeated until the bridge reports the cut. The robot has to be at rest.
+
+    Attributes:
+        epoch: As in `MotionCommand`.
+        cut_id: Identifies the cut. The bridge executes it once.
+        point_id: The point, for the record.
+        echo: As in `MotionCommand`.
+        token: As in `MotionCommand`.
     """
 
     epoch: Epoch
@@ -82,7 +89,14 @@ class CutCommand(Message, frozen=True, kw_only=True):
 
 
 class StopRequest(Message, frozen=True, kw_only=True):
-    """Anyone → bridge and controller: the software stop, latched by both. Sent several times with one `stop_id`."""
+    """Any process → bridge and controller: the software stop, latched by both. Sent several times with one `stop_id`.
+
+    Attributes:
+        stop_id: Identifies the stop, also in the reset.
+        source: Process or input that it came from.
+        user: Who pressed; empty for a stop by a program.
+        reason: Cause, as text.
+    """
 
     stop_id: Name
     source: Name
@@ -91,7 +105,14 @@ class StopRequest(Message, frozen=True, kw_only=True):
 
 
 class JointState(Message, frozen=True, kw_only=True):
-    """Bridge → all: measured actuated coordinates, [θ_l, θ_r, q₁…q₇] (rad, rad/s), as sensor_msgs/JointState."""
+    """Bridge → all: measured actuated coordinates, like sensor_msgs/JointState.
+
+    Attributes:
+        header: Time of measurement.
+        sequence: Strictly increasing.
+        position: [θ_l, θ_r, q₁…q₇] (rad).
+        velocity: Their velocities (rad/s).
+    """
 
     header: Header
     sequence: Count
@@ -100,7 +121,7 @@ class JointState(Message, frozen=True, kw_only=True):
 
 
 class Odometry(Message, frozen=True, kw_only=True):
-    """Bridge → all: the base from its wheels.
+    """Bridge → all: wheel odometry of the base.
 
     Attributes:
         header: `frame_id` is odom.
@@ -118,7 +139,13 @@ class Odometry(Message, frozen=True, kw_only=True):
 
 
 class RejectionCount(Struct, frozen=True, forbid_unknown_fields=True):
-    """How many messages of a topic were refused for one reason."""
+    """Messages of a topic that were refused for one reason.
+
+    Attributes:
+        topic: The topic.
+        reason: Reason for the refusal, as text.
+        count: Number of messages since the start of the bridge.
+    """
 
     topic: Text
     reason: Text
@@ -126,25 +153,27 @@ class RejectionCount(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class BridgeState(Message, frozen=True, kw_only=True):
-    """Bridge → all: its own latch, watchdog and cutter; the controller cannot overrule any of them.
+    """Bridge → all: stop latch, watchdog and cutter of the bridge. The controller can override none of them.
 
     Attributes:
-        kind: `sim`, `real`, or `fakes`: the real robot's drivers with fakes in place of the devices.
-        epoch: Of the newest token given out; 0 before the first.
-        holder: First 16 hexadecimal digits of the SHA-256 of its random part; empty when nobody holds it.
-        sequence: Of the command that the robot follows, or followed last.
-        moving: Whether what is sent to the actuators is anything but zero.
-        watchdog: True while no valid setpoint has come for the deadline: base 0, arm holds, cutter inhibited.
-        stop_id: The latched software stop, empty when none.
+        header: Time of the state.
+        kind: `sim`, `real`, or `fakes` (the drivers of the real robot on fake devices).
+        epoch: Epoch of the newest token; 0 before the first.
+        holder: First 16 hexadecimal digits of the SHA-256 of the token's random part; empty without a holder.
+        sequence: `sequence` of the motion command that the robot follows, or followed last.
+        moving: Whether any actuator is sent a velocity other than zero.
+        watchdog: True while no valid setpoint has arrived within the deadline: base 0, arm holds, cutter inhibited.
+        stop_id: The latched software stop; empty without one.
         stopped_by: User and reason of that stop.
-        cutter: What the blades do.
-        cut_id: The last cut asked for, empty when none.
-        outcome: How that cut ended, empty while it goes on.
-        real_time_factor: Simulated seconds a second; 1 on a real robot.
-        round_trip_s: From a joint state to the command that answers it, median over the last second; 0 without any.
-        round_trip_worst_s: The longest of them.
+        cutter: State of the blades.
+        cut_id: The last requested cut; empty before the first.
+        outcome: Outcome of that cut; empty during the cut.
+        real_time_factor: Simulated time per real time; 1 on a real robot.
+        round_trip_s: Time from a joint state to the command that answers it, median of the last second (s); 0 without
+            commands.
+        round_trip_worst_s: The longest of them (s).
         rejections: Messages refused since the start, by reason.
-        battery: Charge of the base; None where nobody tells, as in the simulation.
+        battery: Charge of the base, 0 … 1; None if unknown, as in simulation.
         relaxed_limits: Safety limits that its configuration sets less strictly than usual, within their hard bounds.
     """
 
@@ -169,7 +198,13 @@ class BridgeState(Message, frozen=True, kw_only=True):
 
 
 class ReleaseStop(Message, frozen=True, kw_only=True):
-    """Controller → bridge: release the latched stop `stop_id`. Moves nothing; any other id is refused."""
+    """Controller → bridge: release a latched stop. It moves nothing.
+
+    Attributes:
+        stop_id: The latched stop; any other id is refused.
+        user: Who resets it.
+        reason: Reason for the reset, as text.
+    """
 
     stop_id: Name
     user: Text
@@ -177,7 +212,16 @@ class ReleaseStop(Message, frozen=True, kw_only=True):
 
 
 class Intrinsics(Struct, frozen=True, forbid_unknown_fields=True):
-    """Pinhole camera: image size (px), focal lengths and principal point (px)."""
+    """Pinhole camera model.
+
+    Attributes:
+        width: Columns of the image (px).
+        height: Rows of the image (px).
+        fx: Focal length along a row (px).
+        fy: Focal length along a column (px).
+        cx: Column of the principal point (px).
+        cy: Row of the principal point (px).
+    """
 
     width: Annotated[int, Meta(ge=1, le=4096)]
     height: Annotated[int, Meta(ge=1, le=4096)]
@@ -188,20 +232,20 @@ class Intrinsics(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class CameraFrame(Message, frozen=True, kw_only=True):
-    """Bridge → perception and server: one RGB-D frame with the robot's measured posture when it was taken.
+    """Bridge → perception and server: one RGB-D frame with the robot's measured posture at exposure.
 
     Attributes:
         header: `frame_id` is camera: z forward, x right, y down.
         sequence: Strictly increasing.
-        intrinsics: Of all images in the frame.
-        base: Measured base_link in odom at exposure.
+        intrinsics: Camera model of all images in the frame.
+        base: Measured pose of base_link in odom at exposure.
         position: Measured actuated coordinates at exposure (rad).
         color_jpeg: H×W×3, JPEG.
         depth_zlib: H×W uint16 little-endian, row-major, zlib; in units of `depth_unit`; 0 = no return.
-        depth_unit: Metres a count.
+        depth_unit: Depth of one count (m).
         labels_zlib: H×W uint8 class indices (`WOOD_CLASSES`), zlib. Empty without a label camera (a real robot).
-        point_id: Point of the requested close-up; empty in other pictures.
-        number: Of the request.
+        point_id: Point of the requested close-up; empty in other frames.
+        number: `number` of the close-up request.
     """
 
     header: Header

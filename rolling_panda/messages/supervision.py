@@ -1,4 +1,4 @@
-"""The controller's state, who holds control, plans, previews, teleoperation and the session's report."""
+"""Messages of supervision: controller state, control, stops, plan, preview, teleoperation and report."""
 
 from typing import Annotated, Literal
 
@@ -29,19 +29,19 @@ from rolling_panda.messages.types import (
     Vector3,
 )
 
-#: Seconds since 1970, of people's clocks.
+#: Wall clock, seconds since 1970.
 WallTime = Annotated[float, Meta(ge=0.0, le=1e11)]
 
 
 class ReplayState(Message, frozen=True, kw_only=True):
-    """Replay → server: what is on the wire is a recording.
+    """Replay → server: the wire carries a recording instead of a robot.
 
     Attributes:
-        name: Of the file.
-        begins_at: When its first message was recorded (s since 1970).
-        duration_s: From the first to the last message.
-        position_s: Where it is played now, from its beginning.
-        playing: False while it stands still.
+        name: Name of the file.
+        begins_at: Time of the first recorded message (s since 1970).
+        duration_s: Time from the first to the last message (s).
+        position_s: Current position from the beginning (s).
+        playing: False while the replay is paused.
     """
 
     name: Text
@@ -52,10 +52,18 @@ class ReplayState(Message, frozen=True, kw_only=True):
 
 
 class QueueEntry(Struct, frozen=True, forbid_unknown_fields=True):
-    """A pruning point in the controller's queue: its life, why it is where it is, the `digest` that was accepted.
+    """A pruning point in the controller's queue.
 
-    `recorded` is the point as the ledger has it, where perception does not show it and somebody has to decide.
-    `azimuth` is the turn of the approach about the cane (rad) that somebody wants, None where the search chooses it.
+    Attributes:
+        point_id: The point.
+        state: State of the point.
+        reason: Reason for the state, as text.
+        user: The person who last decided about the point.
+        cut_id: Its last cut; empty before the first.
+        accepted_position: Position at acceptance, in odom (m).
+        digest: Hash of the accepted point, see `PruningPoint.digest`.
+        recorded: The point from the ledger, if perception does not report it and a person has to decide.
+        azimuth: Requested turn of the approach about the cane (rad); None if the posture search chooses it.
     """
 
     point_id: Name
@@ -70,43 +78,55 @@ class QueueEntry(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Proximity(Struct, frozen=True, forbid_unknown_fields=True):
-    """The least distance (m) between two things that must not touch, and which; negative where they overlap."""
+    """The smallest monitored distance.
+
+    Attributes:
+        distance: Distance (m); negative in penetration.
+        what: Names of the two parts.
+    """
 
     distance: Metre
     what: Text
 
 
 class QueueOrder(Struct, frozen=True, forbid_unknown_fields=True):
-    """Whose order of work it is: that of `user`, or the plan's where empty; `revision` counts people's changes."""
+    """Origin of the order of work.
+
+    Attributes:
+        revision: Number of changes by people.
+        user: The person who set the order; empty for the plan's order.
+    """
 
     revision: Count = 0
     user: Text = ""
 
 
 class ControllerState(Message, frozen=True, kw_only=True):
-    """Controller → all: mode, queue and the quality of tracking.
+    """Controller → all: mode, queue and tracking error.
 
     Attributes:
-        mode: State of the supervision machine.
-        phase: Step of the cut sequence in AUTO, else empty.
-        reason: Why the machine is in this mode.
-        allowed: Intent types that would be taken now; every other one is answered with a reason.
-        active_point_id: The point being worked on, empty when none.
+        header: Time of the state.
+        mode: State of the supervision state machine.
+        phase: Step of the cut sequence in AUTO; empty otherwise.
+        reason: Reason for the mode, as text.
+        allowed: Intent types that are allowed now. Every other one is refused with a reason.
+        active_point_id: Current point of the work; empty without one.
         method: Name of the whole-body method.
         T_odom_tool: Measured tool pose.
-        T_odom_tool_desired: Where the trajectory has it now; None when nothing is tracked.
+        T_odom_tool_desired: Desired tool pose on the trajectory; None without a trajectory.
         position_error: Tool position error (m).
         rotation_error: Tool rotation error (rad).
         manipulability: ω of the arm.
-        joint_margin: Least distance of an arm joint to its limit (rad).
-        tick_s: Median time of one control step over the last second (s).
+        joint_margin: Smallest distance of an arm joint to its limit (rad).
+        tick_s: Median duration of one control step over the last second (s).
         ticks: Control periods since the start.
-        late_ticks: Those of them that lasted more than half as long again as they should.
-        queue: Every point known, in the order of work.
-        limited_by: What keeps the robot from doing all that is asked of it now, by name; empty where nothing does.
-        proximity: What it is nearest to touching while it moves; None where nothing is near.
-        order: Whose order that is.
-        interrupted: What a pause or a protective stop has ended; empty once something is begun, or the robot disarmed.
+        late_ticks: Control periods that lasted more than 1.5 times their nominal length.
+        queue: All known points, in the order of work.
+        limited_by: Name of the constraint that limits the current motion; empty without one.
+        proximity: Smallest monitored distance during motion; None if nothing is near.
+        order: Origin of the order of work.
+        interrupted: Activity that a pause or a protective stop interrupted; empty after the next start, or when
+            disarmed.
         relaxed_limits: Safety limits that its configuration sets less strictly than usual, within their hard bounds.
     """
 
@@ -134,23 +154,23 @@ class ControllerState(Message, frozen=True, kw_only=True):
     relaxed_limits: tuple[Text, ...] = ()
 
 
-#: Who asks, as others may see it: a digest of a session, never the session itself. Empty = nobody.
+#: Public key of a client: a digest of its session, never the session itself. Empty = nobody.
 ClientKey = Annotated[str, Meta(max_length=64)]
-#: The random part of a token.
+#: Random part of a token.
 Nonce = Annotated[str, Meta(max_length=32, pattern=r"^[0-9a-f]*(?!\n)$")]
-#: A view that has shown nothing yet counts as this old (s).
+#: Age of the view of a client that has not seen any state yet (s).
 NEVER_SEEN_S = 1e6
 
 
 class Person(Struct, frozen=True, forbid_unknown_fields=True):
-    """Somebody whose page or script is heard from now.
+    """A person whose page or script was heard within the last second.
 
     Attributes:
-        key: Who.
-        user: Their name.
-        role: What they may do.
-        heard_age_s: Since they last said something (s).
-        view_age_s: Age of the newest state of the robot that they have drawn or fetched (s).
+        key: Key of the client.
+        user: Name of the user.
+        role: Role of the user.
+        heard_age_s: Time since the last message of the client (s).
+        view_age_s: Age of the newest state of the robot that the client has drawn or fetched (s).
     """
 
     key: ClientKey
@@ -161,11 +181,11 @@ class Person(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Presence(Message, frozen=True, kw_only=True):
-    """Server → controller: who is there. It renews the lease of the one who holds control, from their last word on.
+    """Server → controller: the people who are present. It renews the holder's lease from the holder's last message on.
 
     Attributes:
-        sequence: Strictly increasing; one that is not above the last counts for nothing.
-        people: Everybody heard from within the last second.
+        sequence: Strictly increasing; a message that does not increase it is ignored.
+        people: Everybody heard within the last second.
     """
 
     sequence: Count
@@ -176,15 +196,15 @@ class ControlState(Message, frozen=True, kw_only=True):
     """Controller → all: the lease on the robot's motion.
 
     Attributes:
-        holder: Key of who holds control, empty when nobody.
-        user: Their name.
-        expires_s: How long the lease still lives without a word of its holder (s).
-        requested_by: Name of who asks for control, empty when nobody.
-        requested_key: Their key.
-        next_user: Name of who gets control as soon as the robot is at rest, empty when nobody.
-        notice: What became of control last, in words.
-        notice_number: Grows with each such change, so that a page tells each once.
-        supervised: Whether somebody who may operate sees the robot now.
+        holder: Key of the holder; empty without one.
+        user: Name of the holder.
+        expires_s: Time to the end of the lease without a message of the holder (s).
+        requested_by: Name of the person who asks for control; empty without one.
+        requested_key: Key of that person.
+        next_user: Name of the person who gets control when the robot is at rest; empty without one.
+        notice: Last change of control, as text.
+        notice_number: Increases with each change, so that a page shows each notice once.
+        supervised: Whether a person who may operate the robot sees it now.
     """
 
     holder: ClientKey
@@ -199,14 +219,14 @@ class ControlState(Message, frozen=True, kw_only=True):
 
 
 class StopRecord(Struct, frozen=True, forbid_unknown_fields=True):
-    """One stop as a process has latched it.
+    """One stop that a process has latched.
 
     Attributes:
-        stop_id: Its id.
+        stop_id: Id of the stop.
         source: Process or input that it came from.
-        user: Who pressed; empty where nobody did.
-        reason: Why.
-        wall_time: When this process latched it.
+        user: Who pressed; empty for a stop by a program.
+        reason: Cause, as text.
+        wall_time: Time at which this process latched it (s since 1970).
     """
 
     stop_id: Annotated[str, Meta(min_length=1, max_length=64)]
@@ -217,12 +237,12 @@ class StopRecord(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class StopState(Message, frozen=True, kw_only=True):
-    """Bridge and controller → all: the stops that this process holds latched, the newest first.
+    """Bridge and controller → all: the latched stops of this process.
 
     Attributes:
-        process: Whose latch this is.
-        stops: What is latched.
-        released_by: Who released the last one that was, and why; empty before.
+        process: The sender.
+        stops: Latched stops, newest first.
+        released_by: User and reason of the last release; empty before the first.
         hardware: Whether the hardware stop is pressed; always false from the controller.
     """
 
@@ -233,7 +253,12 @@ class StopState(Message, frozen=True, kw_only=True):
 
 
 class HardwareStop(Message, frozen=True, kw_only=True):
-    """Anyone → the simulated bridge: press or release the robot's emergency stop button, which it does not have."""
+    """Any process → simulated bridge: press or release the simulated emergency stop button.
+
+    Attributes:
+        pressed: Whether it is pressed.
+        user: Who acts.
+    """
 
     pressed: bool
     user: Text
@@ -243,22 +268,22 @@ PlanState = Literal["none", "planning", "valid", "void"]
 
 
 class PointPlan(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What the plan says of one accepted point.
+    """Plan for one accepted point: the motion to it, or the reason for a refusal.
 
     Attributes:
-        point_id: Of the point.
-        revision: That was accepted, and that the plan is for.
-        order: 1 for the first that is worked on; 0 when the plan refuses the point.
-        reason: Why it is refused, empty when it is not.
-        begins_s: When the way to it begins, from the start of the session (s).
-        duration_s: Of the way to it, up to where the tool stands clear of the canes (s).
-        clearance: Least distance on that way between the robot's parts, and from them to the ground and obstacles (m).
-        between: Between what that is.
-        manipulability: Least ω of the arm at the cut and on the way to it.
-        torque_margin: What is left of the torque of the joint that uses the largest share of its own (Nm).
-        torque_joint: That joint.
-        base: Where the base stands for the cut; None when refused.
-        plan_hash: SHA-256 of the way in every control period; empty when refused.
+        point_id: The point.
+        revision: Accepted revision that the plan is for.
+        order: Position in the order of work, from 1; 0 for a refused point.
+        reason: Reason for the refusal, as text; empty otherwise.
+        begins_s: Start of the motion to it, from the start of the work (s).
+        duration_s: Duration of that motion, up to where the tool is clear of the canes (s).
+        clearance: Smallest distance during that motion, among the robot's parts and to ground and obstacles (m).
+        between: The two parts with that distance.
+        manipulability: Smallest ω of the arm at the cut and on the motion to it.
+        torque_margin: Remaining torque of the joint that uses the largest fraction of its limit (Nm).
+        torque_joint: Name of that joint.
+        base: Pose of base_link in odom at the cut; None for a refused point.
+        plan_hash: SHA-256 of the motion in every control period; empty for a refused point.
     """
 
     point_id: Name
@@ -277,11 +302,11 @@ class PointPlan(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 class PlanRow(Struct, frozen=True, forbid_unknown_fields=True):
-    """A moment of a planned way.
+    """One sample of a planned motion.
 
     Attributes:
-        time: From the beginning of the way (s).
-        base: base_link in odom.
+        time: Time from the start of the motion (s).
+        base: Pose of base_link in odom.
         position: Actuated coordinates (rad).
         T_odom_tool: Tool pose.
     """
@@ -293,22 +318,27 @@ class PlanRow(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class PlannedPoint(Struct, frozen=True, forbid_unknown_fields=True):
-    """One accepted point of the plan: what is said of it, and the way to it, thinned out for display."""
+    """One accepted point of the plan.
+
+    Attributes:
+        plan: Figures of the plan.
+        preview: Motion to the point, downsampled for display.
+    """
 
     plan: PointPlan
     preview: tuple[PlanRow, ...] = ()
 
 
 class SessionPlan(Message, frozen=True, kw_only=True):
-    """Controller → all: how the accepted points will be worked off.
+    """Controller → all: order and motions of the work on the accepted points.
 
     Attributes:
         header: `frame_id` is odom.
-        state: `valid` while work follows it; `void` once something changed; `planning` until the next one is there.
-        reason: Why it is void, or why there is none.
-        plan_hash: SHA-256 of everything the plan was made from and of everything in it; empty when there is none.
-        duration_s: Of the session, cuts included (s).
-        points: Those to be worked on in their order, then those refused.
+        state: `valid` while the work follows the plan; `void` after a change; `planning` until the next plan is ready.
+        reason: Reason why the plan is void or missing, as text.
+        plan_hash: SHA-256 of the inputs and the content of the plan; empty without a plan.
+        duration_s: Duration of the work, including the cuts (s).
+        points: Points in the order of work, then the refused points.
     """
 
     header: Header
@@ -323,19 +353,20 @@ PreviewPhase = Literal["none", "waiting", "rolling", "ready", "approved", "expir
 
 
 class PreviewedCut(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """One point of a preview, with the way to it and the way out again.
+    """One point of a preview, with the motion to it and out again.
 
     Attributes:
-        point_id: Of the point.
-        revision: That is accepted, and that is previewed.
-        begins_s: When the way to it begins (s from the start).
-        cut_s: When the blades close (s from the start); None where they do not.
-        ends_s: When the way to the next point begins, or the work ends (s from the start).
-        result: How it ends, in words: cut, or why not.
-        clearance: Least distance meanwhile between the robot's parts, and from them to ground and obstacles (m).
-        between: Between what that is.
-        manipulability: Least ω of the arm meanwhile.
-        joint_margin: Least distance of an arm joint to its limit meanwhile (rad).
+        point_id: The point.
+        revision: Accepted revision that is previewed.
+        begins_s: Start of the motion to it (s from the start of the preview).
+        cut_s: Time at which the blades close (s from the start); None without a cut.
+        ends_s: Start of the motion to the next point, or end of the work (s from the start).
+        result: Outcome as text: cut, or the reason why not.
+        clearance: Smallest distance from `begins_s` to `ends_s`, among the robot's parts and to ground and
+            obstacles (m).
+        between: The two parts with that distance.
+        manipulability: Smallest ω of the arm in that time.
+        joint_margin: Smallest distance of an arm joint to its limit in that time (rad).
     """
 
     point_id: Name
@@ -351,21 +382,21 @@ class PreviewedCut(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 
 
 class PreviewState(Message, frozen=True, kw_only=True):
-    """Controller → all: whether there is a preview, whether it still describes what would happen, and who approved it.
+    """Controller → all: state, figures and approval of the preview.
 
     Attributes:
         header: `frame_id` is odom.
-        required: True while no cut begins that nobody has approved the preview of.
-        phase: `waiting` for the robot to rest and the plan to be made, `rolling` while it is computed; `ready` to be
-            approved; `expired` once something has changed.
-        reason: What has changed, or what is waited for.
-        preview_hash: SHA-256 of all that it was made from and of all that is in it; empty when there is none.
-        approved_by: Who has approved it; empty when nobody has.
-        start: Where the base begins.
+        required: True if a cut needs an approved preview.
+        phase: `waiting` for the robot to rest and for the plan; `rolling` while it is computed; `ready` for approval;
+            `approved`; `expired` after a change.
+        reason: The change that expired it, or the cause of waiting, as text.
+        preview_hash: SHA-256 of the inputs and the content of the preview; empty without a preview.
+        approved_by: Name of the person who approved it; empty without an approval.
+        start: Pose of base_link in odom at the start.
         position: Actuated coordinates at the start (rad).
-        duration_s: Of all of it (s).
-        cuts: Points in their order.
-        remaining: Accepted points that come after those, and are not in it.
+        duration_s: Duration of the preview (s).
+        cuts: Points in the order of work.
+        remaining: Number of accepted points after these that are not part of the preview.
     """
 
     header: Header
@@ -382,7 +413,14 @@ class PreviewState(Message, frozen=True, kw_only=True):
 
 
 class PreviewRow(Struct, frozen=True, forbid_unknown_fields=True):
-    """A moment of a preview: `time` from the start (s), base in odom, actuated coordinates (rad), tool in odom (m)."""
+    """One sample of a preview.
+
+    Attributes:
+        time: Time from the start (s).
+        base: Pose of base_link in odom.
+        position: Actuated coordinates (rad).
+        tool: Position of the tool in odom (m).
+    """
 
     time: NonNegative
     base: PlanarPose
@@ -391,7 +429,13 @@ class PreviewRow(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class PreviewMotion(Message, frozen=True, kw_only=True):
-    """Controller → server: the motion of a preview, for the ghost in the 3-D view."""
+    """Controller → server: the motion of a preview, for the ghost in the 3-D view.
+
+    Attributes:
+        header: `frame_id` is odom.
+        preview_hash: Hash of the preview, see `PreviewState`.
+        rows: Samples of the motion.
+    """
 
     header: Header
     preview_hash: Digest
@@ -402,18 +446,18 @@ _Number = Annotated[int, Meta(ge=0, le=100000)]
 
 
 class CutReport(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """One cut and how it ended, or a point that was given up before the blades were asked to close.
+    """One cut with its outcome, or a point that was given up before the order to cut.
 
     Attributes:
-        cut_id: Of the cut; empty where the point was given up before there was one.
-        point_id: Point that was to be cut.
-        vine: Its vine.
-        spur: Its spur on that vine.
-        outcome: As it is known now; empty while it goes on.
-        reason: In words.
-        user: Who accepted it, or said how it ended.
-        ended_at: When; 0 while it goes on.
-        seconds: From the end of the cut before, or the start of work if that was later, to the end of this one.
+        cut_id: Id of the cut; empty for a point that was given up before.
+        point_id: Point of the cut.
+        vine: Number of its vine.
+        spur: Number of its spur on that vine.
+        outcome: Current outcome; empty during the cut.
+        reason: Reason for the outcome, as text.
+        user: Who accepted the point, or reported the outcome.
+        ended_at: Time of its end (s since 1970); 0 during the cut.
+        seconds: Time from the end of the previous cut, or from a later start of work, to the end of this cut (s).
     """
 
     cut_id: ClientKey = ""
@@ -428,7 +472,16 @@ class CutReport(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 class VineReport(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The cuts of one vine by outcome, points accepted there that cannot be reached, and the time of the cuts (s)."""
+    """Cuts of one vine by outcome.
+
+    Attributes:
+        vine: Number of the vine.
+        done: Cuts with outcome DONE.
+        not_cut: Cuts with outcome FAILED_NOT_CUT.
+        unknown: Cuts with outcome UNKNOWN.
+        unreachable: Accepted points that the plan refuses.
+        seconds: Total time of the cuts (s).
+    """
 
     vine: _Number
     done: Count = 0
@@ -439,7 +492,14 @@ class VineReport(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 class RefusalReport(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What somebody asked for and did not get: when, who, what, and why."""
+    """A refused request.
+
+    Attributes:
+        at: Time (s since 1970).
+        user: Who asked.
+        asked: The request, as text.
+        reason: Reason for the refusal, as text.
+    """
 
     at: WallTime
     user: Text
@@ -448,7 +508,13 @@ class RefusalReport(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
 
 class ControlReport(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Somebody took, granted or returned control: when, who, and what."""
+    """A change of control: taken, granted or returned.
+
+    Attributes:
+        at: Time (s since 1970).
+        user: Who acted.
+        what: The change, as text.
+    """
 
     at: WallTime
     user: Text
@@ -456,16 +522,16 @@ class ControlReport(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
 
 class SessionReport(Message, frozen=True, kw_only=True):
-    """Controller → all: what has happened since it started, as far as it is on disk.
+    """Controller → all: cuts, refusals and changes of control since the controller started, as recorded on disk.
 
     Attributes:
-        began_at: When the controller started.
-        written_at: When the newest row of the ledger was written that is in here.
+        began_at: Start of the controller (s since 1970).
+        written_at: Time of the newest ledger row in the report (s since 1970).
         cuts: The newest cuts, oldest first.
-        cut_count: All cuts, those left out of `cuts` too.
-        vines: Each vine with a cut or a point that cannot be reached, by its number; all of them count.
+        cut_count: Number of all cuts.
+        vines: Every vine with a cut or an unreachable point, sorted by number.
         refusals: The newest refusals.
-        refusal_count: All of them.
+        refusal_count: Number of all refusals.
         control: The newest changes of control.
     """
 
@@ -480,7 +546,7 @@ class SessionReport(Message, frozen=True, kw_only=True):
 
 
 JointVelocity = Annotated[float, Meta(ge=-10.0, le=10.0)]
-#: Speed by hand, relative to the robot's usual one.
+#: Fraction of the usual speed of motion by hand.
 SpeedScale = Annotated[float, Meta(ge=0.05, le=1.0)]
 ArmVelocities = tuple[
     JointVelocity, JointVelocity, JointVelocity, JointVelocity, JointVelocity, JointVelocity, JointVelocity
@@ -488,29 +554,33 @@ ArmVelocities = tuple[
 
 
 class BaseVelocity(Struct, frozen=True, forbid_unknown_fields=True):
-    """Forward velocity (m/s) and yaw rate (rad/s) of the base."""
+    """Velocity of the base.
+
+    Attributes:
+        linear: Forward velocity (m/s).
+        angular: Yaw rate (rad/s).
+    """
 
     linear: Annotated[float, Meta(ge=-2.0, le=2.0)]
     angular: Annotated[float, Meta(ge=-4.0, le=4.0)]
 
 
 class TeleopTarget(Message, frozen=True, kw_only=True):
-    """Server → controller while the operator holds: what the robot should do.
+    """Server → controller while the operator holds a control: target of the motion by hand.
 
-    A `target` alone is followed by the tool, with base and arm together. With `base` beside it, the tool keeps to the
-    target while the base moves under it, as far as the arm allows. `base` alone drives with the arm still, `joints`
-    alone turns joints with the base still.
+    With `target` alone the tool follows the target, with base and arm. With `target` and `base` the tool stays at the
+    target while the base moves, as far as the arm allows. With `base` alone the arm rests, with `joints` the base.
 
     Attributes:
-        sequence: Strictly increasing; one that is not above the last is refused until the hold has ended by silence.
-        hold: False ends the hold at once; silence ends it too.
+        sequence: Strictly increasing; a lower one is refused until the hold has ended by timeout.
+        hold: False ends the hold at once; a timeout ends it too.
         user: Who holds.
-        target: Desired T_odom_tool in odom.
+        target: Desired T_odom_tool.
         base: Velocity of the base.
         joints: Velocities of the arm's joints (7, rad/s).
-        client: Tells apart who has the same name, as in an intent.
-        speed_scale: Of the usual speed, for all of the above.
-        round_trip_s: From the holder's page to the server and back, as the server measured it (s).
+        client: Key of the client, to distinguish clients of one user.
+        speed_scale: Fraction of the usual speed.
+        round_trip_s: Round-trip time between server and page, measured by the server (s).
     """
 
     sequence: Count

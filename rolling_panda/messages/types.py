@@ -1,4 +1,4 @@
-"""Types that the messages share: bounded numbers, names, headers and poses."""
+"""Shared types of the messages: bounded numbers, names, headers and poses."""
 
 from typing import Annotated, Final, Literal, get_args
 
@@ -13,7 +13,7 @@ Fraction = Annotated[float, Meta(ge=0.0, le=1.0)]
 Angle = Annotated[float, Meta(ge=-1e6, le=1e6)]
 Speed = Annotated[float, Meta(ge=-100.0, le=100.0)]
 Count = Annotated[int, Meta(ge=0, le=2**62)]
-#: Grows by one with each fencing token that the bridge gives out: at one a second this lasts for 30 years.
+#: The epoch increases by one with each fencing token that the bridge issues. At one a second this lasts for 30 years.
 MOST_EPOCHS: Final = 10**9
 Epoch = Annotated[int, Meta(ge=0, le=MOST_EPOCHS)]
 #: Without the last part of the pattern a newline at the end would pass: "$" also matches before it.
@@ -31,10 +31,10 @@ Role = Literal["viewer", "operator", "supervisor"]
 Process = Literal["bridge", "controller", "perception", "server"]
 PROCESSES: tuple[Process, ...] = ("bridge", "controller", "perception", "server")
 Mode = Literal["IDLE", "READY", "TELEOP", "AUTO", "PAUSED", "PROTECTIVE_STOP", "FAULT", "ESTOP_LATCHED"]
-#: What a pause or a protective stop has ended, and nobody has begun again.
+#: Activity that a pause or a protective stop has interrupted and that nobody has resumed.
 Interrupted = Literal["", "work", "survey", "teleoperation"]
 Phase = Literal["", "APPROACH", "CLOSE_UP", "ADVANCE", "CUT", "RETREAT", "SURVEY"]
-#: UNREACHABLE: accepted by somebody, refused by the plan that holds; ACCEPTED again once a plan can reach it.
+#: UNREACHABLE: accepted, but refused by the current plan; ACCEPTED again once a plan reaches it.
 PointState = Literal["PROPOSED", "ACCEPTED", "UNREACHABLE", "CUTTING", "DONE", "FAILED_NOT_CUT", "UNKNOWN", "REJECTED"]
 Severity = Literal["info", "warning", "error"]
 Outcome = Literal["", "DONE", "FAILED_NOT_CUT", "UNKNOWN"]
@@ -51,25 +51,41 @@ Covariance = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
 
 
 class Message(Struct, frozen=True, kw_only=True, tag=True, forbid_unknown_fields=True):
-    """Root of the wire messages: a map with a `type` tag; unknown fields are refused."""
+    """Base of the wire messages: a map with a `type` tag; unknown fields are refused."""
 
 
 class Header(Struct, frozen=True, forbid_unknown_fields=True):
-    """Who measured when: `stamp` is the sender's monotonic clock (s), for differences only, in frame `frame_id`."""
+    """Time and frame of a message.
+
+    Attributes:
+        stamp: The sender's monotonic clock (s), for differences only.
+        frame_id: Frame of the poses and positions in the message.
+    """
 
     stamp: Finite = 0.0
     frame_id: Annotated[str, Meta(max_length=64)] = ""
 
 
 class Pose(Struct, frozen=True, forbid_unknown_fields=True):
-    """A rigid placement: `position` (m) and `quat_xyzw` (unit) of a child frame in the frame that the owner names."""
+    """Pose of a frame in another frame; the field that contains it names both.
+
+    Attributes:
+        position: Origin (m).
+        quat_xyzw: Rotation, unit quaternion x, y, z, w.
+    """
 
     position: Vector3
     quat_xyzw: QuatXyzw
 
 
 class PlanarPose(Struct, frozen=True, forbid_unknown_fields=True):
-    """The base on the ground: `x`, `y` (m) and heading `phi` (rad) of base_link in odom."""
+    """Pose of base_link in odom, on the ground plane.
+
+    Attributes:
+        x: Forward (m).
+        y: Left (m).
+        phi: Heading, counter-clockwise from x (rad).
+    """
 
     x: Metre = 0.0
     y: Metre = 0.0
@@ -77,7 +93,13 @@ class PlanarPose(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Heartbeat(Message, frozen=True, kw_only=True):
-    """A process's loop is turning: `sequence` grows with each turn, not with each send."""
+    """The loop of a process runs.
+
+    Attributes:
+        process: The sender.
+        sequence: Number of loop iterations. It stops growing when the loop hangs, even if sending continues.
+        status: State of the process, as text.
+    """
 
     process: Process
     sequence: Count
@@ -85,7 +107,14 @@ class Heartbeat(Message, frozen=True, kw_only=True):
 
 
 class LogEvent(Message, frozen=True, kw_only=True):
-    """Something a person should be able to read later: what happened, or why something was refused."""
+    """A line of the log: an event, or a refusal with its reason.
+
+    Attributes:
+        header: Time of the event.
+        process: The sender.
+        severity: Severity.
+        text: The line.
+    """
 
     header: Header
     process: Process
@@ -94,12 +123,12 @@ class LogEvent(Message, frozen=True, kw_only=True):
 
 
 class RuleEffect(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What another pruning rule would make of the points that are shown: nothing has changed yet.
+    """Effect that another pruning rule would have on the current points. Nothing has changed yet.
 
     Attributes:
-        changed: Points whose cut would be at another place, of another kind, or with other nodes kept.
-        removed: Points that it would not ask for.
-        added: How many others it would ask for.
+        changed: Points whose cut would get another place, kind or number of kept nodes.
+        removed: Points that would go.
+        added: Number of points that would be new.
     """
 
     changed: tuple[Name, ...] = ()
@@ -108,7 +137,13 @@ class RuleEffect(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 class Answer(Message, frozen=True, kw_only=True):
-    """Reply of every service: done or not, and the reason in words; with the effect, where that was the question."""
+    """Reply of every service.
+
+    Attributes:
+        ok: Whether the request was executed.
+        reason: Reason for a refusal, as text.
+        effect: Answer to `EvaluateRule`.
+    """
 
     ok: bool
     reason: Text = ""

@@ -60,111 +60,134 @@ export type CameraPreset = "follow"|"row"|"tool"|"top";
 
 export type Layer = "plant"|"points"|"trail"|"camera"|"cloud"|"simulated";
 
-/** Is a process connected, and how old is its last word (s; None before the first). */
+/** Connection of a process. */
 export interface ProcessPresence {
+  /** The process. */
   process: Process;
+  /** Whether it is connected. */
   present: boolean;
+  /** Age of its last message (s); None before the first. */
   age_s: number|null;
 }
 
-/** Who measured when: `stamp` is the sender's monotonic clock (s), for differences only, in frame `frame_id`. */
+/** Time and frame of a message. */
 export interface Header {
+  /** The sender's monotonic clock (s), for differences only. */
   stamp: number;
+  /** Frame of the poses and positions in the message. */
   frame_id: string;
 }
 
-/** A rigid placement: `position` (m) and `quat_xyzw` (unit) of a child frame in the frame that the owner names. */
+/** Pose of a frame in another frame; the field that contains it names both. */
 export interface Pose {
+  /** Origin (m). */
   position: Vector3;
+  /** Rotation, unit quaternion x, y, z, w. */
   quat_xyzw: QuatXyzw;
 }
 
-/** Where to cut, and why. */
+/** A proposed cut: place, direction, reason and uncertainty. */
 export interface PruningPoint {
   /** Stable while the point is tracked from frame to frame. */
   point_id: string;
-  /** Grows when what is cut changes: its kind, the nodes kept, or by more than noise its place or tangent. */
+  /** Increases when the cut changes: its kind, the nodes kept, or its place or tangent by more than noise. */
   revision: number;
-  /** On the cane's axis, in odom (m). */
+  /** Position on the cane's axis, in odom (m). */
   position: Vector3;
-  /** Unit vector along the cane, pointing away from the cordon, in odom. */
+  /** Unit vector along the cane in odom, pointing away from the cordon. */
   tangent: UnitVector3;
-  /** Of the cane (m). */
+  /** Radius of the cane (m). */
   radius: number;
-  /** 0…1. */
+  /** 0 … 1. */
   confidence: number;
-  /** Count nodes seen on the cane (the basal bud is not counted). */
+  /** Number of count nodes seen on the cane, without the basal bud. */
   nodes_seen: number;
-  /** Count nodes that stay below the cut. */
+  /** Number of count nodes that stay below the cut. */
   nodes_kept: number;
   /** Number of the vine along the row, as perceived. */
   vine: number;
   /** Number of the spur position on that vine, as perceived. */
   spur: number;
-  /** Why here, in one sentence a grower understands. */
+  /** Reason for the cut, in one sentence for a grower. */
   reason: string;
-  /** Shortens the cane that stays, takes the old stub off, tips the cane that will fruit, or is a person's. */
+  /** `spur cut` shortens the cane that stays, `renewal cut` removes the old stub, `cane cut` shortens the fruiting cane, `by hand` was placed by a person. */
   kind: CutKind;
+  /** Covariance of the position (m²): xx, xy, xz, yy, yz, zz. */
   position_covariance: Covariance|null;
+  /** Covariance of the tangent in the same order. */
   tangent_covariance: Covariance|null;
-  /** Past the last kept node, along the cane (m); None where no kept node is below the cut. */
+  /** Distance past the last kept node along the cane (m); None without a kept node below the cut. */
   offset: number|null;
   /** Predicted cutting force (N). */
   force: number;
-  /** To the surface of the nearest known wire (m); None while none is known. */
+  /** Distance to the surface of the nearest known wire (m); None if none is known. */
   wire_distance: number|null;
   /** The same for cordons. */
   cordon_distance: number|null;
-  /** To the nearest node that stays (m); None where none is known. */
+  /** Distance to the nearest node that stays (m); None if none is known. */
   node_distance: number|null;
-  /** Hash of what is cut and where, as `rolling_panda.point_digest` makes it; one for each revision. */
+  /** Hash of the revision's place and kind, see `point_digest`. */
   digest: string;
 }
 
-/** A pruning point in the controller's queue: its life, why it is where it is, the `digest` that was accepted. `recorded` is the point as the ledger has it, where perception does not show it and somebody has to decide. `azimuth` is the turn of the approach about the cane (rad) that somebody wants, None where the search chooses it. */
+/** A pruning point in the controller's queue. */
 export interface QueueEntry {
+  /** The point. */
   point_id: string;
+  /** State of the point. */
   state: PointState;
+  /** Reason for the state, as text. */
   reason: string;
+  /** The person who last decided about the point. */
   user: string;
+  /** Its last cut; empty before the first. */
   cut_id: string;
+  /** Position at acceptance, in odom (m). */
   accepted_position: Vector3|null;
+  /** Hash of the accepted point, see `PruningPoint.digest`. */
   digest: string;
+  /** The point from the ledger, if perception does not report it and a person has to decide. */
   recorded: PruningPoint|null;
+  /** Requested turn of the approach about the cane (rad); None if the posture search chooses it. */
   azimuth: number|null;
 }
 
-/** The least distance (m) between two things that must not touch, and which; negative where they overlap. */
+/** The smallest monitored distance. */
 export interface Proximity {
+  /** Distance (m); negative in penetration. */
   distance: number;
+  /** Names of the two parts. */
   what: string;
 }
 
-/** Whose order of work it is: that of `user`, or the plan's where empty; `revision` counts people's changes. */
+/** Origin of the order of work. */
 export interface QueueOrder {
+  /** Number of changes by people. */
   revision: number;
+  /** The person who set the order; empty for the plan's order. */
   user: string;
 }
 
-/** Controller → all: mode, queue and the quality of tracking. */
+/** Controller → all: mode, queue and tracking error. */
 export interface ControllerState {
   type: "ControllerState";
+  /** Time of the state. */
   header: Header;
-  /** State of the supervision machine. */
+  /** State of the supervision state machine. */
   mode: Mode;
-  /** Step of the cut sequence in AUTO, else empty. */
+  /** Step of the cut sequence in AUTO; empty otherwise. */
   phase: Phase;
-  /** Why the machine is in this mode. */
+  /** Reason for the mode, as text. */
   reason: string;
-  /** Intent types that would be taken now; every other one is answered with a reason. */
+  /** Intent types that are allowed now. Every other one is refused with a reason. */
   allowed: string[];
-  /** The point being worked on, empty when none. */
+  /** Current point of the work; empty without one. */
   active_point_id: string;
   /** Name of the whole-body method. */
   method: string;
   /** Measured tool pose. */
   T_odom_tool: Pose|null;
-  /** Where the trajectory has it now; None when nothing is tracked. */
+  /** Desired tool pose on the trajectory; None without a trajectory. */
   T_odom_tool_desired: Pose|null;
   /** Tool position error (m). */
   position_error: number;
@@ -172,517 +195,592 @@ export interface ControllerState {
   rotation_error: number;
   /** ω of the arm. */
   manipulability: number;
-  /** Least distance of an arm joint to its limit (rad). */
+  /** Smallest distance of an arm joint to its limit (rad). */
   joint_margin: number;
-  /** Median time of one control step over the last second (s). */
+  /** Median duration of one control step over the last second (s). */
   tick_s: number;
   /** Control periods since the start. */
   ticks: number;
-  /** Those of them that lasted more than half as long again as they should. */
+  /** Control periods that lasted more than 1.5 times their nominal length. */
   late_ticks: number;
-  /** Every point known, in the order of work. */
+  /** All known points, in the order of work. */
   queue: QueueEntry[];
-  /** What keeps the robot from doing all that is asked of it now, by name; empty where nothing does. */
+  /** Name of the constraint that limits the current motion; empty without one. */
   limited_by: string;
-  /** What it is nearest to touching while it moves; None where nothing is near. */
+  /** Smallest monitored distance during motion; None if nothing is near. */
   proximity: Proximity|null;
-  /** Whose order that is. */
+  /** Origin of the order of work. */
   order: QueueOrder;
-  /** What a pause or a protective stop has ended; empty once something is begun, or the robot disarmed. */
+  /** Activity that a pause or a protective stop interrupted; empty after the next start, or when disarmed. */
   interrupted: Interrupted;
   /** Safety limits that its configuration sets less strictly than usual, within their hard bounds. */
   relaxed_limits: string[];
 }
 
-/** How many messages of a topic were refused for one reason. */
+/** Messages of a topic that were refused for one reason. */
 export interface RejectionCount {
+  /** The topic. */
   topic: string;
+  /** Reason for the refusal, as text. */
   reason: string;
+  /** Number of messages since the start of the bridge. */
   count: number;
 }
 
-/** Bridge → all: its own latch, watchdog and cutter; the controller cannot overrule any of them. */
+/** Bridge → all: stop latch, watchdog and cutter of the bridge. The controller can override none of them. */
 export interface BridgeState {
   type: "BridgeState";
+  /** Time of the state. */
   header: Header;
-  /** `sim`, `real`, or `fakes`: the real robot's drivers with fakes in place of the devices. */
+  /** `sim`, `real`, or `fakes` (the drivers of the real robot on fake devices). */
   kind: BridgeKind;
-  /** Of the newest token given out; 0 before the first. */
+  /** Epoch of the newest token; 0 before the first. */
   epoch: number;
-  /** True while no valid setpoint has come for the deadline: base 0, arm holds, cutter inhibited. */
+  /** True while no valid setpoint has arrived within the deadline: base 0, arm holds, cutter inhibited. */
   watchdog: boolean;
-  /** The latched software stop, empty when none. */
+  /** The latched software stop; empty without one. */
   stop_id: string;
   /** User and reason of that stop. */
   stopped_by: string;
-  /** What the blades do. */
+  /** State of the blades. */
   cutter: "open"|"closing"|"opening"|"jammed";
-  /** The last cut asked for, empty when none. */
+  /** The last requested cut; empty before the first. */
   cut_id: string;
-  /** How that cut ended, empty while it goes on. */
+  /** Outcome of that cut; empty during the cut. */
   outcome: Outcome;
-  /** Simulated seconds a second; 1 on a real robot. */
+  /** Simulated time per real time; 1 on a real robot. */
   real_time_factor: number;
-  /** From a joint state to the command that answers it, median over the last second; 0 without any. */
+  /** Time from a joint state to the command that answers it, median of the last second (s); 0 without commands. */
   round_trip_s: number;
-  /** The longest of them. */
+  /** The longest of them (s). */
   round_trip_worst_s: number;
   /** Messages refused since the start, by reason. */
   rejections: RejectionCount[];
-  /** Charge of the base; None where nobody tells, as in the simulation. */
+  /** Charge of the base, 0 … 1; None if unknown, as in simulation. */
   battery: number|null;
   /** Safety limits that its configuration sets less strictly than usual, within their hard bounds. */
   relaxed_limits: string[];
-  /** First 16 hexadecimal digits of the SHA-256 of its random part; empty when nobody holds it. */
+  /** First 16 hexadecimal digits of the SHA-256 of the token's random part; empty without a holder. */
   holder: string;
-  /** Of the command that the robot follows, or followed last. */
+  /** `sequence` of the motion command that the robot follows, or followed last. */
   sequence: number;
-  /** Whether what is sent to the actuators is anything but zero. */
+  /** Whether any actuator is sent a velocity other than zero. */
   moving: boolean;
 }
 
-/** Bridge → all: measured actuated coordinates, [θ_l, θ_r, q₁…q₇] (rad, rad/s), as sensor_msgs/JointState. */
+/** Bridge → all: measured actuated coordinates, like sensor_msgs/JointState. */
 export interface JointState {
   type: "JointState";
+  /** Time of measurement. */
   header: Header;
+  /** Strictly increasing. */
   sequence: number;
+  /** [θ_l, θ_r, q₁…q₇] (rad). */
   position: Actuated;
+  /** Their velocities (rad/s). */
   velocity: ActuatedVelocity;
 }
 
-/** The base on the ground: `x`, `y` (m) and heading `phi` (rad) of base_link in odom. */
+/** Pose of base_link in odom, on the ground plane. */
 export interface PlanarPose {
+  /** Forward (m). */
   x: number;
+  /** Left (m). */
   y: number;
+  /** Heading, counter-clockwise from x (rad). */
   phi: number;
 }
 
 /** Controller → all: the lease on the robot's motion. */
 export interface ControlState {
   type: "ControlState";
-  /** Key of who holds control, empty when nobody. */
+  /** Key of the holder; empty without one. */
   holder: string;
-  /** Their name. */
+  /** Name of the holder. */
   user: string;
-  /** How long the lease still lives without a word of its holder (s). */
+  /** Time to the end of the lease without a message of the holder (s). */
   expires_s: number;
-  /** Name of who asks for control, empty when nobody. */
+  /** Name of the person who asks for control; empty without one. */
   requested_by: string;
-  /** Their key. */
+  /** Key of that person. */
   requested_key: string;
-  /** Name of who gets control as soon as the robot is at rest, empty when nobody. */
+  /** Name of the person who gets control when the robot is at rest; empty without one. */
   next_user: string;
-  /** What became of control last, in words. */
+  /** Last change of control, as text. */
   notice: string;
-  /** Grows with each such change, so that a page tells each once. */
+  /** Increases with each change, so that a page shows each notice once. */
   notice_number: number;
-  /** Whether somebody who may operate sees the robot now. */
+  /** Whether a person who may operate the robot sees it now. */
   supervised: boolean;
 }
 
-/** One stop as a process has latched it. */
+/** One stop that a process has latched. */
 export interface StopRecord {
-  /** Its id. */
+  /** Id of the stop. */
   stop_id: string;
   /** Process or input that it came from. */
   source: string;
-  /** Who pressed; empty where nobody did. */
+  /** Who pressed; empty for a stop by a program. */
   user: string;
-  /** Why. */
+  /** Cause, as text. */
   reason: string;
-  /** When this process latched it. */
+  /** Time at which this process latched it (s since 1970). */
   wall_time: number;
 }
 
-/** Bridge and controller → all: the stops that this process holds latched, the newest first. */
+/** Bridge and controller → all: the latched stops of this process. */
 export interface StopState {
   type: "StopState";
-  /** Whose latch this is. */
+  /** The sender. */
   process: Process;
-  /** What is latched. */
+  /** Latched stops, newest first. */
   stops: StopRecord[];
-  /** Who released the last one that was, and why; empty before. */
+  /** User and reason of the last release; empty before the first. */
   released_by: string;
   /** Whether the hardware stop is pressed; always false from the controller. */
   hardware: boolean;
 }
 
-/** Replay → server: what is on the wire is a recording. */
+/** Replay → server: the wire carries a recording instead of a robot. */
 export interface ReplayState {
   type: "ReplayState";
-  /** Of the file. */
+  /** Name of the file. */
   name: string;
-  /** When its first message was recorded (s since 1970). */
+  /** Time of the first recorded message (s since 1970). */
   begins_at: number;
-  /** From the first to the last message. */
+  /** Time from the first to the last message (s). */
   duration_s: number;
-  /** Where it is played now, from its beginning. */
+  /** Current position from the beginning (s). */
   position_s: number;
-  /** False while it stands still. */
+  /** False while the replay is paused. */
   playing: boolean;
 }
 
-/** 10 Hz: everything that changes all the time. The last known state stays, with its age. */
+/** 10 Hz: state of the robot. The last known state stays, with its age. */
 export interface PageState {
   type: "PageState";
-  /** Grows by one a message; the page echoes the last one it rendered. */
+  /** Increases by one with each message; the page echoes the last one it rendered. */
   number: number;
-  /** Who is signed in on this page. */
+  /** Name of the user of this page. */
   user: string;
-  /** What they may do. */
+  /** Role of the user. */
   role: Role;
-  /** Pages open now. */
+  /** Number of open pages. */
   viewers: number;
-  /** One row a process. */
+  /** Connection of each process. */
   processes: ProcessPresence[];
-  /** Its newest state, None before the first. Without its queue, which is in `PagePoints`. */
+  /** Newest controller state, without its queue, which is in `PagePoints`; None before the first. */
   controller: ControllerState|null;
-  /** Age of it (s). */
+  /** Age of that state (s). */
   controller_age_s: number|null;
-  /** Its newest state. */
+  /** Newest bridge state; None before the first. */
   bridge: BridgeState|null;
-  /** Age of it (s). */
+  /** Age of that state (s). */
   bridge_age_s: number|null;
-  /** Newest joint state: speeds for the gauges. */
+  /** Newest joint state. */
   joints: JointState|null;
-  /** Base pose in odom. */
+  /** Pose of base_link in odom. */
   base: PlanarPose|null;
   /** Sequence of the newest camera frame, to fetch `/camera/color.jpg?n=…`. */
   camera_frame: number;
-  /** The reader's own key, to be compared with the holder's. */
+  /** Key of this page, to be compared with the holder's. */
   client: string;
-  /** Who holds control of the robot's motion. */
+  /** Lease on the robot's motion. */
   control: ControlState|null;
-  /** What bridge and controller hold latched. */
+  /** Latched stops of bridge and controller. */
   stops: StopState[];
-  /** Speed of each actuator in parts of its limit, wheels first; empty before the first joint state. */
+  /** Speed of each actuator as a fraction of its limit, wheels first; empty before the first joint state. */
   speed_ratios: number[];
-  /** The recording that is played; None with a robot. */
+  /** The recording that is replayed; None with a robot. */
   replay: ReplayState|null;
   /** Safety limits that a process's configuration sets less strictly than usual. */
   relaxed_limits: string[];
-  /** The robot's wire is not protected: every program on its machine can move it. */
+  /** True if the wire has no TLS: every program on the robot's machine can move it. */
   plain_wire: boolean;
 }
 
-/** What the plan says of one accepted point. */
+/** Plan for one accepted point: the motion to it, or the reason for a refusal. */
 export interface PointPlan {
-  /** Of the point. */
+  /** The point. */
   point_id: string;
-  /** That was accepted, and that the plan is for. */
+  /** Accepted revision that the plan is for. */
   revision: number;
-  /** 1 for the first that is worked on; 0 when the plan refuses the point. */
+  /** Position in the order of work, from 1; 0 for a refused point. */
   order: number;
-  /** Why it is refused, empty when it is not. */
+  /** Reason for the refusal, as text; empty otherwise. */
   reason: string;
-  /** When the way to it begins, from the start of the session (s). */
+  /** Start of the motion to it, from the start of the work (s). */
   begins_s: number;
-  /** Of the way to it, up to where the tool stands clear of the canes (s). */
+  /** Duration of that motion, up to where the tool is clear of the canes (s). */
   duration_s: number;
-  /** Least distance on that way between the robot's parts, and from them to the ground and obstacles (m). */
+  /** Smallest distance during that motion, among the robot's parts and to ground and obstacles (m). */
   clearance: number;
-  /** Between what that is. */
+  /** The two parts with that distance. */
   between: [string, string];
-  /** Least ω of the arm at the cut and on the way to it. */
+  /** Smallest ω of the arm at the cut and on the motion to it. */
   manipulability: number;
-  /** What is left of the torque of the joint that uses the largest share of its own (Nm). */
+  /** Remaining torque of the joint that uses the largest fraction of its limit (Nm). */
   torque_margin: number;
-  /** That joint. */
+  /** Name of that joint. */
   torque_joint: string;
-  /** Where the base stands for the cut; None when refused. */
+  /** Pose of base_link in odom at the cut; None for a refused point. */
   base: PlanarPose|null;
-  /** SHA-256 of the way in every control period; empty when refused. */
+  /** SHA-256 of the motion in every control period; empty for a refused point. */
   plan_hash: string;
 }
 
-/** One row of the queue: the point as perceived and its life in the controller's queue. `pixel` is its place in the newest camera image (px, None when outside), `cane_angle` the direction of the cane in that image (rad, from rightwards to downwards), for drawing. `plan` is what the session's plan says of it, None where no plan that holds does. */
+/** One row of the queue. */
 export interface PagePoint {
+  /** The point as perceived. */
   point: PruningPoint;
+  /** The point in the controller's queue. */
   entry: QueueEntry;
+  /** Its position in the newest camera image (px, column and row); None outside the image. */
   pixel: [number, number]|null;
+  /** Direction of the cane in that image (rad, from right to down). */
   cane_angle: number|null;
+  /** The plan for the point; None without a valid plan. */
   plan: PointPlan|null;
 }
 
-/** A place without a point: why, and what it needs. Without vine and spur (0) it is about no spur in particular. `position` is where the spur was seen (m, odom). */
+/** A spur without a pruning point. */
 export interface UndecidedSite {
+  /** Reason, as text. */
   reason: string;
+  /** Another look by the camera, or a decision by the operator. */
   needs: Need;
+  /** Number of the vine; 0 for no particular spur. */
   vine: number;
+  /** Number of the spur on that vine; 0 for no particular spur. */
   spur: number;
+  /** Position of the spur in odom (m), if known. */
   position: Vector3|null;
 }
 
-/** The session's plan in brief: whether it holds or why not, its hash, and how long it takes (s). */
+/** Summary of the plan. */
 export interface PagePlan {
+  /** As in `SessionPlan`. */
   state: PlanState;
+  /** As in `SessionPlan`. */
   reason: string;
+  /** As in `SessionPlan`. */
   plan_hash: string;
+  /** Duration of the work, including the cuts (s). */
   duration_s: number;
 }
 
-/** Nodes kept on a spur, and on a Guyot vine's new cane; least diameter preferred (m); past the last node (m). */
+/** Numbers from which the cuts follow. */
 export interface PruningRule {
+  /** Training system. */
   system: "spur"|"guyot";
+  /** Nodes kept on a spur. */
   nodes_kept: number;
+  /** Nodes kept on the new cane of a Guyot vine. */
   fruiting_nodes: number;
+  /** Smallest diameter of a cane that is preferred to stay (m). */
   preferred_diameter: number;
+  /** Distance of the cut past the last kept node (m). */
   offset: number;
 }
 
-/** Sent when it changed: every point in the order of work, and the undecided sites. */
+/** Sent on change: all points in the order of work, and the undecided sites. */
 export interface PagePoints {
   type: "PagePoints";
+  /** All points. */
   points: PagePoint[];
+  /** Spurs without a point. */
   undecided_sites: UndecidedSite[];
+  /** Name of the segmenter. */
   segmenter: string;
+  /** Number of camera frames used so far. */
   frames: number;
+  /** Width and height of the camera image (px). */
   image_size: [number, number];
+  /** Summary of the plan. */
   plan: PagePlan|null;
+  /** Current pruning rule. */
   rule: PruningRule|null;
 }
 
-/** One point of a preview, with the way to it and the way out again. */
+/** One point of a preview, with the motion to it and out again. */
 export interface PreviewedCut {
-  /** Of the point. */
+  /** The point. */
   point_id: string;
-  /** That is accepted, and that is previewed. */
+  /** Accepted revision that is previewed. */
   revision: number;
-  /** When the way to it begins (s from the start). */
+  /** Start of the motion to it (s from the start of the preview). */
   begins_s: number;
-  /** When the blades close (s from the start); None where they do not. */
+  /** Time at which the blades close (s from the start); None without a cut. */
   cut_s: number|null;
-  /** When the way to the next point begins, or the work ends (s from the start). */
+  /** Start of the motion to the next point, or end of the work (s from the start). */
   ends_s: number;
-  /** How it ends, in words: cut, or why not. */
+  /** Outcome as text: cut, or the reason why not. */
   result: string;
-  /** Least distance meanwhile between the robot's parts, and from them to ground and obstacles (m). */
+  /** Smallest distance from `begins_s` to `ends_s`, among the robot's parts and to ground and obstacles (m). */
   clearance: number;
-  /** Between what that is. */
+  /** The two parts with that distance. */
   between: [string, string];
-  /** Least ω of the arm meanwhile. */
+  /** Smallest ω of the arm in that time. */
   manipulability: number;
-  /** Least distance of an arm joint to its limit meanwhile (rad). */
+  /** Smallest distance of an arm joint to its limit in that time (rad). */
   joint_margin: number;
 }
 
-/** Controller → all: whether there is a preview, whether it still describes what would happen, and who approved it. */
+/** Controller → all: state, figures and approval of the preview. */
 export interface PreviewState {
   type: "PreviewState";
   /** `frame_id` is odom. */
   header: Header;
-  /** True while no cut begins that nobody has approved the preview of. */
+  /** True if a cut needs an approved preview. */
   required: boolean;
-  /** `waiting` for the robot to rest and the plan to be made, `rolling` while it is computed; `ready` to be approved; `expired` once something has changed. */
+  /** `waiting` for the robot to rest and for the plan; `rolling` while it is computed; `ready` for approval; `approved`; `expired` after a change. */
   phase: PreviewPhase;
-  /** What has changed, or what is waited for. */
+  /** The change that expired it, or the cause of waiting, as text. */
   reason: string;
-  /** SHA-256 of all that it was made from and of all that is in it; empty when there is none. */
+  /** SHA-256 of the inputs and the content of the preview; empty without a preview. */
   preview_hash: string;
-  /** Who has approved it; empty when nobody has. */
+  /** Name of the person who approved it; empty without an approval. */
   approved_by: string;
-  /** Where the base begins. */
+  /** Pose of base_link in odom at the start. */
   start: PlanarPose|null;
   /** Actuated coordinates at the start (rad). */
   position: Actuated|null;
-  /** Of all of it (s). */
+  /** Duration of the preview (s). */
   duration_s: number;
-  /** Points in their order. */
+  /** Points in the order of work. */
   cuts: PreviewedCut[];
-  /** Accepted points that come after those, and are not in it. */
+  /** Number of accepted points after these that are not part of the preview. */
   remaining: number;
 }
 
-/** Sent when the controller has said it: the preview, and whether it is approved. */
+/** Sent on change: the preview and its approval. */
 export interface PagePreview {
   type: "PagePreview";
+  /** State of the preview. */
   preview: PreviewState;
 }
 
-/** A line of the log: `number` grows; `wall_time` is the server's clock (s since 1970), for people. */
+/** A line of the log. */
 export interface PageEvent {
+  /** Increases by one with each line. */
   number: number;
+  /** Wall clock of the server (s since 1970). */
   wall_time: number;
+  /** Process that the line is from. */
   process: string;
+  /** Severity. */
   severity: Severity;
+  /** The line. */
   text: string;
 }
 
-/** New lines of the log, oldest first; the last 200 at the start. */
+/** New lines of the log. */
 export interface PageEvents {
   type: "PageEvents";
+  /** Lines, oldest first. A new page gets the last 200. */
   events: PageEvent[];
 }
 
-/** A point was clicked in the 3-D view of this session; empty = nothing. */
+/** A point was clicked in the 3-D view of this session. */
 export interface Selected {
   type: "Selected";
+  /** The point; empty for none. */
   point_id: string;
 }
 
-/** A click into the 3-D view of a session that places points: from `origin` along `direction` (odom, m). */
+/** A click in the 3-D view while points are placed by hand. */
 export interface PickRay {
   type: "PickRay";
+  /** Origin of the pick ray in odom (m). */
   origin: Vector3;
+  /** Unit direction of the pick ray in odom. */
   direction: UnitVector3;
 }
 
-/** Of two places that were clicked while this session measures: second less first (m, odom), what is there. */
+/** Result of a measurement between two clicks in the 3-D view. */
 export interface Measured {
   type: "Measured";
+  /** Second position minus the first, in odom (m). */
   offset: Vector3;
+  /** Names of the clicked objects. */
   between: [string, string];
 }
 
-/** The server has ended or refused what this page holds, and takes no more of it before the page lets go. */
+/** The server has ended or refused the hold of this page. The page has to release before it can hold again. */
 export interface HoldEnded {
   type: "HoldEnded";
+  /** Reason, as text. */
   reason: string;
 }
 
-/** Answer to a `Ping`, at once, for the round trip. */
+/** Immediate answer to a `Ping`, to measure the round trip. */
 export interface Pong {
   type: "Pong";
+  /** `number` of the `Ping`. */
   number: number;
 }
 
-/** 10 Hz: the page is alive, and `rendered` is the number of the last `PageState` it drew. */
+/** 10 Hz: the page is alive. */
 export interface Ping {
   type: "Ping";
+  /** Chosen by the page; the `Pong` repeats it. */
   number: number;
+  /** `number` of the last `PageState` that the page drew. */
   rendered: number;
 }
 
-/** Forward velocity (m/s) and yaw rate (rad/s) of the base. */
+/** Velocity of the base. */
 export interface BaseVelocity {
+  /** Forward velocity (m/s). */
   linear: number;
+  /** Yaw rate (rad/s). */
   angular: number;
 }
 
-/** 20 Hz while the operator holds: the tool may follow the gizmo. `hold` false, or silence, ends it. */
+/** 20 Hz while the operator holds a control. Without `base` and `joints` the tool follows the gizmo. */
 export interface Hold {
   type: "Hold";
-  /** Grows by one a message. */
+  /** Increases by one with each message. */
   sequence: number;
-  /** Whether they still hold. */
+  /** False ends the hold at once; a timeout ends it too. */
   hold: boolean;
-  /** The base moves so, instead of the tool. */
+  /** Velocity of the base. */
   base?: BaseVelocity|null;
-  /** The arm's joints turn so (rad/s), instead of the tool. */
+  /** Velocities of the arm's joints (7, rad/s). */
   joints?: ArmVelocities|null;
-  /** Of the usual speed. */
+  /** Fraction of the usual speed. */
   speed_scale?: number;
 }
 
-/** Show or hide this session's gizmo in the 3-D view; shown, it starts at the tool, along these axes. */
+/** Show or hide the gizmo of this session. */
 export interface ShowGizmo {
   type: "ShowGizmo";
+  /** Whether to show it. It appears at the tool. */
   visible: boolean;
+  /** Frame whose axes it follows. */
   axes?: GizmoAxes;
 }
 
-/** From now on clicks into the 3-D view are meant for new points, each answered with a `PickRay`; or no more. */
+/** Switch placing of points by hand. */
 export interface PlaceByHand {
   type: "PlaceByHand";
+  /** While true, each click in the 3-D view is answered with a `PickRay`. */
   active: boolean;
 }
 
-/** Put the camera of this session's 3-D views here; `follow` goes along with the base from then on. */
+/** Place the camera of this session's 3-D views. */
 export interface PlaceCamera {
   type: "PlaceCamera";
+  /** View; `follow` moves with the base. */
   preset: CameraPreset;
 }
 
-/** Show these layers on this session's 3-D views, and no others. */
+/** Choose the layers of this session's 3-D views. */
 export interface ShowLayers {
   type: "ShowLayers";
+  /** Layers to show; all others are hidden. */
   layers: Layer[];
 }
 
-/** From now on clicks into the 3-D view measure, each second one answered with `Measured`; or no more. */
+/** Switch measuring. */
 export interface Measure {
   type: "Measure";
+  /** While true, every second click in the 3-D view is answered with `Measured`. */
   active: boolean;
 }
 
-/** Show this moment of the preview in the 3-D view (s from its start); None = nothing of it. */
+/** Show the preview in the 3-D view at one moment. */
 export interface ShowPreview {
   type: "ShowPreview";
+  /** Time from the start of the preview (s); None hides it. */
   time: number|null;
 }
 
-/** Highlight a point in the 3-D view and bring this session's cameras there; empty = none. */
+/** Highlight a point in the 3-D view and move this session's cameras there. */
 export interface Select {
   type: "Select";
-  /** Of the point. */
+  /** The point; empty for none. */
   point_id: string;
-  /** The page follows the work, and nobody has chosen: who has just moved a camera keeps it for a while. */
+  /** True if the page follows the work. A camera that a person has just moved then stays for a while. */
   follow?: boolean;
 }
 
-/** One cut and how it ended, or a point that was given up before the blades were asked to close. */
+/** One cut with its outcome, or a point that was given up before the order to cut. */
 export interface CutReport {
-  /** Of the cut; empty where the point was given up before there was one. */
+  /** Id of the cut; empty for a point that was given up before. */
   cut_id: string;
-  /** Point that was to be cut. */
+  /** Point of the cut. */
   point_id: string;
-  /** Its vine. */
+  /** Number of its vine. */
   vine: number;
-  /** Its spur on that vine. */
+  /** Number of its spur on that vine. */
   spur: number;
-  /** As it is known now; empty while it goes on. */
+  /** Current outcome; empty during the cut. */
   outcome: Outcome;
-  /** In words. */
+  /** Reason for the outcome, as text. */
   reason: string;
-  /** Who accepted it, or said how it ended. */
+  /** Who accepted the point, or reported the outcome. */
   user: string;
-  /** When; 0 while it goes on. */
+  /** Time of its end (s since 1970); 0 during the cut. */
   ended_at: number;
-  /** From the end of the cut before, or the start of work if that was later, to the end of this one. */
+  /** Time from the end of the previous cut, or from a later start of work, to the end of this cut (s). */
   seconds: number;
 }
 
-/** The cuts of one vine by outcome, points accepted there that cannot be reached, and the time of the cuts (s). */
+/** Cuts of one vine by outcome. */
 export interface VineReport {
+  /** Number of the vine. */
   vine: number;
+  /** Cuts with outcome DONE. */
   done: number;
+  /** Cuts with outcome FAILED_NOT_CUT. */
   not_cut: number;
+  /** Cuts with outcome UNKNOWN. */
   unknown: number;
+  /** Accepted points that the plan refuses. */
   unreachable: number;
+  /** Total time of the cuts (s). */
   seconds: number;
 }
 
-/** What somebody asked for and did not get: when, who, what, and why. */
+/** A refused request. */
 export interface RefusalReport {
+  /** Time (s since 1970). */
   at: number;
+  /** Who asked. */
   user: string;
+  /** The request, as text. */
   asked: string;
+  /** Reason for the refusal, as text. */
   reason: string;
 }
 
-/** Somebody took, granted or returned control: when, who, and what. */
+/** A change of control: taken, granted or returned. */
 export interface ControlReport {
+  /** Time (s since 1970). */
   at: number;
+  /** Who acted. */
   user: string;
+  /** The change, as text. */
   what: string;
 }
 
-/** Controller → all: what has happened since it started, as far as it is on disk. */
+/** Controller → all: cuts, refusals and changes of control since the controller started, as recorded on disk. */
 export interface SessionReport {
   type: "SessionReport";
-  /** When the controller started. */
+  /** Start of the controller (s since 1970). */
   began_at: number;
-  /** When the newest row of the ledger was written that is in here. */
+  /** Time of the newest ledger row in the report (s since 1970). */
   written_at: number;
   /** The newest cuts, oldest first. */
   cuts: CutReport[];
-  /** All cuts, those left out of `cuts` too. */
+  /** Number of all cuts. */
   cut_count: number;
-  /** Each vine with a cut or a point that cannot be reached, by its number; all of them count. */
+  /** Every vine with a cut or an unreachable point, sorted by number. */
   vines: VineReport[];
   /** The newest refusals. */
   refusals: RefusalReport[];
-  /** All of them. */
+  /** Number of all refusals. */
   refusal_count: number;
   /** The newest changes of control. */
   control: ControlReport[];
