@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 TYPESCRIPT := typescript@5.9.3
 
-.PHONY: help demo test test-training fast check format bench mutation clean lock materials browser drivers training
+.PHONY: help demo test test-training fast check format docs bench mutation clean lock materials browser drivers training
 .DEFAULT_GOAL := help
 
 help:
@@ -14,7 +14,8 @@ help:
 	@echo "make test-training  the tests of the training, with PyTorch"
 	@echo "make fast    tests that only compute: no browser, no processes"
 	@echo "make format  format the code, write the generated files anew"
-	@echo "make check   formatting, types, import contracts, generated files"
+	@echo "make check   formatting, types, import contracts, generated files, docs"
+	@echo "make docs    the documentation as a site, in build/site; without warnings, or it fails"
 	@echo "make bench   measurements                                                     (ARGS='tick --json tick.json')"
 	@echo "make mutation   small changes of what safety rests on: a test has to fail for each   (ARGS='codec --sample 20')"
 	@echo "make lock    bring the lock files up to date with pyproject.toml"
@@ -55,6 +56,7 @@ check: $(VENV)/.project
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python -m rolling_panda.generate --check
+	@$(MAKE) --no-print-directory docs
 	@if ! command -v npx >/dev/null; then \
 		echo "web/: not type-checked, as Node.js is not installed here"; \
 	elif ! npx --yes --package $(TYPESCRIPT) tsc --version >/dev/null 2>&1; then \
@@ -63,6 +65,24 @@ check: $(VENV)/.project
 		echo "npx $(TYPESCRIPT) tsc -p web/jsconfig.json"; \
 		npx --yes --package $(TYPESCRIPT) tsc -p web/jsconfig.json --noEmit; \
 	fi
+
+# Built anew when something of it has changed. `--strict` turns a warning, such as a broken link, into an error; it would
+# count none with `--quiet`.
+DOCUMENTED := mkdocs.yml $(wildcard *.md) benchmarks/README.md assets/network/vine.md web/icon.svg $(shell find docs/* \
+	rolling_panda bridge controller perception server recorder -name __pycache__ -prune -o \( -type d -o -type f \) -print)
+docs: build/docs/.built
+build/docs/.built: build/docs/.installed $(DOCUMENTED)
+	NO_MKDOCS_2_WARNING=1 build/docs/bin/mkdocs build --strict
+	@touch $@
+	@echo "the documentation is in build/site: open build/site/index.html"
+
+build/docs/.installed: requirements-docs.lock | $(VENV)/.locked
+	@rm -rf build/docs
+	$(PYTHON) -m venv --without-pip build/docs
+	@$(BIN)/pip --python build/docs/bin/python install --quiet --disable-pip-version-check --only-binary :all: \
+		--require-hashes -r requirements-docs.lock || { rm -rf build/docs; \
+		echo "The documentation is not checked: the packages of requirements-docs.lock cannot be installed here."; exit 1; }
+	@touch $@
 
 bench: $(VENV)/.project
 	@exec $(BIN)/rolling-panda bench $(ARGS)
@@ -136,8 +156,10 @@ lock:
 	$(COMPILE) --extra dev --output-file requirements.lock pyproject.toml
 	$(COMPILE) --constraint requirements.lock --output-file requirements-run.lock pyproject.toml
 	$(COMPILE) --constraint requirements.lock --extra real --output-file requirements-real.lock pyproject.toml
-	$(BIN)/python -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["training"], sep="\n")' \
-		| $(COMPILE) --constraint requirements.lock --output-file requirements-training.lock -
+	for extra in training docs; do \
+		$(BIN)/python -c 'import sys, tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"][sys.argv[1]], sep="\n")' $$extra \
+			| $(COMPILE) --constraint requirements.lock --output-file requirements-$$extra.lock - || exit 1; \
+	done
 
 clean:
 	rm -rf $(VENV) build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

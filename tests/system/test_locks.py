@@ -19,6 +19,7 @@ RUN = PROJECT["dependencies"]
         ("requirements-run.lock", RUN),
         ("requirements-real.lock", RUN + PROJECT["optional-dependencies"]["real"]),
         ("requirements-training.lock", PROJECT["optional-dependencies"]["training"]),
+        ("requirements-docs.lock", PROJECT["optional-dependencies"]["docs"]),
         ("requirements.lock", RUN + PROJECT["optional-dependencies"]["dev"]),
     ],
 )
@@ -33,7 +34,14 @@ def test_every_declared_dependency_is_locked_at_an_allowed_version(lock: str, de
 
 
 @pytest.mark.parametrize(
-    "lock", ["requirements-run.lock", "requirements-real.lock", "requirements-training.lock", "requirements.lock"]
+    "lock",
+    [
+        "requirements-run.lock",
+        "requirements-real.lock",
+        "requirements-training.lock",
+        "requirements-docs.lock",
+        "requirements.lock",
+    ],
 )
 def test_a_lock_has_hashes_and_no_index_address(lock: str) -> None:
     text = (ROOT / lock).read_text()
