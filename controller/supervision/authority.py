@@ -93,7 +93,7 @@ class Authority:
         if intent.role == "viewer":
             return "a viewer may look and stop, not operate"
         if isinstance(intent, intents.TakeControl):
-            return lease.take(client, intent.confirmed, now)
+            return lease.take(client, intent.confirmed)
         if isinstance(intent, intents.RequestControl):
             return lease.request(client, now)
         if isinstance(intent, intents.GrantControl):

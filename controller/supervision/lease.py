@@ -41,7 +41,7 @@ class Lease:
         if self.holder is None:
             self._give(client, now, f"{client.user} holds control")
 
-    def take(self, client: Client, confirmed: bool, now: float) -> str:
+    def take(self, client: Client, confirmed: bool) -> str:
         """Take control, from somebody else only on purpose; why not, empty when it comes."""
         if self.held_by(client):
             return ""

@@ -66,6 +66,15 @@ def test_what_the_controller_may_send_a_thousand_times_a_second_is_sent_on_uncha
         np.testing.assert_allclose(bound.step(sent, arm), sent, atol=1e-12)
 
 
+def test_from_what_the_arm_took_it_goes_on_without_a_jerk() -> None:
+    bound, arm = limiter(), (LOWER + UPPER) / 2
+    velocity, change = np.full(7, 0.5), np.full(7, 2e-4)
+    bound.go_on_from(velocity, change)
+    sent = bound.step(np.zeros(9), arm)
+    assert np.all(np.abs(sent[ARM_XI] - (velocity + change)) <= LIMITS.jerk[ARM_XI] * DT**2 + 1e-12)
+    assert not sent[:2].any()
+
+
 def test_where_packets_may_be_lost_the_arm_may_go_on_with_its_acceleration_and_stays_below_its_velocity() -> None:
     repeats = 20
     bound, arm = Limiter(LIMITS, 13.5, 0.01, DT, repeats), (LOWER + UPPER) / 2

@@ -17,8 +17,10 @@ def test_depth_comes_back_to_half_a_count_and_what_is_no_depth_is_zero() -> None
     labels = np.arange(24, dtype=np.uint8).reshape(4, 6) % 9
     picture = encode_picture(INTRINSICS, color, depth, labels)
     counts = np.frombuffer(zlib.decompress(picture.depth_zlib), "<u2").reshape(4, 6)
-    assert np.all(counts[0, :4] == 0)
-    assert np.abs(counts[1:] * picture.depth_unit - depth[1:]).max() <= picture.depth_unit / 2 + 1e-6
+    assert picture.intrinsics == INTRINSICS
+    none, seen = np.ravel(counts)[:4], np.ravel(counts)[4:]
+    assert np.all(none == 0)
+    assert np.abs(seen * picture.depth_unit - np.ravel(depth)[4:]).max() <= picture.depth_unit / 2 + 1e-6
     assert np.array_equal(np.frombuffer(zlib.decompress(picture.labels_zlib), np.uint8).reshape(4, 6), labels)
     assert np.abs(np.asarray(Image.open(io.BytesIO(picture.color_jpeg))).astype(int) - 120).max() < 4
 

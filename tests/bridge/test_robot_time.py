@@ -20,11 +20,30 @@ def test_a_second_has_a_thousand_steps_and_each_is_later_than_the_last(kind: typ
 
 
 def test_a_simulated_robot_loses_the_time_that_its_process_stood_still() -> None:
-    time = SteppedTime(0.0, 0.001)
-    pass_time(time, 0.0, 1.0)
-    assert time.due(6.0) <= 20
-    pass_time(time, 6.0, 1.0)
-    assert time.now == pytest.approx(2.0, abs=0.05)
+    time = SteppedTime(7.0, 0.001)
+    pass_time(time, 7.0, 1.0)
+    assert time.due(13.0) == 20
+    pass_time(time, 13.0, 1.0)
+    assert time.now == pytest.approx(9.02, abs=0.005)
+    assert time.due(13.5) == 0, "it does not hurry"
+
+
+@pytest.mark.parametrize("kind", [SteppedTime, RealTime])
+def test_no_step_is_due_before_its_time(kind: type[SteppedTime | RealTime]) -> None:
+    time = kind(100.0, 0.001)
+    assert time.now == 100.0
+    assert time.due(100.0) == time.due(100.0009) == 0
+    assert time.due(100.0101) == 10
+    for _ in range(10):
+        time.tick()
+    assert time.due(100.0102) == 0
+
+
+def test_steps_of_a_real_robot_that_fall_on_the_time_are_due() -> None:
+    time = RealTime(0.0, 0.001)
+    for wake in range(1, 1000):
+        assert time.due(wake * 0.001) == 1, wake
+        time.tick()
 
 
 def test_a_real_robots_first_step_after_a_standstill_knows_how_long_it_was() -> None:

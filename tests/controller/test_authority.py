@@ -108,6 +108,27 @@ def test_the_old_holder_is_told_before_and_after_control_goes_over():
     assert after.notice_number > before.notice_number and "Bob" in after.notice
 
 
+def test_a_request_for_control_is_told_granted_and_forgotten_in_time():
+    it = authority()
+    it.claim(ADA, 0.0)
+    assert it.ask(intents.RequestControl(user="Bob", client="b"), 0.1) == ""
+    assert (it.message(0.1).requested_by, it.message(0.1).requested_key) == ("Bob", "b")
+    for second in range(40):
+        assert it.review(presence(second + 1, second * 0.9, ada()), True, second * 0.9) == ""
+    assert (it.message(36.0).requested_by, it.message(36.0).holder) == ("", "a")
+    assert it.ask(intents.RequestControl(user="Bob", client="b"), 36.0) == ""
+    assert it.ask(intents.GrantControl(user="Ada", client="a"), 36.0) == ""
+    assert it.message(36.0).next_user == "Bob"
+
+
+def test_control_is_given_back_by_who_holds_it():
+    it = authority()
+    it.claim(ADA, 0.0)
+    assert it.ask(intents.ReturnControl(user="Bob", client="b"), 0.1) == "you do not hold control"
+    assert it.ask(intents.ReturnControl(user="Ada", client="a"), 0.1) == ""
+    assert not it.held
+
+
 def test_somebody_who_has_seen_nothing_yet_is_told_so():
     it = authority()
     it.review(presence(1, 5.0, ada(age=NEVER_SEEN_S)), True, 5.0)

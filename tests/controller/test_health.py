@@ -29,7 +29,7 @@ def test_all_is_well(mode):
         ({"joints": 0.21}, "joint states"),
         ({"odometry": 0.26}, "odometry"),
         ({"bridge": 0.6}, "bridge"),
-        ({"joints": float("inf")}, "endlessly"),
+        ({"joints": float("inf")}, "are endlessly old"),
         ({"watchdog": True}, "watchdog"),
     ],
 )

@@ -51,11 +51,18 @@ def test_others_do_not_renew_it():
     assert it.review(True, 1.0)
 
 
+def test_who_holds_control_has_it_already_and_takes_it_from_nobody():
+    it = held()
+    for confirmed in (False, True):
+        assert it.take(ADA, confirmed) == ""
+        assert it.held_by(ADA) and it.next_holder is None
+
+
 def test_taking_over_needs_a_confirmation_and_a_robot_at_rest():
     it = held()
-    assert "confirm" in it.take(BOB, False, 0.1)
+    assert "confirm" in it.take(BOB, False)
     assert it.held_by(ADA)
-    assert it.take(BOB, True, 0.1) == ""
+    assert it.take(BOB, True) == ""
     # From here on nobody moves it.
     assert not it.held_by(ADA) and not it.held_by(BOB)
     assert "wait" in it.refusal(ADA) and "wait" in it.refusal(BOB)
@@ -69,8 +76,8 @@ def test_taking_over_needs_a_confirmation_and_a_robot_at_rest():
 
 def test_of_two_who_take_at_once_the_first_gets_it():
     it = held()
-    assert it.take(BOB, True, 0.1) == ""
-    assert "taking control already" in it.take(EVE, True, 0.1)
+    assert it.take(BOB, True) == ""
+    assert "taking control already" in it.take(EVE, True)
     it.review(True, 0.2)
     assert it.held_by(BOB)
 
@@ -78,7 +85,9 @@ def test_of_two_who_take_at_once_the_first_gets_it():
 def test_a_request_is_granted_by_the_holder_alone():
     it = held()
     assert "nobody asks" in it.grant(ADA)
+    before = it.notice_number
     assert it.request(BOB, 0.1) == ""
+    assert (it.notice, it.notice_number) == ("Bob asks Ada for control", before + 1)
     assert "asked already" in it.request(EVE, 0.1)
     assert "hold control already" in it.request(ADA, 0.1)
     assert "only who holds" in it.grant(BOB)
@@ -99,8 +108,11 @@ def test_a_request_is_forgotten_in_time():
 def test_control_is_given_back_by_its_holder():
     it = held()
     assert "do not hold" in it.give_back(BOB)
+    before = it.notice_number
     assert it.give_back(ADA) == ""
     assert it.holder is None
+    assert (it.notice, it.notice_number) == ("Ada gave control back", before + 1)
+    assert it.review(True, 0.1) == "Ada gave control back"
     assert "take it" in it.request(BOB, 0.1)
 
 
@@ -125,9 +137,9 @@ def test_there_is_never_more_than_one_holder(script):
             case "claim":
                 it.claim(client, now)
             case "take":
-                it.take(client, False, now)
+                it.take(client, False)
             case "seize":
-                it.take(client, True, now)
+                it.take(client, True)
             case "request":
                 it.request(client, now)
             case "grant":
@@ -153,6 +165,6 @@ def test_there_is_never_more_than_one_holder(script):
 def test_a_thousand_times_two_operators_take_at_once_and_one_has_it(pair):
     for _ in range(1000):
         it = Lease()
-        answers = [it.take(client, True, 0.0) for client in pair]
+        answers = [it.take(client, True) for client in pair]
         it.review(True, 0.0)
         assert answers.count("") == 1 and it.held_by(pair[0]) and not it.held_by(pair[1])

@@ -24,7 +24,19 @@ def test_a_stop_latches_once_and_says_who_and_why():
 
 
 def test_a_stop_that_only_the_bridge_has_seen_latches_too():
-    assert "dog in the row" in StopLatch().update((), bridge("a"))
+    assert StopLatch().update((), bridge("a")) == "software stop: eve: dog in the row"
+
+
+def test_an_emergency_stop_is_told_from_a_software_stop_and_a_process_stands_for_a_person():
+    for source, user, told in (
+        ("hardware", "", "emergency stop: the button"),
+        ("hardware", "eve", "emergency stop: the button"),
+        ("server", "", "software stop by server: the button"),
+        ("server", "eve", "software stop by eve: the button"),
+        ("bridge", "", "software stop: the button"),
+    ):
+        pressed = m.StopRequest(stop_id="a", source=source, user=user, reason="the button")
+        assert StopLatch().update((pressed,), BRIDGE) == told
 
 
 def test_reset_ends_only_when_the_bridge_shows_the_release():
@@ -32,7 +44,7 @@ def test_reset_ends_only_when_the_bridge_shows_the_release():
     latch.update((stop("a"),), bridge("a"))
     assert not latch.released(bridge("a"))
     assert latch.ask_release(RESET, bridge("a"), 1.0) == ""
-    assert latch.release_due().stop_id == "a"
+    assert latch.release_due() == m.ReleaseStop(stop_id="a", user="ada", reason="looked at it")
     assert latch.release_due() is None
     assert not latch.released(bridge("a"))
     assert latch.released(BRIDGE)
@@ -101,8 +113,18 @@ def test_of_two_stops_the_one_that_the_bridge_holds_is_released():
     latch = StopLatch()
     latch.update((stop("a"),), bridge("a"))
     latch.update((stop("b"),), bridge("a"))
-    latch.ask_release(RESET, bridge("a"), 1.0)
+    looked_at_a = msgspec.structs.replace(RESET, stop_id="a")
+    assert latch.ask_release(looked_at_a, bridge("a"), 1.0) == ""
     assert latch.release_due().stop_id == "a"
+    assert latch.released(BRIDGE)
+
+
+def test_a_stop_that_the_bridge_does_not_hold_is_reset_by_its_own_id():
+    latch = StopLatch()
+    latch.update((stop("a"), stop("b")), BRIDGE)
+    looked_at_a = msgspec.structs.replace(RESET, stop_id="a")
+    assert "another stop was pressed" in latch.ask_release(looked_at_a, BRIDGE, 1.0)
+    assert latch.ask_release(msgspec.structs.replace(RESET, stop_id="b"), BRIDGE, 1.0) == ""
     assert latch.released(BRIDGE)
 
 

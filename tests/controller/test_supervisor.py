@@ -1,4 +1,15 @@
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+
+from controller.inputs import Sample
+from rolling_panda import messages as m
+from rolling_panda import topics
 from rolling_panda.messages import commands as intents
+from rolling_panda.messages.robot import RejectionCount
+from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
 from rolling_panda.model.robot import ARM_Q
 from tests.support.controller_at_work import CONFIG, robot, run_until
 
@@ -29,8 +40,26 @@ def test_a_lost_server_ends_the_way_home_without_a_change_of_mode():
     r.run(0.1)
     r.server = False
     r.run(3.0)
-    assert any("homing was stopped" in text for text in r.events), r.events
+    assert sum("homing was stopped" in text for text in r.events) == 1, r.events
     assert not r.controller._movement.homing
+
+
+def test_who_is_heard_no_more_ends_the_way_home_with_a_warning_and_is_not_told_so_where_nothing_moves():
+    r = ready()
+    assert r.ask(intents.Home(user="ada")).ok
+    r.run(0.1)
+    r.people.clear()
+    said = told(outputs(r, 1.5))
+    assert [severity for severity, text in said if "homing was stopped: control by ada has ended" in text] == [
+        "warning"
+    ]
+    assert r.controller.mode == "READY"
+    r.people.add("ada")
+    r.run(0.1)
+    assert r.ask(intents.TakeControl(user="ada")).ok
+    r.run(0.1)
+    r.people.clear()
+    assert not [text for _, text in told(outputs(r, 1.5)) if "homing" in text]
 
 
 def test_an_operator_stops_the_way_home_and_is_named():
@@ -41,3 +70,162 @@ def test_an_operator_stops_the_way_home_and_is_named():
     r.run(0.1)
     assert r.state.mode == "READY"
     assert "stopped by ada" in r.state.reason
+
+
+def bridge_says(r, **changes):
+    """The bridge's state has these values from now on."""
+    inputs = r.inputs
+
+    def changed():
+        given = inputs()
+        said = msgspec.structs.replace(given.bridge.message, **changes)
+        return replace(given, bridge=Sample(said, given.bridge.at))
+
+    r.inputs = changed
+
+
+def outputs(r, seconds):
+    """What the controller sends in a time, the newest last."""
+    return [r.step() for _ in range(round(seconds / r.dt))]
+
+
+def told(outs):
+    return [(event.severity, event.text) for out in outs for event in out.events]
+
+
+def test_a_change_of_mode_is_a_warning_from_a_pause_on():
+    r = ready()
+    r.teleop = TeleopTarget(sequence=1, hold=True, user="ada", base=BaseVelocity(0.1, 0.0))
+    said = told(outputs(r, 0.1))
+    assert ("info", "READY → TELEOP: ada moves the robot") in said
+    assert r.ask(intents.Pause(user="ada")).ok
+    assert ("warning", "TELEOP → PAUSED: pause by ada") in told(outputs(r, 0.1))
+
+
+def test_who_commands_the_robot_is_told_and_that_another_controller_does_is_a_warning_and_a_fault():
+    r = robot()
+    assert ("info", "this controller commands the robot: epoch 1") in told(outputs(r, 0.1))
+    assert r.ask(intents.Arm(user="ada")).ok
+    bridge_says(r, holder=m.fingerprint("cafe"))
+    outs = outputs(r, 0.1)
+    [severity] = [severity for severity, text in told(outs) if "another controller commands this robot; " in text]
+    assert severity == "warning"
+    assert r.controller.mode == "FAULT" and outs[-1].motion is None
+
+
+#: Longer than braking takes, and shorter.
+LONG, SHORT = 0.5, 0.3
+
+
+def moved_by_others(r):
+    """The bridge is told to move by a command that this controller has not sent."""
+    bridge_says(r, moving=True, sequence=10**6)
+
+
+def test_a_robot_that_moves_by_commands_of_others_is_stopped_under_another_token():
+    r = ready()
+    moved_by_others(r)
+    assert all(out.stop is None for out in outputs(r, SHORT)), "the robot may be braking"
+    outs = outputs(r, LONG - SHORT)
+    (stop,) = {out.stop for out in outs} - {None}
+    assert (stop.source, stop.user) == ("controller", "") and "has not sent" in stop.reason
+    assert r.controller.mode == "ESTOP_LATCHED"
+    [given_back] = [out.token for out in outs if out.token is not None and out.token.releases]
+    asked_anew = [out.token.token for out in outs if out.token is not None][-1]
+    assert asked_anew != given_back.token
+    # It is sent until the bridge has it, and no longer.
+    assert r.step().stop == stop
+    r.stop_id = stop.stop_id
+    assert r.step().stop is None
+
+
+def test_motion_that_ends_in_time_and_begins_again_is_no_motion_of_others():
+    r = ready()
+    inputs = r.inputs
+    for _ in range(3):
+        moved_by_others(r)
+        assert all(out.stop is None for out in outputs(r, SHORT))
+        r.inputs = inputs
+        assert all(out.stop is None for out in outputs(r, 0.05))
+
+
+def test_a_hold_of_somebody_else_ends_the_motion_of_who_has_control():
+    r = ready()
+    r.teleop = TeleopTarget(sequence=1, hold=True, user="ada", base=BaseVelocity(0.1, 0.0))
+    outputs(r, 0.3)
+    assert r.controller.mode == "TELEOP"
+    r.teleop = TeleopTarget(sequence=1, hold=True, user="bob", base=BaseVelocity(0.1, 0.0))
+    said = told(outputs(r, 0.05))
+    assert ("info", "TELEOP → READY: the hold was released") in said
+    r.run(1.0)
+    assert r.controller.mode == "READY" and np.abs(r.xi).max() < 1e-3
+
+
+def test_a_hold_gives_control_that_nobody_has_and_is_refused_once_where_the_robot_cannot_move():
+    r = ready()
+    assert r.ask(intents.ReturnControl(user="ada")).ok
+    r.run(0.05)
+    r.teleop = TeleopTarget(sequence=1, hold=True, user="bob", base=BaseVelocity(0.1, 0.0))
+    assert [out.control.user for out in outputs(r, 0.1) if out.control is not None][-1] == "bob"
+    assert r.controller.mode == "TELEOP"
+    r = ready()
+    inputs = r.inputs
+    bridge_says(r, cutter="closing")
+    r.teleop = TeleopTarget(sequence=1, hold=True, user="ada", base=BaseVelocity(0.1, 0.0))
+    refused = [(severity, text) for severity, text in told(outputs(r, 0.3)) if "teleoperation refused" in text]
+    assert refused == [("warning", "teleoperation refused: the blades are closing; wait until the cut has ended")]
+    # What was held all the time moves nothing when the cut has ended: it must be released first.
+    r.inputs = inputs
+    r.run(0.3)
+    assert r.controller.mode == "READY"
+    r.teleop = TeleopTarget(sequence=1, hold=False, user="ada")
+    r.run(0.05)
+    r.teleop = TeleopTarget(sequence=1, hold=True, user="ada", base=BaseVelocity(0.1, 0.0))
+    r.run(0.1)
+    assert r.controller.mode == "TELEOP"
+
+
+@pytest.mark.parametrize("missing", ["server", "odometry"])
+def test_a_hold_without_a_link_or_measurements_is_refused(missing):
+    r = ready()
+    inputs = r.inputs
+    gone = {"server": {"server_seen": 0.0}, "odometry": {"odometry": Sample(inputs().odometry.message, -9.0)}}[missing]
+    r.inputs = lambda: replace(inputs(), **gone)
+    r.teleop = TeleopTarget(sequence=1, hold=True, user="ada", base=BaseVelocity(0.1, 0.0))
+    r.now += 1.0
+    said = [text for severity, text in told(outputs(r, 0.1)) if "teleoperation refused" in text]
+    assert len(said) == 1 and missing in said[0] and r.controller.mode == "READY"
+
+
+def refusing(r, count):
+    """The watchdog holds the robot, and so many commands have been refused."""
+    refused = (RejectionCount(topic=topics.MOTION.name, reason="old sequence", count=count),)
+    bridge_says(r, watchdog=True, rejections=refused)
+
+
+def tokens(outs):
+    return {out.token.token for out in outs if out.token is not None}
+
+
+def test_a_bridge_that_refuses_every_command_is_asked_for_another_token_after_two_seconds():
+    r = ready()
+    inputs = r.inputs
+    (first,) = tokens(outputs(r, 0.5))
+    refusing(r, 1)
+    assert tokens(outputs(r, 1.9)) == {first}
+    outs = outputs(r, 0.3)
+    assert [out.token.token for out in outs if out.token is not None and out.token.releases] == [first]
+    [severity] = [severity for severity, text in told(outs) if "another token is asked for" in text]
+    assert severity == "warning"
+    (second,) = tokens(outputs(r, 1.0))
+    assert second != first
+    # It obeys again, and keeps the token.
+    r.inputs = inputs
+    assert tokens(outputs(r, 3.0)) == {second}
+
+
+def test_a_watchdog_that_holds_the_robot_without_refusing_commands_changes_no_token():
+    r = ready()
+    (first,) = tokens(outputs(r, 0.5))
+    refusing(r, 0)
+    assert tokens(outputs(r, 5.0)) == {first}

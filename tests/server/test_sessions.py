@@ -39,7 +39,7 @@ def test_bad_attempts_cost_more_and_more_time_and_a_good_one_ends_that():
         with pytest.raises(SignInError) as caught:
             sessions.sign_in("wrong", 0.0)
     assert caught.value.wait_s == 0.0
-    with pytest.raises(SignInError, match="too many") as caught:
+    with pytest.raises(SignInError, match="^too many bad sign-ins; try again in") as caught:
         sessions.sign_in("wrong", 0.5)
     assert caught.value.wait_s == pytest.approx(0.5)
     with pytest.raises(SignInError):
@@ -68,6 +68,15 @@ def test_a_session_that_was_ended_is_gone():
     sessions.end(session)
     assert sessions.find(session.session_id, 0.0) is None
     assert sessions.active() == ()
+
+
+def test_sessions_of_removed_and_changed_accounts_are_void_and_those_of_links_are_not():
+    sessions = Sessions(60.0)
+    by_link = sessions.sign_in(sessions.invite("ann", "viewer"), 0.0)
+    same, changed, removed = (sessions.open(name, "operator", 0.0, f"{name} 1") for name in ("ada", "bob", "eve"))
+    assert sessions.void({"ada": "ada 1", "bob": "bob 2"}) == (changed, removed)
+    assert sessions.void({}) == (same, changed, removed)
+    assert by_link in sessions.active()
 
 
 def test_a_good_sign_in_makes_bad_ones_of_that_address_be_forgotten():

@@ -14,7 +14,7 @@ PASSWORD = "correct horse battery"
 
 @pytest.fixture
 def users(tmp_path):
-    file = UserFile(tmp_path / "state" / "users.json")
+    file = UserFile(tmp_path / "state" / "cell" / "users.json")
     file.add("ada", "supervisor", PASSWORD)
     return file
 
