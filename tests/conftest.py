@@ -10,6 +10,7 @@ from hypothesis import settings
 from playwright.sync_api import sync_playwright
 
 from tests.support.played_page import browser, page, server, tab
+from tests.support.processes.local_router import local_router
 
 __all__ = ["browser", "page", "server", "tab"]
 
@@ -41,6 +42,13 @@ def ordinary_scheduling(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     before = os.sched_getscheduler(0), os.getpriority(os.PRIO_PROCESS, 0)
     yield
     assert (os.sched_getscheduler(0), os.getpriority(os.PRIO_PROCESS, 0)) == before, "a test changed its own priority"
+
+
+@pytest.fixture(scope="module")
+def endpoint() -> Iterator[str]:
+    """Of a router without encryption, one for a file of tests."""
+    with local_router() as endpoint:
+        yield endpoint
 
 
 @pytest.fixture(scope="session")

@@ -2,7 +2,6 @@
 
 import json
 import re
-import socket
 import subprocess
 import tempfile
 import time
@@ -19,6 +18,7 @@ from rolling_panda.errors import InputError
 from rolling_panda.resources import resource
 from rolling_panda.runtime.launch import child_environment, python_command
 from rolling_panda.transport.zenoh import Router
+from tests.support.processes.live_robot import free_port
 
 _TOKEN = "for-this-measurement-only-0123456789abcdefghij"
 _START_S = 180.0
@@ -39,8 +39,8 @@ class RealSite:
         self._folder = tempfile.TemporaryDirectory(prefix="rolling-panda-")
         self._processes: list[subprocess.Popen[str]] = []
         folder = Path(self._folder.name)
-        port = _free_port()
-        self.endpoint = f"tcp/127.0.0.1:{_free_port()}"
+        port = free_port()
+        self.endpoint = f"tcp/127.0.0.1:{free_port()}"
         self._router = Router(TransportConfig(mode="router", connect=(), listen=(self.endpoint,), plain_wire=True))
         config = folder / "fakes.toml"
         text = resource("assets/config/fakes.toml").read_text(encoding="utf-8")
@@ -148,9 +148,3 @@ class RealSite:
             return self._page.get("/api/health").is_success
         except httpx.TransportError:
             return False
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])

@@ -2,7 +2,6 @@
 
 import re
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -21,7 +20,9 @@ from rolling_panda import topics
 from rolling_panda.config import TransportConfig
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.resources import resource
-from rolling_panda.transport.zenoh import Feed, ForeignWire, Publisher, Router, Slot, Transport
+from rolling_panda.transport.zenoh import Feed, ForeignWire, Publisher, Slot, Transport
+from tests.support.processes.local_router import local_router
+from tests.support.waiting import until
 
 pytestmark = pytest.mark.alone
 
@@ -66,13 +67,6 @@ class Live:
         return received.message
 
 
-def until(condition: Callable[[], bool], limit_s: float = 20.0) -> None:
-    end = time.monotonic() + limit_s
-    while not condition():
-        assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.01)
-
-
 @pytest.fixture(scope="module")
 def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Live]:
     with running_bridge(tmp_path_factory.mktemp("bridge")) as bridge:
@@ -98,22 +92,9 @@ def started(folder: Path, endpoint: str, config: Path, *words: str, **how: Any) 
 
 
 @contextmanager
-def a_router() -> Iterator[str]:
-    """Its endpoint."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
-    router = Router(TransportConfig(mode="router", connect=(), listen=(endpoint,), plain_wire=True))
-    try:
-        yield endpoint
-    finally:
-        router.close()
-
-
-@contextmanager
 def running_bridge(folder: Path, **changes: float) -> Iterator[Live]:
     """A bridge that has told its first state."""
-    with a_router() as endpoint:
+    with local_router() as endpoint:
         yield from _running(folder, endpoint, configured(folder, **changes))
 
 
@@ -175,7 +156,7 @@ def test_the_widest_deadline_that_can_be_set_still_stops_it_within_its_bound(tmp
 def test_a_bridge_whose_deadline_is_out_of_bounds_does_not_start(
     tmp_path: Path, key: str, value: float, allowed: str
 ) -> None:
-    with a_router() as endpoint:
+    with local_router() as endpoint:
         process = started(tmp_path, endpoint, configured(tmp_path, **{key: value}), stderr=subprocess.PIPE)
         try:
             _, said = process.communicate(timeout=60)

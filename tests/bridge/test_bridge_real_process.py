@@ -5,7 +5,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -17,10 +17,10 @@ from rolling_panda.config import TransportConfig
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.resources import resource
 from rolling_panda.runtime.launch import child_environment
-from rolling_panda.transport.zenoh import Router, Transport
+from rolling_panda.transport.zenoh import Transport
 from tests.support.extras import need
 from tests.support.processes.device_process import DeviceProcess
-from tests.support.processes.live_robot import free_port
+from tests.support.waiting import until
 
 need("real")
 
@@ -32,12 +32,10 @@ FORWARD = (*RobotModel().drive.wheels(0.2, 0.0), 0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0
 
 
 class Site:
-    """A router, a base and an arm, and a configuration that names them."""
+    """A base and an arm, and a configuration that names them."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.endpoint = f"tcp/127.0.0.1:{free_port()}"
-        self.router = Router(TransportConfig(mode="router", connect=(), listen=(self.endpoint,), plain_wire=True))
+    def __init__(self, endpoint: str, folder: Path) -> None:
+        self.endpoint, self.folder = endpoint, folder
         self.base = DeviceProcess("base", "--plain-wire", "--connect", self.endpoint)
         self.arm = DeviceProcess("arm", "--arm", ADDRESS)
         text = resource("assets/config/real.toml").read_text()
@@ -47,38 +45,19 @@ class Site:
         self.config.write_text(text)
 
     def command(self, *options: str) -> list[str]:
-        state = str(self.folder / "state")
-        return [
-            sys.executable,
-            "-m",
-            "bridge",
-            "real",
-            "--config",
-            str(self.config),
-            "--state",
-            state,
-            "--plain-wire",
-            *options,
-        ]
+        files = ["--config", str(self.config), "--state", str(self.folder / "state")]
+        return [sys.executable, "-m", "bridge", "real", *files, "--plain-wire", *options]
 
     def close(self) -> None:
         self.base.close()
         self.arm.close()
-        self.router.close()
 
 
 @pytest.fixture(scope="module")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
-    site = Site(tmp_path_factory.mktemp("site"))
+def site(endpoint: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    site = Site(endpoint, tmp_path_factory.mktemp("site"))
     yield site
     site.close()
-
-
-def until(condition: Callable[[], bool], limit_s: float = 20.0) -> None:
-    end = time.monotonic() + limit_s
-    while not condition():
-        assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.01)
 
 
 def moved(site: Site) -> float:

@@ -5,7 +5,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -13,6 +13,7 @@ import pytest
 
 from rolling_panda.runtime.launch import child_environment
 from tests.support.processes.device_process import DeviceProcess
+from tests.support.waiting import until
 
 pytestmark = pytest.mark.alone
 
@@ -38,13 +39,6 @@ def running(*command: str) -> Iterator[int]:
     finally:
         process.kill()
         process.wait()
-
-
-def until(condition: Callable[[], bool], limit_s: float = 30.0) -> None:
-    end = time.monotonic() + limit_s
-    while not condition():
-        assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.001)
 
 
 def commands(box: DeviceProcess) -> int:

@@ -1,7 +1,7 @@
 """The base's driver against a base in its own process, over a real router."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -11,9 +11,9 @@ from bridge.real.config import BaseConfig
 from bridge.real.mp500 import Mp500
 from rolling_panda.config import TransportConfig
 from rolling_panda.model.robot import RobotModel
-from rolling_panda.transport.zenoh import ForeignWire, Router
+from rolling_panda.transport.zenoh import ForeignWire
 from tests.support.processes.device_process import DeviceProcess
-from tests.support.processes.live_robot import free_port
+from tests.support.waiting import until
 
 pytestmark = pytest.mark.alone
 
@@ -24,13 +24,10 @@ LEFT = np.array(DRIVE.wheels(0.2, 0.4))
 
 
 @pytest.fixture(scope="module")
-def device() -> Iterator[tuple[str, DeviceProcess]]:
-    endpoint = f"tcp/127.0.0.1:{free_port()}"
-    router = Router(TransportConfig(mode="router", connect=(), listen=(endpoint,), plain_wire=True))
+def device(endpoint: str) -> Iterator[tuple[str, DeviceProcess]]:
     device = DeviceProcess("base", "--plain-wire", "--connect", endpoint)
     yield endpoint, device
     device.close()
-    router.close()
 
 
 @pytest.fixture
@@ -48,14 +45,6 @@ def base(device: tuple[str, DeviceProcess]) -> Iterator[Mp500]:
 @pytest.fixture
 def fake(device: tuple[str, DeviceProcess]) -> DeviceProcess:
     return device[1]
-
-
-def until(condition: Callable[[], bool], limit_s: float = 5.0) -> float:
-    began = time.monotonic()
-    while not condition():
-        assert time.monotonic() - began < limit_s, "waited in vain"
-        time.sleep(0.005)
-    return time.monotonic() - began
 
 
 def drive(base: Mp500, wheels: np.ndarray, seconds: float) -> None:

@@ -21,6 +21,7 @@ from rolling_panda.model.robot import RobotModel
 from rolling_panda.runtime.launch import child_environment
 from tests.support.extras import need
 from tests.support.processes.device_process import DeviceProcess
+from tests.support.waiting import until
 
 need("real")
 
@@ -47,13 +48,6 @@ def arm(box: DeviceProcess) -> Iterator[Panda]:
     until(lambda: arm.read().fault == "" and arm.read().commands > 10, 15.0)
     yield arm
     arm.close()
-
-
-def until(condition: Callable[[], bool], limit_s: float = 5.0) -> None:
-    end = time.monotonic() + limit_s
-    while not condition():
-        assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.01)
 
 
 class Hand:

@@ -1,6 +1,5 @@
 """The control loop over a real router; the test is the bridge and the server."""
 
-import socket
 import threading
 import time
 
@@ -31,7 +30,7 @@ from rolling_panda.topics import (
     STOP,
     TOKEN,
 )
-from rolling_panda.transport.zenoh import Router, Transport
+from rolling_panda.transport.zenoh import Transport
 
 pytestmark = pytest.mark.alone
 
@@ -109,11 +108,7 @@ class Rest:
 
 
 @pytest.fixture
-def rest(tmp_path):
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
-    router = Router(TransportConfig(mode="router", connect=(), listen=(endpoint,), plain_wire=True))
+def rest(endpoint, tmp_path):
     others = Rest(endpoint)
     others.folder = tmp_path
     stopping = threading.Event()
@@ -130,7 +125,6 @@ def rest(tmp_path):
         ledger.close()
         stop_file.close()
     others.close()
-    router.close()
 
 
 def test_a_stop_that_cannot_be_kept_for_the_next_start_is_a_fault_until_it_can(rest):

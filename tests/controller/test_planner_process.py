@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 
 import numpy as np
 import psutil
@@ -16,10 +15,9 @@ from controller.planning.rollout import Rollout
 from rolling_panda.config import RobotConfig
 from rolling_panda.generate.__main__ import ROOT
 from tests.controller.test_cuts import CONFIG, PLANNER, POST, point, request
+from tests.support.waiting import until
 
 pytestmark = pytest.mark.alone
-
-_STARTS_S = 60.0
 
 
 @pytest.fixture
@@ -30,16 +28,9 @@ def worker():
     assert worker.pid is None or not psutil.pid_exists(worker.pid)
 
 
-def eventually(condition, limit_s=_STARTS_S):
-    end = time.monotonic() + limit_s
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.02)
-
-
 def answered(worker, asked):
     worker.ask(asked)
-    eventually(lambda: worker.newest is not None and worker.newest.request.number == asked.number)
+    until(lambda: worker.newest is not None and worker.newest.request.number == asked.number)
     return worker.newest
 
 
@@ -60,7 +51,7 @@ def test_what_cannot_be_planned_from_is_answered_with_a_failure_and_a_dead_proce
     assert "every coordinate must be finite" in answered(worker, broken).failure
     first = worker.pid
     os.kill(first, signal.SIGKILL)
-    eventually(lambda: not psutil.pid_exists(first) or psutil.Process(first).status() == psutil.STATUS_ZOMBIE)
+    until(lambda: not psutil.pid_exists(first) or psutil.Process(first).status() == psutil.STATUS_ZOMBIE)
     assert "process ended" in answered(worker, request(point("a", 0.3), number=3)).failure
     assert len(answered(worker, request(point("a", 0.3), number=4)).cuts) == 1
     assert worker.pid != first
@@ -84,7 +75,7 @@ def test_it_ends_with_a_parent_that_is_killed() -> None:
         assert parent.stdout is not None
         child = int(parent.stdout.readline())
         parent.kill()
-    eventually(lambda: not psutil.pid_exists(child))
+    until(lambda: not psutil.pid_exists(child))
 
 
 def test_a_preview_is_answered_as_the_rollout_in_this_process_does_before_a_plan_that_waits(worker) -> None:
@@ -92,6 +83,6 @@ def test_a_preview_is_answered_as_the_rollout_in_this_process_does_before_a_plan
     wanted = PreviewRequest(1, asked.q, asked.points)
     worker.ask(asked)
     worker.ask(wanted)
-    eventually(lambda: worker.newest_preview is not None)
+    until(lambda: worker.newest_preview is not None)
     assert worker.newest_preview.digest == Rollout(CONFIG, RobotConfig()).roll(wanted).digest
-    eventually(lambda: worker.newest is not None and worker.newest.request.number == 7)
+    until(lambda: worker.newest is not None and worker.newest.request.number == 7)

@@ -13,6 +13,7 @@ from controller.ledger.writer import LedgerWriter
 from rolling_panda import messages as m
 from rolling_panda.errors import LedgerError
 from tests.support.fake_wire import pruning_point
+from tests.support.waiting import until
 
 
 def record(number, text="x"):
@@ -21,13 +22,6 @@ def record(number, text="x"):
 
 def line(text, process="server"):
     return m.LogEvent(header=m.Header(), process=process, severity="info", text=text)
-
-
-def eventually(condition):
-    end = time.monotonic() + 20.0
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.002)
 
 
 @pytest.fixture
@@ -64,7 +58,7 @@ class Disk:
 def test_what_is_handed_over_is_in_the_ledger_when_the_state_says_so(tmp_path, writers):
     writer = writers(lambda: Ledger(tmp_path))
     writer.write([record(1, "a"), record(2, "b")])
-    eventually(lambda: writer.state.durable == 2)
+    until(lambda: writer.state.durable == 2)
     with reading(tmp_path) as database:
         rows = list(read(database))
     assert [json.loads(row.entry.body)["frame_id"] for row in rows] == ["a", "b"]
@@ -80,7 +74,7 @@ def test_handing_over_never_waits_for_a_slow_disk(writers):
         writer.write([record(number)])
     assert time.monotonic() - began < 0.5 and writer.state.durable == 0
     disk.go.set()
-    eventually(lambda: writer.state.durable == 1000)
+    until(lambda: writer.state.durable == 1000)
     assert len(disk.rows) == 1000
 
 
@@ -89,11 +83,11 @@ def test_a_full_disk_is_told_and_nothing_is_lost_when_there_is_room_again(writer
     disk.full = True
     writer = writers(lambda: disk)
     writer.write([record(1)])
-    eventually(lambda: writer.state.failure)
+    until(lambda: writer.state.failure)
     assert "disk is full" in writer.state.failure and writer.state.durable == 0
     writer.write([record(2)])
     disk.full = False
-    eventually(lambda: writer.state.durable == 2)
+    until(lambda: writer.state.durable == 2)
     assert writer.state.failure == "" and len(disk.rows) == 2
 
 
@@ -101,9 +95,9 @@ def test_a_ledger_that_cannot_be_opened_is_told_and_tried_again(tmp_path, writer
     folder = tmp_path / "later"
     writer = writers(lambda: Ledger(folder))
     writer.write([record(1)])
-    eventually(lambda: writer.state.failure)
+    until(lambda: writer.state.failure)
     folder.mkdir()
-    eventually(lambda: writer.state.durable == 1)
+    until(lambda: writer.state.durable == 1)
 
 
 def test_the_end_writes_what_waits_and_closes(writers):
@@ -119,14 +113,14 @@ def test_the_report_tells_of_what_is_durable_and_of_no_more(writers):
     writer = writers(lambda: disk)
     cutting, cut = (TicketRow(point=pruning_point("p1"), state=state, cut_id="c1") for state in ("CUTTING", "DONE"))
     writer.write([Record(1, "ticket", "p1", cutting)])
-    eventually(lambda: writer.report.cuts)
+    until(lambda: writer.report.cuts)
     assert [each.outcome for each in writer.report.cuts] == [""]
     disk.go.clear()
     writer.write([Record(2, "ticket", "p1", cut)])
     time.sleep(0.05)
     assert [each.outcome for each in writer.report.cuts] == [""]
     disk.go.set()
-    eventually(lambda: [each.outcome for each in writer.report.cuts] == ["DONE"])
+    until(lambda: [each.outcome for each in writer.report.cuts] == ["DONE"])
 
 
 def test_a_flood_of_lines_is_counted_instead_of_recorded(writers):
@@ -136,7 +130,7 @@ def test_a_flood_of_lines_is_counted_instead_of_recorded(writers):
         writer.note(line(f"refused {number}"))
     now[0] += 1.0
     writer.note(line("after"))
-    eventually(lambda: len(disk.rows) == 202)
+    until(lambda: len(disk.rows) == 202)
     assert "refused 199" in disk.rows[199].body
     left_out = json.loads(disk.rows[200].body)
     assert left_out["lines"] == 800 and left_out["text"].startswith("800 lines") and "after" in disk.rows[201].body

@@ -3,7 +3,6 @@
 import signal
 import subprocess
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -13,18 +12,9 @@ from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.config import TransportConfig
 from rolling_panda.runtime.launch import child_environment, python_command
-from rolling_panda.transport.zenoh import Router, Transport
-from tests.support.processes.live_robot import free_port
+from rolling_panda.transport.zenoh import Transport
 
 pytestmark = pytest.mark.alone
-
-
-@pytest.fixture(scope="module")
-def endpoint() -> Iterator[str]:
-    endpoint = f"tcp/127.0.0.1:{free_port()}"
-    router = Router(TransportConfig(mode="router", connect=(), listen=(endpoint,), plain_wire=True))
-    yield endpoint
-    router.close()
 
 
 def publish(transport: Transport, seconds: float, recorder: subprocess.Popen[str] | None = None) -> float:

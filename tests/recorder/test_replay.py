@@ -11,29 +11,24 @@ from rolling_panda import topics
 from rolling_panda.config import TransportConfig
 from rolling_panda.messages import commands as intents
 from rolling_panda.messages.commands import SeekReplay
-from rolling_panda.transport.zenoh import Router, Transport
+from rolling_panda.transport.zenoh import Transport
 from tests.recorder.test_player import event, joints, recording
-from tests.support.processes.live_robot import free_port
+from tests.support.waiting import until
 
 pytestmark = pytest.mark.alone
 
 
 @pytest.fixture
-def server() -> Iterator[tuple[Replay, Transport]]:
-    endpoint = f"tcp/127.0.0.1:{free_port()}"
-    router = Router(TransportConfig(mode="router", connect=(), listen=(endpoint,), plain_wire=True))
+def server(endpoint: str) -> Iterator[tuple[Replay, Transport]]:
     server = Transport(TransportConfig(connect=(endpoint,), plain_wire=True), "server", "rp1")
     replay = Replay(
         TransportConfig(connect=(endpoint,), plain_wire=True),
         Player(recording(event(0.35, "it begins")), "a.mcap", time.monotonic()),
     )
-    end = time.monotonic() + 5.0
-    while not {"bridge", "controller", "perception"} <= server.present() and time.monotonic() < end:
-        time.sleep(0.02)
+    until(lambda: {"bridge", "controller", "perception"} <= server.present())
     yield replay, server
     replay.__exit__()
     server.close()
-    router.close()
 
 
 def test_a_server_sees_the_robot_of_the_recording_and_moves_in_it(server: tuple[Replay, Transport]) -> None:

@@ -1,6 +1,5 @@
 """On a wire with certificates each process may say what is its own to say, and an intruder nothing at all."""
 
-import socket
 import subprocess
 import time
 from collections.abc import Callable
@@ -23,16 +22,11 @@ from rolling_panda.transport.access import BEARERS, CALLERS, access_control
 from rolling_panda.transport.certificates import APART, NAMES, main, make
 from rolling_panda.transport.codec import encode
 from rolling_panda.transport.zenoh import Onlooker, Router, Transport
+from tests.support.processes.live_robot import free_port
 
 pytestmark = pytest.mark.alone
 
 ROBOTS = ("rp1", "rp2")
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 @pytest.fixture(scope="module")

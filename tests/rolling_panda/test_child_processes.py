@@ -5,7 +5,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import psutil
@@ -13,6 +13,7 @@ import pytest
 
 from rolling_panda.cli.child_processes import ChildExit, ChildProcesses
 from rolling_panda.runtime.launch import child_environment
+from tests.support.waiting import until
 
 pytestmark = pytest.mark.alone
 
@@ -25,14 +26,6 @@ def children(tmp_path: Path) -> Iterator[ChildProcesses]:
     made = ChildProcesses(tmp_path)
     yield made
     made.end()
-
-
-def until(condition: Callable[[], bool], limit_s: float = 10.0) -> float:
-    began = time.monotonic()
-    while not condition():
-        assert time.monotonic() - began < limit_s, "waited in vain"
-        time.sleep(0.01)
-    return time.monotonic() - began
 
 
 def exit_of(children: ChildProcesses) -> ChildExit:

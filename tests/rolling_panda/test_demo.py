@@ -172,9 +172,7 @@ def test_a_process_that_cannot_start_is_told_with_its_reason(tmp_path: Path) -> 
 
 
 def test_the_router_is_where_other_commands_look_unless_that_port_is_taken() -> None:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        usual = int(probe.getsockname()[1])
+    usual = free_port()
     endpoint = f"tcp/127.0.0.1:{usual}"
     assert choose_router_port(endpoint) == usual
     with socket.create_server(("127.0.0.1", usual)):

@@ -1,6 +1,5 @@
-import time
-
 from rolling_panda.runtime.latest_file import LatestFileWriter
+from tests.support.waiting import until
 
 
 def test_the_newest_is_on_disk_after_closing(tmp_path):
@@ -29,10 +28,3 @@ def test_what_the_disk_refuses_is_written_once_it_takes_it(tmp_path):
     assert (tmp_path / "gone" / "it").read_bytes() == b"stopped"
     until(lambda: keeper.kept and keeper.failure == "")
     keeper.close()
-
-
-def until(condition):
-    end = time.monotonic() + 20.0
-    while not condition():
-        assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.005)

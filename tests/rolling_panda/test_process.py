@@ -1,11 +1,9 @@
 """How a process starts and ends: by signal, with its parent, and with one clear line when it cannot start."""
 
 import signal
-import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +14,7 @@ import controller.__main__ as controller
 import perception.__main__ as perception
 import server.__main__ as server
 from rolling_panda import __version__
-from rolling_panda.config import TransportConfig
 from rolling_panda.runtime.process import ProcessContext, run_process
-from rolling_panda.transport.zenoh import Router
 
 pytestmark = pytest.mark.alone
 
@@ -58,16 +54,6 @@ for _ in range(1000):
     while not stopping.wait(1e-6):
         pass
 """
-
-
-@pytest.fixture(scope="module")
-def endpoint() -> Iterator[str]:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
-    router = Router(TransportConfig(mode="router", connect=(), listen=(endpoint,), plain_wire=True))
-    yield endpoint
-    router.close()
 
 
 class Child:

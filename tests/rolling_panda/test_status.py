@@ -10,19 +10,9 @@ from rolling_panda import messages as m
 from rolling_panda.cli import main as cli
 from rolling_panda.config import TransportConfig
 from rolling_panda.topics import HEARTBEAT
-from rolling_panda.transport.zenoh import Router, Transport
+from rolling_panda.transport.zenoh import Transport
 
 pytestmark = pytest.mark.alone
-
-
-@pytest.fixture(scope="module")
-def endpoint() -> Iterator[str]:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
-    router = Router(TransportConfig(mode="router", connect=(), listen=(endpoint,), plain_wire=True))
-    yield endpoint
-    router.close()
 
 
 @pytest.fixture

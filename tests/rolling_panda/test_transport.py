@@ -2,7 +2,6 @@
 
 import math
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -19,37 +18,17 @@ from rolling_panda.messages import commands as intents
 from rolling_panda.messages.robot import CameraFrame, Intrinsics
 from rolling_panda.topics import CAMERA, HEARTBEAT, INTENT, MOTION, Service, Topic, key
 from rolling_panda.transport.codec import StrictDecoder
-from rolling_panda.transport.zenoh import Feed, ForeignWire, Onlooker, Rejections, Router, Slot, Transport
+from rolling_panda.transport.zenoh import Feed, ForeignWire, Onlooker, Rejections, Slot, Transport
+from tests.support.processes.live_robot import free_port
+from tests.support.waiting import until
 
 pytestmark = pytest.mark.alone
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def free_endpoint() -> str:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
-
-
-def until(condition: Callable[[], bool], limit_s: float = 5.0) -> float:
-    began = time.monotonic()
-    while not condition():
-        assert time.monotonic() - began < limit_s, "waited in vain"
-        time.sleep(0.002)
-    return time.monotonic() - began
-
-
 def motion(sequence: int, speed: float = 0.0) -> m.MotionCommand:
     return m.MotionCommand(epoch=1, sequence=sequence, echo=sequence, xi=(speed,) * 9)
-
-
-@pytest.fixture(scope="module")
-def endpoint() -> Iterator[str]:
-    endpoint = free_endpoint()
-    router = Router(TransportConfig(mode="router", connect=(), listen=(endpoint,), plain_wire=True))
-    yield endpoint
-    router.close()
 
 
 @pytest.fixture
@@ -252,7 +231,7 @@ def test_a_killed_process_is_gone_at_once(endpoint: str, bridge: Transport) -> N
 
 
 def test_without_a_router_one_line_says_so() -> None:
-    config = TransportConfig(connect=(free_endpoint(),), connect_timeout_s=0.3, plain_wire=True)
+    config = TransportConfig(connect=(f"tcp/127.0.0.1:{free_port()}",), connect_timeout_s=0.3, plain_wire=True)
     with pytest.raises(TransportError, match="Is the router running") as error:
         Transport(config, "bridge", "rp1")
     assert "\n" not in str(error.value) and ".rs:" not in str(error.value)

@@ -1,6 +1,5 @@
 """Bridge, controller and server over a real router, all in this process, on a robot that only integrates."""
 
-import socket
 import threading
 from contextlib import ExitStack, contextmanager
 
@@ -20,7 +19,8 @@ from controller.loop import Loop
 from controller.stop_file import open_stop_file
 from rolling_panda.config import RobotConfig, TransportConfig
 from rolling_panda.model.robot import RobotModel
-from rolling_panda.transport.zenoh import Router, Transport
+from rolling_panda.transport.zenoh import Transport
+from tests.support.processes.local_router import local_router
 from tests.support.running_server import running_server
 
 MODEL = RobotModel()
@@ -86,12 +86,8 @@ def running(run, stopping):
 
 @contextmanager
 def live_two(folder):
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
-    router = Router(TransportConfig(mode="router", connect=(), listen=(endpoint,), plain_wire=True))
-    live = LiveTwo(endpoint, folder)
-    try:
+    with local_router() as endpoint:
+        live = LiveTwo(endpoint, folder)
         with live.bridge(), live.transport("server") as wire, running_server(wire) as server:
             live.server = server
             live.start_controller()
@@ -99,5 +95,3 @@ def live_two(folder):
                 yield live
             finally:
                 live.stop_controller()
-    finally:
-        router.close()

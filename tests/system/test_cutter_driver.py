@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import pytest
 
@@ -10,8 +10,8 @@ from bridge.real import ros_messages as ros
 from bridge.real.config import CutterConfig
 from bridge.real.cutter import Cutter
 from rolling_panda.config import TransportConfig
-from rolling_panda.transport.zenoh import ForeignWire, Router
-from tests.support.processes.live_robot import free_port
+from rolling_panda.transport.zenoh import ForeignWire
+from tests.support.waiting import until
 
 pytestmark = pytest.mark.alone
 
@@ -41,14 +41,6 @@ class Secateurs:
         return ros.encode(ros.make(ros.SET_BOOL_REPLY, success=not fault, message=fault))
 
 
-@pytest.fixture(scope="module")
-def endpoint() -> Iterator[str]:
-    endpoint = f"tcp/127.0.0.1:{free_port()}"
-    router = Router(TransportConfig(mode="router", connect=(), listen=(endpoint,), plain_wire=True))
-    yield endpoint
-    router.close()
-
-
 @pytest.fixture
 def device(endpoint: str) -> Iterator[Secateurs]:
     wire = ForeignWire(TransportConfig(connect=(endpoint,), plain_wire=True))
@@ -64,13 +56,6 @@ def cutter(endpoint: str, device: Secateurs) -> Iterator[Cutter]:
     cutter.enable(True)
     yield cutter
     cutter.close()
-
-
-def until(condition: Callable[[], bool], limit_s: float = 5.0) -> None:
-    end = time.monotonic() + limit_s
-    while not condition():
-        assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.005)
 
 
 def test_it_closes_opens_again_and_says_that_the_blades_met(cutter: Cutter, device: Secateurs) -> None:

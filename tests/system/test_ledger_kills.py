@@ -1,7 +1,6 @@
 """The controller is killed at random moments of its work; what it has acknowledged is there when it starts again."""
 
 import random
-import socket
 import subprocess
 import sys
 import time
@@ -16,7 +15,8 @@ from rolling_panda.errors import ServiceError
 from rolling_panda.messages import commands as intents
 from rolling_panda.runtime.launch import child_environment
 from rolling_panda.topics import CONTROLLER, INTENT, POINTS
-from rolling_panda.transport.zenoh import Router, Transport
+from rolling_panda.transport.zenoh import Transport
+from tests.support.processes.local_router import local_router
 
 pytestmark = pytest.mark.alone
 
@@ -143,21 +143,15 @@ def test_no_acknowledged_decision_is_lost(tmp_path, kills):
     for begin in range(0, kills, ROUND):
         folder = tmp_path / str(begin)
         folder.mkdir()
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
         # Each round has its own: what a router keeps for clients that were killed goes with it.
-        router = Router(TransportConfig(mode="router", connect=(), listen=(endpoint,), plain_wire=True))
-        operator = Operator(endpoint)
-        try:
-            for kill in range(begin, min(kills, begin + ROUND)):
-                killed(folder, endpoint, operator, chance)
-                assert verify(folder).problem == ""
-                assert lost(folder, operator) == set(), f"after kill {kill + 1}"
-            assert operator.done
-        finally:
-            operator.wire.close()
-            router.close()
+        with local_router() as endpoint:
+            operator = Operator(endpoint)
+            with operator.wire:
+                for kill in range(begin, min(kills, begin + ROUND)):
+                    killed(folder, endpoint, operator, chance)
+                    assert verify(folder).problem == ""
+                    assert lost(folder, operator) == set(), f"after kill {kill + 1}"
+                assert operator.done
 
 
 def killed(folder, endpoint, operator, chance):

@@ -1,8 +1,7 @@
 """A second controller of one robot, as processes of their own over TLS: it waits, says so, and takes over."""
 
 import subprocess
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -15,6 +14,7 @@ from rolling_panda.topics import BRIDGE, CONTROLLER
 from rolling_panda.transport.certificates import make
 from rolling_panda.transport.zenoh import Onlooker
 from tests.rolling_panda.test_access import free_port
+from tests.support.waiting import until
 
 pytestmark = pytest.mark.alone
 
@@ -65,13 +65,6 @@ class Site:
         newest = self._bridge.peek()
         assert newest is not None
         return sum(row.count for row in newest.message.rejections if row.topic == "command/token")
-
-
-def until(condition: Callable[[], bool], limit_s: float = 60.0) -> None:
-    began = time.monotonic()
-    while not condition():
-        assert time.monotonic() - began < limit_s, "waited in vain"
-        time.sleep(0.005)
 
 
 @pytest.fixture
