@@ -29,7 +29,7 @@ OUTSIDE = {
     "CHANGELOG.md": "changelog.html",
     "SECURITY.md": "security.html",
     "assets/network/vine.md": "network.html",
-    "benchmarks/README.md": "benchmarks.html",
+    "benchmarks/README.md": "benchmarks/index.html",
     "web/icon.svg": "icon.svg",
 }
 #: A file or folder of code, named in a text and not in a link.
@@ -47,7 +47,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         files.remove(file)
         address = file.dest_uri.removeprefix("site/").replace("README.html", "index.html")
         files.append(_document(f"docs/{file.src_uri}", address, config))
-    for name, address in OUTSIDE.items():
+    measured = {name: name.replace(".md", ".html") for name in _texts("benchmarks")}
+    for name, address in (measured | OUTSIDE).items():
         files.append(_document(name, address, config))
     files.append(File.generated(config, "reference/index.md", content="".join(_contents())))
     for package in PACKAGES:
@@ -58,8 +59,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Hides the list of pages beside the one page of a tab. In the search, texts come before the API reference."""
-    if page.parent is None:
+    """Hides the list of pages beside the first one. In the search, texts come before the API reference."""
+    if page.is_homepage:
         page.meta["hide"] = ["navigation"]
     if not page.file.src_uri.startswith("reference/"):
         page.meta["search"] = {"boost": 3}
@@ -97,6 +98,12 @@ def _document(name: str, address: str, config: MkDocsConfig) -> File:
     return File(name, str(ROOT), config.site_dir, use_directory_urls=False, dest_uri=address)
 
 
+def _texts(folder: str) -> list[str]:
+    """The documents of a folder, its README first."""
+    paths = sorted((ROOT / folder).glob("*.md"), key=lambda path: (path.stem != "README", path))
+    return [f"{folder}/{path.name}" for path in paths]
+
+
 def _folders(package: str) -> Iterator[Path]:
     for module in sorted((ROOT / package).rglob("__init__.py")):
         yield module.parent
@@ -112,8 +119,9 @@ def _fill(nav: list[Any]) -> None:
     for entry in nav:
         for title, pages in entry.items():
             if title == "Decisions":
-                numbered = sorted((ROOT / "docs/decisions").glob("0*.md"))
-                pages += ["docs/decisions/README.md", *(f"docs/decisions/{path.name}" for path in numbered)]
+                pages += _texts("docs/decisions")
+            elif title == "Measure":
+                pages += _texts("benchmarks")
             elif title == "API reference":
                 pages += ["reference/index.md"]
                 pages += [{package: [_entry(folder, package) for folder in _folders(package)]} for package in PACKAGES]
