@@ -1,9 +1,24 @@
 """How benchmarks write what they found: JSON that people can read and compare line by line."""
 
+import argparse
 import json
 import os
 import platform
+from pathlib import Path
 from typing import Any
+
+
+def bench_parser(name: str, about: str | None) -> argparse.ArgumentParser:
+    """The arguments of `rolling-panda bench NAME`: --json so far, for `write`."""
+    parser = argparse.ArgumentParser(prog=f"rolling-panda bench {name}", description=about)
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures here")
+    return parser
+
+
+def write(path: Path | None, document: dict[str, Any]) -> None:
+    """Write a document with the machine that its figures are from; without a path, write nothing."""
+    if path is not None:
+        path.write_text(one_row_a_line({"machine": machine(), **document}), encoding="utf-8")
 
 
 def machine() -> str:

@@ -172,7 +172,7 @@ def draw(results: Path, out: Path, names: Sequence[str] = tuple(PICTURES)) -> tu
     return written, missing
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str]) -> int:
     """Draw, and say what was drawn. Returns the exit code."""
     parser = argparse.ArgumentParser(prog="rolling-panda bench plots", description=__doc__)
     parser.add_argument("--results", type=Path, default=Path("benchmarks/results"), metavar="DIR")
@@ -196,7 +196,3 @@ def _read(path: Path) -> dict[str, Any]:
     if not isinstance(document, dict) or not {"results", "samples"} <= document.keys():
         raise InputError(f"{path} is not what `bench reach --json` writes; run it again")
     return document
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -10,20 +10,17 @@ posture inside the limits has at the goal, and no method can end with more. `nul
 baseline that can be compared with directly.
 """
 
-import argparse
-import json
 import os
 import sys
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from multiprocessing import get_context
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.common.documents import machine
+from benchmarks.common.documents import bench_parser, write
 from benchmarks.control.arm_ik import ArmIk
 from benchmarks.control.reach_judge import Quality, judge
 from benchmarks.control.reach_run import BASE, MethodName, Runner
@@ -113,16 +110,15 @@ def summarise(rows: Sequence[Row]) -> dict[str, float | int]:
     }
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str]) -> int:
     """Run, print, and write the figures. Returns the exit code."""
-    parser = argparse.ArgumentParser(prog="rolling-panda bench arm", description=__doc__)
+    parser = bench_parser("arm", __doc__)
     parser.add_argument("--seed", type=int, default=0, help="of the pairs and the planner (default: 0)")
     parser.add_argument("--count", type=int, default=1000, help="pairs (default: 1000)")
     parser.add_argument(
         "--method", choices=("hierarchy", "nullspace"), default="hierarchy", help="(default: hierarchy)"
     )
     parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help="processes (default: all cores)")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write every figure here")
     arguments = parser.parse_args(argv)
     if arguments.count < 1 or arguments.jobs < 1:
         parser.error("--count and --jobs must be at least 1")
@@ -136,9 +132,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     print(", ".join(f"{name} {value}" for name, value in summary.items()))
     for row in [row for row in rows if not row.quality.reached][:10]:
         print(f"  pair {row.pair}: {row.reason or 'ended away from the goal'}")
-    if arguments.json is not None:
-        document = {"machine": machine(), "summary": summary, "results": [asdict(row) for row in rows]}
-        arguments.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    write(arguments.json, {"summary": summary, "results": [asdict(row) for row in rows]})
     return 0
 
 
@@ -172,7 +166,3 @@ def _best(goal: Any) -> float:
     found = ik.solve(np.broadcast_to(flange.rotation, (n, 3, 3)), at_mount, q7)
     inside = np.isfinite(found.omega) & (ik.margin(found.q) > 0.0)
     return float(found.omega[inside].max()) if inside.any() else 0.0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

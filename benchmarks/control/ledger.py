@@ -1,8 +1,6 @@
 """What recording costs the control step: without a disk, with one, and with one whose every flush takes 200 ms."""
 
-import argparse
 import gc
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -11,7 +9,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from benchmarks.common.documents import machine, one_row_a_line
+from benchmarks.common.documents import bench_parser, write
 from benchmarks.control.tick import working
 from benchmarks.control.tick_parts import Times
 from controller.ledger.check import verify
@@ -109,10 +107,9 @@ def measure(kinds: dict[str, Callable[[], LedgerWriter | NoDisk]], steps: int) -
     return durations
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str]) -> int:
     """Measure, print, and write the figures. Returns the exit code."""
-    parser = argparse.ArgumentParser(prog="rolling-panda bench ledger", description=__doc__)
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures here")
+    parser = bench_parser("ledger", __doc__)
     parser.add_argument("--seconds", type=float, default=30.0, help="of work of each kind (default: %(default)s)")
     parser.add_argument(
         "--real-time", action="store_true", help="scheduled before other programs, as the controller is"
@@ -132,15 +129,14 @@ def main(argv: Sequence[str] | None = None) -> int:
                 durations[name] += those
                 if name != "no disk":
                     _check(place / name)
-    figures: dict[str, Any] = {"machine": machine(), "slow_flush_s": _SLOW_S}
+    figures: dict[str, Any] = {"slow_flush_s": _SLOW_S}
     for name, each in durations.items():
         times = Times.of(each)
         figures[name] = {**asdict(times), "steps": len(each)}
         print(
             f"{name:<10} median {times.median_us} us, p99 {times.p99_us} us, max {times.max_us} us, {len(each)} steps"
         )
-    if arguments.json is not None:
-        arguments.json.write_text(one_row_a_line(figures), encoding="utf-8")
+    write(arguments.json, figures)
     return 0
 
 
@@ -158,7 +154,3 @@ def _check(place: Path) -> None:
     verdict = verify(place)
     if verdict.problem or not verdict.rows:
         raise SystemExit(f"bench ledger: the ledger is not whole: {verdict.problem or 'it is empty'}")
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -5,12 +5,9 @@ tool is led to and fro by a held target, as an operator would. Figures come from
 counters and, for the tool, from the simulator's trace.
 """
 
-import argparse
-import json
 import math
 import re
 import statistics
-import sys
 import tempfile
 import time
 from collections.abc import Sequence
@@ -18,7 +15,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from benchmarks.common.documents import machine
+from benchmarks.common.documents import bench_parser, write
 from benchmarks.page.load import cores_between, processor_times
 from rolling_panda.resources import resource
 from tests.support.processes.demo import Demo
@@ -134,15 +131,14 @@ def figures(seen: Watched, rate_hz: float, base_rate_hz: float) -> Figures:
     )
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str]) -> int:
     """Run the benchmark; returns the exit code."""
-    parser = argparse.ArgumentParser(prog="rolling-panda bench live", description=__doc__)
+    parser = bench_parser("live", __doc__)
     parser.add_argument("--seconds", type=float, default=60.0, help="how long to watch (default: 60)")
     parser.add_argument("--rate", type=float, default=1000.0, help="of the arm in Hz, 50 to 1000 (default: 1000)")
     parser.add_argument("--base-rate", type=float, default=50.0, help="of the base in Hz, 50 to --rate (default: 50)")
     parser.add_argument("--seed", type=int, default=0, help="row to grow (default: 0)")
     parser.add_argument("--port", type=int, default=8766, help="port of the page (default: 8766)")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures here")
     arguments = parser.parse_args(argv)
     if not 50.0 <= arguments.rate <= 1000.0:
         parser.error(f"--rate {arguments.rate:g} is outside 50 to 1000")
@@ -161,11 +157,5 @@ def main(argv: Sequence[str] | None = None) -> int:
             demo.close()
     for name, value in asdict(found).items():
         print(f"{name:<22} {value}")
-    if arguments.json is not None:
-        document = {"machine": machine(), **asdict(found)}
-        arguments.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    write(arguments.json, asdict(found))
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

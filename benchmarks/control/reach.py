@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.common.documents import machine, one_row_a_line
+from benchmarks.common.documents import bench_parser, write
 from benchmarks.common.intervals import share
 from benchmarks.control import reach_targets
 from benchmarks.control.arm_ik import ArmIk
@@ -58,14 +58,9 @@ class Row:
     omega: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str]) -> int:
     """Run, print, and write the figures. Returns the exit code."""
-    arguments = _parser().parse_args(argv)
-    try:
-        return _run(arguments)
-    except RollingPandaError as error:
-        print(f"rolling-panda bench reach: {error}", file=sys.stderr)
-        return 1
+    return _run(_parser().parse_args(argv))
 
 
 def run(targets: Sequence[Target], method: MethodName, seed: int, jobs: int, folder: Path | None = None) -> list[Row]:
@@ -117,9 +112,9 @@ def summarise(rows: Sequence[Row]) -> dict[str, Any]:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="rolling-panda bench reach",
-        description="From rest at a configuration to rest with the tool at a pose, within 1 mm, 0.5° and 30 s, on a "
+    parser = bench_parser(
+        "reach",
+        "From rest at a configuration to rest with the tool at a pose, within 1 mm, 0.5° and 30 s, on a "
         "kinematic robot (0.8 m/s and 0.6 rad/s for the base, the arm's full rates). Limits are judged by finite "
         "differences of what was done.",
     )
@@ -130,7 +125,6 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--method", choices=METHODS, default="hierarchy", help="(default: hierarchy)")
     parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help="processes (default: all cores)")
     parser.add_argument("--trajectories", type=Path, metavar="DIR", help="write t, q, xi of each target as npz here")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write every figure here")
     return parser
 
 
@@ -149,16 +143,14 @@ def _run(arguments: argparse.Namespace) -> int:
     rows = run(targets, arguments.method, arguments.seed, arguments.jobs, arguments.trajectories)
     summary = summarise(rows)
     _print(arguments.method, rows, summary, time.perf_counter() - began)
-    if arguments.json is not None:
-        document = {
-            "machine": machine(),
-            "method": arguments.method,
-            "targets": str(arguments.targets or f"drawn: seed {arguments.seed}, free axis {arguments.free_axis}"),
-            "summary": summary,
-            "samples": [{"target": row.target, "t": row.omega[0], "omega": row.omega[1]} for row in rows[:_SAMPLED]],
-            "results": [_flat(row) for row in rows],
-        }
-        arguments.json.write_text(one_row_a_line(document), encoding="utf-8")
+    document = {
+        "method": arguments.method,
+        "targets": str(arguments.targets or f"drawn: seed {arguments.seed}, free axis {arguments.free_axis}"),
+        "summary": summary,
+        "samples": [{"target": row.target, "t": row.omega[0], "omega": row.omega[1]} for row in rows[:_SAMPLED]],
+        "results": [_flat(row) for row in rows],
+    }
+    write(arguments.json, document)
     return 0
 
 
@@ -265,7 +257,3 @@ def _make(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise RollingPandaError(f"cannot write to {folder}: {error.strerror}") from error
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -5,12 +5,9 @@ from each joint state to the command that answers it; a recorder is there for ev
 does meets both alike.
 """
 
-import argparse
-import json
 import math
 import signal
 import subprocess
-import sys
 import tempfile
 import threading
 from collections.abc import Iterator, Sequence
@@ -20,7 +17,7 @@ from typing import Any
 
 import psutil
 
-from benchmarks.common.documents import machine
+from benchmarks.common.documents import bench_parser, one_row_a_line, write
 from benchmarks.control.live import configured, watch
 from rolling_panda import messages as m
 from rolling_panda.config import TransportConfig
@@ -142,15 +139,14 @@ def measure(demo: Demo, pairs: int, stretch_s: float, folder: Path) -> dict[str,
     return {"stretches": pairs, "stretch_s": stretch_s, **summary(*took), **used}
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str]) -> int:
     """Run the benchmark; returns the exit code: 1 where recording costs too much."""
-    parser = argparse.ArgumentParser(prog="rolling-panda bench record", description=__doc__)
+    parser = bench_parser("record", __doc__)
     parser.add_argument("--pairs", type=int, default=10, help="stretches with and without a recorder (default: 10)")
     parser.add_argument("--seconds", type=float, default=6.0, help="of each stretch (default: 6)")
     parser.add_argument("--rate", type=float, default=100.0, help="of arm and joint states in Hz (default: 100)")
     parser.add_argument("--seed", type=int, default=0, help="row to grow (default: 0)")
     parser.add_argument("--port", type=int, default=8767, help="port of the page (default: %(default)s)")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures here")
     arguments = parser.parse_args(argv)
     with tempfile.TemporaryDirectory() as folder:
         config = Path(folder) / "record.toml"
@@ -161,16 +157,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             figures = measure(demo, arguments.pairs, arguments.seconds, Path(folder))
         finally:
             demo.close()
-    document = {
-        "machine": machine(),
-        "rate_hz": arguments.rate,
-        **figures,
-    }
-    print(json.dumps(document, indent=1))
-    if arguments.json is not None:
-        arguments.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    document = {"rate_hz": arguments.rate, **figures}
+    print(one_row_a_line(document))
+    write(arguments.json, document)
     return 0 if figures["within"] else 1
-
-
-if __name__ == "__main__":
-    sys.exit(main())

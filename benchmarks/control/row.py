@@ -3,10 +3,8 @@
 Several methods work on the same accepted points: a seed's row looks the same to each before the first cut.
 """
 
-import argparse
 import math
 import re
-import sys
 import tempfile
 import time
 from collections.abc import Sequence
@@ -17,7 +15,7 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace
 
-from benchmarks.common.documents import machine, one_row_a_line
+from benchmarks.common.documents import bench_parser, write
 from benchmarks.control.cane_touches import Cane, CaneTouches
 from benchmarks.control.cut_truth import true_cut
 from benchmarks.control.row_report import Cut, RowRun, mean_stages, summarise, tell, tell_stages
@@ -202,9 +200,9 @@ def _work(loop: ClosedLoop, todo: list[str]) -> dict[str, float]:
     return durations
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str]) -> int:
     """Run the benchmark; returns the exit code."""
-    parser = argparse.ArgumentParser(prog="rolling-panda bench row", description=__doc__)
+    parser = bench_parser("row", __doc__)
     parser.add_argument("--seed", type=int, default=0, help="first seed (default: 0)")
     parser.add_argument("--count", type=int, default=10, help="rows to work off (default: 10)")
     parser.add_argument("--points", type=int, default=4, help="most points accepted in a row (default: 4)")
@@ -228,7 +226,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--segmenter", default="", choices=SEGMENTERS, help="in place of the configured one")
     parser.add_argument("--stages", action="store_true", help="say where the time of a cut goes")
     parser.add_argument("--no-plan", action="store_true", help="work along the row without the session's plan")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows and the summary here")
     parser.add_argument("--plot", type=Path, metavar="FILE", help="draw the time of a cut by method and stage (PNG)")
     arguments = parser.parse_args(argv)
     methods = arguments.method or list(METHODS)
@@ -262,18 +259,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         from benchmarks.control.row_plot import draw
 
         draw({method: mean_stages([run for run in runs if run.method == method]) for method in methods}, arguments.plot)
-    if arguments.json is not None:
-        document = {
-            "pictures_hz": arguments.pictures,
-            "looks": not arguments.no_looks,
-            "segmenter": arguments.segmenter,
-            "machine": machine(),
-            "summary": summary,
-            "results": [asdict(run) for run in runs],
-        }
-        arguments.json.write_text(one_row_a_line(document), encoding="utf-8")
+    document = {
+        "pictures_hz": arguments.pictures,
+        "looks": not arguments.no_looks,
+        "segmenter": arguments.segmenter,
+        "summary": summary,
+        "results": [asdict(run) for run in runs],
+    }
+    write(arguments.json, document)
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

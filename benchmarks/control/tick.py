@@ -1,15 +1,13 @@
 """Time of one control step while the robot works on accepted points: everything that runs every period."""
 
-import argparse
 import gc
-import sys
 import time
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from benchmarks.common.documents import machine, one_row_a_line
+from benchmarks.common.documents import bench_parser, write
 from benchmarks.control.tick_parts import Recorder, Times, measure_parts, obstacles
 from benchmarks.peers.run import run_peers
 from controller.config import ControllerConfig
@@ -67,10 +65,9 @@ def recorded(steps: int) -> list[IkProblem]:
     return demands[:steps]
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str]) -> int:
     """Measure, print, and write the figures. Returns the exit code."""
-    parser = argparse.ArgumentParser(prog="rolling-panda bench tick", description=__doc__)
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures here")
+    parser = bench_parser("tick", __doc__)
     parser.add_argument("--steps", type=int, default=5000, help="control steps measured (default: %(default)s)")
     parser.add_argument("--peers", action="store_true", help="also Pink, mink, PlaCo and TSID on the same problems")
     parser.add_argument(
@@ -84,7 +81,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         parser.error("--steps must be at least 1")
     durations, demands = measure(arguments.steps)
     whole, parts = Times.of(durations), measure_parts(demands)
-    figures: dict[str, Any] = {**asdict(whole), "steps": len(durations), "machine": machine()}
+    figures: dict[str, Any] = {**asdict(whole), "steps": len(durations)}
     figures["parts"] = {name: asdict(times) for name, times in parts.items()}
     print(
         f"one control step: median {whole.median_us} us, p99 {whole.p99_us} us, max {whole.max_us} us, "
@@ -98,8 +95,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"\n{'peers on the same problems':<30}{'median':>9}{'p99':>9}{'max us':>9}")
         for peer in figures["peers"]:
             print(_line(peer))
-    if arguments.json is not None:
-        arguments.json.write_text(one_row_a_line(figures), encoding="utf-8")
+    write(arguments.json, figures)
     return 0
 
 
@@ -142,7 +138,3 @@ def working(method: Method | None = None) -> KinematicRobot:
     ):
         robot.ask(intent)
     return robot
-
-
-if __name__ == "__main__":
-    sys.exit(main())

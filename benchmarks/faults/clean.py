@@ -4,16 +4,13 @@ Bridge and controller in one process on a plant with servo lag, cut after cut al
 other minute the ways between them have up to 100 ms of jitter. The clock is simulated.
 """
 
-import argparse
-import json
-import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
 
 import msgspec
 import numpy as np
 
+from benchmarks.common.documents import bench_parser, write
 from benchmarks.faults.judge import Rows, replays, violations
 from controller.inputs import Sample
 from controller.interface import Outputs
@@ -127,13 +124,12 @@ def _still(rows: Rows) -> list[bool]:
     return still
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str]) -> int:
     """Work; returns 0 when nothing stopped and no limit was broken."""
-    parser = argparse.ArgumentParser(prog="rolling-panda bench clean", description=__doc__)
+    parser = bench_parser("clean", __doc__)
     parser.add_argument("--seed", type=int, default=0, help="of the jitter (default: 0)")
     parser.add_argument("--seconds", type=float, default=3600.0, help="simulated (default: 3600)")
     parser.add_argument("--jitter", type=float, default=0.1, help="of the ways in every other minute (s; default: 0.1)")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write there what was found")
     arguments = parser.parse_args(argv)
     found = work(EndlessRow(arguments.seed), arguments.seconds, arguments.jitter)
     print(
@@ -142,11 +138,5 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     for at, mode in found.stops:
         print(f"  {at:8.1f} s: {mode}")
-    if arguments.json is not None:
-        document = {"seed": arguments.seed, **asdict(found)}
-        arguments.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    write(arguments.json, {"seed": arguments.seed, **asdict(found)})
     return 0 if not found.stops and not found.replayed and not found.beyond else 1
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -5,18 +5,15 @@ ROS 2 messages over Zenoh against a base that judges every `cmd_vel`. Every ten 
 presses a stop; measured is when base and arm are at rest, and whether the page says why.
 """
 
-import argparse
 import random
-import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.common.documents import machine, one_row_a_line
+from benchmarks.common.documents import bench_parser, one_row_a_line, write
 from benchmarks.faults.real_site import RealSite
 from bridge.core.bridge import actuated
 from bridge.real import mp500
@@ -245,13 +242,12 @@ def summary(found: Found, seconds: float) -> dict[str, Any]:
     }
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str]) -> int:
     """Run the benchmark; returns the exit code: 1 for a breach, a late stop or a reason that was not told."""
-    parser = argparse.ArgumentParser(prog="rolling-panda bench real", description=__doc__)
+    parser = bench_parser("real", __doc__)
     parser.add_argument("--minutes", type=float, default=10.0, help="how long (default: 10)")
     parser.add_argument("--seed", type=int, default=0, help="of the commands (default: 0)")
     parser.add_argument("--address", default="127.0.0.42", help="of the fake arm (default: %(default)s)")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures here")
     arguments = parser.parse_args(argv)
     seconds = 60.0 * arguments.minutes
     with RealSite(arguments.address) as site:
@@ -262,12 +258,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     print(one_row_a_line(figures))
     for line in found.breaches[:10]:
         print(f"breach: {line}")
-    if arguments.json is not None:
-        document = {"machine": machine(), "seed": arguments.seed, **figures}
-        arguments.json.write_text(one_row_a_line(document), encoding="utf-8")
+    write(arguments.json, {"seed": arguments.seed, **figures})
     good = all(row["within"] and row["told"] == row["n"] for row in figures["faults"])
     return 0 if good and not found.breaches else 1
-
-
-if __name__ == "__main__":
-    sys.exit(main())

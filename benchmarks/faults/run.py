@@ -12,7 +12,6 @@ import json
 import math
 import re
 import shutil
-import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
@@ -21,7 +20,7 @@ from pathlib import Path
 
 import msgspec
 
-from benchmarks.common.documents import machine, one_row_a_line
+from benchmarks.common.documents import write
 from benchmarks.faults.cut_faults import CUT_FAULTS, Report, run_cut_faults, table
 from benchmarks.faults.forked_trials import apart
 from benchmarks.faults.judge import Trial, braking_after, judge, last_taken, summary
@@ -116,9 +115,7 @@ def _around_cuts(parser: argparse.ArgumentParser, arguments: argparse.Namespace)
         parser.error(f"--cuts {arguments.cuts} --only {' '.join(arguments.only)!r} is no trial; faults are {names}")
 
     def keep(report: Report) -> None:
-        if file is not None:
-            document = {"seed": arguments.seed, "machine": machine(), **msgspec.to_builtins(report)}
-            file.write_text(one_row_a_line(document), encoding="utf-8")
+        write(file, {"seed": arguments.seed, **msgspec.to_builtins(report)})
 
     before = Report()
     if file is not None and file.exists():
@@ -139,7 +136,7 @@ def loaded() -> str:
     return re.sub(r"^camera_(moving|resting)_hz = .*$", r"camera_\1_hz = 10.0", text, flags=re.MULTILINE)
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str]) -> int:
     """Run trials; returns 0 when every requirement held."""
     parser = argparse.ArgumentParser(prog="rolling-panda bench faults", description=__doc__)
     parser.add_argument("--seed", type=int, default=0, help="of the trials (default: 0)")
@@ -181,17 +178,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     else:
         trials = _between_processes(live, arguments.seed, arguments.live, arguments.pages)
     found = summary(trials)
-    if arguments.json is not None:
-        document = {
-            "seed": arguments.seed,
-            "world": "one process" if arguments.live is None else "real processes",
-            "pages": arguments.pages,
-            "summary": found,
-            "results": [row_of(trial) for trial in trials],
-        }
-        arguments.json.write_text(one_row_a_line(document), encoding="utf-8")
+    document = {
+        "seed": arguments.seed,
+        "world": "one process" if arguments.live is None else "real processes",
+        "pages": arguments.pages,
+        "summary": found,
+        "results": [row_of(trial) for trial in trials],
+    }
+    write(arguments.json, document)
     return 0 if found and all(entry["held"] for entry in found.values()) else 1
-
-
-if __name__ == "__main__":
-    sys.exit(main())

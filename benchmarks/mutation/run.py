@@ -5,7 +5,6 @@ A check that no test misses shows as a mutant that survives. Kill it with a test
 ended; survivors are tried again each time.
 """
 
-import argparse
 import json
 import os
 import subprocess
@@ -16,6 +15,7 @@ from typing import Any
 
 import msgspec
 
+from benchmarks.common.documents import bench_parser, write
 from benchmarks.common.intervals import share
 from benchmarks.mutation.targets import TARGETS, Target
 from rolling_panda.errors import InputError
@@ -178,14 +178,13 @@ def score(name: str, found: Found, known: list[Justified]) -> Score:
 
 def main(argv: list[str]) -> int:
     """Run the command; returns the exit code: 1 where a survivor is not justified."""
-    parser = argparse.ArgumentParser(prog="rolling-panda bench mutation", description=__doc__)
+    parser = bench_parser("mutation", __doc__)
     parser.add_argument("targets", nargs="*", metavar="TARGET", help=f"of {', '.join(TARGETS)} (default: all)")
     parser.add_argument(
         "--sample", type=int, default=0, metavar="N", help="so many mutants of each target (default: all)"
     )
     parser.add_argument("--seed", type=int, default=0, help="which ones (default: %(default)s)")
     parser.add_argument("--workers", type=int, default=1, help="mutants at once; 0 tells what is known")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the scores there")
     arguments = parser.parse_args(argv)
     if unknown := set(arguments.targets) - set(TARGETS):
         raise InputError(f"there is no target {', '.join(sorted(unknown))}; there are {', '.join(TARGETS)}")
@@ -201,7 +200,5 @@ def main(argv: list[str]) -> int:
             f"{row.target}: {row.killed} of {row.tried} tried killed, {row.justified} justified, "
             f"{len(row.unjustified)} neither; there are {row.mutants}"
         )
-    if arguments.json is not None:
-        rows = [row.document(arguments.sample, arguments.seed) for row in scores]
-        arguments.json.write_text(json.dumps({"targets": rows}, indent=1) + "\n", encoding="utf-8")
+    write(arguments.json, {"targets": [row.document(arguments.sample, arguments.seed) for row in scores]})
     return 1 if any(row.unjustified for row in scores) else 0

@@ -5,24 +5,21 @@ has been open for a while. The attackers are a process on the same machine, with
 Who presses goes before them, as a browser does in `bench page`: an operator has a computer of their own.
 """
 
-import argparse
 import http.client
 import json
 import os
 import random
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
 from typing import Any, TypeVar
 from urllib.parse import urlsplit
 
 import httpx
 
-from benchmarks.common.documents import machine
+from benchmarks.common.documents import bench_parser, write
 from benchmarks.page.latencies import Spread, spread
 from rolling_panda.errors import InputError
 from rolling_panda.runtime.launch import child_environment, python_command
@@ -203,20 +200,19 @@ def _until(condition: Callable[[], _T]) -> _T:
     return value
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str]) -> int:
     """Run the benchmark; returns 1 where a stop under attack was not in time."""
-    parser = argparse.ArgumentParser(prog="rolling-panda bench attacks", description=__doc__)
+    parser = bench_parser("attacks", __doc__)
     parser.add_argument("--stops", type=int, default=110, help="presses of the stop under each (default: 110)")
     parser.add_argument("--only", nargs="+", choices=tuple(ATTACKS), default=tuple(ATTACKS), help="these attacks alone")
     parser.add_argument("--seed", type=int, default=0, help="row to grow (default: 0)")
     parser.add_argument("--port", type=int, default=8768, help="port of the page (default: 8768)")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures here")
     arguments = parser.parse_args(argv)
     print("starting the demo", flush=True)
     demo = Demo(arguments.port, arguments.seed)
     with suppress(PermissionError):
         os.setpriority(os.PRIO_PROCESS, 0, _OPERATOR_NICE)
-    document: dict[str, Any] = {"machine": machine(), "stops": arguments.stops, "limit_s": LIMIT_S}
+    document: dict[str, Any] = {"stops": arguments.stops, "limit_s": LIMIT_S}
     held = True
     try:
         viewer = demo.guest("onlooker", "viewer")
@@ -224,8 +220,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             found = under(demo, viewer, name, arguments.stops, arguments.seed)
             document[name] = asdict(found)
             held &= _show(name, found)
-            if arguments.json is not None:
-                arguments.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+            write(arguments.json, document)
     finally:
         demo.close()
     return 0 if held else 1
@@ -244,7 +239,3 @@ def _show(name: str, found: Figures) -> bool:
         flush=True,
     )
     return held
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -6,8 +6,6 @@ followed from the robot to the screen. With `--viewers` the same is done while o
 """
 
 import argparse
-import json
-import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -16,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import psutil
 
-from benchmarks.common.documents import machine
+from benchmarks.common.documents import bench_parser, write
 from benchmarks.page.browser import chromium, put_first
 from benchmarks.page.crowd import looked_at
 from benchmarks.page.hands import Drags, Heap, drag, first_paints, open_page, press_stop, signed_in, watch_screen
@@ -158,9 +156,9 @@ def show(name: str, value: Any) -> None:
         print(f"{name:<32} {value}")
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str]) -> int:
     """Run the benchmark; returns the exit code."""
-    parser = argparse.ArgumentParser(prog="rolling-panda bench page", description=__doc__)
+    parser = bench_parser("page", __doc__)
     parser.add_argument(
         "--drags", type=int, default=100, help="movements of the gizmo in each situation (default: 100)"
     )
@@ -176,7 +174,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--scale", type=float, default=0.25, help="pixels drawn of each of the page's (default: 0.25)")
     parser.add_argument("--seed", type=int, default=0, help="row to grow (default: 0)")
     parser.add_argument("--port", type=int, default=8767, help="port of the page (default: 8767)")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures here")
     arguments = parser.parse_args(argv)
     with tempfile.TemporaryDirectory() as folder:
         record = Path(folder) / "trace"
@@ -187,16 +184,5 @@ def main(argv: Sequence[str] | None = None) -> int:
         finally:
             demo.close()
     show("", found)
-    if arguments.json is not None:
-        document = {
-            "machine": machine(),
-            "viewport": [1280, 800],
-            "scale": arguments.scale,
-            **found,
-        }
-        arguments.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    write(arguments.json, {"viewport": [1280, 800], "scale": arguments.scale, **found})
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -4,21 +4,17 @@ The demo runs as a person would start it. Processor time is that of its whole pr
 set size, which counts shared pages once.
 """
 
-import argparse
 import base64
-import json
 import os
 import shutil
-import sys
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 import psutil
 
-from benchmarks.common.documents import machine
+from benchmarks.common.documents import bench_parser, write
 from tests.support.chromium import FLAGS
 from tests.support.processes.demo import Demo
 
@@ -120,14 +116,13 @@ def _name(process: psutil.Process) -> str:
     return "camera"
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str]) -> int:
     """Run the benchmark; returns the exit code."""
-    parser = argparse.ArgumentParser(prog="rolling-panda bench load", description=__doc__)
+    parser = bench_parser("load", __doc__)
     parser.add_argument("--seconds", type=float, default=20.0, help="how long each situation lasts (default: 20)")
     parser.add_argument("--seed", type=int, default=0, help="row to grow (default: 0)")
     parser.add_argument("--robots", type=int, default=1, help="so many robots at once (default: 1)")
     parser.add_argument("--port", type=int, default=8765, help="port of the page (default: 8765)")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures here")
     arguments = parser.parse_args(argv)
     print("starting the demo", flush=True)
     demo = Demo(arguments.port, arguments.seed, None, "--robots", str(arguments.robots))
@@ -151,18 +146,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     finally:
         demo.close()
     _show(idle, moving, page, factor, still_working)
-    if arguments.json is not None:
-        document = {
-            "machine": machine(),
-            "seconds": arguments.seconds,
-            "robots": arguments.robots,
-            "idle": asdict(idle),
-            "moving": asdict(moving),
-            "page": asdict(page) if page is not None else None,
-            "real_time_factor": round(factor, 3),
-            "still_working": still_working,
-        }
-        arguments.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    document = {
+        "seconds": arguments.seconds,
+        "robots": arguments.robots,
+        "idle": asdict(idle),
+        "moving": asdict(moving),
+        "page": asdict(page) if page is not None else None,
+        "real_time_factor": round(factor, 3),
+        "still_working": still_working,
+    }
+    write(arguments.json, document)
     return 0
 
 
@@ -178,7 +171,3 @@ def _show(idle: Cost, moving: Cost, page: PageCost | None, factor: float, still_
             f"one idle page: {page.bytes_per_s:.0f} bytes/s, {page.browser_cores:.2f} cores of a browser that draws in "
             f"software, {page.demo_cores:+.2f} cores of the demo"
         )
-
-
-if __name__ == "__main__":
-    sys.exit(main())

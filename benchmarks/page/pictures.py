@@ -142,7 +142,7 @@ def played(browser: Any, album: Album, only: Sequence[str]) -> None:
             album.take(page, called, part)
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str]) -> int:
     """Take the pictures; returns the exit code."""
     parser = argparse.ArgumentParser(prog="rolling-panda bench pictures", description=__doc__)
     parser.add_argument("--out", type=Path, default=ROOT / "docs/images/page", help="folder (default: %(default)s)")
@@ -169,7 +169,3 @@ def main(argv: Sequence[str] | None = None) -> int:
             played(browser, album, arguments.only)
             browser.close()
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -7,9 +7,6 @@ standing in turn, on a survey and at work whenever the camera comes to the same 
 places that were recorded in a closed loop (`--record`), again and again.
 """
 
-import argparse
-import json
-import sys
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
@@ -20,7 +17,7 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from benchmarks.common.documents import machine
+from benchmarks.common.documents import bench_parser, write
 from benchmarks.common.intervals import quantile
 from benchmarks.perception.obstacle_judge import KINDS, ObstacleJudge, Verdict
 from bridge.sim.camera.config import CameraConfig
@@ -34,7 +31,6 @@ from perception.obstacles.obstacle_map import ObstacleMap
 from perception.segmentation.frame import View, decode_frame
 from perception.segmentation.segmenter import SEGMENTERS, Segmenter, choose_segmenter
 from rolling_panda import messages as m
-from rolling_panda.errors import RollingPandaError
 from rolling_panda.model.robot import RobotModel
 
 CONDITIONS = ("standing", "survey", "work")
@@ -197,9 +193,9 @@ def summarise(outcomes: Sequence[Outcome]) -> dict[str, float | int | None]:
     }
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str]) -> int:
     """Run the benchmark; returns the exit code."""
-    parser = argparse.ArgumentParser(prog="rolling-panda bench obstacles", description=__doc__)
+    parser = bench_parser("obstacles", __doc__)
     parser.add_argument("--seeds", type=int, nargs="+", default=list(SEEDS), help="rows (default: %(default)s)")
     parser.add_argument(
         "--condition", action="append", choices=CONDITIONS, help="may be given several times (default: all of them)"
@@ -212,7 +208,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         help="rendered at most for a row in a condition, half as many standing (default: %(default)s)",
     )
     parser.add_argument("--segmenter", choices=SEGMENTERS, default="network", help="what tells classes")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write summary and results here")
     parser.add_argument("--record", type=int, metavar="SEED", help="record places of work in this row, and end")
     words = parser.parse_args(argv)
     if words.minutes <= 0.0 or words.pictures < 2 or any(seed < 0 for seed in words.seeds):
@@ -222,11 +217,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
         print(record(words.record, _TRACK))
         return 0
-    try:
-        segmenter = choose_segmenter(words.segmenter)
-    except RollingPandaError as error:
-        print(f"rolling-panda bench obstacles: {error}", file=sys.stderr)
-        return 1
+    segmenter = choose_segmenter(words.segmenter)
     model, outcomes, begin = RobotModel(), [], time.monotonic()
     conditions = words.condition or CONDITIONS
     for number, seed in enumerate(words.seeds):
@@ -235,9 +226,15 @@ def main(argv: Sequence[str] | None = None) -> int:
             outcome = run(condition, number, seed, 60.0 * words.minutes, pictures, segmenter, model)
             outcomes.append(outcome)
             print(_line(outcome, time.monotonic() - begin), flush=True)
-        if words.json is not None:
-            # After each row, so that a run which is broken off has told what it had.
-            _write(words, outcomes, conditions)
+        # After each row, so that a run which is broken off has told what it had.
+        document = {
+            "minutes": words.minutes,
+            "pictures": words.pictures,
+            "segmenter": words.segmenter,
+            "summary": _summary(outcomes, conditions),
+            "results": [asdict(outcome) for outcome in outcomes],
+        }
+        write(words.json, document)
     summary = _summary(outcomes, conditions)
     print()
     print(f"{'':<26}" + "".join(f"{name:>12}" for name in conditions))
@@ -248,18 +245,6 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _summary(outcomes: Sequence[Outcome], conditions: Sequence[str]) -> dict[str, dict[str, float | int | None]]:
     return {name: summarise([each for each in outcomes if each.condition == name]) for name in conditions}
-
-
-def _write(words: argparse.Namespace, outcomes: Sequence[Outcome], conditions: Sequence[str]) -> None:
-    document = {
-        "machine": machine(),
-        "minutes": words.minutes,
-        "pictures": words.pictures,
-        "segmenter": words.segmenter,
-        "summary": _summary(outcomes, conditions),
-        "results": [asdict(outcome) for outcome in outcomes],
-    }
-    words.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
 
 
 def _short(value: float | int | None) -> str:
@@ -275,7 +260,3 @@ def _line(outcome: Outcome, seconds: float) -> str:
         f"{seconds:6.0f} s  seed {outcome.seed}, {outcome.condition}: {outcome.frames} frames of {outcome.pictures} "
         f"pictures; angle {angle}°, thickness ×{thick}, p95 {p95} m, left out {outcome.left_out}"
     )
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -6,9 +6,7 @@ apart.
 """
 
 import argparse
-import json
 import resource
-import sys
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
@@ -19,7 +17,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.common.documents import machine
+from benchmarks.common.documents import bench_parser, write
 from benchmarks.common.intervals import Figure, quantile, share
 from benchmarks.perception.confusion import Confusion, no_counts, shares
 from benchmarks.perception.gallery import save_failure
@@ -37,7 +35,6 @@ from perception.pipeline import Perception
 from perception.segmentation.frame import decode_frame
 from perception.segmentation.segmenter import SEGMENTERS, choose_segmenter
 from rolling_panda import messages as m
-from rolling_panda.errors import RollingPandaError
 from rolling_panda.model.robot import RobotModel
 
 #: Vines of a row, and the way between two frames (m): the survey drives at 0.15 m/s, and the camera takes two a second.
@@ -178,9 +175,9 @@ def _by_kind(spurs: list[dict[str, int | bool | str]]) -> dict[str, Figure]:
     return {f"right_of_all_{kind.replace(' ', '_')}s": share(sum(right), len(right)) for kind, right in own.items()}
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str]) -> int:
     """Run the benchmark; returns the exit code."""
-    parser = argparse.ArgumentParser(prog="rolling-panda bench perception", description=__doc__)
+    parser = bench_parser("perception", __doc__)
     parser.add_argument("--seed", type=int, default=100, help="of the first row (default: %(default)s)")
     parser.add_argument("--vines", type=int, default=12, help="vines to survey (default: %(default)s)")
     parser.add_argument(
@@ -203,7 +200,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         help="survey one row of so many vines instead, and tell what each vine's frames cost",
     )
     parser.add_argument("--gallery", type=Path, metavar="DIR", help="put pictures of wrong points here")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write summary and results here")
     words = parser.parse_args(argv)
     if words.seed < 0 or words.vines < 1:
         parser.error(f"--seed {words.seed} --vines {words.vines}: give a seed of 0 or more and at least one vine")
@@ -213,67 +209,56 @@ def main(argv: Sequence[str] | None = None) -> int:
     if words.growth:
         return _growth(words)
     looks = Looks() if words.looks == "two" else None
-    try:
-        for number, done in enumerate(range(0, words.vines, ROW_VINES)):
-            segmenter = Confusion(choose_segmenter(words.segmenter, words.weights), survey.confusion)
-            rule = RuleConfig(system=words.training_system)
-            perception = Perception(PerceptionConfig(fuse=words.fuse, rule=rule), segmenter, model)
-            seed, vines = words.seed + number, min(ROW_VINES, words.vines - done)
-            before = len(survey.points)
-            survey_row(seed, vines, perception, model, CameraConfig(), survey, words.gallery, looks, words.step)
-            new = survey.points[before:]
-            print(f"seed {seed}: {vines} vines, {len(new)} points, {sum(p.right for p in new)} right", flush=True)
-    except RollingPandaError as error:
-        print(f"rolling-panda bench perception: {error}", file=sys.stderr)
-        return 1
+    for number, done in enumerate(range(0, words.vines, ROW_VINES)):
+        segmenter = Confusion(choose_segmenter(words.segmenter, words.weights), survey.confusion)
+        rule = RuleConfig(system=words.training_system)
+        perception = Perception(PerceptionConfig(fuse=words.fuse, rule=rule), segmenter, model)
+        seed, vines = words.seed + number, min(ROW_VINES, words.vines - done)
+        before = len(survey.points)
+        survey_row(seed, vines, perception, model, CameraConfig(), survey, words.gallery, looks, words.step)
+        new = survey.points[before:]
+        print(f"seed {seed}: {vines} vines, {len(new)} points, {sum(p.right for p in new)} right", flush=True)
     summary = summarise(survey) | ({} if looks is None else summarise_looks(looks))
     for name, figure in summary.items():
         print(_line(name, figure))
     for need in get_args(m.Need):
         print(f"{f'open for {need}':24} {sum(each.needs == need for each in survey.undecided_sites):8}")
-    if words.json is not None:
-        document = {
-            "machine": machine(),
-            "seed": words.seed,
-            "vines": words.vines,
-            "segmenter": words.segmenter,
-            "step_m": words.step,
-            "fuse": words.fuse,
-            "training_system": words.training_system,
-            "looks": words.looks,
-            "voided": [] if looks is None else [*looks.right_voided, *looks.wrong_voided],
-            "summary": {name: asdict(figure) for name, figure in summary.items()},
-            "by_visibility": {
-                kind: {name: asdict(figure) for name, figure in summarise(survey, kind).items()}
-                for kind in ("clear", "partly", "hidden")
-            },
-            "memory_mib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024,
-            "confusion": shares(survey.confusion),
-            "results": [asdict(point) for point in survey.points],
-            "spurs": survey.spurs,
-            "open": {need: sum(a.needs == need for a in survey.undecided_sites) for need in get_args(m.Need)},
-            "undecided": [msgspec.to_builtins(each) for each in survey.undecided_sites],
-        }
-        words.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    document = {
+        "seed": words.seed,
+        "vines": words.vines,
+        "segmenter": words.segmenter,
+        "step_m": words.step,
+        "fuse": words.fuse,
+        "training_system": words.training_system,
+        "looks": words.looks,
+        "voided": [] if looks is None else [*looks.right_voided, *looks.wrong_voided],
+        "summary": {name: asdict(figure) for name, figure in summary.items()},
+        "by_visibility": {
+            kind: {name: asdict(figure) for name, figure in summarise(survey, kind).items()}
+            for kind in ("clear", "partly", "hidden")
+        },
+        "memory_mib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024,
+        "confusion": shares(survey.confusion),
+        "results": [asdict(point) for point in survey.points],
+        "spurs": survey.spurs,
+        "open": {need: sum(a.needs == need for a in survey.undecided_sites) for need in get_args(m.Need)},
+        "undecided": [msgspec.to_builtins(each) for each in survey.undecided_sites],
+    }
+    write(words.json, document)
     return 0
 
 
 def _growth(words: argparse.Namespace) -> int:
-    try:
-        perception = Perception(PerceptionConfig(fuse=words.fuse), choose_segmenter(words.segmenter, words.weights))
-    except RollingPandaError as error:
-        print(f"rolling-panda bench perception: {error}", file=sys.stderr)
-        return 1
+    perception = Perception(PerceptionConfig(fuse=words.fuse), choose_segmenter(words.segmenter, words.weights))
     stretches = grow_long(words.seed, words.vines, words.step, perception, RobotModel())
     print(table(stretches))
-    if words.json is not None:
-        document = {"machine": machine(), "seed": words.seed}
-        document |= {
-            "segmenter": words.segmenter,
-            "step_m": words.step,
-            "stretches": [asdict(stretch) for stretch in stretches],
-        }
-        words.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    document = {
+        "seed": words.seed,
+        "segmenter": words.segmenter,
+        "step_m": words.step,
+        "stretches": [asdict(stretch) for stretch in stretches],
+    }
+    write(words.json, document)
     return 0
 
 
@@ -281,7 +266,3 @@ def _line(name: str, figure: Figure) -> str:
     if figure.value is None:
         return f"{name:24} –"
     return f"{name:24} {figure.value:8.4f}   95 % {figure.low:.4f} … {figure.high:.4f}   n {figure.n}"
-
-
-if __name__ == "__main__":
-    sys.exit(main())

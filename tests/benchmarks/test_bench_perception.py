@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from benchmarks.__main__ import main as bench
 from benchmarks.perception.judge import RowJudge
 from benchmarks.perception.points import evaluate
 from benchmarks.perception.survey import STEP, Survey, main, summarise
@@ -135,7 +136,7 @@ def test_the_command_writes_what_it_measured(tmp_path, capsys):
     assert all({"value", "low", "high", "n"} == set(figure) for figure in document["summary"].values())
     assert len(document["results"]) >= 6 and document["summary"]["right_cane"]["value"] >= 0.8
     assert document["summary"]["along_error_median_m"]["value"] < 0.005
-    assert main(["--weights", str(tmp_path / "none.onnx")]) == 1
+    assert bench(["perception", "--weights", str(tmp_path / "none.onnx")]) == 1
     assert "cannot load" in capsys.readouterr().err
 
 

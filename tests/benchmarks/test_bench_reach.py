@@ -3,6 +3,7 @@ import json
 import numpy as np
 import pytest
 
+from benchmarks.__main__ import main
 from benchmarks.control import reach, reach_targets
 from benchmarks.control.arm_ik import ArmIk
 from benchmarks.control.reach_judge import BaseBounds, Trajectory, judge, rolling, violations
@@ -46,7 +47,7 @@ def test_a_file_is_read_as_it_says(tmp_path):
 def test_a_wrong_file_gets_one_clear_line(tmp_path, capsys, change, words):
     path = tmp_path / "targets.json"
     path.write_text(json.dumps({"targets": [GOOD | change]}))
-    assert reach.main(["--targets", str(path)]) == 1
+    assert main(["reach", "--targets", str(path)]) == 1
     error = capsys.readouterr().err
     assert words in error and error.count("\n") == 1 and "Traceback" not in error
     with pytest.raises(InputError):
