@@ -11,8 +11,8 @@ import msgspec
 
 from controller.core import Controller
 from controller.ledger.journal import LedgerState
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
-from rolling_panda.messages import commands as intents
 
 #: How long an operator's question waits for its answer (s); less than the service's timeout.
 _ANSWER_S = 0.8

@@ -12,13 +12,13 @@ from controller.interface import Outputs, StepInputs
 from controller.ledger.journal import ApproachRow, EventLogger, Journal, OrderRow, PreviewRow, RequestRow, TicketRow
 from controller.motion.follower import Tracking
 from controller.planning.plan_manager import PlanManager
-from controller.planning.preview import ABOUT_PREVIEWS, PreviewManager
+from controller.planning.preview import PreviewManager
 from controller.planning.preview_plan import PreviewRequest
 from controller.planning.work_plan import PlanRequest
 from controller.report import controller_state
-from controller.supervision.authority import ABOUT_CONTROL, client_of
+from controller.supervision.authority import client_of
 from controller.supervision.modes import Event
-from controller.supervision.permission import EVENTS, Situation, allowed, refusal
+from controller.supervision.permission import Situation, allowed, refusal
 from controller.supervision.stale_messages import StaleMessageFilter
 from controller.supervision.supervisor import Supervisor
 from controller.whole_body.task import Method
@@ -26,11 +26,13 @@ from controller.work.movement import MotionResult, Movement
 from controller.work.next_cut import Found
 from controller.work.point_queue import PointQueue, Ticket
 from controller.work.queue_requests import QueueRequests
+from controller.work.survey import open_place
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.bounds import wider
+from rolling_panda.commands import COMMAND_OF, Handlers
 from rolling_panda.config import RobotConfig
 from rolling_panda.errors import ControlError
-from rolling_panda.messages import commands as intents
 from rolling_panda.messages.perception import CloseUpRequest
 from rolling_panda.messages.supervision import StopRecord
 
@@ -73,7 +75,7 @@ class Controller:
             config, robot_config, self._queue, self._event_log, run_id, self._known, method, permit
         )
         self._supervisor = Supervisor(config, self._movement, self._event_log)
-        self._queue_requests = QueueRequests(self._queue)
+        self._handlers = self._all_handlers()
         self._inputs, self._stale_filter = StepInputs(), StaleMessageFilter()
         self._points_seen: object = None
         self._state_due = self._stops_due = -math.inf
@@ -178,20 +180,38 @@ class Controller:
         """
         self._event_log.now = now
         self._supervisor.authority.saw(intent, now)
-        if isinstance(intent, ABOUT_CONTROL):
-            refused = self._supervisor.authority.ask(intent, now)
-        else:
-            refused = refusal(intent, now, self._situation(now, intent)) or self._do(intent, now)
-        what = type(intent).__name__
-        if isinstance(intent, intents.AnyIntent):
-            row = RequestRow(asked=intent, ok=not refused, reason=refused[:500], mode=self.mode)
-            self._journal.add("request", intent.user, row)
+        command = COMMAND_OF.get(type(intent))
+        if command is None:
+            return m.Answer(ok=False, reason=f"{type(intent).__name__} is not something this controller does")
+        refused = refusal(command, now, self._situation(now, intent)) or self._handlers[command.message](intent, now)
+        row = RequestRow(asked=intent, ok=not refused, reason=refused[:500], mode=self.mode)
+        self._journal.add("request", intent.user, row)
         if refused:
-            self._event_log.say("warning", f"{intent.user}: {what} refused: {refused}")
+            self._event_log.say("warning", f"{intent.user}: {command.name} refused: {refused}")
             return m.Answer(ok=False, reason=refused[:500])
-        if told := self._queue_requests.told(intent):
-            self._event_log.say("info", f"{intent.user}: {told}")
+        if text := command.text(intent):
+            self._event_log.say("info", f"{intent.user}: {text}")
         return m.Answer(ok=True)
+
+    def _all_handlers(self) -> Handlers:
+        """The handler of each command of the table."""
+        decisions = QueueRequests(self._queue, self._event_log).handlers()
+        turn = decisions[intents.SetApproach]
+        return {
+            **self._supervisor.authority.handlers(),
+            **decisions,
+            **self._previews.handlers(),
+            intents.SetApproach: lambda asked, now: self._being_worked_on(asked.point_id) or turn(asked, now),
+            intents.Arm: self._change_mode,
+            intents.Resume: self._change_mode,
+            intents.Acknowledge: self._change_mode,
+            intents.Start: self._start,
+            intents.Survey: self._start,
+            intents.LookAgain: self._look_again,
+            intents.Pause: self._pause,
+            intents.Home: self._home,
+            intents.Reset: lambda asked, now: self._supervisor.stops.ask_release(asked, self._supervisor.bridge, now),
+        }
 
     def _take(self, inputs: StepInputs, now: float) -> None:
         self._inputs = inputs
@@ -245,37 +265,46 @@ class Controller:
         refused = self._previews.start_refused()
         return self._supervisor.situation(self._queue.waits, refused, now, intent)
 
-    def _do(self, intent: intents.Intent, now: float) -> str:
-        """Handle a permitted intent. Returns why its content is refused; empty when done."""
-        supervisor, movement = self._supervisor, self._movement
-        if isinstance(intent, intents.Reset):
-            return supervisor.stops.ask_release(intent, supervisor.bridge, now)
-        if isinstance(intent, intents.Pause) and movement.homing:
-            movement.stay()
-            supervisor.remark(f"homing was stopped by {intent.user}")
-            self._event_log.say("info", supervisor.state.reason)
+    def _change_mode(self, asked: intents.Intent, now: float) -> str:
+        """Put the command's event to the mode machine; whoever moves a robot that nobody holds gets control."""
+        command, authority = COMMAND_OF[type(asked)], self._supervisor.authority
+        client = client_of(asked)
+        if command.control:
+            authority.claim(client, now)
+        if command.event is None:
             return ""
-        if isinstance(intent, intents.Survey) and (unknown := self._queue_requests.unknown_place(intent)):
-            return unknown
-        client, event = client_of(intent), EVENTS.get(type(intent))
-        if isinstance(intent, intents.OF_HOLDER):
-            supervisor.authority.claim(client, now)
-        if event is not None:
-            rights = supervisor.authority.rights(client, intent.role)
-            refused = supervisor.event(event, now, f"{type(intent).__name__.lower()} by {intent.user}", rights)
-            if isinstance(intent, intents.Start) and not refused:
-                self._previews.start()
-                movement.sequence.start(intent if isinstance(intent, intents.Survey) else None)
-            return refused
-        if isinstance(intent, intents.Home):
-            movement.go_home()
-            supervisor.remark("homing the arm")
-            return ""
-        if isinstance(intent, intents.SetApproach) and intent.point_id == movement.sequence.active:
-            return f"{intent.point_id} is being worked on: pause first"
-        if isinstance(intent, ABOUT_PREVIEWS):
-            return self._previews.do(intent, now)
-        return self._queue_requests.points(intent)
+        reason = f"{command.name.lower()} by {asked.user}"
+        return self._supervisor.event(command.event, now, reason, authority.rights(client, asked.role))
+
+    def _start(self, asked: intents.Start, now: float) -> str:
+        refused = self._change_mode(asked, now)
+        if not refused:
+            self._previews.start()
+            survey = asked if isinstance(asked, intents.Survey | intents.LookAgain) else None
+            self._movement.sequence.start(survey)
+        return refused
+
+    def _look_again(self, asked: intents.LookAgain, now: float) -> str:
+        if open_place(self._queue.perceived, asked.vine, asked.spur) is None:
+            return f"nothing is left open at vine {asked.vine}, spur {asked.spur}"
+        return self._start(asked, now)
+
+    def _pause(self, asked: intents.Pause, now: float) -> str:
+        if not self._movement.homing:
+            return self._change_mode(asked, now)
+        self._movement.stay()
+        self._supervisor.remark(f"homing was stopped by {asked.user}")
+        self._event_log.say("info", self._supervisor.state.reason)
+        return ""
+
+    def _home(self, asked: intents.Home, now: float) -> str:
+        self._change_mode(asked, now)
+        self._movement.go_home()
+        self._supervisor.remark("homing the arm")
+        return ""
+
+    def _being_worked_on(self, point_id: str) -> str:
+        return f"{point_id} is being worked on: pause first" if point_id == self._movement.sequence.active else ""
 
     def _review(self, now: float) -> PlanRequest | None:
         """Update the session's plan; returns the next request to the planner."""

@@ -13,8 +13,8 @@ from perception.config import PerceptionConfig
 from perception.pipeline import Perception
 from rolling_panda import messages as m
 from rolling_panda import topics
+from rolling_panda.commands import PlantRequest
 from rolling_panda.errors import RollingPandaError
-from rolling_panda.messages.commands import PlantRequest
 from rolling_panda.messages.perception import CloseUpResult, Obstacles, PointCrop
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.transport.zenoh import Received, Transport

@@ -26,8 +26,7 @@ from perception.tracking.crop_cache import CropCache
 from perception.tracking.retained_canes import RetainedCanes
 from perception.tracking.tracker import Proposal, Tracker, TrackerUpdate
 from rolling_panda import messages as m
-from rolling_panda.errors import InputError
-from rolling_panda.messages.commands import (
+from rolling_panda.commands import (
     AddPoint,
     AddPointInImage,
     EvaluateRule,
@@ -36,6 +35,7 @@ from rolling_panda.messages.commands import (
     SetRule,
     UndoRule,
 )
+from rolling_panda.errors import InputError
 from rolling_panda.messages.perception import Capsule, CloseUpResult, PointCrop
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.model.robot import RobotModel

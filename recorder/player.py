@@ -7,8 +7,8 @@ from typing import Any
 from recorder.recording import RecordedMessage, Recording
 from rolling_panda import messages as m
 from rolling_panda import topics
+from rolling_panda.commands import SeekReplay
 from rolling_panda.messages import supervision as control_messages
-from rolling_panda.messages.commands import SeekReplay
 from rolling_panda.messages.supervision import ReplayState
 from rolling_panda.topics import Topic
 

@@ -19,9 +19,9 @@ from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.cli.child_processes import ChildProcesses
 from rolling_panda.cli.demo import choose_router_port, write_secret
+from rolling_panda.commands import SeekReplay
 from rolling_panda.config import TransportConfig
 from rolling_panda.errors import InputError, RollingPandaError
-from rolling_panda.messages.commands import SeekReplay
 from rolling_panda.runtime.launch import python_command
 from rolling_panda.runtime.process import ROBOT_ID, stop_on_signals
 from rolling_panda.topics import TOPICS

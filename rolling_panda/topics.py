@@ -8,20 +8,9 @@ from typing import Any, Generic, Literal, TypeVar
 
 from msgspec import Struct
 
+from rolling_panda import commands
 from rolling_panda import messages as m
-from rolling_panda.messages import commands as commands_messages
-from rolling_panda.messages import commands as intents
-from rolling_panda.messages import commands as plant_requests
-from rolling_panda.messages import perception as close_up_messages
-from rolling_panda.messages import perception as crop_messages
-from rolling_panda.messages import perception as row_messages
-from rolling_panda.messages import robot as camera_messages
-from rolling_panda.messages import supervision as control_messages
-from rolling_panda.messages import supervision as plan_messages
-from rolling_panda.messages import supervision as preview_messages
-from rolling_panda.messages import supervision as report_messages
-from rolling_panda.messages import supervision as supervision_messages
-from rolling_panda.messages import supervision as teleop_messages
+from rolling_panda.messages import perception, robot, supervision
 
 #: The default robot id.
 ROBOT_ID = "rp1"
@@ -102,7 +91,7 @@ CUT = Topic(
     "close the blades once; repeated until the bridge reports it", express=True,
 )
 CLOSE_UP_REQUEST = Topic(
-    "command/close-up", close_up_messages.CloseUpRequest, "controller", "bridge", 0, "REAL_TIME", "DROP",
+    "command/close-up", perception.CloseUpRequest, "controller", "bridge", 0, "REAL_TIME", "DROP",
     "take a close-up of a point now; repeated until it was taken", express=True,
 )
 STOP = Topic(
@@ -110,7 +99,7 @@ STOP = Topic(
     "software stop; sent several times", express=True,
 )
 TELEOP = Topic(
-    "operator/teleop", teleop_messages.TeleopTarget, "server", "controller", 30, "REAL_TIME", "DROP",
+    "operator/teleop", supervision.TeleopTarget, "server", "controller", 30, "REAL_TIME", "DROP",
     "target of motion by hand while the operator holds", express=True,
 )
 JOINTS = Topic(
@@ -130,35 +119,35 @@ CONTROLLER = Topic(
     "mode, queue, tracking error",
 )
 PRESENCE = Topic(
-    "operator/presence", control_messages.Presence, "server", "controller", 5, "REAL_TIME", "DROP",
+    "operator/presence", supervision.Presence, "server", "controller", 5, "REAL_TIME", "DROP",
     "people whose page or script is heard; renews the lease", express=True,
 )
 CONTROL = Topic(
-    "state/control", control_messages.ControlState, "controller", "server", 20, "INTERACTIVE_HIGH", "DROP",
+    "state/control", supervision.ControlState, "controller", "server", 20, "INTERACTIVE_HIGH", "DROP",
     "holder of control of the robot's motion",
 )
 STOPS = Topic(
-    "state/stops", control_messages.StopState, "bridge, controller", "server", 2, "INTERACTIVE_HIGH", "DROP",
+    "state/stops", supervision.StopState, "bridge, controller", "server", 2, "INTERACTIVE_HIGH", "DROP",
     "stops latched by bridge and controller; also at once on change", latched=True,
 )
 HARDWARE_STOP = Topic(
-    "simulation/hardware-stop", control_messages.HardwareStop, "any", "bridge, devices", 0, "INTERACTIVE_HIGH", "BLOCK",
+    "simulation/hardware-stop", supervision.HardwareStop, "any", "bridge, devices", 0, "INTERACTIVE_HIGH", "BLOCK",
     "emergency stop button of the simulated robot",
 )
 PLAN = Topic(
-    "controller/plan", plan_messages.SessionPlan, "controller", "server", 0.2, "DATA_LOW", "DROP",
+    "controller/plan", supervision.SessionPlan, "controller", "server", 0.2, "DATA_LOW", "DROP",
     "plan of the work; also at once on change", latched=True,
 )
 PREVIEW = Topic(
-    "controller/preview", preview_messages.PreviewState, "controller", "server", 2, "DATA_LOW", "DROP",
+    "controller/preview", supervision.PreviewState, "controller", "server", 2, "DATA_LOW", "DROP",
     "state and approval of the preview; also at once on change", latched=True,
 )
 PREVIEW_MOTION = Topic(
-    "controller/preview-motion", preview_messages.PreviewMotion, "controller", "server", 0.2, "DATA_LOW", "DROP",
+    "controller/preview-motion", supervision.PreviewMotion, "controller", "server", 0.2, "DATA_LOW", "DROP",
     "motion of the preview; also at once on change", latched=True,
 )
 REPORT = Topic(
-    "controller/report", report_messages.SessionReport, "controller", "server", 0.2, "BACKGROUND", "DROP",
+    "controller/report", supervision.SessionReport, "controller", "server", 0.2, "BACKGROUND", "DROP",
     "cuts, refusals and changes of control since the controller started", latched=True,
 )
 HEARTBEAT = Topic(
@@ -170,7 +159,7 @@ EVENT = Topic(
     "log line: an event, or a refusal with its reason",
 )
 CAMERA = Topic(
-    "camera/frame", camera_messages.CameraFrame, "bridge", "perception, server", 2, "DATA_LOW", "DROP",
+    "camera/frame", robot.CameraFrame, "bridge", "perception, server", 2, "DATA_LOW", "DROP",
     "RGB-D frame with the measured posture at exposure",
 )
 POINTS = Topic(
@@ -178,23 +167,23 @@ POINTS = Topic(
     "all current pruning points", latched=True,
 )
 CROPS = Topic(
-    "perception/crops", crop_messages.PointCrop, "perception", "server", 2, "BACKGROUND", "DROP",
+    "perception/crops", perception.PointCrop, "perception", "server", 2, "BACKGROUND", "DROP",
     "picture of a point: at once when new, then one after the other", latched=True,
 )
 CLOSE_UP = Topic(
-    "perception/close-up", close_up_messages.CloseUpResult, "perception", "controller", 0, "INTERACTIVE_HIGH", "DROP",
+    "perception/close-up", perception.CloseUpResult, "perception", "controller", 0, "INTERACTIVE_HIGH", "DROP",
     "result of a close-up", express=True,
 )
 OBSTACLES = Topic(
-    "perception/obstacles", row_messages.Obstacles, "perception", "controller, server", 1, "DATA_LOW", "DROP",
+    "perception/obstacles", perception.Obstacles, "perception", "controller, server", 1, "DATA_LOW", "DROP",
     "posts, trunks, cordons, wires and retained canes seen so far", latched=True,
 )
 SCENERY = Topic(
-    "scenery", row_messages.Scenery, "bridge", "server", 0.5, "BACKGROUND", "DROP",
+    "scenery", perception.Scenery, "bridge", "server", 0.5, "BACKGROUND", "DROP",
     "the simulated row; for display only", latched=True,
 )
 REPLAY = Topic(
-    "replay/state", supervision_messages.ReplayState, "controller", "server", 10, "INTERACTIVE_HIGH", "DROP",
+    "replay/state", supervision.ReplayState, "controller", "server", 10, "INTERACTIVE_HIGH", "DROP",
     "position in the recording that is replayed", latched=True,
 )
 
@@ -205,31 +194,23 @@ TOPICS: tuple[Topic[Any], ...] = (
 )
 
 
-INTENT: Service[intents.Intent] = Service(
-    "service/intent",
-    (
-        intents.Arm, intents.AcceptPoint, intents.RejectPoint, intents.ReconsiderPoint,
-        intents.RestoreAccepted, intents.ResolvePoint,
-        intents.AcceptAll, intents.MoveInQueue, intents.ResetOrder, intents.SetApproach,
-        intents.RequestPreview, intents.ApprovePreview, intents.RequirePreview, intents.Start, intents.Survey,
-        intents.Pause, intents.Resume, intents.Home, intents.Acknowledge, intents.Reset, intents.TakeControl,
-        intents.RequestControl, intents.GrantControl, intents.ReturnControl,
-    ),
+INTENT: Service[commands.Intent] = Service(
+    "service/intent", commands.INTENTS,
     "controller", 1.0, "command of an operator",
 )
 RELEASE: Service[m.ReleaseStop] = Service(
     "service/release", (m.ReleaseStop,), "bridge", 0.5, "release a latched stop",
 )
-PLANT: Service[plant_requests.PlantRequest] = Service(
+PLANT: Service[commands.PlantRequest] = Service(
     "service/plant",
     (
-        plant_requests.SetRule, plant_requests.EvaluateRule, plant_requests.UndoRule, plant_requests.AddPoint,
-        plant_requests.AddPointInImage, plant_requests.MovePoint,
+        commands.SetRule, commands.EvaluateRule, commands.UndoRule, commands.AddPoint,
+        commands.AddPointInImage, commands.MovePoint,
     ),
     "perception", 2.0, "set, evaluate or undo a pruning rule; add or move a point by hand",
 )
-SEEK: Service[commands_messages.SeekReplay] = Service(
-    "service/seek", (commands_messages.SeekReplay,), "controller", 1.0, "jump in, play or pause the recording",
+SEEK: Service[commands.SeekReplay] = Service(
+    "service/seek", (commands.SeekReplay,), "controller", 1.0, "jump in, play or pause the recording",
 )
 SERVICES: tuple[Service[Any], ...] = (INTENT, RELEASE, PLANT, SEEK)
 # fmt: on

@@ -16,8 +16,8 @@ from controller.ledger.check import verify
 from controller.ledger.journal import LedgerState, Record
 from controller.ledger.store import Entry, Ledger
 from controller.ledger.writer import LedgerWriter
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
-from rolling_panda.messages import commands as intents
 from rolling_panda.runtime.scheduling import set_priority
 
 _PERIOD_S = 0.01

@@ -29,9 +29,9 @@ from controller.config import ControllerConfig
 from controller.motion.follower import Tracking
 from controller.whole_body.registry import METHODS
 from perception.segmentation.segmenter import SEGMENTERS
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.config import load_section
-from rolling_panda.messages import commands as intents
 from rolling_panda.resources import resource
 from tests.support.worlds.closed_loop import ClosedLoop
 

@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 from controller.inputs import Sample
-from rolling_panda.messages import commands as intents
+from rolling_panda import commands as intents
 from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
 from tests.support.worlds.closed_loop import ClosedLoop
 

@@ -15,9 +15,9 @@ from controller.core import Controller
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.registry import make_method
 from controller.whole_body.task import IkProblem, Method
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
-from rolling_panda.messages import commands as intents
 from rolling_panda.model.robot import RobotModel
 from tests.support.worlds.kinematic_robot import KinematicRobot
 

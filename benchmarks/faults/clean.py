@@ -14,8 +14,8 @@ from benchmarks.common.documents import bench_parser, write
 from benchmarks.faults.judge import Rows, replays, violations
 from controller.inputs import Sample
 from controller.interface import Outputs
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
-from rolling_panda.messages import commands as intents
 from tests.support.worlds.faulty_world import FaultyWorld
 
 _USER = "ada"

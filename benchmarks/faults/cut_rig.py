@@ -21,11 +21,11 @@ import msgspec
 
 from benchmarks.faults.state_disk import StateDisk
 from controller.ledger.store import FILE
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.config import TransportConfig
 from rolling_panda.errors import RollingPandaError, ServiceError
-from rolling_panda.messages import commands as intents
 from rolling_panda.messages.perception import CloseUpRequest, CloseUpResult, Obstacles, point_digest
 from rolling_panda.messages.supervision import Person, Presence, StopState
 from rolling_panda.runtime.launch import child_environment, python_command

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from controller.config import ControllerConfig
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
-from rolling_panda.messages import commands as intents
 from tests.support.worlds.faulty_world import FaultyWorld
 
 Inject = Callable[[FaultyWorld], None]
@@ -134,7 +134,7 @@ def _stuck_wheel(world: FaultyWorld) -> None:
 
 def _taken_over(world: FaultyWorld) -> None:
     world.people = (*world.people, "bob")
-    world.ask(intents.TakeControl(user="bob", confirmed=True))
+    world.ask(intents.TakeControl(user="bob", confirm=True))
 
 
 def _bad_link(world: FaultyWorld) -> None:

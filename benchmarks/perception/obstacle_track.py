@@ -10,7 +10,7 @@ from benchmarks.control.row_walk import walk
 from benchmarks.perception.obstacles import Place, Track
 from bridge.core.bridge import BridgeOutputs
 from bridge.sim.robot.robot import SimulatedRobot
-from rolling_panda.messages import commands as intents
+from rolling_panda import commands as intents
 from rolling_panda.resources import resource
 from tests.support.worlds.closed_loop import ClosedLoop
 

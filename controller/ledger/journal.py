@@ -7,8 +7,8 @@ from typing import Literal
 
 import msgspec
 
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
-from rolling_panda.messages import commands as intents
 
 #: What a row is about: a life of a point, an order of work, whether previews are required, what
 #: somebody asked and how it was answered, a stop, a

@@ -8,7 +8,7 @@ import msgspec
 from msgspec.structs import replace
 
 from controller.ledger.journal import RequestRow, TicketRow
-from rolling_panda.messages import commands as intents
+from rolling_panda import commands as intents
 from rolling_panda.messages.supervision import ControlReport, CutReport, RefusalReport, SessionReport, VineReport
 
 #: What goes over the wire of each; the ledger has all.

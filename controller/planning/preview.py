@@ -5,7 +5,6 @@ over these points in this order, among what stood around. What follows it cuts f
 """
 
 from collections.abc import Sequence
-from typing import Final
 
 import numpy as np
 
@@ -16,13 +15,12 @@ from controller.planning.plan_validity import approaches_changed, away_from
 from controller.planning.preview_plan import Preview, PreviewRequest, motion_message, state_message
 from controller.work.point_queue import PointQueue, Ticket
 from controller.work.posture_search import CutPlan
-from rolling_panda.messages import commands as intents
+from rolling_panda import commands as intents
+from rolling_panda.commands import Handlers
 from rolling_panda.messages.perception import Capsule, PruningPoint
 from rolling_panda.messages.supervision import PreviewMotion, PreviewPhase, PreviewState
 from rolling_panda.model.differential_drive import Array
 
-#: Intents about previews.
-ABOUT_PREVIEWS: Final = (intents.RequestPreview, intents.ApprovePreview, intents.RequirePreview)
 #: A preview shows so many points at most.
 MOST = 10
 #: It is repeated this often for those who come later (s).
@@ -63,17 +61,13 @@ class PreviewManager:
         """Take up what was required before a restart."""
         self.required = row.required
 
-    def do(self, intent: intents.Intent, now: float) -> str:
-        """What an operator asks of previews; returns why not, empty when done."""
-        if isinstance(intent, intents.RequirePreview):
-            self.required, self._fresh = intent.required, True
-            self._journal.add("preview", "preview", PreviewRow(required=intent.required, user=intent.user))
-            return ""
-        if isinstance(intent, intents.RequestPreview):
-            return self._want(intent.point_id, now)
-        if isinstance(intent, intents.ApprovePreview):
-            return self._approve(intent.preview_hash, intent.user)
-        return f"{type(intent).__name__} is nothing about previews"
+    def handlers(self) -> Handlers:
+        """Handlers of the commands about previews; each returns why it is refused, empty when done."""
+        return {
+            intents.RequirePreview: lambda asked, now: self._require(asked.required, asked.user),
+            intents.RequestPreview: lambda asked, now: self._want(asked.point_id, now),
+            intents.ApprovePreview: lambda asked, now: self._approve(asked.preview_hash, asked.user),
+        }
 
     def start_refused(self) -> str:
         """Why work may not begin for want of an approval; empty when it may."""
@@ -192,6 +186,11 @@ class PreviewManager:
             return None
         self._fresh_motion, self._moved_at = False, now
         return motion_message(self._preview, now)
+
+    def _require(self, required: bool, user: str) -> str:
+        self.required, self._fresh = required, True
+        self._journal.add("preview", "preview", PreviewRow(required=required, user=user))
+        return ""
 
     def _want(self, point_id: str, now: float) -> str:
         ticket = self._queue.get(point_id) if point_id else self._queue.next()

@@ -1,18 +1,15 @@
 """Control authority: lease, presence and the rights of each client. Pure: `now` is an argument."""
 
 import math
-from typing import Final
 
 from controller.identity import Client
 from controller.inputs import Sample
 from controller.supervision.lease import Lease
 from controller.supervision.modes import Rights, Who
-from rolling_panda.messages import commands as intents
+from rolling_panda import commands as intents
+from rolling_panda.commands import Handlers
 from rolling_panda.messages.supervision import NEVER_SEEN_S, ControlState, Presence
 from rolling_panda.messages.types import Role
-
-#: Intents about control itself.
-ABOUT_CONTROL: Final = (intents.TakeControl, intents.RequestControl, intents.GrantControl, intents.ReturnControl)
 
 
 class Authority:
@@ -87,18 +84,14 @@ class Authority:
         """Give control to a client that moves a robot without a holder."""
         self._lease.claim(client, now)
 
-    def ask(self, intent: intents.Intent, now: float) -> str:
-        """Take, request, grant or return control. Returns why it is refused; empty when done."""
-        client, lease = client_of(intent), self._lease
-        if intent.role == "viewer":
-            return "a viewer may look and stop, not operate"
-        if isinstance(intent, intents.TakeControl):
-            return lease.take(client, intent.confirmed)
-        if isinstance(intent, intents.RequestControl):
-            return lease.request(client, now)
-        if isinstance(intent, intents.GrantControl):
-            return lease.grant(client)
-        return lease.give_back(client)
+    def handlers(self) -> Handlers:
+        """Handlers of the commands about control itself; each returns why it is refused, empty when done."""
+        return {
+            intents.TakeControl: lambda asked, now: self._lease.take(client_of(asked), asked.confirm),
+            intents.RequestControl: lambda asked, now: self._lease.request(client_of(asked), now),
+            intents.GrantControl: lambda asked, now: self._lease.grant(client_of(asked)),
+            intents.ReturnControl: lambda asked, now: self._lease.give_back(client_of(asked)),
+        }
 
     def message(self, now: float) -> ControlState:
         """The message of the lease."""

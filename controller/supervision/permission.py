@@ -1,46 +1,14 @@
-"""Permission of each intent in the present state, with the reason of a refusal."""
+"""Permission of each command in the present state, with the reason of a refusal."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Final
 
 from controller.config import ControllerConfig
 from controller.supervision import health as safety
 from controller.supervision import modes
 from controller.supervision.modes import Event
-from rolling_panda.messages import commands as intents
-
-#: What an intent is to the machine of modes.
-EVENTS: dict[type[intents.Intent], Event] = {
-    intents.Arm: Event.ARM,
-    intents.Start: Event.START,
-    intents.Survey: Event.START,
-    intents.Pause: Event.PAUSE,
-    intents.Resume: Event.RESUME,
-    intents.Acknowledge: Event.ACKNOWLEDGE,
-    intents.Reset: Event.RESET,
-}
-#: One intent of each type, to ask whether it would be taken; None where only its content can be refused.
-_PROBES: dict[type[intents.Intent], intents.Intent | None] = {
-    intents.Arm: intents.Arm(user=""),
-    intents.AcceptPoint: None,
-    intents.RejectPoint: None,
-    intents.ReconsiderPoint: None,
-    intents.RestoreAccepted: None,
-    intents.ResolvePoint: None,
-    intents.AcceptAll: None,
-    intents.MoveInQueue: None,
-    intents.ResetOrder: None,
-    intents.SetApproach: None,
-    intents.RequestPreview: None,
-    intents.ApprovePreview: None,
-    intents.RequirePreview: None,
-    intents.Start: intents.Start(user=""),
-    intents.Survey: intents.Survey(user=""),
-    intents.Pause: intents.Pause(user=""),
-    intents.Resume: intents.Resume(user=""),
-    intents.Home: intents.Home(user=""),
-    intents.Acknowledge: intents.Acknowledge(user=""),
-    intents.Reset: intents.Reset(user="", reason="-"),
-}
+from rolling_panda.commands import COMMANDS, Command, Condition
 
 
 @dataclass(frozen=True)
@@ -72,47 +40,48 @@ class Situation:
     approval: str = ""
 
 
-def refusal(intent: intents.Intent, now: float, situation: Situation) -> str:
-    """Why an intent would not be taken now, apart from its own content; empty when it would.
+#: The check of each condition: why it does not hold, empty where it does.
+_CHECKS: Final[dict[Condition, Callable[[Situation], str]]] = {
+    "fresh sensors": lambda now: safety.sensors(now.health, now.config),
+    "bridge obeys": lambda now: (
+        "the bridge's watchdog holds the robot: wait until it takes commands" if now.health.watchdog else ""
+    ),
+    "server": lambda now: safety.supervision(now.health, now.config, False),
+    "at rest": lambda now: now.busy,
+    "workable point": lambda now: now.waits,
+    "approved preview": lambda now: now.approval,
+    "perception": lambda now: safety.perception(now.health, now.config),
+    "watched": lambda now: now.unwatched,
+}
+
+
+def refusal(command: Command, now: float, situation: Situation) -> str:
+    """Why a command would be refused now, apart from the content of its message; empty when it would not.
 
     Args:
-        intent: What is asked.
+        command: Row of the table.
         now: Monotonic time (s).
         situation: Of the robot.
     """
-    config, health, mode = situation.config, situation.health, situation.state.mode
+    mode, event = situation.state.mode, command.event
     if "operator" not in situation.rights:
         return situation.not_theirs or "only who may operate may ask for this"
-    if isinstance(intent, intents.OF_HOLDER) and mode != "FAULT" and situation.not_theirs:
+    # Acknowledging a fault moves nothing.
+    if command.control and mode != "FAULT" and situation.not_theirs:
         return situation.not_theirs
-    event = EVENTS.get(type(intent))
     if event is not None and not (event is Event.PAUSE and situation.homing):
         refused = modes.step(situation.state, event, now, by=situation.rights).refused
         if refused:
             return refused
-    if isinstance(intent, intents.Arm | intents.Start | intents.Home):
-        why = safety.sensors(health, config)
-        if why:
-            return why
-        if health.watchdog:
-            return "the bridge's watchdog holds the robot: wait until it takes commands"
-    if isinstance(intent, intents.Start | intents.Home):
-        why = safety.supervision(health, config, False) or situation.busy
-        if why:
-            return why
-    if isinstance(intent, intents.Start):
-        if situation.waits and not isinstance(intent, intents.Survey):
-            return situation.waits
-        if situation.approval and not isinstance(intent, intents.Survey):
-            return situation.approval
-        return safety.perception(health, config) or situation.unwatched
-    if isinstance(intent, intents.Home) and mode != "READY":
-        return f"the arm is brought home in READY; the mode is {mode}"
-    return ""
+    if command.modes and mode not in command.modes:
+        return f"{command.name} is possible in {' and '.join(command.modes)}; the mode is {mode}"
+    return next((why for condition in command.conditions if (why := _CHECKS[condition](situation))), "")
 
 
 def allowed(now: float, situation: Situation) -> tuple[str, ...]:
-    """Types of the intents that would be taken now."""
+    """Names of the commands that would be taken now, apart from those about control itself."""
     return tuple(
-        kind.__name__ for kind, probe in _PROBES.items() if probe is None or not refusal(probe, now, situation)
+        command.name
+        for command in COMMANDS
+        if command.process == "controller" and command.tag != "control" and not refusal(command, now, situation)
     )

@@ -1,7 +1,7 @@
 """Latch of software stops. A stop stays latched until the bridge shows its release."""
 
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
-from rolling_panda.messages import commands as intents
 from rolling_panda.messages.supervision import StopRecord, StopState
 
 #: How long the bridge may take to show that it has released a stop, before it may be asked again (s).

@@ -17,8 +17,8 @@ from controller.supervision.modes import Event
 from controller.supervision.permission import Situation
 from controller.supervision.stop_latch import StopLatch
 from controller.work.movement import Movement
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
-from rolling_panda.messages import commands as intents
 from rolling_panda.messages.supervision import StopRecord
 
 #: A bridge whose watchdog has held the robot for so long (s) is asked for another token.

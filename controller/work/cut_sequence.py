@@ -26,8 +26,8 @@ from controller.work.point_queue import PointQueue
 from controller.work.posture_search import CutPlan, PostureSearch, Unreachable
 from controller.work.stages import PHASES, Stage, StepResult
 from controller.work.survey import Survey
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
-from rolling_panda.messages import commands as intents
 from rolling_panda.messages.perception import CloseUpResult
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_XI
@@ -121,7 +121,7 @@ class CutSequence:
         """Whether a cut has been asked for and how it ends is not known yet: the blades may be closing."""
         return self._blades.busy
 
-    def start(self, survey: intents.Survey | None = None) -> None:
+    def start(self, survey: intents.Survey | intents.LookAgain | None = None) -> None:
         """Start with getting the tool clear of the canes, or a survey."""
         self._forget()
         # Since a plan was made the robot may have been moved by hand.

@@ -14,8 +14,8 @@ from controller.whole_body.saturation import Saturation
 from controller.work.homing import Homing
 from controller.work.point_queue import PointQueue
 from controller.work.stages import StepResult
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
-from rolling_panda.messages import commands as intents
 from rolling_panda.model.differential_drive import NXI, Array
 
 #: How the base slows down towards the end of the way (m/s²), and how near is there (m).
@@ -39,7 +39,7 @@ class Survey:
         follower: Follower,
         saturation: Saturation,
         queue: PointQueue,
-        asked: intents.Survey | None = None,
+        asked: intents.Survey | intents.LookAgain | None = None,
     ) -> None:
         """Bind the parts.
 
@@ -54,8 +54,10 @@ class Survey:
         self._homing: Homing | None = Homing(config, follower, 1.0 / config.rate_hz)
         c, s = math.cos(config.row_heading), math.sin(config.row_heading)
         self._along, self._left = np.array([c, s]), np.array([-s, c])
-        self._distance = 0.0 if asked is None else asked.distance
-        self._place = None if asked is None or asked.vine == 0 else open_place(queue.perceived, asked.vine, asked.spur)
+        self._distance = asked.distance if isinstance(asked, intents.Survey) else 0.0
+        self._place = (
+            open_place(queue.perceived, asked.vine, asked.spur) if isinstance(asked, intents.LookAgain) else None
+        )
         self._line: tuple[float, float] | None = None
         self._goal = 0.0
         self._stops: list[float] = []

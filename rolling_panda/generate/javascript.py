@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, get_args, get_origin
 
 import msgspec
 
+from rolling_panda import commands as intents
 from rolling_panda import messages
 from rolling_panda.errors import MessageError
 from rolling_panda.generate.description import (
@@ -18,7 +19,6 @@ from rolling_panda.generate.description import (
     reachable,
     union_members,
 )
-from rolling_panda.messages import commands as intents
 from rolling_panda.messages import page as page_messages
 from rolling_panda.messages.supervision import SessionReport
 
@@ -37,7 +37,7 @@ def messages_module() -> str:
     for name, list_name in CONSTANTS.items():
         values = ", ".join(f'"{value}"' for value in get_args(aliases()[name]))
         parts.append(f"export const {list_name} = Object.freeze([{values}]);\n")
-    holders = ", ".join(f'"{intent.__name__}"' for intent in intents.OF_HOLDER)
+    holders = ", ".join(f'"{command.name}"' for command in intents.COMMANDS if command.control)
     parts.append(
         f"/** Intents that need control, except for acknowledging a fault. */\n"
         f"export const OF_HOLDER = Object.freeze([{holders}]);\n"

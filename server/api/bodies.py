@@ -1,12 +1,19 @@
-"""Request and response bodies of the REST interface: strict types, bounds, no unknown fields, no NaN."""
+"""Request and response bodies of the REST interface: strict types, bounds, no unknown fields, no NaN.
 
+The bodies of requests that become a message are made from the message, with its bounds.
+"""
+
+import inspect
 import json
-from typing import Annotated, Any, Literal
+from collections.abc import Callable, Collection
+from types import UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
 
+import msgspec
 from fastapi import Path
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, field_validator, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model, field_validator, model_validator
 
-from rolling_panda.messages.commands import SURE
+from rolling_panda.commands import Intent, PlantRequest
 from rolling_panda.messages.types import Role
 
 #: As `rolling_panda.messages.Name`.
@@ -39,6 +46,61 @@ class _JsonTuples(_Body):
     @classmethod
     def _tuples(cls, value: Any) -> Any:
         return tuple(value) if isinstance(value, list) else value
+
+
+#: Bounds that msgspec and pydantic call the same.
+_BOUNDS = ("ge", "gt", "le", "lt", "min_length", "max_length")
+#: Of the caller, never of a body.
+_CALLER = frozenset({*Intent.__struct_fields__, *PlantRequest.__struct_fields__})
+
+
+def fields_of(message: type[msgspec.Struct], in_path: Collection[str] = ()) -> Callable[..., dict[str, Any]]:
+    """A FastAPI dependency that reads the fields of a message from the body and the path of a request.
+
+    Args:
+        message: Type that the request becomes. What it says of the caller is not read.
+        in_path: Fields that are part of the path; each is the name of a point.
+    """
+    own = [
+        field for field in msgspec.structs.fields(message) if field.name not in _CALLER and field.name not in in_path
+    ]
+
+    def read(**given: Any) -> dict[str, Any]:
+        body: BaseModel | None = given.pop("body", None)
+        return given | ({} if body is None else dict(body))
+
+    keyword = inspect.Parameter.KEYWORD_ONLY
+    parameters = [inspect.Parameter(name, keyword, annotation=Annotated[str, POINT_ID]) for name in in_path]
+    if own:
+        fields: dict[str, Any] = {
+            field.name: (_strict(field.type), ... if field.required else field.default) for field in own
+        }
+        model = create_model(message.__name__, __base__=_JsonTuples, __doc__=inspect.getdoc(message), **fields)
+        parameters.append(inspect.Parameter("body", keyword, annotation=model))
+    read.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    return read
+
+
+def _strict(hint: Any) -> Any:
+    """An annotation of msgspec as pydantic has it."""
+    origin, arguments = get_origin(hint), get_args(hint)
+    if hint is int:
+        return Annotated[int, Field(le=_MAX_INTEGER), _INTEGER]
+    if origin is Annotated:
+        inner: Any = _strict(arguments[0])
+        for meta in arguments[1:]:
+            bounds = {name: getattr(meta, name) for name in _BOUNDS if getattr(meta, name) is not None}
+            if arguments[0] is int:
+                bounds["le"] = min(bounds.get("le", _MAX_INTEGER), _MAX_INTEGER)
+            # In the regular expressions of pydantic and of JSON Schema "$" matches at the end alone.
+            pattern = None if meta.pattern is None else meta.pattern.replace(r"(?!\n)", "")
+            inner = Annotated[inner, Field(pattern=pattern, **bounds)]
+        return inner
+    if origin in (Union, UnionType):
+        return Union[tuple(_strict(argument) for argument in arguments)]  # noqa: UP007
+    if origin is tuple:
+        return tuple[tuple(_strict(argument) for argument in arguments)]  # type: ignore[misc]
+    return hint
 
 
 class SignIn(_Body):
@@ -80,82 +142,6 @@ class SignInMethod(BaseModel):
     password: bool
 
 
-class AcceptPoint(_Body):
-    """The revision that the operator saw; an older one is refused. With `digest`, changed content is refused too."""
-
-    revision: Annotated[int, Field(ge=0, le=_MAX_INTEGER), _INTEGER]
-    digest: Annotated[str, Field(max_length=64, pattern=r"^[0-9a-f]*$")] = ""
-
-
-class RejectPoint(_Body):
-    """The reason."""
-
-    reason: _Text = ""
-
-
-class ResolvePoint(_Body):
-    """How an UNKNOWN cut ended, and how that was established."""
-
-    outcome: Literal["DONE", "FAILED_NOT_CUT"]
-    reason: Annotated[str, Field(min_length=1, max_length=400)]
-
-
-class Survey(_Body):
-    """Distance along the row (m)."""
-
-    distance: Annotated[float, Field(ge=0.1, le=500.0)] = 4.0
-
-
-class MoveInQueue(_Body):
-    """The point to go before; empty for the end. `revision` is that of the order in `GET /api/state`."""
-
-    before: Annotated[str, Field(max_length=64)] = ""
-    revision: Annotated[int, Field(ge=0, le=_MAX_INTEGER), _INTEGER]
-
-
-class SetApproach(_Body):
-    """Angle of the approach about the cane (rad); null leaves it to the search."""
-
-    azimuth: Annotated[float, Field(ge=-3.2, le=3.2)] | None = None
-
-
-class ResetOrder(_Body):
-    """The revision of the order in `GET /api/state`."""
-
-    revision: Annotated[int, Field(ge=0, le=_MAX_INTEGER), _INTEGER]
-
-
-class Place(_Body):
-    """A site without a decision."""
-
-    vine: Annotated[int, Field(ge=1, le=100000), _INTEGER]
-    spur: Annotated[int, Field(ge=0, le=100000), _INTEGER]
-
-
-class RequestPreview(_Body):
-    """The point to preview; empty for all accepted ones in their order."""
-
-    point_id: Annotated[str, Field(max_length=64)] = ""
-
-
-class ApprovePreview(_Body):
-    """The hash of the preview that the operator saw."""
-
-    preview_hash: Annotated[str, Field(max_length=64, pattern=r"^[0-9a-f]*$")]
-
-
-class RequirePreview(_Body):
-    """Whether each cut needs an approved preview."""
-
-    required: bool
-
-
-class AcceptAll(_Body):
-    """Least confidence, 0…1; points below it stay proposed."""
-
-    confidence: Annotated[float, Field(ge=0.0, le=1.0)] = SURE
-
-
 class Stop(_Body):
     """The reason, for the log. It cannot fail the stop: it is cut where too long, and ignored where unreadable."""
 
@@ -171,19 +157,6 @@ class Stop(_Body):
         # A lone surrogate is valid JSON, but cannot be encoded as UTF-8.
         text = reason.encode(errors="replace").decode() if isinstance(reason, str) else ""
         return cls(reason=text[:STOP_REASON_LENGTH]) if text else cls()
-
-
-class TakeControl(_Body):
-    """`confirm` takes control from its holder."""
-
-    confirm: bool = False
-
-
-class Reset(_Body):
-    """Why it is safe again; with `stop_id`, stops that came after that one stay latched."""
-
-    reason: Annotated[str, Field(min_length=1, max_length=500)]
-    stop_id: Annotated[str, Field(max_length=64)] = ""
 
 
 class Target(_JsonTuples):
@@ -277,16 +250,6 @@ class Me(BaseModel):
     role: Role
 
 
-class Rule(_Body):
-    """Parameters of the pruning rule; omitted ones take their defaults. Lengths in metres."""
-
-    system: Literal["spur", "guyot"] = "spur"
-    nodes_kept: Annotated[int, Field(ge=1, le=5), _INTEGER] = 2
-    fruiting_nodes: Annotated[int, Field(ge=3, le=20), _INTEGER] = 8
-    preferred_diameter: Annotated[float, Field(ge=0.003, le=0.015)] = 0.006
-    offset: Annotated[float, Field(ge=0.005, le=0.05)] = 0.020
-
-
 class RuleOutcome(Outcome):
     """How many points a rule would move, remove and add, and how many acceptances it would void."""
 
@@ -294,31 +257,3 @@ class RuleOutcome(Outcome):
     removed: int = 0
     added: int = 0
     voided: int = 0
-
-
-class Move(_Body):
-    """Distance along the cane (m), positive away from the cordon."""
-
-    along: Annotated[float, Field(ge=-0.1, le=0.1)]
-
-
-class Seek(_Body):
-    """Position in a recording (s from its start; the present one when omitted), and whether it plays."""
-
-    position_s: Annotated[float, Field(ge=0.0, le=1e9)] | None = None
-    playing: bool = True
-
-
-class Ray(_JsonTuples):
-    """A ray in odom (m): the point is placed on the known cane nearest to it."""
-
-    origin: tuple[_Metre, _Metre, _Metre]
-    direction: tuple[_Unit, _Unit, _Unit]
-
-
-class Pixel(_Body):
-    """A pixel of a camera image, as fractions of its width and height; `sequence` is that of the frame."""
-
-    sequence: Annotated[int, Field(ge=0, le=_MAX_INTEGER), _INTEGER]
-    u: Annotated[float, Field(ge=0.0, le=1.0)]
-    v: Annotated[float, Field(ge=0.0, le=1.0)]

@@ -1,11 +1,9 @@
-"""REST for control of the robot: who holds it, and its transfer."""
+"""REST for control of the robot: who holds it."""
 
 import msgspec
 from fastapi import APIRouter, Depends, Response
 
-from rolling_panda.messages import commands as intents
 from rolling_panda.messages.supervision import ClientKey, ControlState
-from server.api import bodies as body
 from server.api.dependencies import Caller, Operator, activity
 from server.api.responses import COMMAND, UNAVAILABLE, answer, message, query
 from server.robots.context import Result, RobotContext
@@ -18,7 +16,7 @@ class Control(ControlState, frozen=True, kw_only=True, tag="ControlState"):
 
 
 def control_router(robot: RobotContext) -> APIRouter:
-    """`/api/control`; commands without parameters are in `commands.py`."""
+    """`/api/control`; its transfer is in the table of commands."""
     router = APIRouter(prefix="/api/control", tags=["control"], dependencies=[Depends(activity(robot))])
 
     @router.get("", responses=query(Control, UNAVAILABLE))
@@ -33,10 +31,5 @@ def control_router(robot: RobotContext) -> APIRouter:
     async def here(session: Operator) -> Response:
         """Report presence, which renews the lease: a page does so while the 3-D view keeps it busy."""
         return answer(Result(200, True, ""))
-
-    @router.post("/take", responses=COMMAND)
-    async def take(session: Operator, request: body.TakeControl) -> Response:
-        """Take control; from its holder only with `confirm`, after a stop of the robot."""
-        return answer(await robot.ask(session, intents.TakeControl(user=session.user, confirmed=request.confirm)))
 
     return router

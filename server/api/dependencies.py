@@ -35,24 +35,26 @@ def _caller(session: Visitor) -> Session:
 Caller = Annotated[Session, Depends(_caller)]
 
 
-def _operator(session: Caller) -> Session:
+def operator(session: Caller) -> Session:
+    """The session of a caller who may operate."""
     if not session.may_operate:
         raise HTTPException(403, f"a {session.role} may look and stop, not operate")
     return session
 
 
 #: Roles that may move the robot and decide on its work.
-Operator = Annotated[Session, Depends(_operator)]
+Operator = Annotated[Session, Depends(operator)]
 
 
-def _supervisor(session: Caller) -> Session:
+def supervisor(session: Caller) -> Session:
+    """The session of a supervisor."""
     if session.role != "supervisor":
         raise HTTPException(403, f"only a supervisor may do this, not a {session.role}")
     return session
 
 
 #: The role that resets stops and invites others.
-Supervisor = Annotated[Session, Depends(_supervisor)]
+Supervisor = Annotated[Session, Depends(supervisor)]
 
 
 def activity(robot: RobotContext) -> Callable[[Request], Awaitable[None]]:

@@ -1,48 +1,56 @@
-"""REST for requests to perception: pruning rules, points placed by hand, and crops of points."""
+"""REST for requests to perception about the pruning rule, and for crops of points."""
 
 from dataclasses import replace
-from typing import Annotated
+from typing import Annotated, Any
 
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Depends, Query, Response
 from fastapi.responses import JSONResponse
 
-from rolling_panda.messages import commands as ask
+from rolling_panda import commands as ask
 from rolling_panda.messages.page import PagePoints
 from rolling_panda.messages.perception import PruningRule
 from rolling_panda.messages.types import RuleEffect
 from server.api import bodies as body
+from server.api.bodies import fields_of
 from server.api.dependencies import Caller, Operator, PointId
 from server.api.responses import COMMAND, INVALID, NOT_FOUND, answer, query
 from server.robots.context import Result, RobotContext
+
+
+def _rule(fields: Annotated[dict[str, Any], Depends(fields_of(PruningRule))]) -> PruningRule:
+    return PruningRule(**fields)
+
+
+#: The pruning rule that a request's body describes.
+RuleBody = Annotated[PruningRule, Depends(_rule)]
 
 
 def plant_router(robot: RobotContext) -> APIRouter:
     """Requests that perception answers."""
     router = APIRouter(prefix="/api", tags=["points"])
 
-    @router.post("/rule", responses=COMMAND)
-    async def rule(session: Operator, request: body.Rule) -> Response:
+    @router.post("/rule", name="rule", responses=COMMAND)
+    async def set_rule(session: Operator, rule: RuleBody) -> Response:
         """Set the pruning rule. All points change at once; accepted ones may be removed."""
-        wanted = ask.SetRule(user=session.user, rule=PruningRule(**request.model_dump()))
+        wanted = ask.SetRule(user=session.user, rule=rule)
         return answer(await robot.ask_perception(session, wanted))
 
     @router.post("/rule/what-if", responses=COMMAND | {200: {"model": body.RuleOutcome}})
-    async def what_if(session: Operator, request: body.Rule) -> Response:
+    async def what_if(session: Operator, rule: RuleBody) -> Response:
         """What a rule would change, without setting it. `voided` counts the acceptances that would become void."""
-        wanted = ask.EvaluateRule(user=session.user, rule=PruningRule(**request.model_dump()))
+        wanted = ask.EvaluateRule(user=session.user, rule=rule)
         result = await robot.ask_perception(session, wanted)
         if not result.ok or result.effect is None:
             return answer(result)
         return JSONResponse(rule_outcome(result.effect, robot.points).model_dump())
 
     @router.post("/rule/undo", responses=COMMAND)
-    async def undo(session: Operator, request: body.Rule) -> Response:
+    async def undo(session: Operator, rule: RuleBody) -> Response:
         """Undo the present rule: restore the points and acceptances from before it.
 
         The body has the rule that the caller saw; where it has changed since, the request is refused. Later cuts,
         decisions and points by hand stay.
         """
-        rule = PruningRule(**request.model_dump())
         done = await robot.ask_perception(session, ask.UndoRule(user=session.user, rule=rule))
         if not done.ok:
             return answer(done)
@@ -50,25 +58,6 @@ def plant_router(robot: RobotContext) -> APIRouter:
         if not restored.ok:
             return answer(replace(restored, reason=f"the rule is back, its acceptances are not: {restored.reason}"))
         return answer(done)
-
-    @router.post("/points/by-hand", responses=COMMAND)
-    async def by_hand(session: Operator, request: body.Ray) -> Response:
-        """Add a point where a line of sight meets a cane; `reason` is its name."""
-        wanted = ask.AddPoint(user=session.user, origin=request.origin, direction=request.direction)
-        return answer(await robot.ask_perception(session, wanted))
-
-    @router.post("/points/by-hand-in-image", responses=COMMAND)
-    async def by_hand_in_image(session: Operator, request: body.Pixel) -> Response:
-        """Add a point on the cane under a pixel of one of the newest camera images; `reason` is its name."""
-        return answer(
-            await robot.ask_perception(session, ask.AddPointInImage(user=session.user, **request.model_dump()))
-        )
-
-    @router.post("/points/{point_id}/move", responses=COMMAND)
-    async def move(session: Operator, point_id: PointId, request: body.Move) -> Response:
-        """Move a point along its cane; `reason` describes the result. Its acceptance may become void."""
-        wanted = ask.MovePoint(user=session.user, point_id=point_id, along=request.along)
-        return answer(await robot.ask_perception(session, wanted))
 
     @router.get(
         "/points/{point_id}/crop",

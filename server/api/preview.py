@@ -1,17 +1,16 @@
-"""REST for previews of the robot's motion, and their approval."""
+"""REST for previews of the robot's motion, and the check of their approval."""
 
 import math
 
 import msgspec
 from fastapi import APIRouter, Response
 
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
-from rolling_panda.messages import commands as intents
 from rolling_panda.messages.supervision import PreviewMotion, PreviewState
-from server.api import bodies as body
-from server.api.dependencies import Caller, Operator
-from server.api.responses import COMMAND, answer, message, query
-from server.robots.context import Result, RobotContext
+from server.api.dependencies import Caller
+from server.api.responses import message, query
+from server.robots.context import RobotContext
 from server.robots.link import Posture
 
 #: Permitted deviation from the start of the preview: base (m), heading and joints of the arm (rad).
@@ -35,28 +34,15 @@ def preview_router(robot: RobotContext) -> APIRouter:
         state, motion = robot.link.preview.peek(), robot.link.preview_motion.peek()
         return message(Previewed(state.message if state else None, motion.message if motion else None))
 
-    @router.post("", responses=COMMAND)
-    async def ask(session: Operator, request: body.RequestPreview) -> Response:
-        """Make a preview of all accepted points in their order, or of one of them alone."""
-        return answer(await robot.ask(session, intents.RequestPreview(user=session.user, point_id=request.point_id)))
-
-    @router.post("/approve", responses=COMMAND)
-    async def approve(session: Operator, request: body.ApprovePreview) -> Response:
-        """Approve the preview with this hash; refused where the robot or the preview has changed."""
-        state = robot.link.preview.peek()
-        why = "" if state is None else outdated(state.message, request.preview_hash, robot.link.posture(state.at))
-        if why:
-            robot.note("warning", f"{session.user}: ApprovePreview refused: {why}")
-            return answer(Result(409, False, why))
-        wanted = intents.ApprovePreview(user=session.user, preview_hash=request.preview_hash)
-        return answer(await robot.ask(session, wanted))
-
-    @router.post("/required", responses=COMMAND)
-    async def require(session: Operator, request: body.RequirePreview) -> Response:
-        """Set whether each cut needs an approved preview."""
-        return answer(await robot.ask(session, intents.RequirePreview(user=session.user, required=request.required)))
-
     return router
+
+
+def outdated_preview(robot: RobotContext, approval: intents.ApprovePreview) -> str:
+    """Why an approval is refused, since the robot or the preview has changed; empty where it is passed on."""
+    state = robot.link.preview.peek()
+    if state is None:
+        return ""
+    return outdated(state.message, approval.preview_hash, robot.link.posture(state.at))
 
 
 def outdated(state: PreviewState, preview_hash: str, posture: Posture | None) -> str:

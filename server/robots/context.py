@@ -9,11 +9,11 @@ from typing import Any, Protocol
 
 import msgspec
 
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda import topics
+from rolling_panda.commands import EvaluateRule, PlantRequest
 from rolling_panda.errors import InputError, ServiceError
-from rolling_panda.messages import commands as intents
-from rolling_panda.messages.commands import EvaluateRule, PlantRequest
 from rolling_panda.messages.page import GizmoAxes, Measured, PagePoints, PageState, PickRay
 from rolling_panda.runtime.token_bucket import TokenBuckets
 from server.auth.sessions import Session

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from bridge.sim.robot import trace
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
-from rolling_panda.messages import commands as intents
 from tests.support.worlds.closed_loop import ClosedLoop
 
 

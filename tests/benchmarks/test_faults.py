@@ -11,8 +11,8 @@ from msgspec.structs import replace as replace_field
 from benchmarks.faults.forked_trials import apart
 from benchmarks.faults.kinds import FAULTS
 from benchmarks.faults.run import deal, main, run_trial, start
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
-from rolling_panda.messages import commands as intents
 from rolling_panda.messages.supervision import BaseVelocity
 from tests.support.worlds.faulty_world import FaultyWorld
 

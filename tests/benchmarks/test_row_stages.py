@@ -4,9 +4,9 @@ import pytest
 from benchmarks.control.row_stages import LIMITS, STAGES, StageClock
 from controller.config import ControllerConfig
 from controller.core import Controller
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
-from rolling_panda.messages import commands as intents
 from tests.support.worlds.kinematic_robot import KinematicRobot
 
 

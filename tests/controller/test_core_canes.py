@@ -10,7 +10,7 @@ from controller.motion.surroundings import obstacles_of
 from controller.planning.work_plan import WorkPlan
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.collision_geometry import BLADES
-from rolling_panda.messages import commands as intents
+from rolling_panda import commands as intents
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.messages.supervision import TeleopTarget
 from rolling_panda.model.robot import RobotModel, pose_message

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rolling_panda.messages import commands as intents
+from rolling_panda import commands as intents
 from rolling_panda.messages.supervision import BaseVelocity, StopRecord, TeleopTarget
 from tests.support.controller_at_work import CONFIG, point, robot, run_until, working
 
@@ -53,7 +53,7 @@ def test_a_viewer_moves_nothing():
 def test_who_takes_control_gets_a_robot_at_rest_and_has_to_resume():
     r = far_at_work()
     assert "confirm" in r.ask(intents.TakeControl(user="bob")).reason
-    assert r.ask(intents.TakeControl(user="bob", confirmed=True)).ok
+    assert r.ask(intents.TakeControl(user="bob", confirm=True)).ok
     out = r.step()
     assert r.controller.mode == "PAUSED"
     while out.control is None or out.control.user != "bob":

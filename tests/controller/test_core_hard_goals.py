@@ -5,7 +5,7 @@ import pinocchio as pin
 
 from controller.motion.surroundings import obstacles_of
 from controller.whole_body.collision import CollisionModel
-from rolling_panda.messages import commands as intents
+from rolling_panda import commands as intents
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
 from rolling_panda.model.robot import ARM_Q, RobotModel, pose_message

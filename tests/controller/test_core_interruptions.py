@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rolling_panda.messages import commands as intents
+from rolling_panda import commands as intents
 from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
 from rolling_panda.model.robot import ARM_Q
 from tests.support.controller_at_work import entry, finish, point, robot, run_until, working

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from controller.planning.cuts import CutPlanner
+from rolling_panda import commands as intents
 from rolling_panda.config import RobotConfig
-from rolling_panda.messages import commands as intents
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
 from rolling_panda.model.robot import ARM_Q

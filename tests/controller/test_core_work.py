@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from controller.config import ControllerConfig
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
-from rolling_panda.messages import commands as intents
 from rolling_panda.model.robot import ARM_Q, ARM_XI, RobotModel
 from tests.support.controller_at_work import CONFIG, entry, finish, point, robot, run_until, working
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from rolling_panda.messages import commands as intents
+from rolling_panda import commands as intents
 from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
 from tests.support.controller_at_work import point, robot, run_until, working
 

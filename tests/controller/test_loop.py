@@ -14,9 +14,9 @@ from controller.ledger.store import Ledger, read
 from controller.ledger.writer import LedgerWriter
 from controller.loop import Loop
 from controller.stop_file import open_stop_file
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig, TransportConfig
-from rolling_panda.messages import commands as intents
 from rolling_panda.topics import (
     BRIDGE,
     CONTROLLER,

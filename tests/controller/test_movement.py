@@ -6,8 +6,8 @@ from controller.identity import Token
 from controller.ledger.journal import EventLogger, Journal
 from controller.work.movement import Movement
 from controller.work.point_queue import PointQueue
+from rolling_panda import commands as intents
 from rolling_panda.config import RobotConfig
-from rolling_panda.messages import commands as intents
 from rolling_panda.model.robot import ARM_Q
 from tests.support.controller_at_work import CONFIG, robot
 

@@ -13,8 +13,8 @@ from controller.ledger.journal import ApproachRow, Journal, OrderRow
 from controller.planning.cuts import CutPlanner
 from controller.planning.work_plan import PlanRequest
 from controller.work.order import LARGEST, Approaches, WorkOrder
+from rolling_panda import commands as intents
 from rolling_panda.config import RobotConfig
-from rolling_panda.messages import commands as intents
 from rolling_panda.model.robot import ARM_Q
 from tests.support.controller_at_work import CONFIG, entry, finish, point, robot
 

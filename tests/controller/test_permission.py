@@ -5,7 +5,8 @@ from controller.inputs import Inputs
 from controller.supervision import health as safety
 from controller.supervision import modes
 from controller.supervision.permission import Situation, allowed, refusal
-from rolling_panda.messages import commands as intents
+from rolling_panda import commands as intents
+from rolling_panda.commands import COMMAND_OF
 
 WELL = replace(
     safety.health(Inputs(), None, 0.0),
@@ -30,7 +31,7 @@ def test_a_ready_robot_with_work_may_start_and_go_home() -> None:
 
 
 def test_each_thing_that_is_missing_is_said() -> None:
-    start, home = intents.Start(user="ada"), intents.Home(user="ada")
+    start, home = COMMAND_OF[intents.Start], COMMAND_OF[intents.Home]
     assert refusal(start, 0.0, situation(waits="no point is accepted")) == "no point is accepted"
     assert refusal(home, 0.0, situation(waits="no point is accepted")) == ""
     assert refusal(start, 0.0, situation(busy="the blades are closing")) == "the blades are closing"

@@ -9,8 +9,8 @@ from controller.core import Controller
 from controller.ledger.journal import PreviewRow
 from controller.planning import preview as preview_module
 from controller.planning.preview_plan import PreviewRequest
+from rolling_panda import commands as intents
 from rolling_panda.config import RobotConfig
-from rolling_panda.messages import commands as intents
 from rolling_panda.messages.perception import Capsule
 from tests.support.controller_at_work import CONFIG, entry, point
 from tests.support.previewed import ROLLOUT, Previewed

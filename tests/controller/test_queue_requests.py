@@ -1,6 +1,6 @@
 """What the controller's log says of what operators ask."""
 
-from rolling_panda.messages import commands as intents
+from rolling_panda import commands as intents
 from tests.controller.test_core_work import point, robot
 
 

@@ -6,9 +6,9 @@ import pytest
 from controller.planning import preview as preview_module
 from controller.planning.preview_plan import PreviewRequest
 from controller.planning.rollout import ActuatorLag, Rollout
+from rolling_panda import commands as intents
 from rolling_panda.config import RobotConfig
 from rolling_panda.errors import ControlError
-from rolling_panda.messages import commands as intents
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.model.differential_drive import NXI
 from rolling_panda.model.robot import ARM_Q, RobotModel

@@ -6,7 +6,7 @@ from msgspec.structs import replace
 
 from controller.ledger.journal import RequestRow, TicketRow
 from controller.ledger.session_report import SessionReportBuilder
-from rolling_panda.messages import commands as intents
+from rolling_panda import commands as intents
 from rolling_panda.messages.supervision import SessionReport
 from rolling_panda.messages.types import Answer
 from rolling_panda.transport.codec import StrictDecoder, encode
@@ -111,7 +111,7 @@ def test_who_says_later_how_a_cut_ended_takes_the_robot_no_time():
 
 
 def test_refusals_and_changes_of_control_are_told_and_the_newest_go_over_the_wire():
-    rows = [(1.0, asked(intents.TakeControl(user="bob", confirmed=True)))]
+    rows = [(1.0, asked(intents.TakeControl(user="bob", confirm=True)))]
     rows += [(2.0 + n, asked(intents.Start(user="bob"), f"no point is accepted {n}")) for n in range(150)]
     told = report(*rows)
     assert [(change.user, change.what) for change in told.control] == [("bob", "took control")]

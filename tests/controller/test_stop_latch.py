@@ -1,8 +1,8 @@
 import msgspec
 
 from controller.supervision.stop_latch import StopLatch
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
-from rolling_panda.messages import commands as intents
 from tests.support.fake_wire import bridge_state
 
 BRIDGE = bridge_state()

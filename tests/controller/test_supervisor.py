@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from controller.inputs import Sample
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda import topics
-from rolling_panda.messages import commands as intents
 from rolling_panda.messages.robot import RejectionCount
 from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
 from rolling_panda.model.robot import ARM_Q

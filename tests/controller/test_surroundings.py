@@ -8,9 +8,9 @@ from controller.core import Controller
 from controller.inputs import Sample
 from controller.motion.surroundings import Surroundings
 from controller.whole_body.collision import CollisionModel
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
-from rolling_panda.messages import commands as intents
 from rolling_panda.messages.perception import Capsule, Obstacles
 from rolling_panda.messages.supervision import TeleopTarget
 from rolling_panda.model.robot import RobotModel, pose_message

@@ -5,8 +5,8 @@ import pytest
 
 from controller.inputs import Sample
 from controller.work.survey import looked_again
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
-from rolling_panda.messages import commands as intents
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.model.robot import ARM_Q, RobotModel
 from tests.support.controller_at_work import CONFIG, finish, point, robot, run_until
@@ -118,9 +118,9 @@ def test_a_place_left_open_is_looked_at_from_both_sides_and_from_before_it():
     tell(r, place)
     r.step()
     assert r.ask(intents.Arm(user="ada")).ok
-    unknown = r.ask(intents.Survey(user="ada", vine=1, spur=7))
+    unknown = r.ask(intents.LookAgain(user="ada", vine=1, spur=7))
     assert not unknown.ok and "nothing is left open at vine 1, spur 7" in unknown.reason
-    assert r.ask(intents.Survey(user="ada", vine=1, spur=2)).ok
+    assert r.ask(intents.LookAgain(user="ada", vine=1, spur=2)).ok
     stood = []
     run_until(r, lambda s: s is not None and s.mode == "AUTO", 2.0)
     while r.state.mode == "AUTO":

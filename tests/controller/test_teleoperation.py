@@ -9,8 +9,8 @@ from controller.config import ControllerConfig
 from controller.core import Controller
 from controller.inputs import Sample
 from controller.motion.teleoperation import Teleoperation, latency_speed_scale
+from rolling_panda import commands as intents
 from rolling_panda.config import RobotConfig
-from rolling_panda.messages import commands as intents
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
 from rolling_panda.model.robot import pose_message

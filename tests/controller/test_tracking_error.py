@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from controller.motion.tracking_error import TrackingErrorMonitor
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
-from rolling_panda.messages import commands as intents
 from tests.support.controller_at_work import point, working
 
 

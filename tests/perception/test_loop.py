@@ -7,8 +7,8 @@ import pytest
 from perception.config import PerceptionConfig
 from perception.loop import Loop, Worker
 from rolling_panda import messages as m
+from rolling_panda.commands import SetRule
 from rolling_panda.errors import MessageError
-from rolling_panda.messages.commands import SetRule
 from rolling_panda.messages.perception import Capsule, PointCrop
 from rolling_panda.topics import CLOSE_UP, CROPS, EVENT, HEARTBEAT, OBSTACLES, PLANT, POINTS
 from rolling_panda.transport.zenoh import Slot

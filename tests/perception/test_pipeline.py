@@ -18,8 +18,8 @@ from perception.segmentation.segmenter import LabelImageSegmenter
 from perception.skeleton.topology import perceive_plant
 from perception.tracking.tracker import TrackerUpdate
 from rolling_panda import messages as m
+from rolling_panda.commands import AddPoint, AddPointInImage, EvaluateRule, MovePoint, SetRule, UndoRule
 from rolling_panda.errors import MessageError
-from rolling_panda.messages.commands import AddPoint, AddPointInImage, EvaluateRule, MovePoint, SetRule, UndoRule
 from rolling_panda.messages.perception import point_digest
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.transport.codec import StrictDecoder, encode

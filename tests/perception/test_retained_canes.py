@@ -25,7 +25,7 @@ from perception.skeleton.fragments import CANE
 from perception.tracking.retained_canes import RetainedCanes
 from perception.tracking.tracker import Proposal
 from rolling_panda import messages as m
-from rolling_panda.messages.commands import SetRule
+from rolling_panda.commands import SetRule
 from rolling_panda.messages.robot import Intrinsics
 from rolling_panda.model.robot import RobotModel
 

@@ -11,7 +11,7 @@ from recorder.player import Player
 from recorder.recording import RecordedMessage, Recording
 from rolling_panda import messages as m
 from rolling_panda import topics
-from rolling_panda.messages.commands import SeekReplay
+from rolling_panda.commands import SeekReplay
 from rolling_panda.topics import Topic
 
 BEGAN = 1.8e9

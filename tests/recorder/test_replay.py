@@ -7,10 +7,10 @@ import pytest
 
 from recorder.player import Player
 from recorder.replay import Replay
+from rolling_panda import commands as intents
 from rolling_panda import topics
+from rolling_panda.commands import SeekReplay
 from rolling_panda.config import TransportConfig
-from rolling_panda.messages import commands as intents
-from rolling_panda.messages.commands import SeekReplay
 from rolling_panda.transport.zenoh import Transport
 from tests.recorder.test_player import event, joints, recording
 from tests.support.waiting import until

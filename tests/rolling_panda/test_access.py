@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from bridge.sim.robot.trace import read
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.config import TransportConfig
 from rolling_panda.errors import InputError, ServiceError, TransportError
-from rolling_panda.messages import commands as intents
 from rolling_panda.runtime.launch import child_environment, python_command
 from rolling_panda.topics import BRIDGE, INTENT, JOINTS, MOTION, RELEASE, SERVICES, STOP, TOKEN, TOPICS, key
 from rolling_panda.transport.access import BEARERS, CALLERS, access_control

@@ -1,9 +1,9 @@
 """The table of what is on the wire is complete and consistent."""
 
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda import topics as t
-from rolling_panda.messages import commands as intents
-from rolling_panda.messages.commands import PlantRequest
+from rolling_panda.commands import PlantRequest
 
 
 def test_names_are_unique_and_keys_carry_robot_and_version() -> None:

@@ -11,10 +11,10 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.config import TransportConfig
 from rolling_panda.errors import ServiceError, TransportError
-from rolling_panda.messages import commands as intents
 from rolling_panda.messages.robot import CameraFrame, Intrinsics
 from rolling_panda.topics import CAMERA, HEARTBEAT, INTENT, MOTION, Service, Topic, key
 from rolling_panda.transport.codec import StrictDecoder

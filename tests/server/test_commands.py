@@ -5,11 +5,11 @@ import time
 import msgspec
 import pytest
 
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda import topics
+from rolling_panda.commands import SeekReplay
 from rolling_panda.errors import ServiceError
-from rolling_panda.messages import commands as intents
-from rolling_panda.messages.commands import SeekReplay
 from rolling_panda.messages.supervision import (
     BaseVelocity,
     PlannedPoint,
@@ -82,10 +82,10 @@ def client(server):
         ("resume", None, intents.Resume(user="ann")),
         ("home", None, intents.Home(user="ann")),
         ("survey", {"distance": 2.5}, intents.Survey(user="ann", distance=2.5)),
-        ("look-again", {"vine": 2, "spur": 3}, intents.Survey(user="ann", vine=2, spur=3)),
+        ("look-again", {"vine": 2, "spur": 3}, intents.LookAgain(user="ann", vine=2, spur=3)),
         ("acknowledge", None, intents.Acknowledge(user="ann")),
         ("reset", {"reason": "checked"}, intents.Reset(user="ann", reason="checked")),
-        ("control/take", {"confirm": True}, intents.TakeControl(user="ann", confirmed=True)),
+        ("control/take", {"confirm": True}, intents.TakeControl(user="ann", confirm=True)),
         ("control/take", {}, intents.TakeControl(user="ann")),
         ("control/request", None, intents.RequestControl(user="ann")),
         ("control/grant", None, intents.GrantControl(user="ann")),

@@ -4,8 +4,7 @@ import pytest
 
 from rolling_panda import messages as m
 from rolling_panda import topics
-from rolling_panda.errors import ServiceError
-from rolling_panda.messages.commands import (
+from rolling_panda.commands import (
     AddPoint,
     AddPointInImage,
     EvaluateRule,
@@ -14,6 +13,7 @@ from rolling_panda.messages.commands import (
     SetRule,
     UndoRule,
 )
+from rolling_panda.errors import ServiceError
 from rolling_panda.messages.perception import PointCrop
 from tests.support.fake_wire import FakeWire, controller_state, pruning_point, pruning_points
 from tests.support.running_server import eventually, running_server

@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 from controller.planning.rollout import Rollout
+from rolling_panda import commands as intents
 from rolling_panda.config import RobotConfig
-from rolling_panda.messages import commands as intents
 from tests.support.controller_at_work import CONFIG, robot
 
 ROLLOUT = Rollout(CONFIG, RobotConfig())

@@ -9,10 +9,10 @@ import pytest
 
 from controller.ledger.check import verify
 from controller.ledger.start import restored
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.config import TransportConfig
 from rolling_panda.errors import ServiceError
-from rolling_panda.messages import commands as intents
 from rolling_panda.runtime.launch import child_environment
 from rolling_panda.topics import CONTROLLER, INTENT, POINTS
 from rolling_panda.transport.zenoh import Transport
@@ -27,7 +27,7 @@ import sys, threading
 from pathlib import Path
 from controller.interface import Outputs
 from controller.config import ControllerConfig
-from controller.ledger.journal import Journal, RequestRow
+from controller.ledger.journal import EventLogger, Journal, RequestRow
 from controller.ledger.store import Ledger
 from controller.ledger.start import restored
 from controller.ledger.writer import LedgerWriter
@@ -45,7 +45,7 @@ class Desk:
         self.journal = Journal()
         self.queue = PointQueue(ControllerConfig(), self.journal)
         self.queue.restore(rows)
-        self.operator = QueueRequests(self.queue)
+        self.handlers = QueueRequests(self.queue, EventLogger(self.journal)).handlers()
         self.cuts = 0
         self.intent = None
 
@@ -54,7 +54,7 @@ class Desk:
         return self.journal.number
 
     def answer(self, intent, now):
-        refused = self.operator.points(intent)
+        refused = self.handlers[type(intent)](intent, 0.0)
         self.journal.add("request", intent.user, RequestRow(asked=intent, ok=not refused, reason=refused, mode="READY"))
         return m.Answer(ok=not refused, reason=refused)
 

@@ -2,8 +2,8 @@
 
 import pytest
 
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
-from rolling_panda.messages import commands as intents
 from tests.support.worlds.closed_loop import ClosedLoop
 
 #: Far enough from the end of the row for the base to come before it (m, odom).
@@ -29,7 +29,7 @@ def test_what_was_unclear_is_settled_by_looking_again(seed: int) -> None:
         assert open_places, "this row has nothing unclear: take another seed"
         place = open_places[0]
         assert loop.ask(intents.Arm(user="ada")).ok
-        assert loop.ask(intents.Survey(user="ada", vine=place.vine, spur=place.spur)).ok
+        assert loop.ask(intents.LookAgain(user="ada", vine=place.vine, spur=place.spur)).ok
         assert loop.run_until(lambda: loop.controller.mode == "READY", 60.0), loop.controller.mode
         told = loop.inputs.points.message
         assert (place.vine, place.spur) not in {(each.vine, each.spur) for each in unclear(told)}

@@ -22,7 +22,7 @@ from hypothesis.stateful import (
 
 from controller.config import ControllerConfig
 from controller.ledger.check import reading, verify
-from controller.ledger.journal import Journal, LedgerState, RequestRow, TicketRow
+from controller.ledger.journal import EventLogger, Journal, LedgerState, RequestRow, TicketRow
 from controller.ledger.store import Entry, Ledger, read
 from controller.work.point_queue import PointQueue
 from controller.work.queue_requests import QueueRequests
@@ -58,7 +58,7 @@ class Robot:
         self.journal = Journal()
         self.queue = PointQueue(ControllerConfig(), self.journal)
         self.queue.restore(rows)
-        self.operator = QueueRequests(self.queue)
+        self.handlers = QueueRequests(self.queue, EventLogger(self.journal)).handlers()
         self.see()
 
     def see(self):
@@ -73,7 +73,7 @@ class Robot:
         self.journal.observe(LedgerState(self.journal.number), 0.0)
 
     def answer(self, intent):
-        refused = self.operator.points(intent)
+        refused = self.handlers[type(intent)](intent, 0.0)
         self.journal.add("request", intent.user, RequestRow(asked=intent, ok=not refused, reason=refused, mode="READY"))
         self.record()
         return m.Answer(ok=not refused, reason=refused)

@@ -21,9 +21,9 @@ from controller.planning.work_plan import WorkPlan
 from perception.config import PerceptionConfig
 from perception.pipeline import Perception
 from perception.segmentation.segmenter import choose_segmenter
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig, load_section
-from rolling_panda.messages import commands as intents
 from rolling_panda.messages.perception import CloseUpResult, Obstacles
 from rolling_panda.messages.supervision import Person, Presence
 from rolling_panda.model.differential_drive import Array

@@ -20,9 +20,9 @@ from controller.config import ControllerConfig
 from controller.core import Controller
 from controller.inputs import Sample
 from controller.interface import Outputs, StepInputs
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
-from rolling_panda.messages import commands as intents
 from rolling_panda.messages.perception import Obstacles
 from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
 from rolling_panda.model.robot import RobotModel, configuration, pose_message

@@ -10,8 +10,8 @@ from controller.core import Controller
 from controller.inputs import Sample
 from controller.interface import Outputs, StepInputs
 from controller.ledger.journal import LedgerState
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
-from rolling_panda.messages import commands as intents
 from rolling_panda.messages.perception import Capsule, CloseUpRequest, CloseUpResult, Obstacles
 from rolling_panda.messages.supervision import Person, Presence, TeleopTarget
 from rolling_panda.model.differential_drive import NXI, Array

@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rolling_panda.messages import commands as intents
+from rolling_panda import commands as intents
+from rolling_panda.commands import COMMAND_OF
 
 #: A lease lives so long, a hold so long (s); and a period more.
 LEASE_S, HOLD_S, PERIOD_S = 1.0, 0.15, 0.011
@@ -187,7 +188,7 @@ class Judge:
         if ok:
             self.heard_at[intent.user] = world.now
             assert intent.role != "viewer", f"a viewer may {intent}"
-            if isinstance(intent, intents.OF_HOLDER) and before != "FAULT":
+            if COMMAND_OF[type(intent)].control and before != "FAULT":
                 assert holder is None or holder.user == intent.user, f"{intent} while {holder} holds control"
             if isinstance(intent, intents.Acknowledge) and before == "FAULT":
                 assert intent.role == "supervisor"

@@ -19,9 +19,9 @@ from controller.core import Controller
 from controller.inputs import Sample
 from controller.interface import StepInputs
 from controller.ledger.journal import LedgerState
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
-from rolling_panda.messages import commands as intents
 from rolling_panda.messages.perception import Obstacles
 from rolling_panda.messages.supervision import BaseVelocity, Person, Presence, TeleopTarget
 from rolling_panda.runtime.latest_file import KeptValue
@@ -201,7 +201,7 @@ class RandomWorld:
             if mode == "READY":
                 self.prepare(user)
             if not self.answer(steps[mode](user=user)) and self.chance.random() < 0.2:
-                self.answer(intents.TakeControl(user=user, confirmed=True))
+                self.answer(intents.TakeControl(user=user, confirm=True))
 
     def prepare(self, user):
         """Look at what nobody knows, accept what is there, and drive on to new points where all is done."""
@@ -243,7 +243,7 @@ class RandomWorld:
                 intents.ResolvePoint(
                     user=user, point_id=point, outcome=chance.choice(("DONE", "FAILED_NOT_CUT")), reason="looked"
                 ),
-                intents.AcceptAll(user=user), intents.TakeControl(user=user, confirmed=chance.random() < 0.5),
+                intents.AcceptAll(user=user), intents.TakeControl(user=user, confirm=chance.random() < 0.5),
                 intents.RequestControl(user=user), intents.GrantControl(user=user), intents.ReturnControl(user=user),
             ]
         )  # fmt: skip

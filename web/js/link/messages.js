@@ -5,7 +5,7 @@
 export const PROCESSES = Object.freeze(["bridge", "controller", "perception", "server"]);
 
 /** Intents that need control, except for acknowledging a fault. */
-export const OF_HOLDER = Object.freeze(["Arm", "Start", "Survey", "Resume", "Home", "Acknowledge"]);
+export const OF_HOLDER = Object.freeze(["Arm", "Start", "Survey", "LookAgain", "Resume", "Home", "Acknowledge"]);
 
 export const TEXT_MAX_LENGTH = 500;
 

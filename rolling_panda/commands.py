@@ -1,6 +1,13 @@
-"""Commands of an operator: to the controller, to perception, to a replay."""
+"""What an operator can ask for: the message of each command, and one table, `COMMANDS`, that says the rest about it.
 
-from typing import Annotated, Final, Literal
+The REST routes with their bodies, the permission of each command, the log, and the page's and the documents' lists are
+made from the table. The controller's handlers are in `controller/core.py`.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import degrees
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Union
 
 from msgspec import Meta, Struct
 
@@ -11,13 +18,16 @@ from rolling_panda.messages.types import (
     Digest,
     Fraction,
     Message,
+    Mode,
     Name,
     NonNegative,
+    Process,
     Role,
     Text,
     UnitVector3,
     Vector3,
 )
+from rolling_panda.mode_table import Event
 
 
 class SeekReplay(Message, frozen=True, kw_only=True):
@@ -196,7 +206,7 @@ class ResolvePoint(Intent, frozen=True, kw_only=True):
 
     point_id: Name
     outcome: Literal["DONE", "FAILED_NOT_CUT"]
-    reason: Annotated[str, Meta(min_length=1, max_length=500)]
+    reason: Annotated[str, Meta(min_length=1, max_length=400)]
 
 
 class AcceptAll(Intent, frozen=True, kw_only=True):
@@ -280,17 +290,25 @@ class Start(Intent, frozen=True, kw_only=True):
 
 
 class Survey(Start, frozen=True, kw_only=True):
-    """READY → AUTO: drive along the row with the arm in its survey posture. Nothing is cut.
+    """READY → AUTO. Drive along the row with the camera on the vines. It cuts nothing.
 
     Attributes:
-        distance: Length of the survey (m).
-        vine: With `spur`: number of the vine of an undecided site. Only this site is surveyed, from both sides.
-        spur: Number of the spur of that site.
+        distance: Distance ahead along the row (m).
     """
 
     distance: Annotated[float, Meta(ge=0.1, le=500.0)] = 4.0
-    vine: Annotated[int, Meta(ge=0, le=100000)] = 0
-    spur: Annotated[int, Meta(ge=0, le=100000)] = 0
+
+
+class LookAgain(Start, frozen=True, kw_only=True):
+    """READY → AUTO. Drive to an undecided site and take images from both its sides. It cuts nothing.
+
+    Attributes:
+        vine: Vine of the site.
+        spur: Spur of the site.
+    """
+
+    vine: Annotated[int, Meta(ge=1, le=100000)]
+    spur: Annotated[int, Meta(ge=0, le=100000)]
 
 
 class Pause(Intent, frozen=True, kw_only=True):
@@ -325,10 +343,10 @@ class TakeControl(Intent, frozen=True, kw_only=True):
     """Take control of the robot's motion. If somebody else has control, the robot stops first.
 
     Attributes:
-        confirmed: Required to take control from somebody else.
+        confirm: Required to take control from somebody else.
     """
 
-    confirmed: bool = False
+    confirm: bool = False
 
 
 class RequestControl(Intent, frozen=True, kw_only=True):
@@ -343,31 +361,133 @@ class ReturnControl(Intent, frozen=True, kw_only=True):
     """Give up control. Motion is paused."""
 
 
-AnyIntent = (
-    Arm
-    | AcceptPoint
-    | RejectPoint
-    | ReconsiderPoint
-    | RestoreAccepted
-    | ResolvePoint
-    | AcceptAll
-    | MoveInQueue
-    | ResetOrder
-    | SetApproach
-    | RequestPreview
-    | ApprovePreview
-    | RequirePreview
-    | Start
-    | Survey
-    | Pause
-    | Resume
-    | Home
-    | Acknowledge
-    | Reset
-    | TakeControl
-    | RequestControl
-    | GrantControl
-    | ReturnControl
+#: Handles a command at a monotonic time (s). Returns why it is refused; empty when it is done.
+Handler = Callable[[Any, float], str]
+Handlers = dict[type[Struct], Handler]
+
+#: What must hold for a command besides its mode; `controller/supervision/permission.py` checks each.
+Condition = Literal[
+    "fresh sensors", "bridge obeys", "server", "at rest", "workable point", "approved preview", "perception", "watched"
+]
+#: Section of the REST interface.
+Tag = Literal["mode", "points", "preview", "control"]
+
+
+@dataclass(frozen=True)
+class Command:
+    """One row: who may ask for what, when, and where.
+
+    Attributes:
+        message: Type of the request. Its docstring and its own fields describe the route and its body.
+        tag: Section of the REST interface.
+        path: Below `/api`; a field in braces is part of the path. Empty where another route asks for it.
+        log: Text for the log when it is done, as a template of the message's fields or a function of the message.
+            Empty where the handler logs, or a change of mode.
+        role: The least role.
+        process: That answers.
+        control: Whether it moves the robot or leads to it, and so needs control.
+        event: Event of the mode machine that it causes, which says in which modes it is possible.
+        modes: Modes in which it is possible where it causes no event; empty for all.
+        conditions: What must hold besides.
+    """
+
+    message: type[Intent] | type[PlantRequest]
+    tag: Tag
+    path: str = ""
+    log: str | Callable[[Any], str] = ""
+    role: Role = "operator"
+    process: Process = "controller"
+    control: bool = False
+    event: Event | None = None
+    modes: tuple[Mode, ...] = ()
+    conditions: tuple[Condition, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Name of the command: that of its message."""
+        return self.message.__name__
+
+    def text(self, intent: Struct) -> str:
+        """The text for the log."""
+        if callable(self.log):
+            return self.log(intent)
+        return self.log.format_map({name: getattr(intent, name) for name in intent.__struct_fields__})
+
+
+def _approach_text(intent: SetApproach) -> str:
+    turn = "as the search finds it" if intent.azimuth is None else f"turned by {degrees(intent.azimuth):.0f}°"
+    return f"set the approach of {intent.point_id}: {turn}"
+
+
+def _resolved_text(intent: ResolvePoint) -> str:
+    return f"inspected {intent.point_id}: {'cut' if intent.outcome == 'DONE' else 'not cut'}: {intent.reason}"
+
+
+_MOTION: Final[tuple[Condition, ...]] = ("fresh sensors", "bridge obeys", "server", "at rest")
+_WATCHED_MOTION: Final[tuple[Condition, ...]] = (*_MOTION, "perception", "watched")
+
+COMMANDS: Final[tuple[Command, ...]] = (
+    Command(Arm, "mode", "/arm", control=True, event=Event.ARM, conditions=("fresh sensors", "bridge obeys")),
+    Command(
+        Start,
+        "mode",
+        "/start",
+        control=True,
+        event=Event.START,
+        conditions=(*_MOTION, "workable point", "approved preview", "perception", "watched"),
+    ),
+    Command(Survey, "mode", "/survey", control=True, event=Event.START, conditions=_WATCHED_MOTION),
+    Command(LookAgain, "mode", "/look-again", control=True, event=Event.START, conditions=_WATCHED_MOTION),
+    Command(Pause, "mode", "/pause", event=Event.PAUSE),
+    Command(Resume, "mode", "/resume", control=True, event=Event.RESUME),
+    Command(Home, "mode", "/home", "home", control=True, modes=("READY",), conditions=_MOTION),
+    Command(Acknowledge, "mode", "/acknowledge", control=True, event=Event.ACKNOWLEDGE),
+    Command(Reset, "mode", "/reset", role="supervisor", event=Event.RESET),
+    Command(AcceptAll, "points", "/points/accept-all"),
+    Command(AcceptPoint, "points", "/points/{point_id}/accept", "accepted {point_id}, revision {revision}"),
+    Command(
+        RejectPoint,
+        "points",
+        "/points/{point_id}/reject",
+        lambda asked: f"rejected {asked.point_id}{f': {asked.reason}' if asked.reason else ''}",
+    ),
+    Command(ReconsiderPoint, "points", "/points/{point_id}/reconsider", "undid the decision about {point_id}"),
+    Command(ResolvePoint, "points", "/points/{point_id}/resolve", _resolved_text),
+    Command(RestoreAccepted, "points", log="undid the rule, with the acceptances that it had made void"),
+    Command(
+        MoveInQueue,
+        "points",
+        "/points/{point_id}/work-before",
+        lambda asked: f"moved {asked.point_id} {f'before {asked.before}' if asked.before else 'to the end'}",
+    ),
+    Command(AddPoint, "points", "/points/by-hand", process="perception"),
+    Command(AddPointInImage, "points", "/points/by-hand-in-image", process="perception"),
+    Command(MovePoint, "points", "/points/{point_id}/move", process="perception"),
+    Command(SetApproach, "points", "/points/{point_id}/approach", _approach_text),
+    Command(ResetOrder, "points", "/order/planners", "restored the order of the plan"),
+    Command(
+        RequestPreview,
+        "preview",
+        "/preview",
+        lambda asked: f"requested a preview of {asked.point_id or 'the work'}",
+    ),
+    Command(ApprovePreview, "preview", "/preview/approve", "approved the preview {preview_hash:.8}"),
+    Command(
+        RequirePreview,
+        "preview",
+        "/preview/required",
+        lambda asked: "requires a preview before each cut" if asked.required else "requires no previews any more",
+    ),
+    Command(TakeControl, "control", "/control/take"),
+    Command(RequestControl, "control", "/control/request"),
+    Command(GrantControl, "control", "/control/grant"),
+    Command(ReturnControl, "control", "/control/return"),
 )
-#: Commands for the holder of control. A fault is acknowledged without control.
-OF_HOLDER: Final = (Arm, Start, Survey, Resume, Home, Acknowledge)
+COMMAND_OF: Final[dict[type[Struct], Command]] = {command.message: command for command in COMMANDS}
+#: Messages to the controller, told apart by their tags.
+INTENTS: Final = tuple(command.message for command in COMMANDS if issubclass(command.message, Intent))
+
+if TYPE_CHECKING:
+    AnyIntent = Intent
+else:
+    AnyIntent = Union[INTENTS]  # noqa: UP007
