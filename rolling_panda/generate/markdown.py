@@ -7,9 +7,11 @@ from typing import Annotated, Any, Literal, get_args, get_origin
 import msgspec
 
 from rolling_panda import messages
+from rolling_panda.commands import COMMANDS, Command
 from rolling_panda.errors import MessageError
 from rolling_panda.generate.description import alias_name, aliases, describe, is_union, reachable, union_members
 from rolling_panda.messages import page as page_messages
+from rolling_panda.mode_table import ROWS
 from rolling_panda.topics import SERVICES, TOPICS
 
 _BLOCK = re.compile(r"(<!-- generated: ([a-z-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
@@ -87,6 +89,27 @@ def services_table() -> str:
         for service in SERVICES
     ]
     return table(("service", "requests", "answered by", "timeout", "what"), rows)
+
+
+def commands_table() -> str:
+    """One row for each command."""
+    rows = [
+        (
+            f"[{command.name}](#{command.name.lower()})",
+            f"`POST /api{command.path}`" if command.path else "–",
+            "control" if command.control else command.role,
+            ", ".join(_modes(command)) or "all",
+            ", ".join(command.conditions) or "–",
+        )
+        for command in COMMANDS
+    ]
+    return table(("command", "route", "least right", "modes", "conditions"), rows)
+
+
+def _modes(command: Command) -> tuple[str, ...]:
+    if command.event is None:
+        return command.modes
+    return tuple(row.before for row in ROWS if row.event is command.event)
 
 
 def types_table() -> str:
@@ -199,6 +222,7 @@ def table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
 BLOCKS: dict[str, Callable[[], str]] = {
     "topics": topics_table,
     "services": services_table,
+    "commands": commands_table,
     "types": types_table,
     "messages": wire_messages,
     "page-messages": page_message_sections,

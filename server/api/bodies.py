@@ -14,6 +14,7 @@ from fastapi import Path
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model, field_validator, model_validator
 
 from rolling_panda.commands import Intent, PlantRequest
+from rolling_panda.generate.description import describe
 from rolling_panda.messages.types import Role
 
 #: As `rolling_panda.messages.Name`.
@@ -61,9 +62,8 @@ def fields_of(message: type[msgspec.Struct], in_path: Collection[str] = ()) -> C
         message: Type that the request becomes. What it says of the caller is not read.
         in_path: Fields that are part of the path; each is the name of a point.
     """
-    own = [
-        field for field in msgspec.structs.fields(message) if field.name not in _CALLER and field.name not in in_path
-    ]
+    about = describe(message)
+    own = [field for field in about.fields if field.name not in _CALLER and field.name not in in_path]
 
     def read(**given: Any) -> dict[str, Any]:
         body: BaseModel | None = given.pop("body", None)
@@ -73,9 +73,13 @@ def fields_of(message: type[msgspec.Struct], in_path: Collection[str] = ()) -> C
     parameters = [inspect.Parameter(name, keyword, annotation=Annotated[str, POINT_ID]) for name in in_path]
     if own:
         fields: dict[str, Any] = {
-            field.name: (_strict(field.type), ... if field.required else field.default) for field in own
+            field.name: (
+                _strict(field.hint),
+                Field(... if field.required else field.default, description=field.about or None),
+            )
+            for field in own
         }
-        model = create_model(message.__name__, __base__=_JsonTuples, __doc__=inspect.getdoc(message), **fields)
+        model = create_model(message.__name__, __base__=_JsonTuples, __doc__=about.about, **fields)
         parameters.append(inspect.Parameter("body", keyword, annotation=model))
     read.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     return read

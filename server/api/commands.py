@@ -4,7 +4,6 @@ A script signs in as a page does: `POST /api/sign-in` with a single-use token, k
 header with the server's own address on every POST. `POST /api/invite` makes the token of another session.
 """
 
-import inspect
 import re
 import time
 from collections.abc import Callable
@@ -18,6 +17,7 @@ from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.commands import COMMANDS, Command, PlantRequest, SeekReplay
 from rolling_panda.errors import ServiceError
+from rolling_panda.generate.description import describe
 from rolling_panda.messages.supervision import BaseVelocity
 from server.api import bodies as body
 from server.api.bodies import fields_of
@@ -110,5 +110,5 @@ def _add(router: APIRouter, robot: RobotContext, command: Command) -> None:
         name=command.name,
         tags=[command.tag],
         responses=COMMAND,
-        description=inspect.getdoc(command.message),
+        description=describe(command.message).about,
     )(ask)
