@@ -252,8 +252,8 @@ class BridgeCore:
         self._watch_button(now)
         tripped = self._watch(now)
         stopped = bool(self._latch.stop_id)
-        share = 0.0 if stopped or self._faults.current else self._watchdog.trust(now)
-        xi = self._limiter.step(share * self._desired, self._measured.position[2:])
+        speed_scale = 0.0 if stopped or self._faults.current else self._watchdog.trust(now)
+        xi = self._limiter.step(speed_scale * self._desired, self._measured.position[2:])
         blades = not (stopped or tripped)
         releases = self._faults.releases
         self.robot.write(Setpoint(xi, blades, self._fence.epoch, self._validator.sequence, self._clock, releases))

@@ -349,11 +349,11 @@ class ControlBox:
         acceleration = (desired - self._state.dq_d) / TICK_S
         jerk = (acceleration - self._state.ddq_d) / TICK_S
         for i, (value, (name, kind, limit)) in enumerate(zip((desired, acceleration, jerk), _LIMITS, strict=True)):
-            share = np.abs(value) / limit
-            if not np.all(share <= _TOLERANCE):
-                self._reflex(kind, f"{name} is {np.max(share):.3f} of what joint {int(np.argmax(share)) + 1} may have")
+            ratio = np.abs(value) / limit
+            if not np.all(ratio <= _TOLERANCE):
+                self._reflex(kind, f"{name} is {np.max(ratio):.3f} of what joint {int(np.argmax(ratio)) + 1} may have")
                 return False
-            self._worst[i] = max(self._worst[i], float(share.max()))
+            self._worst[i] = max(self._worst[i], float(ratio.max()))
         return True
 
     def _reflex(self, kind: int, reason: str) -> None:

@@ -189,7 +189,7 @@ def _vector(x: float, z: float) -> object:
     return ros.make("geometry_msgs/msg/Vector3", x=x, y=0.0, z=z)
 
 
-def battery(header: object, share: float) -> object:
+def battery(header: object, charge: float) -> object:
     """The maker's battery message with a charge (0…1)."""
     return ros.make(
         ros.BATTERY_STATE,
@@ -200,7 +200,7 @@ def battery(header: object, share: float) -> object:
         charge=math.nan,
         capacity=math.nan,
         design_capacity=100.0,
-        percentage=share,
+        percentage=charge,
         power_supply_status=2,
         power_supply_health=0,
         power_supply_technology=1,

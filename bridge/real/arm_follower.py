@@ -78,5 +78,5 @@ class ArmFollower:
         return self._limiter.step(self._desired, q)[ARM_XI]
 
     def _goal(self, now: float) -> Array:
-        share = min(1.0, (now - self._began) / self._span)
-        return self._start + share * (self._target - self._start)
+        fraction = min(1.0, (now - self._began) / self._span)
+        return self._start + fraction * (self._target - self._start)

@@ -83,8 +83,8 @@ class BaseEstimate:
         x, y, phi = self._in_odom((rolled_x, rolled_y, rolled_phi))
         x_said, y_said, phi_said = self._carried(odometry, at)
         wrong = x_said - x, y_said - y, math.remainder(phi_said - phi, math.tau)
-        share = 1.0 if max(map(abs, wrong)) > _ELSEWHERE else _BELIEVED
-        x, y, turn = x + share * wrong[0], y + share * wrong[1], self._frame[2] + share * wrong[2]
+        gain = 1.0 if max(map(abs, wrong)) > _ELSEWHERE else _BELIEVED
+        x, y, turn = x + gain * wrong[0], y + gain * wrong[1], self._frame[2] + gain * wrong[2]
         c, s = math.cos(turn), math.sin(turn)
         self._frame = (x - c * rolled_x + s * rolled_y, y - s * rolled_x - c * rolled_y, turn)
 

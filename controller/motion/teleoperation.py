@@ -84,8 +84,8 @@ class Teleoperation:
     def _driven(self, base: BaseVelocity, speed_scale: float) -> tuple[float, float]:
         """Forward velocity (m/s) and yaw rate (rad/s), slowed alike until no wheel is too fast to brake in time."""
         fastest = abs(base.linear) + abs(base.angular) * self._drive.half_track
-        share = speed_scale * min(1.0, self._config.teleop_base_speed / fastest) if fastest > 0.0 else 0.0
-        return share * base.linear, share * base.angular
+        scale = speed_scale * min(1.0, self._config.teleop_base_speed / fastest) if fastest > 0.0 else 0.0
+        return scale * base.linear, scale * base.angular
 
 
 def latency_speed_scale(round_trip_s: float) -> float:

@@ -156,8 +156,8 @@ class ArmPathPlanner:
         """Whether the arm can go straight from a to b; looks at the middle first, where most ways end."""
         count = int(np.ceil(float(np.abs(b - a).max()) / _LOOK))
         needed = self._limits.clearance if least is None else least
-        for share in _halving(count):
-            if self._least(place, a + share * (b - a))[0] < needed:
+        for fraction in _halving(count):
+            if self._least(place, a + fraction * (b - a))[0] < needed:
                 return False
         return True
 
@@ -192,7 +192,7 @@ class _Tree:
 
 
 def _halving(count: int) -> Array:
-    """The shares 1/count … 1, the end first, then middles of what is left."""
+    """The fractions 1/count … 1: the end first, then by bisection."""
     if count <= 1:
         return np.array([1.0])
     order = np.arange(1, count + 1)

@@ -138,15 +138,15 @@ class BasePlanner:
         return None
 
     def _sampled(
-        self, start: Array, first: Profile, drive: Profile, second: Profile, share_in: float, share_out: float
+        self, start: Array, first: Profile, drive: Profile, second: Profile, overlap_in: float, overlap_out: float
     ) -> BaseMotion:
-        """The wheels' turning in each period. What does not overlap begins on a whole period."""
+        """Rotation of the wheels in each period. A segment without overlap begins on a whole period."""
         dt = self._limits.dt
-        lead = share_in * min(first.duration, drive.duration / 2.0)
-        tail = share_out * min(second.duration, drive.duration / 2.0)
-        t_drive = _grid(first.duration, dt) if share_in == 0.0 else first.duration - lead
+        lead = overlap_in * min(first.duration, drive.duration / 2.0)
+        tail = overlap_out * min(second.duration, drive.duration / 2.0)
+        t_drive = _grid(first.duration, dt) if overlap_in == 0.0 else first.duration - lead
         end = t_drive + drive.duration
-        t_second = _grid(end, dt) if share_out == 0.0 else end - tail
+        t_second = _grid(end, dt) if overlap_out == 0.0 else end - tail
         count = max(1, math.ceil((max(end, t_second + second.duration) - 1e-9) / dt))
         t: Array = dt * np.arange(count + 1, dtype=np.float64)
         heading = start[2] + first.at(t) + second.at(t - t_second)

@@ -149,15 +149,15 @@ class PathPlanner:
         along = line / length
         aside = np.array([-along[1], along[0]])
         heading = float(np.arctan2(along[1], along[0]))
-        shares = {0.5} | {
+        fractions = {0.5} | {
             round(float(np.clip((np.array(o.start[:2]) - start[:2]) @ along / length, 0.1, 0.9)), 1)
             for o in self._collision.obstacles
             if abs(float((np.array(o.start[:2]) - start[:2]) @ aside)) < 1.0
         }
         for far in _ROUND:
             for side in (far, -far):
-                for share in sorted(shares, key=lambda s: abs(s - 0.5))[:3]:
-                    point = start[:2] + share * line + side * aside
+                for fraction in sorted(fractions, key=lambda s: abs(s - 0.5))[:3]:
+                    point = start[:2] + fraction * line + side * aside
                     yield self._base.via([start, np.array([*point, heading]), goal])
 
     def _runs_into(self, base: BaseMotion) -> bool:

@@ -167,7 +167,7 @@ class Cascade:
         f[1 + m :] = (-_IDLE * (p.sent / p.speed)) @ Q[:, m:]
         if damping > 0.0:
             H.ravel()[2 + n : (1 + m) * (2 + n) : 2 + n] += damping
-        share = p.scale if p.keep_path else 1.0
+        fixed = p.scale if p.keep_path else 1.0
         scaled = p.keep_path and size > _NOTHING
         if scaled:
             # α‖b‖ instead of α: a small b must not make the program badly conditioned.
@@ -179,12 +179,12 @@ class Cascade:
             low[0], high[0] = 0.0, p.scale * size
         else:
             H[0, 0] = 1.0
-            f[1 : 1 + m] = -(R @ (share * p.b + p.c))
+            f[1 : 1 + m] = -(R @ (fixed * p.b + p.c))
             low[0], high[0] = -1.0, 1.0
         v, _, flag, info = daqp.solve(H, f, rows, high, low, self._sense(len(high)), **_SETTINGS)
         if flag < 1 or not math.isfinite(float(v.sum())):
             return None
-        scale = min(max(float(v[0]) / size, 0.0), 1.0) if scaled else share
+        scale = min(max(float(v[0]) / size, 0.0), 1.0) if scaled else fixed
         return v, scale, info["lam"]
 
     def _null_space(self, p: Problem, Q: Array, m: int, v: Array, rows: Array, low: Array, high: Array) -> Array:

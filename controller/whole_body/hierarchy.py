@@ -97,11 +97,11 @@ class Hierarchy:
         for task, jacobian, target in self._tasks:
             task.write(problem, jacobian, target)
         rows = self._inequalities(problem, bounds)
-        J, wanted, share = self._tool(problem)
-        answer = self._cascade.solve(self._problem(problem, bounds, rows, J, wanted, share, base))
+        J, wanted, speed_scale = self._tool(problem)
+        answer = self._cascade.solve(self._problem(problem, bounds, rows, J, wanted, speed_scale, base))
         if answer is None:
             return self._brake(problem, "no velocity satisfies the limits; the robot brakes", manipulability)
-        return self._solution(problem, answer, base, bounds, share, rows.names, manipulability)
+        return self._solution(problem, answer, base, bounds, speed_scale, rows.names, manipulability)
 
     # --- parts of the problem ----------------------------------------------------------------------------------------
 
@@ -119,19 +119,19 @@ class Hierarchy:
         self._tasks = tuple(places)
 
     def _tool(self, problem: IkProblem) -> tuple[Array, Array, float]:
-        """J over ν, what is wanted of J ν as far as the speed cap allows, and the share of it that this is, 0…1.
+        """Jacobian J over ν, target of J ν within the speed cap, and the speed scale 0…1 that the cap causes.
 
         Weighted by the limits of the tool or of the actuators themselves.
         """
         if isinstance(problem.tool, ActuatorTask):
             # Of a base that is given nothing can be wanted; its rows would only outnumber the arm's joints.
             wanted = _ARM if problem.arm_only else _ALL
-            shares = np.diag(1.0 / self._box.speed)[wanted]
-            return shares, shares @ self._actuation.nu(problem.tool.xi), 1.0
+            weights = np.diag(1.0 / self._box.speed)[wanted]
+            return weights, weights @ self._actuation.nu(problem.tool.xi), 1.0
         m = 5 if problem.tool.free_axis else 6
         J, b = np.empty((m, NXI)), np.empty(m)
         R = problem.kinematics.T_odom_tool.rotation
-        share = tool_rows(
+        speed_scale = tool_rows(
             problem.kinematics.J_xi,
             R,
             problem.tool.twist,
@@ -141,7 +141,7 @@ class Hierarchy:
             J,
             b,
         )
-        return J, b, share
+        return J, b, speed_scale
 
     def _inequalities(self, problem: IkProblem, bounds: Bounds) -> _Rows:
         """Rows of the guards, then those of the wheels, over ν."""
@@ -156,10 +156,10 @@ class Hierarchy:
         return _Rows(A, lower, upper, names)
 
     def _problem(
-        self, problem: IkProblem, bounds: Bounds, rows: _Rows, J: Array, b: Array, share: float, base: Array
+        self, problem: IkProblem, bounds: Bounds, rows: _Rows, J: Array, b: Array, speed_scale: float, base: Array
     ) -> Problem:
         keep_path, speed, k = problem.tool.keep_path, self._box.speed, len(rows.names)
-        rise = min(1.0, (max(problem.scale, 0.0) + self._rise) / share) if share > 0.0 else 1.0
+        rise = min(1.0, (max(problem.scale, 0.0) + self._rise) / speed_scale) if speed_scale > 0.0 else 1.0
         T, t, A, low, high = self._T, self._t, rows.A, rows.lower, rows.upper
         c = self._nothing[: len(b)]
         if not problem.arm_only:
@@ -182,7 +182,7 @@ class Hierarchy:
         answer: Answer,
         base: Array,
         bounds: Bounds,
-        share: float,
+        speed_scale: float,
         names: tuple[str, ...],
         manipulability: Manipulability,
     ) -> Solution:
@@ -191,7 +191,7 @@ class Hierarchy:
         sendable(answer.nu, base, self._actuation.wheels, bounds.wheel_lower, bounds.wheel_upper, xi)
         if problem.held is not None:
             xi[:2] = problem.sent[:2]
-        scale = answer.scale * share
+        scale = answer.scale * speed_scale
         worst = given_up(answer.slack)
         if worst >= 0:
             return Solution(xi, scale, manipulability.value, False, _too_near(names, worst))
@@ -239,11 +239,11 @@ def tool_rows(
         b: Written.
 
     Returns:
-        The share of the twist that the speed cap allows, 0…1.
+        Speed scale 0…1 of the twist that keeps the speed cap.
     """
     m = len(b)
     speed = math.sqrt(twist[0] ** 2 + twist[1] ** 2 + twist[2] ** 2)
-    share = max(speed_cap, 0.0) / speed if speed > speed_cap else 1.0
+    speed_scale = max(speed_cap, 0.0) / speed if speed > speed_cap else 1.0
     for row in range(m):
         for j in range(9):
             J[row, j] = 0.0
@@ -256,12 +256,12 @@ def tool_rows(
                 along = R[i - 3, axis] if i >= 3 else 0.0
             if along != 0.0:
                 along *= weight[row]
-                b[row] += along * share * twist[i]
+                b[row] += along * speed_scale * twist[i]
                 for j in range(2):
                     J[row, j] += along * (J_xi[i, 0] * wheels[0, j] + J_xi[i, 1] * wheels[1, j])
                 for j in range(2, 9):
                     J[row, j] += along * J_xi[i, j]
-    return share
+    return speed_scale
 
 
 @compiled(COUNT(MATRIX, VECTOR, PACKED, COUNT, PACKED, VECTOR, VECTOR))
@@ -287,7 +287,7 @@ def wheel_rows(wheels: Array, least: Array, most: Array, at: int, A: Array, lowe
 
 
 def without_base(rows: Array, base: Array, rest: Array) -> Array:
-    """What rows (k×9, over ν or ξ̇) leave of `rest` (k) for the arm, the base's share of them being `base` (2)."""
+    """Remainder of `rest` (k) for the arm: rows (k×9, over ν or ξ̇) with the base's part `base` (2) subtracted."""
     left = np.empty(len(rest))
     _without_base(rows, base, rest, left)
     return left

@@ -72,5 +72,5 @@ def escape_pose(T_odom_tool: Any, towards_row: Array, depth: float) -> Any:
     """
     back = -T_odom_tool.rotation[:, 2]
     away = -float(back @ towards_row)
-    direction, share = (back, away) if away > 0.5 else (-towards_row, 1.0)
-    return pin.SE3(T_odom_tool.rotation, T_odom_tool.translation + direction * (depth / share))
+    direction, cosine = (back, away) if away > 0.5 else (-towards_row, 1.0)
+    return pin.SE3(T_odom_tool.rotation, T_odom_tool.translation + direction * (depth / cosine))

@@ -241,8 +241,8 @@ def clear_arc(cane: Cane, arc: float, others: list[Array], config: RuleConfig, k
         keep_out: Keep-out zones of the blades.
     """
     first_reason, tight = "", None
-    for share in (0.0, 0.5, -0.5, 1.0, -1.0):
-        place = arc + share * config.max_shift
+    for fraction in (0.0, 0.5, -0.5, 1.0, -1.0):
+        place = arc + fraction * config.max_shift
         position = cane.at(place)
         if any(abs(node.arc - place) < config.node_distance for node in cane.nodes):
             continue
@@ -306,7 +306,7 @@ def node_distance(cane: Cane, nodes: tuple[Node, ...], position: Array) -> float
 
 
 def cut_confidence(cane: Cane, arc: float, choice: float, config: RuleConfig) -> float:
-    """Visible share of the cane up to the cut × size of the kept nodes in the image × certainty of the choice."""
+    """Visible fraction of the cane up to the cut × size of the kept nodes in the image × certainty of the choice."""
     hidden = sum(max(0.0, min(span.end, arc) - span.start) for span in cane.hidden) + cane.base_gap
     seen = float(np.clip(1.0 - hidden / arc, 0.0, 1.0))
     pixels = min(node.pixels for node in count_nodes(cane, config)[: config.nodes_kept])

@@ -15,16 +15,16 @@ from rolling_panda.model.differential_drive import Array
 
 
 def largest_rise(room: Array, step: Array, repeats: float = 0.0) -> Array:
-    """The greatest rise in this period from which the limit is still kept.
+    """The largest increment β of this period that still keeps the limit.
 
-    Where it may be repeated n times against our will before it can fall, n β + β + (β − step) + … stays in the room.
+    If the last increment may be repeated n times by lost packets, n β + β + (β − step) + … stays within the margin.
 
     Args:
-        room: What is left up to the limit (n); where it is negative, the answer leads back, without repeats at once.
-        step: By how much the rise may change from one period to the next (n), positive.
-        repeats: How often at most (n above).
+        room: Margin to the limit (n). If it is negative, the result leads back; without repeats, in one period.
+        step: Largest change of the increment from one period to the next (n), positive.
+        repeats: Largest number of repeats (n above).
     """
-    share = step * (repeats + 0.5)
-    inside = np.maximum(share * share - 0.25 * step * step + 2.0 * step * room, 0.0)
-    rise: Array = np.maximum(np.sqrt(inside) - share, np.minimum(room / (1.0 + repeats), step))
+    half = step * (repeats + 0.5)
+    inside = np.maximum(half * half - 0.25 * step * step + 2.0 * step * room, 0.0)
+    rise: Array = np.maximum(np.sqrt(inside) - half, np.minimum(room / (1.0 + repeats), step))
     return rise

@@ -95,9 +95,9 @@ def hit_rods(ray: Ray, rods: Sequence[Capsule]) -> Hit:
     b, c, f = axis @ ray.direction, aside @ ray.direction, (axis * aside).sum(axis=1)
     # Nearest on the line through the rod, then on the rod itself, then on the ray.
     along = (b * f - c * e) / np.maximum(e - b * b, _TINY)
-    share = np.clip((b * along + f) / e, 0.0, 1.0)
-    along = np.maximum(b * share - c, 0.0)
-    gap = np.linalg.norm(aside + along[:, None] * ray.direction - share[:, None] * axis, axis=1)
+    fraction = np.clip((b * along + f) / e, 0.0, 1.0)
+    along = np.maximum(b * fraction - c, 0.0)
+    gap = np.linalg.norm(aside + along[:, None] * ray.direction - fraction[:, None] * axis, axis=1)
     surface = along - np.sqrt(np.maximum(radius**2 - gap**2, 0.0))
     distance = np.where(gap <= np.maximum(radius, _TOLERANCE), np.maximum(surface, 0.0), np.inf)
     first = int(np.argmin(distance))

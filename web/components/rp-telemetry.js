@@ -50,8 +50,8 @@ class RpGauge extends HTMLElement {
     const kind = this.kind;
     if (!kind) return;
     setText(this.value, value === null ? "–" : kind.format(value));
-    const share = value === null ? 0 : Math.min(1, Math.max(0, value / kind.fullScale));
-    this.fill.style.setProperty("width", `${(100 * share).toFixed(1)}%`);
+    const fraction = value === null ? 0 : Math.min(1, Math.max(0, value / kind.fullScale));
+    this.fill.style.setProperty("width", `${(100 * fraction).toFixed(1)}%`);
     const low = value !== null && kind.warnBelow !== undefined && value < kind.warnBelow;
     const high = value !== null && kind.warnAbove !== undefined && value > kind.warnAbove;
     this.dataset.warning = low ? "low" : high ? "high" : "";

@@ -58,14 +58,14 @@ def _edge_artifacts(config: CameraConfig, depth: Floats, rng: np.random.Generato
     near, far = minimum_filter(bounded, 3), maximum_filter(bounded, 3)
     edge = np.flatnonzero(far - near > _STEP * near)
     edge = edge[rng.random(len(edge)) < config.edge_bleed]
-    kind, share = rng.random(len(edge)), rng.random(len(edge), dtype=np.float32)
+    kind, fraction = rng.random(len(edge)), rng.random(len(edge), dtype=np.float32)
     here = bounded.ravel()[edge]
     nearer = near.ravel()[edge]
-    mixed = nearer + share * (np.minimum(far.ravel()[edge], nearer + np.float32(1.0)) - nearer)
+    mixed = nearer + fraction * (np.minimum(far.ravel()[edge], nearer + np.float32(1.0)) - nearer)
     out = depth.copy().ravel()
     out[edge] = np.where(kind < _NEARER, nearer, np.where(kind < _NEARER + _MIXED, mixed, np.float32(np.inf)))
     # The foreground keeps its depth in most cases.
-    keeps = (here == nearer) & (kind >= _NEARER) & (share < 0.7)
+    keeps = (here == nearer) & (kind >= _NEARER) & (fraction < 0.7)
     out[edge[keeps]] = here[keeps]
     return out.reshape(depth.shape)
 

@@ -22,7 +22,7 @@ class LaggedRobot:
         self.begun: list[int] = []
         #: Share of what is sent that each actuator does.
         self.follows = np.ones(9)
-        self._share = TICK_S / np.array([0.05] * 2 + [0.02] * 7)
+        self._gain = TICK_S / np.array([0.05] * 2 + [0.02] * 7)
 
     def read(self) -> Measurement:
         """What was measured last."""
@@ -30,7 +30,7 @@ class LaggedRobot:
 
     def write(self, setpoint: Setpoint) -> None:
         """One step of 1 ms."""
-        velocity = self.now.velocity + (self.follows * setpoint.xi - self.now.velocity) * self._share
+        velocity = self.now.velocity + (self.follows * setpoint.xi - self.now.velocity) * self._gain
         self.now = replace(self.now, velocity=velocity, position=self.now.position + velocity * TICK_S)
         self.rows.append((setpoint.at, setpoint.xi, velocity, setpoint.epoch, setpoint.sequence))
 

@@ -69,12 +69,12 @@ def grow_cane(
         if not last:
             pieces.append(("node", node, draw(rng, config.node_swelling)))
         for kind, piece, swelling in pieces:
-            share = min(1.0, max(0.0, (here + piece / 2 - inside) / length))
+            fraction = min(1.0, max(0.0, (here + piece / 2 - inside) / length))
             turned = np.exp(-max(0.0, here + piece / 2 - inside) / _TURNING)
             heading = turned * direction + (1.0 - turned) * upright
             side = zigzag * (1.0 - turned)
-            over = lean_over * share**2
-            heading = heading + [bend[0] * share + side + over[0], bend[1] * share * 0.5 + over[1], 0.0]
+            over = lean_over * fraction**2
+            heading = heading + [bend[0] * fraction + side + over[0], bend[1] * fraction * 0.5 + over[1], 0.0]
             beyond = point + piece * unit_vector(heading)
             ends = [_radius(config, base, (s - inside) / length) * swelling for s in (here, here + piece)]
             parent = row.add(Rod(kind, point, beyond, ends[0], ends[1], parent, *numbers))
@@ -85,8 +85,8 @@ def grow_cane(
         zigzag = -zigzag
 
 
-def _radius(config: VineyardConfig, base: float, share: float) -> float:
-    return base * (1.0 - (1.0 - config.cane_taper) * min(1.0, max(0.0, share)))
+def _radius(config: VineyardConfig, base: float, fraction: float) -> float:
+    return base * (1.0 - (1.0 - config.cane_taper) * min(1.0, max(0.0, fraction)))
 
 
 def unit_vector(vector: Array) -> Array:

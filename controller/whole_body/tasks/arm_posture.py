@@ -22,20 +22,20 @@ class ArmPosture:
             gain: Of the posture's error (1/s).
             speed: Largest ν (9).
         """
-        self._gain, self._share = gain, weight**0.5 / speed[ARM_XI]
+        self._gain, self._weight = gain, weight**0.5 / speed[ARM_XI]
 
     def prepare(self, jacobian: Array) -> None:
         """Each joint has a row of its own."""
-        jacobian[:, ARM_XI] = np.diag(self._share)
+        jacobian[:, ARM_XI] = np.diag(self._weight)
 
     def write(self, problem: IkProblem, jacobian: Array, target: Array) -> None:
         """Write the targets."""
         posture = problem.posture
-        _follow(posture.q, posture.rate, problem.q, self._gain, self._share, target)
+        _follow(posture.q, posture.rate, problem.q, self._gain, self._weight, target)
 
 
 @compiled(NOTHING(VECTOR, VECTOR, VECTOR, NUMBER, VECTOR, VECTOR))
-def _follow(q_ref: Array, rate_ref: Array, q: Array, gain: float, share: Array, target: Array) -> None:
+def _follow(q_ref: Array, rate_ref: Array, q: Array, gain: float, weight: Array, target: Array) -> None:
     """Write the targets (7) of the configurations (12)."""
     for i in range(7):
-        target[i] = share[i] * (rate_ref[5 + i] + gain * (q_ref[5 + i] - q[5 + i]))
+        target[i] = weight[i] * (rate_ref[5 + i] + gain * (q_ref[5 + i] - q[5 + i]))

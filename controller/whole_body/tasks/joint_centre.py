@@ -39,5 +39,5 @@ def _go_back(q: Array, low: Array, high: Array, scale: Array, gain: float, jacob
     """Write the rows (7×9) and targets (7) of a configuration (12) between the zones' edges (7)."""
     for i in range(7):
         depth = max(low[i] - q[5 + i], 0.0) - max(q[5 + i] - high[i], 0.0)
-        share = abs(depth) * scale[i]
-        jacobian[i, 2 + i], target[i] = share, share * gain * depth
+        weight = abs(depth) * scale[i]
+        jacobian[i, 2 + i], target[i] = weight, weight * gain * depth

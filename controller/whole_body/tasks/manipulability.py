@@ -28,7 +28,7 @@ class ClimbManipulability:
             gain: Velocity along the gradient where ω is 0 (rad/s).
             good: ω_good.
         """
-        self._share, self._gain, self._good = math.sqrt(weight), gain, good
+        self._weight, self._gain, self._good = math.sqrt(weight), gain, good
         #: Of the arm in this period; the method sets it before `write`.
         self.now: Manipulability | None = None
 
@@ -41,18 +41,18 @@ class ClimbManipulability:
         lack = 0.0 if now is None else max(1.0 - now.value / self._good, 0.0)
         gradient = _LEVEL if now is None else now.gradient
         # The row fades in with the lack, so that nothing jumps where ω crosses ω_good.
-        _climb(gradient, self._share * lack, self._gain * lack, jacobian, target)
+        _climb(gradient, self._weight * lack, self._gain * lack, jacobian, target)
 
 
 @compiled(NOTHING(VECTOR, NUMBER, NUMBER, MATRIX, VECTOR))
-def _climb(gradient: Array, share: float, speed: float, jacobian: Array, target: Array) -> None:
+def _climb(gradient: Array, weight: float, speed: float, jacobian: Array, target: Array) -> None:
     """Write the row (1×9) along the gradient (9) and its target; nothing is wanted where it is level."""
     steepness = 0.0
     for slope in gradient:
         steepness += slope * slope
     steepness = math.sqrt(steepness)
     if steepness < _FLAT:
-        share, steepness = 0.0, 1.0
+        weight, steepness = 0.0, 1.0
     for i in range(9):
-        jacobian[0, i] = share * gradient[i] / steepness
-    target[0] = share * speed
+        jacobian[0, i] = weight * gradient[i] / steepness
+    target[0] = weight * speed

@@ -16,21 +16,21 @@ class Smoothness:
 
     def __init__(self, weight: float, actuation: Actuation, speed: Array) -> None:
         """Scale by the largest speeds `speed` (9, ν)."""
-        self._share, self._actuation = weight**0.5 / speed, actuation
+        self._weight, self._actuation = weight**0.5 / speed, actuation
 
     def prepare(self, jacobian: Array) -> None:
         """Each actuator has a row of its own."""
-        jacobian[:] = np.diag(self._share)
+        jacobian[:] = np.diag(self._weight)
 
     def write(self, problem: IkProblem, jacobian: Array, target: Array) -> None:
         """Write the targets."""
-        _keep(self._actuation.twist, problem.sent, self._share, target)
+        _keep(self._actuation.twist, problem.sent, self._weight, target)
 
 
 @compiled(NOTHING(PACKED, VECTOR, VECTOR, VECTOR))
-def _keep(twist: Array, sent: Array, share: Array, target: Array) -> None:
+def _keep(twist: Array, sent: Array, weight: Array, target: Array) -> None:
     """Write the targets (9) after ξ̇ `sent` (9); `twist` gives [v, ω] of the wheels' speeds (2×2)."""
     for i in range(2):
-        target[i] = share[i] * (twist[i, 0] * sent[0] + twist[i, 1] * sent[1])
+        target[i] = weight[i] * (twist[i, 0] * sent[0] + twist[i, 1] * sent[1])
     for i in range(2, 9):
-        target[i] = share[i] * sent[i]
+        target[i] = weight[i] * sent[i]

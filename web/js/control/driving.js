@@ -47,9 +47,9 @@ export function drive(source, way) {
   return whyNoDriving() || hold.press(source, wanted);
 }
 
-/** @param {number} share */
-function clamp(share) {
-  return Math.max(-1, Math.min(1, share));
+/** @param {number} value */
+function clamp(value) {
+  return Math.max(-1, Math.min(1, value));
 }
 
 /** @type {Set<string>} */
