@@ -13,32 +13,32 @@ Weight = Annotated[float, Meta(ge=0.0, le=1e4)]
 
 
 class HierarchyConfig(Struct, frozen=True, forbid_unknown_fields=True):
-    """Weights among the tasks of the null space (each against a velocity in shares of its limit), and damping.
+    """Parameters of the method `hierarchy`. The weights are for velocities that are scaled by their limits.
 
     Attributes:
         base_heading: Weight of the base's heading.
-        base_place: Weight of the base's place along its heading.
+        base_place: Weight of the base's position along its heading.
         arm_posture: Weight of the arm's posture.
-        manipulability: Weight of the climb to more manipulability.
-        joint_centre: Weight, at the limit, of the way back to the middle of a joint; 0 outside `limit_zone`.
+        manipulability: Weight of the task that increases the manipulability.
+        joint_centre: Weight of the task that moves a joint to its middle, at the joint's limit; 0 outside `limit_zone`.
         smoothness: Weight against changes of velocity.
-        good_manipulability: ω of the arm from which on it is not raised.
+        good_manipulability: ω of the arm above which the manipulability task is off.
         damping: λ² where the smallest singular value of the scaled Jacobian is 0.
         damping_from: Singular value below which damping begins.
         clock_rise: Largest rise of the rate of a motion's clock (1/s).
-        axle_ahead: Least distance of the tool ahead of the axle in transit (m).
-        axle_rate: Rate at which that distance may be used up (1/s).
-        collisions: Whether distances to itself, the ground and obstacles are kept.
-        collision_distance: d_s, kept between any two parts that are watched (m).
-        blade_distance: The same for the blades (m), which work near wires that nothing else may come near to.
-        cutter_distance: The same for the cutter's body (m), whose capsule is 9 mm larger than it.
-        cane_distance: The same of the robot's other parts to canes that stay (m).
-        cane_speed: ξ for canes (m/s): wider than for what does not give, and in step with the way into a cut.
-        cane_braking: Deceleration that an approach to a cane reckons with (m/s²), that of the way into a cut.
-        collision_influence: d_i, nearer than which they approach more slowly (m).
-        collision_speed: ξ, fastest approach at d_i (m/s), and fastest parting below d_s.
-        collision_braking: Deceleration that an approach reckons with (m/s²).
-        tipping: Whether the wheels and the caster are kept on the ground.
+        axle_ahead: Smallest distance of the tool ahead of the axle in transit (m).
+        axle_rate: Rate at which that distance may decrease to `axle_ahead` (1/s).
+        collisions: Whether the collision guard is on: distances to itself, the ground and obstacles.
+        collision_distance: d_s, smallest distance of each monitored pair (m).
+        blade_distance: d_s of the blades (m), which work near wires.
+        cutter_distance: d_s of the cutter's body (m), whose capsule is 9 mm larger than the body.
+        cane_distance: d_s of the robot's other parts to retained canes (m).
+        cane_speed: ξ for canes (m/s), larger than for stiff obstacles and matched to the approach to a cut.
+        cane_braking: Deceleration a for canes (m/s²), that of the approach to a cut.
+        collision_influence: d_i, distance below which a pair slows its approach (m).
+        collision_speed: ξ, largest approach speed at d_i and largest separation speed below d_s (m/s).
+        collision_braking: Deceleration a in the approach limit (m/s²).
+        tipping: Whether the tipping guard is on, which keeps wheels and caster on the ground.
     """
 
     base_heading: Weight = 4.0
@@ -78,82 +78,82 @@ def is_cane(pair: tuple[str, str]) -> bool:
 
 
 class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
-    """How the robot is moved and supervised.
+    """Settings of motion and supervision.
 
     Attributes:
-        home: Survey posture of the arm (rad): the camera looks at the row.
-        reach: Posture the search for a cut posture starts from (rad), elbow aside, tool to the left.
-        method: Whole-body method by name.
+        home: Survey posture of the arm (rad), with the camera facing the row.
+        reach: Initial posture of the search for a cut posture (rad), elbow aside, tool to the left.
+        method: Name of the whole-body method.
         rate_hz: Control rate, that of the arm.
-        base_rate_hz: Rate of the base; `rate_hz` over it, rounded, is the number of control periods in one of the base.
+        base_rate_hz: Rate of the base. A period of the base has `rate_hz` / `base_rate_hz` control periods, rounded.
             Methods other than `hierarchy` run at one rate.
         row_heading: Direction of the row in odom (rad); the base keeps parallel to it, the row on its left.
         row_distance: Distance of the row from the line y = 0 along `row_heading` where the base drives (m).
-        base_speed: Limit of the base in automatic work and teleoperation (m/s).
-        base_yaw_rate: Limit of the base's turning (rad/s).
-        base_acceleration: Limit of the base (m/s²), kept low so that the stretched arm does not tip it.
-        base_yaw_acceleration: Limit of the base's turning up (rad/s²).
-        base_braking: Of the base when the robot has to stop (m/s²).
-        arm_share: Share of the arm's rated velocity that is used.
-        arm_acceleration_share: Share of the arm's rated acceleration that is used.
-        arm_jerk_share: Share of the arm's rated jerk that is used; braking for a reason may use all of it.
-        tool_speed: Limit of the tool between cuts (m/s).
-        tool_turn: Limit of the tool's turning (rad/s).
-        tool_acceleration: Of planned motions (m/s²).
-        tool_jerk: Of planned motions (m/s³).
-        cut_speed: Limit in the last `slow_zone` before the cut (m/s).
-        slow_zone: Length of it (m): with the blades' reach the canes are entered inside it.
-        slow_braking: How the tool slows down to that (m/s²).
-        blend: Share of the shorter of two legs that overlaps with the other, where the tool rounds the corner.
-        advance_speed: Limit along the approach line (m/s).
-        stand_off: Distance of the stand-off from the cut (m), from where the approach is straight.
-        arm_only: Distance to a cut (m) within which only the arm moves, on the way in and out.
-        clearance: Distance kept from the canes between cuts (m).
-        position_tolerance: The tool is in place to cut (m).
-        rotation_tolerance: The same for its direction (rad).
-        settle_speed: Slower than this the tool counts as at rest there (m/s).
-        settle_joints: Slower than this each joint does (rad/s); at 0.1 the bridge closes no blades.
-        reach_timeout_s: A motion that has not ended this long after its planned end has failed (s).
-        cut_timeout_s: A cut without outcome for this long is UNKNOWN (s).
-        largest_radius: Canes thicker than this are refused (m).
-        survey_speed: Of the base on a survey (m/s).
-        pre_cut_check: Whether a close-up checks each point before it is cut.
-        post_cut_check: Whether a close-up checks each cut; else the cutter's report counts.
-        close_up_within: Largest distance from the place clear of the canes at the close-up before a cut (m).
+        base_speed: Speed limit of the base in automatic work and teleoperation (m/s).
+        base_yaw_rate: Limit of the base's yaw rate (rad/s).
+        base_acceleration: Acceleration limit of the base (m/s²), low so that the stretched arm does not tip it.
+        base_yaw_acceleration: Limit of the base's yaw acceleration (rad/s²).
+        base_braking: Deceleration of the base when the robot has to stop (m/s²).
+        arm_share: Fraction of the arm's rated velocity that is used.
+        arm_acceleration_share: Fraction of the arm's rated acceleration that is used.
+        arm_jerk_share: Fraction of the arm's rated jerk that is used; braking for a reason may use all of it.
+        tool_speed: Speed limit of the tool between cuts (m/s).
+        tool_turn: Limit of the tool's angular speed (rad/s).
+        tool_acceleration: Acceleration limit of planned tool motions (m/s²).
+        tool_jerk: Jerk limit of planned tool motions (m/s³).
+        cut_speed: Speed limit in the last `slow_zone` before the cut (m/s).
+        slow_zone: Length of the slow last stretch (m). The blades enter the canes inside it.
+        slow_braking: Deceleration of the tool to `cut_speed` (m/s²).
+        blend: Fraction of the shorter of two segments that overlaps with the other, where the tool rounds the corner.
+        advance_speed: Speed limit along the approach line (m/s).
+        stand_off: Distance of the stand-off from the cut (m); from there the approach is straight.
+        arm_only: Distance to a cut (m) within which only the arm moves, in and out.
+        clearance: Distance from the canes between cuts (m).
+        position_tolerance: Largest position error of the tool at a cut (m).
+        rotation_tolerance: Largest rotation error of the tool at a cut (rad).
+        settle_speed: Speed below which the tool counts as at rest at a cut (m/s).
+        settle_joints: Speed below which each joint counts as at rest (rad/s); at 0.1 the bridge closes no blades.
+        reach_timeout_s: A motion fails this long after its planned end (s).
+        cut_timeout_s: A cut without an outcome for this long is UNKNOWN (s).
+        largest_radius: Canes with a larger radius are refused (m).
+        survey_speed: Speed of the base on a survey (m/s).
+        pre_cut_check: Whether a close-up checks each point before its cut.
+        post_cut_check: Whether a close-up checks each cut; otherwise the cutter's report counts.
+        close_up_within: Largest distance from the pose clear of the canes at the close-up before a cut (m).
         close_up_speed: Largest speed of the tool at the close-up before a cut (m/s).
-        close_up_from: Distance of the tool from the cut at the close-up afterwards (m).
+        close_up_from: Distance of the tool from the cut at the close-up after it (m).
         close_up_timeout_s: Time limit of a close-up (s).
-        moved_tolerance: A point that moved further than this after acceptance is not cut (m).
-        base_lag_s: Time constant with which the wheels follow their command (s).
-        arm_lag_s: By which the arm's servos follow late (s); half a period comes on top.
-        gain_position: Of the tool's position error (1/s).
-        gain_rotation: Of the tool's rotation error (1/s).
-        gain_posture: Of the null-space posture (1/s).
-        gain_heading: Of the base's heading to the row (1/s).
+        moved_tolerance: A point that moved further than this after its acceptance is not cut (m).
+        base_lag_s: Time constant of the wheels' response (s).
+        arm_lag_s: Time constant of the arm's servos (s), without half a period of sampling.
+        gain_position: Gain of the tool's position error (1/s).
+        gain_rotation: Gain of the tool's rotation error (1/s).
+        gain_posture: Gain of the null-space posture (1/s).
+        gain_heading: Gain of the base's heading error (1/s).
         gain_manipulability: k₀ of the manipulability gradient.
         gain_limits: k of the joint-limit repulsion.
         limit_zone: γ_start, distance from a limit where repulsion begins (rad).
         damping: λ of the damped pseudo-inverse, in units of the weighted Jacobian.
         joint_margin: Distance from every joint limit that is never entered (rad).
-        search_steps: Iterations of the posture search in 10 ms, spread over the control periods.
-        joints_max_age_s: Older joint states stop the robot (s).
-        odometry_max_age_s: Older odometry stops the robot (s).
-        bridge_max_age_s: Older bridge states stop the robot (s).
-        server_max_age_s: Older server heartbeats stop automatic work (s).
-        supervision_s: Automatic work ends after so long without anybody who may operate and sees the robot (s).
-        hold_link_max_age_s: Older server heartbeats end teleoperation (s).
-        perception_max_age_s: Older perception heartbeats stop automatic work (s).
+        search_steps: Iterations of the posture search in 10 ms, distributed over the control periods.
+        joints_max_age_s: Age limit of joint states; a protective stop follows (s).
+        odometry_max_age_s: Age limit of odometry; a protective stop follows (s).
+        bridge_max_age_s: Age limit of bridge states; a protective stop follows (s).
+        server_max_age_s: Age limit of server heartbeats in automatic work (s).
+        supervision_s: Automatic work pauses when no operator has seen the robot for this long (s).
+        hold_link_max_age_s: Age limit of server heartbeats in teleoperation (s).
+        perception_max_age_s: Age limit of perception heartbeats in automatic work (s).
         ledger_max_age_s: Work whose record is not durable after this long is a fault (s).
-        obstacles_max_age_s: Automatic work stops when the picture behind what is known to stand around is older (s);
-            the camera rests for two of them when nothing moves.
-        hold_max_age_s: Teleoperation ends after this silence (s).
-        teleop_speed: Limit of the tool in teleoperation (m/s).
-        teleop_turn: The same for turning (rad/s).
-        teleop_base_speed: Limit of each wheel on the ground where base or tool are led by hand (m/s): from it
-            `base_braking` has the base at rest 0.1 s after it hears of letting go, which leaves the word 50 ms.
-        teleop_base: What the base does in teleoperation: `free` keeps it parallel to the row, in `transit` the tool's
-            sideways motion steers it.
-        hierarchy: Of the method `hierarchy`.
+        obstacles_max_age_s: Age limit of the camera frame behind the obstacles in automatic work (s). While nothing
+            moves, the camera sends a frame every 2 s.
+        hold_max_age_s: Teleoperation ends when the hold is not renewed for this long (s).
+        teleop_speed: Speed limit of the tool in teleoperation (m/s).
+        teleop_turn: Limit of the tool's angular speed in teleoperation (rad/s).
+        teleop_base_speed: Speed limit of each wheel on the ground in teleoperation (m/s). From it, `base_braking` stops
+            the base within 0.1 s, which leaves 50 ms for the message of the release.
+        teleop_base: Base in teleoperation: `free` keeps it parallel to the row; in `transit` the tool's sideways motion
+            steers it.
+        hierarchy: Parameters of the method `hierarchy`.
     """
 
     home: ArmPosture = (-0.2784, -0.1128, -0.0354, -2.0055, 1.6759, 1.2124, -0.269)
