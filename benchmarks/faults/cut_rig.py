@@ -6,15 +6,12 @@ have really done, and asks for work as a person would. It keeps what it was told
 
 import contextlib
 import json
-import signal
 import sqlite3
-import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 import msgspec
@@ -28,11 +25,11 @@ from rolling_panda.config import TransportConfig
 from rolling_panda.errors import RollingPandaError, ServiceError
 from rolling_panda.messages.perception import CloseUpRequest, CloseUpResult, Obstacles, point_digest
 from rolling_panda.messages.supervision import Person, Presence, StopState
-from rolling_panda.runtime.launch import child_environment, python_command
 from rolling_panda.transport import certificates
 from rolling_panda.transport.access import RECORDER
 from rolling_panda.transport.zenoh import Onlooker, Transport
-from tests.support.processes.live_robot import free_port
+from tests.support.processes.local_router import free_port
+from tests.support.processes.processes import Processes
 from tests.support.processes.wall_clock import WallClock, together
 
 PROCESSES = ("router", "plant", "bridge", "controller")
@@ -65,16 +62,17 @@ class Told:
     forgotten: list[str] = field(default_factory=list)
 
 
-class CutRig:
+class CutRig(Processes):
     """Use as a context manager; `folder` keeps state, logs and the blades' record."""
 
     def __init__(self, folder: Path, clock: WallClock, disk: StateDisk) -> None:
         """Start nothing yet; the processes see this clock, and their state folder is on this disk."""
-        self.folder, self.clock, self.disk = folder, clock, disk
+        super().__init__(folder)
+        self.clock, self.disk = clock, disk
+        self.environment |= together(clock.environment, disk.environment)
         self.state_folder = disk.folder
         self.endpoint = f"tls/127.0.0.1:{free_port()}"
         certificates.make(folder / "certificates", ("127.0.0.1",), None)
-        self.processes: dict[str, subprocess.Popen[str]] = {}
         self.told = Told()
         self.controller: m.ControllerState | None = None
         self.controller_at = self.joints_at = 0.0
@@ -99,17 +97,10 @@ class CutRig:
             raise
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """End everything."""
-        self.close()
-
     # --- processes ---------------------------------------------------------------------------------------------------
 
     def start(self, name: str) -> None:
         """Start (or start again) one process."""
-        self._close_pipes(name)
         closed = ["--certificates", str(self.folder / "certificates")]
         kept = ["--connect", self.endpoint, "--state", str(self.state_folder), *closed]
         plant = self.folder / "plant"
@@ -122,37 +113,20 @@ class CutRig:
             ),
             "controller": ("controller", kept),
         }[name]
-        with (self.folder / f"{name}.log").open("a") as log:
-            self.processes[name] = subprocess.Popen(
-                python_command(*words),
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE if name == "plant" else log,
-                stderr=log,
-                text=True,
-                env=child_environment() | together(self.clock.environment, self.disk.environment),
-            )
+        self.launch(name, *words, answers=name == "plant")
         if name == "plant":
-            out = self.processes[name].stdout
-            assert out is not None and out.readline() == "up\n"
+            self.answer(name)
 
-    def kill(self, name: str) -> None:
-        """Kill -9, and wait until it is gone."""
-        self.processes[name].kill()
-        self.processes[name].wait()
+    def kill(self, name: str) -> float:
+        """Kill -9, and wait until it is gone; returns when (s, monotonic)."""
+        at = super().kill(name)
         # What it said last is not what it says once it is back.
         self.latched.pop(name, None)
         if name == "controller":
             self.controller = None
         elif name == "bridge":
             self.bridge = None
-
-    def halt(self, name: str) -> None:
-        """SIGSTOP."""
-        self.processes[name].send_signal(signal.SIGSTOP)
-
-    def go_on(self, name: str) -> None:
-        """SIGCONT."""
-        self.processes[name].send_signal(signal.SIGCONT)
+        return at
 
     def close(self) -> None:
         """End everything."""
@@ -160,38 +134,7 @@ class CutRig:
         self._wires.close()
         if self._ledger is not None:
             self._ledger.close()
-        for process in reversed(self.processes.values()):
-            if process.poll() is None:
-                process.send_signal(signal.SIGCONT)
-                process.terminate()
-        for name, process in self.processes.items():
-            try:
-                process.wait(5)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
-            self._close_pipes(name)
-
-    def _close_pipes(self, name: str) -> None:
-        process = self.processes.get(name)
-        for pipe in () if process is None else (process.stdin, process.stdout):
-            if pipe is not None:
-                pipe.close()
-
-    def wait(self, condition: Callable[[], Any], limit_s: float, what: str) -> Any:
-        """Poll until `condition()` is truthy; its value.
-
-        Raises:
-            RollingPandaError: It was not within `limit_s`, or a process has ended by itself.
-        """
-        end = time.monotonic() + limit_s
-        while not (value := condition()):
-            ended = [name for name, process in self.processes.items() if process.poll() is not None]
-            if ended or time.monotonic() > end:
-                why = f"{', '.join(ended)} ended" if ended else f"waited {limit_s:.0f} s for {what}"
-                raise RollingPandaError(f"{why}; {self.describe()}\n{self.logs()}")
-            time.sleep(0.02)
-        return value
+        super().close()
 
     def describe(self) -> str:
         """What the controller says it does."""
@@ -200,14 +143,6 @@ class CutRig:
             return "no controller was heard"
         rows = ", ".join(f"{each.point_id} {each.state}" for each in state.queue if each.state != "DONE")
         return f"{state.mode} {state.phase} ({state.reason}), {time.monotonic() - self.controller_at:.1f} s ago: {rows}"
-
-    def logs(self) -> str:
-        """The last lines of every process."""
-        parts = []
-        for name in self.processes:
-            lines = (self.folder / f"{name}.log").read_text(errors="replace").splitlines()[-8:]
-            parts.append("\n".join([f"--- {name}", *lines]))
-        return "\n".join(parts)
 
     # --- the wire ----------------------------------------------------------------------------------------------------
 
@@ -399,8 +334,7 @@ class CutRig:
             if fresh and state is not None and state.mode == "AUTO" and not waits:
                 self.offer()
                 return
-            ended = [name for name, process in self.processes.items() if process.poll() is not None]
-            if ended or time.monotonic() > end:
+            if (ended := self.ended()) or time.monotonic() > end:
                 why = f"{', '.join(ended)} ended" if ended else f"it does not work again: {said}"
                 raise RollingPandaError(f"{why}; {self.describe()}\n{self.logs()}")
             if fresh:

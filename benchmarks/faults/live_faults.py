@@ -107,7 +107,7 @@ def _happen(robot: FaultyRobot, fault: LiveFault, later_s: float, way: float) ->
         out = Happened(fault, at, robot.trace, time.monotonic(), _mode(robot))
     time.sleep(_WRITTEN_S)
     for name in fault.restart:
-        if robot.processes[name].poll() is not None:
+        if name not in robot.processes:
             robot.start(name)
     if fault.restart:
         robot.wait(lambda: robot.back(fault.restart), 30, f"{fault.restart} to be back")

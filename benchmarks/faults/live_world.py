@@ -1,8 +1,6 @@
 """The real processes behind a router that can fail, and a script that operates them."""
 
 import json
-import signal
-import subprocess
 import threading
 import time
 from contextlib import AbstractContextManager, nullcontext
@@ -13,8 +11,8 @@ import httpx
 
 from benchmarks.page.crowd import looked_at
 from rolling_panda.errors import RollingPandaError
-from rolling_panda.runtime.launch import child_environment, python_command
-from tests.support.processes.live_robot import PROCESSES, LiveRobot, free_port
+from tests.support.processes.live_robot import PROCESSES, LiveRobot
+from tests.support.processes.local_router import free_port
 from tests.support.processes.wall_clock import WallClock
 
 #: How often a hand renews its hold (s).
@@ -29,72 +27,34 @@ class FaultyRobot(LiveRobot):
         """Start nothing yet; as `LiveRobot`."""
         super().__init__(folder, seed, config)
         self._doors = {name: f"tcp/127.0.0.1:{free_port()}" for name in PROCESSES if name != "router"}
-        self._router: subprocess.Popen[str] | None = None
         self.traces: list[Path] = []
         self.wall_clock = WallClock(folder)
+        self.environment |= self.wall_clock.environment
 
     def start(self, name: str) -> None:
         """Start (or start again) one process."""
         if name == "router":
             doors = [word for name, endpoint in self._doors.items() for word in ("--door", f"{name}={endpoint}")]
-            with (self.folder / "router.log").open("ab") as log:
-                self._router = subprocess.Popen(
-                    python_command("benchmarks.faults.faulty_router", doors),
-                    stdin=subprocess.PIPE,
-                    stdout=subprocess.PIPE,
-                    stderr=log,
-                    text=True,
-                    env=child_environment(),
-                )
-            assert self._router.stdout is not None
-            if self._router.stdout.readline() != "open\n":
-                said = (self.folder / "router.log").read_text()
-                raise RollingPandaError(f"the faulty router did not come up:\n{said}")
+            self.launch(name, "benchmarks.faults.faulty_router", doors, answers=True)
+            self.answer(name)
             return
         if name == "bridge":
             self.trace = self.folder / f"trace{len(self.traces)}"
             self.traces.append(self.trace)
         super().start(name)
 
-    def environment(self) -> dict[str, str]:
-        """With a wall clock that can be set."""
-        return super().environment() | self.wall_clock.environment
-
     def endpoint_of(self, name: str) -> str:
         """The process's own door."""
         return self._doors[name]
 
-    def close(self) -> None:
-        """End everything, the router last."""
-        super().close()
-        if self._router is not None:
-            # It ends when its standard input closes.
-            self._router.communicate(timeout=10)
-
     def order(self, **words: Any) -> float:
         """Tell the router what is to go wrong; returns when it was so (s, monotonic)."""
-        router = self._router
-        assert router is not None and router.stdin is not None and router.stdout is not None
-        router.stdin.write(json.dumps(words) + "\n")
-        router.stdin.flush()
-        router.stdout.readline()
+        self.answer("router", json.dumps(words))
         return time.monotonic()
 
     def spoil(self, origin: str, to: str, topic: str, **fault: Any) -> float:
         """A fault on the way of a topic; returns when it began (s, monotonic)."""
         return self.order(**{"from": origin, "to": to, "topic": topic, "fault": fault})
-
-    def halt(self, name: str) -> float:
-        """SIGSTOP: the process stands still with all its connections. Returns when (s, monotonic)."""
-        at = time.monotonic()
-        self.processes[name].send_signal(signal.SIGSTOP)
-        return at
-
-    def go_on(self, name: str) -> float:
-        """SIGCONT. Returns when (s, monotonic)."""
-        at = time.monotonic()
-        self.processes[name].send_signal(signal.SIGCONT)
-        return at
 
     def looked_at(self, pages: int) -> AbstractContextManager[None]:
         """So many pages look on meanwhile, a fifth of which never read."""

@@ -11,7 +11,7 @@ from rolling_panda.config import TransportConfig
 from rolling_panda.errors import ServiceError
 from rolling_panda.topics import CONTROLLER, MOTION, RELEASE, STOP
 from rolling_panda.transport.zenoh import Transport
-from tests.support.processes.live_robot import free_port
+from tests.support.processes.local_router import free_port
 
 pytestmark = pytest.mark.alone
 COMMAND = m.MotionCommand(epoch=1, token="a", sequence=1, echo=1, xi=(0.0,) * 9)

@@ -19,7 +19,7 @@ from rolling_panda.resources import resource
 from rolling_panda.runtime.launch import child_environment
 from rolling_panda.transport.zenoh import Transport
 from tests.support.extras import need
-from tests.support.processes.device_process import DeviceProcess
+from tests.support.real_rig import Devices
 from tests.support.waiting import until
 
 need("real")
@@ -31,13 +31,12 @@ REST = (0.0,) * 9
 FORWARD = (*RobotModel().drive.wheels(0.2, 0.0), 0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-class Site:
-    """A base and an arm, and a configuration that names them."""
+class Site(Devices):
+    """Devices, and a configuration that names them."""
 
-    def __init__(self, endpoint: str, folder: Path) -> None:
-        self.endpoint, self.folder = endpoint, folder
-        self.base = DeviceProcess("base", "--plain-wire", "--connect", self.endpoint)
-        self.arm = DeviceProcess("arm", "--arm", ADDRESS)
+    def __init__(self, folder: Path) -> None:
+        super().__init__(ADDRESS)
+        self.folder = folder
         text = resource("assets/config/real.toml").read_text()
         text = text.replace("tls/127.0.0.1:7447", self.endpoint).replace('address = ""', f'address = "{ADDRESS}"')
         text = text.replace('realtime = "enforce"', 'realtime = "ignore"').replace("width = 848", "enabled = false", 1)
@@ -48,14 +47,10 @@ class Site:
         files = ["--config", str(self.config), "--state", str(self.folder / "state")]
         return [sys.executable, "-m", "bridge", "real", *files, "--plain-wire", *options]
 
-    def close(self) -> None:
-        self.base.close()
-        self.arm.close()
-
 
 @pytest.fixture(scope="module")
-def site(endpoint: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
-    site = Site(endpoint, tmp_path_factory.mktemp("site"))
+def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    site = Site(tmp_path_factory.mktemp("site"))
     yield site
     site.close()
 
@@ -111,7 +106,7 @@ def test_it_follows_the_wire_or_only_tells_the_robots_state(site: Site, readonly
         else:
             np.testing.assert_allclose(wheels, FORWARD[:2], atol=0.1)
             np.testing.assert_allclose(site.arm.tell()["dq"], FORWARD[2:], atol=0.02)
-            assert [*site.base.tell()["breaches"], *site.arm.tell()["breaches"]] == []
+            assert site.breaches() == []
     finally:
         bridge.send_signal(signal.SIGINT)
         code = bridge.wait(10)

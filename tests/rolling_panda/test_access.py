@@ -1,6 +1,5 @@
 """On a wire with certificates each process may say what is its own to say, and an intruder nothing at all."""
 
-import subprocess
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -16,13 +15,13 @@ from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.config import TransportConfig
 from rolling_panda.errors import InputError, ServiceError, TransportError
-from rolling_panda.runtime.launch import child_environment, python_command
 from rolling_panda.topics import BRIDGE, INTENT, JOINTS, MOTION, RELEASE, SERVICES, STOP, TOKEN, TOPICS, key
 from rolling_panda.transport.access import BEARERS, CALLERS, access_control
 from rolling_panda.transport.certificates import APART, NAMES, main, make
 from rolling_panda.transport.codec import encode
 from rolling_panda.transport.zenoh import Onlooker, Router, Transport
-from tests.support.processes.live_robot import free_port
+from tests.support.processes.local_router import free_port
+from tests.support.processes.processes import Processes
 
 pytestmark = pytest.mark.alone
 
@@ -236,31 +235,20 @@ def commands(wire: Onlooker, seconds: float) -> None:
 
 
 def test_only_the_controller_moves_the_robot(certificates: Path, tmp_path: Path) -> None:
-    port, trace = free_port(), tmp_path / "trace"
-    endpoint = f"tls/127.0.0.1:{port}"
+    endpoint, trace = f"tls/127.0.0.1:{free_port()}", tmp_path / "trace"
     shared = ["--certificates", str(certificates)]
-    lines = {
-        "router": ("rolling_panda", ["router", "--listen", endpoint, *shared]),
-        "bridge": (
-            "bridge",
-            ["sim", "--trace", str(trace), "--connect", endpoint, "--state", str(tmp_path / "state"), *shared],
-        ),
-    }
-    running: list[subprocess.Popen[bytes]] = []
     settings = TransportConfig(connect=(endpoint,), connect_timeout_s=20.0, certificates=str(certificates))
 
     def driven() -> float:
         return float(np.abs(read(trace).rows["base_velocity"][:, 0]).max())
 
-    try:
-        for module, words in lines.values():
-            running.append(subprocess.Popen(python_command(module, words), env=child_environment()))
+    with Processes(tmp_path) as site:
+        site.launch("router", "rolling_panda", ["router", "--listen", endpoint, *shared])
+        kept = ["--trace", str(trace), "--connect", endpoint, "--state", str(tmp_path / "state")]
+        site.launch("bridge", "bridge", ["sim", *kept, *shared])
         with Onlooker(settings, "rp1") as onlooker:
             state = onlooker.slot(BRIDGE)
-            end = time.monotonic() + 60.0
-            while state.peek() is None:
-                assert time.monotonic() < end and all(child.poll() is None for child in running)
-                time.sleep(0.05)
+            site.wait(lambda: state.peek() is not None, 60.0, "the bridge")
         for intruder in ("server", "perception"):
             with Transport(settings, intruder, "rp1") as wire:
                 commands(wire, 1.0)
@@ -269,8 +257,3 @@ def test_only_the_controller_moves_the_robot(certificates: Path, tmp_path: Path)
             commands(wire, 1.5)
         time.sleep(0.3)
         assert driven() > 0.02
-    finally:
-        for child in reversed(running):
-            child.terminate()
-        for child in running:
-            child.wait(10)

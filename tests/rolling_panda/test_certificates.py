@@ -9,7 +9,7 @@ from cryptography import x509
 
 from rolling_panda.runtime.launch import child_environment, python_command
 from rolling_panda.transport.certificates import NAMES, make, out_of_date
-from tests.support.processes.live_robot import free_port
+from tests.support.processes.local_router import free_port
 from tests.support.processes.wall_clock import WallClock
 
 TEN_YEARS = 10 * 365 * 86400

@@ -22,7 +22,7 @@ from rolling_panda.cli import main as cli
 from rolling_panda.cli.demo import _check_robots, choose_router_port, demo_robots, process_commands, write_secret
 from rolling_panda.errors import InputError
 from rolling_panda.runtime.launch import child_environment, python_command
-from tests.support.processes.live_robot import free_port
+from tests.support.processes.local_router import free_port
 
 STARTUP_S = 60.0
 CHILDREN = {"router", "bridge", "controller", "perception", "server"}

@@ -2,6 +2,7 @@
 
 import os
 import time
+from contextlib import ExitStack
 
 import numpy as np
 
@@ -16,10 +17,10 @@ from bridge.real.panda import Panda
 from bridge.real.robot import RealRobot
 from rolling_panda.config import TransportConfig
 from rolling_panda.model.differential_drive import Array
-from rolling_panda.transport.zenoh import ForeignWire, Router
+from rolling_panda.transport.zenoh import ForeignWire
 from tests.support.bridge_rig import MODEL, PICTURE
 from tests.support.processes.device_process import DeviceProcess
-from tests.support.processes.live_robot import free_port
+from tests.support.processes.local_router import local_router
 
 ADDRESS = f"127.0.{os.getpid() % 250 + 1}.8"
 SERVICE = "cutter/close"
@@ -39,19 +40,28 @@ class OnePicture:
         pass
 
 
-class RealPlant:
+class Devices:
+    """Router, base with cutter, and arm, each in a process of its own but the router."""
+
+    def __init__(self, address: str = ADDRESS) -> None:
+        self._begun = ExitStack()
+        self.endpoint = self._begun.enter_context(local_router())
+        self.base = DeviceProcess("base", "--plain-wire", "--connect", self.endpoint)
+        self.arm = DeviceProcess("arm", "--arm", address)
+
+    def breaches(self) -> list[str]:
+        return [*self.base.tell()["breaches"], *self.arm.tell()["breaches"]]
+
+    def close(self) -> None:
+        self.base.close()
+        self.arm.close()
+        self._begun.close()
+
+
+class RealPlant(Devices):
     """Base, arm and blades; what they have been made to do is read from themselves."""
 
-    def __init__(self) -> None:
-        self.endpoint = f"tcp/127.0.0.1:{free_port()}"
-        self.router = Router(TransportConfig(mode="router", connect=(), listen=(self.endpoint,), plain_wire=True))
-        self.base = DeviceProcess("base", "--plain-wire", "--connect", self.endpoint)
-        self.arm = DeviceProcess("arm", "--arm", ADDRESS)
-        self.robot: RealRobot | None = None
-
-    @property
-    def transport(self) -> TransportConfig:
-        return TransportConfig(connect=(self.endpoint,), plain_wire=True)
+    robot: RealRobot | None = None
 
     def start(self) -> BridgeCore:
         """A bridge on these devices, once they are there; the one before lets go."""
@@ -59,9 +69,10 @@ class RealPlant:
             self.robot.close()
         config = BridgeConfig()
         acceleration = config.wheel_acceleration
-        base = Mp500(ForeignWire(self.transport), MODEL.drive, acceleration, BaseConfig())
+        wire = TransportConfig(connect=(self.endpoint,), plain_wire=True)
+        base = Mp500(ForeignWire(wire), MODEL.drive, acceleration, BaseConfig())
         arm = Panda(ArmConfig(address=ADDRESS, realtime="ignore"), MODEL.limits)
-        blades = Cutter(ForeignWire(self.transport), CutterConfig(service=SERVICE))
+        blades = Cutter(ForeignWire(wire), CutterConfig(service=SERVICE))
         self.robot = RealRobot(base, arm, blades, OnePicture())
         end = time.monotonic() + 15.0
         while self.robot.read().fault or blades.read().state != "open":
@@ -72,13 +83,5 @@ class RealPlant:
     def velocity(self) -> Array:
         return np.array([*self.base.tell()["wheels"], *self.arm.tell()["dq"]])
 
-    def breaches(self) -> list[str]:
-        return [*self.base.tell()["breaches"], *self.arm.tell()["breaches"]]
-
     def bites(self) -> int:
         return int(self.base.tell_all("report")["cutter"]["bites"])
-
-    def close(self) -> None:
-        self.base.close()
-        self.arm.close()
-        self.router.close()

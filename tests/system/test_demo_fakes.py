@@ -10,7 +10,7 @@ from bridge.sim.robot import trace
 from rolling_panda.resources import resource
 from tests.support.extras import need
 from tests.support.processes.demo import Demo
-from tests.support.processes.live_robot import free_port
+from tests.support.processes.local_router import free_port
 
 need("real")
 

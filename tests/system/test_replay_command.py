@@ -12,7 +12,7 @@ from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.runtime.launch import child_environment, python_command
 from tests.support import fake_wire
-from tests.support.processes.live_robot import free_port
+from tests.support.processes.local_router import free_port
 from tests.support.running_server import answers, eventually
 
 # The server takes half a minute to start on a busy machine.

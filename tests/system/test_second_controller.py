@@ -9,47 +9,35 @@ import pytest
 
 from rolling_panda.config import TransportConfig
 from rolling_panda.resources import resource
-from rolling_panda.runtime.launch import child_environment, python_command
 from rolling_panda.topics import BRIDGE, CONTROLLER
 from rolling_panda.transport.certificates import make
 from rolling_panda.transport.zenoh import Onlooker
-from tests.rolling_panda.test_access import free_port
+from tests.support.processes.local_router import free_port
+from tests.support.processes.processes import Processes
 from tests.support.waiting import until
 
 pytestmark = pytest.mark.alone
 
 
-class Site:
+class Site(Processes):
     """Router and bridge run; controllers come and go."""
 
     def __init__(self, folder: Path, stack: ExitStack) -> None:
-        self.folder, self.stack = folder, stack
+        super().__init__(folder)
+        stack.callback(self.close)
         make(folder / "certificates", ("127.0.0.1",), 2)
-        self.endpoint = f"tls/127.0.0.1:{free_port()}"
+        self.endpoint, self.shown = f"tls/127.0.0.1:{free_port()}", str(folder / "certificates")
         text = resource("assets/config/sim.toml").read_text().replace("width = 848", "width = 64")
         (folder / "sim.toml").write_text(text.replace("height = 480", "height = 48"))
-        self.run("rolling_panda", "router", "--listen", self.endpoint)
+        self.launch("router", "rolling_panda", ["router", "--listen", self.endpoint, "--certificates", self.shown])
         self.process("bridge", "bridge", "bridge")
-        shown = str(folder / "certificates")
-        wire = TransportConfig(connect=(self.endpoint,), connect_timeout_s=20.0, certificates=shown)
+        wire = TransportConfig(connect=(self.endpoint,), connect_timeout_s=20.0, certificates=self.shown)
         self.onlooker = stack.enter_context(Onlooker(wire, "rp1"))
         self._bridge, self._controller = self.onlooker.slot(BRIDGE), self.onlooker.slot(CONTROLLER)
 
-    def run(self, module: str, *words: str, said: str = "router") -> "subprocess.Popen[bytes]":
-        command = python_command(module, [*words, "--certificates", str(self.folder / "certificates")])
-        with (self.folder / f"{said}.log").open("w") as log:
-            process = subprocess.Popen(command, env=child_environment(), stderr=log)
-        self.stack.callback(process.wait, 10)
-        self.stack.callback(process.kill)
-        return process
-
-    def process(self, module: str, state: str, said: str) -> "subprocess.Popen[bytes]":
-        own = ["--connect", self.endpoint, "--config", str(self.folder / "sim.toml")]
-        return self.run(module, *own, "--state", str(self.folder / state), said=said)
-
-    def said(self, name: str) -> str:
-        """What this process wrote to its standard error."""
-        return (self.folder / f"{name}.log").read_text()
+    def process(self, module: str, state: str, name: str) -> "subprocess.Popen[str]":
+        own = ["--connect", self.endpoint, "--config", str(self.folder / "sim.toml"), "--certificates", self.shown]
+        return self.launch(name, module, [*own, "--state", str(self.folder / state)])
 
     @property
     def held(self) -> tuple[int, str]:
@@ -78,9 +66,9 @@ def test_it_waits_says_so_and_takes_over_after_the_first_has_ended_or_was_killed
     until(lambda: bool(site.held[1]) and site.mode() == "IDLE")
     epoch, holder = site.held
     second, same = site.process("controller", "two", "second"), site.process("controller", "one", "same")
-    assert same.wait(60) == 1 and f"another controller works with {site.folder / 'one'}" in site.said("same")
+    assert same.wait(60) == 1 and f"another controller works with {site.folder / 'one'}" in site.log("same").read_text()
     until(lambda: site.refused() > 5)
-    assert "another controller commands this robot; this one waits" in site.said("second")
+    assert "another controller commands this robot; this one waits" in site.log("second").read_text()
     assert site.held == (epoch, holder) and site.mode() == "IDLE"
     first.terminate()
     until(lambda: site.held[1] not in ("", holder), 20.0)

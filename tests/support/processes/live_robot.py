@@ -1,31 +1,21 @@
 """The five processes on loopback, started one by one over real Zenoh, so that one can watch, stop or kill any."""
 
-import signal
-import socket
-import subprocess
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 import httpx
 
-from rolling_panda.runtime.launch import child_environment, python_command
+from tests.support.processes.local_router import free_port
+from tests.support.processes.processes import Processes
 
 PROCESSES = ("router", "bridge", "controller", "perception", "server")
 TOKEN = "for-this-test-only-0123456789abcdefghijklmnop"
 
 
-def free_port() -> int:
-    """A loopback port that nobody listens on now."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
-class LiveRobot:
+class LiveRobot(Processes):
     """Router, bridge, controller, perception and server, each a process of its own."""
 
     def __init__(
@@ -39,14 +29,13 @@ class LiveRobot:
             config: TOML configuration; None takes the simulation's.
             certificates: Folder of them, for mutual TLS on the wire; None for a plain one.
         """
-        self.folder = folder
+        super().__init__(folder)
         self.seed = seed
         self.config, self.certificates = config, certificates
         self.port, self.router_port = free_port(), free_port()
         self.url = f"http://127.0.0.1:{self.port}"
         self.endpoint = f"{'tcp' if certificates is None else 'tls'}/127.0.0.1:{self.router_port}"
         self.trace = folder / "trace"
-        self.processes: dict[str, subprocess.Popen[bytes]] = {}
         self._client: httpx.Client | None = None
 
     def __enter__(self) -> Self:
@@ -58,12 +47,6 @@ class LiveRobot:
             self.wait(self._healthy, 60, "the server to answer")
             undo.pop_all()
         return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """End everything."""
-        self.close()
 
     def start(self, name: str) -> None:
         """Start (or start again) one process; its output goes to a file of its name."""
@@ -87,39 +70,16 @@ class LiveRobot:
         plain = self.certificates is None
         options += ["--plain-wire"] if plain else ["--certificates", str(self.certificates)]
         module, words = ("rolling_panda", ["router", *options]) if name == "router" else (name, options)
-        with (self.folder / f"{name}.log").open("ab") as log:
-            self.processes[name] = subprocess.Popen(
-                python_command(module, words), stdout=log, stderr=log, env=self.environment()
-            )
-
-    def environment(self) -> dict[str, str]:
-        """Of each process."""
-        return child_environment()
+        self.launch(name, module, words)
 
     def endpoint_of(self, name: str) -> str:
         """Where a process finds the wire."""
         return self.endpoint
 
-    def kill(self, name: str) -> float:
-        """Kill -9 a process. Returns when, on the monotonic clock that all processes of the machine share (s)."""
-        process = self.processes[name]
-        at = time.monotonic()
-        process.send_signal(signal.SIGKILL)
-        process.wait()
-        return at
-
     def close(self) -> None:
         """End everything, politely first."""
         self._sign_out()
-        for process in reversed(self.processes.values()):
-            if process.poll() is None:
-                process.terminate()
-        for process in self.processes.values():
-            try:
-                process.wait(5)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+        super().close()
 
     @property
     def client(self) -> httpx.Client:
@@ -179,23 +139,10 @@ class LiveRobot:
         """The queue, in the order of work."""
         return list(self.client.get("/api/points").json()["points"])
 
-    def wait(self, condition: Callable[[], Any], timeout_s: float, what: str) -> Any:
-        """Poll until `condition()` is truthy; its value."""
-        deadline = time.monotonic() + timeout_s
-        while time.monotonic() < deadline:
-            value = condition()
-            if value:
-                return value
-            time.sleep(0.05)
-        raise AssertionError(f"waited {timeout_s} s for {what}\n{self.logs()}")
-
     def logs(self) -> str:
-        """The last lines of every process."""
-        parts = []
-        for name in self.processes:
-            lines = (self.folder / f"{name}.log").read_text(errors="replace").splitlines()[-15:]
-            parts.append(f"--- {name}\n" + "\n".join(lines))
-        if self._client is not None and self.processes["server"].poll() is None:
+        """The last lines of every process and of the page's log."""
+        server, parts = self.processes.get("server"), [super().logs()]
+        if self._client is not None and server is not None and server.poll() is None:
             told = self._client.get("/api/events").json()["events"][-25:]
             parts.append("--- log\n" + "\n".join(f"{line['process']}: {line['text']}" for line in told))
         return "\n".join(parts)
@@ -206,9 +153,6 @@ class LiveRobot:
         self._client = None
 
     def _healthy(self) -> bool:
-        ended = [name for name, process in self.processes.items() if process.poll() is not None]
-        if ended:
-            raise AssertionError(f"ended at the start: {', '.join(ended)}\n{self.logs()}")
         try:
             return httpx.get(f"{self.url}/api/health", timeout=1).status_code == 200
         except httpx.HTTPError:

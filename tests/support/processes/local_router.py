@@ -1,11 +1,18 @@
-"""A router on this machine, for tests of what is said through it."""
+"""A router on this machine, for what speaks over a real wire, and ports that nobody listens on."""
 
+import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 from rolling_panda.config import TransportConfig
 from rolling_panda.transport.zenoh import Router
-from tests.support.processes.live_robot import free_port
+
+
+def free_port() -> int:
+    """A loopback port that nobody listens on now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
 
 
 @contextmanager
