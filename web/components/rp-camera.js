@@ -117,7 +117,7 @@ class RpCamera extends HTMLElement {
 
   connectedCallback() {
     const source = element("span", { class: "tag" });
-    const freeze = element("button", { id: "freeze", class: "quiet", text: "Freeze", attributes: { type: "button" } });
+    const freeze = element("button", { id: "freeze", class: "quiet", text: "Freeze" });
     const { head, note } = panelHead("Camera", source, freeze);
     this.picture.append(this.overlay);
     this.append(head, this.picture);

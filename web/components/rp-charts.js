@@ -187,12 +187,7 @@ export class RpCharts extends HTMLElement {
     this.shown = signal(history);
     this.isOpen = false;
     this.when = element("span", { class: "hint number", attributes: { role: "status" } });
-    this.pause = element("button", {
-      id: "pause-charts",
-      class: "quiet",
-      text: "Pause",
-      attributes: { type: "button" },
-    });
+    this.pause = element("button", { id: "pause-charts", class: "quiet", text: "Pause" });
     /** @type {Node[]} */
     this.tools = [this.when, this.pause];
     this.figures = READINGS.map((reading) => figure(reading.id, reading.label, reading.description));

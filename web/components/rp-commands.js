@@ -4,7 +4,7 @@ import { whyNot } from "../js/control/allowed.js";
 import { ask } from "../js/link/api.js";
 import { link, now, pageState, points } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
-import { element, setEnabled } from "../js/views/dom.js";
+import { dropDown, element, setEnabled } from "../js/views/dom.js";
 
 /**
  * @type {readonly (readonly [id: string, intent: import("../js/control/allowed.js").Intent, word: string, hint:
@@ -30,7 +30,7 @@ class RpCommands extends HTMLElement {
     this.setAttribute("aria-label", "Robot");
     const distance = surveyDistance();
     for (const [id, intent, word, hint] of BUTTONS) {
-      const button = element("button", { id, text: word, attributes: { type: "button" } });
+      const button = element("button", { id, text: word });
       button.addEventListener("click", () => {
         void ask(word, `api/${id}`, intent === "Survey" ? { distance: Number(distance.value) } : {});
       });
@@ -42,12 +42,14 @@ class RpCommands extends HTMLElement {
 }
 
 function surveyDistance() {
-  const select = element("select", {
-    id: "survey-distance",
-    attributes: { "aria-label": "How far ahead the survey goes", title: "How far ahead along the row the survey goes" },
-  });
-  for (const metres of DISTANCES)
-    select.append(element("option", { text: `${metres} m`, attributes: { value: String(metres) } }));
+  const attributes = {
+    "aria-label": "How far ahead the survey goes",
+    title: "How far ahead along the row the survey goes",
+  };
+  const select = dropDown(
+    { id: "survey-distance", attributes },
+    DISTANCES.map((metres) => [String(metres), `${metres} m`]),
+  );
   select.value = String(USUAL_DISTANCE);
   return select;
 }

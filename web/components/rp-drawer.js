@@ -18,7 +18,7 @@ export function drawerButton(sheet, words) {
   const button = element("button", {
     class: "quiet opens",
     text: words,
-    attributes: { type: "button", "aria-controls": "drawer" },
+    attributes: { "aria-controls": "drawer" },
     data: { opens: sheet },
     onclick: () => drawer.set(drawer.get() === sheet ? "" : sheet),
   });
@@ -57,7 +57,6 @@ class RpDrawer extends HTMLElement {
       id: "close-drawer",
       class: "quiet",
       text: "Close",
-      attributes: { type: "button" },
       onclick: () => drawer.set(""),
     });
     this.append(element("div", { class: "panel-head" }, this.heading, this.tools, close), this.waiting);

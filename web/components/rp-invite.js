@@ -3,13 +3,13 @@
 import { post } from "../js/link/api.js";
 import { link as serverLink, pageState } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
-import { element, setText } from "../js/views/dom.js";
+import { dropDown, element, setText } from "../js/views/dom.js";
 
-/** @type {readonly (readonly [role: import("../js/link/messages.js").Role, may: string])[]} */
+/** @type {readonly (readonly [role: import("../js/link/messages.js").Role, words: string])[]} */
 const ROLES = Object.freeze([
-  ["viewer", "looks, and may stop the robot"],
-  ["operator", "moves the robot"],
-  ["supervisor", "also resets a stop, and invites"],
+  ["viewer", "viewer: looks, and may stop the robot"],
+  ["operator", "operator: moves the robot"],
+  ["supervisor", "supervisor: also resets a stop, and invites"],
 ]);
 
 class RpInvite extends HTMLElement {
@@ -19,7 +19,7 @@ class RpInvite extends HTMLElement {
       id: "invite",
       class: "quiet",
       text: "Invite",
-      attributes: { type: "button", "aria-expanded": "false", "aria-controls": "invitation" },
+      attributes: { "aria-expanded": "false", "aria-controls": "invitation" },
     });
     const user = element("input", {
       id: "invite-user",
@@ -32,15 +32,13 @@ class RpInvite extends HTMLElement {
         autocomplete: "off",
       },
     });
-    const role = element("select", { id: "invite-role" });
-    for (const [name, may] of ROLES)
-      role.append(element("option", { text: `${name}: ${may}`, attributes: { value: name } }));
+    const role = dropDown({ id: "invite-role" }, ROLES);
     const words = element("p", { class: "hint", attributes: { role: "status" } });
     const link = element("input", {
       id: "invite-link",
       attributes: { type: "text", readonly: "", "aria-label": "Sign-in link" },
     });
-    const copy = element("button", { id: "invite-copy", text: "Copy", attributes: { type: "button" } });
+    const copy = element("button", { id: "invite-copy", text: "Copy" });
     const made = element("div", { class: "invite-made" }, link, copy);
     const form = element(
       "form",
@@ -49,7 +47,7 @@ class RpInvite extends HTMLElement {
       user,
       element("label", { text: "Role", attributes: { for: "invite-role" } }),
       role,
-      element("button", { id: "invite-make", class: "primary", text: "Make a link" }),
+      element("button", { id: "invite-make", class: "primary", text: "Make a link", attributes: { type: "submit" } }),
       words,
       made,
     );

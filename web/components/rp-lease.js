@@ -86,7 +86,7 @@ class RpLease extends HTMLElement {
  * @param {() => void} press
  */
 function button(id, press) {
-  return element("button", { id, attributes: { type: "button" }, onclick: press });
+  return element("button", { id, onclick: press });
 }
 
 customElements.define("rp-lease", RpLease);

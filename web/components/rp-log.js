@@ -4,24 +4,30 @@ import { PROCESSES } from "../js/link/messages.js";
 import { clockWords, inWords } from "../js/state/format.js";
 import { log } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
-import { element, setText } from "../js/views/dom.js";
+import { dropDown, element, setText } from "../js/views/dom.js";
 import { icon } from "../js/views/icons.js";
 import { drawerButton } from "./rp-drawer.js";
 
 /** @typedef {import("../js/link/messages.js").PageEvent} PageEvent */
 
+/** @typedef {readonly (readonly [value: string, words: string])[]} Options */
+
+/** @type {Options} */
 const LEAST = Object.freeze([
   ["info", "Everything"],
   ["warning", "Warnings and errors"],
   ["error", "Errors"],
 ]);
-/** With the page's own lines. */
-const FROM = Object.freeze([["", "All processes"], ...[...PROCESSES, "page"].map((name) => [name, name])]);
+/** With the page's own lines. @type {Options} */
+const FROM = [["", "All processes"], ...PROCESSES.map((name) => /** @type {const} */ ([name, name])), ["page", "page"]];
 
 class RpLog extends HTMLElement {
   connectedCallback() {
-    const least = choice("log-filter", "Least severity shown in the log", LEAST);
-    const from = choice("log-process", "Process shown in the log", FROM);
+    const least = dropDown(
+      { id: "log-filter", attributes: { "aria-label": "Least severity shown in the log" } },
+      LEAST,
+    );
+    const from = dropDown({ id: "log-process", attributes: { "aria-label": "Process shown in the log" } }, FROM);
     const words = element("input", {
       id: "log-words",
       attributes: { type: "search", placeholder: "Find", "aria-label": "Words shown in the log", autocomplete: "off" },
@@ -91,18 +97,6 @@ class RpLog extends HTMLElement {
     }
     drawOn([log], draw);
   }
-}
-
-/**
- * @param {string} id
- * @param {string} label
- * @param {readonly (readonly string[])[]} options Value and words.
- */
-function choice(id, label, options) {
-  const select = element("select", { id, attributes: { "aria-label": label } });
-  for (const [value, words] of options)
-    select.append(element("option", { text: words, attributes: { value: value ?? "" } }));
-  return select;
 }
 
 /** @param {PageEvent} line */

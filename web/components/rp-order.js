@@ -45,7 +45,6 @@ class RpOrder extends HTMLElement {
       id: "planners-order",
       class: "quiet",
       text: "Plan's order",
-      attributes: { type: "button" },
       onclick: () => void resetOrder(),
     });
     this.space = element("div", { class: "order-space" });

@@ -78,12 +78,7 @@ export class RpPointDetails extends HTMLElement {
     this.row = null;
     this.buttons = STEPS.map((step) => {
       const words = `${step > 0 ? "+" : "−"}${Math.abs(step)}`;
-      return element("button", {
-        class: "quiet",
-        text: words,
-        attributes: { type: "button" },
-        onclick: () => this.move(step),
-      });
+      return element("button", { class: "quiet", text: words, onclick: () => this.move(step) });
     });
     this.moves.append(element("span", { text: "Move, mm" }), ...this.buttons);
     this.turn = element("input", {
@@ -99,7 +94,6 @@ export class RpPointDetails extends HTMLElement {
     this.free = element("button", {
       class: "quiet",
       text: "As found",
-      attributes: { type: "button" },
       onclick: () => this.row && void turnApproach(this.row, null),
     });
     this.turning = 0;

@@ -36,14 +36,7 @@ export class RpRejectForm extends HTMLElement {
     });
     const usual = element("div", { class: "usual" });
     for (const words of USUAL) {
-      usual.append(
-        element("button", {
-          class: "quiet",
-          text: words,
-          attributes: { type: "button" },
-          onclick: () => this.send(words),
-        }),
-      );
+      usual.append(element("button", { class: "quiet", text: words, onclick: () => this.send(words) }));
     }
     this.append(form, usual);
     this.addEventListener("keydown", (event) => {
@@ -103,14 +96,10 @@ export class RpPoint extends HTMLElement {
     this.reason = element("p", { class: "reason" });
     this.acceptButton = element(
       "button",
-      { class: "accept", attributes: { type: "button" }, onclick: () => this.row && void accept(this.row) },
+      { class: "accept", onclick: () => this.row && void accept(this.row) },
       icon("DONE"),
     );
-    this.rejectButton = element(
-      "button",
-      { class: "reject", attributes: { type: "button" }, onclick: () => this.reject() },
-      icon("REJECTED"),
-    );
+    this.rejectButton = element("button", { class: "reject", onclick: () => this.reject() }, icon("REJECTED"));
   }
 
   connectedCallback() {

@@ -29,7 +29,7 @@ const STEP = 0.05;
 class RpPreview extends HTMLElement {
   connectedCallback() {
     const button = (/** @type {string} */ id, /** @type {string} */ text, /** @type {() => void} */ onclick) =>
-      element("button", { id, text, attributes: { type: "button" }, onclick });
+      element("button", { id, text, onclick });
     const all = button("preview", "Preview", () => void askPreview(""));
     const one = button("preview-one", "Chosen", () => void askPreview(selected.get()));
     const run = button("preview-play", "Play", togglePlayback);

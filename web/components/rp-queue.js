@@ -254,7 +254,7 @@ function orderOfWork() {
 }
 
 function undoButton() {
-  const button = element("button", { id: "undo", class: "quiet", text: "Undo", attributes: { type: "button" } });
+  const button = element("button", { id: "undo", class: "quiet", text: "Undo" });
   button.addEventListener("click", () => void undo());
   drawOn([decisions, pageState, link, now], () => {
     setEnabled(button, whyNoUndo(), `Take back: ${decisions.get().at(-1)?.words ?? ""} (Z)`);
@@ -263,7 +263,7 @@ function undoButton() {
 }
 
 function acceptEvery() {
-  const button = element("button", { id: "accept-all", attributes: { type: "button" } });
+  const button = element("button", { id: "accept-all" });
   button.addEventListener("click", () => void acceptAll());
   drawOn([points, pageState, link, now], () => {
     const sure = confidentPoints().length;
@@ -284,7 +284,7 @@ function acceptEvery() {
 function addByHand() {
   const button = element(
     "button",
-    { id: "add-by-hand", attributes: { type: "button", "aria-label": "Add a point by hand" } },
+    { id: "add-by-hand", attributes: { "aria-label": "Add a point by hand" } },
     icon("add"),
   );
   button.addEventListener("click", () => setPlacing(!placing.get()));

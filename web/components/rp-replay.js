@@ -6,7 +6,7 @@ import { drawOn } from "../js/state/signals.js";
 import { element, setText } from "../js/views/dom.js";
 
 class RpReplay extends HTMLElement {
-  toggle = element("button", { id: "replay-toggle", attributes: { type: "button" } });
+  toggle = element("button", { id: "replay-toggle" });
   slider = element("input", {
     id: "replay-position",
     attributes: { type: "range", min: "0", step: "0.1", value: "0", "aria-label": "Position in the recording" },

@@ -63,18 +63,8 @@ class RpRule extends HTMLElement {
     super();
     this.summary = element("span");
     this.outcome = element("p", { class: "rule-outcome", attributes: { role: "status" } });
-    this.apply = element("button", {
-      id: "rule-apply",
-      class: "primary",
-      text: "Apply",
-      attributes: { type: "button" },
-    });
-    this.discard = element("button", {
-      id: "rule-discard",
-      class: "quiet",
-      text: "Discard",
-      attributes: { type: "button" },
-    });
+    this.apply = element("button", { id: "rule-apply", class: "primary", text: "Apply" });
+    this.discard = element("button", { id: "rule-discard", class: "quiet", text: "Discard" });
     /** @type {Map<Quantity, { row: HTMLElement, input: HTMLInputElement, value: HTMLElement }>} */
     this.sliders = new Map();
     /** @type {HTMLInputElement[]} */

@@ -16,7 +16,7 @@ const LOAD_TIMEOUT_MS = 20_000;
 class RpScene extends HTMLElement {
   connectedCallback() {
     const words = element("p", { text: "Loading the 3-D view…" });
-    const retry = element("button", { text: "Load it again", attributes: { type: "button" } });
+    const retry = element("button", { text: "Load it again" });
     retry.hidden = true;
     const frame = element("iframe", { attributes: { title: "3-D view of the robot and the row", tabindex: "0" } });
     const waiting = element("div", { class: "empty", attributes: { role: "status" } }, words, retry);

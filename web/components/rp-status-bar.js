@@ -93,12 +93,7 @@ class RpStatusBar extends HTMLElement {
   person() {
     const name = element("span", { class: "user-name" });
     const role = element("span", { class: "user-role" });
-    const leave = element("button", {
-      id: "sign-out",
-      class: "quiet",
-      text: "Sign out",
-      attributes: { type: "button" },
-    });
+    const leave = element("button", { id: "sign-out", class: "quiet", text: "Sign out" });
     leave.addEventListener("click", async () => {
       const answer = await post("api/sign-out");
       if (answer.ok) location.replace("/");

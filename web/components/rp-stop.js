@@ -21,7 +21,6 @@ class RpStop extends HTMLElement {
       {
         id: "stop",
         attributes: {
-          type: "button",
           "aria-keyshortcuts": "Space",
           title: `Stops base and arm${multiRobot ? " of every robot" : ""}. Space bar does the same.`,
         },

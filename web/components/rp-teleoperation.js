@@ -35,7 +35,7 @@ class RpJoints extends HTMLElement {
         const word = way > 0 ? "up" : "down";
         const button = element("button", {
           text: way > 0 ? "+" : "−",
-          attributes: { type: "button", "aria-label": `Joint ${joint + 1} ${word}` },
+          attributes: { "aria-label": `Joint ${joint + 1} ${word}` },
           data: { joint: String(joint + 1), way: word },
         });
         const joints = /** @type {import("../js/link/messages.js").ArmVelocities} */ (
@@ -146,7 +146,7 @@ class RpTeleoperation extends HTMLElement {
   connectedCallback() {
     const toggle = element(
       "button",
-      { id: "teleop", attributes: { type: "button", "aria-pressed": "false" } },
+      { id: "teleop", attributes: { "aria-pressed": "false" } },
       icon("TELEOP"),
       "Teleoperate",
     );
@@ -179,7 +179,7 @@ class RpTeleoperation extends HTMLElement {
     const holdWords = element("span", { text: "Hold to move" });
     const button = element(
       "button",
-      { id: "hold", attributes: { type: "button", "aria-keyshortcuts": "H" } },
+      { id: "hold", attributes: { "aria-keyshortcuts": "H" } },
       holdWords,
       element("kbd", { text: "H" }),
     );
@@ -234,7 +234,7 @@ class RpTeleoperation extends HTMLElement {
  */
 function choice(label, chosen, choose, values) {
   const buttons = values.map(([value, text, title]) => {
-    const button = element("button", { text, data: { choice: value }, attributes: { type: "button", title } });
+    const button = element("button", { text, data: { choice: value }, attributes: { title } });
     button.addEventListener("click", () => choose(value));
     drawOn([chosen], () => button.setAttribute("aria-pressed", String(chosen.get() === value)));
     return button;

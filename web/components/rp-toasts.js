@@ -24,7 +24,7 @@ class RpToasts extends HTMLElement {
         const close = element("button", {
           class: "quiet",
           text: "×",
-          attributes: { type: "button", "aria-label": "Close notice" },
+          attributes: { "aria-label": "Close notice" },
           onclick: () => dismissToast(toast.id),
         });
         const node = element(

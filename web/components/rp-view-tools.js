@@ -17,11 +17,7 @@ import { element, setEnabled, setText } from "../js/views/dom.js";
 
 class RpPlacing extends HTMLElement {
   connectedCallback() {
-    const done = element("button", {
-      id: "placing-done",
-      text: "Done",
-      attributes: { type: "button", "aria-keyshortcuts": "Escape" },
-    });
+    const done = element("button", { id: "placing-done", text: "Done", attributes: { "aria-keyshortcuts": "Escape" } });
     done.addEventListener("click", () => setPlacing(false));
     this.append(
       element("p", {
@@ -42,17 +38,13 @@ class RpViewTools extends HTMLElement {
   connectedCallback() {
     const presets = PRESETS.map(([preset, word, hint], index) => {
       const key = String(index + 1);
-      const traits = { text: word, data: { preset }, attributes: { type: "button", "aria-keyshortcuts": key } };
+      const traits = { text: word, data: { preset }, attributes: { "aria-keyshortcuts": key } };
       const button = element("button", traits);
       button.addEventListener("click", () => placeCamera(preset));
       drawOn([link, pageState], () => setEnabled(button, whyNoLooking(), `${hint} (key ${key})`));
       return button;
     });
-    const measure = element("button", {
-      id: "measure",
-      text: "Measure",
-      attributes: { type: "button", "aria-keyshortcuts": "M" },
-    });
+    const measure = element("button", { id: "measure", text: "Measure", attributes: { "aria-keyshortcuts": "M" } });
     measure.addEventListener("click", () => setMeasuring(!measuring.get()));
 
     const list = element("div", { id: "layers", class: "layers" });
@@ -60,7 +52,7 @@ class RpViewTools extends HTMLElement {
     const open = element("button", {
       id: "show-layers",
       text: "Layers",
-      attributes: { type: "button", "aria-expanded": "false", "aria-controls": "layers", title: "What the view shows" },
+      attributes: { "aria-expanded": "false", "aria-controls": "layers", title: "What the view shows" },
     });
     const show = (/** @type {boolean} */ shown) => {
       list.hidden = !shown;

@@ -24,11 +24,25 @@ export function element(tag, traits = {}, ...children) {
   if (traits.id) node.id = traits.id;
   if (traits.class) node.className = traits.class;
   if (traits.text !== undefined) node.textContent = traits.text;
+  // A button submits its form only where it says so.
+  if (node instanceof HTMLButtonElement) node.type = "button";
   for (const [name, value] of Object.entries(traits.data ?? {})) node.dataset[name] = value;
   for (const [name, value] of Object.entries(traits.attributes ?? {})) node.setAttribute(name, value);
   if (traits.onclick) node.addEventListener("click", /** @type {EventListener} */ (traits.onclick));
   node.append(...children);
   return node;
+}
+
+/**
+ * @param {Traits} traits
+ * @param {readonly (readonly [value: string, words: string])[]} options
+ */
+export function dropDown(traits, options) {
+  return element(
+    "select",
+    traits,
+    ...options.map(([value, words]) => element("option", { text: words, attributes: { value } })),
+  );
 }
 
 /**

@@ -55,7 +55,7 @@ function siteWords(site) {
 function siteItem(site) {
   const item = element("li", {}, element("span", { text: siteWords(site) }));
   if (site.needs !== "another look" || site.position === null) return item;
-  const button = element("button", { class: "quiet look-again", text: "Look again", attributes: { type: "button" } });
+  const button = element("button", { class: "quiet look-again", text: "Look again" });
   const { vine, spur } = site;
   button.addEventListener("click", () => void ask("Look again", "api/look-again", { vine, spur }));
   setEnabled(button, whyNot("Survey"), HINT);
