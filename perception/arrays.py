@@ -3,18 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from rolling_panda.messages.types import Vector3
-
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 Labels = NDArray[np.uint8]
-
-
-def vector3(point: Array) -> Vector3:
-    """A point (3) as the wire has it."""
-    x, y, z = (float(value) for value in point)
-    return x, y, z
 
 
 def distance(a: Array, b: Array) -> float:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from msgspec.structs import replace
 
-from perception.arrays import Array, Labels, distance, vector3
+from perception.arrays import Array, Labels, distance
 from perception.config import PerceptionConfig, RuleConfig
 from perception.obstacles.obstacle_map import ObstacleMap
 from perception.plant.capsules import CapsuleSet
@@ -39,6 +39,7 @@ from rolling_panda.errors import InputError
 from rolling_panda.messages.perception import Capsule, CloseUpResult, PointCrop
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.model.robot import RobotModel
+from rolling_panda.model.wire_values import vector3
 
 #: A point by hand nearer than this to another one is the same cut (m).
 _DUPLICATE = 0.01

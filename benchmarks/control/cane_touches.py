@@ -8,6 +8,7 @@ from controller.whole_body.collision_geometry import BLADES
 from controller.whole_body.obstacle import Obstacle
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import RobotModel
+from rolling_panda.model.wire_values import vector3
 
 #: A cane of the row: its vine, spur and number.
 Cane = tuple[int, int, int]
@@ -49,7 +50,7 @@ class CaneTouches:
             self._canes = {name: (rod.vine, rod.spur, rod.cane) for name, rod in canes.items()}
             self._model.set_obstacles(
                 [
-                    Obstacle(name, "cane", _point(rod.start), _point(rod.end), max(rod.start_radius, rod.end_radius))
+                    Obstacle(name, "cane", vector3(rod.start), vector3(rod.end), max(rod.start_radius, rod.end_radius))
                     for name, rod in canes.items()
                 ]
             )
@@ -58,8 +59,3 @@ class CaneTouches:
                 self.touched.setdefault(self._canes[b], set()).add(a)
                 if b in self._staying:
                     self.touched_staying.setdefault(self._canes[b], set()).add(a)
-
-
-def _point(at: Array) -> tuple[float, float, float]:
-    x, y, z = at.tolist()
-    return x, y, z

@@ -15,12 +15,12 @@ import numpy as np
 
 from benchmarks.common.documents import bench_parser, one_row_a_line, write
 from benchmarks.faults.real_site import RealSite
-from bridge.core.bridge import actuated
 from bridge.real import mp500
 from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.config import TransportConfig
 from rolling_panda.model.robot import RobotModel
+from rolling_panda.model.wire_values import actuated
 from rolling_panda.runtime.scheduling import set_priority
 from rolling_panda.transport.zenoh import Transport
 

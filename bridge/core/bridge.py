@@ -31,6 +31,7 @@ from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.messages.supervision import StopState
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import Limits
+from rolling_panda.model.wire_values import actuated
 from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.topics import BRIDGE, CLOSE_UP_REQUEST, CUT, MOTION, ODOMETRY, STOPS, TOKEN
 from rolling_panda.transport.zenoh import Rejections
@@ -420,9 +421,3 @@ class BridgeCore:
             return None
         self._scenery_revision, capsules = self._scenery()
         return Scenery(header=m.Header(now, "odom"), revision=self._scenery_revision, capsules=capsules)
-
-
-def actuated(values: Array) -> m.Actuated:
-    """Values over ξ (9) as the wire has them."""
-    a, b, c, d, e, f, g, h, i = (float(value) for value in values)
-    return a, b, c, d, e, f, g, h, i

@@ -7,6 +7,7 @@ import numpy as np
 from bridge.config import OdometryConfig
 from rolling_panda import messages as m
 from rolling_panda.model.differential_drive import Array, DifferentialDrive
+from rolling_panda.model.wire_values import planar_pose
 
 
 class Odometer:
@@ -35,7 +36,7 @@ class Odometer:
     @property
     def pose(self) -> m.PlanarPose:
         """Where the wheels say the base is, now and without noise."""
-        return _planar(self._pose)
+        return planar_pose(self._pose)
 
     def follow(self, wheels: Array) -> None:
         """Integrate up to these wheel angles (2, rad); the first ones are the origin's."""
@@ -59,7 +60,7 @@ class Odometer:
         message = m.Odometry(
             header=m.Header(stamp, "odom"),
             sequence=self._sequence,
-            pose=_planar(pose),
+            pose=planar_pose(pose),
             linear=linear + float(noise[3]) * config.linear_noise,
             angular=angular + float(noise[4]) * config.angular_noise,
         )
@@ -70,8 +71,3 @@ class Odometer:
         if self._waiting and self._waiting[0][0] <= ticks:
             return self._waiting.popleft()[1]
         return None
-
-
-def _planar(pose: Array) -> m.PlanarPose:
-    x, y, phi = (float(value) for value in pose)
-    return m.PlanarPose(x, y, phi)

@@ -6,6 +6,7 @@ from controller.identity import Token
 from controller.whole_body.saturation import Saturation
 from rolling_panda import messages as m
 from rolling_panda.model.differential_drive import NXI, Array
+from rolling_panda.model.wire_values import actuated
 
 #: So many periods of rest come first under a new token: the bridge takes no other beginning, and one may be lost.
 _AT_REST_FIRST = 3
@@ -53,14 +54,7 @@ class Setpoints:
         self._number += 1
         if xi.any():
             self.moved = self._number
-        a, b, c, d, e, f, g, h, i = xi.tolist()
-        return m.MotionCommand(
-            epoch=token.epoch,
-            token=token.nonce,
-            sequence=self._number,
-            echo=echo,
-            xi=(a, b, c, d, e, f, g, h, i),
-        )
+        return m.MotionCommand(epoch=token.epoch, token=token.nonce, sequence=self._number, echo=echo, xi=actuated(xi))
 
     def withhold(self) -> None:
         """Nothing is sent in this period."""

@@ -12,6 +12,7 @@ from rolling_panda.messages.perception import Capsule
 from rolling_panda.messages.types import PointState
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_Q
+from rolling_panda.model.wire_values import vector3
 
 #: Something stands where nothing within this of it (m) stood when the plan was made.
 OBSTACLE_TOLERANCE = 0.05
@@ -91,7 +92,7 @@ class ObstacleWatch:
         """
         self._before, self._track = before, track
         self._axes = Axes(tuple(obstacles_of(self._before)))
-        self._lines = Axes(tuple(Obstacle("", "line", _point(a), _point(b), _BESIDE_TOOL) for a, b in lines))
+        self._lines = Axes(tuple(Obstacle("", "line", vector3(a), vector3(b), _BESIDE_TOOL) for a, b in lines))
 
     @classmethod
     def of(cls, plan: WorkPlan) -> "ObstacleWatch":
@@ -131,8 +132,3 @@ class ObstacleWatch:
             # More canes come into view all along the row; only the tool goes in among them.
             return float(self._lines.gaps(place[None], np.zeros(1)).min()) < 0.0
         return float(np.hypot(*(place[:2] - self._track).T).min()) < _REACH
-
-
-def _point(at: Array) -> tuple[float, float, float]:
-    x, y, z = at.tolist()
-    return x, y, z

@@ -12,6 +12,7 @@ from rolling_panda import messages as m
 from rolling_panda.messages.perception import Capsule, PruningPoint
 from rolling_panda.messages.supervision import PreviewedCut, PreviewMotion, PreviewPhase, PreviewRow, PreviewState
 from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.wire_values import actuated, planar_pose
 
 #: No point of the robot is farther from one place to the next (m).
 STEP = 0.005
@@ -104,7 +105,6 @@ def state_message(
     if preview is None:
         return PreviewState(header=header, required=required, phase=phase, reason=reason[:500])
     q = preview.request.q
-    a, b, c, d, e, f, g, h, i = q[3:].tolist()
     return PreviewState(
         header=header,
         required=required,
@@ -112,8 +112,8 @@ def state_message(
         reason=reason[:500],
         preview_hash=preview.digest,
         approved_by=approved_by,
-        start=_planar(q),
-        position=(a, b, c, d, e, f, g, h, i),
+        start=planar_pose(q),
+        position=actuated(q[3:]),
         duration_s=preview.duration,
         cuts=preview.cuts,
         remaining=left,
@@ -123,11 +123,6 @@ def state_message(
 def motion_message(preview: Preview, now: float) -> PreviewMotion:
     """The message of the motion."""
     return PreviewMotion(header=m.Header(now, "odom"), preview_hash=preview.digest, rows=preview.rows)
-
-
-def _planar(q: Array) -> m.PlanarPose:
-    x, y, phi = q[:3].tolist()
-    return m.PlanarPose(x, y, phi)
 
 
 def sweep(model: CollisionModel, times: Sequence[float], configurations: Sequence[Array]) -> SweptVolume:

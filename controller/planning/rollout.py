@@ -33,6 +33,7 @@ from rolling_panda.messages.supervision import PreviewedCut, PreviewRow
 from rolling_panda.mode_table import Event
 from rolling_panda.model.differential_drive import NXI, Array, DifferentialDrive
 from rolling_panda.model.robot import Limits
+from rolling_panda.model.wire_values import actuated, planar_pose, vector3
 
 #: Between two rows of the motion that is shown (s).
 ROW_S = 0.1
@@ -137,14 +138,10 @@ class _Run:
 
     def _inputs(self, number: int, now: float) -> Inputs:
         header = m.Header(now, "odom")
-        a, b, c, d, e, f, g, h, i = self._actuators.q[3:].tolist()
-        j, k, n, o, p, r, s, t, u = self._actuators.xi.tolist()
-        drive = self._movement.body.robot.drive
-        linear, angular = drive.twist(j, k)
-        joints = m.JointState(
-            header=header, sequence=number, position=(a, b, c, d, e, f, g, h, i), velocity=(j, k, n, o, p, r, s, t, u)
-        )
-        base = _planar(self._actuators.q)
+        position, velocity = actuated(self._actuators.q[3:]), actuated(self._actuators.xi)
+        linear, angular = self._movement.body.robot.drive.twist(*velocity[:2])
+        joints = m.JointState(header=header, sequence=number, position=position, velocity=velocity)
+        base = planar_pose(self._actuators.q)
         odometry = m.Odometry(header=header, sequence=number, pose=base, linear=linear, angular=angular)
         if self._pending and now >= self._pending[0][0]:
             self._close_up = Sample(self._pending.popleft()[1], now)
@@ -196,9 +193,8 @@ class _Run:
         if sequence.active and sequence.plan is not None:
             self._plans[sequence.active] = sequence.plan
         q = measured.q
-        x, y, z = measured.kinematics.T_odom_tool.translation.tolist()
-        a, b, c, d, e, f, g, h, i = q[3:].tolist()
-        return PreviewRow(now, _planar(q), (a, b, c, d, e, f, g, h, i), (x, y, z))
+        tool = vector3(measured.kinematics.T_odom_tool.translation)
+        return PreviewRow(now, planar_pose(q), actuated(q[3:]), tool)
 
     def _digest(self) -> str:
         encode = msgspec.msgpack.Encoder(order="deterministic").encode
@@ -207,11 +203,6 @@ class _Run:
             out.update(encode(part))
         out.update(np.ascontiguousarray(request.q, dtype="<f8").tobytes())
         return out.hexdigest()
-
-
-def _planar(q: Array) -> m.PlanarPose:
-    x, y, phi = q[:3].tolist()
-    return m.PlanarPose(x, y, phi)
 
 
 @dataclass

@@ -13,6 +13,7 @@ from rolling_panda.messages.perception import Capsule, PruningPoint
 from rolling_panda.messages.supervision import PlannedPoint, PlanRow, PlanState, PointPlan, SessionPlan
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import pose_message
+from rolling_panda.model.wire_values import actuated, planar_pose
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +140,7 @@ def planned_point(cut: PlannedCut, order: int) -> PlannedPoint:
             manipulability=cut.manipulability,
             torque_margin=cut.torque_margin,
             torque_joint=cut.torque_joint,
-            base=_planar(cut.cut.q_cut),
+            base=planar_pose(cut.cut.q_cut),
             plan_hash=cut.way.digest,
         ),
         preview(cut.way),
@@ -156,12 +157,6 @@ def preview(way: Plan) -> tuple[PlanRow, ...]:
 
 
 def _row(way: Plan, row: int) -> PlanRow:
-    a, b, c, d, e, f, g, h, i = way.q[row, 3:].tolist()
     T = way.T_odom_tool[row]
     pose = pose_message(pin.SE3(T[:3, :3], T[:3, 3]))
-    return PlanRow(float(way.t[row]), _planar(way.q[row]), (a, b, c, d, e, f, g, h, i), pose)
-
-
-def _planar(q: Array) -> m.PlanarPose:
-    x, y, phi = q[:3].tolist()
-    return m.PlanarPose(x, y, phi)
+    return PlanRow(float(way.t[row]), planar_pose(way.q[row]), actuated(way.q[row, 3:]), pose)

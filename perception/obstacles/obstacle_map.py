@@ -10,7 +10,7 @@ from collections import Counter
 
 import numpy as np
 
-from perception.arrays import Array, Index, Labels, vector3
+from perception.arrays import Array, Index, Labels
 from perception.config import ObstacleConfig
 from perception.obstacles.cylinder_fit import Cylinder, RowPlane, fit_cylinders, row_plane
 from perception.obstacles.occupancy import OccupancyGrid, OccupiedCells
@@ -18,6 +18,7 @@ from perception.plant.capsules import CapsuleSet
 from perception.segmentation.frame import View
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.messages.types import WoodClass
+from rolling_panda.model.wire_values import vector3
 
 #: Share of the published capsules that may be cylinders; the rest is for canes.
 _MAX_SHARE = 0.75

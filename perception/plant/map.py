@@ -10,10 +10,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from perception.arrays import Array, interpolate, vector3
+from perception.arrays import Array, interpolate
 from perception.plant.model import Cane, Node, Plant, Spur
 from perception.plant.numbering import SpurNumber
 from rolling_panda.messages.types import Vector3
+from rolling_panda.model.wire_values import vector3
 
 #: Axes nearer to each other than this are one cane (m).
 _SAME_CANE = 0.015

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from perception.arrays import Array, interpolate, vector3
+from perception.arrays import Array, interpolate
 from perception.config import CloseUpConfig, PerceptionConfig
 from perception.segmentation.frame import CANE, SPUR, View
 from perception.segmentation.segmenter import Segmenter
@@ -18,6 +18,7 @@ from perception.tracking.presence import wood_presence
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import CloseUpResult, Finding
 from rolling_panda.messages.robot import CameraFrame
+from rolling_panda.model.wire_values import vector3
 
 #: Spacing of axis samples (m), and samples to either side in a tangent.
 _STEP, _TANGENT_SAMPLES = 0.001, 10

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from perception.arrays import Array, Labels, distance, interpolate, vector3
+from perception.arrays import Array, Labels, distance, interpolate
 from perception.config import ObstacleConfig, RuleConfig
 from perception.plant.map import KnownCane, KnownSpur
 from perception.plant.numbering import SpurNumber
@@ -21,6 +21,7 @@ from perception.segmentation.frame import View
 from perception.tracking.presence import wood_presence
 from perception.tracking.tracker import Proposal
 from rolling_panda.messages.perception import Capsule
+from rolling_panda.model.wire_values import vector3
 
 #: Largest distance of a cut from the axis of its cane (m).
 _ON_CANE = 0.015

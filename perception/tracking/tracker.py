@@ -12,7 +12,7 @@ import numpy as np
 from msgspec.structs import replace
 from scipy.spatial.distance import cdist
 
-from perception.arrays import Array, Labels, distance, vector3
+from perception.arrays import Array, Labels, distance
 from perception.config import TrackerConfig
 from perception.plant.numbering import SpurNumber
 from perception.rules.pruning import Cut, cutting_force
@@ -21,6 +21,7 @@ from perception.tracking.presence import wood_presence
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import point_digest
 from rolling_panda.messages.types import CutKind
+from rolling_panda.model.wire_values import vector3
 
 #: Frames without support after which a contradicted point is withdrawn, and an unpublished track is deleted.
 _MAX_MISSES, _MAX_MISSES_UNPUBLISHED = 5, 20

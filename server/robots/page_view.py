@@ -11,6 +11,7 @@ from rolling_panda.messages.robot import CameraFrame, JointState
 from rolling_panda.messages.supervision import SessionPlan
 from rolling_panda.messages.types import Role
 from rolling_panda.model.robot import ARM_Q, Limits, RobotModel, configuration, pose_message
+from rolling_panda.model.wire_values import vector3
 from server.auth.sessions import Session
 from server.robots.link import RobotLink
 
@@ -168,8 +169,7 @@ class PageView:
 
 def _ahead(point: m.PruningPoint) -> m.Vector3:
     """A point on the cane's tangent, past the cut."""
-    x, y, z = (np.array(point.position) + _TANGENT_STEP * np.array(point.tangent)).tolist()
-    return x, y, z
+    return vector3(np.array(point.position) + _TANGENT_STEP * np.array(point.tangent))
 
 
 def _angle(here: tuple[float, float] | None, there: tuple[float, float] | None) -> float | None:

@@ -9,6 +9,7 @@ from rolling_panda import messages as m
 from rolling_panda.messages.page import CameraPreset, Layer, Measured, PagePoints
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import configuration
+from rolling_panda.model.wire_values import vector3
 from server.auth.sessions import Session
 from server.robots.link import RobotLink
 from server.robots.page_view import PageView
@@ -48,8 +49,8 @@ class SceneUpdater:
         points = self._scene.measure(owner, np.array(origin), np.array(direction))
         if points is None:
             return None
-        x, y, z = (points[1].position - points[0].position).tolist()
-        return Measured(offset=(x, y, z), between=(points[0].surface, points[1].surface))
+        offset = vector3(points[1].position - points[0].position)
+        return Measured(offset=offset, between=(points[0].surface, points[1].surface))
 
     async def step(self, now: float) -> None:
         """Draw the robot as measured, and continue the animations."""

@@ -11,6 +11,7 @@ from rolling_panda import messages as m
 from rolling_panda.messages.page import PagePoint
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.wire_values import vector3
 from server.scene.meshes import capsules_mesh, color_of
 
 Line = tuple[m.Vector3, ...]
@@ -92,8 +93,7 @@ def _nearest(start: Array, along: Array, position: Array, direction: Array) -> t
 def _split(line: Line, at: float) -> tuple[Line, Line]:
     """Split a line at a vertex index with a fraction."""
     k = min(int(at), len(line) - 2)
-    x, y, z = (np.array(line[k]) + (at - k) * (np.array(line[k + 1]) - np.array(line[k]))).tolist()
-    vertex = (x, y, z)
+    vertex = vector3(np.array(line[k]) + (at - k) * (np.array(line[k + 1]) - np.array(line[k])))
     below = line[: k + 1] if at == k else (*line[: k + 1], vertex)
     return below, (vertex, *line[k + 1 :])
 

@@ -23,9 +23,10 @@ from bridge.sim.camera.render_process import CameraRenderer
 from bridge.sim.robot.cutter import CutResult, Cutter, close_blades
 from bridge.sim.robot.model import STEP_S, build_plant
 from bridge.sim.robot.trace import CUTTER, TraceWriter
-from bridge.sim.vineyard.row import Row, vector3
+from bridge.sim.vineyard.row import Row
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.wire_values import vector3
 
 _DISPLAYED = frozenset({"post", "trunk", "cordon", "spur", "cane", "node", "wire", "hose", "old cut"})
 _WHEELS_ON_FLOOR = 3

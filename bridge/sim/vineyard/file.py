@@ -6,10 +6,11 @@ import msgspec
 import numpy as np
 
 from bridge.sim.vineyard.config import VineyardConfig
-from bridge.sim.vineyard.row import Array, Rod, Row, vector3
+from bridge.sim.vineyard.row import Array, Rod, Row
 from bridge.sim.vineyard.truth import RightCut, judge, judge_guyot
 from rolling_panda.errors import ConfigError, InputError
 from rolling_panda.messages.types import Vector3, WoodClass
+from rolling_panda.model.wire_values import vector3
 
 _FORMAT = "rolling-panda vineyard 1"
 

@@ -9,15 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rolling_panda.messages.types import Vector3, WoodClass
+from rolling_panda.messages.types import WoodClass
 
 Array = NDArray[np.float64]
-
-
-def vector3(point: Array) -> Vector3:
-    """A point (3) as the wire has it."""
-    x, y, z = (float(value) for value in point)
-    return x, y, z
 
 
 @dataclass(frozen=True)

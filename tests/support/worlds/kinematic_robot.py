@@ -16,15 +16,9 @@ from rolling_panda.messages.perception import Capsule, CloseUpRequest, CloseUpRe
 from rolling_panda.messages.supervision import Person, Presence, TeleopTarget
 from rolling_panda.model.differential_drive import NXI, Array
 from rolling_panda.model.robot import ARM_Q, RobotModel
+from rolling_panda.model.wire_values import actuated, planar_pose
 
 _ALL = frozenset({"bridge", "controller", "perception", "server"})
-Nine = tuple[float, float, float, float, float, float, float, float, float]
-
-
-def nine(vector: Array) -> Nine:
-    """A vector over ξ as the wire has it."""
-    a, b, c, d, e, f, g, h, i = (float(value) for value in vector)
-    return a, b, c, d, e, f, g, h, i
 
 
 @dataclass
@@ -196,11 +190,12 @@ class KinematicRobot:
         header = m.Header(self.now, "odom")
         v, w = self.model.drive.twist(float(self.xi[0]), float(self.xi[1]))
         self._joints = Sample(
-            m.JointState(header=header, sequence=self._sequence, position=nine(self.q[3:]), velocity=nine(self.xi)),
+            m.JointState(
+                header=header, sequence=self._sequence, position=actuated(self.q[3:]), velocity=actuated(self.xi)
+            ),
             self.now,
         )
-        x, y, phi = (float(value) for value in self.q[:3])
-        pose = m.PlanarPose(x, y, phi)
+        pose = planar_pose(self.q)
         self._odometry = Sample(
             m.Odometry(header=header, sequence=self._sequence, pose=pose, linear=v, angular=w), self.now
         )
