@@ -89,9 +89,9 @@ def _strict(hint: Any) -> Any:
     """An annotation of msgspec as pydantic has it."""
     origin, arguments = get_origin(hint), get_args(hint)
     if hint is int:
-        return Annotated[int, Field(le=_MAX_INTEGER), _INTEGER]
+        return _strict(Annotated[int, msgspec.Meta()])
     if origin is Annotated:
-        inner: Any = _strict(arguments[0])
+        inner: Any = arguments[0] if arguments[0] is int else _strict(arguments[0])
         for meta in arguments[1:]:
             bounds = {name: getattr(meta, name) for name in _BOUNDS if getattr(meta, name) is not None}
             if arguments[0] is int:
@@ -99,7 +99,8 @@ def _strict(hint: Any) -> Any:
             # In the regular expressions of pydantic and of JSON Schema "$" matches at the end alone.
             pattern = None if meta.pattern is None else meta.pattern.replace(r"(?!\n)", "")
             inner = Annotated[inner, Field(pattern=pattern, **bounds)]
-        return inner
+        # The bounds come first: in the schema those outside of a validator are lost.
+        return Annotated[inner, _INTEGER] if arguments[0] is int else inner
     if origin in (Union, UnionType):
         return Union[tuple(_strict(argument) for argument in arguments)]  # noqa: UP007
     if origin is tuple:
