@@ -47,7 +47,7 @@ def _work(context: ProcessContext) -> None:
     ledger.write([start_record(context.config_path, run_id)])
     planner = PlannerProcess(config, robot_config)
     loop = Loop(controller, context.transport, config.rate_hz, ledger, planner, stop_file)
-    # What lives now lives until the end: the collector need not look at it in the middle of a control period.
+    # All objects so far live until the end. The garbage collector then skips them, which keeps its pauses short.
     gc.collect()
     gc.freeze()
     try:

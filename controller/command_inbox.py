@@ -23,7 +23,7 @@ _PATIENCE_S = 0.6
 
 
 class CommitBarrier:
-    """Things to say, in the order of the records that they rest on. No clock: `now` is given."""
+    """Queue of messages that wait for their records to be durable, in the order of the records. No clock."""
 
     def __init__(self) -> None:
         """Start with nothing to say."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Client:
-    """Somebody who may hold control: a key that tells apart who has the same name, and the name."""
+    """A client that may have control: its key, which distinguishes clients of one user, and the user's name."""
 
     key: str
     user: str
@@ -13,11 +13,11 @@ class Client:
 
 @dataclass(frozen=True)
 class Token:
-    """What every motion command and cut order carries: any other one actuates nothing.
+    """Fencing token: part of every motion command and cut order. The bridge refuses any other token.
 
     Attributes:
-        epoch: Given out by the bridge, one more with each token.
-        nonce: Drawn by this controller, 64 random bits.
+        epoch: Issued by the bridge, increased by one with each token.
+        nonce: 64 random bits drawn by this controller.
     """
 
     epoch: int

@@ -13,7 +13,7 @@ Msg = TypeVar("Msg", bound=m.Message)
 
 @dataclass(frozen=True)
 class Sample(Generic[Msg]):
-    """A message and when it came in (s, the clock of `now`)."""
+    """A message and its arrival time (s, the clock of `now`)."""
 
     message: Msg
     at: float
@@ -21,26 +21,26 @@ class Sample(Generic[Msg]):
 
 @dataclass(frozen=True)
 class Inputs:
-    """The newest of everything; None where nothing has come yet.
+    """Newest message of each topic; None before the first.
 
     Attributes:
-        joints: Measured wheels and arm.
-        odometry: Base from its wheels.
-        bridge: Latch, watchdog and cutter.
-        points: What perception holds true.
-        obstacles: What perception sees standing in the way.
-        teleop: Where the held gizmo is.
-        presence: Who is there.
-        server_seen: When the server's newest heartbeat came in (s).
-        perception_seen: The same of perception.
-        present: Processes connected now.
-        stops: Stop requests that came in since the last step.
-        wall_time: Now (s since 1970), for people alone.
-        ledger: How much of what was recorded is durable.
-        close_up: Result of the newest requested close-up.
-        tick_s: Median time of one control step, measured by the loop (s).
+        joints: Joint state.
+        odometry: Odometry.
+        bridge: Bridge state.
+        points: Pruning points.
+        obstacles: Obstacles.
+        teleop: Target of motion by hand.
+        presence: People who are present.
+        server_seen: Arrival time of the server's newest heartbeat (s).
+        perception_seen: Arrival time of perception's newest heartbeat (s).
+        present: Connected processes.
+        stops: Stop requests since the last step.
+        wall_time: Wall clock (s since 1970), for texts only.
+        ledger: Durability of the records.
+        close_up: Result of the newest close-up.
+        tick_s: Median duration of one control step, measured by the loop (s).
         ticks: Control periods, counted by the loop.
-        late_ticks: Those of them that lasted more than half as long again as they should.
+        late_ticks: Control periods that lasted more than 1.5 times their nominal length.
     """
 
     joints: Sample[m.JointState] | None = None

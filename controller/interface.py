@@ -13,11 +13,11 @@ from rolling_panda.messages.supervision import ControlState, PreviewMotion, Prev
 
 @dataclass(frozen=True)
 class StepInputs(Inputs):
-    """Inputs of one step with the newest answers of the planner.
+    """Inputs of one step, with the newest results of the planner.
 
     Attributes:
-        plan: Newest plan of the session.
-        preview: Newest preview that was made.
+        plan: Newest plan.
+        preview: Newest preview.
     """
 
     plan: WorkPlan | None = None
@@ -26,7 +26,7 @@ class StepInputs(Inputs):
 
 @dataclass(frozen=True)
 class Outputs:
-    """What to send after one step; None or empty where nothing is due.
+    """Messages to send after one step; None or empty if nothing is due.
 
     `request` and `preview_request` go to the planner, `records` to the ledger.
     """

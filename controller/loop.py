@@ -51,16 +51,16 @@ from rolling_panda.topics import (
 )
 from rolling_panda.transport.zenoh import Msg, Slot, Transport
 
-#: The most that passes for the loop between two turns, in periods.
+#: Longest time that the loop's clock advances in one iteration, in periods.
 _LONGEST_TURN = 5
-#: How many turns the time of one is the median of, at most.
+#: Number of iterations in the median of the step time, at most.
 _TIMED = 200
-#: A period that lasts this many times as long as it should is late.
+#: A period is late from this multiple of its nominal length.
 _LATE = 1.5
 
 
 class _Newest(Generic[Msg]):
-    """The newest message of a topic with its time on the loop's clock."""
+    """Newest message of a topic, with its arrival time on the loop's clock."""
 
     def __init__(self, slot: Slot[Msg], clock: LoopClock) -> None:
         self._slot, self._clock = slot, clock
@@ -75,7 +75,7 @@ class _Newest(Generic[Msg]):
 
 
 class Loop:
-    """Ties one `Controller` to the wire."""
+    """Connects one `Controller` to the wire."""
 
     def __init__(
         self,
@@ -86,15 +86,15 @@ class Loop:
         planner: PlannerProcess | None = None,
         stop_file: KeptValue[Stops] | None = None,
     ) -> None:
-        """Subscribe and announce; nothing runs before `run`.
+        """Create subscribers and publishers. `run` starts the loop.
 
         Args:
-            controller: What decides.
+            controller: The core.
             transport: Open session.
-            rate_hz: Of control.
-            ledger: Records what is decided and done.
-            planner: Answers plan requests; without one, work goes on without a plan.
-            stop_file: Keeps what is latched for the next start; without one, nothing is kept.
+            rate_hz: Control rate.
+            ledger: Writer of the records.
+            planner: Planner of plans and previews; None works without them.
+            stop_file: File of the latched stops; None keeps nothing.
         """
         self._planner, self._ledger = planner, ledger
         self._barrier = CommitBarrier()
@@ -127,7 +127,7 @@ class Loop:
         self._count = self._late = 0
 
     def update(self) -> StepInputs:
-        """The newest of everything."""
+        """Collect the newest inputs."""
         beats = self._beats
         return StepInputs(
             joints=self._joints.sample(),
@@ -152,14 +152,14 @@ class Loop:
         )
 
     def _recorded(self) -> LedgerState:
-        """How far what must survive a restart is on disk: the ledger, and the stops that are latched."""
+        """Durability of the ledger and of the latched stops."""
         state = self._ledger.state
         return LedgerState(state.durable, state.failure or self._stop_file.failure)
 
     def publish(self, outputs: Outputs, now: float) -> None:
-        """Send what is due; the state when all that it tells is durable.
+        """Send what is due. The state is sent when its content is durable.
 
-        While another controller commands the robot, its word alone is on the wire: of this one only events are.
+        While another controller commands the robot, this one sends events only.
         """
         self._ledger.write(outputs.records)
         waits = self._controller.waits
@@ -184,7 +184,8 @@ class Loop:
         if outputs.stops is not None:
             self._stop_file.keep(outputs.stops.stops)
             self._stops_told = outputs.stops
-        # What is told to be latched is so after a restart as well; where the disk does not take it, there is a fault.
+        # A stop is reported as latched when it is on disk, so that it is latched after a restart too.
+        # If the disk fails, there is a fault.
         if self._stops_told is not None and (self._stop_file.kept or self._stop_file.failure):
             if not waits:
                 self._latched.put(self._stops_told)
@@ -210,7 +211,7 @@ class Loop:
             self._report.put(self._ledger.report)
 
     def run(self, stopping: threading.Event) -> None:
-        """Keep time until told to stop; a period that lasts too long is counted, and none is made up for."""
+        """Run until `stopping` is set. Late periods are counted; missed periods are skipped."""
         due = began = time.monotonic()
         while not stopping.is_set():
             started = time.monotonic()
@@ -238,18 +239,18 @@ class Loop:
 
     def _on_heartbeat(self, beat: m.Heartbeat, at: float) -> None:
         last = self._beats.get(beat.process)
-        # A beat whose number stands still comes from a loop that stands still.
+        # A heartbeat with an unchanged number comes from a loop that hangs.
         if last is None or last[0] != beat.sequence:
             self._beats[beat.process] = (beat.sequence, self._clock.of(at))
 
     def _record_lines(self) -> None:
-        """What the other processes log goes into the ledger; the controller's own lines are in its records."""
+        """Write the log lines of the other processes to the ledger. The controller's own lines are in its records."""
         for line in self._log_events.drain():
             if line.message.process != self._transport.process:
                 self._ledger.note(line.message)
 
     def _release(self, release: m.ReleaseStop) -> None:
-        """On a thread of its own: a service call may wait, the control loop may not."""
+        """Runs on its own thread, because the service call blocks."""
         try:
             answer = self._transport.call(RELEASE, release)
         except ServiceError as error:

@@ -18,7 +18,7 @@ _END_S = 2.0
 
 
 class PlannerProcess:
-    """The newest request of each kind is worked on, one at a time, previews first. Close it when done.
+    """Processes the newest request of each kind, one at a time, previews first. Close it at the end.
 
     `newest` is the last plan, `newest_preview` the last preview.
     """

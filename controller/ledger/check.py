@@ -24,12 +24,12 @@ from rolling_panda.errors import LedgerError
 
 @dataclass(frozen=True)
 class Verdict:
-    """What was found.
+    """Result of a check.
 
     Attributes:
-        rows: How many rows are whole, from the first on.
-        head: Hash of the last of them.
-        problem: What is wrong first; empty when nothing is.
+        rows: Number of intact rows from the first on.
+        head: Hash of the last intact row.
+        problem: First problem, as text; empty without one.
     """
 
     rows: int

@@ -1,4 +1,4 @@
-"""Records of the controller and how many of them are durable: the side of the ledger without files."""
+"""Records of the controller and their durability. This part of the ledger has no files."""
 
 from collections import deque
 from collections.abc import Iterable
@@ -18,7 +18,7 @@ Kind = Literal["ticket", "order", "approach", "preview", "request", "stop", "eve
 
 @dataclass(frozen=True)
 class Record:
-    """A row to be written: `number` grows with each record of one start, `name` says whose or which."""
+    """A row to be written. `number` increases with each record of one start; `name` identifies the subject."""
 
     number: int
     kind: Kind
@@ -28,14 +28,14 @@ class Record:
 
 @dataclass(frozen=True)
 class LedgerState:
-    """What has become of the records: all up to number `durable` are on disk; `failure` says why no more are."""
+    """Durability of the records: all up to number `durable` are on disk. `failure` is the reason why others are not."""
 
     durable: int = 0
     failure: str = ""
 
 
 class TicketRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A point's life at one moment; `hash` binds the acceptance, WITHDRAWN says that perception has taken it back."""
+    """State of a point. `hash` binds the acceptance; WITHDRAWN means that perception has withdrawn the point."""
 
     point: m.PruningPoint
     state: m.PointState | Literal["WITHDRAWN"]
@@ -47,7 +47,7 @@ class TicketRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 class OrderRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The order of work as `user` has put it, none where the plan says; `revision` counts people's changes of it."""
+    """Order of work set by `user`; empty for the plan's order. `revision` counts the changes by people."""
 
     order: tuple[str, ...]
     revision: int
@@ -55,21 +55,21 @@ class OrderRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 class ApproachRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """By how much `user` wants the approach to a point turned about its cane (rad); None leaves it to the search."""
+    """Turn of the approach about the cane (rad) that `user` has set; None leaves it to the posture search."""
 
     azimuth: float | None
     user: str = ""
 
 
 class PreviewRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Whether a cut needs its preview to be approved, and who said so."""
+    """Whether a cut needs an approved preview, and who set that."""
 
     required: bool
     user: str = ""
 
 
 class RequestRow(msgspec.Struct, frozen=True, kw_only=True):
-    """What somebody asked for and how it was answered; refusals too."""
+    """A command of an operator and its answer, also a refusal."""
 
     asked: intents.AnyIntent
     ok: bool
@@ -138,7 +138,7 @@ class Journal:
 
 
 class EventLogger:
-    """Collects what is said until it is taken. `now` is set by the step or the answer under way."""
+    """Collects log lines until they are drained. The current step or answer sets `now`."""
 
     def __init__(self, journal: Journal) -> None:
         """Nothing is said yet; what will be goes into the journal too."""

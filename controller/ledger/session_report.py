@@ -22,7 +22,7 @@ _CONTROL: dict[type[intents.Intent], str] = {
 
 
 class SessionReportBuilder:
-    """Takes rows in their order; `report` is what they come to."""
+    """Builds the `report` from rows in their order."""
 
     def __init__(self) -> None:
         """Nothing has happened."""

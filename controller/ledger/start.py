@@ -1,4 +1,4 @@
-"""The controller's start: what it restores from the ledger, and what it records first."""
+"""Start of the controller: state restored from the ledger, and the first record."""
 
 import hashlib
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ Row = TypeVar("Row", bound=msgspec.Struct)
 
 
 class StartRow(msgspec.Struct, frozen=True, kw_only=True):
-    """A process has started: which program on which Python, and with which configuration."""
+    """Start of a process: version of program and Python, and the configuration."""
 
     program: About
     run_id: str
@@ -30,7 +30,7 @@ class _Version(msgspec.Struct, frozen=True):
 
 
 class _Start(msgspec.Struct, frozen=True):
-    """What any version says of its start."""
+    """The fields of a start record that all versions have."""
 
     program: _Version
 
@@ -49,7 +49,7 @@ def start_record(config: Path, run_id: str) -> Record:
 
 @dataclass(frozen=True)
 class Restored:
-    """What was recorded before: points, and what people want: order of work, previews, approaches."""
+    """State from the ledger: points, order of work, preview settings and approaches."""
 
     tickets: tuple[TicketRow, ...] = ()
     order: OrderRow | None = None

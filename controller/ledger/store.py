@@ -1,7 +1,7 @@
-"""The ledger: an append-only table in which each row holds the hash of the row before.
+"""The ledger: an append-only table in which each row has the hash of the previous row.
 
-SQLite with a write-ahead log and a flush to disk for each transaction: what `append` has returned for is still there
-after `kill -9` and after a power cut. A second file, the head, names the newest row, so that a lost end is found too.
+SQLite with a write-ahead log and a flush to disk for each transaction. Rows survive `kill -9` and a power cut once
+`append` has returned. A second file, the head, names the newest row, so that a missing end is detected.
 """
 
 import contextlib
@@ -41,7 +41,7 @@ _BUSY_S = 0.5
 
 @dataclass(frozen=True)
 class Entry:
-    """A row to be: when (ISO 8601, UTC), what kind of thing, whose or which, and everything about it as JSON."""
+    """A new row: time (ISO 8601, UTC), kind, subject, and content as JSON."""
 
     at: str
     kind: str
@@ -51,7 +51,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class Row:
-    """A row as it stands in the ledger; `hash` binds it to the row before."""
+    """A row of the ledger; `hash` binds it to the previous row."""
 
     number: int
     entry: Entry
@@ -59,7 +59,7 @@ class Row:
 
 
 class Ledger:
-    """A ledger opened for writing. One thread at a time."""
+    """A ledger open for writing. Not thread-safe."""
 
     def __init__(self, folder: Path) -> None:
         """Open or begin the ledger in a folder.

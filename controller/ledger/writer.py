@@ -30,7 +30,7 @@ _LINES_A_SECOND = 20.0
 
 
 class Store(Protocol):
-    """What records are written to."""
+    """Destination of the records."""
 
     def append(self, entries: Iterable[Entry]) -> int:
         """Add rows durably, all or none."""
@@ -40,14 +40,14 @@ class Store(Protocol):
 
 
 class LeftOut(msgspec.Struct, frozen=True):
-    """So many log lines of other processes came too fast to be recorded."""
+    """Number of log lines of other processes that exceeded the rate limit and were not recorded."""
 
     text: str
     lines: int
 
 
 class LedgerWriter:
-    """Hand records over with `write` and `note`; `state` says how far they are. Close it when done."""
+    """Writes the records passed to `write` and `note`. `state` has their durability. Close it at the end."""
 
     def __init__(self, open_store: Callable[[], Store], clock: Callable[[], float] = time.monotonic) -> None:
         """Start the thread, which opens the ledger and keeps trying while it cannot."""

@@ -30,10 +30,10 @@ def wheels_ahead(wheels: Array, sent: Array, ahead: float, lag: float) -> Array:
 
 
 class BaseEstimate:
-    """The base's pose at the time of the joint states: p̂ = p + what the wheels have turned since odometry's p was true.
+    """Base pose at the time of the newest joint state: odometry pose p plus the wheel motion since its time stamp.
 
-    The stamps of joint states and odometry are of one clock, the sender's, so that their difference holds whatever the
-    wire's delay is.
+    Joint states and odometry have stamps of one clock, the sender's. So their difference does not depend on the delay
+    of the connection.
     """
 
     def __init__(self, drive: DifferentialDrive) -> None:

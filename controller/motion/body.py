@@ -19,7 +19,7 @@ from rolling_panda.model.robot import RobotModel
 
 
 class Body:
-    """Holds the parts that belong to one robot. `take` the inputs of each control period first."""
+    """State and model of one robot. Call `take` with the inputs of each control period first."""
 
     def __init__(self, config: ControllerConfig, robot_config: RobotConfig, method: Method | None = None) -> None:
         """Build them.

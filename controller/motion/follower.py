@@ -19,12 +19,12 @@ from rolling_panda.model.robot import ARM_Q, ARM_XI, Kinematics
 
 @dataclass(frozen=True)
 class Measured:
-    """The robot in one control period.
+    """State of the robot in one control period.
 
     Attributes:
         q: Configuration (12).
-        kinematics: Of the tool at q.
-        sent: ξ̇ sent last (9, rad/s).
+        kinematics: Kinematics of the tool at q.
+        sent: Last command ξ̇ (9, rad/s).
     """
 
     q: Array

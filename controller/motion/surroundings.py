@@ -18,7 +18,7 @@ _ON_SPUR = 0.045
 
 
 class Surroundings:
-    """Keeps a collision model up to date with the newest obstacles, and with which of them the blades may touch."""
+    """Updates the collision model with the newest obstacles and with the contacts that the blades are allowed."""
 
     def __init__(self, model: CollisionModel) -> None:
         """Begin with nothing around."""

@@ -18,7 +18,7 @@ _PROMPT_S, _LATE_S, _SLOWEST = 0.25, 0.5, 0.25
 
 
 class Teleoperation:
-    """Watches the hold and follows it. A hold must be pressed anew after anything else has ended it."""
+    """Checks the hold and follows its target. After any other end than its release a hold has to be pressed again."""
 
     def __init__(self, config: ControllerConfig, follower: Follower, drive: DifferentialDrive) -> None:
         """Bind the parts."""

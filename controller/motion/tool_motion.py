@@ -1,4 +1,4 @@
-"""A tool motion of straight legs that overlap, with the posture along it."""
+"""A tool motion of overlapping straight segments, with the posture along it."""
 
 import math
 from collections.abc import Sequence
@@ -23,14 +23,14 @@ _ROOM_S = 0.02
 
 @dataclass(frozen=True)
 class Leg:
-    """A straight way of the tool.
+    """A straight segment of a tool motion.
 
     Attributes:
         goal: T_odom_tool at its end (pin.SE3).
-        q_goal: Configuration (12) wanted at its end, for the null space.
+        q_goal: Desired configuration (12) at its end, for the null space.
         speed: Largest tool speed (m/s).
-        frozen_within: Distance to its goal within which only the arm moves (m); infinite: on the whole leg.
-        frozen_until: Distance from its beginning until which only the arm moves (m).
+        frozen_within: Distance to the goal within which only the arm moves (m); infinite for the whole segment.
+        frozen_until: Distance from the start up to which only the arm moves (m).
     """
 
     goal: Any
@@ -42,7 +42,7 @@ class Leg:
 
 @dataclass(frozen=True)
 class _Timed:
-    """A leg in its place: from rest to rest, its time counted from `begin` (s)."""
+    """A segment from rest to rest that starts at `begin` (s)."""
 
     begin: float
     trajectory: PoseTrajectory
@@ -66,12 +66,11 @@ class _Timed:
 
 
 class ToolMotion:
-    """Legs one after the other; a leg begins while the one before it still comes to rest.
+    """A sequence of segments. A segment begins while the previous one still decelerates.
 
-    Each leg is a quintic from rest to rest. Where two overlap, their motions add up, so that the tool rounds the corner
-    between them without stopping; velocity and acceleration stay continuous. The base has a quintic of its own, from
-    when it may move for the first time to when it may for the last: under way while the arm alone follows the tool's
-    path. The clock advances as far as the limits let it.
+    Each segment is a quintic from rest to rest. Where two overlap, their motions add up: the tool rounds the corner
+    without stopping, with continuous velocity and acceleration. The base follows its own quintic, from the first to the
+    last time at which it may move. The clock of the motion advances as fast as the limits allow.
     """
 
     def __init__(

@@ -15,15 +15,15 @@ TORQUE_RATE = 1000.0
 
 @dataclass(frozen=True)
 class JointTorque:
-    """One actuator along a motion.
+    """Torque of one actuator along a motion.
 
     Attributes:
-        joint: Name.
+        joint: Name of the joint.
         limit: Rated torque (Nm).
-        peak: Largest torque, either way (Nm).
-        margin: Limit less peak (Nm); negative where the motion cannot be made.
+        peak: Largest magnitude of the torque (Nm).
+        margin: Limit minus peak (Nm); negative if the motion is infeasible.
         at: Time of the peak (s).
-        peak_rate: Largest rate of torque, either way (Nm/s).
+        peak_rate: Largest magnitude of the torque's rate (Nm/s).
     """
 
     joint: str
@@ -47,7 +47,7 @@ class TorqueReport:
 
     @property
     def tightest(self) -> JointTorque:
-        """The actuator that uses the largest share of its limit."""
+        """The actuator that uses the largest fraction of its limit."""
         return max(self.joints, key=lambda joint: joint.peak / joint.limit)
 
 

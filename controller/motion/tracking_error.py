@@ -18,7 +18,7 @@ _LIMIT = np.array([WHEELS_RAD] * 2 + [JOINTS_RAD] * (NXI - 2))
 
 
 class TrackingErrorMonitor:
-    """Adds up the difference between what was sent and what was measured, on the bridge's own clock."""
+    """Integrates the difference between commanded and measured velocity, on the bridge's clock."""
 
     def __init__(self) -> None:
         """Nothing has been sent."""

@@ -24,7 +24,7 @@ PEAK_VELOCITY, PEAK_ACCELERATION, PEAK_JERK = 1.875, 5.7735, 60.0
 
 @dataclass(frozen=True)
 class Rates:
-    """Bounds of a motion over one kind of distance: velocity, acceleration and jerk in that unit and seconds."""
+    """Limits of a motion along one distance: velocity, acceleration and jerk, in the unit of the distance and seconds."""
 
     velocity: float
     acceleration: float
@@ -41,7 +41,7 @@ class Rates:
 
 
 class Progress(Struct, frozen=True):
-    """Share of a motion done, 0…1, and its first two derivatives by time (1/s, 1/s²)."""
+    """Progress 0…1 along a motion, and its first two time derivatives (1/s, 1/s²)."""
 
     s: float
     rate: float
@@ -63,7 +63,7 @@ def quintic(time: float, duration: float) -> Progress:
 
 
 def quintic_time(s: float) -> float:
-    """The share of the duration, 0…1, after which the quintic has come to the share `s` of its way."""
+    """Normalised time 0…1 at which the quintic reaches the progress `s`."""
     low, high = 0.0, 1.0
     for _ in range(30):
         middle = 0.5 * (low + high)
@@ -72,7 +72,7 @@ def quintic_time(s: float) -> float:
 
 
 class ToolState(Struct, frozen=True):
-    """Where the tool should be (T_odom_tool, pin.SE3), and its twist [v; ω] (6) at the tool with its rate (6)."""
+    """Desired tool pose (T_odom_tool, pin.SE3), its twist [v; ω] (6) at the tool, and the twist's rate (6)."""
 
     T_odom_tool: Any
     twist: Array
@@ -80,7 +80,7 @@ class ToolState(Struct, frozen=True):
 
 
 class PoseTrajectory:
-    """From one tool pose to another, at rest at both ends: along a screw, or `straight` with the turn alongside."""
+    """Trajectory between two tool poses, at rest at both ends: along a screw, or `straight` with a separate rotation."""
 
     def __init__(
         self,
@@ -212,11 +212,11 @@ class Profile:
     some phases have no length.
 
     Attributes:
-        distance: To cover; negative backwards.
-        jerk: Magnitude of the jerk in the stretches that have one.
-        t_jerk: Length of each of these (s).
-        t_hold: Length of each stretch of constant acceleration (s).
-        t_cruise: Length of the stretch of constant velocity (s).
+        distance: Distance; negative backwards.
+        jerk: Magnitude of the jerk in the phases of constant jerk.
+        t_jerk: Duration of each of these phases (s).
+        t_hold: Duration of each phase of constant acceleration (s).
+        t_cruise: Duration of the phase of constant velocity (s).
     """
 
     distance: float
@@ -289,15 +289,15 @@ def durations(distances: Array, rates: Rates) -> Array:
 
 @dataclass(frozen=True)
 class Correction:
-    """A straight shift of everything that is still to come.
+    """A straight shift of the rest of a motion.
 
-    A quintic begins and ends without velocity and acceleration, so that the sum of it and the motion goes on from the
-    position, velocity and acceleration that the motion has, and ends at rest at the new goal.
+    It is a quintic that begins and ends with zero velocity and acceleration. So its sum with the motion is continuous in
+    position, velocity and acceleration, and ends at rest at the new goal.
 
     Attributes:
-        begin: When it begins, on the motion's clock (s).
-        duration: How long it takes (s).
-        by: By how much (3, m, odom).
+        begin: Start on the motion's clock (s).
+        duration: Duration (s).
+        by: Displacement (3, m, odom).
     """
 
     begin: float

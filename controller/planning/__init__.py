@@ -1,1 +1,1 @@
-"""Base places, arm postures and motions within the limits. Pure: no clock, no wire."""
+"""Planning of base poses, arm postures and motions within the limits. Pure: no clock, no wire."""

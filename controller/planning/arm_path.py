@@ -1,8 +1,8 @@
 """Collision-free arm paths: straight, through a tucked posture, or by RRT-Connect.
 
 The search is RRT-Connect (Kuffner and LaValle, 2000): two trees of postures, one from each end, grow towards random
-postures and towards each other. What it finds is shortened by cutting corners. Seeded: the same question has the same
-answer.
+postures and towards each other. The path is then shortened by cutting corners. The random seed is fixed: equal requests
+have equal results.
 """
 
 from collections.abc import Iterator
@@ -27,20 +27,20 @@ _GIVE, _ESCAPES = 0.001, 300
 
 @dataclass(frozen=True)
 class ArmPath:
-    """Postures (k×7, rad) to be visited in turn, straight from each to the next."""
+    """A path of the arm: postures (k×7, rad), connected by straight lines in joint space."""
 
     postures: Array
 
 
 @dataclass(frozen=True)
 class Blocked:
-    """No way was found, and why, in words."""
+    """No path was found; `reason` is the reason as text."""
 
     reason: str
 
 
 class ArmPathPlanner:
-    """Ways of the arm for a base that stands still."""
+    """Plans paths of the arm with the base at rest."""
 
     def __init__(self, collision: CollisionModel, limits: PlanLimits, seed: int = 0) -> None:
         """Bind what is in the way.
@@ -168,7 +168,7 @@ class ArmPathPlanner:
 
 
 class _Tree:
-    """Postures that can be reached from the first one."""
+    """Tree of postures that are reachable from its root."""
 
     def __init__(self, root: Array) -> None:
         self.nodes = [root]

@@ -1,8 +1,8 @@
 """Motions of a differential drive between two poses: turn, drive, turn, with optional overlap.
 
-Blended, the base turns already (or still) while it drives, which makes an arc of changing curvature. Where it ends
-then depends on both at once, so that the first turn and the distance are found by Newton's method on the very arcs
-that the wheels make in each control period. Forwards or backwards, whichever is quicker.
+With overlap the base turns while it drives, on an arc of changing curvature. The end pose then depends on turn and
+distance together. Both are found by Newton's method on the exact arcs of the wheels in each control period. The base
+drives forwards or backwards, whichever is faster.
 """
 
 import math
@@ -25,10 +25,10 @@ _STRAIGHT = ((0.0, 0.0),)
 
 @dataclass(frozen=True)
 class BaseMotion:
-    """A motion of the base from rest to rest, one row a control period.
+    """A motion of the base from rest to rest, one row for each control period.
 
     Attributes:
-        wheels: Angles (T×2, rad) that the left and the right wheel turn in each period.
+        wheels: Rotation of the left and the right wheel in each period (T×2, rad).
         poses: Base poses [x, y, φ] (T+1×3) before the first and after each period; φ is continuous.
     """
 
@@ -42,7 +42,7 @@ class BaseMotion:
 
 
 class BasePlanner:
-    """Motions between base poses within the limits."""
+    """Plans motions between base poses within the limits."""
 
     def __init__(self, drive: DifferentialDrive, limits: PlanLimits) -> None:
         """Bind the wheels' geometry and the limits."""

@@ -1,4 +1,4 @@
-"""Planner of the accepted cuts: a collision-free posture for each, in the order of least time."""
+"""Planner of the accepted cuts: a collision-free posture for each, in the fastest order."""
 
 import hashlib
 
@@ -36,7 +36,7 @@ _ROW_S = 0.01
 
 
 class CutPlanner:
-    """Answers plan requests. The same request, asked of any instance, has the same answer."""
+    """Answers plan requests. Equal requests have equal answers, from any instance."""
 
     def __init__(self, config: ControllerConfig, robot_config: RobotConfig) -> None:
         """Build the models (about half a second)."""

@@ -1,7 +1,7 @@
 """Motions of base and arm from one configuration to another, checked for collisions.
 
-Base and arm move at the same time where that is clear; where it is not, one after
-the other, then with the arm folded while the base drives, and round what is in the way.
+Base and arm move at the same time if that is free of collisions. Otherwise they move one after the other, then with the
+arm folded while the base drives, then around the obstacle.
 """
 
 from collections.abc import Iterator
@@ -36,10 +36,10 @@ class Stand:
 
     Attributes:
         q: Configuration (12); the wheels' entries are those of the start.
-        time: Estimated time to get there (s).
-        margin: Least distance to a joint limit (rad).
+        time: Estimated travel time (s).
+        margin: Smallest distance to a joint limit (rad).
         omega: Manipulability of the arm.
-        clearance: Least distance between the robot's parts, from the ground and from obstacles (m).
+        clearance: Smallest distance among the robot's parts and to ground and obstacles (m).
     """
 
     q: Array
@@ -51,13 +51,13 @@ class Stand:
 
 @dataclass(frozen=True)
 class Planned:
-    """A plan and what it is like.
+    """A planned motion with its figures.
 
     Attributes:
         plan: The motion.
-        stand: Where it ends.
-        clearance: Least distance along it (m), and between what; a start that is too near to something does not count
-            until the motion has led out of that.
+        stand: Its end.
+        clearance: Smallest distance along it (m) with the two parts. A start that is too near to an obstacle counts
+            only after the motion has left it.
     """
 
     plan: Plan
@@ -67,13 +67,13 @@ class Planned:
 
 @dataclass(frozen=True)
 class Refused:
-    """No plan, and why, in words."""
+    """No plan; `reason` is the reason as text."""
 
     reason: str
 
 
 class PathPlanner:
-    """Plans motions to configurations. Uses its robot model's work space: one instance a thread."""
+    """Plans motions to configurations. Not thread-safe: it uses the work space of its robot model."""
 
     def __init__(self, robot: RobotModel, collision: CollisionModel, limits: PlanLimits, seed: int = 0) -> None:
         """Bind the parts.

@@ -1,9 +1,9 @@
 """Clearance of a previewed motion from obstacles that were detected since.
 
-More of the row comes into sight all the time, and what was seen before is seen better; a motion that was approved stays
-what it was as long as nothing new is too near to it. New is what sticks out by more than `SAME` of all that was known.
-It is too near to a part of the robot where it is nearer than control lets it come, or nearer than the least distance
-that was shown for that cut, or than plans keep where that is less.
+The camera keeps seeing more of the row, and sees known parts more accurately. An approved motion stays valid as long as
+no new obstacle is too near to it. A new obstacle extends more than `SAME` beyond all known ones. It is too near to a part
+of the robot if it is nearer than the collision guard allows, or nearer than both the smallest distance shown for that
+cut and the clearance of plans.
 """
 
 import math
@@ -32,7 +32,7 @@ _SPACING = 0.01
 
 
 class PathWatch:
-    """Made once a preview. A look takes about a millisecond, and longer where much has come close."""
+    """One instance for each preview. A check takes about a millisecond, longer if many obstacles are near."""
 
     def __init__(self, preview: Preview, swept: SweptVolume, settings: HierarchyConfig) -> None:
         """Look after one motion.
@@ -116,7 +116,7 @@ class PathWatch:
 
 
 class _Way:
-    """The part of a motion that belongs to one cut, with boxes around pieces of it."""
+    """The motion for one cut, with bounding boxes around its pieces."""
 
     def __init__(self, swept: SweptVolume, cut: PreviewedCut) -> None:
         on_the_way = (swept.time >= cut.begins_s) & (swept.time <= cut.ends_s)

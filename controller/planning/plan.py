@@ -1,4 +1,4 @@
-"""A planned motion as data: one row a control period."""
+"""A planned motion as data: one row for each control period."""
 
 import hashlib
 from collections.abc import Iterator
@@ -25,10 +25,10 @@ class Plan:
 
     Attributes:
         t: Time of each row (T, s), one control period apart.
-        q: Configuration (T×12); q[k+1] is q[k] moved by xi[k] for one period, on the exact arc of the wheels.
+        q: Configuration (T×12). q[k+1] is q[k] integrated with xi[k] over one period, on the exact arc of the wheels.
         xi: ξ̇ from each row to the next (T×9); zero in the last.
         T_odom_tool: Tool poses (T×4×4).
-        digest: SHA-256 of t, q and xi, to tell one plan from another.
+        digest: SHA-256 of t, q and xi, the identity of the plan.
     """
 
     t: Array
@@ -51,7 +51,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class Travel:
-    """Upper bound of the distance travelled by any point of the robot up to each row (T, m)."""
+    """Upper bound of the distance that any point of the robot has travelled up to each row (T, m)."""
 
     bound: Array
 
@@ -106,7 +106,7 @@ def assemble(robot: RobotModel, q: Array, base: BaseMotion, arm: Array, limits: 
 
 @dataclass(frozen=True)
 class Wait:
-    """Rows that base and arm stand still before they begin to move."""
+    """Number of rows for which base and arm wait before they move."""
 
     base: int = 0
     arm: int = 0

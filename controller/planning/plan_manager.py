@@ -1,4 +1,4 @@
-"""Requests, validity and state of the session plan."""
+"""Requests, validity and state of the plan."""
 
 from collections.abc import Sequence
 
@@ -23,7 +23,7 @@ _REPEAT_S = 5.0
 
 
 class PlanManager:
-    """Keeps one plan. `review` it now and then; between reviews `known` answers for single points."""
+    """Manages one plan. Call `review` regularly; in between `known` answers for single points."""
 
     def __init__(self, queue: PointQueue) -> None:
         """Begin without a plan."""

@@ -1,4 +1,4 @@
-"""Validity of a plan: changes of the points, the obstacles and the place of the robot."""
+"""Validity of a plan: changes of the points, the obstacles and the robot's position."""
 
 from collections.abc import Iterable, Sequence
 
@@ -24,7 +24,7 @@ _REACH = 1.3
 _BESIDE_TOOL = 0.12
 #: Rows of a way between two places of the base that are looked at.
 _LOOK = 20
-#: Places along an obstacle's axis that are compared, as shares of its length.
+#: Positions along an obstacle's axis that are compared, as fractions of its length.
 _SHARES = np.linspace(0.0, 1.0, 9)
 #: What became of a point by the work itself leaves the plan for the others as it is.
 _WORKED: frozenset[PointState] = frozenset({"CUTTING", "DONE", "FAILED_NOT_CUT", "UNKNOWN"})
@@ -80,7 +80,7 @@ def away_from(start: Array, q: Array) -> str:
 
 
 class ObstacleWatch:
-    """Looks out for what a plan has not reckoned with. Made once a plan; a look takes about a millisecond."""
+    """Detects obstacles that the plan did not consider. One instance for each plan; a check takes about a millisecond."""
 
     def __init__(self, before: tuple[Capsule, ...], track: Array, lines: Sequence[tuple[Array, Array]]) -> None:
         """Remember what stood around, and where robot and tool will be.

@@ -1,7 +1,7 @@
 """Previews of the work: requests, validity and approval.
 
-Where people require it, no cut begins without an approval. An approval is for one motion: from where the robot stood,
-over these points in this order, among what stood around. What follows it cuts from the postures that were shown.
+If required, no cut begins without an approval. An approval is for one motion: from the robot's pose, over these points in
+this order, among these obstacles. The work then uses the postures of the preview.
 """
 
 from collections.abc import Sequence
@@ -30,7 +30,7 @@ _PLAN_S = 15.0
 
 
 class PreviewManager:
-    """Keeps one preview. `review` it now and then; `permit` and `known` answer for single points in between."""
+    """Manages one preview. Call `review` regularly; in between `permit` and `known` answer for single points."""
 
     def __init__(self, queue: PointQueue, journal: Journal, settings: HierarchyConfig) -> None:
         """Nothing is asked for, and nothing is required.

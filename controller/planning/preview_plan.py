@@ -1,4 +1,4 @@
-"""A preview as data: the request, the motion, the volume that it sweeps, and its messages."""
+"""A preview as data: request, motion, swept volume and messages."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -20,12 +20,12 @@ STEP = 0.005
 
 @dataclass(frozen=True, eq=False)
 class SweptVolume:
-    """A motion, place by place.
+    """Samples of the robot's shape along a motion.
 
     Attributes:
-        shapes: Of the robot's parts.
-        time: Of each place (k, s).
-        placed: Rotation, row by row, and middle of each part in odom (k×p×12).
+        shapes: Shapes of the robot's parts.
+        time: Time of each sample (k, s).
+        placed: Rotation, row by row, and centre of each part in odom (k×p×12).
     """
 
     shapes: Shapes
@@ -35,16 +35,16 @@ class SweptVolume:
 
 @dataclass(frozen=True, eq=False)
 class PreviewRequest:
-    """Everything that a preview depends on, apart from the configuration.
+    """All inputs of a preview except the configuration file.
 
     Attributes:
-        number: Grows by one a request.
+        number: Increases by one with each request.
         q: Configuration (12) at the start, at rest.
-        points: Accepted points, each as it was accepted, in the order of work.
-        obstacles: What stands in the way.
-        cuts: What the session's plan says of points, by id; the others are searched for as in work.
-        turned: Points of which somebody has said the turn of the approach about the cane, and that (rad).
-        close_up_s: From asking for a picture to knowing what it shows (s).
+        points: Points as accepted, in the order of work.
+        obstacles: Obstacles.
+        cuts: Cuts of the current plan by point id. For other points the posture is searched as in work.
+        turned: Turn of the approach about the cane (rad) for points where a person has set it.
+        close_up_s: Time from the request of a close-up to its result (s).
     """
 
     number: int
@@ -58,17 +58,17 @@ class PreviewRequest:
 
 @dataclass(frozen=True, eq=False)
 class Preview:
-    """Answer to a request.
+    """Result of a request.
 
     Attributes:
-        request: What was asked.
-        cuts: For the wire, in order; those that were not come to are not in it.
-        plans: Posture of each cut that was found, by id; who follows the preview cuts from these.
-        rows: The motion, thinned out.
-        duration: Of all of it (s).
-        digest: SHA-256 of the request, the configuration and the motion; empty when there is none.
-        failure: Why there is none; empty when there is one.
-        swept: The room that the motion takes up; None when there is none.
+        request: The request.
+        cuts: Cuts for the message, in the order of work, without those that were not reached.
+        plans: Posture of each cut by point id. Work that follows the preview uses them.
+        rows: The motion, downsampled.
+        duration: Duration (s).
+        digest: SHA-256 of request, configuration and motion; empty without a motion.
+        failure: Reason for the failure, as text; empty otherwise.
+        swept: Swept volume of the motion; None without a motion.
     """
 
     request: PreviewRequest

@@ -1,7 +1,7 @@
 """Simulation of the work as the controller would execute it from the present state.
 
-It is the controller's own sequence, whole-body law and limits, period by period, on a robot without mass. Cutter and
-camera answer as they should. Nothing is planned a second time, so that what is shown is what will be sent.
+It runs the controller's own sequence, whole-body method and limits, period by period, on a robot without mass. Cutter and
+camera always succeed. The preview is therefore the motion that will be commanded.
 """
 
 import hashlib
@@ -43,7 +43,7 @@ _TOKEN = Token(1, "preview")
 
 
 class Rollout:
-    """Answers preview requests. The same request, asked of any instance, has the same answer."""
+    """Answers preview requests. Equal requests have equal answers, from any instance."""
 
     def __init__(self, config: ControllerConfig, robot_config: RobotConfig) -> None:
         """Nothing is built yet: each preview begins with a robot of its own."""
@@ -61,7 +61,7 @@ class Rollout:
 
 
 class _Run:
-    """One preview under way."""
+    """Computation of one preview."""
 
     def __init__(self, config: ControllerConfig, robot_config: RobotConfig, request: PreviewRequest) -> None:
         self._configs, self._request, self._dt = (config, robot_config), request, 1.0 / config.rate_hz
@@ -207,7 +207,7 @@ class _Run:
 
 @dataclass
 class _Least:
-    """The least of everything since a point was begun with."""
+    """Smallest figures since the start of a point."""
 
     point_id: str
     begins: float
@@ -219,7 +219,7 @@ class _Least:
 
 
 class CutLog:
-    """`sample` the robot now and then; `cuts` at the end."""
+    """Collects the figures of each cut: call `sample` regularly and `cuts` at the end."""
 
     def __init__(self, limits: Limits, collision: CollisionModel, queue: PointQueue) -> None:
         """Nothing has been worked on.
@@ -276,7 +276,7 @@ class CutLog:
 
 
 class ActuatorLag:
-    """Where the robot goes by what is sent. `step` it once a control period."""
+    """Response of the actuators to the commands. Call `step` once for each control period."""
 
     def __init__(self, drive: DifferentialDrive, q: Array, wheel_lag_s: float, arm_lag_s: float, dt: float) -> None:
         """At rest.

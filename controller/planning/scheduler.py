@@ -1,8 +1,7 @@
-"""Order, duration and feasibility of the targets of a session, before the robot moves.
+"""Order, duration and feasibility of the targets, before the robot moves.
 
-Pure: targets in, a schedule out. Each target's feasibility is found on its own, from a stand of its own; the order is
-the one with the least time between stands, base and arm together, from where the robot is; and every motion between
-them is planned and looked over, so that what the schedule says has been tried.
+Pure: targets in, a schedule out. The feasibility of each target is checked separately. The order minimises the travel
+time of base and arm from the robot's current configuration. Every motion between the targets is planned and checked.
 """
 
 import math
@@ -25,12 +24,12 @@ _WORTH = 1e-6
 
 @dataclass(frozen=True)
 class Target:
-    """A configuration to go to, for instance clear of the canes before a cut.
+    """A target configuration, for instance clear of the canes before a cut.
 
     Attributes:
-        name: Of the point.
-        stand: Configuration there.
-        hold_s: Time spent there (s): the cut and the way in and out.
+        name: Id of the point.
+        stand: The configuration.
+        hold_s: Time at the target (s): approach, cut and retreat.
     """
 
     name: str
@@ -40,13 +39,13 @@ class Target:
 
 @dataclass(frozen=True)
 class Requirements:
-    """What a target has to offer to be worked on.
+    """Requirements for a feasible target.
 
     Attributes:
-        clearance: Least distance kept on the way (m).
-        omega: Least manipulability of the arm at the target.
-        margin: Least distance to a joint limit at the target (rad).
-        duration: Longest way to it (s).
+        clearance: Smallest distance along the motion (m).
+        omega: Smallest manipulability of the arm at the target.
+        margin: Smallest distance to a joint limit at the target (rad).
+        duration: Longest travel time (s).
     """
 
     clearance: float = 0.015
@@ -57,13 +56,13 @@ class Requirements:
 
 @dataclass(frozen=True)
 class Stop:
-    """A target in the schedule: the motion to it, and what it is like.
+    """A target of the schedule with the motion to it.
 
     Attributes:
-        name: Of the target.
-        planned: Motion from the stop before.
-        begins: When the motion begins (s from the start of the session).
-        arrives: When it ends (s).
+        name: Name of the target.
+        planned: Motion from the previous stop.
+        begins: Start of the motion (s from the start of the work).
+        arrives: End of the motion (s from the start of the work).
     """
 
     name: str
@@ -84,7 +83,7 @@ class Stop:
 
 @dataclass(frozen=True)
 class Schedule:
-    """The session: stops in order, its length (s), and the refused targets with the reason of each."""
+    """Stops in the order of work, total duration (s), and the refused targets with their reasons."""
 
     stops: tuple[Stop, ...]
     duration: float
@@ -92,7 +91,7 @@ class Schedule:
 
 
 class Scheduler:
-    """Orders targets and says what is feasible."""
+    """Orders targets and checks their feasibility."""
 
     def __init__(
         self, planner: PathPlanner, base: BasePlanner, limits: PlanLimits, tool_speed: float = math.inf

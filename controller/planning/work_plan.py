@@ -1,4 +1,4 @@
-"""The plan of a session as data, and its message."""
+"""The plan of the work as data, and its message."""
 
 import math
 from collections.abc import Sequence
@@ -18,15 +18,15 @@ from rolling_panda.model.wire_values import actuated, planar_pose
 
 @dataclass(frozen=True, eq=False)
 class PlanRequest:
-    """Everything that a plan depends on, apart from the configuration.
+    """All inputs of a plan except the configuration file.
 
     Attributes:
-        number: Grows by one a request.
+        number: Increases by one with each request.
         q: Configuration (12) at the start.
-        points: Accepted points, each as it was accepted.
-        obstacles: What stands in the way.
-        turned: Points of which somebody has said the turn of the approach about the cane, and that (rad).
-        order: Points in the order that people want them in; of none the plan chooses it.
+        points: Points as accepted.
+        obstacles: Obstacles.
+        turned: Turn of the approach about the cane (rad) for points where a person has set it.
+        order: Points in the order set by people; empty if the plan chooses the order.
     """
 
     number: int
@@ -39,18 +39,18 @@ class PlanRequest:
 
 @dataclass(frozen=True, eq=False)
 class PlannedCut:
-    """A cut that can be made.
+    """A feasible cut.
 
     Attributes:
-        point: As it was accepted.
-        cut: Poses of the tool, and the robot's posture at each.
-        way: Motion to where the tool stands clear of the canes.
-        begins: When it begins (s from the start of the session).
-        clearance: Least distance on the way (m).
-        between: Between what.
-        manipulability: Least ω of the arm on the way and at the cut.
-        torque_margin: Of the joint that uses the largest share of its torque (Nm).
-        torque_joint: That joint.
+        point: The point as accepted.
+        cut: Poses of the tool, with the robot's posture at each.
+        way: Motion to the pose clear of the canes.
+        begins: Start of the motion (s from the start of the work).
+        clearance: Smallest distance along the motion (m).
+        between: The two parts with that distance.
+        manipulability: Smallest ω of the arm along the motion and at the cut.
+        torque_margin: Remaining torque of the joint that uses the largest fraction of its limit (Nm).
+        torque_joint: Name of that joint.
     """
 
     point: PruningPoint
@@ -66,16 +66,16 @@ class PlannedCut:
 
 @dataclass(frozen=True, eq=False)
 class WorkPlan:
-    """Answer to a request.
+    """Result of a request.
 
     Attributes:
-        request: What was asked.
-        cuts: In the order of work.
-        refused: Reason for each point that is not worked on, by id.
-        points: What is said of each point, for the wire.
-        duration: Of the session (s).
-        digest: SHA-256 of the request, the configuration and all of the answer; empty when planning failed.
-        failure: Why there is no plan at all; empty when there is one.
+        request: The request.
+        cuts: Feasible cuts in the order of work.
+        refused: Reason for each refused point, by id.
+        points: Plan of each point, for the message.
+        duration: Duration of the work (s).
+        digest: SHA-256 of request, configuration and result; empty if planning failed.
+        failure: Reason for the failure, as text; empty otherwise.
     """
 
     request: PlanRequest

@@ -15,7 +15,7 @@ Action = Literal["none", "pause", "protect", "fault"]
 
 @dataclass(frozen=True)
 class Health:
-    """How fresh everything is, in seconds on this process's clock; infinite where nothing ever came.
+    """Ages of the inputs (s, on this process's clock), infinite before the first; and other conditions.
 
     Attributes:
         joints: Age of the newest joint state.
@@ -24,12 +24,12 @@ class Health:
         server: Age of the server's newest heartbeat.
         perception: Age of perception's newest heartbeat.
         present: Processes connected now.
-        watchdog: The bridge says that its watchdog holds the robot.
-        overruled: Another controller holds the bridge's token.
-        refused: How many motion commands the bridge has refused since its start.
-        ledger: Why what is done cannot be recorded; empty when it can.
-        tracking_error: Why the robot does not do what it is told; empty when it does.
-        obstacles: Age of the picture behind what is known to stand around.
+        watchdog: Whether the bridge's watchdog holds the robot.
+        overruled: Whether another controller has the bridge's token.
+        refused: Number of motion commands that the bridge has refused since its start.
+        ledger: Reason why the ledger cannot record; empty if it can.
+        tracking_error: Description of a tracking error above its limit; empty without one.
+        obstacles: Age of the camera frame behind the obstacles.
     """
 
     joints: float
@@ -95,7 +95,7 @@ def _picture_age(inputs: Inputs, now: float) -> float:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What to do, and why. `none` with an empty reason when all is well."""
+    """Reaction to the health, with its reason. `none` with an empty reason if all is well."""
 
     action: Action
     reason: str = ""

@@ -13,7 +13,7 @@ _REQUEST_S: Final = 30.0
 
 
 class Lease:
-    """Who holds control. The robot changes hands only at rest; until then nobody but who holds it moves it."""
+    """The lease. Control changes hands only when the robot is at rest; until then the holder keeps it."""
 
     def __init__(self) -> None:
         """Nobody holds control."""

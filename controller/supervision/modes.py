@@ -1,4 +1,4 @@
-"""The supervision state machine. Pure: it steps one table and refuses all other events with a reason."""
+"""The supervision state machine. Pure: it executes one table and refuses all other events with a reason."""
 
 from dataclasses import dataclass, replace
 from typing import Final
@@ -44,12 +44,12 @@ _WANTED: Final[dict[Who, str]] = {
 
 @dataclass(frozen=True)
 class State:
-    """Where the machine is.
+    """State of the machine.
 
     Attributes:
-        mode: Its mode.
-        reason: Why it is there, in words.
-        clear_since: When the cause of a PROTECTIVE_STOP or FAULT went away (s); None while it is there.
+        mode: The mode.
+        reason: Reason for the mode, as text.
+        clear_since: Time at which the cause of a PROTECTIVE_STOP or FAULT disappeared (s); None while it is present.
     """
 
     mode: Mode
@@ -59,7 +59,7 @@ class State:
 
 @dataclass(frozen=True)
 class Transition:
-    """What came of an event: the state after it, and why it was refused (empty when it was taken)."""
+    """Result of an event: the state after it, and the reason of a refusal (empty otherwise)."""
 
     state: State
     refused: str = ""

@@ -16,10 +16,10 @@ class Situation:
     """State that a permission depends on.
 
     Attributes:
-        config: Of the controller.
-        state: Of the machine of modes.
-        health: Freshness of the inputs.
-        homing: True while the arm is brought home.
+        config: Section `[controller]`.
+        state: State of the supervision state machine.
+        health: Health of the inputs.
+        homing: True during homing.
         busy: Action that blocks a new motion; empty when none.
         waits: Reason why no accepted point is workable; empty when one is.
         rights: Rights of the client.

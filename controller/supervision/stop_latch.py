@@ -11,9 +11,9 @@ _MOST = 50
 
 
 class StopLatch:
-    """Takes stop requests and the bridge's latch together; asks the bridge for release; forgets nothing by itself.
+    """Latches stop requests together with the bridge's latch, and requests the bridge's release after a reset.
 
-    The bridge's latch says which id is to be released: that of the newest stop that it holds.
+    The id to release is that of the newest stop that the bridge has latched.
     """
 
     def __init__(self, stops: tuple[StopRecord, ...] = ()) -> None:

@@ -29,7 +29,7 @@ _BRAKING_S: Final = 0.4
 
 
 class Supervisor:
-    """The machine of modes with everything that drives it. `take` the inputs of each period first, then `review`."""
+    """The supervision state machine and its inputs. Call `update` with the inputs of each period, then `review`."""
 
     def __init__(self, config: ControllerConfig, movement: Movement, event_log: EventLogger) -> None:
         """Start in IDLE.

@@ -3,12 +3,12 @@
 With the velocities scaled by their limits, x = ν/ν_max, and the QR factorisation Jᵀ = Q₁ R, every x is Q₁ y + Z z with
 Z spanning ker J: J x = Rᵀ y, whatever z is.
 
-1. Bounds and rows are constraints of both programs. Where they exclude each other, the rows (never the bounds) are
-   first moved by the least amount, in the sense of squares, that makes them possible.
+1. Bounds and rows are constraints of both programs. If they are infeasible together, the rows (never the bounds) are
+   first relaxed by the smallest amount in the least-squares sense.
 2. Tool: min ‖Rᵀ y − α b − c‖² + κ‖b‖² (1 − α)² + λ²‖y‖² + ε‖z − z_sent‖² over y, z, 0 ≤ α ≤ α_max.
-3. Null space: min ‖T x − t‖² over z alone, with y and α as found. The tool's velocity cannot change by it.
+3. Null space: min ‖T x − t‖² over z alone, with y and α from step 2. It cannot change the tool's velocity.
 
-Where the optimum without any inequality satisfies them all, it is the optimum of both programs, and they are not run.
+If the unconstrained optimum satisfies all inequalities, it is the solution, and the programs are not run.
 """
 
 import math
@@ -29,39 +29,39 @@ from controller.whole_body.small_matrices import (
 )
 from rolling_panda.model.differential_drive import Array
 
-#: κ: a path is left by about this share of the velocity that is missing along it.
+#: κ: the deviation from the path is about this fraction of the velocity that is missing along it.
 _SLOWER = 1e-3
 #: ε: makes the first program's answer unique. Small against κ, so that the tool is not slowed to spare the null space,
 #: but not so small that joints race for a hundredth more of its speed.
 _IDLE = 3e-5
-#: Below this wanted velocity of the tool (in shares of its limits) there is nothing to scale.
+#: Below this target velocity of the tool (as a fraction of its limits) there is nothing to scale.
 _NOTHING = 1e-5
 #: Slack from which on a row counts as given up.
 _GIVEN_UP = 1e-6
 #: What a row is moved beyond the least (in its unit): at the least itself a single velocity is possible, which a solver
 #: that reckons with rounding may not find.
 _ROOM = 1e-8
-#: A velocity below this share of its limit counts as none.
+#: A velocity below this fraction of its limit counts as zero.
 _STANDS = 0.02
 _SETTINGS = {"primal_tol": 1e-10}
 _FREE = 1e30
 
 
 class Problem(Struct, frozen=True):
-    """One period, over the n velocities that are free; k rows, of which the first `soft` may give way.
+    """Problem of one period, over the n free velocities, with k rows. The first `soft` rows may be relaxed.
 
     Attributes:
-        J: Of the tool's task (m×n), its rows scaled so that a velocity at the limit has length 1.
-        b: Wanted J ν − c (m), scaled likewise; the part that may be slowed.
-        c: What has to be made good whatever the speed (m), scaled likewise.
+        J: Jacobian of the tool's task (m×n), its rows scaled so that a velocity at the limit has length 1.
+        b: Target of J ν − c (m), scaled likewise; it may be slowed by α.
+        c: Part of the target that is not slowed (m), scaled likewise.
         speed: Largest ν (n).
-        sent: The last ν (n).
-        lower: Of ν (n).
-        upper: Of ν (n).
+        sent: Last ν (n).
+        lower: Lower bound of ν (n).
+        upper: Upper bound of ν (n).
         A: Rows over ν (k×n).
-        A_lower: Of A ν (k); −inf where there is none.
-        A_upper: Of A ν (k); inf where there is none.
-        soft: Number of rows that may give way.
+        A_lower: Lower bound of A ν (k); −inf for none.
+        A_upper: Upper bound of A ν (k); inf for none.
+        soft: Number of rows that may be relaxed.
         T: Rows of the null-space tasks (…×n), weighted.
         t: Their targets, weighted.
         scale: Largest α.
@@ -86,14 +86,14 @@ class Problem(Struct, frozen=True):
 
 
 class Answer(Struct, frozen=True):
-    """What the cascade found.
+    """Solution of the cascade.
 
     Attributes:
         nu: Velocities (n).
         scale: α.
-        slack: By how much each soft row was moved, in its unit; None where none was.
-        holds: Index of the bound (0…n−1) or row (n…) that holds the tool back the most; −1 for none.
-        missing: Share of b that J ν lacks where α is fixed, 0 otherwise.
+        slack: Relaxation of each soft row, in its unit; None without one.
+        holds: Index of the bound (0…n−1) or row (n…) that limits the tool the most; −1 for none.
+        missing: Fraction of b that J ν lacks if α is fixed, 0 otherwise.
     """
 
     nu: Array

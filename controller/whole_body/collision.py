@@ -1,11 +1,11 @@
 """Distances between robot, ground and obstacles, and their derivatives over ξ̇.
 
-Shapes are in Coal behind Pinocchio, so that one call computes every distance. Which pairs it computes is decided by a
-broad phase: spheres around the robot's parts against the obstacles' axes. `dampers`, which runs every control period,
-repeats it only when the robot may have moved by `_SLACK` since.
+One call of Coal, through Pinocchio, computes all distances. A broad phase selects the pairs: spheres around the robot's
+parts against the obstacles' axes. `dampers` runs in every control period. It repeats the broad phase only when the robot may
+have moved by `_SLACK`.
 
-Obstacles occupy slots: capsules in the geometry model that are given a size and a place when an obstacle comes near. So
-hundreds of obstacles can be replaced at run time without building Pinocchio's data again.
+Obstacles occupy slots: capsules in the geometry model that get a size and a pose when an obstacle comes near. So
+hundreds of obstacles can be replaced at run time without rebuilding Pinocchio's data.
 """
 
 from collections.abc import Collection, Sequence
@@ -43,7 +43,7 @@ _Z = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True)
 class Distances:
-    """Pairs nearer than was asked for.
+    """Pairs below a requested distance.
 
     Attributes:
         distance: Of each pair (k, m), negative where they overlap.
@@ -60,14 +60,14 @@ class Distances:
 
 @dataclass(frozen=True)
 class Clearance:
-    """The least distance (m) and between what."""
+    """The smallest distance (m) and its two parts."""
 
     distance: float
     pair: Pair
 
 
 class Dampers(Struct, frozen=True):
-    """How the distances of near pairs change: ḋ = normal_jacobian ξ̇.
+    """Rates of the distances of near pairs: ḋ = normal_jacobian ξ̇.
 
     Attributes:
         normal_jacobian: (k×9).
@@ -81,7 +81,7 @@ class Dampers(Struct, frozen=True):
 
 
 class CollisionModel:
-    """The robot among obstacles. Uses the work space of its `RobotModel`, so it belongs to the same thread."""
+    """Collision model of the robot and the obstacles. Not thread-safe: it uses the work space of its `RobotModel`."""
 
     _slots: int
     _geometry: Any

@@ -1,4 +1,4 @@
-"""The robot's shape for collision checks: capsules, one sphere and one box in Coal, on Pinocchio's joints.
+"""Collision geometry of the robot: capsules, one sphere and one box in Coal, on Pinocchio's joints.
 
 - Arm: the cylinders with spherical ends of `panda_collision.urdf` (example-robot-data, after franka_description), taken
   as capsules: radii 0.045 to 0.09 m. In any posture the meshes of the moving links are inside them, by 6 to 32 mm.
@@ -39,12 +39,12 @@ _CASTER_RADIUS, _CASTER_HEIGHT = 0.145, 0.100
 
 @dataclass(frozen=True)
 class Shapes:
-    """The robot's parts: each is a box, which may be a line or a point, and all that is near enough to it.
+    """The robot's parts as rounded boxes: a box, which may be a line or a point, with a radius around it.
 
     Attributes:
-        parts: Names (p); a part of several shapes comes up once for each.
+        parts: Names (p); a part of several shapes appears once for each.
         half: Half sizes of the boxes (p×3, m).
-        around: How near (p, m): the radius of a capsule or a sphere.
+        around: Radius of the rounding (p, m), that of a capsule or a sphere.
     """
 
     parts: tuple[str, ...]

@@ -1,9 +1,9 @@
 """Compilation of functions over small arrays by Numba.
 
-At this size a call of NumPy costs more than the arithmetic behind it: some dozens of them were most of a control step.
-Such a function is compiled when its module is imported, for the types that its signature names. So nothing is compiled
-while the robot moves; arguments of other types are a TypeError. The machine code is kept beside the source, or in
-NUMBA_CACHE_DIR, for the next start.
+At this size the overhead of a NumPy call exceeds its arithmetic: dozens of calls were most of a control step. Such a
+function is compiled at the import of its module, for the types of its signature. So nothing is compiled while the robot
+moves, and arguments of other types raise a TypeError. The machine code is cached beside the source, or in
+NUMBA_CACHE_DIR.
 
 A signature is the type of the result applied to those of the arguments: `NUMBER(VECTOR, MATRIX)`.
 """

@@ -1,8 +1,8 @@
 """Method `decoupled`: drive, stop, then reach. The baseline of the comparisons.
 
-While the base is not at the posture's goal it turns towards it, drives there and turns into the goal's heading, with
-the arm still; the motion's clock waits for it. Then the base stands and the arm alone takes the tool to where it
-should be, by the damped pseudo-inverse of `nullspace`. Both within the same limits as the other methods.
+First the base turns towards the posture's goal, drives there and turns to the goal's heading. The arm rests and the
+motion's clock waits. Then the base rests and the arm alone moves the tool, by the damped pseudo-inverse of `nullspace`.
+The limits are those of the other methods.
 """
 
 import math

@@ -32,7 +32,7 @@ class Terms:
 
 
 class Dynamics:
-    """Forward and inverse dynamics. Uses the work space of its `RobotModel`, so it belongs to the same thread."""
+    """Forward and inverse dynamics. Not thread-safe: it uses the work space of its `RobotModel`."""
 
     def __init__(self, robot: RobotModel) -> None:
         """Remember the robot."""

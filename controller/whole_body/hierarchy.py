@@ -1,8 +1,8 @@
 """Method `hierarchy`: hard limits, then the tool, then posture; docs/control.md has the equations.
 
-What the base and the joints can do in one period is feasible by construction (`velocity_bounds.py`). Guards (`guards/`)
-add rows that come before the tool. The tool's task is answered exactly or slowed along its path, and everything else
-happens in its null space (`tasks/`) by two quadratic programs (`cascade.py`).
+The velocity bounds of one period are feasible by construction (`velocity_bounds.py`). Guards (`guards/`)
+add rows with priority over the tool. The tool's task is executed exactly or slowed along its path. All other tasks act
+in its null space (`tasks/`). Two quadratic programs solve this (`cascade.py`).
 """
 
 import math

@@ -9,7 +9,7 @@ from rolling_panda.model.robot import ARM_Q, ARM_XI, Limits
 class LimitRepulsion:
     """Velocity that moves joints away from near limits, zero elsewhere and continuous at the zone's edge.
 
-    As printed, eq. 18 is zero at the limit, jumps at γ_start, and always points upwards; here it is
+    The printed eq. 18 is zero at the limit, jumps at γ_start, and is always positive. Here it is
     k (γ_start − d)², positive near the lower limit and negative near the upper.
     """
 

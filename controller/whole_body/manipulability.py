@@ -1,6 +1,7 @@
 """Manipulability of the arm, ω = √det(J Jᵀ), and its gradient: the paper's constraint task 1 (eqs. 15 and 16).
 
-Of the ARM, as the paper's text says: the whole robot's Jacobian, which its formula prints, hides arm singularities.
+The Jacobian is that of the ARM, as in the paper's text. The whole robot's Jacobian of the printed formula hides
+singularities of the arm.
 """
 
 import numpy as np
@@ -22,7 +23,7 @@ class Manipulability(Struct, frozen=True):
 
 
 class ArmManipulability:
-    """Computes ω and its gradient from the joints' axes, which the Jacobian's columns hold."""
+    """Computes ω and its gradient from the joint axes in the Jacobian's columns."""
 
     def at(self, J: Array) -> Manipulability:
         """ω and gradient from the tool's Jacobian J (6×12) of the current configuration."""

@@ -1,4 +1,4 @@
-"""Scales the speed of a method without inequality constraints, so that it stops before contact.
+"""Speed scaling of a method without inequality constraints, so that it stops before a contact.
 
 The velocity is scaled as a whole until every row of the guard holds. Its direction does not change: the robot stops
 before an obstacle and moves on as soon as the commanded motion leads away from it.

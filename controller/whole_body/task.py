@@ -27,8 +27,8 @@ class ToolTask:
     Attributes:
         twist: ẋ_d + K e (6): [v; ω] at the tool in odom's axes (m/s, rad/s).
         free_axis: True leaves the rotation about the tool's y, the cane's axis, to the lower priorities.
-        keep_path: True slows down as a whole where the limits do not let the tool be as fast as asked; False answers
-            with the nearest possible twist.
+        keep_path: True slows the whole twist if the limits do not allow its speed; False gives the nearest feasible
+            twist.
     """
 
     twist: Array
@@ -38,10 +38,10 @@ class ToolTask:
 
 @dataclass(frozen=True)
 class ActuatorTask:
-    """First priority instead of the tool's: the actuators' own velocities, slowed as a whole where they do not fit.
+    """First priority in place of the tool: velocities of the actuators, slowed as a whole if the limits require it.
 
     Attributes:
-        xi: ξ̇ wanted (9, rad/s).
+        xi: Desired ξ̇ (9, rad/s).
     """
 
     xi: Array
@@ -50,12 +50,12 @@ class ActuatorTask:
 
 @dataclass(frozen=True)
 class Posture:
-    """Where base and arm should be, as far as the tool lets them.
+    """Desired posture of base and arm, with lower priority than the tool.
 
     Attributes:
-        q: Configuration wanted now (12); the wheels' entries are not used.
+        q: Desired configuration now (12); the wheels' entries are not used.
         rate: Its rate (12).
-        goal: Configuration at the end of the motion (12); None where there is no end.
+        goal: Configuration at the end of the motion (12); None without an end.
     """
 
     q: Array
@@ -65,21 +65,21 @@ class Posture:
 
 @dataclass(frozen=True)
 class IkProblem:
-    """One control period's problem.
+    """Problem of one control period.
 
     Attributes:
         q: Configuration (12).
-        kinematics: Of the tool at q.
-        sent: ξ̇ sent last (9).
-        tool: First priority: the tool's twist, or the actuators' own velocities.
+        kinematics: Kinematics of the tool at q.
+        sent: Last command ξ̇ (9).
+        tool: First priority: the tool's twist, or velocities of the actuators.
         posture: Last priority.
-        base: What the base is for.
+        base: Role of the base.
         speed_cap: Largest speed of the tool's origin (m/s).
-        wheel_cap: Largest speed of each wheel on the ground (m/s); the method `hierarchy` keeps to it.
+        wheel_cap: Largest speed of each wheel on the ground (m/s); used by the method `hierarchy`.
         scale: Rate of the motion's clock in the last period, 0…1.
-        before: ξ̇ sent in the period before the last (9); None where nothing accelerates.
-        held: Velocities that the wheels really have (2, rad/s) in a period in which only the arm is solved for and the
-            wheels' command stays; None in the others.
+        before: Command ξ̇ before the last (9); None without acceleration.
+        held: Measured wheel velocities (2, rad/s) in a period that solves for the arm only and keeps the wheels'
+            command; None in other periods.
     """
 
     q: Array
@@ -130,14 +130,14 @@ def _squares(q: Array, sent: Array, before: Array, wanted: Array, posture: Array
 
 
 class Solution(Struct, frozen=True):
-    """What a method answers.
+    """Solution of a method.
 
     Attributes:
         xi: ξ̇ to send (9), within every limit of velocity, acceleration and joint position.
         scale: Rate of the motion's clock, 0…1.
         manipulability: ω of the arm.
-        feasible: False when the problem could not be answered: the robot brakes, or a constraint gives way.
-        reason: What is in the way, in words; a hand that slides along it is told too. Empty where nothing is.
+        feasible: False if the problem is infeasible: the robot brakes, or a constraint is relaxed.
+        reason: The limiting constraint, as text, also if the tool slides along it; empty without one.
     """
 
     xi: Array
@@ -148,7 +148,7 @@ class Solution(Struct, frozen=True):
 
 
 class Inequalities(Struct, frozen=True):
-    """Rows A ξ̇ ≥ lower that are kept before the tool's task: A (k×9), lower (k), and what each row is about."""
+    """Rows A ξ̇ ≥ lower with priority over the tool's task: A (k×9), lower (k), and the name of each row."""
 
     A: Array
     lower: Array
@@ -171,7 +171,7 @@ class Guard(Protocol):
 class Method(Protocol):
     """A whole-body method; stateless between calls.
 
-    `flows` is False where base and tool have to come to rest between the legs of a way.
+    `flows` is False if base and tool have to rest between the segments of a motion.
     """
 
     name: str
@@ -183,10 +183,10 @@ class Method(Protocol):
 
 
 class SecondaryTask(Protocol):
-    """A velocity that some part of the robot should have, as far as the tool's task leaves it free.
+    """Desired velocity of a part of the robot, in the null space of the tool's task.
 
     Attributes:
-        name: Of the task.
+        name: Name of the task.
         rows: Number of its rows.
     """
 

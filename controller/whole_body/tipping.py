@@ -1,8 +1,8 @@
 """Tipping constraint: the zero-moment point inside the support triangle, as rows over ξ̈.
 
-The triangle has its corners at the two driven wheels and at the rear caster. The caster swivels, so that its contact is
-somewhere on a circle about its pivot; the triangle is taken as small as any direction makes it. On flat ground the
-contact forces have no moment that tips at the zero-moment point, so that the wheels stay down while it is inside.
+The corners of the triangle are the contacts of the two driven wheels and the rear caster. The caster swivels: its contact
+is on a circle about its pivot, and the smallest triangle of all directions is used. On flat ground the contact forces
+have no tipping moment about the zero-moment point. So the wheels stay on the ground while it is inside.
 
 With the momentum h = A_g q̇ of all masses about their centre c (centroidal map), the condition for an edge with a point
 P and an inward normal n is linear in ḣ, and so in ξ̈:
@@ -29,11 +29,11 @@ _STEP = 1e-4
 
 
 class TippingRows(Struct, frozen=True):
-    """What acceleration may be: matrix ξ̈ ≥ bound, in metres of the zero-moment point at the robot's own weight.
+    """Bound of the acceleration: matrix ξ̈ ≥ bound, in metres of the zero-moment point at the robot's own weight.
 
     Attributes:
         matrix: (3×9), a row for each edge: front, left, right.
-        bound: (3), never positive: not to accelerate is always allowed.
+        bound: (3), never positive: zero acceleration is always allowed.
     """
 
     matrix: Array

@@ -1,11 +1,11 @@
 """A whole-body method at two rates: base and arm at the base rate, the arm alone at its higher rate.
 
-In a period of the base the method is asked twice. Once for all nine velocities over the base's period, of which the
-base's are sent. And, as in every other period, for the arm's over its own: with the wheels' command as it is, and the
-base moving as it really does. So the arm does not notice which periods are the base's, and makes good what the base
-owes.
+In a period of the base the method solves two problems. The first is for all nine velocities over the base's period; the
+base's velocities are sent. The second, as in every control period, is for the arm over the control period, with the
+wheels' command fixed and the base moving as measured. So the arm's motion does not depend on which periods are the base's,
+and the arm compensates the error of the base.
 
-This is also where a method, which remembers nothing, is told what was sent before and how fast the wheels really turn.
+Methods are stateless. This class gives them the previous commands and the measured wheel speeds.
 """
 
 from dataclasses import replace
@@ -18,7 +18,7 @@ from rolling_panda.model.differential_drive import NXI, Array
 
 
 class TwoRates:
-    """A method for `IkProblem`s that come every period of the arm; `begin` each period before `solve`."""
+    """A method for one `IkProblem` in every control period. Call `begin` in each period before `solve`."""
 
     def __init__(self, arm: Method, base: Method, every: int) -> None:
         """Bind the method for each period, and the same for a period of the base.

@@ -2,14 +2,13 @@
 
 An arm joint with the distance d to its limit, the braking deceleration a and the period dt may have the velocity v for
 which v dt + v²/2a ≤ d, that is v ≤ −a dt + √((a dt)² + 2 a d): after one period at v it can still stop. From a velocity
-inside this bound the next bound is within reach by braking at a, so that the bounds never empty. Half of the joint's
-acceleration is reckoned with for this; the rest is for the servo's lag.
+inside this bound the next bound can be reached by braking at a, so that the bounds are never empty. This uses half of the
+joint's acceleration; the rest is for the servo's lag.
 
-The acceleration may change by j dt in a period. So a joint comes to the bound above as `jerk_limit.py` says, which in
-turn never asks for more than j dt: the bound falls by no more than b dt in a period, so that against it the velocity
-rises by what it changes by plus b dt.
+The acceleration may change by j dt in a period. So a joint approaches the bound above by the law of `jerk_limit.py`, which
+needs no more than j dt. The bound itself falls by at most b dt in a period, which is added to the change of the velocity.
 
-Outside every such guarantee (a start beyond a limit, a velocity above it) the bounds close to the strongest braking.
+Outside these guarantees (a start beyond a limit, a velocity above it) the bounds allow the strongest braking only.
 """
 
 import math
@@ -61,7 +60,7 @@ class Bounds(Struct, frozen=True):
 
 
 class VelocityBounds:
-    """Makes the bounds from where the robot is and what was sent last."""
+    """Computes the bounds from the configuration and the last command."""
 
     def __init__(self, robot: RobotModel, config: ControllerConfig, dt: float) -> None:
         """Precompute for a control period of `dt` (s)."""

@@ -14,7 +14,7 @@ from rolling_panda.model.robot import ARM_Q
 
 
 class ApproachSegments:
-    """Legs for a method whose legs flow into each other, or for one that stops between them."""
+    """Segments for a method that blends them, or for one that stops between them."""
 
     def __init__(self, config: ControllerConfig, flows: bool) -> None:
         """Bind the configuration."""

@@ -22,7 +22,7 @@ Ended = Callable[[str, m.Outcome, str, float], None]
 
 @dataclass
 class _Cut:
-    """A cut under way: the blades may have moved."""
+    """A cut in progress: the blades may have moved."""
 
     point_id: str
     cut_id: str
@@ -32,7 +32,7 @@ class _Cut:
 
 
 class Blades:
-    """Asks for cuts, one at a time, and hands what became of each to the queue."""
+    """Orders cuts, one at a time, and passes the outcome of each to the queue."""
 
     def __init__(self, config: ControllerConfig, queue: PointQueue, run_id: str, ended: Ended | None = None) -> None:
         """Bind the parts.

@@ -14,7 +14,7 @@ _LOST_S = 1.5
 
 @dataclass
 class _Asked:
-    """A close-up under way: expected finding, newest request, first request that counts, retries left."""
+    """A close-up in progress: expected finding, newest request, first request that counts, retries left."""
 
     expected: Finding
     number: int

@@ -1,7 +1,7 @@
 """Camera checks of a point before and after its cut.
 
-After a cut the cutter reports whether the blades met resistance, and the camera whether the wood beyond is gone. Where
-both report an intact cane, it is cut once more. Where they contradict each other, an operator decides.
+After a cut the cutter reports whether the blades met resistance, and the camera whether the wood beyond is gone. If
+both report an intact cane, it is cut once more. If they contradict each other, an operator decides.
 """
 
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ _REQUEST_WITHIN_S = 4.0
 
 @dataclass
 class _Ended:
-    """A cut that ended: the cutter's word, since when, and whether a close-up was requested."""
+    """A cut that ended: the cutter's report, its time, and whether a close-up was requested."""
 
     outcome: Outcome
     word: str
@@ -31,7 +31,7 @@ class _Ended:
 
 
 class PostCutCheck:
-    """Settles cuts whose outcome the cutter knows. Pure but for the queue: time is an argument."""
+    """Decides the outcome of cuts that the cutter has reported. Apart from the queue it is pure: time is an argument."""
 
     def __init__(self, queue: PointQueue, close_ups: CloseUpClient, check: bool) -> None:
         """Bind the parts.

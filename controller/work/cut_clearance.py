@@ -16,7 +16,7 @@ _ROOM = 0.003
 
 
 class CutClearance:
-    """Looks at plans before they are followed. Has its own robot model, as the search for them does."""
+    """Checks cut plans before their execution. It has its own robot model, like the posture search."""
 
     def __init__(self, robot: RobotModel, config: ControllerConfig) -> None:
         """Nothing is known to stand around yet."""

@@ -1,8 +1,8 @@
 """The cut sequence: posture search, travel, approach, advance, cut, retreat, next cut.
 
-Between cuts the tool keeps `clearance` from the canes; into them and out of them it moves on one straight line with
-the base standing still. The posture for the next cut is looked for while the blades close, so that the way out of one
-cut flows into the way to the next.
+Between cuts the tool keeps `clearance` from the canes. It moves into them and out of them on one straight line, with
+the base at rest. The posture search for the next cut runs while the blades close, so that the retreat from one cut
+blends into the motion to the next.
 """
 
 import math
@@ -41,7 +41,7 @@ _NEAR = 0.02
 
 
 class CutSequence:
-    """Works off the queue. `begin` it, `step` it each period while the mode is AUTO, `abort` it otherwise."""
+    """Executes the queue. Call `begin` once, `step` in each period in AUTO, and `abort` in other modes."""
 
     def __init__(
         self,

@@ -21,7 +21,7 @@ _CLEAR = 0.02
 
 
 class Homing:
-    """One way home; `step` it until `done`, drop it to stop."""
+    """One homing motion. Call `step` until `done`; stop calling it to stop the motion."""
 
     def __init__(self, config: ControllerConfig, follower: Follower, dt: float) -> None:
         """Bind the parts for a control period of `dt` (s)."""
@@ -65,9 +65,10 @@ class Homing:
 
 
 class Withdrawal:
-    """One way out with the base still: each joint goes straight to where the way in began, and so away from its limit.
+    """A joint-space retreat with the base at rest: each joint returns straight to its position before the approach.
 
-    Obstacles are kept clear of as ever; the blades leave the line by which they came in, by some centimetres at most.
+    The joints thus move away from their limits. The collision guard stays on. The blades deviate from the line of the
+    approach by a few centimetres at most.
     """
 
     def __init__(self, config: ControllerConfig, follower: Follower, q: Array, q_clear: Array) -> None:

@@ -11,7 +11,7 @@ _STANDS = 0.02
 
 
 class MotionTimeout:
-    """With one motion at a time: `begin` with it, `note` each period how it is followed, then ask."""
+    """Timeout of one motion at a time. Call `begin` at its start and `note` with the tracking of each period."""
 
     def __init__(self, timeout_s: float, dt: float) -> None:
         """Wait so long past a motion's planned end.

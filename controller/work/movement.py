@@ -26,13 +26,13 @@ from rolling_panda.model.robot import RobotModel
 
 @dataclass(frozen=True)
 class MotionResult:
-    """What one period of a mode gave.
+    """Result of one period.
 
     Attributes:
         xi: ξ̇ to send (9).
-        cut: The cut to command, as its id and its point's; None while there is none.
-        event: What it is to the machine of modes, and why; None while the mode goes on.
-        remark: Why the robot is in its mode from now on, in words; empty as before.
+        cut: Cut to order, as cut id and point id; None without one.
+        event: Event for the supervision state machine with its reason; None to stay in the mode.
+        remark: New reason for the mode, as text; empty to keep it.
     """
 
     xi: Array
@@ -42,7 +42,7 @@ class MotionResult:
 
 
 class Movement:
-    """The robot's body with everything that can move it. `take` the inputs of each period first, then `step`."""
+    """The robot's body and all motion sources. Call `update` with the inputs of each period, then `step`."""
 
     def __init__(
         self,

@@ -15,7 +15,7 @@ Permit = Callable[[Ticket], str]
 
 
 class NextCut:
-    """The search for one point's plan. `search` for the next point, `step` each period, read `found`."""
+    """Posture search for the next point. Call `search` for a point and `step` in each period; `found` is the result."""
 
     def __init__(
         self,

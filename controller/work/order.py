@@ -8,7 +8,7 @@ from rolling_panda.messages.supervision import QueueOrder
 
 
 class WorkOrder:
-    """What order is wanted. People's changes are counted, so that two of them at once do not undo each other."""
+    """The order of work. Changes by people are numbered, so that concurrent changes do not overwrite each other."""
 
     def __init__(self, journal: Journal) -> None:
         """Along the row; changes by people are recorded in `journal`."""
@@ -114,7 +114,7 @@ LARGEST = math.radians(75.0)
 
 
 class Approaches:
-    """Kept by point; without a word about a point the search chooses."""
+    """Requested approach directions by point. For other points the posture search chooses."""
 
     def __init__(self, journal: Journal) -> None:
         """Nobody has said anything; what they will is recorded in `journal`."""

@@ -36,14 +36,14 @@ class Ticket:
     """A point on the queue.
 
     Attributes:
-        point: As perceived last.
-        state: Of its life.
-        reason: Why it is there.
+        point: The point as last perceived.
+        state: State of the point.
+        reason: Reason for the state, as text.
         user: Who accepted or rejected it.
-        accepted: The point as the operator saw it when accepting; what is cut.
-        hash: Of what was accepted.
-        cut_id: Of the last cut made for it.
-        seen: True while perception holds the point true.
+        accepted: The point that the operator saw and accepted; it is what is cut.
+        hash: Hash of the accepted point.
+        cut_id: Id of the last cut at the point.
+        seen: Whether perception currently reports the point.
     """
 
     point: PruningPoint
@@ -57,7 +57,7 @@ class Ticket:
 
 
 class PointQueue:
-    """All points ever proposed, by id. Every change of state goes through a method that says why, and is recorded."""
+    """All points by id. Every change of state has a reason and is recorded."""
 
     def __init__(self, config: ControllerConfig, journal: Journal | None = None) -> None:
         """Start empty; changes are recorded in `journal`."""

@@ -1,6 +1,6 @@
-"""Posture search for a cut: base place along the row, approach azimuth and arm posture.
+"""Posture search for a cut: base position along the row, approach azimuth and arm posture.
 
-The search is a generator that yields once an iteration, so that a control period pays for a few iterations only.
+The search is a generator that yields after each iteration, so that a control period runs a few iterations only.
 """
 
 from collections.abc import Callable, Generator
@@ -46,15 +46,15 @@ _DAMPING = np.eye(6) * 1e-4
 
 @dataclass(frozen=True)
 class CutPlan:
-    """A cut that can be reached.
+    """A reachable cut.
 
     Attributes:
         poses: Tool poses of the cut.
         q_clear: Configuration (12) at `poses.clear`.
-        q_stand_off: The same at the stand-off.
-        q_cut: The same at the cut; the base stands where it stood at the stand-off.
-        joint_margin: Least distance to a joint limit on the way (rad).
-        manipulability: Least ω of the arm on the way.
+        q_stand_off: Configuration (12) at the stand-off.
+        q_cut: Configuration (12) at the cut, with the base pose of the stand-off.
+        joint_margin: Smallest distance to a joint limit along the approach (rad).
+        manipulability: Smallest ω of the arm along the approach.
     """
 
     poses: CutPoses
@@ -67,7 +67,7 @@ class CutPlan:
 
 @dataclass(frozen=True)
 class Unreachable:
-    """No posture was found, and why, in words."""
+    """No posture was found; `reason` is the reason as text."""
 
     reason: str
 
@@ -80,7 +80,7 @@ class _Posture:
 
 
 class PostureSearch:
-    """Finds cut plans. Has its own robot model, so that a search may rest while control goes on."""
+    """Searches cut plans. It has its own robot model, so that a search can be suspended while control runs."""
 
     def __init__(
         self, robot: RobotModel, config: ControllerConfig, admits: Callable[[CutPlan], bool] = lambda _: True

@@ -12,7 +12,7 @@ _MOST = 20
 
 @dataclass(eq=False)
 class Change(Generic[Acceptance]):
-    """Another rule, and the acceptances that it made void, by point, as they were."""
+    """A change of the rule, with the acceptances that it made void by point."""
 
     former: PruningRule
     rule: PruningRule
@@ -20,7 +20,7 @@ class Change(Generic[Acceptance]):
 
 
 class RuleHistory(Generic[Acceptance]):
-    """The newest changes. Perception says that a rule is in force, people that one is taken back, in either order."""
+    """The newest changes. Perception's report of a rule and a person's undo can arrive in either order."""
 
     def __init__(self) -> None:
         """Nothing has changed yet."""

@@ -37,16 +37,16 @@ PHASES: dict[Stage, m.Phase] = {
 
 @dataclass(frozen=True)
 class StepResult:
-    """What one period of work gave.
+    """Result of one period of work.
 
     Attributes:
         xi: ξ̇ to send (9).
-        tracking: Of the motion, None while standing.
-        cut: The cut to command now: (cut_id, point_id) as a message without its epoch, else None.
-        finished: True when there is nothing more to do.
-        summary: Why, in words.
-        pause: Why work must pause, empty when it goes on.
-        events: What happened, in words.
+        tracking: Tracking of the motion; None at rest.
+        cut: Cut to order, as (cut_id, point_id); None without one.
+        finished: True at the end of the work.
+        summary: Reason for the end, as text.
+        pause: Reason why the work has to pause; empty to continue.
+        events: Log lines.
     """
 
     xi: Array

@@ -1,7 +1,7 @@
-"""The survey drive: with the arm in its looking posture slowly along the row, so that perception sees every vine.
+"""The survey: a slow drive along the row with the arm in its survey posture, so that the camera sees every vine.
 
-Where places need another look at the end of the way, the robot goes back over it and looks from the other side. An
-operator may also send it to one place that was left open: it looks from either side of it and from before it.
+If undecided sites need another look at the end, the robot drives back once and takes pictures from the other side. An
+operator can also send it to one undecided site: it takes pictures from both sides and from the front.
 """
 
 import math
@@ -31,7 +31,7 @@ _LEAST, _PATIENCE_S = 0.01, 3.0
 
 
 class Survey:
-    """One survey of a stretch. `step` it each period until its work is finished, drop it to stop."""
+    """One survey. Call `step` in each period until it is finished; stop calling it to stop the survey."""
 
     def __init__(
         self,

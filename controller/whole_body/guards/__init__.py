@@ -1,1 +1,1 @@
-"""Inequality constraints above the tool task, one source a file."""
+"""Inequality constraints with priority over the tool task, one source in each file."""

@@ -1,9 +1,9 @@
 """Guard: the tool stays ahead of the axle in transit.
 
-With the tool at (a, b) in base_link the base gives it the velocity [v − bω, aω]: only from ahead (a > 0, driving
-forward) does steering towards a tool that moves sideways come to rest. Behind the axle the base jack-knifes, as a
-trailer pushed backwards does. So a may come down to `ahead` no faster than ȧ ≥ −rate (a − ahead), and comes up again
-below it.
+With the tool at (a, b) in base_link the base gives it the velocity [v − bω, aω]. Steering towards a tool that moves
+sideways is stable only if the tool is ahead of the axle (a > 0, driving forward). Behind the axle the base jack-knifes,
+like a trailer that is pushed backwards. So a decreases towards `ahead` no faster than ȧ ≥ −rate (a − ahead), and
+increases below it.
 """
 
 import math

@@ -4,9 +4,9 @@ For each pair of parts nearer than d_i, with n the direction between their neare
 
 ḋ ≥ −min( ξ (d − d_s)/(d_i − d_s), −a dt + √((a dt)² + 2 a (d − d_s)) )
 
-The first term is Faverjon and Tournassoud's velocity damper. The second lets a pair approach only as fast as it can
-still stop, after one more period, with the deceleration a. Nearer than d_s, the pair has to part. The blades and the
-cutter's body have a d_s of their own, and canes a ξ and an a: the tool slides in between them, and they bend.
+The first term is Faverjon and Tournassoud's velocity damper. The second limits the approach to the speed from which the
+pair can still stop, after one more period, with the deceleration a. Below d_s the pair has to separate. The blades and
+the cutter's body have their own d_s. Canes have their own ξ and a, because the tool slides in between them and they bend.
 """
 
 import math

@@ -1,1 +1,1 @@
-"""Tasks of the null space, one a file. To add one, write its file and put it into `hierarchy.secondary_tasks`."""
+"""Tasks of the null space, one in each file. To add one, write its file and add it to `hierarchy.secondary_tasks`."""

@@ -1,8 +1,8 @@
-"""Task: the base follows place and heading of the posture.
+"""Task: the base follows position and heading of the posture.
 
 With the error (e_x, e_y, e_φ) of the reference in base_link:
 v = v_ref cos e_φ + k_x e_x, ω = ω_ref + k_y v_ref e_y + k_φ sin e_φ, the classic law for a unicycle (Kanayama 1990).
-A distance to the side is made good by steering while the base drives, as a differential drive has to.
+A lateral error is corrected by steering while the base drives, as a differential drive cannot move sideways.
 """
 
 import math
@@ -10,7 +10,7 @@ import math
 from controller.whole_body.task import IkProblem
 from rolling_panda.model.differential_drive import Array
 
-#: k_y: a base 0.1 m beside its line turns towards it by half of that share of its way (rad/m²).
+#: k_y, gain of the lateral error (rad/m²).
 _SIDE = 4.0
 
 
