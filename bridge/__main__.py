@@ -87,7 +87,7 @@ def _check(arguments: argparse.Namespace) -> None:
 def _run(context: ProcessContext) -> None:
     arguments = context.arguments
     if arguments.kind == "real" and arguments.check:
-        from bridge.real.check_command import check
+        from bridge.real.commissioning import check
 
         check(context.config_path, context.wire, arguments.fakes)
         return

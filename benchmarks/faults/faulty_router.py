@@ -42,7 +42,7 @@ class FaultyRouter:
             robot_id: Whose wire it is.
             seed: Of what is lost or spoiled.
         """
-        self._robot_id, self._prefix = robot_id, key(robot_id, "")
+        self._prefix = key(robot_id, "")
         self._sessions = {name: zenoh.open(_config(endpoint)) for name, endpoint in doors.items()}
         self._ways = {pair: BadWay(seed + n) for n, pair in enumerate(itertools.permutations(doors, 2))}
         self._tokens: dict[tuple[str, str], zenoh.LivelinessToken] = {}

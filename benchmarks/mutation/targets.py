@@ -46,7 +46,7 @@ TARGETS = {
         _tests(
             "bridge",
             "fence validator latch limiter watchdog cut_memory cut_orders bridge_core bridge_memory odometer picture "
-            "camera_trigger refusals robot_faults robot_time round_trip time_ratio",
+            "camera_trigger refusals robot_faults robot_time round_trip",
         ),
     ),
     "bridge": Target(

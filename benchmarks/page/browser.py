@@ -15,6 +15,9 @@ from tests.support.chromium import FLAGS
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Frame, Page
 
+#: Of the browser's threads, before ordinary processes and behind what keeps time.
+_NICE = -6
+
 
 @contextmanager
 def chromium() -> Iterator["Browser"]:
@@ -37,7 +40,7 @@ def chromium() -> Iterator["Browser"]:
             browser.close()
 
 
-def put_first(nice: int = -6) -> int:
+def put_first() -> int:
     """Let this process's Chromium go before ordinary processes; how many of its threads could be moved.
 
     An operator's browser is another machine's. Here it shares the robot's processors, and would wait for perception,
@@ -50,19 +53,19 @@ def put_first(nice: int = -6) -> int:
             if "chrom" not in process.name():
                 continue
             for thread in process.threads():
-                if os.getpriority(os.PRIO_PROCESS, thread.id) > nice:
-                    os.setpriority(os.PRIO_PROCESS, thread.id, nice)
+                if os.getpriority(os.PRIO_PROCESS, thread.id) > _NICE:
+                    os.setpriority(os.PRIO_PROCESS, thread.id, _NICE)
                     moved += 1
     return moved
 
 
-def clock_ahead(frame: "Page | Frame", tries: int = 20) -> float:
+def clock_ahead(frame: "Page | Frame") -> float:
     """What to add to `performance.now() / 1000` of a frame for the machine's monotonic clock (s).
 
     The narrowest of several brackets: the frame's reading lies somewhere within it.
     """
     best = (float("inf"), 0.0)
-    for _ in range(tries):
+    for _ in range(20):
         before = time.monotonic()
         read = float(frame.evaluate("performance.now()")) / 1000
         after = time.monotonic()

@@ -20,9 +20,9 @@ from bridge.core.limiter import Limiter
 from bridge.core.odometer import Odometer
 from bridge.core.refusals import Refusals
 from bridge.core.robot_faults import RobotFaults
+from bridge.core.robot_time import TimeRatio
 from bridge.core.round_trip import RoundTrip
 from bridge.core.state_memory import Remembered
-from bridge.core.time_ratio import TimeRatio
 from bridge.core.validator import CommandValidator
 from bridge.core.watchdog import Watchdog
 from rolling_panda import messages as m

@@ -1,9 +1,12 @@
 """The time that a robot's watchdog and all ages run on: how many steps of 1 ms are due, and what time each one has."""
 
+from collections import deque
 from typing import Protocol
 
 # A bridge that has fallen behind takes no more than this many steps at once.
 _BURST = 20
+#: Of the real-time factor (s).
+_WINDOW_S = 1.0
 
 
 class RobotTime(Protocol):
@@ -77,3 +80,19 @@ class RealTime:
         self._due += self._tick_s
         self.now = max(self.now, self._due)
         return self.now
+
+
+class TimeRatio:
+    """The real-time factor over the last second."""
+
+    def __init__(self) -> None:
+        """Start without samples."""
+        self._samples: deque[tuple[float, float]] = deque()
+
+    def factor(self, robot_time: float, now: float) -> float:
+        """Robot seconds a second of the clock, after noting this moment; 1 until there is something to compare."""
+        self._samples.append((robot_time, now))
+        while len(self._samples) > 2 and now - self._samples[1][1] >= _WINDOW_S:
+            self._samples.popleft()
+        robot_then, then = self._samples[0]
+        return (robot_time - robot_then) / (now - then) if now > then else 1.0

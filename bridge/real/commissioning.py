@@ -1,5 +1,6 @@
 """What `rolling-panda bridge real --check` looks at: every device, without moving any."""
 
+import contextlib
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,11 +8,15 @@ from pathlib import Path
 import numpy as np
 
 from bridge.real import mp500
-from bridge.real.build import Devices, NoCutter
+from bridge.real.build import Devices, NoCutter, open_devices, wait_for_states
 from bridge.real.config import RealConfig
-from rolling_panda.model.robot import ARM_Q, Limits
+from rolling_panda.config import RobotConfig, TransportConfig, load_section
+from rolling_panda.errors import InputError
+from rolling_panda.model.robot import ARM_Q, Limits, RobotModel
 
 _WATCH_S = 2.0
+# Long enough for the arm's process to start and connect.
+_SETTLE_S = 6.0
 # Half of the rate that the maker's node has by default.
 _LEAST_WHEELS_HZ = 40.0
 _LEAST_BATTERY = 0.2
@@ -30,18 +35,38 @@ class Finding:
     good: bool
 
 
-def inspect(devices: Devices, config: RealConfig, limits: Limits, watch_s: float = _WATCH_S) -> list[Finding]:
+def check(config_path: Path, wire: TransportConfig, fakes: bool = False) -> None:
+    """Print what was found.
+
+    Raises:
+        InputError: Something is not as it has to be; the text counts how many.
+    """
+    model = RobotModel(load_section(config_path, "robot", RobotConfig))
+    devices = open_devices(config_path, wire, model, False, fakes)
+    try:
+        # Which of them is silent is in the table.
+        with contextlib.suppress(InputError):
+            wait_for_states(devices, _SETTLE_S)
+        findings = inspect(devices, load_section(config_path, "real", RealConfig), model.limits)
+    finally:
+        devices.close()
+    print(table(findings), flush=True)
+    bad = sum(not finding.good for finding in findings)
+    if bad:
+        raise InputError(f"{bad} of {len(findings)} are not as they have to be; nothing was moved")
+
+
+def inspect(devices: Devices, config: RealConfig, limits: Limits) -> list[Finding]:
     """Watch the devices for a while and judge them.
 
     Args:
         devices: Opened without permission to move.
         config: What they should be.
         limits: Of the robot, over q.
-        watch_s: How long to listen.
     """
     before, began = dict(devices.base.heard), time.monotonic()
     frames = 0 if devices.camera is None else devices.camera.taken
-    time.sleep(watch_s)
+    time.sleep(_WATCH_S)
     lasted = time.monotonic() - began
     rates = {name: (count - before.get(name, 0)) / lasted for name, count in devices.base.heard.items()}
     return [

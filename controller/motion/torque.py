@@ -9,9 +9,6 @@ from rolling_panda.errors import InputError
 from rolling_panda.model.differential_drive import NQ, NXI, Array
 from rolling_panda.model.robot import RobotModel
 
-#: Rate of torque that the Panda's controller accepts (Nm/s, data sheet).
-TORQUE_RATE = 1000.0
-
 
 @dataclass(frozen=True)
 class JointTorque:
@@ -23,7 +20,6 @@ class JointTorque:
         peak: Largest magnitude of the torque (Nm).
         margin: Limit minus peak (Nm); negative if the motion is infeasible.
         at: Time of the peak (s).
-        peak_rate: Largest magnitude of the torque's rate (Nm/s).
     """
 
     joint: str
@@ -31,7 +27,6 @@ class JointTorque:
     peak: float
     margin: float
     at: float
-    peak_rate: float
 
 
 @dataclass(frozen=True)
@@ -70,16 +65,13 @@ def torque_report(robot: RobotModel, t: Array, q: Array, xi: Array) -> TorqueRep
     dynamics = Dynamics(robot)
     acceleration = np.gradient(xi, t, axis=0)
     torque = np.array([dynamics.inverse(*sample) for sample in zip(q, xi, acceleration, strict=True)])
-    rates = np.abs(np.gradient(torque, t, axis=0)).max(axis=0)
     limits = robot.model.effortLimit[NQ - NXI :]
     names = list(robot.model.names)[1 + NQ - NXI :]
     size = np.abs(torque)
     return TorqueReport(
         tuple(
-            JointTorque(
-                name, float(limit), float(row.max()), float(limit - row.max()), float(t[row.argmax()]), float(rate)
-            )
-            for name, limit, row, rate in zip(names, limits, size.T, rates, strict=True)
+            JointTorque(name, float(limit), float(row.max()), float(limit - row.max()), float(t[row.argmax()]))
+            for name, limit, row in zip(names, limits, size.T, strict=True)
         )
     )
 

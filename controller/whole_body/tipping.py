@@ -54,13 +54,8 @@ class TippingRows(Struct, frozen=True):
 class Tipping:
     """Zero-moment point and acceleration bound. Uses the work space of its `RobotModel`."""
 
-    def __init__(self, robot: RobotModel, margin: float = MARGIN) -> None:
-        """Work out the triangle.
-
-        Args:
-            robot: With the wheels and the caster's pivot in its description.
-            margin: Distance that the zero-moment point keeps from every edge (m).
-        """
+    def __init__(self, robot: RobotModel) -> None:
+        """Work out the triangle of a robot with the wheels and the caster's pivot in its description."""
         self._robot = robot
         mass = float(pin.computeTotalMass(robot.model))
         self._weight = mass * float(np.linalg.norm(robot.model.gravity.linear))
@@ -73,7 +68,7 @@ class Tipping:
             [[-1.0, 0.0], _inner_normal(left, pivot, _CASTER_TRAIL), _inner_normal(right, pivot, _CASTER_TRAIL)]
         )
 
-        kept = np.sum(self.normals * self.points, axis=1) + margin
+        kept = np.sum(self.normals * self.points, axis=1) + MARGIN
         self._edges = np.column_stack([self.normals, kept])
         # Views of Pinocchio's own memory: the centroidal map A_g (6×12) and the centre of mass (3).
         self._map, self._center = robot.data.Ag, robot.data.com[0]

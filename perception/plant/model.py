@@ -9,6 +9,8 @@ from perception.arrays import Array, interpolate
 
 #: Mean distance of the visible half of a cylinder from its axis, in radii.
 SURFACE_OFFSET = np.pi / 4
+#: To either side, of the chord that tells a direction (m).
+_CHORD = 0.01
 #: Why a cane's axis ends: the wood ends, something occludes it, or the image ends.
 CaneEnd = Literal["free", "hidden", "image border"]
 
@@ -78,9 +80,9 @@ class Cane:
         point: Array = interpolate(np.array([arc]), self.arc, self.axis)[0]
         return point
 
-    def tangent(self, arc: float, reach: float = 0.01) -> Array:
-        """Unit vector along the axis, away from the base, from the chord `reach` (m) to either side."""
-        chord = self.at(min(arc + reach, self.length)) - self.at(max(arc - reach, float(self.arc[0])))
+    def tangent(self, arc: float) -> Array:
+        """Unit vector along the axis, away from the base, from the chord over 1 cm to either side."""
+        chord = self.at(min(arc + _CHORD, self.length)) - self.at(max(arc - _CHORD, float(self.arc[0])))
         length = float(np.linalg.norm(chord))
         fallback: Array = self.axis[-1] - self.axis[0]
         out: Array = chord / length if length > 1e-9 else fallback / max(float(np.linalg.norm(fallback)), 1e-9)

@@ -23,6 +23,8 @@ from rolling_panda.topics import ROBOT_ID as ROBOT_ID
 from rolling_panda.transport.settings import add_wire_arguments
 from rolling_panda.transport.zenoh import Transport
 
+#: After its parent has ended a process has so long to end in order (s).
+_GRACE_S = 2.0
 _PRIORITY: dict[m.Process, Priority] = {
     "bridge": "control",
     "controller": "control",
@@ -166,7 +168,7 @@ def stop_on_signals() -> threading.Event:
     return stopping
 
 
-def end_with_parent(stopping: threading.Event, grace_s: float = 2.0) -> None:
+def end_with_parent(stopping: threading.Event) -> None:
     """End this process when its standard input closes, as it does when the parent ends or is killed."""
 
     def watch() -> None:
@@ -174,7 +176,7 @@ def end_with_parent(stopping: threading.Event, grace_s: float = 2.0) -> None:
             pass
         stopping.set()
         # A hung loop must not outlive the parent.
-        threading.Event().wait(grace_s)
+        threading.Event().wait(_GRACE_S)
         os._exit(1)
 
     threading.Thread(target=watch, name="parent-watch", daemon=True).start()

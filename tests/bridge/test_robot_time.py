@@ -1,6 +1,6 @@
 import pytest
 
-from bridge.core.robot_time import RealTime, RobotTime, SteppedTime
+from bridge.core.robot_time import RealTime, RobotTime, SteppedTime, TimeRatio
 
 
 def pass_time(time: RobotTime, clock: float, seconds: float) -> list[float]:
@@ -54,3 +54,14 @@ def test_a_real_robots_first_step_after_a_standstill_knows_how_long_it_was() -> 
     assert time.tick() >= 5.97
     assert [time.tick() for _ in range(due - 1)][-1] == pytest.approx(6.0, abs=0.002)
     assert len(pass_time(time, 6.0, 1.0)) == pytest.approx(1000, abs=1)
+
+
+def test_the_factor_is_robot_time_over_the_clock_of_the_last_second() -> None:
+    pace = TimeRatio()
+    assert pace.factor(0.0, 10.0) == 1.0
+    for i in range(1, 100):
+        slow = pace.factor(i * 0.025, 10.0 + i * 0.05)
+    assert slow == pytest.approx(0.5)
+    for i in range(1, 100):
+        fast = pace.factor(99 * 0.025 + i * 0.05, 14.95 + i * 0.05)
+    assert fast == pytest.approx(1.0)

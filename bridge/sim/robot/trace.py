@@ -35,6 +35,8 @@ ROW = np.dtype(
     ]
 )
 CUTTER = ("open", "closing", "opening", "jammed")
+#: The robot stands below these speeds (m/s, rad/s).
+_STANDSTILL = 0.01
 _ROWS_PER_BLOCK = 100
 _BLOCK_HEADER = struct.Struct("<cI")
 
@@ -46,18 +48,11 @@ class Trace:
     rows: NDArray[Any]
     events: tuple[dict[str, Any], ...]
 
-    def stopping_time(self, clock: float, base: float = 0.01, joint: float = 0.01) -> float:
-        """Simulated time (s) from a fault to standstill of base and arm; infinite without standstill.
-
-        Args:
-            clock: Time of the fault (s, the bridge's clock).
-            base: Largest speed of the base at standstill (m/s, and rad/s of yaw).
-            joint: Largest speed of an arm joint at standstill (rad/s).
-        """
+    def stopping_time(self, clock: float) -> float:
+        """Simulated time (s) from a fault at `clock` (s, the bridge's clock) to standstill; infinite without it."""
         after = self.rows[self.rows["clock"] >= clock]
-        moving = (np.abs(after["base_velocity"]).max(axis=1, initial=0.0) > base) | (
-            np.abs(after["velocity"][:, 2:]).max(axis=1, initial=0.0) > joint
-        )
+        speeds = np.abs(np.hstack([after["base_velocity"], after["velocity"][:, 2:]]))
+        moving = speeds.max(axis=1, initial=0.0) > _STANDSTILL
         last = np.flatnonzero(moving)
         if len(after) == 0 or (len(last) and last[-1] == len(after) - 1):
             return float("inf")
