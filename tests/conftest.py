@@ -9,7 +9,7 @@ import pytest
 from hypothesis import settings
 from playwright.sync_api import sync_playwright
 
-from tests.support.played_page import browser, page, server, tab
+from tests.support.played_page import browser, close_browser, page, server, tab
 from tests.support.processes.local_router import local_router
 
 __all__ = ["browser", "page", "server", "tab"]
@@ -20,6 +20,14 @@ settings.register_profile("same", deadline=None, derandomize=True, max_examples=
 settings.register_profile("explore", deadline=None, max_examples=500)
 settings.register_profile("fast", deadline=None, derandomize=True, max_examples=8)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> Iterator[None]:
+    """Successive tests share a browser. Other tests find neither it nor its event loop."""
+    yield
+    if nextitem is None or "browser" not in getattr(nextitem, "fixturenames", ()):
+        close_browser()
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -8,7 +8,7 @@ import argparse
 import importlib
 import shutil
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
@@ -112,8 +112,13 @@ def new_page(browser: Any, size: tuple[int, int], scheme: str = "light") -> Iter
     context.close()
 
 
-def played(browser: Any, album: Album, only: Sequence[str]) -> None:
+def played(launch: Callable[[list[str]], Any], album: Album, only: Sequence[str]) -> None:
     """Pictures of the states that a server plays: those that the tests of the page bring it to.
+
+    Args:
+        launch: Starts the browser with these flags.
+        album: Where they are kept.
+        only: Names of those wanted; all where it is empty.
 
     Raises:
         InputError: The tests are not here.
@@ -121,10 +126,10 @@ def played(browser: Any, album: Album, only: Sequence[str]) -> None:
     if not (ROOT / "tests" / "support" / "page_states.py").exists():
         raise InputError(f"{ROOT / 'tests'} is not there: take the pictures in a checkout of the project")
     sys.path.insert(0, str(ROOT / "tests"))
-    states, server = (
-        importlib.import_module("tests.support.page_states"),
-        importlib.import_module("tests.support.played_server"),
+    states, server, host = (
+        importlib.import_module(f"tests.support.{name}") for name in ("page_states", "played_server", "page_host")
     )
+    browser = launch([*FLAT_FLAGS, *host.page_host().flags])
     still = album.folder / STILL
     wanted = [(name, DESKTOP, "light", name, PARTS.get(name, "")) for name in states.STATES]
     wanted += [(name, TABLET, "dark", f"tablet-{name}", "") for name in DARK]
@@ -140,6 +145,7 @@ def played(browser: Any, album: Album, only: Sequence[str]) -> None:
             # Warnings of a page that has only just begun are none of the state's.
             page.wait_for_timeout(700)
             album.take(page, called, part)
+    browser.close()
 
 
 def main(argv: Sequence[str]) -> int:
@@ -165,7 +171,7 @@ def main(argv: Sequence[str]) -> int:
                 walk_through(page, album, arguments.port, arguments.seed)
             browser.close()
         if arguments.part != "live":
-            browser = playwright.chromium.launch(executable_path=chromium, args=list(FLAT_FLAGS))
-            played(browser, album, arguments.only)
-            browser.close()
+            played(
+                lambda flags: playwright.chromium.launch(executable_path=chromium, args=flags), album, arguments.only
+            )
     return 0

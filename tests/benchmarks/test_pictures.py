@@ -46,4 +46,4 @@ def test_what_documents_show_is_there(document: str) -> None:
 def test_without_the_tests_it_says_what_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pictures, "ROOT", tmp_path)
     with pytest.raises(InputError, match="in a checkout of the project"):
-        pictures.played(None, pictures.Album(tmp_path), ())
+        pictures.played(pytest.fail, pictures.Album(tmp_path), ())

@@ -5,22 +5,76 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import pytest
-from playwright.sync_api import Browser, ConsoleMessage, Error, FloatRect, Locator, Page, expect, sync_playwright
+from playwright.sync_api import (
+    Browser,
+    ConsoleMessage,
+    Error,
+    FloatRect,
+    Locator,
+    Page,
+    Playwright,
+    expect,
+    sync_playwright,
+)
 
 from rolling_panda import messages as m
 from tests.support.chromium import FLAT_FLAGS
-from tests.support.played_server import ORIGIN, PlayedServer, point
+from tests.support.page_host import NOTHING, ORIGIN, page_host
+from tests.support.played_server import PlayedServer, point
 
 #: Keys that a test may leave pressed.
 _PRESSED = ("h", "w", "s", "ArrowLeft", "Enter")
 
 
-@pytest.fixture(scope="module")
+class _SharedBrowser:
+    """One browser and one tab for successive tests: to start them takes longer than most tests of the page.
+
+    Meanwhile this thread can neither start another Playwright nor run an event loop.
+    """
+
+    def __init__(self) -> None:
+        self._playwright: Playwright | None = None
+        self._browser: Browser | None = None
+        self._tab: Page | None = None
+
+    def browser(self, chromium_path: str) -> Browser:
+        if self._browser is not None and not self._browser.is_connected():
+            self.close()
+        if self._browser is None:
+            self._playwright = sync_playwright().start()
+            flags = [*FLAT_FLAGS, *page_host().flags]
+            self._browser = self._playwright.chromium.launch(executable_path=chromium_path, args=flags)
+        return self._browser
+
+    def tab(self, browser: Browser) -> Page:
+        if self._tab is None:
+            self._tab = browser.new_context(locale="en-US").new_page()
+        return self._tab
+
+    def close_tab(self) -> None:
+        if self._tab is not None:
+            self._tab.context.close()
+        self._tab = None
+
+    def close(self) -> None:
+        if self._browser is not None:
+            self._browser.close()
+        if self._playwright is not None:
+            self._playwright.stop()
+        self._playwright = self._browser = self._tab = None
+
+
+_SHARED = _SharedBrowser()
+close_browser = _SHARED.close
+
+
+@pytest.fixture
 def browser(chromium_path: str) -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=chromium_path, args=list(FLAT_FLAGS))
-        yield chromium
-        chromium.close()
+    """The browser; a test fails if the server of its pages did."""
+    problems = page_host().problems
+    problems.clear()
+    yield _SHARED.browser(chromium_path)
+    assert problems == [], problems
 
 
 @pytest.fixture
@@ -38,12 +92,29 @@ def server() -> PlayedServer:
     )
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def tab(browser: Browser) -> Iterator[Page]:
-    """One tab for the tests of a file, one after the other: to load the page there again takes half as long."""
-    context = browser.new_context(locale="en-US")
-    yield context.new_page()
-    context.close()
+    """The tab of all tests that need no other."""
+    tab = _SHARED.tab(browser)
+    tab.set_viewport_size({"width": 1280, "height": 800})
+    yield tab
+    try:
+        if tab.url != NOTHING:
+            leave(tab)
+    except Error:
+        _SHARED.close_tab()
+        raise
+
+
+def leave(tab: Page) -> None:
+    """The next test finds the tab as if nobody had used it."""
+    tab.mouse.up()
+    for key in _PRESSED:
+        tab.keyboard.up(key)
+    # A page that is left still puts something into storage.
+    tab.goto(NOTHING)
+    tab.evaluate("localStorage.clear(); sessionStorage.clear()")
+    tab.emulate_media(color_scheme="null", reduced_motion="null")
 
 
 @contextmanager
@@ -67,15 +138,7 @@ def opened(tab: Page, attach: Callable[[Page], None], path: str, width: int, hei
     try:
         yield tab
     finally:
-        # The next test finds the tab as if nobody had used it. A page that is left still puts something into storage.
-        tab.mouse.up()
-        for key in _PRESSED:
-            tab.keyboard.up(key)
-        tab.route(f"{ORIGIN}/nothing", lambda route: route.fulfill(body="", content_type="text/html"))
-        tab.goto(f"{ORIGIN}/nothing")
-        tab.evaluate("localStorage.clear(); sessionStorage.clear()")
-        tab.unroute_all(behavior="ignoreErrors")
-        tab.emulate_media(color_scheme="null", reduced_motion="null")
+        leave(tab)
         tab.remove_listener("pageerror", failed)
         tab.remove_listener("console", said)
     assert problems == [], problems

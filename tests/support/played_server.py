@@ -1,14 +1,16 @@
-"""A server that a test plays: the page's files, its socket and its requests, without a network."""
+"""A server that a test plays: the page's files, its socket and its requests."""
 
 import mimetypes
 import time
 from dataclasses import dataclass, field
+from functools import cache
 from io import BytesIO
 from typing import Any
 
 import msgspec
 from PIL import Image, ImageDraw
-from playwright.sync_api import Page, Route, WebSocketRoute
+from playwright.sync_api import Page
+from starlette.responses import JSONResponse, Response
 
 from rolling_panda import messages as m
 from rolling_panda.messages import page as page_messages
@@ -16,8 +18,9 @@ from rolling_panda.messages import types as types_messages
 from rolling_panda.messages.supervision import ControlState, ReplayState, SessionReport, StopState
 from rolling_panda.resources import resource
 from tests.support.fake_wire import bridge_state
+from tests.support.page_host import ORIGIN, PlayedRequest, PlayedSocket, page_host
 
-ORIGIN = "http://panda.test"
+__all__ = ["ORIGIN"]
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self' ws://panda.test; "
     "frame-src 'self'; base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
@@ -118,79 +121,74 @@ class PlayedServer:
     answers: dict[str, tuple[int, Any]] = field(default_factory=dict)
     posted: list[tuple[str, Any]] = field(default_factory=list)
     said: list[page_messages.FromPage] = field(default_factory=list)
-    sockets: list[WebSocketRoute] = field(default_factory=list)
+    sockets: list[PlayedSocket] = field(default_factory=list)
     crops_fetched: list[str] = field(default_factory=list)
     frames_fetched: list[int] = field(default_factory=list)
     report: SessionReport = field(default_factory=lambda: SessionReport(began_at=0.0, written_at=0.0))
     rule: m.PruningRule | None = field(default_factory=m.PruningRule)
     crop: bytes = field(default_factory=lambda: camera_image((240, 180)))
     view: bytes = b""
+    #: The page of the 3-D view, where `view` is no picture of it.
+    frame: str = VIEW
     number: int = 0
     heres: int = 0
     started: float = field(default_factory=time.time)
     image: bytes = field(default_factory=lambda: camera_image())
 
     def attach(self, page: Page) -> None:
-        page.route(f"{ORIGIN}{self.base}/**", self.serve)
-        page.route_web_socket(f"**{self.base}/ws", self.accept)
+        page_host().show(page, self)
 
-    def serve(self, route: Route) -> None:
-        path = route.request.url.removeprefix(ORIGIN + self.base).split("?")[0]
+    def answer(self, request: PlayedRequest) -> Response | None:
+        path = request.path.removeprefix(self.base)
         if not self.online:
-            route.abort()
-        elif path == "/api/control/here":
+            return None
+        if path == "/api/control/here":
             self.heres += 1
-            route.fulfill(json={"ok": True, "reason": ""})
-        elif route.request.method == "POST":
-            self.posted.append((path, route.request.post_data_json))
+            return JSONResponse({"ok": True, "reason": ""})
+        if request.method == "POST":
+            self.posted.append((path, request.body))
             status, body = self.answers.get(path, (200, {"ok": True, "reason": ""}))
-            route.fulfill(status=status, json=body)
-        elif path == "/api/me":
+            return JSONResponse(body, status)
+        if path == "/api/me":
             status, body = self.answers.get(path, (200, {"user": "Ada", "role": self.role}))
-            route.fulfill(status=status, json=body)
-        elif path == "/api/robot":
-            route.fulfill(json={"arm_limits": [(-2.9, 2.9)] * 7})
-        elif path == "/api/sign-in":
-            route.fulfill(json={"password": False})
-        elif path == "/api/report":
-            route.fulfill(body=msgspec.json.encode(self.report), content_type="application/json")
-        elif path == "/viser/":
-            route.fulfill(body=STILL if self.view else VIEW, content_type="text/html")
-        elif path == "/viser/still.jpg":
-            route.fulfill(body=self.view, content_type="image/jpeg")
-        elif path.startswith("/api/points/") and path.endswith("/crop"):
-            self.crops_fetched.append(route.request.url.removeprefix(ORIGIN))
-            if self.crop:
-                route.fulfill(body=self.crop, content_type="image/jpeg")
-            else:
-                route.fulfill(status=204)
-        elif path == "/camera/color.jpg":
-            self.frames_fetched.append(int(route.request.url.split("n=")[1]))
-            route.fulfill(body=self.image, content_type="image/jpeg")
-        else:
-            name = {"/": "index.html", "/sign-in": "sign-in.html"}.get(path, path.lstrip("/"))
-            file = resource(f"web/{name}")
-            kind = mimetypes.guess_type(name)[0] or "text/plain"
-            route.fulfill(body=file.read_bytes(), content_type=kind, headers={"content-security-policy": POLICY})
+            return JSONResponse(body, status)
+        if path == "/api/robot":
+            return JSONResponse({"arm_limits": [(-2.9, 2.9)] * 7})
+        if path == "/api/sign-in":
+            return JSONResponse({"password": False})
+        if path == "/api/report":
+            return Response(msgspec.json.encode(self.report), media_type="application/json")
+        if path == "/viser/":
+            return Response(STILL if self.view else self.frame, media_type="text/html")
+        if path == "/viser/still.jpg":
+            return Response(self.view, media_type="image/jpeg")
+        if path.startswith("/api/points/") and path.endswith("/crop"):
+            self.crops_fetched.append(request.target)
+            return Response(self.crop, media_type="image/jpeg") if self.crop else Response(status_code=204)
+        if path == "/camera/color.jpg":
+            self.frames_fetched.append(int(request.target.split("n=")[1]))
+            return Response(self.image, media_type="image/jpeg")
+        return page_file({"/": "index.html", "/sign-in": "sign-in.html"}.get(path, path))
 
-    def accept(self, socket: WebSocketRoute) -> None:
-        if not self.online:
-            socket.close()
-            return
-        self.sockets.append(socket)
-        socket.on_message(lambda text: self.hear(socket, text))
+    def accept(self, socket: PlayedSocket) -> bool:
+        if self.online:
+            self.sockets.append(socket)
+            self.greet(socket)
+        return self.online
+
+    def greet(self, socket: PlayedSocket) -> None:
         self.send(socket, self.state())
         self.send(socket, self.page_points())
         self.send(socket, page_messages.PageEvents(events=(self.event(1, "info", "signed in"),)))
 
-    def hear(self, socket: WebSocketRoute, text: str | bytes) -> None:
+    def hear(self, socket: PlayedSocket, text: str) -> None:
         message = msgspec.json.decode(text, type=page_messages.FromPage)
         self.said.append(message)
         if isinstance(message, page_messages.Ping) and self.online and not self.silent:
             self.send(socket, page_messages.Pong(number=message.number))
             self.send(socket, self.state())
 
-    def send(self, socket: WebSocketRoute, message: page_messages.FromServer) -> None:
+    def send(self, socket: PlayedSocket, message: page_messages.FromServer) -> None:
         socket.send(msgspec.json.encode(message).decode())
 
     def tell(self, message: page_messages.FromServer) -> None:
@@ -240,6 +238,14 @@ class PlayedServer:
 
     def stops(self) -> list[Any]:
         return [body for path, body in self.posted if path == "/api/stop"]
+
+
+@cache
+def page_file(name: str) -> Response:
+    """A file of the page, which browsers may cache."""
+    file = resource(f"web/{name.lstrip('/')}")
+    headers = {"content-security-policy": POLICY, "cache-control": "max-age=3600"}
+    return Response(file.read_bytes(), media_type=mimetypes.guess_type(name)[0] or "text/plain", headers=headers)
 
 
 def camera_image(size: tuple[int, int] = (480, 360)) -> bytes:

@@ -335,33 +335,27 @@ def test_echoes_the_state_that_it_has_drawn(page: Page, server: PlayedServer) ->
     until(page, lambda: any(isinstance(message, p.Ping) and message.rendered > 3 for message in server.said))
 
 
-def test_says_what_it_waits_for_before_there_is_anything(browser: Browser) -> None:
+def test_says_what_it_waits_for_before_there_is_anything(tab: Page) -> None:
     server = PlayedServer(controller=None, bridge=None, gone={"controller": 9.0, "bridge": 9.0, "perception": 9.0})
-    context = browser.new_context(locale="en-US")
-    page = context.new_page()
-    server.attach(page)
-    page.goto(f"{ORIGIN}/")
-    expect(page.locator("#mode")).to_have_text("No state yet")
-    expect(page.locator("rp-queue > .empty")).to_contain_text("No pruning point in 12 images so far")
-    expect(page.locator("#start")).to_be_disabled()
-    expect(page.locator("#stop")).to_be_enabled()
-    context.close()
+    server.attach(tab)
+    tab.goto(f"{ORIGIN}/")
+    expect(tab.locator("#mode")).to_have_text("No state yet")
+    expect(tab.locator("rp-queue > .empty")).to_contain_text("No pruning point in 12 images so far")
+    expect(tab.locator("#start")).to_be_disabled()
+    expect(tab.locator("#stop")).to_be_enabled()
 
 
-def test_the_sign_in_link_is_used_once_and_leaves_the_address(browser: Browser) -> None:
+def test_the_sign_in_link_is_used_once_and_leaves_the_address(tab: Page) -> None:
     server = PlayedServer(answers={"/api/sign-in": (401, {"ok": False, "reason": "this token was used"})})
-    context = browser.new_context(locale="en-US")
-    page = context.new_page()
-    server.attach(page)
-    page.goto(f"{ORIGIN}/sign-in?token=secret")
-    expect(page.locator("#progress")).to_have_text("Not signed in: this token was used")
-    assert page.url == f"{ORIGIN}/sign-in"
+    server.attach(tab)
+    tab.goto(f"{ORIGIN}/sign-in?token=secret")
+    expect(tab.locator("#progress")).to_have_text("Not signed in: this token was used")
+    assert tab.url == f"{ORIGIN}/sign-in"
     assert server.posted == [("/api/sign-in", {"token": "secret"})]
     del server.answers["/api/sign-in"]
-    page.locator("#token").fill("another")
-    page.get_by_role("button", name="Sign in").click()
-    expect(page.locator("#mode")).to_have_attribute("data-mode", "READY")
-    context.close()
+    tab.locator("#token").fill("another")
+    tab.get_by_role("button", name="Sign in").click()
+    expect(tab.locator("#mode")).to_have_attribute("data-mode", "READY")
 
 
 def test_a_busy_page_does_not_take_its_own_pause_for_a_lost_link(page: Page, server: PlayedServer) -> None:

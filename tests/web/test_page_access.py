@@ -90,14 +90,12 @@ def test_a_greyed_control_does_nothing_and_says_why_to_keyboard_and_finger(page:
     assert server.posted == []
 
 
-def test_signing_in_needs_no_eyes(browser: Browser, server: PlayedServer, axe: str) -> None:
-    context = browser.new_context(viewport={"width": 1024, "height": 768}, locale="en-US")
-    page = context.new_page()
-    server.attach(page)
-    page.goto(f"{ORIGIN}/sign-in")
-    expect(page.locator("h1")).to_be_visible()
-    assert grave(page, axe) == []
-    context.close()
+def test_signing_in_needs_no_eyes(tab: Page, server: PlayedServer, axe: str) -> None:
+    tab.set_viewport_size({"width": 1024, "height": 768})
+    server.attach(tab)
+    tab.goto(f"{ORIGIN}/sign-in")
+    expect(tab.locator("h1")).to_be_visible()
+    assert grave(tab, axe) == []
 
 
 @pytest.mark.parametrize("size", [(1024, 768), (820, 1180)])

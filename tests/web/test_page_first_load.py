@@ -3,8 +3,9 @@
 from collections.abc import Iterator
 
 import pytest
-from playwright.sync_api import Browser, Page, WebSocketRoute, expect
+from playwright.sync_api import Browser, Page, expect
 
+from tests.support.page_host import PlayedSocket
 from tests.support.played_page import until
 from tests.support.played_server import ORIGIN, PlayedServer
 
@@ -29,15 +30,29 @@ class LateServer(PlayedServer):
 
     waits = True
 
-    def accept(self, socket: WebSocketRoute) -> None:
-        if self.waits:
-            self.sockets.append(socket)
-        else:
-            super().accept(socket)
+    def greet(self, socket: PlayedSocket) -> None:
+        if not self.waits:
+            super().greet(socket)
+
+    def hear(self, socket: PlayedSocket, text: str) -> None:
+        if not self.waits:
+            super().hear(socket, text)
 
     def begin(self) -> None:
         self.waits = False
-        super().accept(self.sockets[-1])
+        self.greet(self.sockets[-1])
+
+
+class BusyServer(PlayedServer):
+    """It refuses its first socket."""
+
+    refused = 0
+
+    def accept(self, socket: PlayedSocket) -> bool:
+        if self.refused:
+            return super().accept(socket)
+        self.refused += 1
+        return False
 
 
 @pytest.fixture
@@ -62,21 +77,11 @@ def test_a_server_that_takes_two_seconds_for_its_first_word_is_no_alarm(fresh: P
 
 
 def test_a_first_try_that_fails_is_no_alarm(fresh: Page) -> None:
-    server = PlayedServer()
-    turned_away: list[WebSocketRoute] = []
-
-    def accept(socket: WebSocketRoute) -> None:
-        if turned_away:
-            server.accept(socket)
-        else:
-            turned_away.append(socket)
-            socket.close()
-
+    server = BusyServer()
     server.attach(fresh)
-    fresh.route_web_socket("**/ws", accept)
     fresh.goto(f"{ORIGIN}/")
     expect(fresh.locator("#mode")).to_have_attribute("data-mode", "READY")
-    assert turned_away and fresh.evaluate("alarming") == []
+    assert server.refused == 1 and fresh.evaluate("alarming") == []
 
 
 def test_while_the_browser_itself_is_busy_the_server_is_not_said_to_be_silent(fresh: Page) -> None:

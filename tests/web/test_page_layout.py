@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
 
 from rolling_panda import messages as m
 from rolling_panda.messages import page as p
@@ -14,7 +14,7 @@ from rolling_panda.resources import resource
 from server.api.page_files import minified
 from tests.support.page_parts import held
 from tests.support.played_page import box_of, until
-from tests.support.played_server import ORIGIN, PlayedServer, bridge, controller, point
+from tests.support.played_server import PlayedServer, bridge, controller, point
 
 pytestmark = pytest.mark.browser
 
@@ -93,9 +93,7 @@ def a_whole_job(page: Page, server: PlayedServer) -> None:
     page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
 
-def test_what_is_accepted_who_comes_and_a_whole_job_move_nothing_on_the_page(
-    browser: Browser, server: PlayedServer
-) -> None:
+def test_what_is_accepted_who_comes_and_a_whole_job_move_nothing_on_the_page(page: Page, server: PlayedServer) -> None:
     """Neither a panel nor a button nor a row of the queue is elsewhere, so that no press meets another one."""
     parts = (
         "#stop",
@@ -113,10 +111,7 @@ def test_what_is_accepted_who_comes_and_a_whole_job_move_nothing_on_the_page(
         return [each.localName, name, box.x, box.y, name === "mode" ? 0 : box.width];
     }}).filter(([name]) => name !== "rp-link-banner")"""
     server.points = tuple(point(number, "PROPOSED", spur=number) for number in range(1, 4))
-    context = browser.new_context(viewport={"width": 1280, "height": 800}, locale="en-US")
-    page = context.new_page()
-    server.attach(page)
-    page.goto(f"{ORIGIN}/")
+    page.reload()
     expect(page.locator("#mode")).to_have_attribute("data-mode", "READY")
     expect(page.locator("rp-point")).to_have_count(3)
     expect(page.locator("rp-camera img")).to_be_visible()
@@ -136,7 +131,6 @@ def test_what_is_accepted_who_comes_and_a_whole_job_move_nothing_on_the_page(
     seen = json.dumps(shifts, indent=1)
     assert sum(share for share, *_ in shifts) < 0.02, f"more than words beside one that has changed moved: {seen}"
     assert page.evaluate(boxes) == before
-    context.close()
 
 
 def test_the_queue_has_room_for_five_points_on_a_small_screen(page: Page, server: PlayedServer) -> None:

@@ -1,15 +1,12 @@
 """What the page's queue shows of the session's plan."""
 
-from collections.abc import Iterator
-
 import msgspec
 import pytest
-from playwright.sync_api import Page, expect, sync_playwright
+from playwright.sync_api import Page, expect
 
 from rolling_panda.messages.supervision import PointPlan
-from tests.support.chromium import FLAGS
 from tests.support.played_page import until
-from tests.support.played_server import ORIGIN, PlayedServer, controller, point
+from tests.support.played_server import PlayedServer, controller, point
 
 pytestmark = pytest.mark.browser
 WAY = PointPlan(
@@ -33,17 +30,6 @@ def server() -> PlayedServer:
         point(3, "PROPOSED"),
     )
     return PlayedServer(points=rows)
-
-
-@pytest.fixture
-def page(chromium_path: str, server: PlayedServer) -> Iterator[Page]:
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=chromium_path, args=list(FLAGS))
-        page = chromium.new_page(viewport={"width": 1280, "height": 800}, locale="en-US")
-        server.attach(page)
-        page.goto(f"{ORIGIN}/")
-        yield page
-        chromium.close()
 
 
 def test_a_row_says_its_number_and_way_or_why_the_plan_refuses_it(page: Page) -> None:

@@ -4,13 +4,14 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from playwright.sync_api import Page, Route, expect
+from playwright.sync_api import Page, expect
+from starlette.responses import JSONResponse, Response
 
-from rolling_panda.resources import resource
 from server.robots.summary import RobotSummary
 from tests.support.axe import axe, grave
+from tests.support.page_host import PlayedRequest, PlayedSocket, page_host
 from tests.support.played_page import opened, until
-from tests.support.played_server import ORIGIN, PlayedServer, controller, point
+from tests.support.played_server import ORIGIN, PlayedServer, controller, page_file, point
 
 __all__ = ["axe"]
 pytestmark = pytest.mark.browser
@@ -29,21 +30,30 @@ class PlayedHall:
         self.online = True
 
     def attach(self, page: Page) -> None:
-        page.route(f"{ORIGIN}/**", self.serve)
-        for robot in self.robots.values():
-            robot.attach(page)
+        page_host().show(page, self)
 
-    def serve(self, route: Route) -> None:
-        path = route.request.url.removeprefix(ORIGIN)
-        if path == "/api/robots" and self.online:
-            route.fulfill(json=[self.summarize(name, robot).model_dump() for name, robot in self.robots.items()])
-        elif path == "/api/stop":
-            self.stops.append(route.request.post_data_json)
-            route.fulfill(json={"ok": True, "reason": ""})
-        elif path.startswith("/js/scene/"):
-            route.fulfill(body=resource(f"web{path}").read_bytes(), content_type="text/javascript")
-        else:
-            route.abort()
+    def robot(self, path: str) -> PlayedServer | None:
+        return next((robot for robot in self.robots.values() if path.startswith(f"{robot.base}/")), None)
+
+    def answer(self, request: PlayedRequest) -> Response | None:
+        robot = self.robot(request.path)
+        if robot is not None:
+            return robot.answer(request)
+        if request.path == "/api/robots" and self.online:
+            return JSONResponse([self.summarize(name, robot).model_dump() for name, robot in self.robots.items()])
+        if request.path == "/api/stop":
+            self.stops.append(request.body)
+            return JSONResponse({"ok": True, "reason": ""})
+        return page_file(request.path) if request.path.startswith("/js/scene/") else None
+
+    def accept(self, socket: PlayedSocket) -> bool:
+        robot = self.robot(socket.path)
+        return robot is not None and robot.accept(socket)
+
+    def hear(self, socket: PlayedSocket, text: str) -> None:
+        robot = self.robot(socket.path)
+        assert robot is not None
+        robot.hear(socket, text)
 
     def summarize(self, name: str, robot: PlayedServer) -> RobotSummary:
         severity, alarm = self.alarms.get(name, ("", ""))

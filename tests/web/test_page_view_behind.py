@@ -1,11 +1,10 @@
 """Where the processor draws the 3-D view, its client draws behind the canvas, and finished pictures are shown."""
 
 import io
-from collections.abc import Iterator
 
 import pytest
 from PIL import Image
-from playwright.sync_api import Browser, Frame, expect
+from playwright.sync_api import Frame, Page, expect
 
 from tests.support.played_server import ORIGIN, PlayedServer
 
@@ -52,14 +51,11 @@ CLIENT = """() => {
 
 
 @pytest.fixture
-def view(browser: Browser, server: PlayedServer) -> Iterator[Frame]:
-    context = browser.new_context(locale="en-US")
-    page = context.new_page()
-    server.attach(page)
-    page.goto(f"{ORIGIN}/")
-    expect(page.locator("rp-scene iframe")).to_have_class("loaded")
-    yield page.frames[1]
-    context.close()
+def view(tab: Page, server: PlayedServer) -> Frame:
+    server.attach(tab)
+    tab.goto(f"{ORIGIN}/")
+    expect(tab.locator("rp-scene iframe")).to_have_class("loaded")
+    return tab.frames[1]
 
 
 def colors(view: Frame) -> list[tuple[int, int, int]]:

@@ -47,9 +47,8 @@ def page(browser: Browser, server: PlayedServer) -> Iterator[Page]:
     """The page, with a 3-D view that has drawn nothing yet."""
     context = browser.new_context(locale="en-US")
     page = context.new_page()
+    server.frame = VIEW.replace(" data-view=drawn", "")
     server.attach(page)
-    empty = VIEW.replace(" data-view=drawn", "")
-    page.route(f"{ORIGIN}/viser/", lambda route: route.fulfill(body=empty, content_type="text/html"))
     page.clock.install()
     page.goto(f"{ORIGIN}/")
     expect(page.locator("rp-scene iframe")).to_have_class("loaded")
