@@ -44,7 +44,7 @@ class CommitBarrier:
             if number > ledger.durable:
                 why = ledger.failure
                 if not why and now - since > _PATIENCE_S:
-                    why = f"the ledger has not taken it within {_PATIENCE_S} s"
+                    why = f"the ledger has not written it within {_PATIENCE_S} s"
                 if not why:
                     return
             self._waiting.popleft()

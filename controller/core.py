@@ -81,7 +81,7 @@ class Controller:
         self._state_due = self._stops_due = -math.inf
         self._relaxed_limits = (*wider("controller", config), *wider("robot", robot_config))
         for line in self._relaxed_limits:
-            self._event_log.say("warning", f"set wider than usual: {line}")
+            self._event_log.say("warning", f"less strict than usual: {line}")
 
     @property
     def mode(self) -> m.Mode:
@@ -286,7 +286,7 @@ class Controller:
 
     def _look_again(self, asked: intents.LookAgain, now: float) -> str:
         if open_place(self._queue.perceived, asked.vine, asked.spur) is None:
-            return f"nothing is left open at vine {asked.vine}, spur {asked.spur}"
+            return f"there is no undecided site at vine {asked.vine}, spur {asked.spur}"
         return self._start(asked, now)
 
     def _pause(self, asked: intents.Pause, now: float) -> str:

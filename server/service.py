@@ -209,7 +209,7 @@ def _robot_context(
         held_elsewhere=lambda session: app_state.held_elsewhere(session, robot),
     )
     for line in widened:
-        robot.note("warning", f"set wider than usual: {line}")
+        robot.note("warning", f"less strict than usual: {line}")
     if wire.plain:
         robot.note("error", PLAIN_WARNING)
     return robot

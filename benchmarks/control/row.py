@@ -109,7 +109,7 @@ def cut_row(
         event, where = events.get(entry.point_id), entry.accepted_position
         assert where is not None
         pieces = severed.get(entry.point_id, [])
-        end = ends.get(entry.point_id, replace(entry, state="PROPOSED", reason="perception does not see it any more"))
+        end = ends.get(entry.point_id, replace(entry, state="PROPOSED", reason="perception no longer reports it"))
         truth = true_cut(truths, pieces)
         cuts.append(
             Cut(

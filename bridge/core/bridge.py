@@ -139,7 +139,7 @@ class BridgeCore:
         self._outcome: m.Outcome = ""
         self._relaxed_limits = relaxed_limits
         self._events: list[tuple[m.Severity, str]] = [
-            ("warning", f"set wider than usual: {line}") for line in relaxed_limits
+            ("warning", f"less strict than usual: {line}") for line in relaxed_limits
         ]
         self._state_due = True
 

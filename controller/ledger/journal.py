@@ -133,7 +133,8 @@ class Journal:
         if self._state.failure:
             return self._state.failure
         if self._unwritten_since is not None and now - self._unwritten_since > patience_s:
-            return f"the ledger has taken nothing for {now - self._unwritten_since:.1f} s: is its disk full or hanging?"
+            waited = now - self._unwritten_since
+            return f"the ledger has written nothing for {waited:.1f} s: is its disk full or hanging?"
         return ""
 
 

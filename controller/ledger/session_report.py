@@ -16,7 +16,7 @@ _MOST_CUTS, _MOST_REFUSALS, _MOST_CHANGES = 500, 100, 100
 _ENDED = ("DONE", "FAILED_NOT_CUT", "UNKNOWN")
 _CONTROL: dict[type[intents.Intent], str] = {
     intents.TakeControl: "took control",
-    intents.GrantControl: "gave control to who had asked",
+    intents.GrantControl: "gave control to the person who had asked",
     intents.ReturnControl: "returned control",
 }
 

@@ -82,7 +82,7 @@ class LedgerWriter:
             self._left_out += 1
             return
         if self._left_out:
-            text = f"{self._left_out} lines of other processes' logs came too fast to be recorded"
+            text = f"{self._left_out} log lines of other processes exceeded the rate limit and were not recorded"
             self.write([Record(0, "event", "controller", LeftOut(text, self._left_out))])
             self._left_out = 0
         self.write([Record(0, "event", line.process, line)])

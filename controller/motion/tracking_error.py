@@ -37,13 +37,13 @@ class TrackingErrorMonitor:
 
     @property
     def reason(self) -> str:
-        """Which actuator does not do what it is told, and by how much; empty when all do."""
+        """Description of the largest tracking error above its limit; empty without one."""
         excess = np.abs(self._behind) - _LIMIT
         worst = int(np.argmax(excess))
         if excess[worst] <= 0.0:
             return ""
         name = ("the left wheel", "the right wheel")[worst] if worst < 2 else f"joint {worst - 1}"
         return (
-            f"the robot does not follow: {name} is {abs(self._behind[worst]):.2f} rad away from what was sent, "
-            f"allowed are {_LIMIT[worst]}"
+            f"the robot does not follow: {name} is {abs(self._behind[worst]):.2f} rad from its command; "
+            f"the limit is {_LIMIT[worst]}"
         )

@@ -24,7 +24,7 @@ PEAK_VELOCITY, PEAK_ACCELERATION, PEAK_JERK = 1.875, 5.7735, 60.0
 
 @dataclass(frozen=True)
 class Rates:
-    """Limits of a motion along one distance: velocity, acceleration and jerk, in the unit of the distance and seconds."""
+    """Limits of velocity, acceleration and jerk along one distance, in the unit of the distance and seconds."""
 
     velocity: float
     acceleration: float
@@ -80,7 +80,7 @@ class ToolState(Struct, frozen=True):
 
 
 class PoseTrajectory:
-    """Trajectory between two tool poses, at rest at both ends: along a screw, or `straight` with a separate rotation."""
+    """Trajectory between two tool poses at rest: along a screw, or `straight` with a separate rotation."""
 
     def __init__(
         self,
@@ -291,8 +291,8 @@ def durations(distances: Array, rates: Rates) -> Array:
 class Correction:
     """A straight shift of the rest of a motion.
 
-    It is a quintic that begins and ends with zero velocity and acceleration. So its sum with the motion is continuous in
-    position, velocity and acceleration, and ends at rest at the new goal.
+    It is a quintic that begins and ends with zero velocity and acceleration. So its sum with the motion is continuous
+    in position, velocity and acceleration, and ends at rest at the new goal.
 
     Attributes:
         begin: Start on the motion's clock (s).

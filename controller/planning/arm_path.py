@@ -69,7 +69,7 @@ class ArmPathPlanner:
             if out is None:
                 return Blocked(
                     f"the arm starts with {1e3 * near[0]:.0f} mm between {near[1][0]} and {near[1][1]}, and no "
-                    f"short way leads out; move it by hand"
+                    f"short path leads out; move it by hand"
                 )
             head.append(out)
         for way in self._guesses(head[-1], goal):
@@ -77,7 +77,7 @@ class ArmPathPlanner:
                 return ArmPath(np.array(head + self._shortened(place, way, rng)[1:]))
         found = self._search(place, head[-1], goal, rng)
         if found is None:
-            return Blocked(f"no way of the arm keeps {1e3 * self._limits.clearance:.0f} mm from everything")
+            return Blocked(f"no path of the arm keeps {1e3 * self._limits.clearance:.0f} mm from every obstacle")
         return ArmPath(np.array(head + self._shortened(place, found, rng)[1:]))
 
     def _guesses(self, start: Array, goal: Array) -> Iterator[list[Array]]:

@@ -1,9 +1,9 @@
 """Clearance of a previewed motion from obstacles that were detected since.
 
 The camera keeps seeing more of the row, and sees known parts more accurately. An approved motion stays valid as long as
-no new obstacle is too near to it. A new obstacle extends more than `SAME` beyond all known ones. It is too near to a part
-of the robot if it is nearer than the collision guard allows, or nearer than both the smallest distance shown for that
-cut and the clearance of plans.
+no new obstacle is too near to it. A new obstacle extends more than `SAME` beyond all known ones. It is too near to a
+part of the robot if it is nearer than the collision guard allows, or nearer than both the smallest distance shown for
+that cut and the clearance of plans.
 """
 
 import math

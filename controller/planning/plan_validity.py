@@ -46,7 +46,7 @@ def points_changed(plan: WorkPlan, tickets: Iterable[Ticket], order: tuple[str, 
         if point_id not in planned:
             return f"{point_id} was accepted after it was made"
         if ticket.accepted != planned[point_id]:
-            return f"{point_id} was accepted anew"
+            return f"{point_id} was accepted again"
     for point_id in planned:
         if point_id not in now or now[point_id].state not in {*BOUND, *_WORKED}:
             return f"{point_id} is no longer accepted"
@@ -71,16 +71,16 @@ def away_from(start: Array, q: Array) -> str:
     moved, turned = float(np.hypot(*away[:2])), abs(float(away[2]))
     arm = float(np.abs(away[ARM_Q]).max())
     if moved > PLACE_TOLERANCE:
-        return f"the robot stands {moved:.2f} m from where it begins"
+        return f"the robot stands {moved:.2f} m from its start"
     if turned > TURN_TOLERANCE:
-        return f"the robot is turned by {np.degrees(turned):.0f}° from where it begins"
+        return f"the robot is turned by {np.degrees(turned):.0f}° from its start"
     if arm > JOINT_TOLERANCE:
-        return f"a joint of the arm is {arm:.2f} rad from where it begins"
+        return f"a joint of the arm is {arm:.2f} rad from its start"
     return ""
 
 
 class ObstacleWatch:
-    """Detects obstacles that the plan did not consider. One instance for each plan; a check takes about a millisecond."""
+    """Detects obstacles that the plan did not consider. One instance a plan; a check takes about a millisecond."""
 
     def __init__(self, before: tuple[Capsule, ...], track: Array, lines: Sequence[tuple[Array, Array]]) -> None:
         """Remember what stood around, and where robot and tool will be.
@@ -124,7 +124,7 @@ class ObstacleWatch:
             kind = now[int(index) // len(_SHARES)].kind
             if self._in_the_way(places[index], kind == "cane"):
                 x, y, z = places[index]
-                return f"a {kind} is seen at ({x:.1f}, {y:.1f}, {z:.1f}) m that was not when it was made"
+                return f"a {kind} is seen at ({x:.1f}, {y:.1f}, {z:.1f}) m that was not there when it was made"
         return ""
 
     def _in_the_way(self, place: Array, cane: bool) -> bool:

@@ -1,7 +1,7 @@
 """Previews of the work: requests, validity and approval.
 
-If required, no cut begins without an approval. An approval is for one motion: from the robot's pose, over these points in
-this order, among these obstacles. The work then uses the postures of the preview.
+If required, no cut begins without an approval. An approval is for one motion: from the robot's pose, over these points
+in this order, among these obstacles. The work then uses the postures of the preview.
 """
 
 from collections.abc import Sequence
@@ -102,7 +102,7 @@ class PreviewManager:
         for before in names[: names.index(name)]:
             earlier = self._queue.get(before)
             if earlier is None or earlier.state not in ("CUTTING", "DONE"):
-                return f"{before} was left, so that the way to {name} is another one than was approved"
+                return f"{before} was skipped, so that the motion to {name} is another one than was approved"
         return ""
 
     def known(self, ticket: Ticket) -> CutPlan | None:

@@ -1,7 +1,7 @@
 """Simulation of the work as the controller would execute it from the present state.
 
-It runs the controller's own sequence, whole-body method and limits, period by period, on a robot without mass. Cutter and
-camera always succeed. The preview is therefore the motion that will be commanded.
+It runs the controller's own sequence, whole-body method and limits, period by period, on a robot without mass. Cutter
+and camera always succeed. The preview is therefore the motion that will be commanded.
 """
 
 import hashlib

@@ -55,7 +55,7 @@ class FencingToken:
             self.overruled = bridge.holder not in ("", self._mine, self._former)
         self.waits = self.overruled or (bridge is None and now - self._began < _UNHEARD_S)
         if self.overruled and not was_overruled:
-            return "another controller commands this robot; this one waits until that one has ended or is silent"
+            return "another controller commands this robot; this one waits until the other has ended or is silent"
         if self.token is not None and self.token != had:
             return f"this controller commands the robot: epoch {self.token.epoch}"
         return ""

@@ -143,11 +143,11 @@ def sensors(health: Health, config: ControllerConfig) -> str:
     if health.tracking_error:
         return health.tracking_error
     if health.joints > config.joints_max_age_s:
-        return f"joint states are {_age(health.joints)} old, allowed are {config.joints_max_age_s} s"
+        return f"joint states are {_age(health.joints)}old; the limit is {config.joints_max_age_s} s"
     if health.odometry > config.odometry_max_age_s:
-        return f"odometry is {_age(health.odometry)} old, allowed are {config.odometry_max_age_s} s"
+        return f"odometry is {_age(health.odometry)}old; the limit is {config.odometry_max_age_s} s"
     if health.bridge > config.bridge_max_age_s:
-        return f"the bridge's state is {_age(health.bridge)} old, allowed are {config.bridge_max_age_s} s"
+        return f"the bridge's state is {_age(health.bridge)}old; the limit is {config.bridge_max_age_s} s"
     return ""
 
 
@@ -168,7 +168,7 @@ def perception(health: Health, config: ControllerConfig) -> str:
     """Why perception does not allow automatic work; empty when it does."""
     if health.obstacles > config.obstacles_max_age_s:
         return (
-            f"the newest picture of what stands around is {_age(health.obstacles)} old, "
+            f"the newest camera frame with the obstacles is {_age(health.obstacles)} old, "
             f"allowed are {config.obstacles_max_age_s} s"
         )
     return _process("perception", health.perception, config.perception_max_age_s, health.present)

@@ -31,7 +31,7 @@ class Lease:
     def refusal(self, client: Client) -> str:
         """Why a client may neither move the robot nor get control by the way; empty when it may."""
         if self.next_holder is not None:
-            return f"control goes over to {self.next_holder.user}; wait until the robot is at rest"
+            return f"control passes to {self.next_holder.user}; wait until the robot is at rest"
         if self.holder is None or self.holder.key == client.key:
             return ""
         return f"{self.holder.user} holds control of this robot; ask for it, or take it"
@@ -67,7 +67,7 @@ class Lease:
     def grant(self, client: Client) -> str:
         """The holder gives control to who has asked; why not, empty when it goes over."""
         if not self.held_by(client):
-            return "only who holds control can grant it"
+            return "only the person in control can grant it"
         if self.requested is None:
             return "nobody asks for control"
         self.next_holder = self.requested

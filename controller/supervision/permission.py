@@ -44,7 +44,7 @@ class Situation:
 _CHECKS: Final[dict[Condition, Callable[[Situation], str]]] = {
     "fresh sensors": lambda now: safety.sensors(now.health, now.config),
     "bridge obeys": lambda now: (
-        "the bridge's watchdog holds the robot: wait until it takes commands" if now.health.watchdog else ""
+        "the bridge's watchdog holds the robot: wait until it accepts commands" if now.health.watchdog else ""
     ),
     "server": lambda now: safety.supervision(now.health, now.config, False),
     "at rest": lambda now: now.busy,
@@ -65,7 +65,7 @@ def refusal(command: Command, now: float, situation: Situation) -> str:
     """
     mode, event = situation.state.mode, command.event
     if "operator" not in situation.rights:
-        return situation.not_theirs or "only who may operate may ask for this"
+        return situation.not_theirs or "this needs the role operator or supervisor"
     # Acknowledging a fault moves nothing.
     if command.control and mode != "FAULT" and situation.not_theirs:
         return situation.not_theirs

@@ -68,10 +68,10 @@ class StopLatch:
     def ask_release(self, intent: intents.Reset, bridge: m.BridgeState | None, now: float) -> str:
         """A supervisor resets; returns why not. The release goes to the bridge, and only its state ends the latch."""
         if bridge is None:
-            return "the bridge has not said yet what it holds: reset again in a moment"
+            return "the bridge has not reported its stop yet: reset again in a moment"
         newest = bridge.stop_id or next(reversed(self._pending), "")
         if intent.stop_id and intent.stop_id != newest:
-            return "another stop was pressed meanwhile: look who pressed it and why, then reset again"
+            return "there is a newer stop: read who pressed it and why, then reset again"
         if self._asked is not None and now - self._asked_at < _RELEASE_S:
             return "the reset is under way"
         self._asked, self._asked_at = intent, now

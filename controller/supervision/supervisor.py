@@ -180,7 +180,7 @@ class Supervisor:
             return ()
         if bridge.header.stamp - self._explained <= _BRAKING_S:
             return ()
-        reason = "the robot moves by commands that this controller has not sent"
+        reason = "the robot moves by commands of another sender"
         stop = m.StopRequest(stop_id=f"motion-{secrets.token_hex(8)}", source="controller", user="", reason=reason)
         self.stop_due = stop
         # Whoever sends them knows this token.

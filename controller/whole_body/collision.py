@@ -1,8 +1,8 @@
 """Distances between robot, ground and obstacles, and their derivatives over ξ̇.
 
 One call of Coal, through Pinocchio, computes all distances. A broad phase selects the pairs: spheres around the robot's
-parts against the obstacles' axes. `dampers` runs in every control period. It repeats the broad phase only when the robot may
-have moved by `_SLACK`.
+parts against the obstacles' axes. `dampers` runs in every control period. It repeats the broad phase only when the
+robot may have moved by `_SLACK`.
 
 Obstacles occupy slots: capsules in the geometry model that get a size and a pose when an obstacle comes near. So
 hundreds of obstacles can be replaced at run time without rebuilding Pinocchio's data.

@@ -90,7 +90,7 @@ class Hierarchy:
     def solve(self, problem: IkProblem) -> Solution:
         """The actuator velocities that answer the problem; see `Method.solve`."""
         if not problem.finite:
-            return self._brake(problem, "the problem holds a number that is not finite", _NOWHERE)
+            return self._brake(problem, "the problem has a number that is not finite", _NOWHERE)
         bounds = self._box.at(problem.q, problem.sent, problem.sent_before, problem.wheel_cap)
         self._climb.now = manipulability = self._manipulability.at(problem.kinematics.J)
         base = bounds.ramp if problem.held is None else self._actuation.twist @ problem.held
@@ -211,7 +211,7 @@ class Hierarchy:
 
 
 def _too_near(names: tuple[str, ...], worst: int) -> str:
-    return f"{names[worst]} cannot be kept: the robot gives way as little as it can"
+    return f"{names[worst]} cannot be kept: it is relaxed by the least amount"
 
 
 def _holder(index: int, free: slice, names: tuple[str, ...]) -> str:

@@ -49,7 +49,7 @@ class Nullspace:
     def solve(self, problem: IkProblem) -> Solution:
         """The actuator velocities that answer the problem; see `Method.solve`."""
         if not problem.finite:
-            return self._brake(problem, "the problem holds a number that is not finite", 0.0)
+            return self._brake(problem, "the problem has a number that is not finite", 0.0)
         manipulability = self._manipulability.at(problem.kinematics.J)
         wanted = self._wanted(problem, manipulability.gradient)
         if wanted is None:

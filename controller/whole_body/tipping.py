@@ -1,8 +1,8 @@
 """Tipping constraint: the zero-moment point inside the support triangle, as rows over ξ̈.
 
-The corners of the triangle are the contacts of the two driven wheels and the rear caster. The caster swivels: its contact
-is on a circle about its pivot, and the smallest triangle of all directions is used. On flat ground the contact forces
-have no tipping moment about the zero-moment point. So the wheels stay on the ground while it is inside.
+The corners of the triangle are the contacts of the two driven wheels and the rear caster. The caster swivels: its
+contact is on a circle about its pivot, and the smallest triangle of all directions is used. On flat ground the contact
+forces have no tipping moment about the zero-moment point. So the wheels stay on the ground while it is inside.
 
 With the momentum h = A_g q̇ of all masses about their centre c (centroidal map), the condition for an edge with a point
 P and an inward normal n is linear in ḣ, and so in ξ̈:

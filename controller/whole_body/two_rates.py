@@ -2,8 +2,8 @@
 
 In a period of the base the method solves two problems. The first is for all nine velocities over the base's period; the
 base's velocities are sent. The second, as in every control period, is for the arm over the control period, with the
-wheels' command fixed and the base moving as measured. So the arm's motion does not depend on which periods are the base's,
-and the arm compensates the error of the base.
+wheels' command fixed and the base moving as measured. So the arm's motion does not depend on which periods are the
+base's, and the arm compensates the error of the base.
 
 Methods are stateless. This class gives them the previous commands and the measured wheel speeds.
 """

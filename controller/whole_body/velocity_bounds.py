@@ -2,11 +2,12 @@
 
 An arm joint with the distance d to its limit, the braking deceleration a and the period dt may have the velocity v for
 which v dt + v²/2a ≤ d, that is v ≤ −a dt + √((a dt)² + 2 a d): after one period at v it can still stop. From a velocity
-inside this bound the next bound can be reached by braking at a, so that the bounds are never empty. This uses half of the
-joint's acceleration; the rest is for the servo's lag.
+inside this bound the next bound can be reached by braking at a, so that the bounds are never empty. This uses half of
+the joint's acceleration; the rest is for the servo's lag.
 
-The acceleration may change by j dt in a period. So a joint approaches the bound above by the law of `jerk_limit.py`, which
-needs no more than j dt. The bound itself falls by at most b dt in a period, which is added to the change of the velocity.
+The acceleration may change by j dt in a period. So a joint approaches the bound above by the law of `jerk_limit.py`,
+which needs no more than j dt. The bound itself falls by at most b dt in a period, which is added to the change of the
+velocity.
 
 Outside these guarantees (a start beyond a limit, a velocity above it) the bounds allow the strongest braking only.
 """

@@ -87,7 +87,7 @@ class Blades:
             return (f"{cut.point_id}: not cut: {text}",)
         if now > cut.deadline:
             self._cut = None
-            text = f"no word from the cutter for {self._timeout_s} s; look whether it is cut"
+            text = f"no report from the cutter for {self._timeout_s} s; look whether it is cut"
             self._queue.resolve(cut.point_id, "UNKNOWN", text)
             return (f"{cut.point_id}: UNKNOWN: {text}",)
         return ()

@@ -31,7 +31,7 @@ class _Ended:
 
 
 class PostCutCheck:
-    """Decides the outcome of cuts that the cutter has reported. Apart from the queue it is pure: time is an argument."""
+    """Decides the outcome of cuts that the cutter has reported. Pure apart from the queue: time is an argument."""
 
     def __init__(self, queue: PointQueue, close_ups: CloseUpClient, check: bool) -> None:
         """Bind the parts.

@@ -325,8 +325,8 @@ class CutSequence:
     def _check_acceptance(self, robot: Measured) -> None:
         ticket = self._queue.get(self._point_id)
         if ticket is not None and ticket.state == "ACCEPTED":
-            # The plan is for one acceptance: of what was accepted anew it knows nothing.
-            why = self._next_cut.permit(ticket) if ticket.accepted is self._accepted else "it was accepted anew"
+            # The plan is for one acceptance: of what was accepted again it knows nothing.
+            why = self._next_cut.permit(ticket) if ticket.accepted is self._accepted else "it was accepted again"
             if not why:
                 return
         else:

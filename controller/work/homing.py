@@ -61,7 +61,7 @@ class Homing:
         """Give up when something has held the arm for long enough."""
         self._held_s = self._held_s + self._dt if held else 0.0
         if self._held_s > _PATIENCE_S:
-            self.blocked = tracking.reason or "something holds the arm back"
+            self.blocked = tracking.reason or "the arm is blocked"
 
 
 class Withdrawal:

@@ -20,12 +20,12 @@ from rolling_panda.model.differential_drive import Array
 _TURNED_TOLERANCE = 0.35
 #: A name that comes back further away than this is another cane's (m).
 _ELSEWHERE = 0.03
-_INTERRUPTED = "the controller ended before it knew whether this was cut; look, and say"
+_INTERRUPTED = "the controller ended before it knew whether this was cut; look, and report the outcome"
 #: Of what perception does not show these are shown from the record: somebody has to decide.
 _ASKED: frozenset[PointState] = frozenset({"ACCEPTED", "UNREACHABLE", "UNKNOWN"})
-_WAITS = "accepted before a restart; waits until perception sees it again"
-_UNSEEN = "perception does not see it any more"
-_UNBOUND = "its record does not fit its hash; accept it anew"
+_WAITS = "accepted before a restart; waits until perception reports it again"
+_UNSEEN = "perception no longer reports it"
+_UNBOUND = "its record does not match its hash; accept it again"
 #: Somebody has accepted these and nothing has begun yet: the acceptance holds while the point is as they saw it.
 BOUND: frozenset[PointState] = frozenset({"ACCEPTED", "UNREACHABLE"})
 _ACCEPTABLE: frozenset[PointState] = frozenset({"PROPOSED", "REJECTED", "FAILED_NOT_CUT"})
@@ -176,7 +176,7 @@ class PointQueue:
         if ticket is None:
             return f"there is no point {point_id!r}"
         if ticket.state == "UNKNOWN":
-            return f"nobody knows whether {point_id} is cut; look, and say so first"
+            return f"it is unknown whether {point_id} is cut; look, and report the outcome first"
         if ticket.state == "UNREACHABLE":
             return f"{point_id} is accepted, and cannot be reached: {ticket.reason}"[:500]
         if ticket.state not in _ACCEPTABLE:
@@ -355,7 +355,7 @@ class PointQueue:
         if ticket is None:
             return f"there is no point {point_id!r}"
         if ticket.state != "UNKNOWN":
-            return f"how {point_id} ended is no question: it is {ticket.state}"
+            return f"how {point_id} ended is not in question: it is {ticket.state}"
         self._put(point_id, replace(ticket, state=outcome, reason=f"{user} looked: {reason}"[:500]))
         return ""
 

@@ -202,7 +202,7 @@ class PostureSearch:
 
     def _why(self, position: Array, lateral: float) -> str:
         if self._passed_over:
-            return "every posture that reaches it comes too near to something that stands around it"
+            return "every posture that reaches it comes too near to an obstacle"
         distance = float(position @ self._left) - lateral
         return (
             f"no posture of the arm reaches it: it is {distance:.2f} m beside the robot's path and "

@@ -55,4 +55,4 @@ class RuleHistory(Generic[Acceptance]):
             voided = changes[-2].voided
             self._changes = changes[:-2]
             return voided
-        return "the controller knows of no acceptance that this rule made void; accept anew what is to be cut"
+        return "the controller knows of no acceptance that this rule made void; accept again what is to be cut"

@@ -12,7 +12,7 @@ class Stage(Enum):
     """Step of the sequence."""
 
     REST = "rest"
-    ESCAPE = "getting clear of the canes"
+    ESCAPE = "moving clear of the canes"
     SEARCH = "looking for a posture"
     TRAVEL = "on the way to the stand-off"
     CLOSE_UP = "looking closely"

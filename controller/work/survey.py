@@ -99,7 +99,7 @@ class Survey:
         if self._moved is None or abs(x - self._moved[0]) > _LEAST:
             self._moved = x, now
         elif now - self._moved[1] > _PATIENCE_S:
-            why = tracking.reason or "something holds the base back"
+            why = tracking.reason or "the base is blocked"
             return StepResult(self._saturation.ramp(robot.sent), pause=f"survey: {why}")
         return StepResult(tracking.xi)
 
@@ -114,7 +114,7 @@ class Survey:
             return StepResult(xi)
         if self._line is not None and not self._again and self._unclear() > 0:
             self._again, self._goal, self._there_at, self._moved = True, self._line[0], None, None
-            text = f"{_counted(self._unclear(), 'place')} to be looked at again: the survey goes back over its way"
+            text = f"{_counted(self._unclear(), 'place')}need another look: the survey drives back"
             return StepResult(xi, events=(text,))
         return StepResult(xi, finished=True, summary=self._summary())
 
@@ -135,7 +135,7 @@ class Survey:
     def _summary(self) -> str:
         perceived = self._queue.perceived
         if perceived is None:
-            return "the survey has ended; perception has told nothing"
+            return "the survey has ended; perception has reported nothing"
         if self._place is not None:
             return looked_again(perceived, self._place)
         named = [(point.vine, point.spur) for point in perceived.points]

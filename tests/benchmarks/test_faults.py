@@ -160,7 +160,7 @@ def test_commands_by_somebody_else_under_the_robots_own_token_are_seen_stopped_a
     before = world.robot.now.position
     world.run(1.0)
     assert world.controller.mode == "ESTOP_LATCHED" and abs(world.robot.now.velocity).max() < 1e-3
-    assert "commands that this controller has not sent" in world.bridge._latch.stopped_by
+    assert "commands of another sender" in world.bridge._latch.stopped_by
     assert 0.05 < abs(world.robot.now.position - before).max() < 1.0
     told = [text for text in said if "commanded to move" in text]
     assert told == (["the robot is commanded to move, though the controller's mode is IDLE"] if mode == "IDLE" else [])

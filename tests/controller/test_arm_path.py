@@ -80,7 +80,7 @@ def test_a_search_without_an_answer_ends(collision):
     )
     blocked = ArmPathPlanner(collision, LIMITS).find(configuration(LEFT), RIGHT)
     assert isinstance(blocked, Blocked)
-    assert blocked.reason == "no way of the arm keeps 20 mm from everything"
+    assert blocked.reason == "no path of the arm keeps 20 mm from every obstacle"
 
 
 def test_a_start_in_contact_is_left_on_the_short_way(collision):

@@ -79,7 +79,7 @@ def test_a_cut_behind_canes_is_refused_with_the_reason_before_anything_moves_the
     r, judge = work(OWN, *fence)
     ended = entry(r, "a")
     assert ended.state == "FAILED_NOT_CUT"
-    assert "too near to something that stands around" in ended.reason
+    assert "too near to an obstacle" in ended.reason
     assert r.cuts == [] and all(distance > 0.0 for distance in judge.least.values())
 
 

@@ -44,7 +44,7 @@ def test_a_ledger_that_hangs_is_a_fault_within_a_second():
         r.step()
         r.ledger = held
         assert r.now - began < 1.0
-    assert r.state.mode == "FAULT" and "taken nothing" in r.state.reason
+    assert r.state.mode == "FAULT" and "written nothing" in r.state.reason
 
 
 def test_the_blades_wait_for_the_record_of_their_intent():

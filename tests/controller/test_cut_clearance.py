@@ -59,7 +59,7 @@ def test_a_wire_over_the_cut_is_passed_from_below():
 def test_a_wire_in_the_way_from_everywhere_is_said_to_be():
     plan = find(wire(POINT[2]))
     assert isinstance(plan, Unreachable)
-    assert "too near to something that stands around" in plan.reason
+    assert "too near to an obstacle" in plan.reason
 
 
 def test_what_is_far_away_changes_nothing():

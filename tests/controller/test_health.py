@@ -78,7 +78,7 @@ def test_the_most_severe_of_several_counts():
 
 def test_old_pictures_of_what_stands_around_stop_automatic_work_alone():
     old = verdict("AUTO", obstacles=6.5)
-    assert old.action == "pause" and "stands around is 6.50 s old" in old.reason
+    assert old.action == "pause" and "with the obstacles is 6.50 s old" in old.reason
     assert verdict("TELEOP", obstacles=6.5) == FINE
 
 

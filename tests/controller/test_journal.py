@@ -27,7 +27,7 @@ def test_a_ledger_that_takes_nothing_is_trouble_after_its_time_and_no_sooner():
     journal.add("event", "x", BODY)
     journal.observe(LedgerState(0), 10.0)
     assert journal.trouble(10.5, 0.6) == ""
-    assert "taken nothing for 0.7 s" in journal.trouble(10.7, 0.6)
+    assert "written nothing for 0.7 s" in journal.trouble(10.7, 0.6)
     journal.observe(LedgerState(1), 10.8)
     assert journal.trouble(20.0, 0.6) == ""
 

@@ -28,8 +28,8 @@ def test_what_was_planned_and_what_the_work_has_done_since_leave_it_valid() -> N
     ("tickets", "words"),
     [
         ([ticket(A), ticket(B), ticket(point("c", 2.0))], "c was accepted after it was made"),
-        ([ticket(A), ticket(point("b", 0.9, revision=2))], "b was accepted anew"),
-        ([ticket(A), ticket(B, accepted=point("b", 0.901))], "b was accepted anew"),
+        ([ticket(A), ticket(point("b", 0.9, revision=2))], "b was accepted again"),
+        ([ticket(A), ticket(B, accepted=point("b", 0.901))], "b was accepted again"),
         ([ticket(A), ticket(B, "REJECTED")], "b is no longer accepted"),
         ([ticket(A, "PROPOSED"), ticket(B)], "a is no longer accepted"),
         ([ticket(B)], "a is no longer accepted"),

@@ -122,7 +122,7 @@ def test_an_unknown_or_failed_cut_waits_for_a_person():
         q.resolve("a", outcome, "why")
         assert q.next() is None
         if outcome == "UNKNOWN":
-            assert "look, and say so first" in q.accept("a", 3, "eve")
+            assert "look, and report the outcome first" in q.accept("a", 3, "eve")
             assert "UNKNOWN" in q.reject("a", "eve", "no")
             assert q.proposed(0.0) == []
             assert q.decide("a", "FAILED_NOT_CUT", "eve", "the cane stands") == ""
@@ -132,7 +132,7 @@ def test_an_unknown_or_failed_cut_waits_for_a_person():
 
 def test_what_a_person_saw_ends_an_unknown_cut_and_nothing_else():
     q = queue(point())
-    assert "no question: it is PROPOSED" in q.decide("a", "DONE", "eve", "cut")
+    assert "not in question: it is PROPOSED" in q.decide("a", "DONE", "eve", "cut")
     assert "there is no point" in q.decide("z", "DONE", "eve", "cut")
     q.accept("a", 3, "ada")
     q.intend("a", "cut-1")

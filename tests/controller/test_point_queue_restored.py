@@ -58,7 +58,7 @@ def test_an_acceptance_stands_but_is_not_worked_on_before_the_point_is_seen_agai
     assert life.queue.accept("a", 3, "ada") == ""
     life = life.restarted()
     assert life.state() == "ACCEPTED" and life.queue.next() is None and life.queue.accepted() == ()
-    assert "waits until perception sees it" in life.queue.entries()[0].reason
+    assert "waits until perception reports it" in life.queue.entries()[0].reason
     life.queue.update(shown())
     assert life.state() == "ACCEPTED"
     life.queue.update(shown(point(revision=4, position=(1.0, 0.852, 1.0))))
@@ -79,7 +79,7 @@ def test_an_acceptance_that_does_not_fit_its_hash_is_none():
     life.queue.accept("a", 3, "ada")
     (body,) = life.rows().values()
     life = Life({"a": body.replace(b"0.85", b"0.86")})
-    assert life.state() == "REJECTED" and "does not fit its hash" in life.queue.get("a").reason
+    assert life.state() == "REJECTED" and "does not match its hash" in life.queue.get("a").reason
 
 
 def test_what_a_person_is_asked_about_is_told_with_its_point_until_perception_shows_it():

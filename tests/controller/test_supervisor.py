@@ -128,7 +128,7 @@ def test_a_robot_that_moves_by_commands_of_others_is_stopped_under_another_token
     assert all(out.stop is None for out in outputs(r, SHORT)), "the robot may be braking"
     outs = outputs(r, LONG - SHORT)
     (stop,) = {out.stop for out in outs} - {None}
-    assert (stop.source, stop.user) == ("controller", "") and "has not sent" in stop.reason
+    assert (stop.source, stop.user) == ("controller", "") and "of another sender" in stop.reason
     assert r.controller.mode == "ESTOP_LATCHED"
     [given_back] = [out.token for out in outs if out.token is not None and out.token.releases]
     asked_anew = [out.token.token for out in outs if out.token is not None][-1]

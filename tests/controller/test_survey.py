@@ -119,7 +119,7 @@ def test_a_place_left_open_is_looked_at_from_both_sides_and_from_before_it():
     r.step()
     assert r.ask(intents.Arm(user="ada")).ok
     unknown = r.ask(intents.LookAgain(user="ada", vine=1, spur=7))
-    assert not unknown.ok and "nothing is left open at vine 1, spur 7" in unknown.reason
+    assert not unknown.ok and "there is no undecided site at vine 1, spur 7" in unknown.reason
     assert r.ask(intents.LookAgain(user="ada", vine=1, spur=2)).ok
     stood = []
     run_until(r, lambda s: s is not None and s.mode == "AUTO", 2.0)

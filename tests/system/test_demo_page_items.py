@@ -345,7 +345,7 @@ def report(page: Page) -> None:
     """On the page, and saved as CSV and as JSON."""
     page.get_by_role("button", name="Report").click()
     expect(page.locator("rp-report .hint").first).to_contain_text("From the ledger", timeout=LONG_MS)
-    expect(page.locator("rp-report")).to_contain_text("gave control to who had asked", timeout=LONG_MS)
+    expect(page.locator("rp-report")).to_contain_text("gave control to the person who had asked", timeout=LONG_MS)
     for words, name in (("CSV", "cuts.csv"), ("JSON", "report.json")):
         with page.expect_download() as saved:
             page.get_by_role("link", name=words).click()

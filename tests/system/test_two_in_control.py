@@ -26,7 +26,7 @@ _AGAIN = (
     "silent for",
     "under way",
     "wait until the robot is at rest",
-    "has not said yet",
+    "has not reported its stop yet",
 )
 PATIENCE_S = 15.0
 

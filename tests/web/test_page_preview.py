@@ -99,8 +99,8 @@ def test_it_is_approved_by_its_hash_and_what_changed_is_said_when_it_expires(pag
     until(page, lambda: ("/api/preview/approve", {"preview_hash": "ab" * 32}) in server.posted)
     told(server, phase="approved", approved_by="Ada")
     expect(page.locator(".preview-words")).to_contain_text("Approved by Ada")
-    told(server, phase="expired", reason="the robot stands 0.31 m from where it begins")
-    expect(page.locator(".preview-words")).to_have_text("Expired: the robot stands 0.31 m from where it begins")
+    told(server, phase="expired", reason="the robot stands 0.31 m from its start")
+    expect(page.locator(".preview-words")).to_have_text("Expired: the robot stands 0.31 m from its start")
     expect(page.locator("#approve-preview")).to_have_attribute("aria-disabled", "true")
 
 

@@ -6,7 +6,8 @@ For each pair of parts nearer than d_i, with n the direction between their neare
 
 The first term is Faverjon and Tournassoud's velocity damper. The second limits the approach to the speed from which the
 pair can still stop, after one more period, with the deceleration a. Below d_s the pair has to separate. The blades and
-the cutter's body have their own d_s. Canes have their own ξ and a, because the tool slides in between them and they bend.
+the cutter's body have their own d_s. Canes have their own ξ and a, because the tool slides in between them and they
+bend.
 """
 
 import math
