@@ -1,4 +1,4 @@
-"""`rolling-panda bridge`: the robot's side of the wire."""
+"""`rolling-panda bridge`: the bridge process between the wire and a robot."""
 
 import argparse
 import gc

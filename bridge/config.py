@@ -12,14 +12,14 @@ NotNegative = Annotated[float, Meta(ge=0.0, le=1.0)]
 
 
 class OdometryConfig(Struct, frozen=True, forbid_unknown_fields=True):
-    """How late and how noisy the base's odometry is; standard deviations of white noise.
+    """Delay and white noise of the simulated odometry.
 
     Attributes:
-        delay_s: From the wheels to the wire (s).
-        position_noise: Of x and y (m).
-        heading_noise: Of the heading (rad).
-        linear_noise: Of the forward velocity (m/s).
-        angular_noise: Of the yaw rate (rad/s).
+        delay_s: Delay from the wheels to the wire (s).
+        position_noise: Standard deviation of x and y (m).
+        heading_noise: Standard deviation of the heading (rad).
+        linear_noise: Standard deviation of the forward velocity (m/s).
+        angular_noise: Standard deviation of the yaw rate (rad/s).
     """
 
     delay_s: NotNegative = 0.0
@@ -30,28 +30,28 @@ class OdometryConfig(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class BridgeConfig(Struct, frozen=True, forbid_unknown_fields=True):
-    """What the bridge enforces, and the plant behind the simulated one. Units: s, m, rad, N.
+    """Limits of the bridge, and parameters of the simulated robot. Units: s, m, rad, N.
 
     Attributes:
         start_arm: Posture of the simulated arm at the start (rad).
         max_age_s: A command computed from an older joint state is refused.
-        fade_s: Silence after which the last setpoint begins to fade.
-        deadline_s: Silence after which the setpoint is zero, the arm holds and the cutter is inhibited: 10 ms less than
-            the 0.2 s that are promised, since a step can be late.
-        wheel_acceleration: Bound on what is sent on to each wheel (rad/s²): 1.8 m/s², since braking tips the base with
-            the arm stretched forward before the vendor's 2.4 m/s² are reached.
-        joint_margin: Distance to an arm joint's limit (rad) at which motion towards it has come to rest.
+        fade_s: Time without a command after which the last setpoint begins to fade.
+        deadline_s: Time without a command after which the setpoint is zero, the arm holds and the cutter is inhibited:
+            10 ms less than the required 0.2 s, because a step can be late.
+        wheel_acceleration: Limit of the setpoint of each wheel (rad/s²): 1.8 m/s². With the arm stretched forward,
+            braking tips the base before the vendor's 2.4 m/s² are reached.
+        joint_margin: Distance to an arm joint's limit (rad) at which motion towards it stops.
         arm_lag_s: Time constant of the simulated arm's velocity servos.
         wheel_lag_s: Time constant of the simulated wheels' velocity servos.
-        close_s: Time the blades take to close, and to open again.
+        close_s: Time to close the blades, and to open them again.
         opening: Gap between the open blades, along the tool's x.
         blade_half_length: Reach of the blades to either side of the tool's origin, along its z.
         blade_half_thickness: Half the thickness of the blades, along its y.
-        largest_diameter: Wood that is thicker jams the blades.
-        joints_hz: Joint states a second; the wire's table says what is usual.
-        camera_moving_hz: Pictures a second while the robot moves or just after the row has changed.
-        camera_resting_hz: Pictures a second otherwise.
-        scenery_s: Period of the display scenery.
+        largest_diameter: Largest diameter of wood that does not jam the blades.
+        joints_hz: Rate of the joint states (Hz); the topic table has the nominal rate.
+        camera_moving_hz: Frame rate while the robot moves or just after the row has changed (Hz).
+        camera_resting_hz: Frame rate otherwise (Hz).
+        scenery_s: Period of the `scenery` topic.
         odometry: Delay and noise of the simulated base's odometry.
     """
 

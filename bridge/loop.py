@@ -1,4 +1,4 @@
-"""The bridge on the wire: take the newest commands, step in real time, publish what is due."""
+"""Loop of the bridge: read the newest commands, step in real time, publish what is due."""
 
 import threading
 import time
@@ -14,7 +14,7 @@ _WAKES = 2
 
 
 class BridgeLoop:
-    """Connects a core with the wire. The core is touched under one lock: services answer on the transport's threads."""
+    """Connects a core to the wire. One lock guards the core, because services answer on the transport's threads."""
 
     def __init__(self, core: BridgeCore, transport: Transport) -> None:
         """Subscribe and announce."""

@@ -1,1 +1,1 @@
-"""The bridge without wires: validation, limits, latches, watchdog and cut memory."""
+"""Core of the bridge: validation, limits, latches, watchdog and cut memory. No wire."""

@@ -1,6 +1,6 @@
-"""The bridge without wires: commands in, one tick of 1 ms, and what is due to be sent out.
+"""Core of the bridge: commands in, one tick of 1 ms, messages out. No wire.
 
-The latch, the watchdog and the limits are here and are the bridge's own: no other process can overrule them.
+Latch, watchdog and limits belong to the bridge: no other process can override them.
 """
 
 import secrets
@@ -58,7 +58,7 @@ SceneryOf = Callable[[], tuple[int, tuple[Capsule, ...]]]
 
 @dataclass(frozen=True)
 class BridgeOutputs:
-    """What is due after a tick; None or empty when nothing is."""
+    """Messages to send after a tick; None or empty if nothing is due."""
 
     joints: m.JointState | None = None
     odometry: m.Odometry | None = None
@@ -70,10 +70,10 @@ class BridgeOutputs:
 
 
 class BridgeCore:
-    """Stands between the wire and a robot; one thread. `now` is the robot's own time (s), and never goes back.
+    """The bridge between the wire and a robot. Not thread-safe. `now` is the robot's time (s); it never decreases.
 
-    `clock` is the machine's, for the record and for the real-time factor, where it differs: a simulation that is too
-    slow loses time.
+    `clock` is the machine's clock, for the record and the real-time factor. It differs from `now` when a simulation is
+    slower than real time.
     """
 
     def __init__(

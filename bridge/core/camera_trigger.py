@@ -1,4 +1,4 @@
-"""When the camera takes a picture, and the posture that belongs to it."""
+"""Trigger of the camera, and the posture at each exposure."""
 
 from collections import deque
 from typing import NamedTuple
@@ -15,7 +15,7 @@ _REMEMBERED_S = 2.0
 
 
 class Posture(NamedTuple):
-    """Where the robot was when: the machine's clock (s), and what a frame says of it."""
+    """Posture of the robot at one time of the machine's clock (s), as a camera frame reports it."""
 
     clock: float
     header: m.Header
@@ -24,7 +24,7 @@ class Posture(NamedTuple):
 
 
 class CameraTrigger:
-    """Pictures at the moving rate while awake, at the resting rate otherwise; one at a time. Counts in ticks."""
+    """Triggers frames, one at a time: at the moving rate while awake, else at the resting rate. Counts in ticks."""
 
     def __init__(self, moving_hz: float, resting_hz: float, tick_s: float) -> None:
         """Start awake, with the first picture due at once."""

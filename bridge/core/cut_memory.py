@@ -1,4 +1,4 @@
-"""Which cuts were ever ordered, kept through every restart: the blades close for a `cut_id` at most once."""
+"""Memory of all ordered cuts. It survives restarts, so that the blades close for a `cut_id` at most once."""
 
 import os
 import threading
@@ -18,7 +18,7 @@ Kept = Literal["kept", "waiting", "failed"]
 
 
 class CutMemory(Protocol):
-    """Remembers cut ids."""
+    """Memory of cut ids."""
 
     @property
     def known(self) -> frozenset[str]:
@@ -29,7 +29,7 @@ class CutMemory(Protocol):
 
 
 class ForLife:
-    """Remembers for as long as the process lives, which is as long as a simulated row exists."""
+    """Memory for the life of the process, which is the life of a simulated row."""
 
     @property
     def known(self) -> frozenset[str]:
@@ -42,9 +42,9 @@ class ForLife:
 
 
 class CutFile:
-    """Remembers in a file with one id a line, each flushed to disk by a thread of its own. Close it when done.
+    """Memory in a file with one id a line. A separate thread flushes each to disk. Close it at the end.
 
-    A disk that hangs delays the cut, never the loop that asks.
+    A hanging disk delays the cut, never the loop.
     """
 
     def __init__(self, folder: Path) -> None:

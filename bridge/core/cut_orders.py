@@ -1,4 +1,4 @@
-"""Cut orders: each `cut_id` is acted on once, and only while the robot is in control."""
+"""Cut orders: each `cut_id` is executed once, and only while the bridge follows commands."""
 
 from typing import Literal
 
@@ -12,7 +12,7 @@ Verdict = Literal["cut", "known", "wait", "refuse"]
 
 
 class CutOrders:
-    """Remembers every cut asked for; with a durable memory, through restarts too."""
+    """Remembers every ordered cut; with a durable memory, also across restarts."""
 
     def __init__(self, memory: CutMemory | None = None) -> None:
         """Start with what the memory knows."""

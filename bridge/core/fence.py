@@ -1,4 +1,4 @@
-"""The fencing token: which controller may command the robot. The bridge alone gives it out, to one at a time."""
+"""The fencing token, which allows one controller to command the robot. Only the bridge issues it."""
 
 from typing import Final
 
@@ -18,7 +18,7 @@ USED_UP = "no epoch is left; end the bridge and give: rolling-panda bridge --beg
 
 
 class Fence:
-    """At most one holder; each token has the next epoch. Times are the robot's (s)."""
+    """Issues tokens: at most one holder, each token with the next epoch. Times are the robot's (s)."""
 
     def __init__(self, epoch: int = 0, token: str | None = None) -> None:
         """Start with what was given out before.

@@ -1,4 +1,4 @@
-"""What a robot is to the bridge: four methods, the same for the simulated and the real one."""
+"""Interface of a robot: four methods, the same for the simulated and the real robot."""
 
 from dataclasses import dataclass
 from typing import Literal, Protocol
@@ -12,10 +12,10 @@ CutterState = Literal["open", "closing", "opening", "jammed"]
 
 @dataclass(frozen=True)
 class Measurement:
-    """What the robot's sensors say: ξ and its rates over [θ_l, θ_r, q₁…q₇] (rad, rad/s), and the cutter.
+    """Measured state of the robot: ξ and its rates over [θ_l, θ_r, q₁…q₇] (rad, rad/s), and the cutter.
 
-    `fault` is why the robot itself does not move, empty when it does; a `severe` one has to be released by a person.
-    `emergency` is whether its emergency stop button is pressed; `battery` the charge (0…1), None when unknown.
+    `fault` is the reason why the robot cannot move, empty without one. A person has to release a `severe` fault.
+    `emergency` tells whether the emergency stop button is pressed. `battery` is the charge (0…1), None if unknown.
     """
 
     position: Array
@@ -32,9 +32,9 @@ class Measurement:
 
 @dataclass(frozen=True)
 class Setpoint:
-    """What is really sent on: ξ̇ (rad/s), whether the blades may close, and the token that it follows from.
+    """Setpoint of the actuators: ξ̇ (rad/s), whether the blades may close, and the token of the command.
 
-    When `releases` grows, a person has released a stop, and the robot may recover from what stopped it.
+    When `releases` increases, a person has released a stop, and the robot may recover from its fault.
     """
 
     xi: Array

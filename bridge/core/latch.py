@@ -1,4 +1,4 @@
-"""The latched stops: every one is kept, and they hold until the newest is released by its own id."""
+"""The latched stops. Every stop is kept, and all hold until the newest is released by its id."""
 
 from rolling_panda.messages.robot import ReleaseStop, StopRequest
 from rolling_panda.messages.supervision import StopRecord
@@ -8,9 +8,9 @@ _MOST, _OVER = 50, 1000
 
 
 class StopLatch:
-    """Remembers stops. One that has been released does not latch again when late repetitions of it arrive.
+    """Latches stops. Late repetitions of a released stop do not latch again.
 
-    Whoever releases names the newest stop, so that one that they have not seen is never released with the others.
+    A release names the newest stop. So a stop that the releasing person has not seen stays latched.
     """
 
     def __init__(

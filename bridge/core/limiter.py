@@ -1,4 +1,4 @@
-"""The last bound before the actuators: velocity, acceleration, jerk and joint position, whatever was asked for."""
+"""The last limiter before the actuators: velocity, acceleration, jerk and joint position, for any input."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ _BRAKING = 0.5
 
 
 class Limiter:
-    """Follows a desired ξ̇ within the limits, from what was sent before. Starts at rest."""
+    """Follows a desired ξ̇ within the limits, starting from the previous setpoint. The first one is zero."""
 
     def __init__(
         self, limits: Limits, wheel_acceleration: float, joint_margin: float, dt: float, repeats: float = 0.0

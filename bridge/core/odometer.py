@@ -1,4 +1,4 @@
-"""Odometry of a base that only tells its wheels: integrated here, and handed out late and noisy if so configured."""
+"""Odometry from wheel measurements, with configurable delay and noise."""
 
 from collections import deque
 
@@ -11,7 +11,7 @@ from rolling_panda.model.wire_values import planar_pose
 
 
 class Odometer:
-    """Follows the wheels. What it tells of the base comes `delay_s` late and with white noise; the pose does not drift.
+    """Integrates the wheels. Its output is delayed by `delay_s` and has white noise; the noise does not accumulate.
 
     Times are in ticks of the bridge.
     """

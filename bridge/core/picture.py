@@ -1,4 +1,4 @@
-"""A camera picture as it travels: JPEG colour, deflated depth and labels."""
+"""An encoded camera frame: JPEG colour, deflated depth and labels."""
 
 import io
 import zlib
@@ -20,8 +20,8 @@ _JPEG_QUALITY = 80
 class Picture:
     """One RGB-D exposure, encoded as in `CameraFrame`.
 
-    `taken_at` is when it was exposed (s, the machine's monotonic clock); None where the camera does not tell, or where
-    that was the moment at which it was asked for.
+    `taken_at` is the time of exposure (s, the machine's monotonic clock). None if the camera does not report it, or if
+    it is the time of the request.
     """
 
     intrinsics: Intrinsics

@@ -1,4 +1,4 @@
-"""What was refused: every refusal counted, the first of a kind logged at once, the others summed up."""
+"""Refused messages: every one is counted, the first of a kind is logged at once, the others are summarized."""
 
 import threading
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ class _Kind:
 
 
 class Refusals:
-    """Counts refusals by topic and reason, and writes a line a kind at most every `quiet_s`. Safe across threads."""
+    """Counts refusals by topic and reason. Logs each kind once in `quiet_s` at most. Thread-safe."""
 
     def __init__(self, rejections: Rejections | None = None, quiet_s: float = 5.0) -> None:
         """Share `rejections` with the transport, so that undecodable messages appear in the same table."""

@@ -1,4 +1,4 @@
-"""What the robot itself says keeps it from moving: told once, and latched where a person has to look first."""
+"""Faults that the robot reports: logged once, and latched if a person has to inspect them first."""
 
 import secrets
 from dataclasses import dataclass
@@ -11,14 +11,14 @@ _RECOVERY_S = 3.0
 
 @dataclass(frozen=True)
 class FaultChange:
-    """A fault begins or ends: a line for the log, and the stop to latch where one is due."""
+    """Begin or end of a fault: a log line, and the stop to latch if the fault is severe."""
 
     text: str
     stop: StopRequest | None
 
 
 class RobotFaults:
-    """Follows the robot's own faults from measurement to measurement. Times are the robot's (s)."""
+    """Tracks the robot's faults from measurement to measurement. Times are the robot's (s)."""
 
     def __init__(self) -> None:
         """Start without a fault."""

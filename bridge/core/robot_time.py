@@ -1,4 +1,4 @@
-"""The time that a robot's watchdog and all ages run on: how many steps of 1 ms are due, and what time each one has."""
+"""The robot's time, used by the watchdog and all ages: number of due steps of 1 ms, and the time of each step."""
 
 from collections import deque
 from typing import Protocol
@@ -10,7 +10,7 @@ _WINDOW_S = 1.0
 
 
 class RobotTime(Protocol):
-    """Counts steps against the machine's clock (s)."""
+    """Counts the due steps by the machine's clock (s)."""
 
     @property
     def now(self) -> float:
@@ -24,9 +24,9 @@ class RobotTime(Protocol):
 
 
 class SteppedTime:
-    """A simulated robot stands still while nobody steps it: its time is the number of steps done.
+    """Time of a simulated robot: the number of executed steps. It stops while nobody steps the robot.
 
-    So a machine that is suspended for a moment, or too slow, loses time and no more.
+    A machine that was suspended or is too slow only loses simulated time.
     """
 
     # Behind by more than this (s), time runs slower instead of hurrying.
@@ -56,9 +56,9 @@ class SteppedTime:
 
 
 class RealTime:
-    """A real robot goes on while nobody steps it: its time is the clock's, and steps that were missed are left out.
+    """Time of a real robot: the clock's. Missed steps are skipped.
 
-    After a standstill the first step has the present time, so that the watchdog finds the silence as long as it was.
+    The first step after a standstill has the current time, so that the watchdog sees the full silence.
     """
 
     def __init__(self, clock: float, tick_s: float) -> None:

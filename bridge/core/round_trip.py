@@ -1,4 +1,4 @@
-"""How long it takes from a joint state to the command that answers it."""
+"""Round-trip time from a joint state to the command that answers it."""
 
 from collections import OrderedDict, deque
 
@@ -8,7 +8,7 @@ _REMEMBERED = 1000
 
 
 class RoundTrip:
-    """Times on the machine's clock (s), over the last second."""
+    """Round-trip times of the last second, on the machine's clock (s)."""
 
     def __init__(self) -> None:
         """Start without samples."""

@@ -1,4 +1,4 @@
-"""What the bridge must still know after a restart, so that an older token never moves the robot again."""
+"""State that the bridge keeps across restarts, so that an older token never moves the robot again."""
 
 import secrets
 import time
@@ -15,14 +15,14 @@ _NAME = "bridge.json"
 
 
 class Remembered(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What is kept.
+    """The stored state.
 
     Attributes:
-        epoch: Of the newest fencing token given out.
-        token: Its random part; None when nobody holds it.
-        stops: Latched stops, the newest first.
-        released: Ids of stops that were released: late repetitions of them latch nothing.
-        released_by: Who released the last one, and why.
+        epoch: Epoch of the newest fencing token.
+        token: Random part of the token; None without a holder.
+        stops: Latched stops, newest first.
+        released: Ids of released stops; late repetitions of them do not latch.
+        released_by: User and reason of the last release.
     """
 
     epoch: Epoch = 0

@@ -1,4 +1,4 @@
-"""Which motion commands are actuated at all: newer than every one before, fresh, and within the robot's limits."""
+"""Validation of motion commands: newer than all earlier ones, fresh, and within the robot's limits."""
 
 from collections import OrderedDict
 from math import isfinite
@@ -23,10 +23,10 @@ _ROUNDING = 1.0 + 1e-9
 
 
 class CommandValidator:
-    """Judges what the controller sends. A refused command changes nothing.
+    """Validates the controller's commands. A refused command changes nothing.
 
-    After a standstill that the bridge itself enforced (start, watchdog, stop) the validator waits for a setpoint at
-    rest, so that nothing that was under way before wakes moving.
+    After a stop by the bridge (start, watchdog, software stop) the first valid command has to be zero, so that no
+    earlier motion resumes.
     """
 
     def __init__(self, velocity_limit: Array, max_age_s: float, fence: Fence) -> None:

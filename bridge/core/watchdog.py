@@ -1,15 +1,15 @@
-"""Silence means stop: how much of the last setpoint still counts, from how long ago it came."""
+"""Watchdog: fades the last setpoint to zero when commands stop."""
 
 #: No setpoint fades earlier than this (s), two periods of control: it would never be followed.
 _ALWAYS_S = 0.02
 
 
 class Watchdog:
-    """A setpoint is followed for `fade_s`, then fades linearly to nothing at `deadline_s`, where the watchdog trips.
+    """A setpoint is followed for `fade_s`, then fades linearly to zero at `deadline_s`, where the watchdog trips.
 
-    Fading before the deadline lets a heavy base come to rest softly and still in time. A gap shorter than `fade_s`
-    changes nothing, unless braking from that setpoint takes longer than what is left until the deadline: then fading
-    begins as early as that asks for.
+    Fading before the deadline lets a heavy base brake smoothly and in time. A gap shorter than `fade_s` changes
+    nothing, unless braking from that setpoint takes longer than the time left to the deadline. Then fading begins
+    earlier.
     """
 
     def __init__(self, fade_s: float, deadline_s: float) -> None:

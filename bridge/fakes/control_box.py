@@ -47,8 +47,8 @@ _STANDSTILL = 1e-3
 class ClientProcess:
     """The local process at the other end of a connection.
 
-    A real control box and its driver each have a computer. Where both share the cores of one busy machine, the driver
-    may wait for a core for longer than 20 packets, which is not a fault of the driver.
+    A real control box and its driver run on separate computers. If both share the cores of one busy machine, the driver
+    may wait for a core for longer than 20 packets. That is not a fault of the driver.
     """
 
     def __init__(self, connection: socket.socket) -> None:
@@ -91,7 +91,7 @@ class ClientProcess:
 
 
 class ControlBox:
-    """Serves one client; `run` is the 1 kHz loop, `tell` the buttons."""
+    """Serves one client. `run` is the 1 kHz loop; `tell` operates the buttons."""
 
     def __init__(self, address: str, body: ArmBody) -> None:
         """Listen.

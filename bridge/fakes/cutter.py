@@ -6,7 +6,7 @@ from rolling_panda.transport.zenoh import ForeignWire
 
 
 class FakeCutter:
-    """Answers when the blades have arrived."""
+    """Answers when the blades have reached their end position."""
 
     def __init__(self, wire: ForeignWire, service: str, blades: BladeBody) -> None:
         """Serve `service`; `close` closes the wire."""

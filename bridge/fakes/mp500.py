@@ -24,7 +24,7 @@ _CHARGE = 0.8
 
 
 class FakeMp500:
-    """Follows `cmd_vel` as the maker's nodes do, with a watchdog of 1 s and stops; `tell` presses its buttons."""
+    """Follows `cmd_vel` like the maker's nodes, with a watchdog of 1 s and stops. `tell` operates the buttons."""
 
     def __init__(self, wire: ForeignWire, wheels: WheelBody, drive: DifferentialDrive) -> None:
         """Serve on the wire; the wheels do not move before `run`.

@@ -1,9 +1,9 @@
-"""What the arm is told each millisecond: the newest target, interpolated, within velocity, acceleration and jerk.
+"""Command of the arm in each millisecond: the interpolated newest target within velocity, acceleration and jerk.
 
-The limits hold from one period of the arm's to the next, from what the arm itself took: how late the callback is by the
-clock plays no part in them. A packet that comes too late or is lost is one more period with the last acceleration; 19
-of them in a row the control box puts up with. Before them, and again between two such rows, the acceleration may be
-as high as it can: so each rise of a velocity leaves room for as many more of it as that takes.
+The limits hold between consecutive control periods of the arm, starting from its own last command. The delay of the
+callback does not matter. For a late or lost packet the control box extrapolates one period with the last acceleration;
+it tolerates 19 in a row. Such a series can start at the highest acceleration. So each increase of a velocity leaves
+enough margin for the extrapolated periods.
 """
 
 from dataclasses import replace
@@ -28,10 +28,10 @@ _SHARE = 0.999
 
 
 class ArmFollower:
-    """Follows joint velocities that come in slower than 1 kHz; holds on a deadline of its own.
+    """Follows target joint velocities that arrive slower than 1 kHz, and holds after its own deadline.
 
-    Between two targets it goes in a straight line for as long as they lay apart, so a stairway of targets becomes
-    the slope that was meant. Times are on one monotonic clock (s).
+    It interpolates linearly between two targets over the time between them, so that steps of the target become ramps.
+    Times are on one monotonic clock (s).
     """
 
     def __init__(self, limits: Limits, joint_margin: float, fade_s: float, deadline_s: float) -> None:

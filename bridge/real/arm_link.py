@@ -1,4 +1,4 @@
-"""What bridge and arm process tell each other through shared memory."""
+"""Messages between bridge and arm process through shared memory."""
 
 from dataclasses import dataclass
 from multiprocessing.context import SpawnContext
@@ -17,11 +17,11 @@ class ArmTarget:
     """Bridge → arm.
 
     Attributes:
-        number: Grows with each write.
-        at: When it was written (s, monotonic).
-        velocity: Of the joints (7, rad/s).
-        releases: How often a person has released the arm; when it grows, the arm may recover from what stopped it.
-        closing: The bridge ends.
+        number: Increases with each write.
+        at: Time of the write (s, monotonic).
+        velocity: Target velocities of the joints (7, rad/s).
+        releases: Number of releases by people. When it increases, the arm may recover from its fault.
+        closing: True when the bridge ends.
     """
 
     number: int
@@ -36,13 +36,13 @@ class ArmState:
     """Arm → bridge.
 
     Attributes:
-        at: When it was written (s, monotonic).
+        at: Time of the write (s, monotonic).
         position: Joint angles (7, rad).
         velocity: Their velocities (7, rad/s).
-        fault: Why the arm does not follow; empty when it does.
-        severe: Whether a person has to release it.
-        success_rate: Share of the last 100 commands that came in time.
-        commands: Commands given since the start.
+        fault: Reason why the arm does not follow; empty without a fault.
+        severe: Whether a person has to release the fault.
+        success_rate: Fraction of the last 100 commands that arrived in time.
+        commands: Number of commands since the start.
     """
 
     at: float
@@ -93,7 +93,7 @@ class SharedNote:
 
 
 class ArmLink:
-    """Both directions; handed to the arm's process when it starts."""
+    """Both directions of the link; passed to the arm's process at its start."""
 
     def __init__(self, context: SpawnContext) -> None:
         """Empty."""

@@ -1,4 +1,4 @@
-"""The real bridge from a configuration file: every device opened, and a state from each before anything begins."""
+"""Assembly of the real bridge: opens every device and waits for a state from each before the start."""
 
 import importlib.util
 import time
@@ -33,7 +33,7 @@ _DRIVERS = ("panda_py", "pyrealsense2", "rosbags")
 
 
 class NoCutter:
-    """Stands on the hand of a robot without a cutter: every cut fails, and says so."""
+    """Cutter of a robot without one: every cut fails with that reason."""
 
     def __init__(self) -> None:
         """No cut yet."""
@@ -56,7 +56,7 @@ class NoCutter:
 
 @dataclass(frozen=True)
 class Devices:
-    """Every device of the robot, opened."""
+    """All opened devices of the robot."""
 
     base: Mp500
     arm: Panda

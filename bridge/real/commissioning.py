@@ -1,4 +1,4 @@
-"""What `rolling-panda bridge real --check` looks at: every device, without moving any."""
+"""Checks of `rolling-panda bridge real --check`: every device, without moving any."""
 
 import contextlib
 import time
@@ -27,7 +27,7 @@ _REALTIME = Path("/sys/kernel/realtime")
 
 @dataclass(frozen=True)
 class Finding:
-    """One row of the table: what was looked at, what was found, what it has to be, and whether it is."""
+    """One row of the table: what is checked, the value found, the required value, and the verdict."""
 
     what: str
     found: str

@@ -13,17 +13,17 @@ _Inertia = Annotated[float, Meta(ge=0.0, le=0.1)]
 
 
 class BaseConfig(Struct, frozen=True, forbid_unknown_fields=True):
-    """The MP-500 as its maker's ROS 2 nodes show it behind a `zenoh-bridge-ros2dds`.
+    """The MP-500: its maker's ROS 2 nodes behind a `zenoh-bridge-ros2dds`.
 
     Attributes:
-        connect: Where that bridge is reached; empty = the router of this program.
-        namespace: Of the ROS nodes, put before every key.
-        command_hz: Velocity commands a second.
-        fade_s: Silence of this program, or of the wheels, after which the last command begins to fade.
-        deadline_s: Silence after which zeros are the goal.
+        connect: Endpoint of that bridge; empty = the router of this program.
+        namespace: Namespace of the ROS nodes, the prefix of every key.
+        command_hz: Rate of the velocity commands (Hz).
+        fade_s: Time without a target, or without wheel speeds, after which the last command begins to fade.
+        deadline_s: Time without a target after which zero is commanded.
         stale_s: Wheel speeds older than this are a fault.
         unmonitored_s: An emergency-stop state older than this is a fault.
-        runaway_s: Wheels that still turn this long after zeros were commanded are stopped by the relay board.
+        runaway_s: If the wheels still turn this long after zero was commanded, the relay board stops them.
     """
 
     connect: Key = ""
@@ -40,14 +40,14 @@ class ArmConfig(Struct, frozen=True, forbid_unknown_fields=True):
     """The Panda, through libfranka.
 
     Attributes:
-        address: Of its control box; empty = no arm.
+        address: Address of its control box; empty = no arm.
         realtime: `enforce` refuses to start without a real-time kernel.
-        fade_s: Silence of this program after which the last target begins to fade.
-        deadline_s: Silence after which the arm holds.
-        joint_margin: Distance to a joint's limit at which motion towards it has ended (rad).
-        load_mass: Of what hangs on the flange (kg).
-        load_center: Its centre of mass in the flange's frame (m).
-        load_inertia: Its inertia about that centre: diagonal (kg·m²).
+        fade_s: Time without a target after which the last target begins to fade.
+        deadline_s: Time without a target after which the arm holds.
+        joint_margin: Distance to a joint's limit at which motion towards it stops (rad).
+        load_mass: Mass of the load on the flange (kg).
+        load_center: Centre of mass of the load in the flange's frame (m).
+        load_inertia: Inertia of the load about that centre: diagonal (kg·m²).
         contact_torque: External torque of a joint that stops the arm (Nm).
         contact_force: External force at the flange that stops the arm (N).
     """
@@ -69,9 +69,9 @@ class CutterConfig(Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         service: Key of the service; empty = no cutter.
-        connect: Where the bridge to that service is reached; empty = the router of this program.
-        timeout_s: How long the blades may take.
-        retry_s: Pause between attempts to open blades that jam.
+        connect: Endpoint of the bridge to that service; empty = the router of this program.
+        timeout_s: Time limit of the blades.
+        retry_s: Pause between attempts to open jammed blades.
     """
 
     service: Key = ""
@@ -84,11 +84,11 @@ class CameraConfig(Struct, frozen=True, forbid_unknown_fields=True):
     """The RealSense on the hand.
 
     Attributes:
-        enabled: Whether there is one.
+        enabled: Whether the camera is present.
         serial: Its serial number; empty = the only one.
         width: Image width (px); 848 is best for depth.
         height: Image height (px).
-        rate_hz: Frames a second.
+        rate_hz: Frame rate (Hz).
     """
 
     enabled: bool = True

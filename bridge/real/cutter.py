@@ -1,7 +1,7 @@
 """Electric secateurs behind a ROS 2 service: `true` closes the blades, `false` opens them.
 
-The service (std_srvs/SetBool) answers when the blades are there: success, or not and why. So a jam is told by the
-device and silence by a timeout; what became of the cane then is unknown, and a person decides.
+The service (std_srvs/SetBool) answers when the blades have reached their end position: success, or a reason. So the
+device reports a jam, and a timeout detects silence. The outcome of the cut is then unknown, and a person decides.
 """
 
 import queue
@@ -19,7 +19,7 @@ from rolling_panda.transport.zenoh import ForeignWire
 
 @dataclass(frozen=True)
 class CutterStatus:
-    """What the blades do, and how the last cut ended."""
+    """State of the blades, and the outcome of the last cut."""
 
     state: CutterState
     cut_id: str = ""
@@ -28,7 +28,7 @@ class CutterStatus:
 
 
 class Cutter:
-    """Implements the cutter's part of the robot. Calls return at once; a thread asks the device."""
+    """Implements the cutter's part of the robot. Calls return at once; a thread calls the service."""
 
     def __init__(self, wire: ForeignWire, config: CutterConfig, moving: bool = True) -> None:
         """Open the blades, whatever they were at, unless `moving` is off."""

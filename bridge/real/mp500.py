@@ -1,11 +1,11 @@
-"""The Neobotix MP-500 base: ROS 2 messages through Zenoh, with a deadline of our own.
+"""The Neobotix MP-500 base: ROS 2 messages through Zenoh, with its own deadline.
 
-The maker's own watchdog lets the base run on for 1 s, 1.5 m at full speed. So a thread here sends commands at a fixed
-rate whatever the bridge does: a target that is not renewed fades to zero within `deadline_s`, and so does any target
-while the wheels do not tell how they turn. No command may be lost on the way, since each is one step of a ramp.
+The maker's watchdog lets the base move for 1 s after the last command, 1.5 m at full speed. So a thread here sends
+commands at a fixed rate, whatever the bridge does. A target that is not renewed fades to zero within `deadline_s`, and
+so does any target while wheel speeds are missing. Commands are sent reliably, because each is one step of a ramp.
 
-The relay board tells the right motor's velocity negated, as it is mounted mirrored, and raw encoder counts in place of
-angles; the wheels' angles are the integral of their speeds.
+The relay board reports the right motor's velocity negated, because the motor is mounted mirrored. It reports raw
+encoder counts instead of angles; the wheels' angles are integrated from their speeds.
 """
 
 import contextlib
@@ -38,15 +38,15 @@ _EMPTY_REQUEST = b"\x00\x01\x00\x00\x00"
 
 @dataclass(frozen=True)
 class BaseState:
-    """What the base says.
+    """State of the base.
 
     Attributes:
         position: Angles of the wheels since the start, left and right (2, rad).
         velocity: Their speeds (2, rad/s).
-        fault: Why the base may not move now; empty when it may.
+        fault: Reason why the base may not move; empty without a fault.
         severe: Whether a person has to release the fault.
-        battery: Charge 0…1; NaN when unknown.
-        emergency: Whether its emergency stop, pressed or tripped by the scanner, is not confirmed as over yet.
+        battery: Charge 0…1; NaN if unknown.
+        emergency: Whether an emergency stop, by button or scanner, is active or not yet confirmed.
     """
 
     position: Array

@@ -1,4 +1,4 @@
-"""The Panda as the bridge sees it: a process that is told targets and tells states."""
+"""The Panda in the bridge: sends targets to the arm's process and reads its states."""
 
 import importlib.util
 import multiprocessing

@@ -1,7 +1,7 @@
-"""The arm's own process: libfranka's 1 kHz loop, with nothing beside it that could keep it waiting.
+"""The arm's process: libfranka's 1 kHz loop, with nothing else that could delay it.
 
-A Python thread that is busy for some milliseconds loses packets, so bridge and arm share memory and no interpreter.
-When the bridge ends, however it ends, targets stop coming: the arm holds and the process ends.
+A Python thread that is busy for some milliseconds loses packets. So bridge and arm are two processes with shared
+memory. When the bridge ends for any reason, targets stop: the arm holds and the process ends.
 """
 
 import gc

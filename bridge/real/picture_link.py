@@ -1,4 +1,4 @@
-"""Pictures of the simulated camera on their way to the camera's driver."""
+"""Transfer of the simulated camera's pictures to the camera's driver."""
 
 import msgspec
 

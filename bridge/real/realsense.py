@@ -1,4 +1,4 @@
-"""The RealSense camera on the hand: pictures on demand, from a thread that keeps the stream flowing."""
+"""The RealSense camera on the hand: pictures on demand, from a thread that reads the stream."""
 
 import threading
 import time
@@ -18,7 +18,7 @@ _STALE_S = 2.0
 
 
 class Frames(Protocol):
-    """Where sets of one colour and one depth frame come from: librealsense's pipeline, or its syncer in a test."""
+    """Source of pairs of a colour and a depth frame: librealsense's pipeline, or its syncer in a test."""
 
     def wait_for_frames(self, timeout_ms: int) -> Any:
         """The next set; raises RuntimeError when none comes in time."""

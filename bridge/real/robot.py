@@ -1,4 +1,4 @@
-"""The real robot behind the bridge's interface: base, arm, cutter and camera put together."""
+"""The real robot behind the bridge's interface: base, arm, cutter and camera."""
 
 from typing import Protocol
 
@@ -15,7 +15,7 @@ READ_ONLY = "the bridge was started with --readonly"
 
 
 class Base(Protocol):
-    """`bridge.real.mp500.Mp500`, or what stands for it."""
+    """Interface of `bridge.real.mp500.Mp500`."""
 
     def read(self) -> BaseState:
         """The newest state."""
@@ -31,7 +31,7 @@ class Base(Protocol):
 
 
 class Arm(Protocol):
-    """`bridge.real.panda.Panda`, or what stands for it."""
+    """Interface of `bridge.real.panda.Panda`."""
 
     def read(self) -> ArmState:
         """The newest state."""
@@ -47,7 +47,7 @@ class Arm(Protocol):
 
 
 class Blades(Protocol):
-    """`bridge.real.cutter.Cutter`, or what stands for it."""
+    """Interface of `bridge.real.cutter.Cutter`."""
 
     def read(self) -> CutterStatus:
         """What the blades do."""
@@ -63,7 +63,7 @@ class Blades(Protocol):
 
 
 class Camera(Protocol):
-    """`bridge.real.realsense.RealSense`, or what stands for it."""
+    """Interface of `bridge.real.realsense.RealSense`."""
 
     def capture(self, expose: bool) -> Picture | None:
         """Ask for a picture, or fetch one."""
@@ -73,7 +73,7 @@ class Camera(Protocol):
 
 
 class RealRobot:
-    """Implements `bridge.core.interface.Robot`; nothing here waits for a device."""
+    """Implements `bridge.core.interface.Robot`; no call blocks."""
 
     def __init__(self, base: Base, arm: Arm, blades: Blades, camera: Camera | None, moving: bool = True) -> None:
         """Put together what is connected already.

@@ -1,7 +1,7 @@
-"""The ROS 2 messages that the base and the cutter speak, as CDR bytes with their 4-byte header.
+"""ROS 2 messages of base and cutter, as CDR bytes with their 4-byte header.
 
-ROS itself is not needed: `rosbags` knows the standard messages, and the makers' own are defined here. A bridge between
-DDS and Zenoh (`zenoh-bridge-ros2dds`) carries exactly these bytes under the topic's name.
+ROS itself is not needed: `rosbags` has the standard messages, and the makers' own are defined here. A bridge between
+DDS and Zenoh (`zenoh-bridge-ros2dds`) forwards exactly these bytes under the topic's name.
 """
 
 from functools import cache

@@ -1,4 +1,4 @@
-"""A RealSense that is librealsense's own software device, fed with the simulated camera's pictures."""
+"""A RealSense made of librealsense's software device and the simulated camera's pictures."""
 
 import io
 import threading
@@ -18,7 +18,7 @@ from rolling_panda.transport.zenoh import ForeignWire
 
 
 class SoftwareDevice:
-    """Colour and depth streams of one lens; what is shown comes out of `wait_for_frames`."""
+    """Colour and depth streams of one camera; `wait_for_frames` returns the pictures that were shown."""
 
     def __init__(self, lens: Intrinsics, rate_hz: int, depth_unit: float) -> None:
         """Streaming, nothing shown yet.
@@ -81,7 +81,7 @@ class SoftwareDevice:
 
 
 class WireFrames:
-    """Implements the driver's `Frames`: a software device that comes into being with the first picture."""
+    """Implements the driver's `Frames` with a software device that is created at the first picture."""
 
     def __init__(self, wire: ForeignWire, rate_hz: int) -> None:
         """Listen; the wire is closed with the frames."""

@@ -143,11 +143,11 @@ def sensors(health: Health, config: ControllerConfig) -> str:
     if health.tracking_error:
         return health.tracking_error
     if health.joints > config.joints_max_age_s:
-        return f"joint states are {_age(health.joints)}old; the limit is {config.joints_max_age_s} s"
+        return f"joint states are {_age(health.joints)} old; the limit is {config.joints_max_age_s} s"
     if health.odometry > config.odometry_max_age_s:
-        return f"odometry is {_age(health.odometry)}old; the limit is {config.odometry_max_age_s} s"
+        return f"odometry is {_age(health.odometry)} old; the limit is {config.odometry_max_age_s} s"
     if health.bridge > config.bridge_max_age_s:
-        return f"the bridge's state is {_age(health.bridge)}old; the limit is {config.bridge_max_age_s} s"
+        return f"the bridge's state is {_age(health.bridge)} old; the limit is {config.bridge_max_age_s} s"
     return ""
 
 

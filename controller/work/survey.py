@@ -114,7 +114,7 @@ class Survey:
             return StepResult(xi)
         if self._line is not None and not self._again and self._unclear() > 0:
             self._again, self._goal, self._there_at, self._moved = True, self._line[0], None, None
-            text = f"{_counted(self._unclear(), 'place')}need another look: the survey drives back"
+            text = f"{_counted(self._unclear(), 'place')} to look at again: the survey drives back"
             return StepResult(xi, events=(text,))
         return StepResult(xi, finished=True, summary=self._summary())
 

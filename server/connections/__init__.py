@@ -1,1 +1,1 @@
-"""Who is connected: how many, how long they may take, and how much they may say."""
+"""Connections to the server: limits of their number, times and rates."""

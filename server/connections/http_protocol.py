@@ -1,4 +1,4 @@
-"""HTTP with limits of time: for a TLS handshake and a request's head, for its body, and for reading the answer."""
+"""HTTP with time limits for the TLS handshake, the head and the body of a request, and the reading of the answer."""
 
 import asyncio
 import random
@@ -18,7 +18,7 @@ _EARLIEST = 0.8
 
 
 class SiteConfig(uvicorn.Config):
-    """Uvicorn's, with the limits that its protocols keep."""
+    """Uvicorn's configuration, with the limits of the protocols."""
 
     def __init__(self, app: ASGIApp, connections: Connections, **options: Any) -> None:
         """Serve `app` within the limits of `connections`."""
@@ -28,7 +28,7 @@ class SiteConfig(uvicorn.Config):
 
 
 class TimedHttp(H11Protocol):
-    """Uvicorn's, but a far end that takes too long to ask or to read is cut off."""
+    """Uvicorn's HTTP protocol. A client that sends or reads too slowly is disconnected."""
 
     config: SiteConfig
     _connection: Connection

@@ -1,8 +1,8 @@
-"""How many connections may be open: in all, from one address, and how many of them WebSockets.
+"""Limits of open connections: in total, for each address, and for WebSockets.
 
-A connection counts from when it is accepted, before any TLS handshake, until its socket is closed. Where there are too
-many, the one that has been idle longest makes room for the new one, so that nobody can keep others out by opening
-connections and saying nothing. Requests that are being answered and open WebSockets stay.
+A connection counts from its acceptance, before any TLS handshake, until its socket is closed. At the limit a new
+connection replaces the one that has been idle longest, so that idle connections cannot keep others out. Requests in
+progress and open WebSockets stay.
 """
 
 import asyncio
@@ -32,10 +32,10 @@ class Connection:
     """One open connection.
 
     Attributes:
-        peer: Its far end: address and port first.
-        busy: A request is being answered, or it is an open WebSocket.
-        served: A request was answered.
-        is_websocket: It was accepted as one.
+        peer: Remote end: address and port first.
+        busy: Whether a request is in progress, or the connection is an open WebSocket.
+        served: Whether a request was answered.
+        is_websocket: Whether it is a WebSocket.
         end: Closes it at once.
     """
 
@@ -63,7 +63,7 @@ class Connection:
 
 
 class Connections:
-    """Every open connection, the one that was served longest ago first. Belongs to the server's event loop."""
+    """All open connections, the one served longest ago first. Belongs to the server's event loop."""
 
     def __init__(self, limits: ServerConfig, note: Callable[[str, str], object] = lambda text, by: None) -> None:
         """None is open; `note(text, by)` hears of what is refused or ended, and whose it was."""
@@ -147,7 +147,7 @@ class Connections:
 
 
 class Listener(socket.socket):
-    """A listening socket that counts what it accepts, once `count` was called."""
+    """A listening socket that counts its accepted connections, after `count` was called."""
 
     _connections: Connections | None = None
     _speaks_tls = False
@@ -178,7 +178,7 @@ class Listener(socket.socket):
 
 
 class _Counted(socket.socket):
-    """The socket of a connection, which counts until it is closed."""
+    """The socket of a counted connection."""
 
     _leave: Callable[[], None] | None = None
 

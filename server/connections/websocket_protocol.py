@@ -1,6 +1,6 @@
-"""WebSockets whose far end has to read and may not say too much: one that breaks this is dropped.
+"""WebSockets with rate limits, and a time limit for reading. A client that breaks them is disconnected.
 
-So nothing is kept for a far end that does not read, and none can take the server's time from the others.
+So no data accumulate for a client that does not read, and no client can use up the server's time.
 """
 
 import asyncio
@@ -25,11 +25,10 @@ _TURN_S = 0.05
 
 
 class LimitedSocket(WebSocketsSansIOProtocol):
-    """Uvicorn's, with limits of what is said, and of how long what it sends may stay unread.
+    """Uvicorn's WebSocket protocol with rate limits and a time limit for unread data.
 
-    A far end that does not answer a ping within `ping_timeout` is cut off. Pings stand behind what was sent before
-    them, so whoever does not read does not answer. Uvicorn itself would then close politely, after all that it has
-    written is read, which may be never.
+    A client that does not answer a ping within `ping_timeout` is disconnected. Pings queue behind earlier data, so a
+    client that does not read does not answer. Uvicorn itself would wait for a regular close, which may never come.
     """
 
     config: SiteConfig

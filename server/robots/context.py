@@ -1,4 +1,4 @@
-"""What the server holds of one robot, shared by REST and the pages, and the operations on it."""
+"""State of one robot in the server, shared by REST and the pages, and the operations on it."""
 
 import asyncio
 import time

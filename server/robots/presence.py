@@ -1,4 +1,4 @@
-"""Which sessions are present, for the controller's lease, and how old the robot's state is that each has seen.
+"""Presence of the sessions, for the controller's lease, and the age of the newest state that each has seen.
 
 No clock here: `now` is given (s).
 """
@@ -22,7 +22,7 @@ class _Client:
 
 
 class PresenceTracker:
-    """When each session was last active, and when the state was measured that it has seen."""
+    """Time of the last activity of each session, and of the measurement of the newest state that it has seen."""
 
     def __init__(self) -> None:
         """No session is present."""

@@ -13,7 +13,7 @@ _RELEASE_REPEATS = 5
 
 @dataclass(frozen=True)
 class TeleopCommand:
-    """What the robot does while it is held, as in `TeleopTarget`."""
+    """Command of a hold, as in `TeleopTarget`."""
 
     target: m.Pose | None = None
     base: BaseVelocity | None = None

@@ -1,4 +1,4 @@
-"""Canes that were cut off: which points are cut, what of each cane still stands, and the fall of the rest."""
+"""Cut canes in the 3-D view: the remaining part of each cane, and the fall of the severed part."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

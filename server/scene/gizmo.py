@@ -32,7 +32,7 @@ class _Gizmo:
 
 
 class SceneGizmos:
-    """Shows gizmos and works out where they were dragged. Called from the server's loop."""
+    """Shows gizmos and computes their dragged poses. Called from the server's loop."""
 
     def __init__(self) -> None:
         """No gizmo is shown."""

@@ -90,7 +90,7 @@ def test_a_request_is_granted_by_the_holder_alone():
     assert (it.notice, it.notice_number) == ("Bob asks Ada for control", before + 1)
     assert "asked already" in it.request(EVE, 0.1)
     assert "hold control already" in it.request(ADA, 0.1)
-    assert "only who holds" in it.grant(BOB)
+    assert "only the person in control" in it.grant(BOB)
     assert it.grant(ADA) == ""
     it.review(True, 0.2)
     assert it.held_by(BOB) and it.requested is None

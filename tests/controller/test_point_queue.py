@@ -68,7 +68,7 @@ def test_a_point_that_moved_or_turned_is_not_accepted_any_more():
 def test_a_point_that_vanished_is_not_cut_and_a_new_look_is_needed():
     q = queue(point())
     q.accept("a", 3, "ada")
-    assert "does not see it" in q.update(shown())[0]
+    assert "no longer reports it" in q.update(shown())[0]
     assert q.next() is None
     assert "does not see" in q.accept("a", 3, "ada")
     q.update(shown(point()))
@@ -236,7 +236,7 @@ def test_an_acceptance_out_of_reach_is_void_like_any_other_and_can_be_taken_back
     assert "acceptance void" in q.update(shown(point(revision=4, position=(1.0, 0.85, 1.006))))[0]
     assert state(q) == "PROPOSED"
     q = beyond()
-    assert "does not see it" in q.update(shown())[0]
+    assert "no longer reports it" in q.update(shown())[0]
     q = beyond()
     assert q.reconsider("a", "ada") == "" and state(q) == "PROPOSED" and q.waits == "no point is accepted"
 

@@ -95,7 +95,7 @@ def test_perception_that_starts_anew_is_no_change_of_the_rule():
     q = accepted("a")
     q.update(shown(A, B, C, frames=9))
     q.update(shown(rule=SHORT, frames=1))
-    assert "perception does not see it" in q.get("a").reason
+    assert "perception no longer reports it" in q.get("a").reason
     q.update(shown(A, rule=SHORT, frames=2))
     assert "knows of no" in q.undo_rule(SHORT) and state(q) == "PROPOSED"
 

@@ -53,7 +53,7 @@ def test_reset_ends_only_when_the_bridge_shows_the_release():
 
 def test_a_reset_where_nothing_is_latched_releases_nothing():
     latch = StopLatch()
-    assert "another stop" in latch.ask_release(msgspec.structs.replace(RESET, stop_id="a"), BRIDGE, 1.0)
+    assert "newer stop" in latch.ask_release(msgspec.structs.replace(RESET, stop_id="a"), BRIDGE, 1.0)
     assert latch.ask_release(RESET, BRIDGE, 1.0) == ""
     assert latch.release_due() is None and not latch.released(BRIDGE)
 
@@ -91,7 +91,7 @@ def test_a_reset_of_a_stop_that_is_not_the_newest_any_more_is_refused():
     latch.update((stop("a"),), bridge("a"))
     latch.update((stop("b"),), bridge("b"))
     looked_at_a = intents.Reset(user="ada", role="supervisor", reason="looked at it", stop_id="a")
-    assert "another stop was pressed" in latch.ask_release(looked_at_a, bridge("b"), 1.0)
+    assert "newer stop" in latch.ask_release(looked_at_a, bridge("b"), 1.0)
     assert latch.release_due() is None
     looked_at_b = intents.Reset(user="ada", role="supervisor", reason="looked at it", stop_id="b")
     assert latch.ask_release(looked_at_b, bridge("b"), 1.0) == ""
@@ -103,7 +103,7 @@ def test_a_reset_of_a_stop_that_is_not_the_newest_any_more_is_refused():
 def test_before_the_bridge_has_said_what_it_holds_a_reset_is_refused_and_later_it_is_not_lost():
     latch = StopLatch()
     latch.update((stop("a"),), None)
-    assert "the bridge has not said" in latch.ask_release(RESET, None, 1.0)
+    assert "the bridge has not reported" in latch.ask_release(RESET, None, 1.0)
     assert not latch.released(None) and not latch.released(BRIDGE)
     assert latch.ask_release(RESET, bridge("a"), 1.1) == ""
     assert latch.release_due().stop_id == "a"
@@ -123,7 +123,7 @@ def test_a_stop_that_the_bridge_does_not_hold_is_reset_by_its_own_id():
     latch = StopLatch()
     latch.update((stop("a"), stop("b")), BRIDGE)
     looked_at_a = msgspec.structs.replace(RESET, stop_id="a")
-    assert "another stop was pressed" in latch.ask_release(looked_at_a, BRIDGE, 1.0)
+    assert "newer stop" in latch.ask_release(looked_at_a, BRIDGE, 1.0)
     assert latch.ask_release(msgspec.structs.replace(RESET, stop_id="b"), BRIDGE, 1.0) == ""
     assert latch.released(BRIDGE)
 

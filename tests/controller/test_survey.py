@@ -55,7 +55,7 @@ def test_it_drives_the_whole_way_with_the_arm_in_its_looking_posture_and_tells_w
 def test_where_places_need_another_look_it_goes_back_over_its_way_once():
     r = surveying(0.6, UNCLEAR)
     finish(r, 40.0)
-    assert abs(r.q[0]) < 0.03 and any("1 place to be looked at again" in text for text in r.events)
+    assert abs(r.q[0]) < 0.03 and any("1 place to look at again" in text for text in r.events)
     assert "1 place still unclear" in r.state.reason
 
 

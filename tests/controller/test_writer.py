@@ -133,4 +133,4 @@ def test_a_flood_of_lines_is_counted_instead_of_recorded(writers):
     until(lambda: len(disk.rows) == 202)
     assert "refused 199" in disk.rows[199].body
     left_out = json.loads(disk.rows[200].body)
-    assert left_out["lines"] == 800 and left_out["text"].startswith("800 lines") and "after" in disk.rows[201].body
+    assert left_out["lines"] == 800 and left_out["text"].startswith("800 log lines") and "after" in disk.rows[201].body

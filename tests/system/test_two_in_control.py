@@ -22,7 +22,7 @@ ANYBODY = st.sampled_from(["ada", "bob", "ada", "bob", "vic"])
 #: Of a busy machine, not of the program: what a person would try again.
 _AGAIN = (
     "watchdog",
-    "old, allowed are",
+    "old; the limit is",
     "silent for",
     "under way",
     "wait until the robot is at rest",

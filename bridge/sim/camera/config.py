@@ -25,7 +25,7 @@ class CameraConfig(Struct, frozen=True, forbid_unknown_fields=True):
         depth_unit: Depth is a multiple of this (m).
         baseline: Between the two infrared imagers (m).
         disparity_noise: Standard deviation of the matched disparity (px); 0 switches the noise off.
-        edge_bleed: Share of the pixels along depth steps that get the foreground depth, a mixture, or none.
+        edge_bleed: Fraction of the pixels along depth steps that get the foreground depth, a mixture, or none.
         thin_width: Objects narrower than this lose depth in patches, in proportion (px).
         calibration_angle: Standard deviation of the hand-eye calibration error (rad).
         color_noise: Standard deviation of the colour sensor's noise (of 255).

@@ -35,12 +35,12 @@ class VineyardConfig(Struct, frozen=True, forbid_unknown_fields=True):
         spurs_per_arm: Largest number of spurs on an arm.
         stub_length: Length of a spur's two-year wood outside the cordon.
         stub_radius: Radius of that stub.
-        cane_shares: Shares of spurs with one, two and three canes.
+        cane_shares: Fractions of spurs with one, two and three canes.
         cane_length: Length of a one-year cane.
         cane_radius: Limits of the radius of a cane at its base.
         cane_radius_mean: Mean of that radius.
         cane_radius_deviation: Standard deviation of that radius.
-        cane_taper: Radius at the tip as a share of that at the base.
+        cane_taper: Radius at the tip as a fraction of that at the base.
         cane_tilt: Standard deviation of a cane's lean along the row; half of that across the row.
         basal: Distance from the cane's base, at the stub's surface, to the middle of the basal bud.
         internode: Distance between the middles of two nodes.

@@ -49,12 +49,12 @@ class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Vineyard(msgspec.Struct, frozen=True):
-    """A row and what it was grown from.
+    """A row with its seed and configuration.
 
     Attributes:
-        seed: Of the row.
-        config: Its spreads.
-        row: As it stands.
+        seed: Random seed of the row.
+        config: Configuration of the row.
+        row: Current row.
     """
 
     seed: int

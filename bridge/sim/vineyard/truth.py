@@ -61,13 +61,13 @@ class SpurTruth:
     Attributes:
         vine: Vine along the row.
         spur: Spur on the vine.
-        canes: How many canes it carries.
+        canes: Number of its canes.
         keeper: The cane that becomes the new spur.
-        diameter: Of the keeper in its first internode (m).
-        nodes: Middles of the keeper's count nodes, base first (N×3, m, world); the basal bud is not one.
-        cut: On the keeper; None where it has fewer nodes than are kept.
-        renewal: On the stub, beyond the keeper; None where the keeper is the last cane on it.
-        surplus: Canes nearer to the cordon than the keeper, each of which needs a cut of its own.
+        diameter: Diameter of that cane in its first internode (m).
+        nodes: Middles of that cane's count nodes, base first (N×3, m, world), without the basal bud.
+        cut: Right cut on that cane; None if it has fewer nodes than are kept.
+        renewal: Right cut on the stub beyond that cane; None if it is the last cane on the stub.
+        surplus: Canes nearer to the cordon, each of which needs its own cut.
     """
 
     vine: int
