@@ -15,6 +15,7 @@ from typing import Any
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
+from mode_diagram import draw
 
 ROOT = Path(__file__).resolve().parents[2]
 #: In the order of the API reference. Benchmarks and tests are no interface.
@@ -59,12 +60,22 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Hides the list of pages beside the first one. In the search, texts come before the API reference."""
+    """Hides the list of pages beside the first one, and draws diagrams.
+
+    In the search, texts come before the API reference.
+    """
     if page.is_homepage:
         page.meta["hide"] = ["navigation"]
     if not page.file.src_uri.startswith("reference/"):
         page.meta["search"] = {"boost": 3}
-    return markdown
+
+    def drawn(diagram: re.Match[str]) -> str:
+        svg, missing = draw(diagram[1])
+        if missing:
+            log.warning("'%s': docs/site/mode_diagram.py has no place for %s", page.file.src_uri, sorted(missing))
+        return f'<div class="diagram">{svg}</div>'
+
+    return re.sub(r"^```mermaid\n(.*?)^```$", drawn, markdown, flags=re.DOTALL | re.MULTILINE)
 
 
 def on_page_content(html: str, page: Page, config: MkDocsConfig, files: Files) -> str:
