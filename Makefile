@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 TYPESCRIPT := typescript@5.9.3
 
-.PHONY: help demo test test-training fast check format docs bench mutation clean lock materials browser drivers training
+.PHONY: help demo test test-training fast coverage check format docs bench mutation clean lock materials browser drivers training
 .DEFAULT_GOAL := help
 
 help:
@@ -13,6 +13,7 @@ help:
 	@echo "make test    make check, then every test"
 	@echo "make test-training  the tests of the training, with PyTorch"
 	@echo "make fast    tests that only compute: no browser, no processes"
+	@echo "make coverage  make fast, then lines and branches covered, by folder; make test COVERAGE=1 counts its first stage"
 	@echo "make format  format the code, write the generated files anew"
 	@echo "make check   formatting, types, import contracts, generated files, docs"
 	@echo "make docs    the documentation as a site, in build/site; without warnings, or it fails"
@@ -28,11 +29,16 @@ demo: $(VENV)/.project
 # First the tests that only compute, one on each core; then those that time would disturb, one after the other. Training
 # has its own target, since nothing else needs PyTorch.
 WITHOUT_TRAINING := --ignore tests/perception/test_training.py
+COVERED := --cov --cov-report=
+COVERAGE_TABLE = $(BIN)/coverage json --quiet -o build/coverage/report.json && \
+	$(BIN)/python tests/support/coverage_table.py build/coverage/report.json
 test: check browser drivers
 ifdef ARGS
 	$(BIN)/pytest $(ARGS)
 else
-	$(BIN)/pytest -n auto -m "not alone and not slow" $(WITHOUT_TRAINING)
+	@mkdir -p build/coverage
+	$(BIN)/pytest -n auto $(if $(COVERAGE),$(COVERED)) -m "not alone and not slow" $(WITHOUT_TRAINING)
+	$(if $(COVERAGE),@$(COVERAGE_TABLE))
 	$(BIN)/pytest -m "alone and not slow" $(WITHOUT_TRAINING)
 	@echo "make test-training runs the tests of the training; it installs PyTorch"
 endif
@@ -41,9 +47,15 @@ test-training: training
 	$(BIN)/pytest tests/perception/test_training.py
 
 # Fewer random examples than `make test` has.
+FAST = HYPOTHESIS_PROFILE=fast $(BIN)/pytest -n auto -m "not alone and not slow and not browser" \
+	$(WITHOUT_TRAINING) tests/bridge tests/controller tests/perception tests/recorder tests/rolling_panda tests/server
 fast: $(VENV)/.project
-	HYPOTHESIS_PROFILE=fast $(BIN)/pytest -n auto -m "not alone and not slow and not browser" \
-		$(WITHOUT_TRAINING) tests/bridge tests/controller tests/perception tests/recorder tests/rolling_panda tests/server
+	$(FAST)
+
+coverage: $(VENV)/.project
+	@mkdir -p build/coverage
+	$(FAST) $(COVERED)
+	@$(COVERAGE_TABLE)
 
 format: $(VENV)/.project
 	$(BIN)/ruff check --fix .
