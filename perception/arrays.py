@@ -1,4 +1,4 @@
-"""Array types and the few vector operations that the whole package shares."""
+"""Array types and vector operations of the package."""
 
 import numpy as np
 from numpy.typing import NDArray

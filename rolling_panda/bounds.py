@@ -1,7 +1,8 @@
-"""Hard bounds of the numbers of safety: part of a field's type, so that no configuration can leave them.
+"""Hard bounds of the safety values. A bound is part of a field's type, so that no configuration can go beyond it.
 
-A field says `Annotated[float, at_most(0.2)]` and what is usual as its default. A value on the safe side of the default
-is taken without a word; one between default and bound is taken, and `wider` says it; one outside is refused.
+A field is annotated with `Annotated[float, at_most(0.2)]`; its default is the usual value. A value as strict as the
+default or stricter is accepted. A value between default and bound is accepted and reported by `wider`. A value outside
+is refused.
 """
 
 import math
@@ -18,14 +19,14 @@ _SAFETY = "safety"
 
 @dataclass(frozen=True)
 class Bound:
-    """What a number of safety may be.
+    """Allowed range of a safety value.
 
     Attributes:
         low: Smallest value; 0 itself is not allowed.
         high: Largest value.
-        safer: Which side of the usual value is the stricter one.
-        or_zero: 0 is allowed too, and means that another source has the number.
-        switch: It is true or false, 1 or 0 in the other attributes.
+        safer: Stricter side of the usual value.
+        or_zero: Whether 0 is allowed too; it means that the value comes from another source.
+        switch: Whether the value is a bool, with 1 or 0 in the other attributes.
     """
 
     low: float
@@ -35,19 +36,19 @@ class Bound:
     switch: bool = False
 
     def allows(self, value: float) -> bool:
-        """Whether a value may be set at all."""
+        """Whether a value is allowed."""
         if self.switch:
             return self.low <= value <= self.high
         return (self.or_zero and value == 0.0) or (self.low <= value <= self.high and (value > 0.0 or self.low < 0.0))
 
     def wider(self, value: float, usual: float) -> bool:
-        """Whether a value that is allowed is less strict than the usual one."""
+        """Whether an allowed value is less strict than the usual one."""
         if self.safer == "neither":
             return False
         return value > usual if self.safer == "less" else value < usual
 
     def __str__(self) -> str:
-        """In words."""
+        """Range as text."""
         if self.switch:
             return "true or false" if self.low < self.high else "true" if self.low else "false"
         span = (
@@ -57,27 +58,27 @@ class Bound:
 
 
 def at_most(high: float, low: float = 0.0) -> Meta:
-    """A number that is safer the smaller it is: more than 0, or from `low` on, up to `high`."""
+    """Bound of a value that is stricter the smaller it is: more than 0, or at least `low`, and at most `high`."""
     return _meta(Bound(low, high, "less"))
 
 
 def at_least(low: float, high: float) -> Meta:
-    """A number that is safer the larger it is, from `low` to `high`."""
+    """Bound of a value that is stricter the larger it is, from `low` to `high`."""
     return _meta(Bound(low, high, "more"))
 
 
 def within(low: float, high: float, or_zero: bool = False) -> Meta:
-    """A number that is right or wrong, as a calibration: from `low` to `high`, or 0 where that means "not measured"."""
+    """Bound of a value without a stricter side, such as a calibration: `low` to `high`, or 0 for "not measured"."""
     return _meta(Bound(low, high, "neither", or_zero))
 
 
 def always_on() -> Meta:
-    """A switch that no configuration may turn off."""
+    """Bound of a switch that no configuration can turn off."""
     return Meta(extra={_SAFETY: Bound(1.0, 1.0, "more", switch=True)})
 
 
 def usually_on() -> Meta:
-    """A switch that a configuration may turn off, which is said."""
+    """Bound of a switch that a configuration can turn off; `wider` reports it."""
     return Meta(extra={_SAFETY: Bound(0.0, 1.0, "more", switch=True)})
 
 
@@ -91,13 +92,13 @@ def _meta(bound: Bound) -> Meta:
 
 @dataclass(frozen=True)
 class Number:
-    """A number of safety as a section has it.
+    """A safety value of a section.
 
     Attributes:
-        name: Key, with those of inner sections before it: `base.deadline_s`, `home[3]`.
-        value: As set.
-        usual: Its default.
-        bound: What it may be.
+        name: Key, prefixed by the keys of its sections: `base.deadline_s`, `home[3]`.
+        value: Current value.
+        usual: Default.
+        bound: Allowed range.
     """
 
     name: str
@@ -107,7 +108,7 @@ class Number:
 
 
 def numbers(config: Struct) -> Iterator[Number]:
-    """Every number of safety of a section, in the order of its keys."""
+    """All safety values of a section, in the order of its keys."""
     yield from _numbers(config, type(config)(), "")
 
 
@@ -148,7 +149,7 @@ def _metas(hint: Any) -> tuple[Meta, ...]:
 
 
 def wider(section: str, config: Struct) -> tuple[str, ...]:
-    """Each number of safety of a section that is less strict than usual, in words."""
+    """Texts of the safety values of a section that are less strict than usual."""
     return tuple(
         f"[{section}] {each.name} = {_said(each.value)}, usually {_said(each.usual)} (allowed: {each.bound})"
         for each in numbers(config)
@@ -157,16 +158,16 @@ def wider(section: str, config: Struct) -> tuple[str, ...]:
 
 
 def check(where: str, section: str, table: Mapping[str, Any], kind: type[Struct]) -> None:
-    """Refuse a value of a configuration file that is outside what its key may be.
+    """Refuse values of a configuration file that are out of range.
 
     Args:
-        where: The file, for the error.
-        section: Name of the section or of one inside it.
-        table: As read; values of a wrong type are left to the decoder.
-        kind: What the section is read into.
+        where: File, for the error.
+        section: Name of the section or subsection.
+        table: Parsed section; the decoder checks the types of its values.
+        kind: Type of the section.
 
     Raises:
-        ConfigError: What was got, what is allowed and what to do.
+        ConfigError: A value is out of range. The text has the value, the range and the remedy.
     """
     hints = get_type_hints(kind, include_extras=True)
     defaults = {field.encode_name: field.default for field in structs.fields(kind)}
@@ -187,7 +188,7 @@ def check(where: str, section: str, table: Mapping[str, Any], kind: type[Struct]
 
 def _check_one(what: str, value: Any, hint: Any, usual: Any) -> None:
     bound = bound_of(hint)
-    # Whatever is of a wrong type is refused by the decoder.
+    # The decoder refuses values of a wrong type.
     if isinstance(value, bool) != (bound is not None and bound.switch) or not isinstance(value, int | float):
         return
     if bound is not None:

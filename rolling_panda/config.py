@@ -40,19 +40,19 @@ _J10000 = Annotated[float, at_most(10000.0, 5000.0)]
 
 
 class TransportConfig(Struct, frozen=True, forbid_unknown_fields=True):
-    """How a process finds the wire.
+    """Connection of a process to the wire.
 
     Attributes:
         mode: `client` of a router, the `router` itself, or `peer` with explicit endpoints.
         connect: Endpoints to connect to, as `tls/HOST:PORT`, or `tcp/HOST:PORT` on a plain wire.
         listen: Endpoints to listen on.
-        connect_timeout_s: How long to try before giving up at the start; later losses are retried for ever.
-        certificates: Folder with ca.pem and this process's NAME.pem and NAME.key, for mutual TLS. What lies in a folder
-            of the robot's id there comes first.
+        connect_timeout_s: Time limit of the connection at the start. Later losses are retried for ever.
+        certificates: Folder with ca.pem and this process's NAME.pem and NAME.key, for mutual TLS. Files in its
+            subfolder with the robot's id take precedence.
         robots: Ids of the robots that a router with certificates serves.
-        field: Keys of the devices behind the drivers, which a router with certificates carries between the bridge and
-            whoever has the certificate of the devices; empty for none.
-        plain_wire: Neither certificates nor access control, on this machine's loopback address alone.
+        field: Keys of the devices behind the drivers. A router with certificates routes them between the bridge and the
+            holder of the devices' certificate; empty for none.
+        plain_wire: No certificates and no access control, on the loopback address only.
     """
 
     mode: Literal["client", "peer", "router"] = "client"
@@ -66,7 +66,7 @@ class TransportConfig(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class RobotConfig(Struct, frozen=True, forbid_unknown_fields=True):
-    """Numbers of the robot that its URDF does not carry. Sources stand beside the values in `assets/config`.
+    """Parameters of the robot that are not in its URDF. `assets/config` has their sources.
 
     Attributes:
         wheel_radius: Effective rolling radius of the wheels (m), as calibrated; 0 takes the URDF's.

@@ -1,10 +1,10 @@
-"""The errors of Rolling Panda: one root, so that an entry point can turn any of them into one clear line."""
+"""Errors of Rolling Panda, with one base class, so that an entry point can print any of them as one line."""
 
 
 class RollingPandaError(Exception):
-    """Root of every error that the program raises on purpose.
+    """Base class of all errors that the program raises.
 
-    The text says what was got, what is allowed and what to do.
+    The text has the value, the allowed values and the remedy.
     """
 
 
@@ -25,7 +25,7 @@ class TransportError(RollingPandaError):
 
 
 class ServiceError(TransportError):
-    """A service did not answer in time, or answered with something else than its reply."""
+    """A service did not answer in time, or its reply was invalid."""
 
 
 class InputError(RollingPandaError):
@@ -33,7 +33,7 @@ class InputError(RollingPandaError):
 
 
 class ControlError(RollingPandaError):
-    """A control step has no answer: its numbers are not finite or its equations cannot be solved."""
+    """A control step has no solution: a value is not finite, or its equations cannot be solved."""
 
 
 class LedgerError(RollingPandaError):

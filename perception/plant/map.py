@@ -1,6 +1,6 @@
 """Map of the vines over all frames: each spur and each cane once, with statistics over their observations.
 
-A cane is identified by its spur and the course of its axis. Its nodes are those seen in a sufficient share of the
+A cane is identified by its spur and the course of its axis. Its nodes are those seen in a sufficient fraction of the
 observations; positions and radii are means with their scatter.
 """
 

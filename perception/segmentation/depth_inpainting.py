@@ -1,4 +1,4 @@
-"""Depth inpainting on thin wood: a pixel whose depth its neighbours do not share gets the median of theirs.
+"""Depth inpainting on thin wood: a pixel whose depth differs from its neighbours' gets their median.
 
 Along the edge of a cane a stereo camera gives the depth of the background, a mixture, or nothing. Uncorrected, a cane
 five pixels wide would lose its width, and scattered points would bend its axis.

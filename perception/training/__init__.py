@@ -1,1 +1,1 @@
-"""Trains the segmentation network on rendered rows; nothing that runs imports it. Needs the extra `training`."""
+"""Training of the segmentation network on rendered rows. No process imports it. It needs the extra `training`."""

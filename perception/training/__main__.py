@@ -1,8 +1,8 @@
 """Train the segmentation network: `python -m perception.training --out FILE.onnx`.
 
-Renders its own pictures, trains on one thread with a fixed seed, scores the result on other rows and writes the network
-with its card. A run that was interrupted, or told to stop with --until, goes on where it stopped; with --start another
-run goes on from there.
+It renders its own pictures, trains on one thread with a fixed seed, evaluates the result on other rows and writes the
+network with its card. A run that was interrupted, or stopped with --until, continues where it stopped. With --start a
+new run starts from those weights.
 """
 
 import argparse

@@ -1,9 +1,8 @@
-"""The same answers in fewer steps, for the file that is exported.
+"""An equivalent network with fewer operations, for export.
 
-Moving pixels into channels and back takes an interpreter of the exported file nearly as long as all convolutions
-together. Both moves are linear, so that the layers beside them can do them: the first convolution by a kernel of twice
-the size that steps over two pixels, the last one by the order of its channels, so that only the one class that was
-chosen for each pixel is left to be moved.
+Moving pixels into channels and back takes ONNX Runtime nearly as long as all convolutions together. Both moves are
+linear and can be merged into the neighbouring layers. The first convolution gets a kernel of twice the size and a
+stride of two. The last one gets another order of its channels, so that only the chosen class of each pixel is moved.
 """
 
 from copy import deepcopy
@@ -19,7 +18,7 @@ _BLOCK = 2
 
 
 class CompactLabeller(nn.Module):
-    """What a labeller says, but for rounding."""
+    """Equal to a labeller except for rounding."""
 
     def __init__(self, labeller: Labeller) -> None:
         """Take over the weights; the labeller stays as it is."""

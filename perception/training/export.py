@@ -1,4 +1,4 @@
-"""Writes a trained network as ONNX, with its classes inside and its card beside it."""
+"""Writes a trained network as ONNX with its classes as metadata, and its model card."""
 
 import json
 import warnings

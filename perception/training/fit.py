@@ -1,4 +1,4 @@
-"""Fits the network: crops of the pictures, varied once more, in a fixed order for a given seed."""
+"""Training loop: augmented crops of the pictures, in a fixed order for a given seed."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -34,14 +34,14 @@ WEIGHTS = tuple(_HEAVIER.get(kind, 1.0) for kind in WOOD_CLASSES)
 
 @dataclass(frozen=True)
 class Progress:
-    """After one step: its number from 1, and the loss."""
+    """Result of one step: its number from 1, and the loss."""
 
     step: int
     loss: float
 
 
 class Run(NamedTuple):
-    """One training: its seed, the rows rendered for it, the steps that it was planned for and those that it took."""
+    """One training run: seed, rendered rows, planned steps and executed steps."""
 
     seed: int
     rows: int
@@ -53,7 +53,7 @@ Runs = tuple[Run, ...]
 
 
 class Trainer:
-    """Weights, optimiser and random state; can be put away and taken up again with the same result."""
+    """Weights, optimiser and random state. It can be saved and resumed with the same result."""
 
     def __init__(self, seed: int, steps: int, rows: int, start: Mapping[str, object] | None = None) -> None:
         """Fresh weights, or those of an earlier training.

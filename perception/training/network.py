@@ -1,7 +1,7 @@
-"""The network: a small encoder and decoder that works on 2×2 blocks of pixels and answers for each pixel.
+"""The network: a small encoder-decoder on 2×2 blocks of pixels, with an output for each pixel.
 
-Folding blocks into channels at the input, and unfolding them at the output, keeps canes a few pixels wide apart at a
-quarter of the cost of working at full resolution.
+Folding blocks into channels at the input, and unfolding them at the output, separates canes that are a few pixels wide
+at a quarter of the cost of full resolution.
 """
 
 from collections.abc import Sequence
@@ -58,7 +58,7 @@ class Network(nn.Module):
 
 
 class Labeller(nn.Module):
-    """The network with what it is for: the index of the likeliest class."""
+    """The network with an argmax: index of the most likely class."""
 
     prior: Tensor
 

@@ -1,4 +1,4 @@
-"""Pictures to train on: rendered rows with far more variety than any one vineyard has, and their true classes."""
+"""Training pictures: rendered rows with more variety than any one vineyard, and their true classes."""
 
 import io
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ class Scenes:
 
     Attributes:
         color: N×H×W×3, RGB.
-        depth: N×H×W (m), 0 where there is none.
+        depth: N×H×W (m), 0 = invalid.
         labels: N×H×W, indices in `WOOD_CLASSES`.
     """
 

@@ -1,4 +1,4 @@
-"""How well a network tells the classes apart, on pictures that it was not trained on."""
+"""Evaluation of a network on pictures that it was not trained on."""
 
 from dataclasses import dataclass
 
@@ -18,7 +18,7 @@ _EVERY, _ALONE = 4, 9
 
 @dataclass(frozen=True)
 class Confusion:
-    """Counts of pixels: row = what it is, column = what the network says."""
+    """Confusion matrix in pixels: row = true class, column = predicted class."""
 
     counts: NDArray[np.int64]
 

@@ -1,1 +1,1 @@
-"""What is made from the message and mode definitions: the page's typed messages, tables and diagrams of the docs."""
+"""Generated files: the page's typed messages, and tables and diagrams of the documentation."""
