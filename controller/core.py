@@ -9,7 +9,7 @@ from collections.abc import Iterable
 
 from controller.config import ControllerConfig
 from controller.interface import Outputs, StepInputs
-from controller.ledger.journal import ApproachRow, EventLogger, Journal, OrderRow, PreviewRow, RequestRow, TicketRow
+from controller.ledger.journal import ApproachRow, EventLogger, Journal, OrderRow, PreviewRequiredRow, RequestRow, TicketRow
 from controller.motion.follower import Tracking
 from controller.planning.plan_manager import PlanManager
 from controller.planning.preview import PreviewManager
@@ -112,7 +112,7 @@ class Controller:
         rows: Iterable[TicketRow],
         stops: tuple[StopRecord, ...] = (),
         order: OrderRow | None = None,
-        preview: PreviewRow | None = None,
+        preview: PreviewRequiredRow | None = None,
         approaches: tuple[tuple[str, ApproachRow], ...] = (),
     ) -> None:
         """Restore the queue, its order and the latched stops of an earlier start. Nothing resumes by itself."""

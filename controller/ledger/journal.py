@@ -61,7 +61,7 @@ class ApproachRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     user: str = ""
 
 
-class PreviewRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class PreviewRequiredRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Whether a cut needs an approved preview, and who set that."""
 
     required: bool

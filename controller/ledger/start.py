@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from controller.ledger.journal import ApproachRow, OrderRow, PreviewRow, Record, TicketRow
+from controller.ledger.journal import ApproachRow, OrderRow, PreviewRequiredRow, Record, TicketRow
 from controller.ledger.store import Ledger
 from rolling_panda import __version__
 from rolling_panda.cli.about import About, about
@@ -53,7 +53,7 @@ class Restored:
 
     tickets: tuple[TicketRow, ...] = ()
     order: OrderRow | None = None
-    preview: PreviewRow | None = None
+    preview: PreviewRequiredRow | None = None
     approaches: tuple[tuple[str, ApproachRow], ...] = ()
 
 
@@ -64,7 +64,7 @@ def restored(folder: Path) -> Restored:
         LedgerError: The ledger cannot be opened, or a row is not what this version writes.
     """
     with Ledger(folder) as ledger:
-        orders, previews = _newest(ledger, "order", OrderRow), _newest(ledger, "preview", PreviewRow)
+        orders, previews = _newest(ledger, "order", OrderRow), _newest(ledger, "preview", PreviewRequiredRow)
         approaches = [name for name, _ in ledger.newest("approach")]
         return Restored(
             tuple(_newest(ledger, "ticket", TicketRow)),
@@ -90,7 +90,7 @@ def _newest(ledger: Ledger, kind: str, row: type[Row]) -> list[Row]:
 
 def _upgraded(kind: str, body: Any) -> Any:
     """A decoded row with the names of this schema version."""
-    if kind == "ticket" and isinstance(body, dict) and body.get("state") == "CUTTING":
+    if kind == "ticket" and isinstance(body, dict) and body.get("state") == "INTENT":
         body["state"] = "CUTTING"
     return body
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from controller.config import HierarchyConfig
-from controller.ledger.journal import Journal, PreviewRow
+from controller.ledger.journal import Journal, PreviewRequiredRow
 from controller.planning.path_watch import PathWatch
 from controller.planning.plan_validity import approaches_changed, away_from
 from controller.planning.preview_plan import Preview, PreviewRequest, motion_message, state_message
@@ -57,7 +57,7 @@ class PreviewManager:
         self._fresh = self._fresh_motion = True
         self._said_at = self._moved_at = -np.inf
 
-    def restore(self, row: PreviewRow) -> None:
+    def restore(self, row: PreviewRequiredRow) -> None:
         """Take up what was required before a restart."""
         self.required = row.required
 
@@ -189,7 +189,7 @@ class PreviewManager:
 
     def _require(self, required: bool, user: str) -> str:
         self.required, self._fresh = required, True
-        self._journal.add("preview", "preview", PreviewRow(required=required, user=user))
+        self._journal.add("preview", "preview", PreviewRequiredRow(required=required, user=user))
         return ""
 
     def _want(self, point_id: str, now: float) -> str:

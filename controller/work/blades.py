@@ -57,7 +57,7 @@ class Blades:
         """Intend a cut at a point; no command is sent before that intent is durable."""
         self._cuts += 1
         cut_id = f"{self._run_id}-{self._cuts}"
-        self._cut = _Cut(point_id, cut_id, now + self._timeout_s, self._queue.intend(point_id, cut_id))
+        self._cut = _Cut(point_id, cut_id, now + self._timeout_s, self._queue.begin_cut(point_id, cut_id))
 
     def command(self, now: float) -> tuple[str, str] | None:
         """(cut_id, point_id) to command in this period; None between repetitions and before the intent is durable."""

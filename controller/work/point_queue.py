@@ -309,7 +309,7 @@ class PointQueue:
         if self.order.hold(order):
             self.sort()
 
-    def intend(self, point_id: str, cut_id: str) -> int:
+    def begin_cut(self, point_id: str, cut_id: str) -> int:
         """ACCEPTED → CUTTING: the blades are about to move. Returns the number of its record."""
         self._put(point_id, replace(self._tickets[point_id], state="CUTTING", cut_id=cut_id, reason="cutting"))
         return self._journal.number

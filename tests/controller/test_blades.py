@@ -14,13 +14,13 @@ class Bridge:
 
 @dataclass
 class Queue:
-    intended: list = field(default_factory=list)
+    begun: list = field(default_factory=list)
     resolved: list = field(default_factory=list)
     durable: int = 1000
 
-    def intend(self, point_id, cut_id):
-        self.intended.append((point_id, cut_id))
-        return len(self.intended)
+    def begin_cut(self, point_id, cut_id):
+        self.begun.append((point_id, cut_id))
+        return len(self.begun)
 
     def recorded(self, number):
         return number <= self.durable
@@ -36,7 +36,7 @@ def test_the_command_is_repeated_with_one_id_until_the_outcome_comes():
     asked = [blades.command(0.01 * tick) for tick in range(20)]
     told = [command for command in asked if command is not None]
     assert 3 <= len(told) <= 5 and set(told) == {("run-1", "p1")}
-    assert queue.intended == [("p1", "run-1")]
+    assert queue.begun == [("p1", "run-1")]
     assert blades.watch(Bridge("another", "DONE"), 0.2) == () and blades.busy
     assert blades.watch(Bridge("run-1", "DONE"), 0.2) == ("p1: cut",)
     assert not blades.busy and blades.command(0.3) is None

@@ -23,7 +23,7 @@ class Work:
 
     def cut(self, outcome: m.Outcome, finding: Finding | None) -> str:
         """One try; the state afterwards."""
-        self.queue.intend("a", "c")
+        self.queue.begin_cut("a", "c")
         self.check.start("a", outcome, f"says {outcome}", self.now)
         assert self.state in ("CUTTING", outcome)
         self.now += 0.5

@@ -105,7 +105,7 @@ def test_order_of_work_is_along_the_row():
 def test_life_of_a_cut_point():
     q = queue(point())
     q.accept("a", 3, "ada")
-    q.intend("a", "cut-1")
+    q.begin_cut("a", "cut-1")
     assert (state(q), q.entries()[0].cut_id) == ("CUTTING", "cut-1")
     assert "CUTTING" in q.reject("a", "ada", "no")
     q.resolve("a", "DONE", "cut")
@@ -118,7 +118,7 @@ def test_an_unknown_or_failed_cut_waits_for_a_person():
     for outcome in ("UNKNOWN", "FAILED_NOT_CUT"):
         q = queue(point())
         q.accept("a", 3, "ada")
-        q.intend("a", "cut-1")
+        q.begin_cut("a", "cut-1")
         q.resolve("a", outcome, "why")
         assert q.next() is None
         if outcome == "UNKNOWN":
@@ -135,7 +135,7 @@ def test_what_a_person_saw_ends_an_unknown_cut_and_nothing_else():
     assert "not in question: it is PROPOSED" in q.decide("a", "DONE", "eve", "cut")
     assert "there is no point" in q.decide("z", "DONE", "eve", "cut")
     q.accept("a", 3, "ada")
-    q.intend("a", "cut-1")
+    q.begin_cut("a", "cut-1")
     assert "it is CUTTING" in q.decide("a", "DONE", "eve", "cut")
     q.resolve("a", "UNKNOWN", "why")
     assert q.decide("a", "DONE", "eve", "the cane is off") == ""
@@ -161,7 +161,7 @@ def test_accepted_points_follow_an_order_asked_for_and_the_others_keep_their_pla
     q.arrange(("d", "a", "c"))
     assert [e.point_id for e in q.entries()] == ["d", "b", "a", "c"]
     assert q.next().point.point_id == "d"
-    q.intend("d", "cut-1")
+    q.begin_cut("d", "cut-1")
     q.resolve("d", "DONE", "cut")
     assert q.next().point.point_id == "a"
     q.arrange(())
@@ -187,7 +187,7 @@ def test_a_decision_is_taken_back_until_the_cut_begins():
     assert queue.reject("a", "Ada", "wrong cane") == "" and queue.reconsider("a", "Ada") == ""
     assert queue.entries()[0].state == "PROPOSED" and queue.entries()[0].reason == ""
     assert queue.accept("a", POINT.revision, "Ada") == ""
-    queue.intend("a", "c1")
+    queue.begin_cut("a", "c1")
     assert "nothing to take back" in queue.reconsider("a", "Ada")
 
 

@@ -96,7 +96,7 @@ def test_what_a_person_is_asked_about_is_told_with_its_point_until_perception_sh
 def test_what_is_done_or_rejected_stays_so():
     life = begun(point(), point("b", position=(2.0, 0.85, 1.0)))
     life.queue.accept("a", 3, "ada")
-    life.queue.intend("a", "run-1")
+    life.queue.begin_cut("a", "run-1")
     life.queue.resolve("a", "DONE", "cut")
     life.queue.reject("b", "ada", "a wire behind it")
     for _ in range(3):
@@ -110,7 +110,7 @@ def test_what_is_done_or_rejected_stays_so():
 def test_an_intent_without_a_result_is_unknown_and_stays_so():
     life = begun(point())
     life.queue.accept("a", 3, "ada")
-    life.queue.intend("a", "run-1")
+    life.queue.begin_cut("a", "run-1")
     life = life.restarted()
     assert life.state() == "UNKNOWN" and life.queue.next() is None
     life.queue.update(shown(point()))
@@ -128,7 +128,7 @@ def test_proposals_are_left_to_perception():
 def test_a_name_that_perception_gives_to_another_cane_after_its_restart_keeps_both_apart():
     life = begun(point())
     life.queue.accept("a", 3, "ada")
-    life.queue.intend("a", "run-1")
+    life.queue.begin_cut("a", "run-1")
     life = life.restarted()
     life.queue.update(shown(point(position=(3.0, 0.85, 1.0))))
     states = {entry.point_id: entry.state for entry in life.queue.entries()}
@@ -142,7 +142,7 @@ def test_a_name_that_perception_gives_to_another_cane_after_its_restart_keeps_bo
 def test_an_intent_is_held_only_when_its_own_record_is_durable():
     life = begun(point())
     life.queue.accept("a", 3, "ada")
-    number = life.queue.intend("a", "run-1")
+    number = life.queue.begin_cut("a", "run-1")
     life.journal.observe(LedgerState(number - 1), 0.0)
     assert not life.queue.recorded(number)
     life.journal.observe(LedgerState(number), 0.0)

@@ -6,7 +6,7 @@ import pytest
 from msgspec import structs
 
 from controller.core import Controller
-from controller.ledger.journal import PreviewRow
+from controller.ledger.journal import PreviewRequiredRow
 from controller.planning import preview as preview_module
 from controller.planning.preview_plan import PreviewRequest
 from rolling_panda import commands as intents
@@ -185,7 +185,7 @@ def test_there_is_nothing_to_preview_without_an_accepted_point(p):
 
 def test_what_was_required_is_required_after_a_restart(rolled):
     controller = Controller(CONFIG, RobotConfig())
-    controller.restore((), preview=PreviewRow(required=True))
+    controller.restore((), preview=PreviewRequiredRow(required=True))
     p = Previewed(POINTS, controller, roll=rolled)
     p.ask(intents.AcceptAll)
     assert p.state.required

@@ -8,7 +8,7 @@ import msgspec
 
 from controller.config import ControllerConfig
 from controller.ledger.check import verify
-from controller.ledger.journal import ApproachRow, Journal, OrderRow, PreviewRow, TicketRow
+from controller.ledger.journal import ApproachRow, Journal, OrderRow, PreviewRequiredRow, TicketRow
 from controller.ledger.start import Restored, restored, start_record
 from controller.ledger.store import FILE, Entry, Ledger
 from controller.work.point_queue import PointQueue
@@ -34,7 +34,7 @@ def test_the_newest_of_each_row_is_restored_and_nothing_of_an_empty_ledger(tmp_p
     rows = [
         *(("ticket", row.point.point_id, row) for row in (old, other, new)),
         *(("order", "order", row) for row in orders),
-        *(("preview", "preview", PreviewRow(required=required)) for required in (True, False)),
+        *(("preview", "preview", PreviewRequiredRow(required=required)) for required in (True, False)),
         *(
             ("approach", name, ApproachRow(azimuth=azimuth))
             for name, azimuth in (("p1", 0.1), ("p2", 0.2), ("p1", 0.3))
@@ -44,13 +44,13 @@ def test_the_newest_of_each_row_is_restored_and_nothing_of_an_empty_ledger(tmp_p
         ledger.append([Entry("t", kind, name, msgspec.json.encode(row).decode()) for kind, name, row in rows])
     found = restored(tmp_path)
     assert found.tickets == (other, new)
-    assert (found.order, found.preview) == (orders[-1], PreviewRow(required=False))
+    assert (found.order, found.preview) == (orders[-1], PreviewRequiredRow(required=False))
     assert found.approaches == (("p2", ApproachRow(azimuth=0.2)), ("p1", ApproachRow(azimuth=0.3)))
 
 
 def test_a_cut_under_way_in_a_ledger_of_schema_1_is_restored(tmp_path):
     row = TicketRow(point=pruning_point("p1"), state="CUTTING", cut_id="run-1", user="ada")
-    body = msgspec.json.encode(row).decode().replace('"state":"CUTTING"', '"state":"CUTTING"')
+    body = msgspec.json.encode(row).decode().replace('"state":"CUTTING"', '"state":"INTENT"')
     with Ledger(tmp_path) as ledger:
         ledger.append([Entry("t", "ticket", "p1", body)])
     database = sqlite3.connect(tmp_path / FILE, isolation_level=None)

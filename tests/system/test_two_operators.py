@@ -144,7 +144,7 @@ class Operators(RuleBasedStateMachine):
             return
         name = ticket.point.point_id
         self.robot.cuts += 1
-        self.robot.queue.intend(name, f"cut-{self.robot.cuts}")
+        self.robot.queue.begin_cut(name, f"cut-{self.robot.cuts}")
         self.robot.record()
         if outcome == "killed":
             self.robot.begin()
