@@ -18,7 +18,7 @@ from rolling_panda import messages as m
 _ANSWER_S = 0.8
 
 
-#: What cannot be made durable within this time is told as not recorded (s).
+#: Time limit of a record; after it the answer is "not recorded" (s).
 _PATIENCE_S = 0.6
 
 
@@ -32,12 +32,12 @@ class CommitBarrier:
     def hold(self, number: int, now: float, say: Callable[[str], None]) -> None:
         """Call `say` once all records up to `number` are durable.
 
-        It is given an empty text then, or why they are not.
+        `say` gets an empty text, or the reason why they are not durable.
         """
         self._waiting.append((number, now, say))
 
     def settle(self, ledger: LedgerState, now: float) -> None:
-        """Say what may be said now."""
+        """Call the functions whose records are durable."""
         while self._waiting:
             number, since, say = self._waiting[0]
             why = ""
@@ -55,7 +55,7 @@ class CommandInbox:
     """`ask` from any thread; `decide` on the loop's."""
 
     def __init__(self, controller: Controller, barrier: CommitBarrier) -> None:
-        """Bind who decides, and what holds answers back until they are durable."""
+        """Bind the controller, and the barrier that holds answers until they are durable."""
         self._controller, self._barrier = controller, barrier
         self._waiting: queue.SimpleQueue[tuple[intents.Intent, float, Future[m.Answer]]] = queue.SimpleQueue()
 
@@ -73,13 +73,13 @@ class CommandInbox:
             return m.Answer(ok=False, reason="it was decided, but not recorded in time: see the state")
 
     def decide(self, now: float) -> None:
-        """Put what waits to the controller; each answer goes out when it is durable."""
+        """Pass the waiting commands to the controller. Each answer is sent when it is durable."""
         while not self._waiting.empty():
             intent, asked_at, future = self._waiting.get()
             # What they had seen has grown older while they waited.
             view_age_s = intent.view_age_s + time.monotonic() - asked_at
             intent = msgspec.structs.replace(intent, view_age_s=view_age_s)
-            # What nobody waits for any more must not be done.
+            # A command whose caller has given up must not be executed.
             if future.set_running_or_notify_cancel():
                 self._hold(self._controller.answer(intent, now), future, now)
 

@@ -13,7 +13,7 @@ from rolling_panda.config import RobotConfig
 from rolling_panda.errors import RollingPandaError
 from rolling_panda.runtime.scheduling import set_priority
 
-#: How long the process is waited for when it is told to end (s).
+#: Time limit for the process to end (s).
 _END_S = 2.0
 
 

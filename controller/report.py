@@ -29,23 +29,23 @@ def controller_state(
     relaxed_limits: tuple[str, ...],
     now: float,
 ) -> m.ControllerState:
-    """The message of what the controller does and sees now.
+    """The message of the controller's state.
 
     Args:
-        config: Of the controller.
-        robot: Its model.
-        state: Of the supervision machine.
-        phase: Of the cut sequence.
-        active: Point being worked on.
-        measured: Robot as measured, None before the first joint state.
-        tracking: Of the motion under way.
-        allowed: Intents that would be taken.
-        inputs: Newest of everything.
+        config: Section `[controller]`.
+        robot: Robot model.
+        state: State of the supervision state machine.
+        phase: Phase of the cut sequence.
+        active: Current point of the work.
+        measured: Measured state of the robot; None before the first joint state.
+        tracking: Tracking of the current motion.
+        allowed: Commands that are allowed.
+        inputs: Newest inputs.
         queue: Points in the order of work.
-        nearest: What the last step's method found nearest to the robot.
-        order: Whose order that is.
-        interrupted: What a pause or a protective stop has ended.
-        relaxed_limits: What the configuration sets less strictly than usual.
+        nearest: Smallest distance in the last step.
+        order: Origin of that order.
+        interrupted: Activity that a pause or a protective stop interrupted.
+        relaxed_limits: Safety limits that the configuration sets less strictly than usual.
         now: Monotonic time (s).
     """
     omega = 0.0
@@ -54,7 +54,7 @@ def controller_state(
     elif measured is not None:
         omega = arm_omega(measured.kinematics.J)
     desired = tracking.desired if tracking is not None else None
-    # In work the sequence itself says why something was given up; a hand has to be told at once.
+    # In work the sequence reports why it gave up; motion by hand has to be reported at once.
     held = tracking.reason if tracking is not None and state.mode == "TELEOP" else ""
     return m.ControllerState(
         header=m.Header(now, "odom"),

@@ -142,7 +142,7 @@ class EventLogger:
     """Collects log lines until they are drained. The current step or answer sets `now`."""
 
     def __init__(self, journal: Journal) -> None:
-        """Nothing is said yet; what will be goes into the journal too."""
+        """Start without lines. Lines are also recorded in the journal."""
         self._journal = journal
         self._events: list[m.LogEvent] = []
         self.now = 0.0
@@ -154,6 +154,6 @@ class EventLogger:
         self._journal.add("event", "controller", event)
 
     def drain(self) -> tuple[m.LogEvent, ...]:
-        """What was said since the last time."""
+        """Return and remove the lines since the last call."""
         events, self._events = tuple(self._events), []
         return events

@@ -73,7 +73,7 @@ class SessionReportBuilder:
         )
 
     def _ticket(self, row: TicketRow, when: float) -> bool:
-        """Returns whether the report tells of it. A point keeps the id of its last cut when it is accepted anew."""
+        """Add a row; returns whether it changes the report. A point that is accepted again keeps its last cut id."""
         point_id = row.point.point_id
         before = self._beyond.pop(point_id, None)
         if row.state == "UNREACHABLE":
@@ -104,7 +104,7 @@ class SessionReportBuilder:
         elif known is not None and row.state in _ENDED:
             told = replace(known, outcome=row.state, reason=row.reason[:500], user=row.user or known.user)
             if not known.outcome:
-                # Somebody may say later how it ended, which takes the robot no time.
+                # A person may report the outcome later; the robot spends no time on that.
                 told = replace(told, ended_at=when, seconds=max(when - self._ready_since, 0.0))
                 self._ready_since = when
             self._cuts[row.cut_id] = told

@@ -159,7 +159,7 @@ class Ledger:
         return (0, ORIGIN) if found is None else (int(found[0]), bytes(found[1]))
 
     def _check_end(self) -> None:
-        """Nothing is added to what has lost its end or whose newest row has been changed."""
+        """Refuse a ledger whose end is missing or whose newest row was changed."""
         problem = ""
         with _told(self.path, "read"):
             rows = list(read(self._database, "ORDER BY number DESC LIMIT 2"))

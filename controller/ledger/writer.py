@@ -57,7 +57,7 @@ class LedgerWriter:
         self._closing = False
         self._state = LedgerState()
         self._account = SessionReportBuilder()
-        #: Of what is durable; made anew on the writer's thread when something in it changes.
+        #: Report of the durable rows, rebuilt on the writer's thread when it changes.
         self.report = self._account.report()
         self._lines, self._left_out = TokenBucket(_LINES_A_SECOND, _LINES_AT_ONCE), 0
         self._thread = threading.Thread(target=self._run, name="ledger", daemon=True)

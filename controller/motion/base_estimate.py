@@ -10,20 +10,20 @@ from rolling_panda.model.differential_drive import Array, DifferentialDrive, Pos
 
 #: Odometry is carried forward by no more than this (s); older odometry is a fault, not something to guess from.
 _LONGEST = 0.1
-#: Share of what odometry says otherwise that is believed at once: its noise must not shake the tool.
+#: Gain of the odometry correction, small so that odometry noise does not shake the tool.
 _BELIEVED = 0.2
-#: What odometry says further away than this (m, rad) is no noise: the estimate begins anew.
+#: A larger difference from the odometry (m, rad) is no noise: the estimate is reset.
 _ELSEWHERE = 0.05
 
 
 def wheels_ahead(wheels: Array, sent: Array, ahead: float, lag: float) -> Array:
-    """Velocities that the wheels will have (2, rad/s): they follow their command with a first-order lag.
+    """Predicted velocities of the wheels (2, rad/s), which follow their command with a first-order lag.
 
     Args:
         wheels: As measured (2, rad/s).
-        sent: What they were told last (2, rad/s).
-        ahead: How far to look (s).
-        lag: Time constant (s); 0 takes them for what they were told.
+        sent: Last command (2, rad/s).
+        ahead: Prediction horizon (s).
+        lag: Time constant (s); 0 returns the command.
     """
     left = math.exp(-ahead / lag) if lag > 0.0 else 0.0
     return np.array([told + (now - told) * left for now, told in zip(wheels.tolist(), sent.tolist(), strict=True)])
@@ -74,7 +74,7 @@ class BaseEstimate:
             past.popleft()
 
     def _correct(self, odometry: m.Odometry, stamp: float) -> None:
-        """Move the frame by what the odometry says of the pose at its time, compared with what was believed."""
+        """Correct the frame by the difference of odometry and estimate at the time of the odometry."""
         then = odometry.header.stamp
         known = next((entry for entry in reversed(self._past) if entry[0] <= then), None)
         if known is None or stamp - then > _LONGEST:

@@ -48,13 +48,13 @@ class Body:
         self.measured: Measured | None = None
 
     def update(self, inputs: Inputs) -> None:
-        """Take in what was measured and what stands around."""
+        """Update state and obstacles from the inputs."""
         if inputs.joints is not None:
             self.tracking_error.update(inputs.joints.message, self.setpoints.sent)
         if inputs.joints is not None and inputs.odometry is not None:
             sent = self.setpoints.sent
             q = self._base.configuration(inputs.joints.message, inputs.odometry.message)
-            # What the arm is told now it does after its own lag; that is when it has to fit the base's velocity.
+            # The arm executes this command after its lag. It has to match the base's velocity at that time.
             ahead = self._config.arm_lag_s + 0.5 * self.dt
             measured = np.array(inputs.joints.message.velocity[:2])
             wheels = wheels_ahead(measured, sent[:2], ahead, self._config.base_lag_s)

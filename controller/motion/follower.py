@@ -94,7 +94,7 @@ class Follower:
         return _tracking(out, wanted.T_odom_tool, error, motion.done)
 
     def _twist(self, wanted: ToolState, scale: float, error: Array, robot: Measured) -> Array:
-        """Twist (6) to ask for: the wanted one, what makes good the error, and a lead for the servos' lag."""
+        """Commanded twist (6): desired twist, error feedback, and a lead for the servos' lag."""
         J, twist = robot.kinematics.J_xi, np.empty(6)
         before, self._J_before = J if self._J_before is None else self._J_before, J
         _ask(
@@ -118,12 +118,12 @@ class Follower:
         return _tracking(self._method.solve(problem), None, np.zeros(6), False)
 
     def carry(self, goal: Any, linear: float, angular: float, robot: Measured, speed_scale: float = 1.0) -> Tracking:
-        """One period with the tool kept to a pose while the base moves under it, as far as the arm allows.
+        """One period with the tool at a fixed pose while the base moves, as far as the arm allows.
 
         Args:
             goal: T_odom_tool wanted (pin.SE3).
             linear: Forward velocity of the base (m/s).
-            angular: Its yaw rate (rad/s).
+            angular: Yaw rate of the base (rad/s).
             robot: Measured robot.
             speed_scale: Share of the tool's speed to use.
         """
@@ -135,13 +135,13 @@ class Follower:
     def seek(
         self, goal: Any, q_goal: Array, robot: Measured, base: BaseMode = "free", speed_scale: float = 1.0
     ) -> Tracking:
-        """One period towards a pose that may move (teleoperation): proportional, at a bounded speed and turn.
+        """One period towards a pose that may move (teleoperation): proportional, with bounded linear and angular speed.
 
         Args:
             goal: T_odom_tool wanted (pin.SE3).
-            q_goal: Configuration (12) of which heading and arm posture are kept to.
+            q_goal: Configuration (12) with the desired heading and arm posture.
             robot: Measured robot.
-            base: What the base is for.
+            base: Role of the base.
             speed_scale: Share of the tool's speed to use.
         """
         posture = q_goal.copy()
@@ -221,7 +221,7 @@ def _ask(
     error: Array,
     twist: Array,
 ) -> None:
-    """Twist = ẋ_d + K e + τ (ẍ_d − J̇ ξ̇): wanted beforehand, so that the servos have what is wanted when it is.
+    """Twist = ẋ_d + K e + τ (ẍ_d − J̇ ξ̇): a lead by the servos' time constant, so that they follow without delay.
 
     Args:
         wanted: ẋ_d (6).

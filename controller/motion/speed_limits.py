@@ -36,7 +36,7 @@ class PlanLimits:
     dt: float = 0.01
 
     def arm_rates(self, span: Array) -> Rates:
-        """Bounds of the share 0…1 of a straight joint motion over `span` (7, rad), so that no joint breaks its own."""
+        """Limits of the progress 0…1 of a straight joint motion over `span` (7, rad) that keep all joint limits."""
         size = np.maximum(np.abs(span), 1e-9)
         return Rates(
             float((self.arm_velocity / size).min()),
@@ -55,15 +55,16 @@ def plan_limits(
     joint_margin: float = 0.03,
     dt: float = 0.01,
 ) -> PlanLimits:
-    """Bounds that leave feedback some room below the robot's own.
+    """Limits for planning, below the robot's own limits to leave margin for feedback.
 
     Args:
-        robot: Whose limits they are.
-        base_speed: Of the base (m/s).
-        base_yaw_rate: Of the base (rad/s).
-        base_acceleration: Of the base (m/s²). With the arm stretched forward the base tips at about 0.7 to 1.7 m/s².
-        arm_share: Share of the arm's rated velocities.
-        arm_acceleration_share: Share of its rated accelerations.
+        robot: The robot model.
+        base_speed: Speed of the base (m/s).
+        base_yaw_rate: Yaw rate of the base (rad/s).
+        base_acceleration: Acceleration of the base (m/s²). With the arm stretched forward the base tips at about 0.7 to
+            1.7 m/s².
+        arm_share: Fraction of the arm's rated velocities.
+        arm_acceleration_share: Fraction of its rated accelerations.
         joint_margin: Distance kept from every joint limit (rad).
         dt: Control period (s).
     """

@@ -82,7 +82,7 @@ def touchable(canes: Sequence[Capsule], axes: Axes, places: Sequence[Array]) -> 
 
 
 def obstacles_of(capsules: Sequence[Capsule]) -> list[Obstacle]:
-    """What the wire says stands around, as the collision model has it; named by kind, number and spur."""
+    """Obstacles for the collision model from their message, named by kind, number and spur."""
     return [
         Obstacle(
             f"{capsule.kind} {number}" + (f" of vine {capsule.vine}, spur {capsule.spur}" if capsule.spur >= 0 else ""),

@@ -13,7 +13,7 @@ from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
 from rolling_panda.model.differential_drive import NXI, Array, DifferentialDrive
 from rolling_panda.model.robot import ARM_XI, placement
 
-#: Who sees the robot no later than this (s) moves it at full speed, who sees it later than that at the slowest.
+#: Delay of the view up to which the speed is full, and from which it is the lowest (s).
 _PROMPT_S, _LATE_S, _SLOWEST = 0.25, 0.5, 0.25
 
 
@@ -48,9 +48,9 @@ class Teleoperation:
         return self._message is not None and _means_something(message)
 
     def _take(self, teleop: Sample[TeleopTarget] | None) -> Sample[TeleopTarget] | None:
-        """The newest demand by its number; one that comes late or twice counts for nothing.
+        """The newest target by its number. Late or repeated ones are ignored.
 
-        After a silence that has ended the hold any number is taken: a server that has started again counts from one.
+        After a timeout has ended the hold any number is accepted, because a restarted server counts from one.
         """
         last = self._newest
         if teleop is not None and (
@@ -89,7 +89,7 @@ class Teleoperation:
 
 
 def latency_speed_scale(round_trip_s: float) -> float:
-    """Share of the speed that a hand gets, by how late it sees the robot: all up to 0.25 s, a quarter from 0.5 s on."""
+    """Speed scale by the delay of the operator's view: 1 up to 0.25 s, 0.25 from 0.5 s on."""
     slow = (round_trip_s - _PROMPT_S) / (_LATE_S - _PROMPT_S)
     return 1.0 - (1.0 - _SLOWEST) * min(max(slow, 0.0), 1.0)
 

@@ -91,10 +91,10 @@ class ToolMotion:
             start: T_odom_tool at the beginning (pin.SE3).
             q_start: Configuration (12) at the beginning.
             legs: At least one.
-            slow_end: True for the way to the cut: the last `slow_zone` is at `cut_speed`.
-            free_axis: True where the rotation about the tool's y does not matter.
-            flows: False makes every leg end at rest before the next one begins.
-            waits: True where it may have to wait at its end until it is extended: the base may still move there.
+            slow_end: True for the motion to a cut: the last `slow_zone` is at `cut_speed`.
+            free_axis: True leaves the rotation about the tool's y free.
+            flows: False ends every segment at rest before the next one begins.
+            waits: True if the motion may wait at its end for an extension; the base may still move then.
         """
         self._config, self._slow_end, self.free_axis = config, slow_end, free_axis
         self._flows, self._waits_until = flows, math.inf if waits and flows else 0.0
@@ -127,10 +127,10 @@ class ToolMotion:
         return "row" if self._free[0] <= self.time < max(self._free[1], self._waits_until) else "frozen"
 
     def extend(self, leg: Leg) -> None:
-        """Go on with one more leg, to a cut, with the base where it ends now; it flows into what is left of the last.
+        """Append a segment to a cut, with the base at its current goal. It blends into the rest of the last segment.
 
         Args:
-            leg: Its end is the goal from now on, and the last `slow_zone` is slow.
+            leg: Its end is the new goal. The last `slow_zone` is slow.
         """
         config, last = self._config, self._legs[-1]
         made = _placed(config, last.leg.goal, last.leg.q_goal, [leg], self._flows, None, 0.0)[0]
@@ -155,7 +155,7 @@ class ToolMotion:
         self.duration = max(self.duration, made.end)
 
     def settle(self, q: Array) -> None:
-        """From now on keep the tool where it should be and the arm otherwise as it is at q (12), once."""
+        """Hold the tool at its desired pose, with the arm posture of q (12); effective once."""
         if self._settled is None:
             self._settled = Posture(q.copy())
 
@@ -222,7 +222,7 @@ def _timed(
     travel = float(np.hypot(*(legs[-1].q_goal[:2] - q_start[:2])))
     # With room for feedback.
     base_s = Rates(0.8 * config.base_speed, 0.75 * config.base_acceleration, 10.0).duration(travel)
-    # The leg that waits for the base: where the tool's line matters least.
+    # The segment that waits for the base: there the line of the tool matters least.
     waits = next((i for i, leg in enumerate(legs) if leg.frozen_until == leg.frozen_within == 0.0), None)
     extra = 0.0
     while True:

@@ -7,7 +7,7 @@ import numpy as np
 from rolling_panda import messages as m
 from rolling_panda.model.differential_drive import NXI, Array
 
-#: By how much wheels and joints may be away from what was sent (rad). In motion at full speed the servos'
+#: Largest tracking error of wheels and joints (rad). In motion at full speed the servos'
 #: lag and the wire's take up 0.1 rad of a joint and 0.3 rad of a wheel.
 WHEELS_RAD, JOINTS_RAD = 1.0, 0.35
 #: What was missed long ago is forgotten with this time constant (s).

@@ -97,10 +97,10 @@ class PoseTrajectory:
             start: T_odom_tool (pin.SE3) at the beginning.
             goal: T_odom_tool (pin.SE3) at the end.
             translation: Bounds of the tool's origin (m).
-            rotation: Bounds of its turning (rad).
-            at_least: Shortest duration (s), for what else has to move in that time.
+            rotation: Bounds of the tool's rotation (rad).
+            at_least: Shortest duration (s), for other motions in that time.
             straight: True for the straight line between the origins. A screw with a turn bulges sideways by about an
-                eighth of length times turn, which over a long way is more than the distance kept from the canes.
+                eighth of length times rotation. Over a long distance that exceeds the clearance from the canes.
         """
         self.start, self.goal = start, goal
         self._straight = straight
@@ -136,14 +136,14 @@ class PoseTrajectory:
         return ToolState(placement, way * progress.rate, acceleration)
 
     def add(self, time: float, position: Array, R: Array, twist: Array, acceleration: Array) -> None:
-        """Carry a straight motion along with another: what it does alone by `time` (s) comes on top of that one.
+        """Add the displacement of a straight motion at `time` (s) to another motion.
 
         Args:
-            time: Of the motion's own clock (s).
-            position: Of the tool (3), without this motion; changed.
-            R: Its rotation (3×3), changed.
-            twist: Its twist (6), changed.
-            acceleration: The rate of that (6), changed.
+            time: Time on this motion's clock (s).
+            position: Position of the tool (3) without this motion; changed.
+            R: Rotation of the tool (3×3); changed.
+            twist: Twist of the tool (6); changed.
+            acceleration: Rate of the twist (6); changed.
 
         Raises:
             InputError: The motion is not straight.

@@ -43,12 +43,12 @@ class ArmPathPlanner:
     """Plans paths of the arm with the base at rest."""
 
     def __init__(self, collision: CollisionModel, limits: PlanLimits, seed: int = 0) -> None:
-        """Bind what is in the way.
+        """Bind the collision model.
 
         Args:
-            collision: Of the robot among obstacles.
+            collision: Collision model of robot and obstacles.
             limits: Joint limits with margin, and the clearance.
-            seed: Of the search.
+            seed: Random seed of the search.
         """
         self._collision, self._limits, self._seed = collision, limits, seed
 
@@ -153,7 +153,7 @@ class ArmPathPlanner:
         return way
 
     def _free(self, place: Array, a: Array, b: Array, least: float | None = None) -> bool:
-        """Whether the arm can go straight from a to b; looks at the middle first, where most ways end."""
+        """Whether the straight line from a to b is free. It checks the middle first, where most collisions are."""
         count = int(np.ceil(float(np.abs(b - a).max()) / _LOOK))
         needed = self._limits.clearance if least is None else least
         for fraction in _halving(count):

@@ -28,7 +28,7 @@ from rolling_panda.model.robot import RobotModel
 
 #: From the blades' command to its outcome (s); an estimate, for the session's length alone.
 CLOSING_S = 0.5
-#: Rows of a way between two looks at the arm's manipulability.
+#: Rows of a motion between two evaluations of the arm's manipulability.
 _LOOK = 10
 
 #: Rows of a plan are no closer than this (s): at an arm's rate of 1 kHz more of them would say nothing more.
@@ -118,7 +118,7 @@ class CutPlanner:
         return Target(name, stand, hold_s)
 
     def _cut(self, point: PruningPoint, cut: CutPlan, stop: Stop) -> PlannedCut | str:
-        """All that is said of a cut, or why its way is not to be driven."""
+        """Figures of a cut, or the reason why its motion is refused."""
         way = stop.planned.plan
         tightest = None
         if len(way.t) > 1:

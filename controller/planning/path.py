@@ -20,7 +20,7 @@ from rolling_panda.model.robot import ARM_Q, RobotModel
 
 #: Arm folded over the base for driving among obstacles.
 _FOLDED = np.array([0.0, -1.2, 0.0, -2.7, 0.0, 1.9, 0.785])
-#: How far beside what is in the way the base goes round it (m).
+#: Lateral distance at which the base passes an obstacle (m).
 _ROUND = (0.75, 1.1, 1.6)
 #: Body of the base: rear, front and half width (m, vendor's mesh).
 _OUTLINE = (-0.523, 0.190, 0.290)
@@ -141,7 +141,7 @@ class PathPlanner:
         return arm_samples(found, self._limits) if isinstance(found, ArmPath) else found
 
     def _round(self, start: Array, goal: Array) -> Iterator[BaseMotion]:
-        """Ways that leave the straight line to either side, in its middle and where obstacles stand beside it."""
+        """Paths that leave the straight line to either side, in its middle and beside obstacles."""
         line = goal[:2] - start[:2]
         length = float(np.hypot(*line))
         if length < 1e-6:
@@ -161,7 +161,7 @@ class PathPlanner:
                     yield self._base.via([start, np.array([*point, heading]), goal])
 
     def _runs_into(self, base: BaseMotion) -> bool:
-        """Whether the body's outline goes over the foot of an obstacle; cheap, and says nothing of what is above it."""
+        """Whether the outline of the base covers the foot of an obstacle. A cheap check that ignores what is above."""
         feet = [(*min(o.start, o.end, key=lambda end: end[2])[:2], o.radius) for o in self._collision.obstacles]
         x, y, radius = np.array(feet).T
         poses = base.poses[::5, :, None]
@@ -173,9 +173,9 @@ class PathPlanner:
         return bool((over & low).any())
 
     def _look(self, plan: Plan) -> Clearance | None:
-        """The first place on the way that is too near, None where none is. Skips as far as nothing can have happened.
+        """First row of the motion that is too near to an obstacle; None without one. Skips rows that cannot collide.
 
-        A start that is too near may get 2 mm nearer while it gets away.
+        A start that is too near may come 2 mm nearer while it leaves.
         """
         travel, row, last = plan.travel(), 0, len(plan.t) - 1
         needed = self._limits.clearance - _BETWEEN
@@ -191,7 +191,7 @@ class PathPlanner:
             row = min(last, travel.next_row(row, least.distance - needed))
 
     def _least(self, plan: Plan) -> Clearance:
-        """The least distance of a plan that was looked over, to a few millimetres."""
+        """Smallest distance of a checked plan, accurate to a few millimetres."""
         travel, row, last = plan.travel(), 0, len(plan.t) - 1
         needed = self._limits.clearance - _BETWEEN
         least: Clearance | None = None

@@ -23,7 +23,7 @@ from rolling_panda.messages.supervision import PreviewedCut
 from rolling_panda.messages.types import WOOD_CLASSES
 from rolling_panda.model.differential_drive import Array
 
-#: What was known, seen again, is where it was to within this (m).
+#: Accuracy of the position of a known obstacle that is seen again (m).
 SAME = 0.005
 #: Places of the motion that are looked at together.
 _BLOCK = 16
@@ -35,12 +35,12 @@ class PathWatch:
     """One instance for each preview. A check takes about a millisecond, longer if many obstacles are near."""
 
     def __init__(self, preview: Preview, swept: SweptVolume, settings: HierarchyConfig) -> None:
-        """Look after one motion.
+        """Watch one motion.
 
         Args:
-            preview: What was shown.
-            swept: The room that it takes up.
-            settings: Say which distances are kept.
+            preview: The approved preview.
+            swept: Swept volume of the motion.
+            settings: Distances of the collision guard.
         """
         self._preview, self._swept = preview, swept
         self._before = preview.request.obstacles
@@ -57,11 +57,11 @@ class PathWatch:
         self._high = np.max([way.high.max(axis=0, initial=-np.inf) for way in self._ways], axis=0, initial=-np.inf)
 
     def changed(self, now: Sequence[Capsule], first: str = "") -> str:
-        """What has come too near, in words; empty where nothing has.
+        """Description of an obstacle that is too near; empty without one.
 
         Args:
-            now: What stands around now.
-            first: Point that the work has come to; the motion before that has been made. Empty: none has.
+            now: Current obstacles.
+            first: Current point of the work; the motion before it is finished. Empty at the start.
         """
         fresh = [capsule for capsule in now if capsule not in self._known]
         spots = self._new_spots(fresh)
@@ -100,7 +100,7 @@ class PathWatch:
         return spots
 
     def _needed(self, fresh: Sequence[Capsule], spots: Array, cut: PreviewedCut, touched: set[Capsule]) -> Array:
-        """How far each part has to be from each spot on the way to a cut (p×m, m); −∞ where it may touch it."""
+        """Required distance of each part from each spot on the motion to a cut (p×m, m); −∞ if contact is allowed."""
         shown = min(cut.clearance, PlanLimits.clearance) - SAME
         needed = np.maximum(np.column_stack([self._kept[capsule.kind] for capsule in fresh]), shown)
         needed[np.ix_(self._blades, [capsule in touched for capsule in fresh])] = -math.inf
@@ -168,16 +168,16 @@ def _look(
     needed: Array,
     out: Array,
 ) -> None:
-    """Write what lacks most: by how much (m), row of `placed`, part, spot, distance (m); nothing where nothing lacks.
+    """Write the largest violation: amount (m), row of `placed`, part, spot, distance (m); nothing without one.
 
     Args:
-        placed: All parts of one place after the other (k p×12).
-        low: Corner of a box around each part at `_BLOCK` places after each other (blocks p×3, m).
+        placed: All parts of one sample after the other (k p×12).
+        low: Lower corner of a box around each part over `_BLOCK` samples (blocks p×3, m).
         high: The opposite corner.
-        half: Of the parts (p×3, m).
-        around: Of the parts (p, m).
+        half: Half sizes of the parts (p×3, m).
+        around: Radii of the parts (p, m).
         spots: Middle and radius (m×4, m).
-        needed: (p×m, m).
+        needed: Required distances (p×m, m).
         out: Written (5).
     """
     parts = len(around)

@@ -79,15 +79,15 @@ def arm_samples(path: ArmPath, limits: PlanLimits) -> Array:
 
 
 def assemble(robot: RobotModel, q: Array, base: BaseMotion, arm: Array, limits: PlanLimits, wait: "Wait") -> Plan:
-    """One plan of a base motion and the arm's samples (n×7), each after its waiting rows.
+    """Plan of a base motion and the arm's samples (n×7), each after its waiting rows.
 
     Args:
-        robot: For the tool's poses.
+        robot: Robot model, for the tool's poses.
         q: Configuration (12) at the start.
         base: Motion of the base.
         arm: Postures of the arm.
-        limits: For the control period.
-        wait: Rows that base and arm stand still before they begin.
+        limits: Limits, for the control period.
+        wait: Number of rows for which base and arm wait.
     """
     count = max(wait.base + len(base.wheels) + 1, wait.arm + len(arm))
     rows = np.empty((count, NQ))
@@ -113,12 +113,12 @@ class Wait:
 
 
 def orders(base: BaseMotion, arm: Array, late: bool) -> Iterator[Wait]:
-    """Ways to put a base motion and an arm motion together: at once, the base first, the arm first.
+    """Combinations of a base motion and an arm motion: together, the base first, the arm first.
 
     Args:
         base: Motion of the base.
         arm: Postures of the arm (n×7).
-        late: True to let the arm end together with the base, not begin with it.
+        late: True lets base and arm end together instead of beginning together.
     """
     waits = len(base.wheels) - len(arm) + 1
     yield Wait(base=max(-waits, 0), arm=max(waits, 0)) if late else Wait()

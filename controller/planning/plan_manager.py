@@ -57,19 +57,19 @@ class PlanManager:
         now: float,
         busy: str = "",
     ) -> PlanRequest | None:
-        """Take a new plan, judge the one there is, and ask for another where that is due.
+        """Accept a new plan, check the current one, and request another if needed.
 
         Args:
-            made: Newest answer of the planner; the same object until there is another.
+            made: Newest result of the planner; the same object until the next one.
             q: Configuration (12) now, None before the first measurement.
-            obstacles: What stands in the way now.
-            at_rest: Whether the robot stands still.
-            working: Whether the robot works off the queue, which moves it from where the plan begins.
+            obstacles: Current obstacles.
+            at_rest: Whether the robot is at rest.
+            working: Whether the robot executes the queue, which moves it away from the start of the plan.
             now: Monotonic time (s).
-            busy: The point that is worked on now; empty when none.
+            busy: Current point of the work; empty without one.
 
         Returns:
-            What to plan; None when nothing is to be planned now.
+            The next request; None without one.
         """
         if made is not None and self._asked is not None and made.request.number == self._asked.number:
             self._take(made)
@@ -93,13 +93,13 @@ class PlanManager:
 
     @property
     def cuts(self) -> dict[str, CutPlan] | None:
-        """What the plan says of each point that it works on; None while one is being made."""
+        """Planned cuts by point id; None while a plan is computed."""
         if self._state == "planning" or (self._state in ("none", "void") and self._queue.next() is not None):
             return None
         return {name: cut.cut for name, cut in self._cuts.items()} if self.valid else {}
 
     def known(self, ticket: Ticket) -> CutPlan | None:
-        """What the plan says of a point as it was accepted; None where it says nothing that holds."""
+        """The planned cut of an accepted point; None without a valid one."""
         plan, point_id = self._plan, ticket.point.point_id
         if plan is None or ticket.accepted not in plan.request.points:
             return None
@@ -109,7 +109,7 @@ class PlanManager:
         return cut.cut if cut is not None and self.valid else None
 
     def message(self, now: float) -> SessionPlan | None:
-        """The plan for the wire where it is due: changed, or not said for a while."""
+        """The message of the plan when it is due: after a change, and periodically."""
         if not self._fresh and now - self._said_at < _REPEAT_S:
             return None
         self._fresh, self._said_at = False, now

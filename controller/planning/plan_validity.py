@@ -14,15 +14,15 @@ from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_Q
 from rolling_panda.model.wire_values import vector3
 
-#: Something stands where nothing within this of it (m) stood when the plan was made.
+#: An obstacle is new if no known one was within this distance (m).
 OBSTACLE_TOLERANCE = 0.05
 #: The robot at rest has left the place that the plan begins from: base (m), heading and arm joints (rad).
 PLACE_TOLERANCE, TURN_TOLERANCE, JOINT_TOLERANCE = 0.05, 0.05, 0.1
-#: No point of the robot is farther than this from the middle of its axle (m): what stands beyond is not in its way.
+#: Largest distance of any point of the robot from the middle of its axle (m).
 _REACH = 1.3
 #: A cane matters where the tool goes in among the canes: its half width, with the camera beside it, and some room (m).
 _BESIDE_TOOL = 0.12
-#: Rows of a way between two places of the base that are looked at.
+#: Rows of a motion between two checked positions of the base.
 _LOOK = 20
 #: Positions along an obstacle's axis that are compared, as fractions of its length.
 _SHARES = np.linspace(0.0, 1.0, 9)
@@ -61,7 +61,7 @@ def approaches_changed(before: tuple[tuple[str, float], ...], now: tuple[tuple[s
 
 
 def place_changed(plan: WorkPlan, q: Array) -> str:
-    """How far a robot at rest at q (12) is from where the plan begins; empty within the tolerances."""
+    """Description of the distance of a robot at rest at q (12) from the plan's start; empty within the tolerances."""
     return away_from(plan.request.q, q)
 
 
@@ -83,12 +83,12 @@ class ObstacleWatch:
     """Detects obstacles that the plan did not consider. One instance a plan; a check takes about a millisecond."""
 
     def __init__(self, before: tuple[Capsule, ...], track: Array, lines: Sequence[tuple[Array, Array]]) -> None:
-        """Remember what stood around, and where robot and tool will be.
+        """Bind the known obstacles and the motion.
 
         Args:
-            before: What stood around.
-            track: Places of the base (n×2, m).
-            lines: Of the tool into each cut: from, to (3 each, m).
+            before: Obstacles at the time of the plan.
+            track: Positions of the base (n×2, m).
+            lines: Line of the tool into each cut: start, end (3 each, m).
         """
         self._before, self._track = before, track
         self._axes = Axes(tuple(obstacles_of(self._before)))
@@ -103,13 +103,13 @@ class ObstacleWatch:
         return cls(plan.request.obstacles, track, lines)
 
     def changed(self, now: Sequence[Capsule]) -> str:
-        """What stands in the plan's way where nothing stood; empty where nothing does.
+        """Description of a new obstacle that affects the plan; empty without one.
 
-        What has gone changes nothing, nor does what is out of the robot's reach all the way, nor a cane that is not
+        Obstacles that disappeared are ignored. So are obstacles out of the robot's reach along the plan, and canes not
         beside the tool's line into a cut.
 
         Args:
-            now: What stands around now.
+            now: Current obstacles.
         """
         if now is self._before or now == self._before or not now or not len(self._track):
             return ""
@@ -118,7 +118,7 @@ class ObstacleWatch:
         places = (start[:, None] + _SHARES[:, None] * (end - start)[:, None]).reshape(-1, 3)
         new = np.full(len(places), True)
         if self._before:
-            # How far each place sticks out of the one that it sticks out of the least.
+            # Distance by which each sample extends beyond its nearest known capsule.
             new = self._axes.gaps(places, -np.repeat(radius, len(_SHARES))).min(axis=1) > OBSTACLE_TOLERANCE
         for index in np.flatnonzero(new):
             kind = now[int(index) // len(_SHARES)].kind

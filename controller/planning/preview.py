@@ -33,12 +33,12 @@ class PreviewManager:
     """Manages one preview. Call `review` regularly; in between `permit` and `known` answer for single points."""
 
     def __init__(self, queue: PointQueue, journal: Journal, settings: HierarchyConfig) -> None:
-        """Nothing is asked for, and nothing is required.
+        """Start without a request; previews are not required.
 
         Args:
-            queue: Of the points.
-            journal: Records what people decide.
-            settings: Say which distances are kept.
+            queue: The queue of points.
+            journal: Records the decisions of people.
+            settings: Distances of the collision guard.
         """
         self._queue, self._journal, self._settings = queue, journal, settings
         self.required = False
@@ -123,20 +123,20 @@ class PreviewManager:
         close_up_s: float,
         now: float,
     ) -> PreviewRequest | None:
-        """Take a new preview, judge the one there is, and ask for the one that is wanted.
+        """Accept a new preview, check the current one, and make the due request.
 
         Args:
-            made: Newest answer; the same object until there is another.
+            made: Newest result; the same object until the next one.
             q: Configuration (12) now, None before the first measurement.
-            obstacles: What stands in the way now.
-            cuts: What the session's plan says of points; None while one is being made.
-            at_rest: Whether the robot stands still.
-            working: Whether it works off the queue.
-            close_up_s: From asking for a picture to knowing what it shows, as it was last (s).
+            obstacles: Current obstacles.
+            cuts: Planned cuts by point id; None while a plan is computed.
+            at_rest: Whether the robot is at rest.
+            working: Whether it executes the queue.
+            close_up_s: Time from the request of the last close-up to its result (s).
             now: Monotonic time (s).
 
         Returns:
-            What to roll forward; None when nothing is to be.
+            The request to compute; None without one.
         """
         if made is not None and self._asked is not None and made.request.number == self._asked.number:
             self._take(made)
@@ -232,7 +232,7 @@ class PreviewManager:
         self._say("ready", "")
 
     def _changed(self, q: Array, obstacles: Sequence[Capsule], at_rest: bool, working: bool) -> str:
-        """What has changed since the preview was made, in words; empty where nothing has."""
+        """Description of a change that expires the preview; empty without one."""
         preview, watch = self._preview, self._watch
         if preview is None or watch is None:
             return ""
@@ -271,7 +271,7 @@ class PreviewManager:
         return ""
 
     def _points(self, point_id: str) -> tuple[PruningPoint, ...]:
-        """What is to be shown, in the order of work: one point, which then comes first, or the next few."""
+        """Points of the preview in the order of work: the requested one, which then comes first, or the next few."""
         tickets = [ticket for ticket in self._queue.in_order() if ticket.state == "ACCEPTED" and ticket.seen]
         if point_id:
             tickets = [ticket for ticket in tickets if ticket.point.point_id == point_id]

@@ -93,12 +93,12 @@ def state_message(
     """The message of the state.
 
     Args:
-        preview: What is shown; None when nothing is.
-        required: Whether no cut begins without an approval.
-        phase: Of the preview.
-        reason: Why it is in that phase.
-        approved_by: Who has approved it.
-        left: Accepted points that are not in it.
+        preview: The preview; None without one.
+        required: Whether a cut needs an approved preview.
+        phase: Phase of the preview.
+        reason: Reason for the phase.
+        approved_by: Who approved it.
+        left: Number of accepted points that are not part of it.
         now: Monotonic time (s).
     """
     header = m.Header(now, "odom")

@@ -222,18 +222,18 @@ class CutLog:
     """Collects the figures of each cut: call `sample` regularly and `cuts` at the end."""
 
     def __init__(self, limits: Limits, collision: CollisionModel, queue: PointQueue) -> None:
-        """Nothing has been worked on.
+        """Start without cuts.
 
         Args:
-            limits: Of the joints.
-            collision: Knows what stands around, and what the blades may touch now.
-            queue: Knows what became of each point.
+            limits: Joint limits.
+            collision: Collision model with the obstacles and the allowed contacts of the blades.
+            queue: The queue, for the outcome of each point.
         """
         self._limits, self._collision, self._queue = limits, collision, queue
         self._points: list[_Least] = []
 
     def sample(self, robot: Measured, active: str, now: float) -> None:
-        """The robot is on the way to, at, or from the `active` point; empty: of the last one still."""
+        """Record the robot's state during the motion to, at or from the `active` point; empty for the last one."""
         if active and (not self._points or self._points[-1].point_id != active):
             begins = now if self._points else 0.0
             self._points.append(_Least(active, begins))

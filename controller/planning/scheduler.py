@@ -72,7 +72,7 @@ class Stop:
 
     @property
     def clearance(self) -> Clearance:
-        """Least distance on the way, and between what."""
+        """Smallest distance along the motion with its two parts."""
         return self.planned.clearance
 
     @property
@@ -109,14 +109,14 @@ class Scheduler:
     def plan(
         self, q: Array, targets: Sequence[Target], required: Requirements | None = None, wanted: Sequence[str] = ()
     ) -> Schedule:
-        """A schedule from rest at a configuration (12) over all targets that can be worked on.
+        """Schedule of all feasible targets, from rest at a configuration (12).
 
         Args:
             q: Configuration (12) at the start.
             targets: In any order; names must differ.
-            required: What each has to offer.
-            wanted: Names in the order that somebody wants; those that it does not name come last. Without it the order
-                is the quickest that is found.
+            required: Requirements for each target.
+            wanted: Names in the order set by a person; other targets come last. Without it the order
+                is the fastest one found.
         """
         required = required or Requirements()
         refused: dict[str, str] = {}
@@ -140,7 +140,7 @@ class Scheduler:
         stops: list[Stop] = []
         now, at = 0.0, q
         waiting = list(order)
-        # What is not reached from its neighbour may still be from where the rest ends.
+        # A target that is not reachable from its neighbour may be reachable from the end of the schedule.
         for _ in range(2):
             begun, missed = len(stops), []
             for target in waiting:
@@ -158,7 +158,7 @@ class Scheduler:
         return Schedule(tuple(stops), now, refused)
 
     def _costs(self, q: Array, stands: Sequence[Stand]) -> Array:
-        """Times (n+1 × n, s) from the start (row 0) and from each stand to each stand."""
+        """Travel times (n+1 × n, s) from the start (row 0) and from each stand to each stand."""
         places = [q, *(stand.q for stand in stands)]
         goals = np.array([stand.q[:3] for stand in stands]).reshape(-1, 3)
         tools = [self._planner.tool(place) for place in places]
@@ -174,7 +174,7 @@ class Scheduler:
         return costs
 
     def _lacking(self, planned: Planned, required: Requirements) -> str:
-        """What keeps a motion from being worth it, in words; empty where nothing does."""
+        """The requirement that a motion does not meet, as text; empty if it meets all."""
         stand, least = planned.stand, planned.clearance
         if least.distance < required.clearance:
             return (

@@ -87,7 +87,7 @@ class WorkPlan:
     failure: str = ""
 
 
-#: Least time between two rows of a preview (s), and the most rows of one way.
+#: Shortest time between two rows of a preview (s), and the largest number of rows of one motion.
 _ROW_S, _MOST_ROWS = 0.1, 200
 
 
@@ -116,7 +116,7 @@ def session_plan(plan: WorkPlan | None, state: PlanState, reason: str, now: floa
 def planned_points(
     request: PlanRequest, cuts: Sequence[PlannedCut], refused: dict[str, str]
 ) -> tuple[PlannedPoint, ...]:
-    """What is said of each point of a request: the cuts in their order, then those refused."""
+    """Plan of each point of a request: the cuts in their order, then the refused points."""
     points = [planned_point(cut, number) for number, cut in enumerate(cuts, 1)]
     revisions = {point.point_id: point.revision for point in request.points}
     points += [

@@ -19,7 +19,7 @@ class Authority:
         """Start without a holder.
 
         Args:
-            supervision_s: Automatic work continues for this long without anybody who sees the robot (s).
+            supervision_s: Time for which automatic work continues without a person who sees the robot (s).
         """
         self._lease = Lease()
         self._supervision_s = supervision_s
@@ -32,11 +32,11 @@ class Authority:
         return self._lease.holder is not None and self._lease.next_holder is None
 
     def review(self, presence: Sample[Presence] | None, at_rest: bool, now: float) -> str:
-        """Update the lease. Returns why the robot must stop; empty when nobody lost control.
+        """Update the lease. Returns the reason why the robot must stop; empty without one.
 
         Args:
             presence: Newest presence message.
-            at_rest: Whether the robot stands still.
+            at_rest: Whether the robot is at rest.
             now: Monotonic time (s).
         """
         last = self._newest

@@ -41,7 +41,7 @@ class FencingToken:
         self.waits = True
 
     def update(self, bridge: m.BridgeState | None, now: float) -> str:
-        """Update the holder of the token. Returns what changed, in words; empty when nothing did.
+        """Update the holder of the token. Returns a description of the change; empty without one.
 
         Args:
             bridge: Newest bridge state.

@@ -47,14 +47,14 @@ class Health:
 
 
 def health(inputs: Inputs, overruled: bool, now: float, ledger: str = "", tracking_error: str = "") -> Health:
-    """How fresh the inputs are.
+    """Compute the health of the inputs.
 
     Args:
-        inputs: Newest of everything.
-        overruled: Another controller holds the bridge's token.
+        inputs: Newest inputs.
+        overruled: Whether another controller has the bridge's token.
         now: Monotonic time (s).
-        ledger: Why what is done cannot be recorded.
-        tracking_error: Why the robot does not do what it is told.
+        ledger: Reason why the ledger cannot record.
+        tracking_error: Description of a tracking error above its limit.
     """
 
     def age(at: float | None) -> float:
@@ -82,10 +82,10 @@ def _refused(bridge: BridgeState) -> int:
 
 
 def _picture_age(inputs: Inputs, now: float) -> float:
-    """The greater of how long ago the obstacles came, and how far their picture's stamp is from the newest joints'.
+    """Age of the obstacles: the larger of the time since their arrival and their frame's stamp relative to the joints'.
 
-    Both stamps are of the bridge's clock. Perception repeats its newest message, so that its arrival alone says little;
-    and a stamp from the future is as wrong as an old one.
+    Both stamps are of the bridge's clock. Perception repeats its newest message, so the arrival alone is not enough.
+    A stamp from the future counts like an old one.
     """
     obstacles, joints = inputs.obstacles, inputs.joints
     if obstacles is None or joints is None:
@@ -111,8 +111,8 @@ def check(mode: Mode, moving: bool, health: Health, config: ControllerConfig) ->
     Args:
         mode: Of the machine.
         moving: True where motion may be under way outside AUTO and TELEOP (bringing the arm home).
-        health: Of the inputs.
-        config: Ages allowed.
+        health: Health of the inputs.
+        config: Age limits.
     """
     if health.overruled and mode != "IDLE":
         return Verdict("fault", OVERRULED)
@@ -137,7 +137,7 @@ def cause(health: Health, config: ControllerConfig) -> str:
 
 
 def sensors(health: Health, config: ControllerConfig) -> str:
-    """Why the robot's own data do not allow motion; empty when they do."""
+    """Reason why the robot's own data forbid motion; empty if they allow it."""
     if health.overruled:
         return OVERRULED
     if health.tracking_error:
@@ -152,13 +152,13 @@ def sensors(health: Health, config: ControllerConfig) -> str:
 
 
 def supervision(health: Health, config: ControllerConfig, teleoperated: bool) -> str:
-    """Why the server does not allow motion; empty when it does.
+    """Reason why the server's state forbids motion; empty if it allows it.
 
     Args:
-        health: Of the inputs.
-        config: Ages allowed.
-        teleoperated: A hand's motion needs a fresher link than work that somebody only watches. Either way a server
-            that has ended, instead of being slow, is noticed at once by its absence.
+        health: Health of the inputs.
+        config: Age limits.
+        teleoperated: Motion by hand needs a fresher connection than supervised work. In both cases a server
+            that has ended, as opposed to a slow one, is detected at once by its absence.
     """
     allowed = config.hold_link_max_age_s if teleoperated else config.server_max_age_s
     return _process("server", health.server, allowed, health.present)

@@ -6,7 +6,7 @@ from typing import Final
 
 from controller.identity import Client
 
-#: A lease whose holder has said nothing for so long has ended (s).
+#: The lease ends this long after the holder's last message (s).
 LIFE_S: Final = 1.0
 #: A request that nobody has answered for so long is forgotten (s).
 _REQUEST_S: Final = 30.0
@@ -42,7 +42,7 @@ class Lease:
             self._give(client, now, f"{client.user} holds control")
 
     def take(self, client: Client, confirmed: bool) -> str:
-        """Take control, from somebody else only on purpose; why not, empty when it comes."""
+        """Take control; from a holder only if confirmed. Returns the reason of a refusal; empty if granted."""
         if self.held_by(client):
             return ""
         if self.next_holder is not None and self.next_holder.key != client.key:
@@ -87,10 +87,10 @@ class Lease:
             self._renewed = max(self._renewed, heard.get(self.holder.key, -math.inf))
 
     def review(self, at_rest: bool, now: float) -> str:
-        """Let time pass. Returns why who moved the robot no longer may; empty when nothing ended.
+        """Update at a time. Returns the reason why the holder lost control; empty without one.
 
         Args:
-            at_rest: Whether the robot stands still, so that it may change hands.
+            at_rest: Whether the robot is at rest, so that control may change hands.
             now: Monotonic time (s).
         """
         if self.requested is not None and now - self._asked > _REQUEST_S:
@@ -105,7 +105,7 @@ class Lease:
         return lost
 
     def left(self, now: float) -> float:
-        """How long the lease still lives without a word of its holder (s); 0 without one."""
+        """Time to the end of the lease without a message of its holder (s); 0 without a holder."""
         return 0.0 if self.holder is None else max(0.0, self._renewed + LIFE_S - now)
 
     def _give(self, client: Client, now: float, told: str) -> None:

@@ -23,7 +23,7 @@ __all__ = [
 #: How long the cause of a protective stop must be gone before it can be acknowledged (s).
 CLEAR_S: Final = 1.0
 
-#: What somebody is to the machine: the kinds of causer that they count as.
+#: Rights of a person: the kinds of causer that they count as.
 Rights = frozenset[Who]
 #: The program itself.
 SYSTEM: Final[Rights] = frozenset({"system", "anyone"})
@@ -76,13 +76,13 @@ def boot(stopped: str = "") -> State:
 
 
 def step(state: State, event: Event, now: float, reason: str = "", by: Rights = SYSTEM) -> Transition:
-    """What an event does.
+    """Process an event.
 
     Args:
-        state: Before it.
-        event: What happened.
+        state: State before it.
+        event: The event.
         now: Monotonic time (s).
-        reason: Why, in words; becomes the reason of the new state.
+        reason: Reason, as text; it becomes the reason of the new state.
         by: Who caused it.
     """
     row = _TABLE.get((state.mode, event))

@@ -40,7 +40,7 @@ class Situation:
     approval: str = ""
 
 
-#: The check of each condition: why it does not hold, empty where it does.
+#: Check of each condition: the reason why it does not hold, empty if it does.
 _CHECKS: Final[dict[Condition, Callable[[Situation], str]]] = {
     "fresh sensors": lambda now: safety.sensors(now.health, now.config),
     "bridge obeys": lambda now: (

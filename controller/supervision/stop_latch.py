@@ -6,7 +6,7 @@ from rolling_panda.messages.supervision import StopRecord, StopState
 
 #: How long the bridge may take to show that it has released a stop, before it may be asked again (s).
 _RELEASE_S = 1.0
-#: What is told of latched stops, the newest first.
+#: Number of latched stops in the message, newest first.
 _MOST = 50
 
 
@@ -48,9 +48,9 @@ class StopLatch:
         return StopState(process="controller", stops=stops, released_by=self._released_by)
 
     def update(self, stops: tuple[m.StopRequest, ...], bridge: m.BridgeState | None, wall_time: float = 0.0) -> str:
-        """Latch what is new; returns why the robot is stopped, empty when nothing new was latched.
+        """Latch new stops. Returns the reason of a new stop; empty without one.
 
-        A request is sent several times with one id: once released, its echoes latch nothing. What the bridge holds
+        A request is sent several times with one id. After its release later copies do not latch. What the bridge has
         latched always counts.
         """
         latched = ""

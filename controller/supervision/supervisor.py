@@ -21,7 +21,7 @@ from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.messages.supervision import StopRecord
 
-#: A bridge whose watchdog has held the robot for so long (s) is asked for another token.
+#: A new token is requested when the bridge's watchdog has held the robot for this long (s).
 _ANEW_S: Final = 2.0
 #: Braking to rest takes less than this (s, the bridge's clock), and so does one command with a spoilt number, which the
 #: watchdog ends.
@@ -48,10 +48,10 @@ class Supervisor:
         #: Stamp of the newest bridge state in which nothing moved but by this controller's commands.
         self._explained = 0.0
         self.state = modes.boot()
-        #: What was under way when it was paused or stopped for its protection, until something is begun.
+        #: Activity that a pause or a protective stop interrupted, until the next start.
         self.interrupted: m.Interrupted = ""
         self._inputs = Inputs()
-        #: When the bridge last did as it was told, and how many commands it had refused by then.
+        #: Time of the last followed command, and the number of refused commands by then.
         self._obeyed, self._refused = 0.0, 0
         self.health = safety.health(self._inputs, False, 0.0)
 
@@ -85,7 +85,7 @@ class Supervisor:
         self.health = safety.health(inputs, self.fencing.overruled, now, trouble, tracking_error)
 
     def review(self, now: float) -> None:
-        """End what must not go on, and begin what an operator's hand holds."""
+        """End the motion that is no longer allowed, and start motion by hand."""
         self._review_token(now)
         inputs, bridge = self._inputs, self.bridge
         stops = (*inputs.stops, *self._review_motion())
@@ -108,7 +108,7 @@ class Supervisor:
         self._review_hold(now)
 
     def event(self, event: Event, now: float, reason: str, by: modes.Rights = modes.SYSTEM) -> str:
-        """Put an event to the machine; what it changes is logged. Returns the refusal."""
+        """Process an event; a change of mode is logged. Returns the reason of a refusal."""
         before = self.state
         transition = modes.step(before, event, now, reason, by)
         self.state = transition.state
@@ -135,13 +135,13 @@ class Supervisor:
         return self._movement.busy(self.bridge)
 
     def situation(self, waits: str, approval: str, now: float, intent: intents.Intent | None = None) -> Situation:
-        """What a permission depends on.
+        """State that a permission depends on.
 
         Args:
-            waits: Why no accepted point can be worked on; empty when one can.
-            approval: Why work may not begin for want of an approved preview; empty when it may.
+            waits: Reason why no accepted point is workable; empty if one is.
+            approval: Reason why the start needs an approved preview; empty if it does not.
             now: Monotonic time (s).
-            intent: What is asked; None for whoever may operate.
+            intent: The command; None for any operator.
         """
         client, authority = Client("", "") if intent is None else client_of(intent), self.authority
         return Situation(
@@ -188,7 +188,7 @@ class Supervisor:
         return (stop,)
 
     def _pause(self, reason: str, now: float) -> None:
-        """What moves comes to rest, and nothing resumes by itself."""
+        """Bring all motion to rest. Nothing resumes by itself."""
         if self.mode in modes.MOVING:
             self.event(Event.LOST, now, reason)
         elif self._movement.homing:

@@ -38,7 +38,7 @@ _IDLE = 3e-5
 _NOTHING = 1e-5
 #: Slack from which on a row counts as given up.
 _GIVEN_UP = 1e-6
-#: What a row is moved beyond the least (in its unit): at the least itself a single velocity is possible, which a solver
+#: Margin added to a row's relaxation (in its unit): at the minimum only one velocity is feasible, which a solver
 #: that reckons with rounding may not find.
 _ROOM = 1e-8
 #: A velocity below this fraction of its limit counts as zero.
@@ -206,7 +206,7 @@ class Cascade:
         return found if flag >= 1 and math.isfinite(float(found.sum())) else z
 
     def _give_way(self, rows: Array, low: Array, high: Array, n: int, soft: int) -> Array | None:
-        """By how much each soft row's lower bound has to come down, least squares, with all else hard."""
+        """Relaxation of each soft row's lower bound in the least-squares sense, with all other constraints hard."""
         if not soft:
             return None
         size = n + soft
@@ -239,7 +239,7 @@ class Cascade:
         return found
 
     def _ridge(self, size: int) -> Array:
-        """What makes the null space's program definite where no task has a say."""
+        """Regularisation that makes the null space's program positive definite."""
         found = self._ridges.get(size)
         if found is None:
             found = self._ridges[size] = RIDGE * np.eye(size)
@@ -247,9 +247,9 @@ class Cascade:
 
 
 def _standing(multipliers: Array, nu: Array, speed: Array) -> int:
-    """Index of the strongest row, or bound of a velocity that it lets be nothing; −1 for none.
+    """Index of the strongest active row, or of the bound of a velocity that is forced to zero; −1 for none.
 
-    A velocity that is bounded where it is large is on its way, and holds nothing back for long.
+    A bound that is active at a large velocity is temporary and does not count.
     """
     strength = np.abs(multipliers)
     strength[: len(nu)][np.abs(nu) > _STANDS * speed] = 0.0
@@ -298,7 +298,7 @@ def unconstrained_solution(
     damping_from: float,
     nu: Array,
 ) -> bool:
-    """Write into nu (n) what answers everything; False where an inequality or damping has a say.
+    """Write the unconstrained optimum into nu (n). Returns False if an inequality or damping is active.
 
     Rᵀ y = b + c gives the tool its velocity; min ‖T (speed · (Q₁ y + Z z)) − t‖² gives z by its normal equations.
     """

@@ -33,7 +33,7 @@ from rolling_panda.model.differential_drive import NQ, NXI, Array
 from rolling_panda.model.robot import Kinematics, RobotModel
 
 Pair = tuple[str, str]
-#: How far (m) a part may have moved before the pairs near it are looked for again.
+#: Motion of a part after which the broad phase is repeated (m).
 _SLACK = 0.06
 #: Obstacles that can be near at the same time without building Pinocchio's data again, which takes some 10 ms.
 _SLOTS = 64
@@ -135,7 +135,7 @@ class CollisionModel:
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
-        """What stands beside the robot."""
+        """The current obstacles."""
         return self._obstacles
 
     def set_obstacles(self, obstacles: Sequence[Obstacle]) -> None:
@@ -187,7 +187,7 @@ class CollisionModel:
         )
 
     def least(self, q: Array) -> Clearance:
-        """The least distance of all watched pairs at q (12)."""
+        """Smallest distance of all monitored pairs at q (12)."""
         self._place(q)
         within = self._smallest(self._compute(list(range(len(self._self_pairs)))))
         # An obstacle counts only where it is nearer than the nearest part of the robot itself.

@@ -153,7 +153,7 @@ _decided: dict[tuple[object, ...], tuple[tuple[int, int], ...]] = {}
 
 
 def self_pairs(robot: RobotModel, geometry: Any, ground: int) -> list[tuple[int, int]]:
-    """Pairs of indices into `geometry` to watch: within the robot, and arm and tool against the ground.
+    """Pairs of indices into `geometry` to monitor: within the robot, and arm and tool against the ground.
 
     Left out are the pairs that the SRDF disables, those whose distance no motion changes, and those that stay farther
     apart than 50 mm in 4096 seeded random postures within the joint limits.
@@ -162,8 +162,8 @@ def self_pairs(robot: RobotModel, geometry: Any, ground: int) -> list[tuple[int,
     neighbours, links 6 and 7, apply.
 
     Args:
-        robot: Whose joints the geometry hangs on.
-        geometry: Pinocchio's geometry model, its ground added.
+        robot: Robot model with the joints of the geometry.
+        geometry: Pinocchio's geometry model with the ground.
         ground: Index of the ground.
     """
     bounds = robot.limits.lower[ARM_Q].tobytes(), robot.limits.upper[ARM_Q].tobytes()

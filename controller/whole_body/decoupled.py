@@ -54,7 +54,7 @@ class Decoupled:
         wanted = np.zeros(NXI)
         wanted[:2] = self._wheels @ (v, omega)
         limited = self._saturation.apply(wanted, problem.q, problem.sent)
-        # While the base carries the tool along the clock runs, but not past what the base has still to do.
+        # The clock advances with the tool's motion by the base, but not beyond the base's remaining motion.
         ahead = math.hypot(float(goal[0] - problem.posture.q[0]), float(goal[1] - problem.posture.q[1])) > _ARRIVED
         return Solution(limited.xi, float(ahead or still and not driving), reach.manipulability)
 

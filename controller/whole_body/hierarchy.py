@@ -27,9 +27,9 @@ from controller.whole_body.velocity_bounds import Bounds, VelocityBounds
 from rolling_panda.model.differential_drive import NXI, Array
 from rolling_panda.model.robot import ARM_XI, RobotModel
 
-#: A clock slower than this stands still.
+#: Rate of the clock below which it counts as stopped.
 _HELD = 1e-2
-#: A hand whose problem is answered by less than the rest is told what holds the tool back.
+#: Scale below which motion by hand reports the limiting constraint.
 _MISSED = 0.5
 #: Velocities of the tool that weigh the same (m/s, rad/s): what damping is measured in, whatever speed is planned.
 _SPEED, _TURN = 0.3, 0.8
@@ -124,7 +124,7 @@ class Hierarchy:
         Weighted by the limits of the tool or of the actuators themselves.
         """
         if isinstance(problem.tool, ActuatorTask):
-            # Of a base that is given nothing can be wanted; its rows would only outnumber the arm's joints.
+            # The base's velocity is given. Its rows would only outnumber the arm's joints.
             wanted = _ARM if problem.arm_only else _ALL
             weights = np.diag(1.0 / self._box.speed)[wanted]
             return weights, weights @ self._actuation.nu(problem.tool.xi), 1.0
@@ -165,7 +165,7 @@ class Hierarchy:
         if not problem.arm_only:
             sent = self._actuation.nu(problem.sent)
             return Problem(J, b, c, speed, sent, bounds.lower, bounds.upper, A, low, high, k, T, t, rise, keep_path)
-        # What the base does meanwhile is made good by the arm; the wheels' rows have no say then.
+        # The arm compensates the base's motion; the wheels' rows do not apply then.
         A, low, high = A[:k], low[:k], high[:k]
         if base[0] != 0.0 or base[1] != 0.0:
             c, t, low = without_base(J, base, c), without_base(T, base, t), without_base(A, base, low)
@@ -198,7 +198,7 @@ class Hierarchy:
         held = problem.tool.keep_path and answer.scale < _HELD
         if held or (answer.missing > _MISSED and answer.holds >= 0):
             what = _holder(answer.holds, free, names)
-            # A hand that slides along what holds it has its answer; it is only told.
+            # Sliding along a constraint is a valid solution of motion by hand; it is only reported.
             return Solution(xi, scale, manipulability.value, not held, f"{what} holds the tool back")
         return Solution(xi, scale, manipulability.value)
 
@@ -229,12 +229,12 @@ def tool_rows(
     """Write J (m×9) and b (m) of the tool's task; m = 5 leaves the rotation about the tool's y free.
 
     Args:
-        J_xi: Over ξ̇ (6×9).
+        J_xi: Jacobian over ξ̇ (6×9).
         R: Rotation of the tool, R_odom_tool (3×3).
-        twist: Wanted (6).
-        speed_cap: Largest speed of the tool's origin (m/s); b is of a twist that is slowed to it.
-        wheels: Of [v, ω].
-        weight: Of the rows (6).
+        twist: Desired twist (6).
+        speed_cap: Largest speed of the tool's origin (m/s); b is for the twist slowed to it.
+        wheels: Wheel speeds of [v, ω].
+        weight: Weights of the rows (6).
         J: Written.
         b: Written.
 
@@ -301,9 +301,9 @@ def _without_base(rows: Array, base: Array, rest: Array, left: Array) -> None:
 
 @compiled(NOTHING(VECTOR, VECTOR, PACKED, VECTOR, VECTOR, VECTOR))
 def sendable(nu: Array, base: Array, wheels: Array, least: Array, most: Array, xi: Array) -> None:
-    """Write ξ̇ (9): of ν (9), or of ν without its first two (7) where the base does `base` (2) by itself.
+    """Write ξ̇ (9) for ν (9), or for the arm's part of ν (7) with the base's velocity `base` (2).
 
-    Rounding of the way back to the wheels' speeds stays inside their bounds `least` and `most` (2).
+    The wheel speeds are clipped to their bounds `least` and `most` (2) against rounding.
     """
     fixed = 9 - len(nu)
     v, omega = (base[0], base[1]) if fixed else (nu[0], nu[1])

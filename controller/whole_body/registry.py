@@ -25,14 +25,14 @@ def make_method(
     """The configured method.
 
     Args:
-        robot: Its model.
-        config: Of the controller.
+        robot: Robot model.
+        config: Section `[controller]`.
         dt: Control period (s).
-        collision: What knows the obstacles, on the same `robot`. With None `hierarchy` keeps its distance to itself and
-            the ground, and the other methods to nothing.
+        collision: Collision model with the obstacles, on the same `robot`. With None `hierarchy` avoids itself and
+            the ground, and the other methods avoid nothing.
 
     Raises:
-        ConfigError: There is no method of that name; the text lists those there are.
+        ConfigError: There is no method of that name; the text lists the known ones.
     """
     try:
         make = METHODS[config.method]

@@ -20,7 +20,7 @@ class Saturated:
     Attributes:
         xi: ξ̇ (9), within every limit.
         scale: Share of the wanted velocity that fits, 0…1; the motion's clock is slowed by it.
-        braked: True when no share fitted and every actuator brakes at its maximum.
+        braked: True if no scale is feasible and every actuator brakes at its maximum.
     """
 
     xi: Array
@@ -51,7 +51,7 @@ class Saturation:
         base = config.base_acceleration / robot.drive.wheel_radius
         self.acceleration[:2] = min(base, float(limits.acceleration[0]))
         self._step = self.acceleration * dt
-        # Rows that give v and ω in shares of their limits.
+        # Rows that give v and ω as fractions of their limits.
         twist = Actuation(robot.drive).twist
         self._base_shares = twist / np.array([[config.base_speed], [config.base_yaw_rate]])
         # What may stop the robot, and the most that the last gate lets through.
@@ -127,7 +127,7 @@ class Saturation:
 
 
 def _along(xi: Array, wanted: Array) -> float:
-    """Share of `wanted` that `xi` holds in its direction, 0…1."""
+    """Fraction of `wanted` that `xi` has in its direction, 0…1."""
     square = float(wanted @ wanted)
     return max(0.0, min(1.0, float(xi @ wanted) / square)) if square > 1e-12 else 1.0
 

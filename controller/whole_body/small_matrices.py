@@ -27,7 +27,7 @@ def orthogonalize(A: Array, Q: Array) -> None:
         length = math.sqrt(length)
         if length == 0.0:
             continue
-        # The reflection I − β w wᵀ takes the column to ∓length; the sign keeps w from cancelling.
+        # The reflection I − β w wᵀ maps the column to ∓length; the sign avoids cancellation in w.
         head = A[k, k]
         diagonal = -length if head > 0.0 else length
         first = head - diagonal

@@ -164,7 +164,7 @@ class Guard(Protocol):
     name: str
 
     def rows(self, problem: IkProblem) -> Inequalities:
-        """What has to hold in this period."""
+        """Constraints of this period."""
         ...
 
 

@@ -110,7 +110,7 @@ class Tipping:
         S = self._robot.drive.basis(float(q[2]))
         v = S @ xi
         pin.rnea(model, data, q, v, acceleration_of_q(S, v, acceleration))
-        # What the world exerts on the first joint is what the ground has to exert, in all six directions.
+        # The wrench on the first joint is the wrench of the ground.
         wrench = data.liMi[1].act(data.f[1])
         x = -wrench.angular[1] / wrench.linear[2] - q[0]
         y = wrench.angular[0] / wrench.linear[2] - q[1]

@@ -40,9 +40,9 @@ class TwoRates:
         """A new period.
 
         Args:
-            sent: ξ̇ sent last (9).
-            before: ξ̇ sent in the period before that (9).
-            wheels: The wheels' velocities as measured or predicted (2, rad/s); None takes them for what was sent.
+            sent: Last command ξ̇ (9).
+            before: Command ξ̇ before the last (9).
+            wheels: Measured or predicted velocities of the wheels (2, rad/s); None uses the last command.
         """
         self._period = (self._period + 1) % self._every
         if self._period == 0:
@@ -60,14 +60,14 @@ class TwoRates:
             sent = sent.copy()
             sent[:2] = base.xi[:2]
         before = self._before.copy()
-        # Seen from the arm's periods, the base gets to what it was told at a constant acceleration.
+        # In the arm's periods the base approaches its command with a constant acceleration.
         for wheel in (0, 1):
             before[wheel] = sent[wheel] - (sent[wheel] - self._sent[wheel]) / self._every
         return self._arm.solve(replace(problem, sent=sent, before=before, held=wheels))
 
 
 def _made_good(problem: IkProblem, wheels: Array) -> ToolTask | ActuatorTask:
-    """The problem's tool with the twist that the base owes: what its wheels were told beyond what they do."""
+    """The tool's task plus the twist that the base lacks: the difference of commanded and measured wheel speeds."""
     tool = problem.tool
     if not isinstance(tool, ToolTask):
         return tool

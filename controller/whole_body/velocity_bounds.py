@@ -137,7 +137,7 @@ def _most(
     else:
         most = math.sqrt(brake * brake + acceleration * room) - brake
     rise = min(_largest_rise(most - sent + brake, jerk, 0.0) - brake, _largest_rise(speed - sent, jerk, 0.0))
-    # Every end is moved into what can be reached, which keeps their order.
+    # Each bound is clipped to the reachable range, which keeps their order.
     rise = min(rise, min(step, change + jerk))
     return sent + max(rise, max(-step, change - jerk))
 

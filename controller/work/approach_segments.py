@@ -21,7 +21,7 @@ class ApproachSegments:
         self._config, self._flows = config, flows
 
     def to(self, plan: CutPlan, T_odom_tool: Any, q: Array) -> tuple[Leg, ...]:
-        """From a pose of the tool (pin.SE3) at q (12) to a cut; where a close-up comes first, to where it is taken."""
+        """Segments from a tool pose (pin.SE3) at q (12) to a cut, or to the pose of a close-up before it."""
         there = self.there(plan, T_odom_tool, q)
         return there if self._config.pre_cut_check else (*there, self.into(plan))
 

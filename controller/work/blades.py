@@ -38,10 +38,10 @@ class Blades:
         """Bind the parts.
 
         Args:
-            config: Of the controller.
-            queue: Holds the intents, and takes what became of them.
-            run_id: Makes the cut ids of this start unlike those of any other.
-            ended: Is told the cutter's word in place of the queue: point, outcome, words, now.
+            config: Section `[controller]`.
+            queue: The queue, which gets the outcomes.
+            run_id: Prefix that makes the cut ids of this start unique.
+            ended: Called with the cutter's report in place of the queue: point, outcome, text, time.
         """
         self._ended = ended
         self._timeout_s, self._queue, self._run_id = config.cut_timeout_s, queue, run_id
@@ -68,7 +68,7 @@ class Blades:
         return cut.cut_id, cut.point_id
 
     def watch(self, bridge: m.BridgeState, now: float) -> tuple[str, ...]:
-        """Take in how the cut ended; returns what happened, in words."""
+        """Update the cut from the bridge's state; returns a log text."""
         cut = self._cut
         if cut is None:
             return ()

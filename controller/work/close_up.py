@@ -34,7 +34,7 @@ class CloseUpClient:
 
         Args:
             timeout_s: Time limit of one close-up, retries included (s).
-            pictures: Largest number of pictures of one close-up. Another one is taken where the last did not show
+            pictures: Largest number of pictures of one close-up. Another one is taken if the last did not show
                 what was expected.
         """
         self._timeout_s, self._pictures = timeout_s, pictures

@@ -37,9 +37,9 @@ class PostCutCheck:
         """Bind the parts.
 
         Args:
-            queue: Takes the result.
+            queue: The queue, which gets the result.
             close_ups: Client for the pictures.
-            check: False takes the cutter's word for it at once.
+            check: False accepts the cutter's report at once.
         """
         self._queue, self._close_ups, self._check = queue, close_ups, check
         self._ended: dict[str, _Ended] = {}
@@ -65,7 +65,7 @@ class PostCutCheck:
             self._close_ups.ask(point_id, "severed", now)
 
     def step(self, now: float) -> list[str]:
-        """Settle what can be settled; what became of it, in words."""
+        """Decide the cuts that can be decided; returns log texts."""
         said = []
         for point_id, ended in list(self._ended.items()):
             close_up = self._close_ups.answer(point_id, now) if ended.requested else None
@@ -106,12 +106,12 @@ _BASE_NEAR = 0.1
 
 
 def not_as_accepted(close_up: CloseUpResult, ticket: Ticket | None, tolerance: float) -> str:
-    """Why a point is not cut after its close-up, in words; empty when it is.
+    """Reason why a point is not cut after its close-up; empty if it is.
 
     Args:
-        close_up: What was seen.
-        ticket: Of the point.
-        tolerance: It may have moved so far since it was accepted (m).
+        close_up: Result of the close-up.
+        ticket: Ticket of the point.
+        tolerance: Largest displacement since the acceptance (m).
     """
     if ticket is None or ticket.accepted is None:
         return "it is not accepted any more"

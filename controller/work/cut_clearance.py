@@ -25,9 +25,9 @@ class CutClearance:
         self.forget()
 
     def forget(self) -> None:
-        """Of plans that are looked at from now on it is remembered what the best of them lacks."""
+        """Start a new search: the deficit of the best plan checked from now on is stored."""
         self._least = math.inf
-        #: What it lacks, in words; empty where nothing was refused.
+        #: Deficit of the best plan, as text; empty if no plan was refused.
         self.lacking = ""
 
     def update(self, obstacles: Sample[Obstacles] | None) -> None:
@@ -46,7 +46,7 @@ class CutClearance:
         return not words
 
     def _nearer(self, plan: CutPlan) -> tuple[float, str]:
-        """By how much what is nearest is nearer than it may be (m), and what that is; empty where nothing is."""
+        """Largest violation of the required distance (m), and its parts; empty without one."""
         settings = self._settings
         within = max(settings.collision_distance + _ROOM, PlanLimits.clearance)
         worst, words = 0.0, ""

@@ -39,7 +39,7 @@ def cut_poses(
         towards_row: Horizontal unit vector from the robot's path to the row (3, odom).
         stand_off: Distance back from the cut (m).
         clearance: Distance back where the tool is clear of the canes (m).
-        azimuth: Turn of the approach about the cane (rad); 0 is nearest to `towards_row`.
+        azimuth: Turn of the approach about the cane (rad); 0 is closest to `towards_row`.
         tilt: Turn of the tool out of the plane square to the cane (rad); positive comes from below.
 
     Raises:

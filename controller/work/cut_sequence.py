@@ -56,8 +56,8 @@ class CutSequence:
     ) -> None:
         """Bind the parts.
 
-        `run_id` makes the cut ids of this start unlike those of any other; `known` is what a plan says of a point,
-        `permit` why it may not be gone to.
+        `run_id` makes the cut ids of this start unique. `known` gives the planned cut of a point, and
+        `permit` the reason why the robot may not approach it.
         """
         self._config, self._follower = config, follower
         self._saturation, self._queue = saturation, queue
@@ -113,7 +113,7 @@ class CutSequence:
         return self._close_ups.took_s
 
     def clear_of_canes(self, q: Array) -> Array:
-        """Configuration (12) that the work under way will be in before it goes on, from q (12): q outside the canes."""
+        """Configuration (12) clear of the canes before the next point, from q (12); q itself outside the canes."""
         return at_base(self._plan.q_clear, q) if self.in_canes and self._plan is not None else q
 
     @property
@@ -130,15 +130,15 @@ class CutSequence:
         self._survey = Survey(self._config, self._follower, self._saturation, self._queue, survey)
 
     def finish_cut_and_pause(self, why: str) -> None:
-        """Begin no further cut, come out of the canes and pause, where there is a reason; empty = work goes on."""
+        """With a reason: begin no further cut, leave the canes and pause. Empty continues the work."""
         self._ending = why
 
     def abort(self) -> None:
-        """Leave the work; a cut under way is still watched, an accepted point stays accepted."""
+        """Abort the work. A cut in progress is still monitored, and an accepted point stays accepted."""
         self._forget()
 
     def watch(self, bridge: m.BridgeState, close_up: CloseUpResult | None, now: float) -> tuple[str, ...]:
-        """Take in the end of a cut and the newest close-up, in every mode; returns what happened, in words."""
+        """Process the end of a cut and the newest close-up, in every mode; returns log texts."""
         if close_up is not None:
             self._close_ups.update(close_up, now)
         return *self._blades.watch(bridge, now), *self._post_cut_check.step(now)
@@ -172,7 +172,7 @@ class CutSequence:
         onwards = self._next_cut.found if self._stage is Stage.RETREAT else None
         plans = [plan for plan in (self._plan, onwards) if isinstance(plan, CutPlan)]
         if plans:
-            # While the tool is got clear of the canes there is no plan, and it is still where the last one led.
+            # While the tool leaves the canes there is no plan; it is still near the last cut.
             self._places = tuple(plan.poses.cut.translation for plan in plans)
         return work if not self._events else work.with_events(tuple(self._events))
 
@@ -194,7 +194,7 @@ class CutSequence:
         return StepResult(tracking.xi, tracking)
 
     def _next(self, robot: Measured) -> StepResult:
-        """Choose the next point and search for a posture; the robot stands still meanwhile."""
+        """Choose the next point and search its posture, with the robot at rest."""
         self._forget()
         if not self._next_cut.search(robot.q):
             # The last cut may still have to be made once more.
@@ -258,10 +258,10 @@ class CutSequence:
     def _advance(self, robot: Measured, now: float) -> StepResult:
         tracking, config = self._track(robot), self._config
         there = self._timeout.over(tracking, now, config.position_tolerance, config.rotation_tolerance)
-        # Where it comes to rest, not where it passes by.
+        # At the end of the motion, not during it.
         rests = there and float(np.linalg.norm(robot.kinematics.J_xi[:3] @ tracking.xi)) < config.settle_speed
         if rests and self._motion is not None and np.abs(tracking.xi[ARM_XI]).max() >= config.settle_joints:
-            # What the arm would still make good beside the tool's path can wait: the blades close at rest.
+            # Remaining corrections beside the tool's path can wait: the blades close at rest.
             self._motion.settle(robot.q)
             rests = False
         if rests:
@@ -339,7 +339,7 @@ class CutSequence:
             self._stage = Stage.ESCAPE
 
     def _refine(self) -> None:
-        """Lead the motion to where perception now sees the point, which is still where it was accepted, but better."""
+        """Correct the motion to the newest, more accurate position of the accepted point."""
         ticket = self._queue.get(self._point_id)
         if ticket is None or self._motion is None or ticket.point.position == self._close_up_of:
             return
@@ -368,7 +368,7 @@ class CutSequence:
         return StepResult(self._saturation.ramp(robot.sent))
 
     def _go(self, robot: Measured, *legs: Leg, to_cut: bool = False) -> None:
-        # From where the tool is, not from where it should be: a motion begins at rest.
+        # From the measured tool pose, not the desired one: a motion begins at rest.
         check = self._config.pre_cut_check
         self._motion = ToolMotion(
             self._config,

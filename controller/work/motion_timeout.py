@@ -52,7 +52,7 @@ class MotionTimeout:
 
 
 def missed(what: str, tracking: Tracking) -> str:
-    """What is missing of a motion to `what`, and why."""
+    """Description of the remaining error of a motion to `what`, and its cause."""
     why = f": {tracking.reason}" if tracking.reason else ""
     return (
         f"{what} was not reached in time: {1e3 * tracking.position_error:.1f} mm and "

@@ -55,17 +55,17 @@ class Movement:
         method: Method | None = None,
         permit: Permit = lambda _: "",
     ) -> None:
-        """Build the robot's model and all that moves it.
+        """Build the robot's model and the motion sources.
 
         Args:
             config: Section `[controller]`.
             robot_config: Section `[robot]`.
-            queue: What is to be cut.
-            event_log: Records events for people.
-            run_id: Makes this start's cut ids unlike any other's.
-            known: What a plan says of a point.
+            queue: The queue of points.
+            event_log: Log of events.
+            run_id: Prefix that makes the cut ids of this start unique.
+            known: Gives the planned cut of a point.
             method: Whole-body method in place of the configured one.
-            permit: Why a point may not be gone to; empty when it may.
+            permit: Gives the reason why the robot may not approach a point; empty if it may.
 
         Raises:
             ConfigError: There is no such method.
@@ -97,7 +97,7 @@ class Movement:
         return bridge.moving and bridge.sequence > self._setpoints.moved
 
     def update(self, inputs: Inputs) -> None:
-        """Take in what was measured and what stands around."""
+        """Update state and obstacles from the inputs."""
         self.body.update(inputs)
         self.body.surroundings.work_at(self.sequence.places)
         self._clearance.update(inputs.obstacles)
@@ -133,12 +133,12 @@ class Movement:
         """One period.
 
         Args:
-            mode: Of the supervision machine.
-            held: Whether somebody holds control.
+            mode: Mode of the supervision state machine.
+            held: Whether a person has control.
             now: Monotonic time (s).
 
         Raises:
-            ControlError: What was wanted cannot be computed.
+            ControlError: The motion cannot be computed.
         """
         self.tracking = None
         robot = self.body.measured
@@ -152,13 +152,13 @@ class Movement:
     def send(
         self, xi: Array, token: Token | None, joints: Sample[m.JointState] | None, latched: bool
     ) -> m.MotionCommand | None:
-        """The command for ξ̇ (9); what is not finite or outside the limits is not sent, the robot brakes.
+        """The command for ξ̇ (9). If it is not finite or outside the limits, the robot brakes instead.
 
         Args:
-            xi: Wanted.
-            token: That it stands on; without one nothing leaves.
-            joints: Newest joint state, which it answers.
-            latched: A stop is, so that nothing leaves once the robot stands.
+            xi: Desired ξ̇.
+            token: Fencing token; without one nothing is sent.
+            joints: Newest joint state, for the echo.
+            latched: Whether a stop is latched. Then nothing is sent once the robot is at rest.
         """
         if not self._setpoints.admits(xi):
             self._event_log.say("error", BRAKED)

@@ -28,11 +28,11 @@ class NextCut:
         """Start without a point.
 
         Args:
-            search: Of postures.
-            queue: Says which point is next.
-            iterations: Of the search in one period.
-            known: What a plan says of a ticket's point, which is then not searched for.
-            permit: Why a ticket's point may not be gone to; empty when it may.
+            search: Posture search.
+            queue: The queue, which chooses the next point.
+            iterations: Iterations of the search in one period.
+            known: Gives the planned cut of a point, which is then used without a search.
+            permit: Gives the reason why the robot may not approach a point; empty if it may.
         """
         self._search, self._queue, self._iterations, self._known = search, queue, iterations, known
         self.permit = permit

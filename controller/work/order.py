@@ -25,7 +25,7 @@ class WorkOrder:
 
     @property
     def by_hand(self) -> tuple[str, ...]:
-        """Points in the order that people have put them in; empty while the plan says."""
+        """Points in the order set by people; empty for the plan's order."""
         return self._by_hand
 
     def restore(self, row: OrderRow) -> None:
@@ -37,20 +37,20 @@ class WorkOrder:
         self._planned = order
 
     def hold(self, order: tuple[str, ...]) -> bool:
-        """Work on these first, whatever is planned; people may still change it. Returns whether that is new."""
+        """Put these points first, whatever the plan; people can still change it. Returns whether it is a change."""
         changed = order != self._held
         self._held = order
         return changed
 
     def move(self, point_id: str, before: str, revision: int, user: str, accepted: Sequence[str]) -> str:
-        """Put a point before another one, or at the end; returns why not, empty when done.
+        """Move a point before another one, or to the end. Returns the reason of a refusal; empty if done.
 
         Args:
-            point_id: What is moved.
-            before: What is worked on after it; empty for the end.
-            revision: Of the order that the operator saw.
+            point_id: The point.
+            before: The point that follows it; empty for the end.
+            revision: Revision of the order that the operator saw.
             user: Who moves it.
-            accepted: Accepted points in the order of now.
+            accepted: Accepted points in their current order.
         """
         if why := self._outdated(revision):
             return why
@@ -117,7 +117,7 @@ class Approaches:
     """Requested approach directions by point. For other points the posture search chooses."""
 
     def __init__(self, journal: Journal) -> None:
-        """Nobody has said anything; what they will is recorded in `journal`."""
+        """Start without requested approaches; later ones are recorded in `journal`."""
         self._journal = journal
         self._turned: dict[str, float] = {}
         self._told: tuple[tuple[str, float], ...] = ()
@@ -132,7 +132,7 @@ class Approaches:
         return self._turned.get(point_id)
 
     def restore(self, rows: tuple[tuple[str, ApproachRow], ...]) -> None:
-        """Take up what was said before a restart."""
+        """Restore the state of an earlier start."""
         for point_id, row in rows:
             self._put(point_id, row.azimuth)
 

@@ -21,7 +21,7 @@ _TURNED_TOLERANCE = 0.35
 #: A name that comes back further away than this is another cane's (m).
 _ELSEWHERE = 0.03
 _INTERRUPTED = "the controller ended before it knew whether this was cut; look, and report the outcome"
-#: Of what perception does not show these are shown from the record: somebody has to decide.
+#: States in which a point is shown from the record if perception does not report it: a person has to decide.
 _ASKED: frozenset[PointState] = frozenset({"ACCEPTED", "UNREACHABLE", "UNKNOWN"})
 _WAITS = "accepted before a restart; waits until perception reports it again"
 _UNSEEN = "perception no longer reports it"
@@ -77,12 +77,12 @@ class PointQueue:
         self._restored: list[str] = []
 
     def update(self, points: PruningPoints, keep: str = "") -> list[str]:
-        """Take in what perception holds true now; returns the acceptances it voided, in words.
+        """Update from perception's current points; returns texts of the voided acceptances.
 
         Args:
-            points: Everything perceived.
-            keep: Point in front of the blades, which hide it from the camera: its disappearance means nothing. Seen
-                elsewhere than accepted it is void like any other.
+            points: Perception's message.
+            keep: Point that the blades hide from the camera: its disappearance is ignored. If it is seen
+                elsewhere than accepted, its acceptance is void like any other.
         """
         voided: list[str] = []
         change = self._rule_change(points)
@@ -127,7 +127,7 @@ class PointQueue:
     def _rule_change(self, points: PruningPoints) -> tuple[PruningRule, PruningRule] | None:
         """The rule before these points and theirs, where somebody has changed it."""
         before = self.perceived
-        # Perception that starts anew counts its frames from the beginning, and its rule is nobody's change.
+        # After a restart perception counts its frames from the beginning. Its rule is then no change by a person.
         if before is None or before.rule is None or points.rule is None or points.frames < before.frames:
             return None
         return None if points.rule == before.rule else (before.rule, points.rule)
@@ -145,7 +145,7 @@ class PointQueue:
         return ""
 
     def restored(self) -> str:
-        """What was accepted again with a rule that was taken back, in words, once; empty when nothing was."""
+        """Text of the acceptances that the undo of a rule has restored, once; empty without any."""
         told, self._restored = ", ".join(self._restored), []
         return told
 
@@ -164,13 +164,13 @@ class PointQueue:
         return self._tickets.get(point_id)
 
     def accept(self, point_id: str, revision: int, user: str, digest: str = "") -> str:
-        """Bind an acceptance to the point as the operator saw it; returns why not, empty when accepted.
+        """Accept a point as the operator saw it. Returns the reason of a refusal; empty if accepted.
 
         Args:
             point_id: Of the point.
-            revision: That the operator saw.
+            revision: Revision that the operator saw.
             user: Who accepts.
-            digest: Hash of what the operator saw; empty where they do not say it.
+            digest: Hash of what the operator saw; empty if not given.
         """
         ticket = self._tickets.get(point_id)
         if ticket is None:
@@ -277,15 +277,15 @@ class PointQueue:
         self.sort()
 
     def reach(self, planned: Iterable[PruningPoint], refused: Mapping[str, str], busy: str = "") -> bool:
-        """Take in which accepted points a plan that holds can reach: ACCEPTED ↔ UNREACHABLE.
+        """Update which accepted points the current plan can reach: ACCEPTED ↔ UNREACHABLE.
 
         Args:
-            planned: What the plan was asked for, each point as it was accepted.
-            refused: Why it refuses some of them, by id.
-            busy: The point that is worked on, which its work decides about.
+            planned: Points of the plan's request, as accepted.
+            refused: Reason for each refused point, by id.
+            busy: Current point of the work, whose state the work decides.
 
         Returns:
-            Whether that is new of any point.
+            Whether the state of any point has changed.
         """
         changed = False
         for point in planned:
@@ -305,7 +305,7 @@ class PointQueue:
         return changed
 
     def hold(self, order: tuple[str, ...]) -> None:
-        """Work on these accepted points first, in this order, until it is let go with none; people may change it."""
+        """Put these accepted points first, in this order, until called with none; people can still change it."""
         if self.order.hold(order):
             self.sort()
 
@@ -345,12 +345,12 @@ class PointQueue:
             elif row.state in BOUND and (row.accepted is None or point_digest(row.accepted) != row.hash):
                 self._put(point_id, replace(self._tickets[point_id], state="REJECTED", reason=_UNBOUND, accepted=None))
             elif row.state in BOUND:
-                # What could not be reached from where the robot stood then is for the next plan to say.
+                # A point that was unreachable from the earlier robot pose is for the next plan to decide.
                 self._put(point_id, replace(self._tickets[point_id], state="ACCEPTED", reason=_WAITS))
         self.sort()
 
     def decide(self, point_id: str, outcome: PointState, user: str, reason: str) -> str:
-        """Somebody has looked how an UNKNOWN cut ended; returns why that is not taken, empty when it is."""
+        """Set the outcome of an UNKNOWN cut after an inspection. Returns the reason of a refusal; empty if done."""
         ticket = self._tickets.get(point_id)
         if ticket is None:
             return f"there is no point {point_id!r}"
@@ -382,12 +382,12 @@ class PointQueue:
         return replace(ticket, state="PROPOSED", reason=text, accepted=None, hash="")
 
     def move(self, point_id: str, before: str, revision: int, user: str) -> str:
-        """Work on an accepted point before another one, or last; returns why not, empty when done.
+        """Move an accepted point in the order of work. Returns the reason of a refusal; empty if done.
 
         Args:
             point_id: What is moved.
-            before: What is worked on after it; empty for the end.
-            revision: Of the order that the operator saw.
+            before: The point that follows it; empty for the end.
+            revision: Revision of the order that the operator saw.
             user: Who moves it.
         """
         for name in (point_id, before):
@@ -412,7 +412,7 @@ class PointQueue:
         return why
 
     def sort(self) -> str:
-        """Put everything where it belongs; nothing keeps that from being done."""
+        """Sort all points into the order of work. It never fails."""
         along = sorted(self._order, key=self._place)
         order = self.order.arranged(along, lambda name: self._tickets[name].state == "ACCEPTED")
         if order != self._order:

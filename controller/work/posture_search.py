@@ -32,7 +32,7 @@ APPROACHES = (
     (0.7, 0.0),
     (-0.7, 0.0),
 )
-#: Tilts where somebody has said the turn about the cane (rad), in order of preference.
+#: Tilts for an azimuth set by a person (rad), in order of preference.
 TILTS = (0.0, 0.2, 0.26, -0.26)
 #: From the arm's shoulder to its wrist at most, over elbow and wrist offsets (m, Panda's dimensions), and from the
 #: wrist to the flange (m).
@@ -111,10 +111,10 @@ class PostureSearch:
         """Search, yielding once an iteration.
 
         Args:
-            position: Of the cut (3, m, odom).
-            tangent: Along the cane (3, odom).
-            q: Configuration (12) now: the base keeps its distance to the row.
-            azimuth: Turn of the approach about the cane (rad) that somebody wants; None leaves it to the search.
+            position: Position of the cut (3, m, odom).
+            tangent: Unit vector along the cane (3, odom).
+            q: Current configuration (12): the base keeps its distance to the row.
+            azimuth: Turn of the approach about the cane (rad) set by a person; None leaves it to the search.
         """
         best: CutPlan | None = None
         self._passed_over = False
@@ -160,7 +160,7 @@ class PostureSearch:
         stand_off = yield from self._solve(q, poses.stand_off, seed)
         if stand_off is None:
             return None
-        # From the stand-off both ways, as the robot will move.
+        # From the stand-off in both directions, like the robot's motion.
         cut = yield from self._solve(stand_off.q, poses.cut, stand_off.q[ARM_Q])
         if cut is None:
             return None

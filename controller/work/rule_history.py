@@ -25,7 +25,7 @@ class RuleHistory(Generic[Acceptance]):
     def __init__(self) -> None:
         """Nothing has changed yet."""
         self._changes: list[Change[Acceptance]] = []
-        #: What is taken back as soon as perception says so; None while nothing is.
+        #: Undo that waits for perception's report; None without one.
         self._coming: Change[Acceptance] | None = None
 
     def changed(
@@ -40,11 +40,11 @@ class RuleHistory(Generic[Acceptance]):
         return None
 
     def undo(self, rule: PruningRule, now: PruningRule | None) -> dict[str, Acceptance] | None | str:
-        """Somebody takes the change to `rule` back while `now` is in force.
+        """Undo the change to `rule` while `now` is in force.
 
         Returns:
-            The acceptances to be restored at once; None where perception has yet to say that the rule is the former
-            one; or why nothing can be taken back.
+            The acceptances to restore at once; None if perception has not yet reported the former
+            rule; or the reason why there is nothing to undo.
         """
         changes = self._changes
         if changes and changes[-1].rule == rule == now:

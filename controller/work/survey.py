@@ -44,11 +44,11 @@ class Survey:
         """Bind the parts.
 
         Args:
-            config: Of the controller.
-            follower: Moves arm and base within the limits.
-            saturation: Brings to rest.
-            queue: Knows what perception holds true.
-            asked: Length of the stretch, ahead along the row from where the robot is, or the place to look at.
+            config: Section `[controller]`.
+            follower: Follower for motions of arm and base.
+            saturation: Braking to rest.
+            queue: The queue with perception's points.
+            asked: Distance ahead along the row, or the site to survey.
         """
         self._config, self._follower, self._saturation, self._queue = config, follower, saturation, queue
         self._homing: Homing | None = Homing(config, follower, 1.0 / config.rate_hz)
@@ -155,7 +155,7 @@ def open_place(perceived: m.PruningPoints | None, vine: int, spur: int) -> m.Und
 
 
 def looked_again(perceived: m.PruningPoints, place: m.UndecidedSite) -> str:
-    """What became of a place, in words."""
+    """Result of a site, as text."""
     where = f"looked again at vine {place.vine}, spur {place.spur}"
     left = open_place(perceived, place.vine, place.spur)
     shown = [point.point_id for point in perceived.points if (point.vine, point.spur) == (place.vine, place.spur)]

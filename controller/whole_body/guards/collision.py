@@ -36,7 +36,7 @@ class CollisionGuard:
         self._dt = dt
 
     def rows(self, problem: IkProblem) -> Inequalities:
-        """What has to hold in this period."""
+        """Constraints of this period."""
         try:
             near = self.model.dampers(problem.q, self._influence, problem.kinematics)
         except ControlError:

@@ -17,11 +17,11 @@ class TippingGuard:
         self._tipping, self._dt = tipping, dt
 
     def rows(self, problem: IkProblem) -> Inequalities:
-        """What has to hold in this period."""
+        """Constraints of this period."""
         # At the speeds of now: within one period they change by less than the margin is for.
         rows = self._tipping.rows(problem.q, problem.sent, S=problem.kinematics.S)
         matrix, lower = rows.over_velocity(problem.sent, self._dt)
         if problem.held is not None:
-            # The base goes on accelerating as it was told to; the rows are about the arm alone.
+            # The base keeps its commanded acceleration; the rows are for the arm alone.
             lower = without_base(matrix, 2.0 * problem.sent[:2] - problem.sent_before[:2] - problem.held, lower)
         return Inequalities(matrix, lower, _NAMES)

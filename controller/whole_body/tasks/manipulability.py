@@ -46,7 +46,7 @@ class ClimbManipulability:
 
 @compiled(NOTHING(VECTOR, NUMBER, NUMBER, MATRIX, VECTOR))
 def _climb(gradient: Array, weight: float, speed: float, jacobian: Array, target: Array) -> None:
-    """Write the row (1×9) along the gradient (9) and its target; nothing is wanted where it is level."""
+    """Write the row (1×9) along the gradient (9) and its target; zero for a zero gradient."""
     steepness = 0.0
     for slope in gradient:
         steepness += slope * slope
