@@ -16,9 +16,9 @@ from controller.whole_body.collision import CollisionModel
 from controller.whole_body.registry import make_method
 from controller.whole_body.task import IkProblem, Method
 from rolling_panda import commands as intents
-from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
 from rolling_panda.model.robot import RobotModel
+from tests.support.points import point
 from tests.support.worlds.kinematic_robot import KinematicRobot
 
 #: Places along the row (m) worked on, one after the other; enough for the steps asked for, again and again.
@@ -112,24 +112,7 @@ def working(method: Method | None = None) -> KinematicRobot:
     config = ControllerConfig()
     robot = KinematicRobot(Controller(config, RobotConfig(), method=method), config.home)
     robot.step()
-    robot.show(
-        tuple(
-            m.PruningPoint(
-                point_id=f"p{i}",
-                revision=1,
-                position=(i * _SPACING, 0.75, 1.0 + 0.02 * (i % 5)),
-                tangent=(0.0, 0.0, 1.0),
-                radius=0.004,
-                confidence=0.9,
-                nodes_seen=5,
-                nodes_kept=2,
-                vine=0,
-                spur=i,
-                reason="benchmark",
-            )
-            for i in range(_COUNT)
-        )
-    )
+    robot.show(tuple(point(f"p{i}", (i * _SPACING, 0.75, 1.0 + 0.02 * (i % 5)), spur=i) for i in range(_COUNT)))
     robot.step()
     for intent in (
         intents.Arm(user="bench"),

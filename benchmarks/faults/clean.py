@@ -16,6 +16,7 @@ from controller.inputs import Sample
 from controller.interface import Outputs
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
+from tests.support.points import point
 from tests.support.worlds.faulty_world import FaultyWorld
 
 _USER = "ada"
@@ -85,11 +86,8 @@ class EndlessRow(FaultyWorld):
 
 
 def _point(number: int) -> m.PruningPoint:
-    return m.PruningPoint(
-        point_id=f"p{number}", revision=1, position=(_FIRST_M + number * _SPACING_M, 0.75, 1.0),
-        tangent=(0.0, 0.0, 1.0), radius=0.004, confidence=0.9, nodes_seen=5, nodes_kept=2,
-        vine=number // 8, spur=number % 8, reason="for the bench",
-    )  # fmt: skip
+    place = (_FIRST_M + number * _SPACING_M, 0.75, 1.0)
+    return point(f"p{number}", place, vine=number // 8, spur=number % 8)
 
 
 def work(world: EndlessRow, seconds: float, jitter_s: float) -> CleanWork:

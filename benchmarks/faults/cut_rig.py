@@ -28,6 +28,7 @@ from rolling_panda.messages.supervision import Person, Presence, StopState
 from rolling_panda.transport import certificates
 from rolling_panda.transport.access import RECORDER
 from rolling_panda.transport.zenoh import Onlooker, Transport
+from tests.support.points import point
 from tests.support.processes.local_router import free_port
 from tests.support.processes.processes import Processes
 from tests.support.processes.wall_clock import WallClock, together
@@ -285,11 +286,8 @@ class CutRig(Processes):
     @staticmethod
     def _point(number: int) -> m.PruningPoint:
         place = number % _PLACES
-        point = m.PruningPoint(
-            point_id=f"p{number}", revision=1, position=(0.30 + 0.02 * place, 0.80, 0.95), tangent=(0.0, 0.0, 1.0),
-            radius=0.004, confidence=0.9, nodes_seen=5, nodes_kept=2, vine=1, spur=1 + place, reason="played",
-        )  # fmt: skip
-        return msgspec.structs.replace(point, digest=point_digest(point))
+        made = point(f"p{number}", (0.30 + 0.02 * place, 0.80, 0.95), vine=1, spur=1 + place)
+        return msgspec.structs.replace(made, digest=point_digest(made))
 
     def lead_on(self) -> str:
         """Do what a person would do next to have the points cut; returns what was refused, for reports."""

@@ -22,7 +22,9 @@ from perception.segmentation.segmenter import LabelImageSegmenter
 from rolling_panda import messages as m
 from rolling_panda.config import load_section
 from rolling_panda.model.robot import RobotModel
+from rolling_panda.model.wire_values import vector3
 from rolling_panda.resources import resource
+from tests.support.points import point as pruning_point
 
 ROW = grow(VineyardConfig(vines=1), 11)
 TRUTHS = [truth for truth in judge(ROW) if truth.cut is not None]
@@ -30,19 +32,7 @@ TRUTHS = [truth for truth in judge(ROW) if truth.cut is not None]
 
 def point(position, tangent, reason="Spur cut.") -> m.PruningPoint:
     tangent = np.array(tangent) / np.linalg.norm(tangent)
-    return m.PruningPoint(
-        point_id="p1",
-        revision=1,
-        position=tuple(float(x) for x in position),
-        tangent=tuple(float(x) for x in tangent),
-        radius=0.004,
-        confidence=0.9,
-        nodes_seen=3,
-        nodes_kept=2,
-        vine=1,
-        spur=1,
-        reason=reason,
-    )
+    return pruning_point("p1", vector3(np.array(position)), vector3(tangent), vine=1, spur=1, reason=reason)
 
 
 @pytest.mark.parametrize("past", [0.0, 0.006, -0.006])

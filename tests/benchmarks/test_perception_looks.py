@@ -1,6 +1,6 @@
 """The ablation of second looks: what they refine, what they void, and what is seen after a cut."""
 
-import msgspec
+import numpy as np
 
 from benchmarks.perception.judge import RowJudge
 from benchmarks.perception.looks import CloseCamera, Looks, look_again, summarise_looks
@@ -11,28 +11,16 @@ from bridge.sim.vineyard.grow import grow
 from bridge.sim.vineyard.truth import judge
 from perception.config import PerceptionConfig
 from perception.segmentation.segmenter import LabelImageSegmenter
-from rolling_panda import messages as m
 from rolling_panda.model.robot import RobotModel
+from rolling_panda.model.wire_values import vector3
+from tests.support.points import point as pruning_point
 
 SEED = 210
 
 
 def point(number, cut, aside=0.0):
-    x, y, z = (float(value) for value in cut.best)
-    return m.PruningPoint(
-        point_id=f"p{number}",
-        revision=1,
-        position=(x + aside, y, z),
-        tangent=msgspec.convert(tuple(map(float, cut.tangent)), m.UnitVector3),
-        radius=0.004,
-        confidence=0.9,
-        nodes_seen=4,
-        nodes_kept=2,
-        vine=1,
-        spur=number,
-        reason="",
-        offset=0.02,
-    )
+    place = vector3(cut.best + np.array([aside, 0.0, 0.0]))
+    return pruning_point(f"p{number}", place, vector3(cut.tangent), vine=1, spur=number, offset=0.02)
 
 
 def test_a_second_look_brings_points_nearer_to_their_canes_and_voids_what_is_on_none():

@@ -5,31 +5,15 @@ from benchmarks.control.row_stages import LIMITS, STAGES, StageClock
 from controller.config import ControllerConfig
 from controller.core import Controller
 from rolling_panda import commands as intents
-from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
+from tests.support.points import point
 from tests.support.worlds.kinematic_robot import KinematicRobot
-
-
-def point(number):
-    return m.PruningPoint(
-        point_id=f"p{number}",
-        revision=1,
-        position=(0.3 + 0.12 * number, 0.76, 1.05),
-        tangent=(0.0, 0.0, 1.0),
-        radius=0.004,
-        confidence=0.9,
-        nodes_seen=3,
-        nodes_kept=2,
-        vine=0,
-        spur=number,
-        reason="test",
-    )
 
 
 def work(config, count=3):
     """Cut a few points; the clock that looked on, and how long it took (s)."""
     robot = KinematicRobot(Controller(config, RobotConfig()), config.home)
-    robot.show(tuple(point(number) for number in range(count)))
+    robot.show(tuple(point(f"p{number}", (0.3 + 0.12 * number, 0.76, 1.05)) for number in range(count)))
     robot.step()
     for intent in (intents.Arm(user="t"), intents.AcceptAll(user="t"), intents.Start(user="t")):
         assert robot.ask(intent).ok

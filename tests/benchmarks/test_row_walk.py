@@ -4,27 +4,11 @@ from benchmarks.control.row_walk import walk
 from controller.config import ControllerConfig
 from controller.core import Controller
 from rolling_panda import commands as intents
-from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
+from tests.support.points import point
 from tests.support.worlds.kinematic_robot import KinematicRobot
 
 CONFIG = ControllerConfig()
-
-
-def point(name, x):
-    return m.PruningPoint(
-        point_id=name,
-        revision=1,
-        position=(x, 0.76, 1.05),
-        tangent=(0.0, 0.0, 1.0),
-        radius=0.004,
-        confidence=0.9,
-        nodes_seen=3,
-        nodes_kept=2,
-        vine=0,
-        spur=0,
-        reason="test",
-    )
 
 
 class Beside:
@@ -53,7 +37,7 @@ class Beside:
             self.robot.step()
             if step % 10 == 0:
                 self._seen |= {name: x for name, x in self._row.items() if abs(x - self.robot.q[0] - 0.3) < 0.5}
-                self.robot.show(tuple(point(name, x) for name, x in self._seen.items()))
+                self.robot.show(tuple(point(name, (x, 0.76, 1.05)) for name, x in self._seen.items()))
 
     def run_until(self, condition, limit_s):
         end = self.now + limit_s

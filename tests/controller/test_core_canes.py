@@ -14,7 +14,8 @@ from rolling_panda import commands as intents
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.messages.supervision import TeleopTarget
 from rolling_panda.model.robot import RobotModel, pose_message
-from tests.support.controller_at_work import entry, point, robot, run_until, working
+from tests.support.controller_at_work import entry, robot, run_until, working
+from tests.support.points import point
 
 CUT = (0.45, 0.75, 1.10)
 STAND_OFF = ControllerConfig().stand_off

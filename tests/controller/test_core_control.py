@@ -5,7 +5,8 @@ import pytest
 
 from rolling_panda import commands as intents
 from rolling_panda.messages.supervision import BaseVelocity, StopRecord, TeleopTarget
-from tests.support.controller_at_work import CONFIG, point, robot, run_until, working
+from tests.support.controller_at_work import CONFIG, robot, run_until, working
+from tests.support.points import point
 
 
 def far_at_work():

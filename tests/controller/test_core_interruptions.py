@@ -5,7 +5,8 @@ import numpy as np
 from rolling_panda import commands as intents
 from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
 from rolling_panda.model.robot import ARM_Q
-from tests.support.controller_at_work import entry, finish, point, robot, run_until, working
+from tests.support.controller_at_work import entry, finish, robot, run_until, working
+from tests.support.points import point
 
 
 def until_retreating_from_the_first(r):

@@ -4,7 +4,8 @@ import numpy as np
 
 from controller.ledger.journal import LedgerState
 from rolling_panda import commands as intents
-from tests.support.controller_at_work import entry, finish, point, run_until, working
+from tests.support.controller_at_work import entry, finish, run_until, working
+from tests.support.points import point
 
 SHOWN = (point("a", (0.6, 0.75, 1.0)), point("b", (0.9, 0.75, 1.0)))
 

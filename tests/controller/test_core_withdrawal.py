@@ -3,7 +3,8 @@
 import msgspec
 import numpy as np
 
-from tests.support.controller_at_work import CONFIG, entry, point, run_until, working
+from tests.support.controller_at_work import CONFIG, entry, run_until, working
+from tests.support.points import point
 
 
 def at_work_and_held(monkeypatch, jog_too=False):

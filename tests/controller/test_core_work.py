@@ -7,7 +7,8 @@ from controller.config import ControllerConfig
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.model.robot import ARM_Q, ARM_XI, RobotModel
-from tests.support.controller_at_work import CONFIG, entry, finish, point, robot, run_until, working
+from tests.support.controller_at_work import CONFIG, entry, finish, robot, run_until, working
+from tests.support.points import point
 
 LIMITS = RobotModel().limits
 

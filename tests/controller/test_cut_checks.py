@@ -8,7 +8,8 @@ from controller.work.cut_checks import PostCutCheck, not_as_accepted
 from controller.work.point_queue import PointQueue, Ticket
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import CloseUpResult, Finding
-from tests.support.controller_at_work import CONFIG, entry, finish, point, run_until, working
+from tests.support.controller_at_work import CONFIG, entry, finish, run_until, working
+from tests.support.points import point
 
 
 class Work:

@@ -9,30 +9,18 @@ import pytest
 from controller.config import ControllerConfig
 from controller.planning.cuts import CutPlanner
 from controller.planning.work_plan import PlanRequest
-from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.model.robot import ARM_Q, RobotModel
+from tests.support.points import point as pruning_point
 
 CONFIG, ROBOT = ControllerConfig(), RobotModel()
 PLANNER = CutPlanner(CONFIG, RobotConfig())
 POST = Capsule("post", (0.5, 0.75, 0.0), (0.5, 0.75, 2.0), 0.05, 0.05)
 
 
-def point(point_id, x, z=1.05, revision=1, tangent=(0.0, 0.0, 1.0)):
-    return m.PruningPoint(
-        point_id=point_id,
-        revision=revision,
-        position=(x, 0.75, z),
-        tangent=tangent,
-        radius=0.004,
-        confidence=0.9,
-        nodes_seen=5,
-        nodes_kept=2,
-        vine=0,
-        spur=0,
-        reason="test",
-    )
+def point(point_id, x, z=1.05, **changes):
+    return pruning_point(point_id, (x, 0.75, z), **changes)
 
 
 def request(*points, obstacles=(), number=1):

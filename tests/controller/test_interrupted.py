@@ -4,7 +4,8 @@ import pytest
 
 from rolling_panda import commands as intents
 from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
-from tests.support.controller_at_work import point, robot, run_until, working
+from tests.support.controller_at_work import robot, run_until, working
+from tests.support.points import point
 
 
 def at_work():

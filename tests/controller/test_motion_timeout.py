@@ -6,7 +6,8 @@ import pytest
 from controller.motion.follower import Tracking
 from controller.work.motion_timeout import MotionTimeout, missed
 from rolling_panda.messages.perception import Capsule
-from tests.support.controller_at_work import entry, point, run_until, working
+from tests.support.controller_at_work import entry, run_until, working
+from tests.support.points import point
 
 TIMEOUT, DT = 6.0, 0.01
 

@@ -16,7 +16,8 @@ from controller.work.order import LARGEST, Approaches, WorkOrder
 from rolling_panda import commands as intents
 from rolling_panda.config import RobotConfig
 from rolling_panda.model.robot import ARM_Q
-from tests.support.controller_at_work import CONFIG, entry, finish, point, robot
+from tests.support.controller_at_work import CONFIG, entry, finish, robot
+from tests.support.points import point
 
 NAMES = tuple("abcdef")
 

@@ -16,7 +16,8 @@ from controller.whole_body.collision import CollisionModel
 from rolling_panda.config import RobotConfig
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.model.robot import ARM_Q, RobotModel
-from tests.support.controller_at_work import CONFIG, point
+from tests.support.controller_at_work import CONFIG
+from tests.support.points import point
 
 A, B = point("a", (0.45, 0.75, 1.05)), point("b", (0.75, 0.75, 1.1))
 START = np.zeros(12)

@@ -5,20 +5,9 @@ from hypothesis import strategies as st
 from controller.config import ControllerConfig
 from controller.work.point_queue import PointQueue
 from rolling_panda import messages as m
+from tests.support.points import point as pruning_point
 
-POINT = m.PruningPoint(
-    point_id="a",
-    revision=3,
-    position=(1.0, 0.85, 1.0),
-    tangent=(0.0, 0.0, 1.0),
-    radius=0.004,
-    confidence=0.8,
-    nodes_seen=5,
-    nodes_kept=2,
-    vine=0,
-    spur=0,
-    reason="test",
-)
+POINT = pruning_point("a", (1.0, 0.85, 1.0), revision=3, confidence=0.8)
 
 
 def point(point_id="a", **changes):

@@ -5,20 +5,7 @@ import msgspec
 from controller.config import ControllerConfig
 from controller.ledger.journal import Journal, LedgerState, TicketRow
 from controller.work.point_queue import PointQueue
-from rolling_panda import messages as m
-
-POINT = m.PruningPoint(
-    point_id="a", revision=3, position=(1.0, 0.85, 1.0), tangent=(0.0, 0.0, 1.0), radius=0.004, confidence=0.8,
-    nodes_seen=5, nodes_kept=2, vine=0, spur=0, reason="test",
-)  # fmt: skip
-
-
-def point(point_id="a", **changes):
-    return msgspec.structs.replace(POINT, point_id=point_id, **changes)
-
-
-def shown(*points):
-    return m.PruningPoints(header=m.Header(), segmenter="none", frames=1, points=points)
+from tests.controller.test_point_queue import POINT, point, shown
 
 
 class Life:

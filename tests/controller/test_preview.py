@@ -12,7 +12,8 @@ from controller.planning.preview_plan import PreviewRequest
 from rolling_panda import commands as intents
 from rolling_panda.config import RobotConfig
 from rolling_panda.messages.perception import Capsule
-from tests.support.controller_at_work import CONFIG, entry, point
+from tests.support.controller_at_work import CONFIG, entry
+from tests.support.points import point
 from tests.support.previewed import ROLLOUT, Previewed
 
 POINTS = (point("a", (0.45, 0.75, 1.05)), point("b", (0.75, 0.75, 1.1)))

@@ -12,7 +12,8 @@ from rolling_panda.errors import ControlError
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.model.differential_drive import NXI
 from rolling_panda.model.robot import ARM_Q, RobotModel
-from tests.support.controller_at_work import CONFIG, entry, point
+from tests.support.controller_at_work import CONFIG, entry
+from tests.support.points import point
 from tests.support.previewed import ROLLOUT, Previewed
 
 POINTS = (point("a", (0.45, 0.75, 1.05)), point("b", (0.75, 0.75, 1.1), (0.1, 0.0, 0.995)))

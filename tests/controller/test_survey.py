@@ -9,7 +9,8 @@ from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.model.robot import ARM_Q, RobotModel
-from tests.support.controller_at_work import CONFIG, finish, point, robot, run_until
+from tests.support.controller_at_work import CONFIG, finish, robot, run_until
+from tests.support.points import point
 
 UNCLEAR = m.UndecidedSite("its base is hidden", "another look", 1, 2)
 ROBOT = RobotModel()

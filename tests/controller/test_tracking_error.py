@@ -4,7 +4,8 @@ import pytest
 from controller.motion.tracking_error import TrackingErrorMonitor
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
-from tests.support.controller_at_work import point, working
+from tests.support.controller_at_work import working
+from tests.support.points import point
 
 
 def run(velocity_of, seconds=2.0, sent=None, step=0.01):

@@ -20,6 +20,8 @@ from perception.tracking.close_up import check_close_up
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import CloseUpResult
 from rolling_panda.model.robot import RobotModel, configuration
+from rolling_panda.model.wire_values import vector3
+from tests.support.points import point as pruning_point
 
 SEED = 210
 MODEL = RobotModel()
@@ -51,22 +53,8 @@ def scene() -> Scene:
 def point(cut: RightCut, aside: float = 0.0, along: float = 0.0) -> m.PruningPoint:
     """The point of a right cut, seen a little beside its cane or along it."""
     sideways = np.cross(cut.tangent, [0.0, 1.0, 0.0])
-    x, y, z = (float(v) for v in cut.best + aside * sideways / np.linalg.norm(sideways) + along * cut.tangent)
-    tx, ty, tz = (float(v) for v in cut.tangent)
-    return m.PruningPoint(
-        point_id="p1",
-        revision=1,
-        position=(x, y, z),
-        tangent=(tx, ty, tz),
-        radius=0.004,
-        confidence=0.9,
-        nodes_seen=4,
-        nodes_kept=2,
-        vine=1,
-        spur=1,
-        reason="",
-        offset=0.02,
-    )
+    place = cut.best + aside * sideways / np.linalg.norm(sideways) + along * cut.tangent
+    return pruning_point("p1", vector3(place), vector3(cut.tangent), vine=1, spur=1, offset=0.02)
 
 
 def view_from_clear(row: Row, cut: RightCut, clearance: float = 0.22) -> View:

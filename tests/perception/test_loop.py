@@ -12,6 +12,7 @@ from rolling_panda.errors import MessageError
 from rolling_panda.messages.perception import Capsule, PointCrop
 from rolling_panda.topics import CLOSE_UP, CROPS, EVENT, HEARTBEAT, OBSTACLES, PLANT, POINTS
 from rolling_panda.transport.zenoh import Slot
+from tests.support.points import point
 
 pytestmark = pytest.mark.alone
 
@@ -161,8 +162,8 @@ def test_a_corrupt_frame_is_told_once_and_sends_no_points(parts):
 def test_new_points_and_points_that_were_cut_are_no_warnings(parts):
     wire, perception, loop = parts
     events = wire.out[EVENT.name].sent
-    point = m.PruningPoint("p1", 1, (0.3, 0.8, 1.0), (0.0, 0.0, 1.0), 0.004, 0.9, 5, 2, 0, 0, "two nodes stay")
-    perception.process = lambda frame: m.PruningPoints(header=m.Header(), segmenter="s", frames=1, points=(point,))
+    shown = m.PruningPoints(header=m.Header(), segmenter="s", frames=1, points=(point("p1", (0.3, 0.8, 1.0)),))
+    perception.process = lambda frame: shown
     perception.withdrawn = ("p2 withdrawn: it has been cut",)
     wire.frames.store(Frame("frame"), 0.0)
     step_until(loop, lambda: len(events) == 2)

@@ -3,25 +3,10 @@
 from controller.config import ControllerConfig
 from controller.core import Controller
 from rolling_panda import commands as intents
-from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
 from tests.support.worlds.kinematic_robot import KinematicRobot
 
 CONFIG = ControllerConfig()
-
-
-def point(point_id, position, tangent=(0.0, 0.0, 1.0), **changes):
-    values = {
-        "revision": 1,
-        "radius": 0.004,
-        "confidence": 0.9,
-        "nodes_seen": 5,
-        "nodes_kept": 2,
-        "vine": 0,
-        "spur": 0,
-        "reason": "test",
-    }
-    return m.PruningPoint(point_id=point_id, position=position, tangent=tangent, **(values | changes))
 
 
 def robot(config=CONFIG, **changes):

@@ -10,6 +10,7 @@ from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.transport.codec import StrictDecoder, encode
 from rolling_panda.transport.zenoh import Feed, Slot
+from tests.support.points import point
 
 
 @cache
@@ -100,10 +101,7 @@ def controller_state(queue=(), mode="READY"):
 
 
 def pruning_point(point_id="p1", revision=3, position=(0.3, 0.85, 1.0)):
-    return m.PruningPoint(
-        point_id=point_id, revision=revision, position=position, tangent=(0.0, 0.0, 1.0), radius=0.005, confidence=0.8,
-        nodes_seen=5, nodes_kept=2, vine=0, spur=1, reason="two count nodes stay",
-    )  # fmt: skip
+    return point(point_id, position, revision=revision, radius=0.005, confidence=0.8, spur=1)
 
 
 def pruning_points(*points, canes=()):

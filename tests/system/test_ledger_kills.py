@@ -16,6 +16,7 @@ from rolling_panda.errors import ServiceError
 from rolling_panda.runtime.launch import child_environment
 from rolling_panda.topics import CONTROLLER, INTENT, POINTS
 from rolling_panda.transport.zenoh import Transport
+from tests.support.points import point
 from tests.support.processes.local_router import local_router
 
 pytestmark = pytest.mark.alone
@@ -87,13 +88,7 @@ ROUND, PLACES = 25, 500
 
 
 def points(count):
-    made = tuple(
-        m.PruningPoint(
-            point_id=f"p{n}", revision=1, position=(0.1 * n, 0.75, 1.0), tangent=(0.0, 0.0, 1.0), radius=0.004,
-            confidence=0.9, nodes_seen=5, nodes_kept=2, vine=0, spur=0, reason="test",
-        )
-        for n in range(count)
-    )  # fmt: skip
+    made = tuple(point(f"p{n}", (0.1 * n, 0.75, 1.0)) for n in range(count))
     return m.PruningPoints(header=m.Header(), segmenter="test", frames=1, points=made)
 
 

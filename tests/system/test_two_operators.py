@@ -28,6 +28,7 @@ from controller.work.point_queue import PointQueue
 from controller.work.queue_requests import QueueRequests
 from rolling_panda import messages as m
 from tests.support.fake_wire import FakeWire
+from tests.support.points import point as pruning_point
 from tests.support.running_server import running_server
 
 NAMES = ("p0", "p1")
@@ -38,10 +39,8 @@ ACCEPTABLE = ("PROPOSED", "REJECTED", "FAILED_NOT_CUT")
 
 
 def point(name, revision):
-    return m.PruningPoint(
-        point_id=name, revision=revision, position=(0.3 * NAMES.index(name), 0.75, 1.0), tangent=(0.0, 0.0, 1.0),
-        radius=0.004, confidence=0.2 + 0.2 * NAMES.index(name), nodes_seen=5, nodes_kept=2, vine=0, spur=0, reason="",
-    )  # fmt: skip
+    at = NAMES.index(name)
+    return pruning_point(name, (0.3 * at, 0.75, 1.0), revision=revision, confidence=0.2 + 0.2 * at)
 
 
 class Robot:

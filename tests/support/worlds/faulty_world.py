@@ -29,6 +29,7 @@ from rolling_panda.model.robot import RobotModel, configuration, pose_message
 from rolling_panda.runtime.latest_file import KeptValue
 from server.auth.sessions import Session
 from server.robots.presence import PresenceTracker
+from tests.support.points import point
 from tests.support.worlds.world import World
 
 MODEL = RobotModel()
@@ -120,10 +121,7 @@ class FaultyWorld(World):
         """Automatic work on a point that is far away, until base and arm move."""
         self.people = (_USER,)
         self.run(0.3)
-        far = m.PruningPoint(
-            point_id="p", revision=1, position=(2.5, 0.75, 1.0), tangent=(0.0, 0.0, 1.0), radius=0.004, confidence=0.9,
-            nodes_seen=5, nodes_kept=2, vine=0, spur=0, reason="trial",
-        )  # fmt: skip
+        far = point("p", (2.5, 0.75, 1.0))
         points = m.PruningPoints(header=m.Header(self.now, "odom"), segmenter="none", frames=1, points=(far,))
         self.inputs = replace(self.inputs, points=Sample(points, self.now))
         self.run(0.02)

@@ -27,6 +27,7 @@ from rolling_panda.messages.supervision import BaseVelocity, Person, Presence, T
 from rolling_panda.runtime.latest_file import KeptValue
 from server.robots.presence import PRESENT_S
 from tests.support.fake_wire import as_received
+from tests.support.points import point
 from tests.support.worlds.random_judge import Judge
 from tests.support.worlds.random_parts import MODEL, CutDisk, Movement, Robot
 
@@ -268,14 +269,10 @@ class RandomWorld:
         )
         self.revision += self.chance.random() < 0.2
         points = tuple(
-            m.PruningPoint(
-                point_id=name, revision=self.revision, position=(0.3 * place + offset, 0.75, 1.0),
-                tangent=(0.0, 0.0, 1.0), radius=0.004, confidence=0.9, nodes_seen=5, nodes_kept=2, vine=0, spur=0,
-                reason="test",
-            )
+            point(name, (0.3 * place + offset, 0.75, 1.0), revision=self.revision)
             for place, (name, offset) in enumerate(zip(self.names, self.offsets, strict=True))
             if self.chance.random() < 0.98
-        )  # fmt: skip
+        )
         message = m.PruningPoints(header=m.Header(self.now), segmenter="test", frames=1, points=points)
         self.inputs = replace(self.inputs, points=Sample(message, self.now))
 
