@@ -9,7 +9,15 @@ from collections.abc import Iterable
 
 from controller.config import ControllerConfig
 from controller.interface import Outputs, StepInputs
-from controller.ledger.journal import ApproachRow, EventLogger, Journal, OrderRow, PreviewRequiredRow, RequestRow, TicketRow
+from controller.ledger.journal import (
+    ApproachRow,
+    EventLogger,
+    Journal,
+    OrderRow,
+    PreviewRequiredRow,
+    RequestRow,
+    TicketRow,
+)
 from controller.motion.follower import Tracking
 from controller.planning.plan_manager import PlanManager
 from controller.planning.preview import PreviewManager

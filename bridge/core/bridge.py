@@ -44,7 +44,7 @@ _STOPS_TICKS = round(1 / STOPS.rate_hz / TICK_S)
 # the tool in place takes.
 _CUT_WHEELS, _CUT_JOINTS = 0.04, 0.1
 MOVING_CUT = "the robot is not at rest"
-# A robot that nobody has stepped for so long (s) has come to rest by its own deadlines, or is on its way: what is sent
+# A robot without a step for this long (s) has stopped by its own deadlines, or is stopping: what is sent
 # begins with how it really moves.
 _STANDSTILL_S = 0.05
 # In these modes of its holder nothing moves, but for braking (s).
@@ -94,14 +94,14 @@ class BridgeCore:
         Args:
             robot: Simulated or real.
             config: Deadlines and rates.
-            limits: Of the robot, over ξ.
-            odometer: Follows the wheels.
-            kind: What the robot is, for people.
-            scenery: Revision and rods to show; None on a real robot.
+            limits: Limits of the robot over ξ.
+            odometer: Odometry from the wheels.
+            kind: Kind of the robot, for display.
+            scenery: Revision and rods of the simulated row; None on a real robot.
             rejections: Table of refusals shared with the transport.
-            cuts: Remembers cuts through restarts; None for as long as this lives.
-            memory: What survives a restart; None forgets.
-            relaxed_limits: What the configuration sets less strictly than usual, to be told.
+            cuts: Durable memory of cuts; None keeps them for the life of the process.
+            memory: State that survives a restart; None keeps nothing.
+            relaxed_limits: Safety limits that the configuration sets less strictly than usual, to report.
         """
         self.robot = robot
         self.refusals = Refusals(rejections)
@@ -114,7 +114,7 @@ class BridgeCore:
         before = self._memory.value
         self._fence = Fence(before.epoch, before.token)
         self._validator = CommandValidator(limits.velocity, config.max_age_s, self._fence)
-        #: Whether a restart would know who holds the token; only then they are told.
+        #: Whether the holder of the token is on disk; it is reported only then.
         self._fence_kept = True
         self._mode: tuple[m.Mode | None, float] = None, 0.0
         self._wanted, self._unwanted_said = 0.0, False
@@ -201,7 +201,7 @@ class BridgeCore:
             self._begin_cut(command.cut_id, "FAILED_NOT_CUT")
 
     def on_picture(self, request: CloseUpRequest) -> None:
-        """Take a picture as soon as the camera is free; only for the controller whose commands are taken."""
+        """Take a picture as soon as the camera is free; only for the token's holder."""
         if request.epoch != self._fence.epoch:
             self.refusals.add(CLOSE_UP_REQUEST.name, "not the controller's that commands the robot")
             return
@@ -331,7 +331,7 @@ class BridgeCore:
             self._events += [("warning", line) for line in self.refusals.lines(now)]
         stops = None
         self._stops_due |= ticks % _STOPS_TICKS == 0
-        # A stop is told to be latched when a restart would find it; where the disk does not take it, that is told too.
+        # A stop is reported as latched when it is on disk. A failure of the disk is reported too.
         if self._stops_due and (self._memory.kept or self._memory.failure):
             self._stops_due = False
             stops = StopState(
@@ -390,7 +390,7 @@ class BridgeCore:
         )
 
     def _watch_mode(self, moving: bool, now: float) -> None:
-        """Say it when the robot moves though the mode of who holds the token, as they told it last, moves nothing."""
+        """Log that the robot moves although the newest mode of the token's holder allows no motion."""
         mode, at = self._mode
         if not moving or (mode is not None and mode not in _STILL and now - at <= SILENT_S):
             self._wanted, self._unwanted_said = now, False

@@ -66,7 +66,7 @@ class CameraTrigger:
         self._wanted = None
 
     def frame(self, picture: Picture) -> CameraFrame | None:
-        """The message for the picture of the last exposure; None for one that nobody asked for."""
+        """The message for the picture of the last exposure; None for an exposure without a request."""
         if self._waiting is None:
             return None
         posture, wanted = self._waiting

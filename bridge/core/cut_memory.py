@@ -37,7 +37,7 @@ class ForLife:
         return frozenset()
 
     def keep(self, cut_id: str) -> Kept:
-        """Kept at once: who asks remembers it too."""
+        """Kept at once; the caller remembers it too."""
         return "kept"
 
 
@@ -77,7 +77,7 @@ class CutFile:
         return self._known
 
     def keep(self, cut_id: str) -> Kept:
-        """Ask for a cut to be remembered; `failed` for good where the disk does not take it."""
+        """Store a cut; `failed` stays set if the disk fails."""
         with self._some:
             if cut_id not in self._told:
                 self._told[cut_id] = "waiting"

@@ -20,17 +20,17 @@ class CutOrders:
         self._known: set[str] = set(self._memory.known)
 
     def judge(self, command: CutCommand, wrong: str | None, blades_free: bool, inhibited: str) -> tuple[Verdict, str]:
-        """Whether to close the blades now, with the reason if not.
+        """Decide whether to close the blades now; returns the reason of a refusal.
 
-        An order that comes while the cutter is inhibited is spent: its repetitions must not cut later, when nobody
-        expects it. One that is not remembered durably yet waits for its next repetition. One with a wrong token or too
+        An order that arrives while the cutter is inhibited is used up: its repetitions must not cut later, when nobody
+        expects it. An order that is not yet on disk waits for its next repetition. An order with a wrong token or too
         old, during another cut or in motion, changes nothing.
 
         Args:
             command: The order.
-            wrong: Why the order itself is none that counts now; None when it is.
-            blades_free: The blades are open and idle.
-            inhibited: Why the cutter is inhibited; empty when it is not.
+            wrong: Reason why the order is invalid; None if it is valid.
+            blades_free: Whether the blades are open and idle.
+            inhibited: Reason why the cutter is inhibited; empty if it is not.
         """
         if command.cut_id in self._known:
             return "known", ""

@@ -21,11 +21,11 @@ class Fence:
     """Issues tokens: at most one holder, each token with the next epoch. Times are the robot's (s)."""
 
     def __init__(self, epoch: int = 0, token: str | None = None) -> None:
-        """Start with what was given out before.
+        """Start with the stored state.
 
         Args:
-            epoch: Of the newest token; 0 before the first.
-            token: Its random part; None when nobody holds it.
+            epoch: Epoch of the newest token; 0 before the first.
+            token: Random part of the token; None without a holder.
         """
         self.epoch, self.token = epoch, token
         self._heard: float | None = None
@@ -46,12 +46,12 @@ class Fence:
         self._heard = now
 
     def ask(self, token: str, now: float, at_rest: bool) -> str:
-        """Give the token to who asks, or let who holds it keep it; why not, empty when it is theirs.
+        """Issue the token, or renew it for its holder. Returns the reason of a refusal; empty if granted.
 
         Args:
-            token: Random part, drawn by who asks.
+            token: Random part drawn by the requesting controller.
             now: Present time.
-            at_rest: Whether nothing moves by what was sent last; only then control changes hands.
+            at_rest: Whether the last commands are zero; only then the token changes hands.
         """
         if self._heard is None:
             # Who held it before a restart of the bridge has as long as ever to be heard.

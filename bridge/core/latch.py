@@ -3,7 +3,7 @@
 from rolling_panda.messages.robot import ReleaseStop, StopRequest
 from rolling_panda.messages.supervision import StopRecord
 
-#: What is told of latched stops, the newest first, and how many released ones are remembered.
+#: Number of latched stops in the message, newest first, and of remembered released ids.
 _MOST, _OVER = 50, 1000
 
 
@@ -16,12 +16,12 @@ class StopLatch:
     def __init__(
         self, stops: tuple[StopRecord, ...] = (), released: tuple[str, ...] = (), released_by: str = ""
     ) -> None:
-        """Start with what was latched and released before.
+        """Start with the stored stops.
 
         Args:
-            stops: Latched, the newest first.
-            released: Ids that latch nothing any more.
-            released_by: Who released the last ones, and why.
+            stops: Latched stops, newest first.
+            released: Ids that do not latch any more.
+            released_by: User and reason of the last release.
         """
         self.stops = stops
         self.released_by = released_by

@@ -45,7 +45,7 @@ class Limiter:
         self._last = np.zeros_like(self._last)
 
     def braking_s(self, velocity: Array) -> float:
-        """How long coming to rest from a velocity (9, rad/s) takes (s), but for the arm's jerk."""
+        """Time to brake to rest from a velocity (9, rad/s) (s), without the arm's jerk limit."""
         return float((np.abs(velocity) / self._change).max()) * self._dt
 
     def go_on_from(self, velocity: Array, change: Array) -> None:
@@ -54,14 +54,14 @@ class Limiter:
         self._last = change
 
     def step(self, desired: Array, arm: Array) -> Array:
-        """What to send on now.
+        """Compute the next setpoint.
 
-        Towards a limit a joint may only be as fast as half its acceleration can still stop; beyond the limit it may
-        only come back. Where that asks for more braking than the joint can do, it brakes as hard as it can. A joint
-        comes to its goal with an acceleration that has died away, in as many periods as its jerk takes.
+        Towards a limit a joint's velocity is bounded so that half its acceleration can stop it. Beyond the limit it may
+        only return. If that needs more braking than possible, the joint brakes at its maximum. A joint
+        reaches its target velocity with zero acceleration, in as many periods as its jerk limit needs.
 
         Args:
-            desired: ξ̇ asked for (9, rad/s), finite.
+            desired: Desired ξ̇ (9, rad/s), finite.
             arm: Measured joint angles (7, rad).
 
         Returns:

@@ -35,7 +35,7 @@ class Odometer:
 
     @property
     def pose(self) -> m.PlanarPose:
-        """Where the wheels say the base is, now and without noise."""
+        """Pose of the base from the wheels, without delay and noise."""
         return planar_pose(self._pose)
 
     def follow(self, wheels: Array) -> None:

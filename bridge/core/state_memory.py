@@ -45,9 +45,9 @@ def open_memory(folder: Path) -> KeptValue[Remembered]:
 
 
 def begin_anew(folder: Path) -> str:
-    """Set aside what the bridge remembers, whatever it is, and latch a stop in its place; returns what was done.
+    """Set the stored state aside, whatever it is, and latch a stop in its place. Returns a description.
 
-    Nobody knows any more what was stopped: a supervisor has to look and to reset before anything moves.
+    The stops of before are unknown: a supervisor has to inspect the robot and reset before anything moves.
 
     Raises:
         OSError: The folder cannot be written.

@@ -55,12 +55,12 @@ class CommandValidator:
         self.must_rest = True
 
     def ask(self, request: TokenRequest, now: float, at_rest: bool) -> str | None:
-        """Give the token, or let its holder keep it, and return None, or the reason why not.
+        """Issue the token, or renew it for its holder. Returns None, or the reason of a refusal.
 
         Args:
-            request: As decoded.
-            now: When it was received (s, the bridge's clock).
-            at_rest: Whether nothing moves by what was sent on last.
+            request: The decoded request.
+            now: Time of its arrival (s, the bridge's clock).
+            at_rest: Whether the last commands are zero.
         """
         reason = self._stale(request.echo, now)
         if reason is not None:
@@ -76,7 +76,7 @@ class CommandValidator:
 
         Args:
             command: As decoded; its numbers are checked again here.
-            now: When it was received (s, the bridge's clock).
+            now: Time of its arrival (s, the bridge's clock).
         """
         reason = self._fault(command, now)
         if reason is None:

@@ -69,9 +69,9 @@ class ArmFollower:
         Args:
             now: Present time (s).
             q: Measured joint angles (7, rad).
-            dq: Velocities that the arm took as commanded last (7, rad/s): after lost packets these are its own guess.
-            ddq: Accelerations likewise (7, rad/s²).
-            hold: Come to rest whatever the target is.
+            dq: Last commanded velocities by the arm (7, rad/s); after lost packets it extrapolates them.
+            ddq: Last commanded accelerations by the arm (7, rad/s²).
+            hold: Brake to rest, whatever the target is.
         """
         self._limiter.go_on_from(dq, ddq * TICK_S)
         self._desired[ARM_XI] = 0.0 if hold else self._watchdog.trust(now) * self._goal(now)

@@ -88,7 +88,7 @@ class SharedNote:
             values, text = numbers[2:].copy(), self._text.raw
             if numbers[0] == ended:
                 break
-        # A writer that died half way leaves a torn note: its age tells.
+        # A writer that died during a write leaves an inconsistent note, which its age reveals.
         return Note(int(ended), values, text.rstrip(b"\0").decode(errors="replace"))
 
 

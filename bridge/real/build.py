@@ -78,7 +78,7 @@ def open_devices(
 
     Args:
         config_path: TOML file with the sections bridge and real.
-        wire: Of this program.
+        wire: Transport settings of this program.
         model: Of the robot.
         moving: False sends no command to any device.
         fakes: The devices are `bridge.fakes`: the camera's pictures come over the wire.
@@ -124,20 +124,20 @@ def real_bridge(
     memory: KeptValue[Remembered] | None = None,
     fakes: bool = False,
 ) -> BridgeCore:
-    """A bridge with the real robot.
+    """Assemble a bridge with the real robot.
 
     Args:
         config_path: TOML file with the sections robot, bridge and real.
-        wire: Of this program.
-        moving: False only reads.
+        wire: Transport settings of this program.
+        moving: False reads only.
         rejections: Table to count refusals in, shared with the transport.
-        cuts: Remembers cuts through restarts; None for as long as this lives.
-        memory: What else survives a restart; None forgets.
-        fakes: The devices are `bridge.fakes`, and the bridge says so.
+        cuts: Durable memory of cuts; None keeps them for the life of the process.
+        memory: Other state that survives a restart; None keeps nothing.
+        fakes: Whether the devices are `bridge.fakes`; the bridge reports it.
 
     Raises:
         ConfigError: A section is wrong.
-        InputError: A driver or a device is missing, or tells no state.
+        InputError: A driver or a device is missing, or reports no state.
         TransportError: The base's or the cutter's wire cannot be reached.
     """
     config = load_section(config_path, "bridge", BridgeConfig)
@@ -161,10 +161,10 @@ def real_bridge(
 
 
 def wait_for_states(devices: Devices, limit_s: float = _FIRST_STATE_S) -> None:
-    """Return when base and arm have told where they stand: before that nobody may take them to stand at zero.
+    """Wait for the first state of base and arm. Before it their position is unknown, not zero.
 
     Raises:
-        InputError: One of them has not, within the limit.
+        InputError: One of them sent none within the time limit.
     """
     end = time.monotonic() + limit_s
     while not (devices.base.told and devices.arm.told):

@@ -36,10 +36,10 @@ class Finding:
 
 
 def check(config_path: Path, wire: TransportConfig, fakes: bool = False) -> None:
-    """Print what was found.
+    """Print the result.
 
     Raises:
-        InputError: Something is not as it has to be; the text counts how many.
+        InputError: Some checks failed; the text has their number.
     """
     model = RobotModel(load_section(config_path, "robot", RobotConfig))
     devices = open_devices(config_path, wire, model, False, fakes)

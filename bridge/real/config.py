@@ -7,7 +7,7 @@ from msgspec import Meta, Struct
 from rolling_panda.bounds import at_least, at_most, within
 
 Key = Annotated[str, Meta(max_length=200)]
-#: Where the centre of what hangs on the flange may be (m), and what its inertia may be (kg·m²).
+#: Bounds of the load's centre of mass (m) and of its inertia (kg·m²).
 _Centre = Annotated[float, within(-0.3, 0.3)]
 _Inertia = Annotated[float, Meta(ge=0.0, le=0.1)]
 

@@ -63,14 +63,14 @@ class Mp500:
     def __init__(
         self, wire: ForeignWire, drive: DifferentialDrive, acceleration: float, config: BaseConfig, moving: bool = True
     ) -> None:
-        """Subscribe, and begin to send zeros.
+        """Subscribe, and start to send zero velocities.
 
         Args:
-            wire: Where the base's ROS 2 topics are; closed with the base.
+            wire: Transport of the base's ROS 2 topics; closed with the base.
             drive: Geometry of the base.
-            acceleration: Largest change of a wheel's speed in what is sent (rad/s²).
+            acceleration: Acceleration limit of a wheel's command (rad/s²).
             config: Names and deadlines.
-            moving: False sends nothing at all: state only.
+            moving: False sends nothing and reads the state only.
         """
         self._wire, self._drive, self._config = wire, drive, config
         self._step = acceleration / config.command_hz
@@ -102,7 +102,7 @@ class Mp500:
 
     @property
     def told(self) -> bool:
-        """Whether the wheels have told their speeds yet."""
+        """Whether wheel speeds have arrived."""
         return self._wheels_at > float("-inf")
 
     def read(self) -> BaseState:
@@ -139,7 +139,7 @@ class Mp500:
         due = time.monotonic()
         while not self._closing.wait(max(0.0, due - time.monotonic())):
             now = time.monotonic()
-            # What was missed is left out: a burst of old commands helps nobody.
+            # Missed commands are skipped: a burst of old commands is useless.
             due = max(due + period, now)
             with self._lock:
                 sent = self._next(now)

@@ -23,7 +23,7 @@ class Panda:
     """Implements the arm's part of the robot. `read` and `write` return at once."""
 
     def __init__(self, config: ArmConfig, limits: Limits, moving: bool = True) -> None:
-        """Start the arm's process; it connects by itself, and says in its state how far it is.
+        """Start the arm's process. It connects by itself and reports its progress in its state.
 
         Raises:
             InputError: The driver is not installed.
@@ -36,7 +36,7 @@ class Panda:
 
     @property
     def told(self) -> bool:
-        """Whether the arm has told where its joints are."""
+        """Whether joint positions have arrived."""
         return bool(np.any(self._link.state().position))
 
     def read(self) -> ArmState:
@@ -53,7 +53,7 @@ class Panda:
         self._link.command(time.monotonic(), velocity, self._releases, closing=False)
 
     def release(self) -> None:
-        """A person says that the arm may recover from what stopped it; it does so by itself then, at rest."""
+        """Allow the arm to recover from its fault; it then does so by itself, at rest."""
         self._releases += 1
         if not self._process.is_alive():
             self._start()

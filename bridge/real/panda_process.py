@@ -19,7 +19,7 @@ from rolling_panda.model.robot import Limits
 from rolling_panda.runtime.scheduling import set_priority
 
 _RETRY_S = 1.0
-# How long the bridge may be silent before this process asks whether it still exists (s).
+# Time without a message of the bridge after which this process checks that the bridge exists (s).
 _ORPHAN_S = 1.0
 # libfranka's filter is off above this (Hz): the follower's targets are smooth already.
 _NO_FILTER = 1000.0
@@ -67,12 +67,12 @@ class _Session:
         return target.closing or (silent and os.getppid() != self._parent)
 
     def say(self, fault: str, severe: bool = False) -> None:
-        """Tell the bridge why the arm does not follow."""
+        """Report the reason why the arm does not follow to the bridge."""
         self._fault, self._severe = fault, severe
         self._tell()
 
     def serve(self) -> None:
-        """One connection: prepare the arm, then follow, or wait for what keeps it from following to go away."""
+        """One connection: prepare the arm, then follow, or wait for the end of a fault."""
         config = self._config
         enforce = (
             libfranka.RealtimeConfig.kEnforce if config.realtime == "enforce" else libfranka.RealtimeConfig.kIgnore

@@ -77,7 +77,7 @@ class RealSense:
                     continue
                 self._newest, self.taken = time.monotonic(), self.taken + 1
                 taken_at = _taken_at(color)
-                # What was exposed before it was asked for shows the robot somewhere else, or the cane before the cut.
+                # A frame from before the request shows an earlier pose of the robot, or the cane before the cut.
                 if self._asked.is_set() and (taken_at is None or taken_at >= self._asked_at):
                     self._asked.clear()
                     self._ready = replace(self._picture(frames), taken_at=taken_at)

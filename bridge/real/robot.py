@@ -76,14 +76,14 @@ class RealRobot:
     """Implements `bridge.core.interface.Robot`; no call blocks."""
 
     def __init__(self, base: Base, arm: Arm, blades: Blades, camera: Camera | None, moving: bool = True) -> None:
-        """Put together what is connected already.
+        """Assemble connected devices.
 
         Args:
-            base: Drives.
-            arm: Reaches.
-            blades: Cut.
-            camera: Sees; None on a robot without one.
-            moving: False only reads: nothing is handed to any device, and the robot says so as its fault.
+            base: The base.
+            arm: The arm.
+            blades: The cutter.
+            camera: The camera; None on a robot without one.
+            moving: False reads only: nothing is sent to any device, and the robot reports that as its fault.
         """
         self._base, self._arm, self._blades, self._camera = base, arm, blades, camera
         self._moving, self._releases = moving, 0

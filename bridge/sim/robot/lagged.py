@@ -18,9 +18,9 @@ class LaggedRobot:
         """Stand at rest with the arm in this posture (7, rad)."""
         self.now = Measurement(np.array([0.0, 0.0, *arm]), np.zeros(9), "open", "", "", "")
         self.rows: list[tuple[float, np.ndarray[Any, Any], np.ndarray[Any, Any], int, int]] = []
-        #: Where in the record a bridge began: from one to the next nobody keeps acceleration.
+        #: Rows of the record at which a bridge started; the acceleration limit does not hold across them.
         self.begun: list[int] = []
-        #: Share of what is sent that each actuator does.
+        #: Fraction of its command that each actuator follows.
         self.follows = np.ones(9)
         self._gain = TICK_S / np.array([0.05] * 2 + [0.02] * 7)
 

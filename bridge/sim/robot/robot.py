@@ -58,9 +58,9 @@ class VelocityServos:
         """Torques (n, N·m) towards a setpoint.
 
         Args:
-            setpoint: Speeds asked for (n, rad/s).
-            measured: Speeds (n, rad/s).
-            inertia: What the servos have to move now (n×n, kg·m²): with it the joints do not disturb each other.
+            setpoint: Desired speeds (n, rad/s).
+            measured: Measured speeds (n, rad/s).
+            inertia: Current mass matrix (n×n, kg·m²), which decouples the joints.
         """
         self._speed += self._blend * (setpoint - self._speed)
         wanted = inertia @ (self._speed - measured) / LOOP_S

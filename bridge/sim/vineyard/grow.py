@@ -16,7 +16,7 @@ from bridge.sim.vineyard.surroundings import add_hose, add_old_cuts, add_posts_a
 _TRUNK_RODS, _ARM_ROD = 6, 0.12
 #: From the head to the first shoot along the cane that was laid down (m): this bow carries none.
 _GUYOT_BEND = 0.16
-#: The spur's two canes leave it at these shares of its length; the lower one further outwards.
+#: Positions of the spur's two canes as fractions of its length; the lower one further outwards.
 _GUYOT_CANES = ((0.55, 0.8), (1.0, 0.3))
 
 
