@@ -42,12 +42,14 @@ def with_usual_config(argv: Sequence[str]) -> list[str]:
 def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("kind", nargs="?", choices=("sim", "real"), default="sim", help="robot (default: sim)")
     parser.add_argument("--seed", type=_seed, default=0, help="of the simulated vineyard (default: 0)")
-    parser.add_argument("--trace", type=Path, metavar="FILE", help="record what the simulation really actuates")
-    parser.add_argument("--check", action="store_true", help="real: look at every device, move none, print a table")
-    parser.add_argument("--fakes", action="store_true", help="real: drivers on fakes of the devices, and it says so")
-    parser.add_argument("--readonly", action="store_true", help="real: tell the robot's state, command nothing")
+    parser.add_argument("--trace", type=Path, metavar="FILE", help="record what the simulation actuates")
     parser.add_argument(
-        "--begin-anew", action="store_true", help="set aside what it remembers, latch a stop in its place, and end"
+        "--check", action="store_true", help="real: check every device without moving it; print a table"
+    )
+    parser.add_argument("--fakes", action="store_true", help="real: use fake devices; the page shows it")
+    parser.add_argument("--readonly", action="store_true", help="real: publish the robot's state, command nothing")
+    parser.add_argument(
+        "--begin-anew", action="store_true", help="set the stored state aside, latch a stop in its place, and end"
     )
 
 
@@ -70,7 +72,7 @@ def _begin_anew(words: Sequence[str]) -> int:
 
 def _seed(text: str) -> int:
     if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"{text!r} is no seed; give a whole number from 0")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a seed; give an integer from 0")
     return int(text)
 
 

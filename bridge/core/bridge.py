@@ -173,7 +173,7 @@ class BridgeCore:
         self._mode = request.mode, now
         if self._fence.epoch != epoch:
             self._halt()
-            self._token_changed(f"a controller has got the token: epoch {self._fence.epoch}")
+            self._token_changed(f"a controller has the token: epoch {self._fence.epoch}")
 
     def _token_changed(self, text: str) -> None:
         self._say("info", text)
@@ -203,7 +203,7 @@ class BridgeCore:
     def on_picture(self, request: CloseUpRequest) -> None:
         """Take a picture as soon as the camera is free; only for the token's holder."""
         if request.epoch != self._fence.epoch:
-            self.refusals.add(CLOSE_UP_REQUEST.name, "not the controller's that commands the robot")
+            self.refusals.add(CLOSE_UP_REQUEST.name, "not from the controller that commands the robot")
             return
         self._camera_trigger.want(request)
 
@@ -271,7 +271,7 @@ class BridgeCore:
             if not self._faults.current:
                 self._say("warning", "no valid setpoint: base 0, arm holds, cutter inhibited")
         elif self._was_tripped and not tripped:
-            self._say("info", "setpoints come in: the robot follows")
+            self._say("info", "setpoints arrive: the robot follows")
         if tripped != self._was_tripped:
             self._state_due = True
         self._was_tripped = tripped
@@ -396,7 +396,7 @@ class BridgeCore:
             self._wanted, self._unwanted_said = now, False
         elif now - self._wanted > _BRAKING_S and not self._unwanted_said:
             self._unwanted_said = True
-            why = f"the controller's mode is {mode}" if mode in _STILL else "no controller says what it does"
+            why = f"the controller's mode is {mode}" if mode in _STILL else "no controller publishes its mode"
             self._say("error", f"the robot is commanded to move, though {why}")
 
     def _frame(self, now: float) -> CameraFrame | None:

@@ -10,11 +10,11 @@ from rolling_panda.messages.types import MOST_EPOCHS
 SILENT_S: Final = 1.0
 
 OLD_EPOCH = "an older controller's command"
-UNKNOWN_EPOCH = "an epoch that the bridge has not given out"
-OTHER_TOKEN = "another token than that of this epoch"
-HELD = "another controller commands the robot; a token is given once that one has ended or is silent"
-MOVING = "the robot still moves; a token is given at rest"
-USED_UP = "no epoch is left; end the bridge and give: rolling-panda bridge --begin-anew"
+UNKNOWN_EPOCH = "an epoch that the bridge has not issued"
+OTHER_TOKEN = "the token does not belong to this epoch"
+HELD = "another controller commands the robot; a token is issued once the other has ended or is silent"
+MOVING = "the robot still moves; a token is issued at rest"
+USED_UP = "no epoch is left; end the bridge and run: rolling-panda bridge --begin-anew"
 
 
 class Fence:

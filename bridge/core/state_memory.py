@@ -39,7 +39,7 @@ def open_memory(folder: Path) -> KeptValue[Remembered]:
         InputError: It cannot be read: a bridge that does not know what was stopped must not start.
     """
     path = folder / _NAME
-    remedy = f"look whether the robot may move, then give: rolling-panda bridge --begin-anew --state {folder}"
+    remedy = f"check that the robot may move, then run: rolling-panda bridge --begin-anew --state {folder}"
     remembered = read_kept(path, Remembered, Remembered(), "what the bridge remembers", remedy)
     return KeptValue(remembered, LatestFileWriter(path))
 
@@ -52,10 +52,10 @@ def begin_anew(folder: Path) -> str:
     Raises:
         OSError: The folder cannot be written.
     """
-    path, done = folder / _NAME, "the bridge begins anew: it remembered nothing"
+    path, done = folder / _NAME, "there was no stored state of the bridge"
     if path.exists():
         aside = path.replace(path.with_suffix(".aside"))
-        done = f"the bridge begins anew: what it remembered is set aside in {aside}"
+        done = f"the stored state of the bridge is set aside in {aside}"
     stop = StopRecord(f"anew-{secrets.token_hex(8)}", "bridge", "", done[:500], time.time())
     replace_durably(path, msgspec.json.encode(Remembered(stops=(stop,))))
     return done

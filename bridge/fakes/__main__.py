@@ -69,7 +69,7 @@ def _parser() -> argparse.ArgumentParser:
         "--arm", metavar="ADDRESS", help="loopback address of the arm's control box (with --seed: the configuration's)"
     )
     parser.add_argument("--seed", type=int, help="all devices on one simulated robot beside the row of this seed")
-    parser.add_argument("--trace", type=Path, metavar="FILE", help="record what the simulation really actuates")
+    parser.add_argument("--trace", type=Path, metavar="FILE", help="record what the simulation actuates")
     return parser
 
 

@@ -53,7 +53,7 @@ def check(config_path: Path, wire: TransportConfig, fakes: bool = False) -> None
     print(table(findings), flush=True)
     bad = sum(not finding.good for finding in findings)
     if bad:
-        raise InputError(f"{bad} of {len(findings)} are not as they have to be; nothing was moved")
+        raise InputError(f"{bad} of {len(findings)} checks failed; nothing was moved")
 
 
 def inspect(devices: Devices, config: RealConfig, limits: Limits) -> list[Finding]:

@@ -106,4 +106,4 @@ class Cutter:
             reply = ros.decode(ros.SET_BOOL_REPLY, data)
         except (ServiceError, MessageError):
             return None
-        return "" if reply.success else (str(reply.message) or "the blades did not get there")
+        return "" if reply.success else (str(reply.message) or "the blades did not reach their end position")

@@ -76,7 +76,7 @@ def commands_router(robot: RobotContext) -> APIRouter:
     async def seek(session: Caller, wanted: Annotated[dict[str, Any], Depends(fields_of(SeekReplay))]) -> Response:
         """Seek, pause or play the recording; 409 while none is played."""
         if robot.link.replay.peek() is None:
-            return answer(Result(409, False, "this is no recording but a robot"))
+            return answer(Result(409, False, "this is a robot, not a recording"))
         try:
             result = await robot.link.call(topics.SEEK, SeekReplay(**wanted))
         except ServiceError as error:

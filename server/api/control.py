@@ -24,7 +24,7 @@ def control_router(robot: RobotContext) -> APIRouter:
         """Who holds control, who requests it, and the remaining time of the lease; `client` is the caller's key."""
         received = robot.link.control.peek()
         if received is None:
-            return answer(Result(503, False, "The controller has not said yet who holds control; ask again."))
+            return answer(Result(503, False, "The controller has not reported the holder of control yet; ask again."))
         return message(Control(**msgspec.structs.asdict(received.message), client=session.client))
 
     @router.post("/here", responses=COMMAND)

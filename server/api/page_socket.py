@@ -218,7 +218,7 @@ class PageSocket:
         # A short pause of a slow browser is resumed; a longer one needs a new press.
         self._robot.end_lapsed_hold(now)
         if self._holding and self._robot.teleop.must_release(self.session.session_id, now):
-            self._end_hold("The hold ended: the page or its link was too slow. Press again to go on.")
+            self._end_hold("The hold ended: the page or its link was too slow. Press again to continue.")
             return
         command = command_of(message, self._robot.scene.gizmos.pose(self.session.session_id))
         if command is not None:

@@ -56,7 +56,7 @@ def plant_router(robot: RobotContext) -> APIRouter:
             return answer(done)
         restored = await robot.ask(session, ask.RestoreAccepted(user=session.user, rule=rule))
         if not restored.ok:
-            return answer(replace(restored, reason=f"the rule is back, its acceptances are not: {restored.reason}"))
+            return answer(replace(restored, reason=f"the rule is restored, its acceptances are not: {restored.reason}"))
         return answer(done)
 
     @router.get(

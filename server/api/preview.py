@@ -60,7 +60,7 @@ def outdated(state: PreviewState, preview_hash: str, posture: Posture | None) ->
     if preview_hash != state.preview_hash:
         return f"the preview is another one now: {state.preview_hash[:8]}, not {preview_hash[:8]}; look again"
     if posture is None or state.start is None or state.position is None:
-        return "where the robot stands is not known"
+        return "the position of the robot is unknown"
     return _deviation(state.start, state.position, posture)
 
 

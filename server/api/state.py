@@ -48,7 +48,7 @@ def state_router(robot: RobotContext) -> APIRouter:
         """The plan: order and approach of each accepted point that can be cut, and why the others cannot."""
         received = robot.link.plan.peek()
         if received is None:
-            return answer(Result(503, False, "The controller has not said its plan yet; ask again."))
+            return answer(Result(503, False, "The controller has not sent its plan yet; ask again."))
         return message(received.message)
 
     @router.get("/events", tags=["state"], responses=query(PageEvents, INVALID))

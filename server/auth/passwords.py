@@ -36,7 +36,7 @@ class Passwords:
             InputError: The users file cannot be read.
         """
         if self._waiting >= _MAX_WAITING:
-            raise SignInError("many are signing in right now; try again in 1 s", 1.0)
+            raise SignInError("too many sign-ins at once; try again in 1 s", 1.0)
         keys = (f"name {name}", f"address {address}")
         self._waiting += 1
         try:
@@ -44,7 +44,7 @@ class Passwords:
             async with self._lock:
                 wait = self._throttle.wait(keys, self._clock())
                 if wait > 0.0:
-                    raise SignInError(f"too many bad sign-ins; try again in {max(1.0, wait):.0f} s", wait)
+                    raise SignInError(f"too many failed sign-ins; try again in {max(1.0, wait):.0f} s", wait)
                 user = await asyncio.to_thread(self.users.check, name, password)
                 if user is None:
                     self._throttle.failed(keys, self._clock())

@@ -91,7 +91,7 @@ class Sessions:
         """
         wait = self._attempts.wait((address,), now)
         if wait > 0.0:
-            raise SignInError(f"too many bad sign-ins; try again in {wait:.0f} s", wait)
+            raise SignInError(f"too many failed sign-ins; try again in {wait:.0f} s", wait)
         invitation = self._invitations.pop(_digest(token), None)
         if invitation is None or now > invitation.expires_at:
             self._attempts.failed((address,), now)

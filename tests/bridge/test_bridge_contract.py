@@ -117,7 +117,7 @@ def test_duplicates_reorders_and_replays_are_not_actuated(rig: Rig) -> None:
     assert "sequence not newer" in rig.refusals
 
 
-@pytest.mark.parametrize(("epoch", "words"), [(0, "an older controller"), (2, "has not given out")])
+@pytest.mark.parametrize(("epoch", "words"), [(0, "an older controller"), (2, "has not issued")])
 def test_an_epoch_that_is_not_the_given_one_actuates_nothing(rig: Rig, epoch: int, words: str) -> None:
     rig.run(0.2, REST)
     assert rig.state.epoch == rig.epoch == 1

@@ -367,7 +367,7 @@ def test_the_bridge_says_it_when_it_moves_and_nobody_says_why(bench: Bench) -> N
         bench.run(0.01, None)
         # Of the right token, though without the holder's word of its mode.
         bench.core.on_motion(bench.message(FORWARD), bench.now)
-    assert bench.state.moving and any("no controller says what it does" in line for line in bench.log)
+    assert bench.state.moving and any("no controller publishes its mode" in line for line in bench.log)
 
 
 def test_the_mode_that_somebody_without_the_token_tells_counts_for_nothing(bench: Bench) -> None:

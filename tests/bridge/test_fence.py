@@ -128,7 +128,7 @@ class Askers(RuleBasedStateMachine):
         self.start()
         assert self.memory is not None
         (stop,) = self.memory.value.stops
-        assert "begins anew" in stop.reason
+        assert "set aside" in stop.reason
         assert self.core.on_release(m.ReleaseStop(stop_id=stop.stop_id, user="ada", reason="looked"), self.now).ok
 
     @invariant()

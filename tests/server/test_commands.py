@@ -436,7 +436,7 @@ def test_a_recording_is_moved_in_and_a_robot_is_not():
     wire = FakeWire()
     with running_server(wire) as server, server.client("viewer") as client:
         refused = client.post("/api/replay", json={"position_s": 3.0})
-        assert refused.status_code == 409 and "no recording" in refused.json()["reason"]
+        assert refused.status_code == 409 and "not a recording" in refused.json()["reason"]
         assert wire.asked == []
         state = ReplayState(name="a.mcap", begins_at=1.8e9, duration_s=9.0, position_s=0.0, playing=True)
         wire.deliver(topics.REPLAY, state)

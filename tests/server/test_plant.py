@@ -154,7 +154,7 @@ def test_a_rule_is_taken_back_by_perception_first_and_then_its_acceptances_by_th
         assert [type(each) for each in server.wire.asked] == [UndoRule]
         server.wire.answer = lambda request: m.Answer(ok=isinstance(request, UndoRule), reason="it began since")
         answer = client.post("/api/rule/undo", json={"nodes_kept": 3})
-        assert answer.json()["reason"] == "the rule is back, its acceptances are not: it began since"
+        assert answer.json()["reason"] == "the rule is restored, its acceptances are not: it began since"
 
 
 def test_the_picture_of_a_point_is_given_for_its_revision(server):

@@ -34,7 +34,7 @@ def test_what_is_as_it_was_passes_however_far_the_wheels_have_turned():
         (posture(x=1.31), "the base moved 0.31 m"),
         (posture(phi=0.2), "the base turned by 11°"),
         (posture(first=0.3), "a joint of the arm moved by 0.30 rad"),
-        (None, "where the robot stands is not known"),
+        (None, "the position of the robot is unknown"),
     ],
 )
 def test_a_robot_that_stands_elsewhere_is_told_how(where, words):

@@ -39,7 +39,7 @@ def test_bad_attempts_cost_more_and_more_time_and_a_good_one_ends_that():
         with pytest.raises(SignInError) as caught:
             sessions.sign_in("wrong", 0.0)
     assert caught.value.wait_s == 0.0
-    with pytest.raises(SignInError, match="^too many bad sign-ins; try again in") as caught:
+    with pytest.raises(SignInError, match="^too many failed sign-ins; try again in") as caught:
         sessions.sign_in("wrong", 0.5)
     assert caught.value.wait_s == pytest.approx(0.5)
     with pytest.raises(SignInError):

@@ -244,7 +244,7 @@ def test_a_hold_that_the_server_ended_goes_on_only_when_pressed_again(page: Page
     page.locator("h1").click()
     page.keyboard.down("h")
     until(page, lambda: server.holds()[-1:] == [True])
-    server.tell(p.HoldEnded(reason="The hold ended: too slow. Press again to go on."))
+    server.tell(p.HoldEnded(reason="The hold ended: too slow. Press again to continue."))
     expect(page.locator(".toast")).to_contain_text("Press again")
     until(page, lambda: not server.holds()[-1])
     count = len(server.holds())

@@ -56,9 +56,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit code."""
     parser = argparse.ArgumentParser(prog="rolling-panda vineyard", description=__doc__)
     parser.add_argument("--seed", type=int, default=0, help="not negative; the same seed gives the same row")
-    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="JSON to write; a PNG goes beside it")
+    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="JSON file; a PNG is written beside it")
     parser.add_argument("--vines", type=int, help="how many (default: as configured)")
-    parser.add_argument("--training", choices=("cordon", "guyot"), help="how the vines are trained")
+    parser.add_argument("--training", choices=("cordon", "guyot"), help="training system")
     parser.add_argument("--config", type=Path, metavar="FILE", help="TOML file with a section [vineyard]")
     arguments = parser.parse_args(argv)
     try:
