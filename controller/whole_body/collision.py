@@ -107,7 +107,8 @@ class CollisionModel:
         objects = self._shapes.geometryObjects
         self._parts = [part_of(item.name) for item in objects]
         self._radii = np.array([bounding_radius(item.geometry) for item in objects])
-        self._reach = _motion_bound(robot.model, self._shapes, self._radii)
+        #: How far any part moves at most for a change of q by 1 (m, 12).
+        self.motion_bound = _motion_bound(robot.model, self._shapes, self._radii)
         self._support = np.array([_support(robot.model, item.parentJoint) for item in objects] + [np.zeros(NQ)])
         self._ground = add_ground(self._shapes)
         self._self_pairs = self_pairs(robot, self._shapes, self._ground)
@@ -212,7 +213,7 @@ class CollisionModel:
         elif not _same(kinematics.T_odom_tool.translation, self._tool.translation):
             raise ControlError("the robot model was moved after these kinematics; compute them again before dampers")
         pin.updateGeometryPlacements(robot.model, robot.data, self._geometry, self._data)
-        if influence != self._known_for or _way(self._reach, q, self._known_at) > _SLACK:
+        if influence != self._known_for or _way(self.motion_bound, q, self._known_at) > _SLACK:
             known = self._nearer(self._everything(influence + _SLACK), influence + _SLACK)
             self._activate(known)
             self._known, self._known_for, self._known_at = known, influence, q.copy()

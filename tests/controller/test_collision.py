@@ -210,4 +210,4 @@ def test_no_part_moves_farther_than_the_bound_that_the_memory_rests_on():
             pin.framesForwardKinematics(ROBOT.model, ROBOT.data, configuration)
             tips.append([ROBOT.data.oMf[i].translation.copy() for i in (ROBOT.tool_id, ROBOT.camera_id)])
         travelled = np.linalg.norm(np.array(tips[1]) - np.array(tips[0]), axis=1).max()
-        assert travelled <= MODEL._reach @ np.abs(change)
+        assert travelled <= MODEL.motion_bound @ np.abs(change)

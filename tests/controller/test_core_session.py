@@ -46,8 +46,7 @@ class Planned:
     def accepted(self, *point_ids):
         self.robot.step()
         for point_id in point_ids:
-            ticket = self.robot.controller._queue.get(point_id)
-            assert self.robot.ask(intents.AcceptPoint(user="ada", point_id=point_id, revision=ticket.point.revision)).ok
+            assert self.robot.ask(intents.AcceptPoint(user="ada", point_id=point_id, revision=1)).ok
         return self
 
     def until_valid(self):

@@ -3,6 +3,7 @@
 import msgspec
 import numpy as np
 
+from controller.motion.follower import Follower
 from tests.support.controller_at_work import CONFIG, entry, run_until, working
 from tests.support.points import point
 
@@ -10,12 +11,11 @@ from tests.support.points import point
 def at_work_and_held(monkeypatch, jog_too=False):
     """Two points to cut, and after the first something holds the tool on its straight way back."""
     r = working((point("a", (0.4, 0.75, 1.0)), point("b", (0.7, 0.75, 1.0))))
-    follower, sequence = r.controller._movement.sequence._follower, r.controller._movement.sequence
 
     def held(done):
         def follow(*arguments):
             tracking = done(*arguments)
-            if sequence.phase != "RETREAT" or sequence.active != "a":
+            if r.state.phase != "RETREAT" or r.state.active_point_id != "a":
                 return tracking
             why = "joint 1 holds the tool back"
             return msgspec.structs.replace(tracking, xi=np.zeros(9), scale=0.0, done=False, reason=why)
@@ -23,7 +23,7 @@ def at_work_and_held(monkeypatch, jog_too=False):
         return follow
 
     for name in ("follow", "jog") if jog_too else ("follow",):
-        monkeypatch.setattr(follower, name, held(getattr(follower, name)))
+        monkeypatch.setattr(Follower, name, held(getattr(Follower, name)))
     return r
 
 

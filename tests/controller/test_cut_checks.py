@@ -135,7 +135,7 @@ def test_without_an_acceptance_nothing_is_cut():
 
 def looking(r, *, dx=0.0, finding="seen", point_id="a"):
     """Let the robot's camera show one point otherwise than the others."""
-    usual = r._looked
+    usual = r.close_up
 
     def looked(request):
         sample = usual(request)
@@ -145,7 +145,7 @@ def looking(r, *, dx=0.0, finding="seen", point_id="a"):
         changed = {"position": (x + dx, y, z)} if finding == "seen" else {"finding": finding, "position": None}
         return type(sample)(msgspec.structs.replace(sample.message, **changed), sample.at)
 
-    r._looked = looked
+    r.close_up = looked
     return r
 
 
@@ -166,7 +166,7 @@ def test_within_five_millimetres_the_place_of_the_closer_look_is_cut():
 
 def test_the_phase_is_told_while_the_robot_looks_and_the_blades_stay_out_of_the_canes():
     r = working((point("a", (0.5, 0.75, 1.0)),))
-    r._looked = lambda request: None
+    r.close_up = lambda request: None
     run_until(r, lambda s: s is not None and s.phase == "CLOSE_UP", 20.0)
     for _ in range(150):
         r.step()

@@ -6,7 +6,6 @@ from controller.identity import Token
 from controller.ledger.journal import EventLogger, Journal
 from controller.work.movement import Movement
 from controller.work.point_queue import PointQueue
-from rolling_panda import commands as intents
 from rolling_panda.config import RobotConfig
 from rolling_panda.model.robot import ARM_Q
 from tests.support.controller_at_work import CONFIG, robot
@@ -43,17 +42,19 @@ def test_under_a_latched_stop_braking_is_sent_and_rest_is_not(movement):
     assert movement.send(np.zeros(9), Token(1, "t"), joints, latched=True) is None
 
 
-def test_nobody_in_control_means_rest_whatever_the_mode():
+def test_nobody_in_control_means_rest_whatever_the_mode(movement):
     r = robot()
     r.q[ARM_Q] = CONFIG.reach
-    r.step()
-    assert r.ask(intents.Arm(user="ada")).ok
-    assert r.ask(intents.Home(user="ada")).ok
+    movement.update(r.inputs())
+    movement.go_home()
     for _ in range(20):
-        out = r.step()
-    movement = r.controller._movement
+        moved, inputs = movement.step("READY", held=True, now=r.now), r.inputs()
+        out = movement.send(moved.xi, Token(1, "t"), inputs.joints, latched=False)
+        r.integrate(np.array(out.xi))
+        r.now += r.dt
+        movement.update(r.inputs())
     assert movement.homing
-    sent = np.abs(out.motion.xi)
+    sent = np.abs(out.xi)
     assert sent.max() > 0.1
     slower = np.abs(movement.step("READY", held=False, now=r.now).xi)
     assert (slower <= 0.99 * sent).all()

@@ -8,6 +8,7 @@ from msgspec import structs
 from controller.core import Controller
 from controller.ledger.journal import PreviewRequiredRow
 from controller.planning import preview as preview_module
+from controller.planning.cuts import CutPlanner
 from controller.planning.preview_plan import PreviewRequest
 from rolling_panda import commands as intents
 from rolling_panda.config import RobotConfig
@@ -150,7 +151,11 @@ def test_what_is_planned_or_accepted_meanwhile_leaves_the_order_that_was_shown(p
     p.robot.show((*POINTS, point("c", (0.1, 0.75, 1.0))))
     shown = p.previewed("a", "b")
     assert p.ask(intents.ApprovePreview, preview_hash=shown.preview_hash) == ""
-    p.robot.controller._queue.arrange(("b", "a"))
+    p.robot.run(0.5)
+    plan = CutPlanner(CONFIG, RobotConfig()).plan(p.request)
+    p.plan = replace(plan, cuts=tuple(sorted(plan.cuts, key=lambda cut: cut.point.point_id, reverse=True)))
+    p.robot.run(0.2)
+    assert p.session_plan.state == "valid"
     assert p.ask(intents.AcceptPoint, point_id="c", revision=1) == ""
     p.worked()
     assert [name for name, _ in p.robot.cuts][:2] == ["a", "b"]

@@ -23,6 +23,13 @@ def ready():
     return r
 
 
+def stays(r):
+    """The arm stays where it is, armed and with somebody who holds control."""
+    before = r.q.copy()
+    r.run(1.0)
+    assert r.state.mode == "READY" and np.abs(r.q - before).max() < 1e-3
+
+
 def test_what_ends_a_mode_ends_what_moved_in_it():
     r = ready()
     assert r.ask(intents.Home(user="ada")).ok
@@ -31,7 +38,10 @@ def test_what_ends_a_mode_ends_what_moved_in_it():
     r.stop()
     r.run(0.2)
     assert r.state.mode == "ESTOP_LATCHED"
-    assert not r.controller._movement.homing
+    assert r.ask(intents.Reset(user="ada", role="supervisor", reason="checked")).ok
+    r.run(0.2)
+    assert r.ask(intents.Arm(user="ada")).ok
+    stays(r)
 
 
 def test_a_lost_server_ends_the_way_home_without_a_change_of_mode():
@@ -41,7 +51,8 @@ def test_a_lost_server_ends_the_way_home_without_a_change_of_mode():
     r.server = False
     r.run(3.0)
     assert sum("homing was stopped" in text for text in r.events) == 1, r.events
-    assert not r.controller._movement.homing
+    r.server = True
+    stays(r)
 
 
 def test_who_is_heard_no_more_ends_the_way_home_with_a_warning_and_is_not_told_so_where_nothing_moves():

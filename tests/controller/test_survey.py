@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from controller.inputs import Sample
 from controller.work.survey import looked_again
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
@@ -30,8 +29,7 @@ def surveying(distance, *undecided_sites, **changes):
 def tell(r, *undecided_sites):
     """What perception says of the row from now on: one point, and what it left open."""
     shown = (point("a", (0.5, 0.75, 1.0), vine=1, spur=1),)
-    told = m.PruningPoints(header=m.Header(), segmenter="none", frames=1, points=shown, undecided_sites=undecided_sites)
-    r._points = Sample(told, r.now)
+    r.show(shown, undecided_sites=undecided_sites)
 
 
 def test_it_drives_the_whole_way_with_the_arm_in_its_looking_posture_and_tells_what_was_found():

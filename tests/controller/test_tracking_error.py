@@ -50,18 +50,18 @@ def test_what_was_not_seen_is_not_judged():
 def test_a_base_that_is_held_back_stops_the_work_with_the_figure():
     r = working((point("a", (2.0, 0.75, 1.0)),))
     r.run(3.0)
-    integrate = r._integrate
+    integrate = r.integrate
 
     def held(command):
         stuck = command.copy()
         stuck[:2] = 0.0
         integrate(stuck)
 
-    r._integrate = held
+    r.integrate = held
     r.run(1.0)
     assert r.state.mode == "PROTECTIVE_STOP"
     assert "does not follow" in r.state.reason and "wheel" in r.state.reason
     assert not r.ask(intents.Acknowledge(user="ada")).ok
-    r._integrate = integrate
+    r.integrate = integrate
     r.run(4.0)
     assert r.ask(intents.Acknowledge(user="ada")).ok

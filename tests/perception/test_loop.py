@@ -55,11 +55,11 @@ class FakePerception:
     withdrawn = ()
     crops = ()
     rejected_wood = ""
-    camera_rays = SimpleNamespace(add=lambda frame: None)
     obstacles = (Capsule("wire", (0.0, 0.75, 1.2), (2.0, 0.75, 1.2), 0.004, 0.004),)
 
     def __init__(self):
-        self.release = threading.Event()
+        self.release, self.noted, self.newest = threading.Event(), [], None
+        self.camera_rays = SimpleNamespace(add=self.noted.append)
 
     def answer(self, request):
         return m.Answer(ok=True, reason=f"kept {request.rule.nodes_kept}")
@@ -72,7 +72,8 @@ class FakePerception:
             self.release.wait(10.0)
         if frame == "corrupt":
             raise MessageError("frame 1: the depth image is corrupt")
-        return m.PruningPoints(header=m.Header(), segmenter="s", frames=1, points=())
+        self.newest = m.PruningPoints(header=m.Header(), segmenter="s", frames=1, points=())
+        return self.newest
 
 
 @pytest.fixture
@@ -119,9 +120,10 @@ def test_what_was_left_out_is_told_when_it_changes_and_at_most_once_a_minute(par
 
     def told(rejected_wood, second):
         perception.rejected_wood = rejected_wood
+        before = perception.newest
         wire.frames.store(Frame(str(second)), float(second))
-        loop.step(float(second))
-        step_until(loop, lambda: loop._worker.busy_for(1e9) == 0.0, float(second))
+        sent = wire.out[POINTS.name].sent
+        step_until(loop, lambda: sent and sent[-1] is perception.newest is not before, float(second))
         return [event.text for event in wire.out[EVENT.name].sent if "left out" in event.text]
 
     assert "1 trunk leaning" in told("1 trunk leaning", 0)[0]
@@ -246,8 +248,7 @@ def test_a_picture_is_sent_when_it_is_new_and_again_now_and_then(parts):
 
 def test_a_frame_that_is_never_worked_on_can_be_clicked_all_the_same(parts):
     wire, perception, loop = parts
-    noted = []
-    loop._camera_rays = SimpleNamespace(add=noted.append)
+    noted = perception.noted
     wire.frames.store(Frame("hang"), 0.0)
     turns(loop, lambda: noted)
     wire.frames.store(Frame("shown"), 0.1)

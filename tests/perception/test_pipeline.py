@@ -16,7 +16,6 @@ from perception.pipeline import Perception, with_width_bias
 from perception.segmentation.frame import decode_frame
 from perception.segmentation.segmenter import LabelImageSegmenter
 from perception.skeleton.topology import perceive_plant
-from perception.tracking.tracker import TrackerUpdate
 from rolling_panda import messages as m
 from rolling_panda.commands import AddPoint, AddPointInImage, EvaluateRule, MovePoint, SetRule, UndoRule
 from rolling_panda.errors import MessageError
@@ -310,9 +309,19 @@ def test_what_was_cut_meanwhile_does_not_come_back_with_the_rule(model, frames):
     rule = m.PruningRule(nodes_kept=1)
     seen.answer(SetRule(user="Ada", rule=rule))
     cut = next(point for point in seen.points().points if point.kind == "spur cut")
-    # As `process` does where it sees the wood beyond a point gone.
-    seen._apply(TrackerUpdate((), (np.array(cut.position),)))
-    seen.withdrawn = ("told with the frame",)
+    row, camera = grow(VineyardConfig(), 1), Camera(CameraConfig(), 1)
+
+    def where(rod):
+        """How far the rod is from the cut (m), and the share of its length at which it is nearest."""
+        axis = rod.end - rod.start
+        share = float(np.clip((cut.position - rod.start) @ axis / (axis @ axis), 0.0, 1.0))
+        return float(np.linalg.norm(cut.position - rod.start - share * axis)), share
+
+    number, rod = min(row.standing(), key=lambda each: where(each[1])[0])
+    after = row.sever(number, where(rod)[1])
+    for k in range(4, 7):
+        seen.process(survey_frame(camera, after, model, k))
+    assert len(seen.withdrawn) == 1 and "it has been cut" in seen.withdrawn[0]
     seen.answer(UndoRule(user="Ada", rule=rule))
     assert seen.withdrawn == (), "what a frame took away is told once"
     back = {point.point_id for point in seen.points().points}

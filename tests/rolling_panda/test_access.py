@@ -4,7 +4,6 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import numpy as np
@@ -18,10 +17,10 @@ from rolling_panda.errors import InputError, ServiceError, TransportError
 from rolling_panda.topics import BRIDGE, INTENT, JOINTS, MOTION, RELEASE, SERVICES, STOP, TOKEN, TOPICS, key
 from rolling_panda.transport.access import BEARERS, CALLERS, access_control
 from rolling_panda.transport.certificates import APART, NAMES, main, make
-from rolling_panda.transport.codec import encode
-from rolling_panda.transport.zenoh import Onlooker, Router, Transport
+from rolling_panda.transport.zenoh import ForeignWire, Onlooker, Router, Transport
 from tests.support.processes.local_router import free_port
 from tests.support.processes.processes import Processes
+from tests.support.waiting import until
 
 pytestmark = pytest.mark.alone
 
@@ -52,15 +51,26 @@ def test_each_topic_is_said_by_its_senders_and_carried_to_its_readers_alone(cert
     settings = config(endpoint, certificates)
     got: set[tuple[str, str, str]] = set()
     with ExitStack() as stack:
-        bearers = {name: stack.enter_context(Onlooker(settings, "rp1", name)) for name in BEARERS}
+        bearers = {name: ForeignWire(settings, name) for name in BEARERS}
+        for wire in bearers.values():
+            stack.callback(wire.close)
         wanted = [key("rp1", topic.name) for topic in TOPICS]
 
-        def listen(reader: str) -> Callable[[Any], None]:
-            return lambda sample: got.add((sample.payload.to_string(), str(sample.key_expr), reader))
+        def listen(reader: str) -> Callable[[bytes, float], None]:
+            def hear(said: bytes, at: float) -> None:
+                sender, where = said.decode().split()
+                got.add((sender, where, reader))
+
+            return hear
 
         for reader, wire in bearers.items():
             for where in (*wanted, key("rp1", "**"), "**"):
-                wire._session.declare_subscriber(where, listen(reader))
+                wire.subscribe(where, listen(reader))
+        says = [
+            (wire.publisher(where), f"{sender} {where}".encode())
+            for sender, wire in bearers.items()
+            for where in wanted
+        ]
         expected = {
             (sender, key("rp1", topic.name), reader)
             for topic in TOPICS
@@ -70,9 +80,8 @@ def test_each_topic_is_said_by_its_senders_and_carried_to_its_readers_alone(cert
         }
 
         def everybody_says_everything() -> None:
-            for sender, wire in bearers.items():
-                for where in wanted:
-                    wire._session.put(where, sender)
+            for say, what in says:
+                say(what)
             time.sleep(0.2)
 
         end = time.monotonic() + 20.0
@@ -131,22 +140,23 @@ def test_every_rule_is_for_one_robot() -> None:
 def test_one_robots_certificates_say_nothing_to_another_robot(tmp_path: Path) -> None:
     """Two robots at one router: a process is heard on its own robot's keys."""
     endpoint, folder = f"tls/127.0.0.1:{free_port()}", tmp_path / "two"
-    make(folder, ("127.0.0.1",), 2, ["rp2"])
-    settings = config(endpoint, folder)
+    make(folder, ("127.0.0.1",), 2, ROBOTS)
+    settings, command = config(endpoint, folder), m.MotionCommand(epoch=1, sequence=1, echo=1, xi=(0.0,) * 9)
     router = Router(msgspec.structs.replace(settings, mode="router", connect=(), listen=(endpoint,), robots=ROBOTS))
-    got: set[str] = set()
-    # The router's own session hears whatever the router lets in.
-    router._session.declare_subscriber("rp/**", lambda sample: got.add(str(sample.key_expr)))
-    try:
-        with Transport(settings, "controller", "rp2") as controller:
-            end = time.monotonic() + 10.0
-            while key("rp2", MOTION.name) not in got and time.monotonic() < end:
-                for robot in ROBOTS:
-                    controller._session.put(key(robot, MOTION.name), b"")
-                time.sleep(0.05)
-        assert got == {key("rp2", MOTION.name)}
-    finally:
-        router.close()
+    with ExitStack() as stack:
+        stack.callback(router.close)
+
+        def wire(process: m.Process, robot: str, certificates: Path) -> Transport:
+            return stack.enter_context(Transport(config(endpoint, certificates), process, robot))
+
+        heard = {robot: wire("bridge", robot, folder).slot(MOTION) for robot in ROBOTS}
+        said = {robot: wire("controller", robot, folder / "rp2").publisher(MOTION) for robot in ROBOTS}
+        until(lambda: said["rp2"].put(command) or heard["rp2"].peek() is not None, 10.0)
+        for _ in range(5):
+            for publisher in said.values():
+                publisher.put(command)
+            time.sleep(0.05)
+        assert heard["rp1"].peek() is None
 
 
 def test_without_a_certificate_of_this_authority_nobody_comes_in(
@@ -172,7 +182,7 @@ def test_without_a_certificate_of_this_authority_nobody_comes_in(
         with pytest.raises(TransportError):
             intruder = Transport(config(endpoint, mixed), "controller", "rp1")
             stop = m.StopRequest(stop_id="a", source="x", user="eve", reason="r")
-            intruder._session.put(key("rp1", STOP.name), stop)
+            intruder.publisher(STOP).put(stop)
         time.sleep(0.3)
         assert got.peek() is None
 
@@ -217,9 +227,10 @@ def test_apart_each_has_its_own_and_they_are_kept_until_they_are_too_old(tmp_pat
     assert "--apart is for one robot; got a, b" in capsys.readouterr().err
 
 
-def commands(wire: Onlooker, seconds: float) -> None:
+def commands(wire: Transport, seconds: float) -> None:
     """Ask for the token, and drive forward by commands that answer the newest joint state, as a controller does."""
     joints, state = wire.slot(JOINTS), wire.slot(BRIDGE)
+    token, motion = wire.publisher(TOKEN), wire.publisher(MOTION)
     end, sequence = time.monotonic() + seconds, 0
     while time.monotonic() < end:
         newest, bridge = joints.peek(), state.peek()
@@ -229,8 +240,8 @@ def commands(wire: Onlooker, seconds: float) -> None:
             # The epoch of one's own making is what the bridge has given out, where that is not told.
             epoch = 1 if bridge is None else bridge.message.epoch
             command = m.MotionCommand(epoch=epoch, token="aa", sequence=sequence, echo=echo, xi=xi)
-            wire._session.put(key("rp1", TOKEN.name), encode(m.TokenRequest(token="aa", echo=echo, mode="TELEOP")))
-            wire._session.put(key("rp1", MOTION.name), encode(command))
+            token.put(m.TokenRequest(token="aa", echo=echo, mode="TELEOP"))
+            motion.put(command)
         time.sleep(0.01)
 
 

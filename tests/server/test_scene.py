@@ -14,30 +14,41 @@ from server.scene.scene import Scene
 from tests.support.played_server import bridge, point
 
 
+class Drawn(Scene):
+    """The scene, and what viser has of it."""
+
+    def handle(self, name: str) -> Any:
+        return self._server.scene.get_handle_by_name(name)
+
+    def kept(self) -> list[Any]:
+        """Messages that viser keeps for views that open later."""
+        return list(self._server._websock_server._broadcast_buffer.message_from_id.values())
+
+
 @pytest.fixture
-def scene() -> Iterator[Scene]:
+def scene() -> Iterator[Drawn]:
     def soon(function: Any, *arguments: Any) -> object:
         return function(*arguments)
 
     def nothing(*_: object) -> None:
         return None
 
-    made = Scene(RobotModel().model, [], soon, nothing, nothing, nothing)
+    made = Drawn(RobotModel().model, [], soon, nothing, nothing, nothing)
     yield made
     made.close()
 
 
-def marker(scene: Scene, name: str = "p1") -> Any:
-    return scene._server.scene.get_handle_by_name(f"/points/{name}")
+def marker(scene: Drawn, name: str = "p1") -> Any:
+    return scene.handle(f"/points/{name}")
 
 
-def shown(scene: Scene, state: m.PointState) -> tuple[Any, tuple[int, ...]]:
+def shown(scene: Drawn, state: m.PointState) -> tuple[Any, tuple[int, ...]]:
     scene.show_points((point(1, state), point(2, "PROPOSED")))
     found = marker(scene)
     return found.vertices, tuple(np.asarray(found.color).tolist())
 
 
-def test_a_point_that_cannot_be_reached_has_another_marker_until_it_can(scene: Scene) -> None:
+def test_a_point_that_cannot_be_reached_has_another_marker_until_it_can(scene: Drawn) -> None:
     for state, shape in (("ACCEPTED", cut_marker()), ("UNREACHABLE", unreachable_marker()), ("ACCEPTED", cut_marker())):
         vertices, color = shown(scene, state)
         assert np.allclose(vertices, shape.vertices) and color == STATE_COLORS[state]
@@ -52,33 +63,34 @@ def cane(x: float, y: float = 0.8, top: float = 1.8) -> tuple[m.Vector3, ...]:
     return tuple((x, y, float(z)) for z in np.linspace(0.5, top, 9))
 
 
-def highest(scene: Scene, x: float) -> float:
+def highest(scene: Drawn, x: float) -> float:
     """The highest place (m) of the drawn lines at x; minus infinity where there is none."""
-    drawn = scene._server.scene.get_handle_by_name("/plant/canes")
+    drawn = scene.handle("/plant/canes")
     places = np.zeros((0, 3)) if drawn is None else np.asarray(drawn.points).reshape(-1, 3)
     return float(places[np.abs(places[:, 0] - x) < 0.01, 2].max(initial=-np.inf))
 
 
-def late_view(scene: Scene) -> set[str]:
+def late_view(scene: Drawn) -> set[str]:
     """Names of all that a view is sent that opens now."""
-    told = scene._server._websock_server._broadcast_buffer.message_from_id.values()
-    return {message.name for message in told if type(message).__name__.endswith(("MeshMessage", "SegmentsMessage"))}
+    return {
+        message.name for message in scene.kept() if type(message).__name__.endswith(("MeshMessage", "SegmentsMessage"))
+    }
 
 
-def falling(scene: Scene, layer: str) -> Any:
+def falling(scene: Drawn, layer: str) -> Any:
     names = [name for name in late_view(scene) if name.startswith(f"/{layer}/falling")]
     assert len(names) <= 1, names
-    return scene._server.scene.get_handle_by_name(names[0]) if names else None
+    return scene.handle(names[0]) if names else None
 
 
-def at_work(scene: Scene, state: m.PointState, outcome: m.Outcome = "") -> None:
+def at_work(scene: Drawn, state: m.PointState, outcome: m.Outcome = "") -> None:
     """Point 1 in a state, and what the blades have told of its cut."""
     rows = (point(1, state, cut_id="c1"), point(2, "ACCEPTED"))
     scene.show_points(rows)
     scene.show_cuts(rows, bridge(cut_id="c1", outcome=outcome), now=100.0)
 
 
-def test_what_the_blades_have_cut_off_falls_for_a_second_and_is_gone(scene: Scene) -> None:
+def test_what_the_blades_have_cut_off_falls_for_a_second_and_is_gone(scene: Drawn) -> None:
     scene.show_canes((cane(0.2), cane(0.4)))
     at_work(scene, "CUTTING")
     assert highest(scene, 0.2) == pytest.approx(1.8) and falling(scene, "plant") is None
@@ -100,13 +112,13 @@ def test_what_the_blades_have_cut_off_falls_for_a_second_and_is_gone(scene: Scen
     assert highest(scene, 0.2) == pytest.approx(0.9) and falling(scene, "plant") is None, "and does not fall again"
 
 
-def test_what_was_cut_before_anybody_looked_is_gone_without_a_fall(scene: Scene) -> None:
+def test_what_was_cut_before_anybody_looked_is_gone_without_a_fall(scene: Drawn) -> None:
     scene.show_canes((cane(0.2),))
     at_work(scene, "DONE")
     assert highest(scene, 0.2) == pytest.approx(0.9) and falling(scene, "plant") is None
 
 
-def test_a_cane_that_is_seen_to_stand_after_its_cut_is_drawn_again(scene: Scene) -> None:
+def test_a_cane_that_is_seen_to_stand_after_its_cut_is_drawn_again(scene: Drawn) -> None:
     scene.show_canes((cane(0.2),))
     at_work(scene, "CUTTING")
     at_work(scene, "CUTTING", "DONE")
@@ -114,7 +126,7 @@ def test_a_cane_that_is_seen_to_stand_after_its_cut_is_drawn_again(scene: Scene)
     assert highest(scene, 0.2) == pytest.approx(1.8)
 
 
-def test_of_canes_that_cross_at_the_cut_only_the_one_that_was_cut_is_gone(scene: Scene) -> None:
+def test_of_canes_that_cross_at_the_cut_only_the_one_that_was_cut_is_gone(scene: Drawn) -> None:
     across = tuple((float(x), 0.81, 0.9) for x in np.linspace(-0.3, 0.7, 9))
     beside = cane(0.235)
     scene.show_canes((across, cane(0.2), beside))
@@ -130,7 +142,7 @@ def row(revision: int, *rods: Capsule) -> Scenery:
     return Scenery(header=m.Header(), revision=revision, capsules=rods)
 
 
-def test_what_the_simulator_severed_falls_too_and_another_row_does_not(scene: Scene) -> None:
+def test_what_the_simulator_severed_falls_too_and_another_row_does_not(scene: Drawn) -> None:
     foot = Capsule("cane", (0.2, 0.8, 0.5), (0.2, 0.8, 1.0), 0.005, 0.005)
     tip = Capsule("cane", (0.2, 0.8, 1.0), (0.2, 0.8, 1.5), 0.005, 0.004)
     post = Capsule("post", (1.0, 0.8, 0.0), (1.0, 0.8, 2.0), 0.05, 0.05)
@@ -141,7 +153,7 @@ def test_what_the_simulator_severed_falls_too_and_another_row_does_not(scene: Sc
     piece = falling(scene, "row")
     heights = np.asarray(piece.vertices)[:, 2]
     assert (heights.min(), heights.max()) == (pytest.approx(0.9), pytest.approx(1.5))
-    assert np.asarray(scene._server.scene.get_handle_by_name("/row/cane").vertices)[:, 2].max() == pytest.approx(0.9)
+    assert np.asarray(scene.handle("/row/cane").vertices)[:, 2].max() == pytest.approx(0.9)
     scene.falling.step(102.0)
     assert late_view(scene) >= {"/row/cane", "/row/post"} and falling(scene, "row") is None
     scene.show_row(row(40, post), now=103.0)

@@ -1,4 +1,7 @@
-"""A controller with a robot that has no mass, whose preview requests are answered after some periods."""
+"""A controller with a robot that has no mass, whose preview requests are answered after some periods.
+
+What it asks the planner is kept as `request`; a test that wants to answer sets `plan`.
+"""
 
 from dataclasses import replace
 
@@ -17,14 +20,15 @@ class Previewed:
         self.robot = robot(**changes)
         if controller is not None:
             self.robot.controller = controller
-        self.state = self.motion = self._answer = self._due = None
+        self.state = self.motion = self.request = self.plan = self.session_plan = self._answer = self._due = None
         self.path = []
         step = self.robot.controller.step
 
         def with_rollout(inputs, now):
             if self._due is not None:
                 self._answer, self._due = roll(self._due), None
-            out = step(inputs if self._answer is None else replace(inputs, preview=self._answer), now)
+            out = step(replace(inputs, plan=self.plan, preview=self._answer), now)
+            self.request, self.session_plan = out.request or self.request, out.plan or self.session_plan
             self._due = out.preview_request or self._due
             self.state = out.preview or self.state
             self.motion = out.preview_motion or self.motion
@@ -64,7 +68,7 @@ class Previewed:
         began = self.robot.now
         while self.robot.state.mode == "AUTO":
             self.robot.step()
-            pose = self.robot.controller._movement.body.measured.kinematics.T_odom_tool
+            pose = self.robot.model.kinematics(self.robot.q).T_odom_tool
             self.path.append(pose.translation.copy())
             assert self.robot.now - began < limit_s
         return self.robot.now - began

@@ -24,7 +24,7 @@ from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
 from rolling_panda.messages.perception import Obstacles
-from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
+from rolling_panda.messages.supervision import BaseVelocity, ControlState, TeleopTarget
 from rolling_panda.model.robot import RobotModel, configuration, pose_message
 from rolling_panda.runtime.latest_file import KeptValue
 from server.auth.sessions import Session
@@ -84,6 +84,7 @@ class FaultyWorld(World):
         self.holds = True
         self.modes: list[str] = []
         self.commanded: m.MotionCommand | None = None
+        self.lease: ControlState | None = None
         self.intruder: Callable[[FaultyWorld], None] = lambda world: None
         self.people: tuple[str, ...] = ()
         self._there = PresenceTracker()
@@ -198,7 +199,7 @@ class FaultyWorld(World):
 
     def send(self, out: Outputs) -> None:
         """Motion and token go their way; the rest arrives at once."""
-        self.commanded = out.motion or self.commanded
+        self.commanded, self.lease = out.motion or self.commanded, out.control or self.lease
         for message in (out.motion, out.token):
             if message is not None:
                 self.motion.push(message, self.now)

@@ -76,10 +76,17 @@ class KinematicRobot:
         self._joints: Sample[m.JointState] | None = None
         self._odometry: Sample[m.Odometry] | None = None
 
-    def show(self, points: tuple[m.PruningPoint, ...], rule: m.PruningRule | None = None) -> None:
-        """What perception holds true from now on, by a rule."""
+    def show(
+        self,
+        points: tuple[m.PruningPoint, ...],
+        rule: m.PruningRule | None = None,
+        undecided_sites: tuple[m.UndecidedSite, ...] = (),
+    ) -> None:
+        """What perception holds true from now on, by a rule, and what it leaves open."""
         header = m.Header(self.now, "odom")
-        message = m.PruningPoints(header=header, segmenter="none", frames=1, points=points, rule=rule)
+        message = m.PruningPoints(
+            header=header, segmenter="none", frames=1, points=points, rule=rule, undecided_sites=undecided_sites
+        )
         self._points = Sample(message, self.now)
 
     def stop(self, stop_id: str = "stop-1") -> None:
@@ -135,7 +142,7 @@ class KinematicRobot:
         if out.token is not None:
             self._fence.ask(out.token.token, self.now, not self._moving)
         if out.picture is not None:
-            self._close_up = self._looked(out.picture)
+            self._close_up = self.close_up(out.picture)
         if out.cut is not None and out.cut.cut_id != self._cut_id:
             self._cut_id, self._cut_at = out.cut.cut_id, self.now
             self.cuts.append((out.cut.point_id, self.model.kinematics(self.q).T_odom_tool.homogeneous.copy()))
@@ -147,7 +154,7 @@ class KinematicRobot:
             self.ledger = LedgerState(out.records[-1].number)
         self.events += [event.text for event in out.events]
         self.record.append(command)
-        self._integrate(command)
+        self.integrate(command)
         self.now += self.dt
         return out
 
@@ -171,7 +178,7 @@ class KinematicRobot:
         for _ in range(round(seconds / self.dt)):
             self.step()
 
-    def _looked(self, request: CloseUpRequest) -> Sample[CloseUpResult]:
+    def close_up(self, request: CloseUpRequest) -> Sample[CloseUpResult] | None:
         """A camera that always sees the point: where it was shown, and off once its cut is done."""
         shown = () if self._points is None else self._points.message.points
         point = next((each for each in shown if each.point_id == request.point_id), None)
@@ -218,7 +225,8 @@ class KinematicRobot:
             moving=self._moving,
         )
 
-    def _integrate(self, command: Array) -> None:
+    def integrate(self, command: Array) -> None:
+        """What a command makes of the robot in one period."""
         inner = 10
         dt = self.dt / inner
         for _ in range(inner):

@@ -96,9 +96,11 @@ class Judge:
         self.at_bridge = set()
         self.told["releases"] += 1
 
-    def bridge_started(self, latched):
+    def bridge_told(self, latched):
+        assert latched or not self.at_bridge, "a stop is no longer latched that nobody released"
+
+    def bridge_started(self):
         self.told["starts of the bridge"] += 1
-        assert latched or not self.at_bridge, "a restart of the bridge released a stop"
         # A bridge begins at rest.
         self.last_xi = np.zeros(9)
 
@@ -189,7 +191,7 @@ class Judge:
             self.heard_at[intent.user] = world.now
             assert intent.role != "viewer", f"a viewer may {intent}"
             if COMMAND_OF[type(intent)].control and before != "FAULT":
-                assert holder is None or holder.user == intent.user, f"{intent} while {holder} holds control"
+                assert holder in ("", intent.user), f"{intent} while {holder} holds control"
             if isinstance(intent, intents.Acknowledge) and before == "FAULT":
                 assert intent.role == "supervisor"
             self._decided(intent, world)
@@ -203,14 +205,14 @@ class Judge:
     def _decided(self, intent, world):
         points = [intent.point_id] if hasattr(intent, "point_id") else []
         if isinstance(intent, intents.AcceptAll):
-            tickets = world.controller._queue.tickets()
+            tickets = world.queue.tickets()
             points = [ticket.point.point_id for ticket in tickets if ticket.state == "ACCEPTED"]
         for name in points:
             if isinstance(intent, intents.AcceptPoint) or (
                 isinstance(intent, intents.AcceptAll) and (name not in self.accepted or name in self.revoked)
             ):
                 assert not self.bitten.get(name), f"{name}, on which the blades have closed, is accepted anew"
-                self.accepted[name] = world.controller._queue.get(name).point.position
+                self.accepted[name] = world.queue.get(name).point.position
                 self.revoked.pop(name, None)
             elif isinstance(intent, intents.RejectPoint | intents.ReconsiderPoint) and name in self.accepted:
                 self.revoked[name] = world.controller.recorded
@@ -224,7 +226,7 @@ class Judge:
             return
         seen = {point.point_id: point.position for point in points.message.points}
         for name, where in self.accepted.items():
-            ticket = world.controller._queue.get(name)
+            ticket = world.queue.get(name)
             if name in self.revoked or ticket is None or ticket.state in ("CUTTING", "UNKNOWN"):
                 continue
             # After a start an acceptance waits until its point is seen again.
@@ -234,9 +236,9 @@ class Judge:
         self.shown_points |= set(seen)
 
     def _may_move(self, world, mode, now):
-        holder = world.controller._supervisor.authority._lease.holder
-        if holder is None or now - self.heard_at.get(holder.user, now) > LEASE_S + PERIOD_S:
+        holder = world.holder
+        if not holder or now - self.heard_at.get(holder, now) > LEASE_S + PERIOD_S:
             return False
         if mode == "TELEOP":
-            return now - self.held_at.get(holder.user, -1.0) <= HOLD_S + PERIOD_S
+            return now - self.held_at.get(holder, -1.0) <= HOLD_S + PERIOD_S
         return mode in ("AUTO", "READY") and bool(self.started_by)

@@ -97,12 +97,13 @@ class Sequence:
 
 
 class Movement:
-    """Stands where the controller's `Movement` stands."""
+    """Stands where the controller's `Movement` stands; `newest` is that of the running controller."""
 
     chance = random.Random(0)
 
     def __init__(self, config, robot_config, queue, lines, run_id, known, method=None, permit=lambda _: ""):
-        saturation = Saturation()
+        self.queue, saturation = queue, Saturation()
+        Movement.newest = self
         self._setpoints, self._saturation = Setpoints(saturation), saturation
         nothing = SimpleNamespace(reason="", model=SimpleNamespace(nearest=None))
         self.body = SimpleNamespace(robot=MODEL, measured=None, tracking_error=nothing, surroundings=nothing)

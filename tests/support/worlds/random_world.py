@@ -72,10 +72,10 @@ class RandomWorld:
         )
         # A simulated cut ends with its bridge: what the robot was told is not told again.
         self.robot.now = replace(self.robot.now, velocity=np.zeros(9))
-        self.judge.bridge_started(bool(self.bridge._latch.stop_id))
+        self.judge.bridge_started()
 
     def start_controller(self):
-        in_cutting = self.starts > 0 and any(t.state == "CUTTING" for t in self.controller._queue.tickets())
+        in_cutting = self.starts > 0 and any(t.state == "CUTTING" for t in self.queue.tickets())
         self.starts += 1
         self.controller = Controller(ControllerConfig(), RobotConfig(), run_id=f"r{self.starts}")
         written = self.chance.randrange(len(self.rows) + 1) if self.rows else 0
@@ -83,10 +83,11 @@ class RandomWorld:
         for _, name, body in self.rows[:written]:
             self.disk[name] = body
         self.rows, self.durable = [], 0
+        self.queue, self.holder = Movement.newest.queue, ""
         self.controller.restore(tuple(self.disk.values()), self.kept_stops)
         self.inputs = StepInputs(present=frozenset(m.PROCESSES))
         self.judge.mode(self.controller.mode, "restart", self)
-        self.judge.restored(self.controller._queue)
+        self.judge.restored(self.queue)
 
     # --- one step ------------------------------------------------------------------------------------------------
 
@@ -97,9 +98,11 @@ class RandomWorld:
         self.now += DT if chance.random() < 0.999 else chance.choice((0.03, 0.3, 3.0))
         if chance.random() < 0.1:
             self.happen()
-        if self.kill_in_intent and chance.random() < 0.1 and self.controller._movement.sequence.in_canes:
+        if self.kill_in_intent and chance.random() < 0.1 and Movement.newest.sequence.in_canes:
             self.start_controller()
         out = self.bridge.step(self.now)
+        if out.state is not None:
+            self.judge.bridge_told(bool(out.state.stop_id))
         for message in (out.joints, out.state, out.odometry, out.stops, *out.events):
             assert message is None or as_received(message) == message
         self.mute = max(0, self.mute - 1)
@@ -131,6 +134,7 @@ class RandomWorld:
         out = self.controller.step(self.inputs, self.now)
         for message in (out.motion, out.token, out.cut, out.state, out.control, out.stops, out.preview, *out.events):
             assert message is None or as_received(message) == message
+        self.holder = out.control.user
         self.judge.stepped(self, out)
         self.inputs = replace(self.inputs, stops=())
         self.write(out.records)
@@ -206,7 +210,7 @@ class RandomWorld:
 
     def prepare(self, user):
         """Look at what nobody knows, accept what is there, and drive on to new points where all is done."""
-        for ticket in self.controller._queue.tickets():
+        for ticket in self.queue.tickets():
             name = ticket.point.point_id
             if ticket.state == "UNKNOWN":
                 self.answer(intents.ResolvePoint(user=user, point_id=name, outcome="DONE", reason="looked"))
@@ -222,8 +226,7 @@ class RandomWorld:
         if self.steps < self.people[intent.user].unheard_until:
             return False
         intent = msgspec.structs.replace(intent, role=PEOPLE[intent.user])
-        holder = self.controller._supervisor.authority._lease.holder
-        before = self.controller.mode
+        holder, before = self.holder, self.controller.mode
         answer = self.controller.answer(intent, self.now)
         self.judge.answered(intent, answer.ok, holder, before, self)
         return answer.ok
