@@ -141,7 +141,7 @@ class Controller:
         """
         self._event_log.now = now
         inputs = self._stale_filter.of(inputs)
-        self._take(inputs, now)
+        self._update(inputs, now)
         supervisor = self._supervisor
         supervisor.review(now)
         moved = self._move(now)
@@ -221,7 +221,7 @@ class Controller:
             intents.Reset: lambda asked, now: self._supervisor.stops.ask_release(asked, self._supervisor.bridge, now),
         }
 
-    def _take(self, inputs: StepInputs, now: float) -> None:
+    def _update(self, inputs: StepInputs, now: float) -> None:
         self._inputs = inputs
         self._journal.observe(inputs.ledger, now)
         self._journal.stops(inputs.stops)

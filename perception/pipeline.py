@@ -315,12 +315,12 @@ class Perception:
         before = self._undo.pop()
         self._config = replace(self._config, rule=before.rule)
         cuts = self._severed[before.severed :]
-        self._tracker.restore(before.tracker, lambda number, position: self._stands(number, position, cuts))
+        self._tracker.restore(before.tracker, lambda number, position: self._is_standing(number, position, cuts))
         self._undecided, self._site_messages = before.undecided, before.undecided_sites
         self._retained_canes.select(self.plant_map.spurs, self._tracker.published_cuts(), before.rule)
         return m.Answer(ok=True, reason=f"{len(self._tracker.points())} points by the rule before")
 
-    def _stands(self, number: SpurNumber, position: Array, cuts: list[Array]) -> bool:
+    def _is_standing(self, number: SpurNumber, position: Array, cuts: list[Array]) -> bool:
         """Whether none of some cuts was made at a position of a spur, or below it on the same cane."""
         for cut in cuts:
             if distance(cut, position) < _SAME_CUT:

@@ -151,7 +151,7 @@ def _metas(hint: Any) -> tuple[Meta, ...]:
 def wider(section: str, config: Struct) -> tuple[str, ...]:
     """Texts of the safety values of a section that are less strict than usual."""
     return tuple(
-        f"[{section}] {each.name} = {_said(each.value)}, usually {_said(each.usual)} (allowed: {each.bound})"
+        f"[{section}] {each.name} = {_shown(each.value)}, usually {_shown(each.usual)} (allowed: {each.bound})"
         for each in numbers(config)
         if each.bound.wider(each.value, each.usual)
     )
@@ -200,8 +200,8 @@ def _check_one(what: str, value: Any, hint: Any, usual: Any) -> None:
         if not outside and math.isfinite(value):
             return
         allowed, why = outside[0] if outside else "a finite number", ""
-    leave = f", or leave the line out for the usual {_said(usual)}" if isinstance(usual, int | float) else ""
-    raise ConfigError(f"{what} is {_said(value)}; allowed is {allowed}{why}. Choose such a value{leave}.")
+    leave = f", or leave the line out for the usual {_shown(usual)}" if isinstance(usual, int | float) else ""
+    raise ConfigError(f"{what} is {_shown(value)}; allowed is {allowed}{why}. Choose such a value{leave}.")
 
 
 def _is_outside(value: float, meta: Meta) -> bool:
@@ -220,7 +220,7 @@ def _limits(meta: Meta) -> str:
     return ", ".join(f"{word} {limit:g}" for word, limit in pairs if limit is not None)
 
 
-def _said(value: Any) -> str:
+def _shown(value: Any) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     return f"{value:.10g}" if isinstance(value, float) else str(value)

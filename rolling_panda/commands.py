@@ -1,7 +1,7 @@
-"""What an operator can ask for: the message of each command, and one table, `COMMANDS`, that says the rest about it.
+"""Commands of an operator: the message of each, and the table `COMMANDS` with their other properties.
 
-The REST routes with their bodies, the permission of each command, the log, and the page's and the documents' lists are
-made from the table. The controller's handlers are in `controller/core.py`.
+REST routes and bodies, permissions, log texts, and the lists of the page and the documents are
+generated from the table. The controller's handlers are in `controller/core.py`.
 """
 
 from collections.abc import Callable
@@ -361,11 +361,11 @@ class ReturnControl(Intent, frozen=True, kw_only=True):
     """Give up control. Motion is paused."""
 
 
-#: Handles a command at a monotonic time (s). Returns why it is refused; empty when it is done.
+#: Handles a command at a monotonic time (s). Returns the reason of a refusal; empty if done.
 Handler = Callable[[Any, float], str]
 Handlers = dict[type[Struct], Handler]
 
-#: What must hold for a command besides its mode; `controller/supervision/permission.py` checks each.
+#: Condition of a command beside its mode; `controller/supervision/permission.py` checks each.
 Condition = Literal[
     "fresh sensors", "bridge obeys", "server", "at rest", "workable point", "approved preview", "perception", "watched"
 ]
@@ -375,20 +375,20 @@ Tag = Literal["mode", "points", "preview", "control"]
 
 @dataclass(frozen=True)
 class Command:
-    """One row: who may ask for what, when, and where.
+    """A command with its properties.
 
     Attributes:
         message: Type of the request. Its docstring and its own fields describe the route and its body.
         tag: Section of the REST interface.
-        path: Below `/api`; a field in braces is part of the path. Empty where another route asks for it.
-        log: Text for the log when it is done, as a template of the message's fields or a function of the message.
-            Empty where the handler logs, or a change of mode.
-        role: The least role.
-        process: That answers.
-        control: Whether it moves the robot or leads to it, and so needs control.
-        event: Event of the mode machine that it causes, which says in which modes it is possible.
-        modes: Modes in which it is possible where it causes no event; empty for all.
-        conditions: What must hold besides.
+        path: Path below `/api`, with fields in braces. Empty if another route sends it.
+        log: Log text on success, as a template of the message's fields or a function of the message.
+            Empty if the handler or a change of mode logs.
+        role: Lowest role that may use it.
+        process: Process that answers.
+        control: Whether it needs control, because it can lead to motion.
+        event: Event of the state machine that it causes, which determines the modes where it is allowed.
+        modes: Allowed modes of a command without an event; empty for all.
+        conditions: Further conditions.
     """
 
     message: type[Intent] | type[PlantRequest]

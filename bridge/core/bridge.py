@@ -176,7 +176,7 @@ class BridgeCore:
             self._token_changed(f"a controller has the token: epoch {self._fence.epoch}")
 
     def _token_changed(self, text: str) -> None:
-        self._say("info", text)
+        self._log("info", text)
         self._remember()
         self._fence_kept, self._state_due = False, True
 
@@ -216,7 +216,7 @@ class BridgeCore:
         """Latch a stop; repetitions change nothing. `wall_time` (s since 1970) is for people."""
         if self._latch.stop(request, wall_time):
             what = "emergency stop" if request.source == "hardware" else "software stop"
-            self._say("warning", f"{what} by {request.user or request.source}: {request.reason}")
+            self._log("warning", f"{what} by {request.user or request.source}: {request.reason}")
             self._stops_changed()
 
     def _stops_changed(self) -> None:
@@ -240,7 +240,7 @@ class BridgeCore:
         self._halt()
         self._faults.released(now)
         self._stops_changed()
-        self._say("info", f"software stop released by {request.user}: {request.reason}")
+        self._log("info", f"software stop released by {request.user}: {request.reason}")
         return m.Answer(ok=True)
 
     def step(self, now: float, clock: float | None = None, wall_time: float = 0.0) -> BridgeOutputs:
@@ -269,9 +269,9 @@ class BridgeCore:
         if tripped and not self._was_tripped:
             self._halt()
             if not self._faults.current:
-                self._say("warning", "no valid setpoint: base 0, arm holds, cutter inhibited")
+                self._log("warning", "no valid setpoint: base 0, arm holds, cutter inhibited")
         elif self._was_tripped and not tripped:
-            self._say("info", "setpoints arrive: the robot follows")
+            self._log("info", "setpoints arrive: the robot follows")
         if tripped != self._was_tripped:
             self._state_due = True
         self._was_tripped = tripped
@@ -284,7 +284,7 @@ class BridgeCore:
         change = self._faults.follow(fault, measured.severe, bool(self._latch.stop_id), now)
         if change is not None:
             self._halt()
-            self._say("warning" if self._faults.current else "info", change.text)
+            self._log("warning" if self._faults.current else "info", change.text)
             if change.stop is not None:
                 self.on_stop(change.stop, now, self._wall)
 
@@ -305,11 +305,11 @@ class BridgeCore:
         if measured.cut_id == self._cut_id and measured.outcome != self._outcome:
             self._outcome = measured.outcome
             severity: m.Severity = "info" if measured.outcome == "DONE" else "warning"
-            self._say(severity, f"cut {self._cut_id}: {measured.outcome}, {measured.detail}")
+            self._log(severity, f"cut {self._cut_id}: {measured.outcome}, {measured.detail}")
             self._camera_trigger.wake(self._ticks)
             self._state_due = True
 
-    def _say(self, severity: m.Severity, text: str) -> None:
+    def _log(self, severity: m.Severity, text: str) -> None:
         self._events.append((severity, text[:500]))
 
     def _outputs(self, now: float) -> BridgeOutputs:
@@ -397,7 +397,7 @@ class BridgeCore:
         elif now - self._wanted > _BRAKING_S and not self._unwanted_said:
             self._unwanted_said = True
             why = f"the controller's mode is {mode}" if mode in _STILL else "no controller publishes its mode"
-            self._say("error", f"the robot is commanded to move, though {why}")
+            self._log("error", f"the robot is commanded to move, though {why}")
 
     def _frame(self, now: float) -> CameraFrame | None:
         measured: Measurement = self._measured

@@ -50,7 +50,7 @@ class Cutter:
         if self._enabled and not blades and self._status.state == "closing":
             self._interrupted.set()
             # Beside the request that is under way: the device must hear it at once.
-            threading.Thread(target=self._ask, args=(False,), name="cutter-open", daemon=True).start()
+            threading.Thread(target=self._call_service, args=(False,), name="cutter-open", daemon=True).start()
         self._enabled = blades
 
     def cut(self, cut_id: str) -> None:
@@ -74,7 +74,7 @@ class Cutter:
             if not self._enabled or self._interrupted.is_set():
                 self._end(cut_id, "FAILED_NOT_CUT", "the cutter was inhibited before the blades began to close")
                 continue
-            said = self._ask(True)
+            said = self._call_service(True)
             if self._interrupted.is_set():
                 self._end(cut_id, "UNKNOWN", "the cutter was inhibited while the blades closed")
             elif said is None:
@@ -92,13 +92,13 @@ class Cutter:
         """Open the blades, however often it takes."""
         while not self._closing.is_set():
             last = self._status
-            if self._ask(False) == "":
+            if self._call_service(False) == "":
                 self._status = CutterStatus("open", last.cut_id, last.outcome, last.detail)
                 return
             self._status = CutterStatus("jammed", last.cut_id, last.outcome, last.detail)
             time.sleep(self._config.retry_s)
 
-    def _ask(self, shut: bool) -> str | None:
+    def _call_service(self, shut: bool) -> str | None:
         """Close or open: empty when the blades are there, else why not; None when nobody answers in time."""
         config = self._config
         try:

@@ -123,7 +123,7 @@ class Mp500:
         with self._lock:
             self._runaway = ""
             self._rest_since = None
-        self._ask(SOFT_RELEASE)
+        self._call(SOFT_RELEASE)
 
     def close(self) -> None:
         """Send a last zero and let go; safe to call twice."""
@@ -146,7 +146,7 @@ class Mp500:
                 runaway = self._is_runaway(now)
             self._send(_twist(*self._drive.twist(float(sent[0]), float(sent[1]))))
             if runaway:
-                self._ask(SOFT_STOP)
+                self._call(SOFT_STOP)
 
     def _next(self, now: float) -> Array:
         fault, severe = self._fault(now)
@@ -242,7 +242,7 @@ class Mp500:
         # The base's own odometry is not used: the bridge has its own from the wheels. It tells that the node is alive.
         self.heard[ODOMETRY] += 1
 
-    def _ask(self, service: str) -> None:
+    def _call(self, service: str) -> None:
         """Ask the relay board from a thread: the answer may take a second; what came of it is in the stop state."""
 
         def ask() -> None:

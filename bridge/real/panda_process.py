@@ -69,7 +69,7 @@ class _Session:
     def say(self, fault: str, severe: bool = False) -> None:
         """Report the reason why the arm does not follow to the bridge."""
         self._fault, self._severe = fault, severe
-        self._tell()
+        self._send_state()
 
     def serve(self) -> None:
         """One connection: prepare the arm, then follow, or wait for the end of a fault."""
@@ -86,7 +86,7 @@ class _Session:
         while not self.ended():
             state = robot.read_once()
             self._note(state)
-            self._judge(state)
+            self._check(state)
             if self._severe and self._link.target().releases != self._releases:
                 self._releases = self._link.target().releases
                 self._recover(robot)
@@ -95,7 +95,7 @@ class _Session:
             else:
                 self._follow(robot)
 
-    def _judge(self, state: Any) -> None:
+    def _check(self, state: Any) -> None:
         """Whether the arm can be commanded as it is; what a person has to release stays until then."""
         if state.robot_mode == _MODE.kReflex:
             reasons = str(state.last_motion_errors) + str(state.current_errors)
@@ -147,18 +147,18 @@ class _Session:
         """Libfranka's callback while nothing is commanded; True to go on watching."""
         self._note(state)
         severe, fault = self._severe, self._fault
-        self._judge(state)
+        self._check(state)
         if (severe, fault) != (self._severe, self._fault):
-            self._tell()
+            self._send_state()
         released = self._link.target().releases != self._releases
         return not (self.ended() or (released and self._severe) or (self._moving and not self._fault))
 
     def _note(self, state: Any) -> None:
         self._position, self._velocity = np.array(state.q), np.array(state.dq)
         self._success_rate = float(state.control_command_success_rate)
-        self._tell()
+        self._send_state()
 
-    def _tell(self) -> None:
+    def _send_state(self) -> None:
         self._link.tell(
             ArmState(
                 time.monotonic(),

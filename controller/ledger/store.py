@@ -69,12 +69,12 @@ class Ledger:
         """
         self.path = folder / FILE
         self._head = folder / HEAD
-        with _told(self.path, "open"):
+        with _ledger_errors(self.path, "open"):
             # Made by us, so that nobody else can read it, whatever the umask is.
             os.close(os.open(self.path, os.O_RDWR | os.O_CREAT, 0o600))
             self._database = sqlite3.connect(self.path, timeout=_BUSY_S, isolation_level=None, check_same_thread=False)
         try:
-            with _told(self.path, "open"):
+            with _ledger_errors(self.path, "open"):
                 self._prepare()
                 sync_folder(folder)
             self._check_end()
@@ -91,7 +91,7 @@ class Ledger:
         Raises:
             LedgerError: None of them is in the ledger; it is as it was before.
         """
-        with _told(self.path, "write"):
+        with _ledger_errors(self.path, "write"):
             self._database.execute("BEGIN IMMEDIATE")
             # Commits at the end, or takes everything back.
             with self._database:
@@ -111,7 +111,7 @@ class Ledger:
         Raises:
             LedgerError: It cannot be read.
         """
-        with _told(self.path, "read"):
+        with _ledger_errors(self.path, "read"):
             yield from self._database.execute(
                 "SELECT name, body FROM audit WHERE number IN "
                 "(SELECT max(number) FROM audit WHERE kind = ? GROUP BY name) ORDER BY number",
@@ -161,7 +161,7 @@ class Ledger:
     def _check_end(self) -> None:
         """Refuse a ledger whose end is missing or whose newest row was changed."""
         problem = ""
-        with _told(self.path, "read"):
+        with _ledger_errors(self.path, "read"):
             rows = list(read(self._database, "ORDER BY number DESC LIMIT 2"))
             if rows:
                 before = rows[1].hash if len(rows) > 1 else ORIGIN
@@ -232,7 +232,7 @@ def head_problem(database: sqlite3.Connection, head: str | OSError | ValueError)
 
 
 @contextlib.contextmanager
-def _told(path: Path, what: str) -> Iterator[None]:
+def _ledger_errors(path: Path, what: str) -> Iterator[None]:
     try:
         yield
     except (*UNREADABLE, OSError) as error:

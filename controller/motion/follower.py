@@ -97,7 +97,7 @@ class Follower:
         """Commanded twist (6): desired twist, error feedback, and a lead for the servos' lag."""
         J, twist = robot.kinematics.J_xi, np.empty(6)
         before, self._J_before = J if self._J_before is None else self._J_before, J
-        _ask(
+        _command_twist(
             wanted.twist,
             wanted.acceleration,
             scale,
@@ -208,7 +208,7 @@ def tool_error(T_odom_tool: Any, T_odom_goal: Any) -> Array:
 
 
 @compiled(NOTHING(VECTOR, VECTOR, NUMBER, MATRIX, MATRIX, VECTOR, NUMBER, NUMBER, VECTOR, VECTOR, VECTOR))
-def _ask(
+def _command_twist(
     wanted: Array,
     acceleration: Array,
     scale: float,

@@ -32,7 +32,7 @@ class Teleoperation:
 
     def holding(self, teleop: Sample[TeleopTarget] | None, now: float) -> bool:
         """Whether the operator holds now: the newest demand says so, is fresh, and is one that can be followed."""
-        newest = self._take(teleop)
+        newest = self._newest_target(teleop)
         if newest is None or not newest.message.hold or now - newest.at > self._config.hold_max_age_s:
             self.pressed = True
             return False
@@ -47,7 +47,7 @@ class Teleoperation:
         self.client = Client(message.client or message.user, message.user)
         return self._message is not None and _means_something(message)
 
-    def _take(self, teleop: Sample[TeleopTarget] | None) -> Sample[TeleopTarget] | None:
+    def _newest_target(self, teleop: Sample[TeleopTarget] | None) -> Sample[TeleopTarget] | None:
         """The newest target by its number. Late or repeated ones are ignored.
 
         After a timeout has ended the hold any number is accepted, because a restarted server counts from one.

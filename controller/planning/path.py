@@ -102,7 +102,7 @@ class PathPlanner:
                 reason = reason or arm.reason
                 continue
             plan = assemble(self._robot, q, base, arm, self._limits, wait)
-            least = self._look(plan)
+            least = self._first_contact(plan)
             if least is None:
                 return Planned(plan, stand, self._least(plan))
             reason = (
@@ -172,7 +172,7 @@ class PathPlanner:
         low = np.array([min(o.start[2], o.end[2]) for o in self._collision.obstacles]) < 0.3
         return bool((over & low).any())
 
-    def _look(self, plan: Plan) -> Clearance | None:
+    def _first_contact(self, plan: Plan) -> Clearance | None:
         """First row of the motion that is too near to an obstacle; None without one. Skips rows that cannot collide.
 
         A start that is too near may come 2 mm nearer while it leaves.

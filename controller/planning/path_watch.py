@@ -110,7 +110,7 @@ class PathWatch:
         """By how much the nearest is too near (m), of which part and spot it is, and its distance (m)."""
         shapes, out = self._swept.shapes, np.zeros(5)
         spots = np.ascontiguousarray(spots[:, :4])
-        _look(way.placed, way.low, way.high, shapes.half, shapes.around, spots, needed, out)
+        _largest_violation(way.placed, way.low, way.high, shapes.half, shapes.around, spots, needed, out)
         lacking, _, part, spot, distance = out.tolist()
         return lacking, int(part), int(spot), distance
 
@@ -158,7 +158,7 @@ def _distance(placed: Array, half: Array, around: float, spot: Array) -> float:
 
 
 @compiled(NOTHING(PACKED, PACKED, PACKED, PACKED, VECTOR, PACKED, PACKED, VECTOR))
-def _look(
+def _largest_violation(
     placed: Array,
     low: Array,
     high: Array,

@@ -72,12 +72,12 @@ class PlanManager:
             The next request; None without one.
         """
         if made is not None and self._asked is not None and made.request.number == self._asked.number:
-            self._take(made)
+            self._accept(made)
         accepted, order, turned = self._queue.accepted(), self._queue.order.by_hand, self._queue.approaches.turned
         if (accepted, order, turned) != self._wanted:
             self._wanted, self._quiet_since = (accepted, order, turned), now
         why = self._why_void(q, obstacles, at_rest, working)
-        self._judge(why, bool(accepted))
+        self._check(why, bool(accepted))
         if self.valid and self._plan is not None:
             refused = {point_id: text[:500] for point_id, text in self._plan.refused.items()}
             self._queue.reach(self._plan.request.points, refused, busy)
@@ -88,7 +88,7 @@ class PlanManager:
         self._number += 1
         self._asked_at = now
         self._asked = PlanRequest(self._number, q.copy(), accepted, tuple(obstacles), order, turned)
-        self._judge(why, True)
+        self._check(why, True)
         return self._asked
 
     @property
@@ -115,7 +115,7 @@ class PlanManager:
         self._fresh, self._said_at = False, now
         return session_plan(None if self._state == "none" else self._plan, self._state, self._reason, now)
 
-    def _take(self, made: WorkPlan) -> None:
+    def _accept(self, made: WorkPlan) -> None:
         self._asked, self._plan = None, made
         self._cuts = {cut.point.point_id: cut for cut in made.cuts}
         self._watch, self._compared = ObstacleWatch.of(made), None
@@ -138,17 +138,17 @@ class PlanManager:
             why = why or place_changed(plan, q)
         return why
 
-    def _judge(self, why: str, work: bool) -> None:
+    def _check(self, why: str, work: bool) -> None:
         if not work and self._asked is None:
-            self._say("none", "no point is accepted")
+            self._set_state("none", "no point is accepted")
         elif self._plan is not None and not why:
-            self._say("valid", "")
+            self._set_state("valid", "")
         elif self._asked is not None:
-            self._say("planning", why or "the first plan is being made")
+            self._set_state("planning", why or "the first plan is being made")
         else:
-            self._say("none" if self._plan is None else "void", why or "waiting to plan")
+            self._set_state("none" if self._plan is None else "void", why or "waiting to plan")
 
-    def _say(self, state: PlanState, reason: str) -> None:
+    def _set_state(self, state: PlanState, reason: str) -> None:
         if (state, reason) == (self._state, self._reason):
             return
         self._state, self._reason, self._fresh = state, reason, True

@@ -139,26 +139,26 @@ class PreviewManager:
             The request to compute; None without one.
         """
         if made is not None and self._asked is not None and made.request.number == self._asked.number:
-            self._take(made)
+            self._accept(made)
         if self._phase in ("ready", "approved") and q is not None:
             if why := self._changed(q, obstacles, at_rest, working):
-                self._say("expired", why)
+                self._set_phase("expired", why)
         if self._begun and not working:
             self._begun = False
             # The robot stands elsewhere now, and some of the points are cut.
-            self._say("expired", "the work that it was approved for has ended")
+            self._set_phase("expired", "the work that it was approved for has ended")
         if self._wanted is None or working or self._asked is not None:
             return None
         if not at_rest or q is None:
-            self._say("waiting", "the robot still moves")
+            self._set_phase("waiting", "the robot still moves")
             return None
         if cuts is None and now - self._wanted_at < _PLAN_S:
-            self._say("waiting", "the plan is being made")
+            self._set_phase("waiting", "the plan is being made")
             return None
         points = self._points(self._wanted)
         self._wanted = None
         if not points:
-            self._say("none", self._queue.waits or "no point is accepted")
+            self._set_phase("none", self._queue.waits or "no point is accepted")
             return None
         self._number += 1
         following, names = self._queue.next(), tuple(point.point_id for point in points)
@@ -168,7 +168,7 @@ class PreviewManager:
         self._asked = PreviewRequest(
             self._number, q.copy(), points, tuple(obstacles), dict(cuts or {}), close_up_s, turned
         )
-        self._say("rolling", "")
+        self._set_phase("rolling", "")
         return self._asked
 
     def message(self, now: float) -> PreviewState | None:
@@ -202,7 +202,7 @@ class PreviewManager:
             return f"{point_id} is {ticket.state}; accept it first" if ticket.seen else f"{point_id} is not seen now"
         self._wanted, self._wanted_at, self._asked = point_id, now, None
         self._approved_by = ""
-        self._say("waiting", "")
+        self._set_phase("waiting", "")
         return ""
 
     def _approve(self, digest: str, user: str) -> str:
@@ -217,19 +217,19 @@ class PreviewManager:
         if following is not None and following.point.point_id != first:
             return f"{following.point.point_id} comes before {first} in the order of work: move {first} to the front"
         self._approved_by = user
-        self._say("approved", "")
+        self._set_phase("approved", "")
         return ""
 
-    def _take(self, made: Preview) -> None:
+    def _accept(self, made: Preview) -> None:
         self._asked, self._approved_by = None, ""
         if made.failure:
             self._preview = None
-            self._say("none", f"the preview failed: {made.failure}")
+            self._set_phase("none", f"the preview failed: {made.failure}")
             return
         self._preview, self._fresh_motion = made, True
         self._watch = None if made.swept is None else PathWatch(made, made.swept, self._settings)
         self._compared, self._in_the_way = None, ""
-        self._say("ready", "")
+        self._set_phase("ready", "")
 
     def _changed(self, q: Array, obstacles: Sequence[Capsule], at_rest: bool, working: bool) -> str:
         """Description of a change that expires the preview; empty without one."""
@@ -277,7 +277,7 @@ class PreviewManager:
             tickets = [ticket for ticket in tickets if ticket.point.point_id == point_id]
         return tuple(ticket.accepted for ticket in tickets[:MOST] if ticket.accepted is not None)
 
-    def _say(self, phase: PreviewPhase, reason: str) -> None:
+    def _set_phase(self, phase: PreviewPhase, reason: str) -> None:
         if (phase, reason) == (self._phase, self._reason):
             return
         self._phase, self._reason, self._fresh = phase, reason, True

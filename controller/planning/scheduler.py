@@ -145,7 +145,7 @@ class Scheduler:
             begun, missed = len(stops), []
             for target in waiting:
                 planned = self._planner.to_stand(at, target.stand)
-                why = self._lacking(planned, required) if isinstance(planned, Planned) else planned.reason
+                why = self._unmet_requirement(planned, required) if isinstance(planned, Planned) else planned.reason
                 if why or not isinstance(planned, Planned):
                     refused[target.name] = why
                     missed.append(target)
@@ -173,7 +173,7 @@ class Scheduler:
             costs[i] = np.maximum(costs[i], 2.0 * np.array(away) / self._tool_speed)
         return costs
 
-    def _lacking(self, planned: Planned, required: Requirements) -> str:
+    def _unmet_requirement(self, planned: Planned, required: Requirements) -> str:
         """The requirement that a motion does not meet, as text; empty if it meets all."""
         stand, least = planned.stand, planned.clearance
         if least.distance < required.clearance:

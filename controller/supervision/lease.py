@@ -61,7 +61,7 @@ class Lease:
         if self.requested is not None and self.requested.key != client.key:
             return f"{self.requested.user} has asked already"
         self.requested, self._asked = client, now
-        self._tell(f"{client.user} asks {self.holder.user} for control")
+        self._notify(f"{client.user} asks {self.holder.user} for control")
         return ""
 
     def grant(self, client: Client) -> str:
@@ -112,11 +112,11 @@ class Lease:
         self.holder, self.next_holder, self._renewed = client, None, now
         if self.requested is not None and self.requested.key == client.key:
             self.requested = None
-        self._tell(told)
+        self._notify(told)
 
     def _drop(self, told: str) -> None:
         self.holder = self.requested = None
-        self._tell(told)
+        self._notify(told)
 
-    def _tell(self, told: str) -> None:
+    def _notify(self, told: str) -> None:
         self.notice, self.notice_number = told, self.notice_number + 1

@@ -136,7 +136,7 @@ class Cascade:
             low[1 + n :], high[1 + n :] = p.A_lower, p.A_upper
         found = self._tool(p, Q, R, rows, low, high)
         if found is None:
-            slack = self._give_way(rows[:, 1:], low[1:], high[1:], n, p.soft)
+            slack = self._relax(rows[:, 1:], low[1:], high[1:], n, p.soft)
             if slack is None:
                 return None
             low[1 + n : 1 + n + p.soft] -= slack
@@ -151,7 +151,7 @@ class Cascade:
             return Answer(nu, scale, slack, int(np.abs(multipliers[1:]).argmax()) if scale < 1.0 else -1)
         rest = R.T @ v[1 : 1 + m] - p.b - p.c
         missing = math.sqrt(float(rest @ rest) / max(float(p.b @ p.b), _NOTHING**2))
-        return Answer(nu, scale, slack, _standing(multipliers[1:], nu, p.speed), missing)
+        return Answer(nu, scale, slack, _active_constraint(multipliers[1:], nu, p.speed), missing)
 
     def _tool(
         self, p: Problem, Q: Array, R: Array, rows: Array, low: Array, high: Array
@@ -205,7 +205,7 @@ class Cascade:
         found, _, flag, _ = daqp.solve(H, rest @ A, free, upper, lower, self._sense(len(upper)), **_SETTINGS)
         return found if flag >= 1 and math.isfinite(float(found.sum())) else z
 
-    def _give_way(self, rows: Array, low: Array, high: Array, n: int, soft: int) -> Array | None:
+    def _relax(self, rows: Array, low: Array, high: Array, n: int, soft: int) -> Array | None:
         """Relaxation of each soft row's lower bound in the least-squares sense, with all other constraints hard."""
         if not soft:
             return None
@@ -246,7 +246,7 @@ class Cascade:
         return found
 
 
-def _standing(multipliers: Array, nu: Array, speed: Array) -> int:
+def _active_constraint(multipliers: Array, nu: Array, speed: Array) -> int:
     """Index of the strongest active row, or of the bound of a velocity that is forced to zero; −1 for none.
 
     A bound that is active at a large velocity is temporary and does not count.

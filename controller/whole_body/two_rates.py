@@ -54,7 +54,7 @@ class TwoRates:
         sent = problem.sent
         wheels = sent[:2] if self._wheels is None else self._wheels
         if self._every == 1 or problem.base == "frozen":
-            return self._arm.solve(replace(problem, tool=_made_good(problem, wheels), before=self._before))
+            return self._arm.solve(replace(problem, tool=_compensated(problem, wheels), before=self._before))
         if self._period == 0:
             base = self._base.solve(replace(problem, before=self._sent_before))
             sent = sent.copy()
@@ -66,7 +66,7 @@ class TwoRates:
         return self._arm.solve(replace(problem, sent=sent, before=before, held=wheels))
 
 
-def _made_good(problem: IkProblem, wheels: Array) -> ToolTask | ActuatorTask:
+def _compensated(problem: IkProblem, wheels: Array) -> ToolTask | ActuatorTask:
     """The tool's task plus the twist that the base lacks: the difference of commanded and measured wheel speeds."""
     tool = problem.tool
     if not isinstance(tool, ToolTask):

@@ -142,7 +142,7 @@ def choose_keeper(spur: Spur, config: RuleConfig) -> _Keeper | str:
 
     Args:
         spur: At least one cane.
-        config: Least diameter and measurement errors.
+        config: Smallest diameter and measurement errors.
     """
     canes = sorted(spur.canes, key=lambda cane: (float(cane.base[2]), -cane.radius))
     if len(canes) == 1:

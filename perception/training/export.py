@@ -24,10 +24,10 @@ def write_network(path: Path, trainer: Trainer, with_depth: Confusion, without: 
 
     Args:
         path: ONNX file; the card is the same name with .md.
-        trainer: Trained.
-        with_depth: How it did on the rows held out.
-        without: The same with the depth taken away.
-        wider: By how much it draws canes too wide (px).
+        trainer: The trained network.
+        with_depth: Its confusion matrix on held-out rows.
+        without: The same without depth.
+        wider: Width bias of canes (px).
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     buffer = BytesIO()

@@ -59,10 +59,10 @@ class Trainer:
         """Fresh weights, or those of an earlier training.
 
         Args:
-            seed: Of weights, crops and variations.
-            steps: How many there will be: the rate of learning falls to nothing over them.
-            rows: That are rendered for it.
-            start: What another trainer's `state` was.
+            seed: Random seed of weights, crops and augmentation.
+            steps: Number of steps; the learning rate decays to zero over them.
+            rows: Number of rendered rows.
+            start: `state` of another trainer.
         """
         torch.manual_seed(seed)
         self.network = Network(CHANNELS, len(WOOD_CLASSES)).to(memory_format=torch.channels_last)

@@ -32,8 +32,8 @@ class Network(nn.Module):
         """Fresh weights from torch's random state.
 
         Args:
-            channels: Of the input.
-            classes: How many there are to tell apart.
+            channels: Number of input channels.
+            classes: Number of classes.
         """
         super().__init__()
         a, b, c, d = WIDTHS
@@ -66,9 +66,9 @@ class Labeller(nn.Module):
         """Wrap a trained network.
 
         Args:
-            network: Trained.
-            weights: Of the classes in training. They make it learn what is small, and also draw it too wide; for the
-                answer their logarithm is taken back.
+            network: The trained network.
+            weights: Class weights of the training. They make it learn small classes, but also predict them too wide.
+                For the output their logarithm is subtracted.
         """
         super().__init__()
         self.network = network

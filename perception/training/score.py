@@ -38,7 +38,7 @@ class Confusion:
 
 
 def widening(labeller: Labeller, scenes: Scenes) -> float:
-    """How much wider than they are it draws canes that stand alone, on average (px).
+    """Mean width bias of isolated canes (px).
 
     Args:
         labeller: With any weights; put into evaluation mode.

@@ -59,8 +59,8 @@ def fields_of(message: type[msgspec.Struct], in_path: Collection[str] = ()) -> C
     """A FastAPI dependency that reads the fields of a message from the body and the path of a request.
 
     Args:
-        message: Type that the request becomes. What it says of the caller is not read.
-        in_path: Fields that are part of the path; each is the name of a point.
+        message: Type of the request. Its fields about the caller are not read.
+        in_path: Fields in the path; each is the id of a point.
     """
     about = describe(message)
     own = [field for field in about.fields if field.name not in _CALLER and field.name not in in_path]
@@ -86,7 +86,7 @@ def fields_of(message: type[msgspec.Struct], in_path: Collection[str] = ()) -> C
 
 
 def _strict(hint: Any) -> Any:
-    """An annotation of msgspec as pydantic has it."""
+    """The pydantic form of a msgspec annotation."""
     origin, arguments = get_origin(hint), get_args(hint)
     if hint is int:
         return _strict(Annotated[int, msgspec.Meta()])
@@ -148,7 +148,7 @@ class SignInMethod(BaseModel):
 
 
 class Stop(_Body):
-    """The reason, for the log. It cannot fail the stop: it is cut where too long, and ignored where unreadable."""
+    """The reason, for the log. It cannot make the stop fail: it is truncated if too long and ignored if unreadable."""
 
     reason: str = "software stop"
 
@@ -188,11 +188,11 @@ _JointVelocity = Annotated[float, Field(ge=-10.0, le=10.0)]
 
 
 class Teleop(_JsonTuples):
-    """Hold the robot to a command; with none of the three the last one stays.
+    """Hold the robot to a target. Without any of the three the last target stays.
 
-    `target`: the tool goes there; its quaternion has length 1. With `base` too: the tool keeps to it while the base
-    moves. `base` alone: the base drives, the arm stands. `joints` alone (rad/s): joints turn, the base stands.
-    `speed_scale` scales the speed.
+    With `target` alone the tool moves there; its quaternion has length 1. With `base` too the tool stays there while
+    the base moves. With `base` alone the base moves and the arm rests. With `joints` alone (rad/s) the base rests.
+    `speed_scale` is the fraction of the usual speed.
     """
 
     model_config = ConfigDict(
@@ -256,7 +256,7 @@ class Me(BaseModel):
 
 
 class RuleOutcome(Outcome):
-    """How many points a rule would move, remove and add, and how many acceptances it would void."""
+    """Numbers of points that a rule would move, remove and add, and of acceptances that it would void."""
 
     changed: int = 0
     removed: int = 0

@@ -66,7 +66,7 @@ class Connections:
     """All open connections, the one served longest ago first. Belongs to the server's event loop."""
 
     def __init__(self, limits: ServerConfig, note: Callable[[str, str], object] = lambda text, by: None) -> None:
-        """None is open; `note(text, by)` hears of what is refused or ended, and whose it was."""
+        """Start without connections. `note(text, by)` reports refused and ended connections with their client."""
         self.limits, self.note = limits, note
         self._open: OrderedDict[tuple[Any, ...], Connection] = OrderedDict()
         self._of_address: Counter[str] = Counter()
@@ -128,7 +128,7 @@ class Connections:
         return connection.is_websocket
 
     def said_by(self, session: object) -> TokenBucket:
-        """What this session may say through all of its WebSockets."""
+        """Rate limit of a session over all of its WebSockets."""
         rate = self.limits.session_messages_hz
         return self._said.setdefault(session, TokenBucket(rate, _BURST_S * rate))
 

@@ -74,7 +74,7 @@ class LimitedSocket(WebSocketsSansIOProtocol):
         now, count = time.monotonic(), len(self.conn.events)
         if not self._messages.take(now, count):
             self._cut(_POLICY, f"it said more than {self.config.limits.socket_messages_hz:.0f} things a second")
-        elif self.handshake_complete and not self.close_sent and not self._said().take(now, count):
+        elif self.handshake_complete and not self.close_sent and not self._bucket().take(now, count):
             most = self.config.limits.session_messages_hz
             self._cut(_POLICY, f"its session said more than {most:.0f} things a second through all of its connections")
         else:
@@ -109,7 +109,7 @@ class LimitedSocket(WebSocketsSansIOProtocol):
     def _state(self) -> dict[str, Any]:
         return self.scope["state"]
 
-    def _said(self) -> TokenBucket:
+    def _bucket(self) -> TokenBucket:
         return self.config.connections.said_by(self._state()["session"])
 
     def _cut(self, code: int, reason: str) -> None:
@@ -131,5 +131,5 @@ class LimitedSocket(WebSocketsSansIOProtocol):
 
 
 def why_ended(scope: Mapping[str, Any]) -> str:
-    """Why the server dropped this connection, in words; empty where it did not."""
+    """Reason why the server closed this connection, as text; empty if it did not."""
     return str(scope.get("state", {}).get(_ENDED, ""))
