@@ -14,7 +14,7 @@ from controller.ledger.journal import LedgerState
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
 
-#: How long an operator's question waits for its answer (s); less than the service's timeout.
+#: Time limit of a command's answer (s), below the service's timeout.
 _ANSWER_S = 0.8
 
 
@@ -76,7 +76,7 @@ class CommandInbox:
         """Pass the waiting commands to the controller. Each answer is sent when it is durable."""
         while not self._waiting.empty():
             intent, asked_at, future = self._waiting.get()
-            # What they had seen has grown older while they waited.
+            # The operator's view has aged while the command waited.
             view_age_s = intent.view_age_s + time.monotonic() - asked_at
             intent = msgspec.structs.replace(intent, view_age_s=view_age_s)
             # A command whose caller has given up must not be executed.

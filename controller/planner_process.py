@@ -66,7 +66,7 @@ class PlannerProcess:
         self._thread.join(_END_S)
 
     def _run(self) -> None:
-        # Scheduling is a thread's own, and the process that it starts inherits it.
+        # Scheduling is per thread, and the child process inherits it.
         set_priority("background")
         connection = self._start()
         while (request := self._next()) is not None and connection is not None:
@@ -119,7 +119,7 @@ def _plan(connection: Connection, config: ControllerConfig, robot_config: RobotC
     """The process: answers requests until nobody is there to ask any more."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, name="parent-watch", daemon=True).start()
-    # What only planning needs is loaded here alone.
+    # Only this process imports the planners.
     from controller.planning.cuts import CutPlanner
     from controller.planning.rollout import Rollout
 

@@ -27,7 +27,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"rolling-panda audit: {error}", file=sys.stderr)
         return 1
     except BrokenPipeError:
-        # Whoever read the export has seen enough.
+        # The reader of the export has closed the pipe.
         sys.stderr.close()
         return 0
 

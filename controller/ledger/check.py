@@ -72,9 +72,9 @@ def verify(folder: Path, expected: bytes | None = None) -> Verdict:
     count, head, met = 0, ORIGIN, expected is None or expected == ORIGIN
     with reading(folder) as database:
         try:
-            # Before the rows, so that a row that is added meanwhile is not missed.
+            # Before the rows, so that a row added during the check is not missed.
             newest = read_head(folder / HEAD)
-            # One view of the ledger, whatever is added meanwhile.
+            # One transaction: a consistent snapshot, whatever is added during the check.
             database.execute("BEGIN")
             check_version(database, folder / FILE)
             for row in read(database):

@@ -10,9 +10,9 @@ import msgspec
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
 
-#: What a row is about: a life of a point, an order of work, whether previews are required, what
-#: somebody asked and how it was answered, a stop, a
-#: log line, a start.
+#: Kind of a row: state of a point, order of work, approach, requirement of previews, command of an operator with its
+#: answer, stop, log line,
+#: start.
 Kind = Literal["ticket", "order", "approach", "preview", "request", "stop", "event", "start"]
 
 

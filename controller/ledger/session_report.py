@@ -11,7 +11,7 @@ from controller.ledger.journal import RequestRow, TicketRow
 from rolling_panda import commands as intents
 from rolling_panda.messages.supervision import ControlReport, CutReport, RefusalReport, SessionReport, VineReport
 
-#: What goes over the wire of each; the ledger has all.
+#: Largest number of each in the message; the ledger has all.
 _MOST_CUTS, _MOST_REFUSALS, _MOST_CHANGES = 500, 100, 100
 _ENDED = ("DONE", "FAILED_NOT_CUT", "UNKNOWN")
 _CONTROL: dict[type[intents.Intent], str] = {
@@ -28,7 +28,7 @@ class SessionReportBuilder:
         """Nothing has happened."""
         self._began = self._written = self._ready_since = 0.0
         self._cuts: dict[str, CutReport] = {}
-        #: Points that were accepted and no cut was begun for yet; points that were given up so.
+        #: Accepted points without a cut so far; points that were given up before a cut.
         self._accepted: set[str] = set()
         self._given_up: set[str] = set()
         #: Vine of each accepted point that cannot be reached now.

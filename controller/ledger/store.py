@@ -20,7 +20,7 @@ from rolling_panda.runtime.state_folder import sync_folder
 
 FILE = "ledger.sqlite"
 HEAD = "ledger.head"
-#: What the first row is bound to.
+#: Hash before the first row.
 ORIGIN = bytes(32)
 SCHEMA = (
     "CREATE TABLE audit (number INTEGER PRIMARY KEY AUTOINCREMENT, at TEXT NOT NULL, kind TEXT NOT NULL, "
@@ -32,7 +32,7 @@ SCHEMA = (
 #: Form of tables and rows, as `PRAGMA user_version` of the file; the first files have 0. Up to 1 the state CUTTING of a
 #: point was called INTENT.
 SCHEMA_VERSION = 2
-#: What reading a file raises that has been changed from outside.
+#: Errors raised by a file that was changed from outside.
 UNREADABLE = (sqlite3.Error, UnicodeDecodeError, TypeError)
 _COLUMNS = "number, at, kind, name, body, hash"
 #: A writer waits this long for another program that holds the file (s).
@@ -70,7 +70,7 @@ class Ledger:
         self.path = folder / FILE
         self._head = folder / HEAD
         with _ledger_errors(self.path, "open"):
-            # Made by us, so that nobody else can read it, whatever the umask is.
+            # Created here, readable by its owner alone, whatever the umask is.
             os.close(os.open(self.path, os.O_RDWR | os.O_CREAT, 0o600))
             self._database = sqlite3.connect(self.path, timeout=_BUSY_S, isolation_level=None, check_same_thread=False)
         try:
@@ -93,7 +93,7 @@ class Ledger:
         """
         with _ledger_errors(self.path, "write"):
             self._database.execute("BEGIN IMMEDIATE")
-            # Commits at the end, or takes everything back.
+            # Commits at the end, or rolls back.
             with self._database:
                 number, previous = self._newest()
                 rows = []

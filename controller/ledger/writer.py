@@ -17,14 +17,14 @@ from rolling_panda.errors import LedgerError
 from rolling_panda.runtime.scheduling import set_priority
 from rolling_panda.runtime.token_bucket import TokenBucket
 
-#: After a failure it tries again this often (s).
+#: Period of the retries after a failure (s).
 _AGAIN_S = 0.5
-#: At the end the last records are waited for this long (s).
+#: Time limit for the last records at the end (s).
 _END_S = 2.0
 #: Rows in one transaction, at most.
 _BATCH = 500
-#: Lines of other processes' logs that are recorded: so many at once, then so many a second. Whoever makes the server
-#: refuse a thousand requests a second must not fill the disk with it.
+#: Rate limit of other processes' log lines: burst, and lines a second. A client that makes the server
+#: refuse a thousand requests a second must not fill the disk.
 _LINES_AT_ONCE = 200.0
 _LINES_A_SECOND = 20.0
 
@@ -95,7 +95,7 @@ class LedgerWriter:
         self._thread.join(_END_S)
 
     def _run(self) -> None:
-        # Scheduling is a thread's own: the disk must not keep the control loop waiting.
+        # Scheduling is per thread: the disk must not delay the control loop.
         set_priority("interface")
         store: Store | None = None
         while True:

@@ -8,7 +8,7 @@ import numpy as np
 from rolling_panda import messages as m
 from rolling_panda.model.differential_drive import Array, DifferentialDrive, Pose
 
-#: Odometry is carried forward by no more than this (s); older odometry is a fault, not something to guess from.
+#: Longest extrapolation of odometry (s); older odometry is a fault.
 _LONGEST = 0.1
 #: Gain of the odometry correction, small so that odometry noise does not shake the tool.
 _BELIEVED = 0.2
@@ -39,7 +39,7 @@ class BaseEstimate:
     def __init__(self, drive: DifferentialDrive) -> None:
         """Know nothing yet; `drive` is the base's geometry."""
         self._drive = drive
-        #: Of the last joint states: stamp, the wheels' angles and the pose by the wheels alone, in a frame of its own.
+        #: Recent joint states: stamp, wheel angles, and the pose integrated from the wheels alone, in its own frame.
         self._past: deque[tuple[float, float, float, Pose]] = deque()
         #: That frame in odom: x, y, turn.
         self._frame: Pose = (0.0, 0.0, 0.0)

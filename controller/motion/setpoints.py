@@ -8,7 +8,7 @@ from rolling_panda import messages as m
 from rolling_panda.model.differential_drive import NXI, Array
 from rolling_panda.model.wire_values import actuated
 
-#: So many periods of rest come first under a new token: the bridge takes no other beginning, and one may be lost.
+#: Number of zero commands at the start of a token. The bridge requires one, and some may be lost.
 _AT_REST_FIRST = 3
 
 BRAKED = "a velocity outside the limits was not sent; the robot brakes"
@@ -21,7 +21,7 @@ class Setpoints:
         """At rest."""
         self._saturation = saturation
         self._number = 0
-        #: Number of the newest command that was more than to rest.
+        #: Sequence of the newest command that was not zero.
         self.moved = 0
         self._token: Token | None = None
         self._rest = 0

@@ -73,7 +73,7 @@ def plan_limits(
         turn=Rates(0.95 * base_yaw_rate, 1.2, 6.0),
         arm_velocity=robot.limits.velocity[ARM_XI] * arm_share,
         arm_acceleration=robot.limits.acceleration[ARM_XI] * arm_acceleration_share,
-        # A fiftieth: the acceleration still rises within a tenth of a second, which shakes nothing.
+        # A fiftieth: the acceleration rises within a tenth of a second, which shakes nothing.
         arm_jerk=0.02 * robot.limits.jerk[ARM_XI],
         lower=robot.limits.lower[ARM_Q] + joint_margin,
         upper=robot.limits.upper[ARM_Q] - joint_margin,

@@ -10,7 +10,7 @@ from controller.whole_body.obstacle import Axes, Obstacle
 from rolling_panda.messages.perception import Capsule, Obstacles
 from rolling_panda.model.differential_drive import Array
 
-#: A rod thinner than this is watched as if it were this thick (m).
+#: Smallest radius of a rod in the collision model (m).
 _THINNEST = 0.001
 #: The spur that is cut has a cane this near to the cut (m): what stays of a cane ends just below it, and shears cut a
 #: stub beside the cane that stays on it.

@@ -15,9 +15,9 @@ from controller.whole_body.task import BaseMode, Posture
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_Q
 
-#: What is reckoned with for the arm's joints on a leg (rad/s, rad/s², rad/s³).
+#: Assumed limits of the arm's joints for a segment (rad/s, rad/s², rad/s³).
 _ARM = Rates(1.3, 4.0, 60.0)
-#: By how much the base's time may be too short (s).
+#: Tolerance of the base's duration (s).
 _ROOM_S = 0.02
 
 
@@ -148,7 +148,7 @@ class ToolMotion:
     def shift(self, by: Array) -> None:
         """Move the goal by (3, m, odom) from now on, without a jump of velocity or acceleration."""
         config = self._config
-        # At the speed of the last part, so that a late correction does not hurry the blades.
+        # At the speed of the last part, so that a late correction does not accelerate the blades.
         made = Correction.within(self.time, by, Rates(config.cut_speed, config.tool_acceleration, config.tool_jerk))
         self._corrections.append(made)
         self.goal = pin.SE3(self.goal.rotation, self.goal.translation + by)
@@ -220,7 +220,7 @@ def _timed(
 ) -> tuple[_Timed, ...]:
     """The legs in their places, with time enough for the base between them."""
     travel = float(np.hypot(*(legs[-1].q_goal[:2] - q_start[:2])))
-    # With room for feedback.
+    # With margin for feedback.
     base_s = Rates(0.8 * config.base_speed, 0.75 * config.base_acceleration, 10.0).duration(travel)
     # The segment that waits for the base: there the line of the tool matters least.
     waits = next((i for i, leg in enumerate(legs) if leg.frozen_until == leg.frozen_within == 0.0), None)
@@ -230,7 +230,7 @@ def _timed(
         free = _free(timed)
         if waits is None or free is None or free[1] - free[0] >= base_s - _ROOM_S:
             return timed
-        # A leg that grows overlaps with more of its neighbours, so that this converges from below.
+        # A longer segment overlaps more with its neighbours, so this converges from below.
         extra = timed[waits].trajectory.duration + base_s - (free[1] - free[0])
 
 
@@ -246,7 +246,7 @@ def _placed(
     out: list[_Timed] = []
     for number, leg in enumerate(legs):
         span = leg.q_goal - q_start
-        # The joints need their time too, with room for feedback.
+        # Time for the joints, with margin for feedback.
         arm_s = _ARM.duration(float(np.abs(span[ARM_Q]).max()))
         trajectory = PoseTrajectory(
             start,

@@ -10,9 +10,9 @@ from rolling_panda.model.differential_drive import NXI, Array
 #: Largest tracking error of wheels and joints (rad). In motion at full speed the servos'
 #: lag and the wire's take up 0.1 rad of a joint and 0.3 rad of a wheel.
 WHEELS_RAD, JOINTS_RAD = 1.0, 0.35
-#: What was missed long ago is forgotten with this time constant (s).
+#: Time constant of the decay of old errors (s).
 _FORGETS_S = 1.0
-#: After a longer gap between two joint states (s) nothing can be said of the time between.
+#: Longest gap between two joint states that is integrated (s).
 _GAP_S = 0.06
 _LIMIT = np.array([WHEELS_RAD] * 2 + [JOINTS_RAD] * (NXI - 2))
 

@@ -200,7 +200,7 @@ def _add(
         R[i, 2] += first * once[2] + second * (once[0] * b - once[1] * a)
 
 
-#: Shorter distances are not worth a motion: they are covered at once, and no velocity comes of it.
+#: Shorter distances need no motion: they are covered at once, without velocity.
 _NOTHING = 1e-12
 
 
@@ -268,7 +268,7 @@ def quickest(distance: float, rates: Rates) -> Profile:
     t_jerk = min(a / j, math.sqrt(speed / j))
     t_hold = max(speed / (j * t_jerk) - t_jerk, 0.0)
     t_cruise = max(d / speed - 2.0 * t_jerk - t_hold, 0.0)
-    # Rounding in the times would leave the end a little off; the jerk takes it up.
+    # Rounding of the times would leave an error at the end; the jerk compensates it.
     covered = t_jerk * (t_jerk + t_hold) * (2.0 * t_jerk + t_hold + t_cruise)
     return Profile(distance, d / covered, t_jerk, t_hold, t_cruise)
 

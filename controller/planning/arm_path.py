@@ -15,13 +15,13 @@ from controller.whole_body.collision import CollisionModel, Pair
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_Q
 
-#: Largest joint step (rad) between two looks at the distances.
+#: Largest joint step (rad) between two collision checks.
 _LOOK = 0.05
-#: Largest joint step of the trees (rad), how often they grow at most, and how often corners are tried to be cut.
+#: Largest joint step of the trees (rad), largest number of their extensions, and number of shortcut attempts.
 _GROW, _GROWTHS, _CUTS = 0.5, 400, 40
-#: Postures (joints 2 to 7) with the arm folded over its own root: ways from anywhere to anywhere pass them.
+#: Postures (joints 2 to 7) with the arm folded over its base, as intermediate goals.
 _TUCKS = np.array([[-0.785, 0.0, -2.356, 0.0, 1.571, 0.785], [-1.2, 0.0, -2.7, 0.0, 1.9, 0.785]])
-#: Starts nearer to something than the clearance may come this much nearer still while they get away (m).
+#: A start below the clearance may come this much nearer while the arm leaves (m).
 _GIVE, _ESCAPES = 0.001, 300
 
 

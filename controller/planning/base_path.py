@@ -16,9 +16,9 @@ from controller.motion.trajectory import Profile, durations, quickest
 from rolling_panda.model.differential_drive import Array, DifferentialDrive
 
 _NEAR, _ITERATIONS, _NUDGE = 1e-11, 12, 1e-6
-#: Shorter drives than this are not driven: the base only turns (m).
+#: For shorter drives the base only turns (m).
 _NO_DRIVE = 1e-9
-#: Shares of a turn that fall together with the drive.
+#: Fractions of a turn that overlap with the drive.
 _BLENDS = ((1.0, 1.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.5), (0.0, 0.0))
 _STRAIGHT = ((0.0, 0.0),)
 

@@ -26,12 +26,12 @@ from rolling_panda.messages.types import Header
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import RobotModel
 
-#: From the blades' command to its outcome (s); an estimate, for the session's length alone.
+#: Estimated time from the order to cut to its outcome (s), for the duration of the work only.
 CLOSING_S = 0.5
 #: Rows of a motion between two evaluations of the arm's manipulability.
 _LOOK = 10
 
-#: Rows of a plan are no closer than this (s): at an arm's rate of 1 kHz more of them would say nothing more.
+#: Shortest time between two rows of a plan (s): a control rate of 1 kHz would add no information.
 _ROW_S = 0.01
 
 

@@ -24,9 +24,9 @@ _FOLDED = np.array([0.0, -1.2, 0.0, -2.7, 0.0, 1.9, 0.785])
 _ROUND = (0.75, 1.1, 1.6)
 #: Body of the base: rear, front and half width (m, vendor's mesh).
 _OUTLINE = (-0.523, 0.190, 0.290)
-#: Motions of the base that are tried between two poses.
+#: Number of base motions that are tried between two poses.
 _WAYS = 2
-#: Between rows that are looked at, distances may fall below the clearance by this much (m).
+#: Largest undershoot of the clearance between two checked rows (m).
 _BETWEEN = 0.005
 
 
@@ -200,7 +200,7 @@ class PathPlanner:
             if least is None and here.distance < needed:
                 row = travel.next_row(row, needed - here.distance)
                 continue
-            # Rows from which the least so far cannot be undercut by more than _BETWEEN are skipped.
+            # Rows that cannot be lower than the minimum so far by more than _BETWEEN are skipped.
             least = here if least is None else min(least, here, key=lambda clearance: clearance.distance)
             row = travel.next_row(row, here.distance - least.distance + _BETWEEN)
         end = self._collision.least(plan.q[last])

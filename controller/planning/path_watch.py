@@ -25,9 +25,9 @@ from rolling_panda.model.differential_drive import Array
 
 #: Accuracy of the position of a known obstacle that is seen again (m).
 SAME = 0.005
-#: Places of the motion that are looked at together.
+#: Number of samples of the motion that are checked together.
 _BLOCK = 16
-#: Between two places along an axis that are looked at (m).
+#: Distance between two checked positions along an axis (m).
 _SPACING = 0.01
 
 

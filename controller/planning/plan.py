@@ -13,9 +13,9 @@ from controller.planning.base_path import BaseMotion
 from rolling_panda.model.differential_drive import NQ, NXI, Array
 from rolling_panda.model.robot import ARM_Q, ARM_XI, RobotModel
 
-#: No point of the robot is farther than this (m) from the axis of each arm joint, the tool included.
+#: Largest distance of any point of arm and tool from the axis of each arm joint (m).
 _LEVERS = np.array([1.25, 1.25, 0.95, 0.95, 0.6, 0.55, 0.4])
-#: The same from the axle's middle, with the base turning (m).
+#: Largest distance of any point of the robot from the middle of the axle (m).
 _BASE_LEVER = 1.3
 
 
@@ -73,7 +73,7 @@ def arm_samples(path: ArmPath, limits: PlanLimits) -> Array:
         last = int(np.ceil((begun + profile.duration) / limits.dt - 1e-9))
         times: Array = limits.dt * np.arange(row, last + 1, dtype=np.float64) - begun
         out.append(a + profile.at(times)[:, None] * (b - a))
-        # The next leg begins on a whole period, so that no period holds the end of one and the beginning of another.
+        # The next segment begins on a whole period, so that no period has the end of one and the start of another.
         row, begun = last + 1, last * limits.dt
     return np.vstack(out)
 

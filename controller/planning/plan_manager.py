@@ -12,13 +12,13 @@ from rolling_panda.messages.perception import Capsule
 from rolling_panda.messages.supervision import PlanState, SessionPlan
 from rolling_panda.model.differential_drive import Array
 
-#: A plan is asked for when nothing has changed for so long (s), as operators accept one point after the other.
+#: Debounce (s): a plan is requested when nothing has changed for this long, as operators accept points in series.
 _SETTLED_S = 0.3
-#: Between two requests (s): while the robot works, more of the row comes into view all the time.
+#: Shortest time between two requests (s): during work the camera sees more of the row all the time.
 _PAUSE_S = 2.0
-#: The same after planning failed.
+#: Shortest time after a failure (s).
 _AGAIN_S = 10.0
-#: The plan is repeated this often for those who come later (s).
+#: Period of the repeated message for late joiners (s).
 _REPEAT_S = 5.0
 
 

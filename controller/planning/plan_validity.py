@@ -16,17 +16,17 @@ from rolling_panda.model.wire_values import vector3
 
 #: An obstacle is new if no known one was within this distance (m).
 OBSTACLE_TOLERANCE = 0.05
-#: The robot at rest has left the place that the plan begins from: base (m), heading and arm joints (rad).
+#: Tolerances of a robot at rest from the plan's start: base (m), heading and arm joints (rad).
 PLACE_TOLERANCE, TURN_TOLERANCE, JOINT_TOLERANCE = 0.05, 0.05, 0.1
 #: Largest distance of any point of the robot from the middle of its axle (m).
 _REACH = 1.3
-#: A cane matters where the tool goes in among the canes: its half width, with the camera beside it, and some room (m).
+#: Range around the tool's line into a cut in which a cane matters (m): half width with camera, and margin.
 _BESIDE_TOOL = 0.12
 #: Rows of a motion between two checked positions of the base.
 _LOOK = 20
 #: Positions along an obstacle's axis that are compared, as fractions of its length.
 _SHARES = np.linspace(0.0, 1.0, 9)
-#: What became of a point by the work itself leaves the plan for the others as it is.
+#: States set by the work itself. They keep the plan of the other points valid.
 _WORKED: frozenset[PointState] = frozenset({"CUTTING", "DONE", "FAILED_NOT_CUT", "UNKNOWN"})
 
 
@@ -129,6 +129,6 @@ class ObstacleWatch:
 
     def _in_the_way(self, place: Array, cane: bool) -> bool:
         if cane:
-            # More canes come into view all along the row; only the tool goes in among them.
+            # The camera sees more canes along the row all the time; only the tool moves among them.
             return float(self._lines.gaps(place[None], np.zeros(1)).min()) < 0.0
         return float(np.hypot(*(place[:2] - self._track).T).min()) < _REACH

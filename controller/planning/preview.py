@@ -21,11 +21,11 @@ from rolling_panda.messages.perception import Capsule, PruningPoint
 from rolling_panda.messages.supervision import PreviewMotion, PreviewPhase, PreviewState
 from rolling_panda.model.differential_drive import Array
 
-#: A preview shows so many points at most.
+#: Largest number of points in a preview.
 MOST = 10
-#: It is repeated this often for those who come later (s).
+#: Period of the repeated message for late joiners (s).
 _STATE_S, _MOTION_S = 0.5, 5.0
-#: For so long a plan is waited for (s); then each posture is searched for, as in work without one.
+#: Time limit for the plan (s); after it each posture is searched, as in work without a plan.
 _PLAN_S = 15.0
 
 
@@ -145,7 +145,7 @@ class PreviewManager:
                 self._set_phase("expired", why)
         if self._begun and not working:
             self._begun = False
-            # The robot stands elsewhere now, and some of the points are cut.
+            # The robot has moved, and some of the points are cut.
             self._set_phase("expired", "the work that it was approved for has ended")
         if self._wanted is None or working or self._asked is not None:
             return None
@@ -162,7 +162,7 @@ class PreviewManager:
             return None
         self._number += 1
         following, names = self._queue.next(), tuple(point.point_id for point in points)
-        # Until it is of no use any more, only people change the order that it shows.
+        # While it is valid, only people change its order.
         self._order = names if following is not None and following.point.point_id == names[0] else ()
         turned = self._queue.approaches.turned
         self._asked = PreviewRequest(

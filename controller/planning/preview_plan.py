@@ -14,7 +14,7 @@ from rolling_panda.messages.supervision import PreviewedCut, PreviewMotion, Prev
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.wire_values import actuated, planar_pose
 
-#: No point of the robot is farther from one place to the next (m).
+#: Largest distance of any point of the robot between two samples (m).
 STEP = 0.005
 
 

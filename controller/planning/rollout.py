@@ -35,9 +35,9 @@ from rolling_panda.model.differential_drive import NXI, Array, DifferentialDrive
 from rolling_panda.model.robot import Limits
 from rolling_panda.model.wire_values import actuated, planar_pose, vector3
 
-#: Between two rows of the motion that is shown (s).
+#: Time between two rows of the preview (s).
 ROW_S = 0.1
-#: A preview ends after so long a point (s).
+#: Time limit of each point (s).
 _LONGEST_S = 90.0
 _TOKEN = Token(1, "preview")
 
@@ -129,7 +129,7 @@ class _Run:
             self._log.closed(moved.cut[1], now)
         due = sequence.picture(now)
         if due is not None and due[0] not in self._asked:
-            # Of two points at the same time, too: of the cut before, and of the next one.
+            # Two points can be due at the same time: that of the previous cut and the next one.
             self._asked.add(due[0])
             self._pending.append((now + self._request.close_up_s, self._shown(*due)))
         if command is not None:

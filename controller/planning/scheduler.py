@@ -18,7 +18,7 @@ from controller.whole_body.collision import Clearance
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_Q
 
-#: Improvements of the order stop when a round of them saves less than this (s).
+#: The optimisation of the order ends when a round saves less than this (s).
 _WORTH = 1e-6
 
 

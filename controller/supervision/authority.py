@@ -41,7 +41,8 @@ class Authority:
         """
         last = self._newest
         if presence is not None and presence is not last:
-            # A sequence that does not grow is a repetition, unless the server restarted: longer silence than the lease.
+            # A sequence that does not increase is a repetition, unless the server restarted: a silence longer than the
+            # lease.
             if last is None or presence.message.sequence > last.message.sequence or presence.at - last.at > 1.0:
                 self._newest = presence
                 people = presence.message.people

@@ -8,7 +8,7 @@ from controller.identity import Client
 
 #: The lease ends this long after the holder's last message (s).
 LIFE_S: Final = 1.0
-#: A request that nobody has answered for so long is forgotten (s).
+#: Lifetime of an unanswered request for control (s).
 _REQUEST_S: Final = 30.0
 
 

@@ -20,14 +20,14 @@ __all__ = [
     "boot",
 ]
 
-#: How long the cause of a protective stop must be gone before it can be acknowledged (s).
+#: Time without the cause of a protective stop before it can be acknowledged (s).
 CLEAR_S: Final = 1.0
 
 #: Rights of a person: the kinds of causer that they count as.
 Rights = frozenset[Who]
 #: The program itself.
 SYSTEM: Final[Rights] = frozenset({"system", "anyone"})
-#: Somebody with no right but to stop.
+#: A person who may only stop.
 ANYBODY: Final[Rights] = frozenset({"anyone"})
 #: A supervisor who holds control.
 OPERATOR: Final[Rights] = frozenset({"anyone", "operator", "holder", "supervisor"})
@@ -110,7 +110,7 @@ def observe(state: State, cause: str, now: float) -> State:
 def _unlisted(state: State, event: Event, reason: str) -> Transition:
     """What an event does that leads nowhere else from here."""
     if event is Event.PROTECT and state.mode == "PROTECTIVE_STOP":
-        # Another cause, or the old one again: the second that it has to be gone for begins anew.
+        # A new cause, or the old one again: the time without a cause starts again.
         return Transition(State("PROTECTIVE_STOP", reason or state.reason))
     if event is Event.STOP or (event is Event.FAULT and state.mode == "FAULT"):
         return Transition(state)

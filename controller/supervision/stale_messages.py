@@ -36,5 +36,5 @@ def _newer(kept: Sample[_Stamped] | None, offered: Sample[_Stamped] | None) -> S
     if kept is None or offered is None:
         return offered
     ahead = offered.message.header.stamp - kept.message.header.stamp
-    # A repetition is never news, however late it comes.
+    # A repetition is never new, however late it arrives.
     return offered if ahead > 0.0 or (ahead < 0.0 and offered.at - kept.at > _RESTART_S) else kept

@@ -4,7 +4,7 @@ from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.messages.supervision import StopRecord, StopState
 
-#: How long the bridge may take to show that it has released a stop, before it may be asked again (s).
+#: Time limit for the bridge to show a release before it is requested again (s).
 _RELEASE_S = 1.0
 #: Number of latched stops in the message, newest first.
 _MOST = 50

@@ -23,7 +23,7 @@ from rolling_panda.messages.supervision import StopRecord
 
 #: A new token is requested when the bridge's watchdog has held the robot for this long (s).
 _ANEW_S: Final = 2.0
-#: Braking to rest takes less than this (s, the bridge's clock), and so does one command with a spoilt number, which the
+#: Longest time to brake to rest (s, the bridge's clock), and of one command with a corrupted number, which the
 #: watchdog ends.
 _BRAKING_S: Final = 0.4
 
@@ -45,7 +45,7 @@ class Supervisor:
         self.fencing = FencingToken()
         #: The stop to send to the bridge, until it shows that it has latched one.
         self.stop_due: m.StopRequest | None = None
-        #: Stamp of the newest bridge state in which nothing moved but by this controller's commands.
+        #: Stamp of the newest bridge state without motion by another sender's commands.
         self._explained = 0.0
         self.state = modes.boot()
         #: Activity that a pause or a protective stop interrupted, until the next start.
@@ -183,7 +183,7 @@ class Supervisor:
         reason = "the robot moves by commands of another sender"
         stop = m.StopRequest(stop_id=f"motion-{secrets.token_hex(8)}", source="controller", user="", reason=reason)
         self.stop_due = stop
-        # Whoever sends them knows this token.
+        # The other sender knows this token.
         self.fencing.release_token()
         return (stop,)
 

@@ -36,10 +36,10 @@ _SLOWER = 1e-3
 _IDLE = 3e-5
 #: Below this target velocity of the tool (as a fraction of its limits) there is nothing to scale.
 _NOTHING = 1e-5
-#: Slack from which on a row counts as given up.
+#: Slack from which a row counts as relaxed.
 _GIVEN_UP = 1e-6
 #: Margin added to a row's relaxation (in its unit): at the minimum only one velocity is feasible, which a solver
-#: that reckons with rounding may not find.
+#: with rounding may not find.
 _ROOM = 1e-8
 #: A velocity below this fraction of its limit counts as zero.
 _STANDS = 0.02
@@ -199,7 +199,7 @@ class Cascade:
         H = A.T @ A + self._ridge(n - m)
         fixed = rows[:, :m] @ y
         free = np.ascontiguousarray(rows[:, m:])
-        # The first program's z is possible; its last digits must not say otherwise.
+        # The first program's z is feasible; rounding must not make it infeasible.
         at = free @ z
         lower, upper = np.minimum(low - fixed, at), np.maximum(high - fixed, at)
         found, _, flag, _ = daqp.solve(H, rest @ A, free, upper, lower, self._sense(len(upper)), **_SETTINGS)
@@ -265,7 +265,7 @@ def given_up(slack: Array | None) -> int:
     return worst if float(slack[worst]) > _GIVEN_UP else -1
 
 
-#: Makes the normal equations definite where no task has a say.
+#: Regularisation that makes the normal equations positive definite.
 RIDGE = 1e-8
 
 
@@ -334,7 +334,7 @@ def unconstrained_solution(
         for i in range(n):
             for j in range(n - m):
                 nu[i] += speed[i] * Q[i, m + j] * z[j]
-    # What is not a number satisfies nothing.
+    # NaN satisfies no bound.
     for i in range(n):
         if not lower[i] <= nu[i] <= upper[i]:
             return False

@@ -35,7 +35,7 @@ from rolling_panda.model.robot import Kinematics, RobotModel
 Pair = tuple[str, str]
 #: Motion of a part after which the broad phase is repeated (m).
 _SLACK = 0.06
-#: Obstacles that can be near at the same time without building Pinocchio's data again, which takes some 10 ms.
+#: Number of obstacle slots. Rebuilding Pinocchio's data for more takes about 10 ms.
 _SLOTS = 64
 _TRANSLATING = ("JointModelPX", "JointModelPY")
 _Z = np.array([0.0, 0.0, 1.0])

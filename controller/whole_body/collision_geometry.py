@@ -144,11 +144,11 @@ def _add_base(geometry: Any, robot: RobotModel) -> None:
 
 #: Postures that decide which pairs can come near each other at all, and what "near" means (m).
 _SAMPLES, _SEED, _NEVER_NEARER = 4096, 20240521, 0.05
-#: A pair whose distance varies by less than this (m) is one that no motion changes.
+#: A pair whose distance varies by less than this (m) counts as rigid.
 _CONSTANT = 1e-6
 _CARRIED = (BASE, CASTER, "link0")
 _NEIGHBOURS_OF_TOOL = ("link6", "link7")
-#: What was decided, by everything that it depends on: a program has several models of one robot.
+#: Cache of the pairs by their inputs, because a process has several models of one robot.
 _decided: dict[tuple[object, ...], tuple[tuple[int, int], ...]] = {}
 
 

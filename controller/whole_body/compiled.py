@@ -20,10 +20,10 @@ FLAG: Any = numba.boolean
 COUNT: Any = numba.int64
 NUMBER: Any = numba.float64
 PAIR: Any = numba.types.UniTuple(numba.float64, 2)
-#: With any distances between their entries in memory, so that parts of larger arrays fit too.
+#: With any strides, so that views of larger arrays fit too.
 VECTOR: Any = numba.float64[:]
 MATRIX: Any = numba.float64[:, :]
-#: Row by row without gaps.
+#: C-contiguous.
 PACKED: Any = numba.float64[:, ::1]
 
 
@@ -39,7 +39,7 @@ def compiled(signature: Any) -> Callable[[_Function], _Function]:
         try:
             return cast(_Function, numba.njit(signature, cache=True, error_model="numpy")(function))
         except (RuntimeError, OSError):
-            # There is no folder to keep machine code in, as on a file system that is read-only: every start compiles.
+            # Without a writable cache folder, as on a read-only file system, every start compiles.
             return cast(_Function, numba.njit(signature, error_model="numpy")(function))
 
     return compile_now

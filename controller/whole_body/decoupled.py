@@ -18,12 +18,12 @@ from controller.whole_body.task import IkProblem, Solution
 from rolling_panda.model.differential_drive import NXI
 from rolling_panda.model.robot import RobotModel
 
-#: The base is at its goal: along and across (m), heading (rad). What is missing, the arm makes good.
+#: Tolerances of the base's goal: along and across (m), heading (rad). The arm compensates the rest.
 _NEAR, _TURNED = 0.02, 0.02
 #: Heading error above which the base turns on the spot (rad).
 _ASTRAY = 0.15
 _GAIN, _DRIVE_GAIN = 2.0, 4.0
-#: The posture's base is at its goal (m).
+#: Tolerance of the posture's base pose (m).
 _ARRIVED = 1e-3
 
 

@@ -31,7 +31,7 @@ from rolling_panda.model.robot import ARM_XI, RobotModel
 _HELD = 1e-2
 #: Scale below which motion by hand reports the limiting constraint.
 _MISSED = 0.5
-#: Velocities of the tool that weigh the same (m/s, rad/s): what damping is measured in, whatever speed is planned.
+#: Unit velocities of the tool for the damping (m/s, rad/s), independent of the planned speed.
 _SPEED, _TURN = 0.3, 0.8
 _NOWHERE = Manipulability(0.0, np.zeros(NXI))
 _ALL, _ARM = slice(0, NXI), ARM_XI

@@ -54,7 +54,7 @@ class Saturation:
         # Rows that give v and ω as fractions of their limits.
         twist = Actuation(robot.drive).twist
         self._base_shares = twist / np.array([[config.base_speed], [config.base_yaw_rate]])
-        # What may stop the robot, and the most that the last gate lets through.
+        # Limits for braking, the largest that the final check allows.
         self._stop_step = self._step.copy()
         braking = min(config.base_braking / robot.drive.wheel_radius, float(limits.acceleration[0]))
         self._stop_step[:2] = np.maximum(braking * dt, self._step[:2])
@@ -83,7 +83,7 @@ class Saturation:
         xi = aimed if largest <= 1.0 else sent + change / largest
         if (xi > upper + _SLACK).any() or (xi < lower - _SLACK).any():
             return Saturated(self.brake(sent), 0.0, True)
-        # How fast the motion's clock may run: no faster than the velocity that could be reached.
+        # Rate of the motion's clock, limited by the reachable velocity.
         reached = 1.0 if largest <= 1.0 else _along(xi, wanted)
         return Saturated(xi, min(scale, reached), False)
 

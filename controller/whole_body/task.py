@@ -112,7 +112,7 @@ class IkProblem:
         squares = _squares(self.q, self.sent, self.sent_before, wanted, posture.q, posture.rate, J)
         if self.held is not None:
             squares += self.held[0] ** 2 + self.held[1] ** 2
-        # A square that overflows belongs to a number that is of no use either.
+        # A number whose square overflows is invalid too.
         return math.isfinite(squares) and not math.isnan(self.speed_cap + self.scale)
 
 

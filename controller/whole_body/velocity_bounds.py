@@ -26,9 +26,9 @@ from rolling_panda.model.differential_drive import NXI, Array
 from rolling_panda.model.jerk_limit import largest_rise
 from rolling_panda.model.robot import ARM_Q, ARM_XI, RobotModel
 
-#: Rate at which a joint outside its limit comes back (1/s), and its largest velocity in doing so (rad/s).
+#: Rate at which a joint outside its limit returns (1/s), and its largest velocity then (rad/s).
 _RETURN, _RETURN_SPEED = 2.0, 0.2
-#: What does not change from period to period; SI, of the arm's joints (7), of v and ω (2) or of a wheel.
+#: Constant limits; SI, of the arm's joints (7), of v and ω (2) or of a wheel.
 _CONSTANTS = np.dtype(
     [
         ("highest", "f8", 7),
@@ -119,7 +119,7 @@ def _ramp(left: float, right: float, step: float) -> tuple[float, float]:
     return left * (1.0 - 1.0 / largest), right * (1.0 - 1.0 / largest)
 
 
-#: The same function for numbers.
+#: The same function for scalars.
 _largest_rise: Callable[[float, float, float], float] = compiled(NUMBER(NUMBER, NUMBER, NUMBER))(
     cast(Any, largest_rise)
 )

@@ -30,7 +30,7 @@ class ApproachSegments:
         speed = self._config.tool_speed
         if self._flows:
             return (Leg(plan.poses.clear, plan.q_clear, speed),)
-        # The base takes the arm along as it is; then the arm alone does the rest.
+        # The base moves with the arm at rest; then the arm moves alone.
         q_there = at_base(q, plan.q_clear)
         carried = _base_pose(q_there) * _base_pose(q).inverse() * T_odom_tool
         return Leg(carried, q_there, speed), Leg(plan.poses.clear, plan.q_clear, speed, math.inf)

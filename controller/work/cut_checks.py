@@ -16,7 +16,7 @@ from controller.work.point_queue import PointQueue, Ticket
 from rolling_panda.messages.perception import CloseUpResult, PruningPoint
 from rolling_panda.messages.types import Outcome, PointState
 
-#: An ended cut for which no close-up is requested within this time (s) ends by the cutter's word.
+#: Time limit for the request of a close-up after a cut (s); after it the cutter's report counts.
 _REQUEST_WITHIN_S = 4.0
 
 
@@ -101,7 +101,7 @@ class PostCutCheck:
         return f"{point_id}: {reason}"
 
 
-#: From farther away the base has to come first, before the canes are entered (m).
+#: From a larger distance the base has to move before the tool enters the canes (m).
 _BASE_NEAR = 0.1
 
 

@@ -11,7 +11,7 @@ from controller.work.posture_search import CutPlan
 from rolling_panda.messages.perception import Obstacles
 from rolling_panda.model.robot import RobotModel
 
-#: Kept on top of the distance below which nothing goes (m): close to that the robot only creeps.
+#: Margin above the smallest distance of the guard (m): close to it the robot is very slow.
 _ROOM = 0.003
 
 
@@ -56,7 +56,7 @@ class CutClearance:
             for distance, pair in zip(near.distance.tolist(), near.pairs, strict=True):
                 needed = settings.kept(pair) + _ROOM
                 if q is plan.q_clear:
-                    # From here a plan leads on.
+                    # The plan continues from here.
                     needed = max(needed, PlanLimits.clearance)
                 if needed - distance > worst:
                     worst = needed - distance

@@ -9,7 +9,7 @@ import pinocchio as pin
 from rolling_panda.errors import InputError
 from rolling_panda.model.differential_drive import Array
 
-#: An approach this near to the cane's direction has no meaning.
+#: An approach this close to the cane's direction is undefined.
 _LEAST_SINE = 0.2
 
 

@@ -32,11 +32,11 @@ from rolling_panda.messages.perception import CloseUpResult
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_XI
 
-#: A point that perception has refined by less than this is aimed at as it was (m).
+#: Smaller refinements of a point by perception are ignored (m).
 _REFINED = 0.0003
-#: Pictures of one close-up at most.
+#: Largest number of pictures of one close-up.
 _PICTURES = 2
-#: Between motions without an end to hold: near enough to go on (m).
+#: Distance to the end of a motion at which the next one begins (m).
 _NEAR = 0.02
 
 
@@ -75,9 +75,9 @@ class CutSequence:
         self._post_cut_check = PostCutCheck(queue, self._close_ups, config.post_cut_check)
         self._blades = Blades(config, queue, run_id, self._post_cut_check.start)
         self._next_cut = NextCut(search, queue, config.search_steps_each, known, permit)
-        #: Where the blades closed last (m, odom), and on which point.
+        #: Position of the last cut (m, odom), and its point.
         self._cut_at: Array = np.zeros(3)
-        #: Where perception had the point at the time of the close-up, which locates it better.
+        #: Perception's position of the point at the close-up, which is more accurate.
         self._close_up_of: m.Vector3 | None = None
         self._ending = self._cut_point = ""
         self._forget()
@@ -166,7 +166,7 @@ class CutSequence:
         if self._stage in (Stage.RETREAT, Stage.TRAVEL):
             away = robot.kinematics.T_odom_tool.translation - self._cut_at
             if float(np.linalg.norm(away)) > self._config.close_up_from:
-                # On the way out, without a stop: a picture of the moment is enough to see that wood is gone.
+                # During the retreat, without a stop: one picture is enough to see that the wood is gone.
                 self._post_cut_check.request_close_up(self._cut_point, now)
         work = _STEPS[self._stage](self, robot, now)
         onwards = self._next_cut.found if self._stage is Stage.RETREAT else None
@@ -289,7 +289,7 @@ class CutSequence:
         assert self._motion is not None and self._plan is not None
         plan = self._next_cut.found
         if self._motion.leg > 0 and isinstance(plan, CutPlan):
-            # Out of the canes, and the way to the next one has begun.
+            # Clear of the canes, and the motion to the next cut has begun.
             self._plan, self._stage = plan, Stage.TRAVEL
             self._point_id, self._accepted = self._next_cut.point_id, self._next_cut.accepted
             return StepResult(tracking.xi, tracking)
@@ -325,7 +325,7 @@ class CutSequence:
     def _check_acceptance(self, robot: Measured) -> None:
         ticket = self._queue.get(self._point_id)
         if ticket is not None and ticket.state == "ACCEPTED":
-            # The plan is for one acceptance: of what was accepted again it knows nothing.
+            # The plan is for one acceptance. It is invalid for a point that was accepted again.
             why = self._next_cut.permit(ticket) if ticket.accepted is self._accepted else "it was accepted again"
             if not why:
                 return

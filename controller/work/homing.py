@@ -12,11 +12,11 @@ from controller.work.motion_timeout import MotionTimeout
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_Q
 
-#: The posture is reached (rad).
+#: Tolerance of the posture (rad).
 _NEAR = 0.01
-#: A clock that runs slower than this for so long (s) has met something.
+#: Rate of the clock, and time below it (s), from which the motion counts as blocked.
 _HELD, _PATIENCE_S = 0.02, 1.5
-#: Near enough to the place clear of the canes to go on (m).
+#: Distance to the pose clear of the canes at which the next motion begins (m).
 _CLEAR = 0.02
 
 
@@ -33,7 +33,7 @@ class Homing:
         self._in: ArmMotion | None = None
         self._held_s = 0.0
         self.done = False
-        #: Why the arm does not get home, in words; empty while it may.
+        #: Reason why homing failed; empty otherwise.
         self.blocked = ""
 
     def step(self, robot: Measured) -> Array:
@@ -78,7 +78,7 @@ class Withdrawal:
         self._motion = ArmMotion(config, q[ARM_Q].copy(), self._goal)
         self._timeout = MotionTimeout(config.reach_timeout_s, self._dt)
         self._timeout.start(self._motion.duration)
-        #: Whether the arm is there, and whether waiting for it is of no use any longer.
+        #: Whether the arm has arrived, and whether the motion has failed.
         self.done = self.late = False
 
     def step(self, robot: Measured, now: float) -> Tracking:

@@ -79,7 +79,7 @@ class Movement:
         self.sequence = CutSequence(config, search, body.follower, body.saturation, queue, run_id, known, permit)
         self.teleoperation = Teleoperation(config, body.follower, body.robot.drive)
         self._homing: Homing | None = None
-        #: Of the motion that the last step followed; None while nothing was followed.
+        #: Tracking of the last step's motion; None without one.
         self.tracking: Tracking | None = None
 
     @property

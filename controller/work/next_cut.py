@@ -36,7 +36,7 @@ class NextCut:
         """
         self._search, self._queue, self._iterations, self._known = search, queue, iterations, known
         self.permit = permit
-        #: Why the next point may not be gone to; empty when it may, and where there is none.
+        #: Reason why the robot may not approach the next point; empty without one.
         self.refused = ""
         self.forget()
 

@@ -109,7 +109,7 @@ class WorkOrder:
         self._journal.add("order", "order", OrderRow(order=order, revision=self._state.revision, user=user))
 
 
-#: Beyond this the tool would come along the row or from behind it (rad).
+#: Largest turn of the approach (rad): beyond it the tool would approach along the row or from behind.
 LARGEST = math.radians(75.0)
 
 

@@ -18,7 +18,7 @@ from rolling_panda.model.differential_drive import Array
 
 #: A cane that turned further than this after acceptance is not the one the operator saw (rad).
 _TURNED_TOLERANCE = 0.35
-#: A name that comes back further away than this is another cane's (m).
+#: A point id that returns at a larger distance belongs to another cane (m).
 _ELSEWHERE = 0.03
 _INTERRUPTED = "the controller ended before it knew whether this was cut; look, and report the outcome"
 #: States in which a point is shown from the record if perception does not report it: a person has to decide.
@@ -26,7 +26,7 @@ _ASKED: frozenset[PointState] = frozenset({"ACCEPTED", "UNREACHABLE", "UNKNOWN"}
 _WAITS = "accepted before a restart; waits until perception reports it again"
 _UNSEEN = "perception no longer reports it"
 _UNBOUND = "its record does not match its hash; accept it again"
-#: Somebody has accepted these and nothing has begun yet: the acceptance holds while the point is as they saw it.
+#: States with an acceptance and no cut yet. The acceptance is valid while the point is as the operator saw it.
 BOUND: frozenset[PointState] = frozenset({"ACCEPTED", "UNREACHABLE"})
 _ACCEPTABLE: frozenset[PointState] = frozenset({"PROPOSED", "REJECTED", "FAILED_NOT_CUT"})
 
@@ -96,7 +96,7 @@ class PointQueue:
                 self._put(point.point_id, Ticket(point))
                 continue
             if not ticket.seen and ticket.state not in BOUND and _apart(ticket.point, point) > _ELSEWHERE:
-                # Perception started anew and counts from one again: this name is another cane's now.
+                # Perception restarted and numbers from one again: this id now belongs to another cane.
                 former = f"{point.point_id}:{point_digest(ticket.point)[:8]}"
                 self._put(former, replace(ticket, point=msgspec.structs.replace(ticket.point, point_id=former)))
                 self._put(point.point_id, Ticket(point))
@@ -407,7 +407,7 @@ class PointQueue:
         self._entries = None
         why = self.approaches.turn(point_id, azimuth, user)
         if not why and ticket.state == "UNREACHABLE":
-            # Another approach may reach it; the plan that follows says.
+            # Another approach may reach it; the next plan decides.
             self._put(point_id, replace(ticket, state="ACCEPTED", reason=""))
         return why
 

@@ -16,7 +16,7 @@ from rolling_panda.errors import InputError
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_Q, RobotModel
 
-#: Places of the cut ahead of the axle (m), in order of preference.
+#: Positions of the cut ahead of the axle (m), in order of preference.
 OFFSETS = (0.15, 0.05, 0.25, -0.05, 0.35, -0.15, 0.45)
 #: Approaches in order of preference: turn about the cane and tilt out of the plane square to it (rad). A cut may lean
 #: by 15° (spur-pruning practice); coming from below brings high points into reach, and either way passes a wire.
@@ -34,7 +34,7 @@ APPROACHES = (
 )
 #: Tilts for an azimuth set by a person (rad), in order of preference.
 TILTS = (0.0, 0.2, 0.26, -0.26)
-#: From the arm's shoulder to its wrist at most, over elbow and wrist offsets (m, Panda's dimensions), and from the
+#: Largest distance from the arm's shoulder to its wrist, with elbow and wrist offsets (m, Panda), and from the
 #: wrist to the flange (m).
 _ARM_LENGTH, _WRIST_TO_FLANGE = 0.3266 + 0.3928 + 0.088, 0.107
 _SHOULDER_HEIGHT = 0.333
@@ -142,7 +142,7 @@ class PostureSearch:
                         return plan
                     if best is None or _quality(plan) > _quality(best):
                         best = plan
-            # A good posture with the straight approach is worth more than a better one from aside.
+            # A good posture with the straight approach is preferred to a better one from the side.
             if best is not None:
                 return best
         return Unreachable(self._why(position, lateral))

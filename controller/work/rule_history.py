@@ -6,7 +6,7 @@ from typing import Generic, TypeVar
 from rolling_panda.messages.perception import PruningRule
 
 Acceptance = TypeVar("Acceptance")
-#: So many changes can be taken back, the last one first.
+#: Number of changes that can be undone, the last one first.
 _MOST = 20
 
 
@@ -51,7 +51,7 @@ class RuleHistory(Generic[Acceptance]):
             self._coming = changes[-1]
             return None
         if len(changes) > 1 and changes[-1].rule == now == changes[-2].former and changes[-2].rule == rule:
-            # Perception was the quicker one: its going back looked like another change.
+            # Perception's report came first; it looked like another change.
             voided = changes[-2].voided
             self._changes = changes[:-2]
             return voided

@@ -18,7 +18,7 @@ from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.model.differential_drive import NXI, Array
 
-#: How the base slows down towards the end of the way (m/s²), and how near is there (m).
+#: Deceleration of the base towards the end of the survey (m/s²), and tolerance of the end (m).
 _BRAKING, _NEAR = 0.2, 0.005
 #: Back to the line along the row: of the heading (1/s), and of the distance from it (1/m², times the speed squared).
 _GAIN_HEADING, _GAIN_ASIDE = 1.2, 6.0

@@ -187,7 +187,7 @@ def test_an_absurd_epoch_on_disk_is_told_with_its_cause_and_one_command_ends_it(
     with pytest.raises(InputError) as told:
         open_memory(tmp_path)
     assert "epoch" in str(told.value) and str(tmp_path / FILE) in str(told.value)
-    (line,) = [part for part in str(told.value).split("give: ") if part.startswith("rolling-panda bridge ")]
+    (line,) = [part for part in str(told.value).split("run: ") if part.startswith("rolling-panda bridge ")]
     assert main(line.split()[2:]) == 0
     assert "a stop is latched, which a supervisor has to reset" in capsys.readouterr().out
     memory = open_memory(tmp_path)

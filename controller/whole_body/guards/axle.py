@@ -14,7 +14,7 @@ from controller.whole_body.task import NO_ROWS, IkProblem, Inequalities
 from rolling_panda.model.differential_drive import NXI
 from rolling_panda.model.robot import ARM_Q, ARM_XI
 
-#: Fastest way back to `ahead` (m/s).
+#: Largest speed of the return to `ahead` (m/s).
 _BACK = 0.1
 _NAMES = ("the tool ahead of the axle",)
 

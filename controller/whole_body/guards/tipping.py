@@ -18,7 +18,7 @@ class TippingGuard:
 
     def rows(self, problem: IkProblem) -> Inequalities:
         """Constraints of this period."""
-        # At the speeds of now: within one period they change by less than the margin is for.
+        # At the current speeds: their change within one period is covered by the margin.
         rows = self._tipping.rows(problem.q, problem.sent, S=problem.kinematics.S)
         matrix, lower = rows.over_velocity(problem.sent, self._dt)
         if problem.held is not None:

@@ -9,7 +9,7 @@ from controller.whole_body.manipulability import Manipulability
 from controller.whole_body.task import IkProblem
 from rolling_panda.model.differential_drive import NXI, Array
 
-#: A gradient of this length has no direction.
+#: Length below which a gradient has no direction.
 _FLAT = 1e-6
 _LEVEL = np.zeros(NXI)
 
@@ -40,7 +40,7 @@ class ClimbManipulability:
         now = self.now
         lack = 0.0 if now is None else max(1.0 - now.value / self._good, 0.0)
         gradient = _LEVEL if now is None else now.gradient
-        # The row fades in with the lack, so that nothing jumps where ω crosses ω_good.
+        # The row's weight grows continuously from 0 at ω_good.
         _climb(gradient, self._weight * lack, self._gain * lack, jacobian, target)
 
 
