@@ -1,7 +1,6 @@
 """The demo: its robots and their commands, and with real processes its start and its end."""
 
 import argparse
-import contextlib
 import os
 import re
 import signal
@@ -9,12 +8,9 @@ import socket
 import stat
 import subprocess
 import threading
-import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import httpx
-import psutil
 import pytest
 
 from rolling_panda.cli import demo
@@ -22,83 +18,8 @@ from rolling_panda.cli import main as cli
 from rolling_panda.cli.demo import _check_robots, choose_router_port, demo_robots, process_commands, write_secret
 from rolling_panda.errors import InputError
 from rolling_panda.runtime.launch import child_environment, python_command
+from tests.support.processes.demo import CHILDREN, STARTUP_S, running_demo
 from tests.support.processes.local_router import free_port
-
-STARTUP_S = 60.0
-CHILDREN = {"router", "bridge", "controller", "perception", "server"}
-
-
-class Demo:
-    """A running demo under test; leaves nothing behind."""
-
-    def __init__(self, folder: Path, *more: str) -> None:
-        self.port = free_port()
-        self.trace = folder / "trace"
-        self.words: list[str] = []
-        self._popen = subprocess.Popen(
-            python_command("rolling_panda", ["demo", "--port", str(self.port), "--trace", str(self.trace), *more]),
-            # The demo's own temporary folder lies in this one, to be removed with it.
-            env=child_environment() | {"TMPDIR": str(folder)},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
-        self.pid = self._popen.pid
-        self.children: list[psutil.Process] = []
-
-    def wait_until_up(self, limit_s: float = STARTUP_S) -> None:
-        assert self._popen.stdout is not None
-        began = time.monotonic()
-        for line in self._popen.stdout:
-            self.words.append(line)
-            if "Ctrl-C ends everything" in line:
-                break
-        assert time.monotonic() - began < limit_s, self.text()
-        self.children = psutil.Process(self.pid).children(recursive=True)
-        for name in CHILDREN:
-            assert all(child.is_running() for child in self.named(name)), self.text()
-
-    def close(self) -> None:
-        if self._popen.poll() is None:
-            self._popen.terminate()
-        self._popen.communicate()
-        for child in self.children:
-            if child.is_running():
-                child.kill()
-
-    def text(self) -> str:
-        return "".join(self.words)
-
-    def child(self, name: str) -> psutil.Process:
-        (found,) = self.named(name)
-        return found
-
-    def named(self, name: str) -> list[psutil.Process]:
-        """Its processes of this name: one, or one a robot."""
-        module = ["rolling_panda", "router"] if name == "router" else [name]
-        found = [child for child in self.children if child.cmdline()[3 : 3 + len(module)] == module]
-        assert found, f"no {name}:\n{self.text()}"
-        return found
-
-    def ends(self, limit_s: float = 5.0) -> int:
-        """Exit code, once the demo and all that it started are gone within the limit."""
-        began = time.monotonic()
-        code = self._popen.wait(limit_s)
-        psutil.wait_procs(self.children, timeout=max(0.0, limit_s - (time.monotonic() - began)))
-        assert not [child.cmdline() for child in self.children if child.is_running()]
-        assert self._popen.stdout is not None
-        self.words.append(self._popen.stdout.read())
-        return code
-
-
-@contextlib.contextmanager
-def running_demo(folder: Path, *more: str, limit_s: float = STARTUP_S) -> Iterator[Demo]:
-    demo = Demo(folder, *more)
-    try:
-        demo.wait_until_up(limit_s)
-        yield demo
-    finally:
-        demo.close()
 
 
 @pytest.mark.alone

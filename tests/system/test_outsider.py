@@ -22,7 +22,7 @@ import zenoh
 
 from bridge.sim.robot.trace import read
 from rolling_panda.transport.certificates import make
-from tests.rolling_panda.test_demo import Demo, running_demo
+from tests.support.processes.demo import TracedDemo, running_demo
 
 pytestmark = pytest.mark.alone
 
@@ -121,19 +121,19 @@ def tried(settings: dict[str, Any]) -> set[str]:
 
 
 @pytest.fixture(scope="module")
-def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Demo]:
+def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TracedDemo]:
     folder = tmp_path_factory.mktemp("demo")
     with running_demo(folder) as demo:
         yield demo
 
 
-def port_of(demo: Demo) -> int:
+def port_of(demo: TracedDemo) -> int:
     found = re.search(r"wire is at \w+/127\.0\.0\.1:(\d+):", demo.text())
     assert found is not None, demo.text()
     return int(found[1])
 
 
-def test_whoever_has_no_certificate_of_this_run_reads_nothing_and_moves_nothing(demo: Demo) -> None:
+def test_whoever_has_no_certificate_of_this_run_reads_nothing_and_moves_nothing(demo: TracedDemo) -> None:
     assert len(TOPICS) > 20 and len(SERVICES) > 3
     ways = outsiders(demo.trace.parent, port_of(demo))
     # The same client is told what it may hear, so silence is a refusal.
@@ -144,7 +144,7 @@ def test_whoever_has_no_certificate_of_this_run_reads_nothing_and_moves_nothing(
     assert not [event for event in trace.events if event["event"] == "cut"]
 
 
-def test_a_bare_connection_is_told_nothing(demo: Demo) -> None:
+def test_a_bare_connection_is_told_nothing(demo: TracedDemo) -> None:
     """The bytes that come back are those of TLS's own refusal, at most."""
     with socket.create_connection(("127.0.0.1", port_of(demo)), timeout=5) as plain:
         plain.sendall(b"\x00" * 64)
@@ -164,7 +164,7 @@ def test_a_bare_connection_is_told_nothing(demo: Demo) -> None:
         raise ConnectionError("closed without a word")
 
 
-def test_the_keys_of_the_run_are_for_this_user_alone(demo: Demo) -> None:
+def test_the_keys_of_the_run_are_for_this_user_alone(demo: TracedDemo) -> None:
     (folder,) = demo.trace.parent.glob("rolling-panda-*/certificates")
     assert folder.stat().st_mode & 0o777 == 0o700 and folder.stat().st_uid == os.getuid()
     keys = list(folder.rglob("*.key"))

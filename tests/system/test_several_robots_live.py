@@ -12,8 +12,8 @@ import pytest
 from playwright.sync_api import expect
 
 from bridge.sim.robot import trace
-from tests.rolling_panda.test_demo import Demo, running_demo
 from tests.support.operator_page import operator_page
+from tests.support.processes.demo import TracedDemo, running_demo
 
 # Slow: two whole simulations and a browser that draws in software, on two cores.
 pytestmark = [pytest.mark.browser, pytest.mark.alone, pytest.mark.slow]
@@ -60,7 +60,7 @@ class Script:
             time.sleep(0.1)
 
 
-def recorded(demo: Demo, name: str) -> trace.Trace:
+def recorded(demo: TracedDemo, name: str) -> trace.Trace:
     return trace.read(demo.trace.with_name(f"{demo.trace.name}-{name}"))
 
 
