@@ -77,6 +77,18 @@ def test_a_disk_that_hangs_keeps_nobody_waiting_but_the_blades(tmp_path: Path, m
     memory.close()
 
 
+def test_a_disk_that_hangs_does_not_keep_the_bridge_from_ending(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    go, memory = threading.Event(), CutFile(tmp_path)
+    monkeypatch.setattr(os, "fsync", lambda descriptor: go.wait(20.0))
+    assert CutOrders(memory).judge(order("a"), None, True, "")[0] == "wait"
+    began = time.monotonic()
+    memory.close()
+    assert time.monotonic() - began < 10.0
+    go.set()
+
+
 def test_a_full_disk_means_no_cut_now_or_later(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     memory = CutFile(tmp_path)
     orders = CutOrders(memory)

@@ -35,9 +35,37 @@ def test_rights_follow_role_and_lease():
 
 def test_what_is_told_names_the_holder_and_nobody_where_nobody_holds():
     it = authority()
-    assert it.message(0.0).holder == ""
+    nobody = it.message(0.0)
+    assert (nobody.holder, nobody.user, nobody.next_user, nobody.expires_s) == ("", "", "", 0.0)
+    assert (nobody.requested_by, nobody.requested_key) == ("", "")
     it.claim(ADA, 0.0)
-    assert it.message(0.0).holder == ADA.key
+    told = it.message(0.25)
+    assert (told.holder, told.user, told.expires_s) == (ADA.key, ADA.user, 0.75)
+
+
+def test_whether_an_operator_sees_the_robot_is_told():
+    it = authority()
+    assert it.message(0.0).supervised is False
+    it.review(presence(1, 0.0, ada()), True, 0.0)
+    assert it.message(0.0).supervised is True
+
+
+def test_what_an_operator_saw_when_they_asked_counts_and_what_a_viewer_saw_does_not():
+    it = authority()
+    it.saw(intents.Arm(user="eve", role="viewer", view_age_s=0.0), 3.0)
+    assert it.unwatched(3.0)
+    it.saw(intents.Arm(user="ada", role="operator", view_age_s=0.5), 3.0)
+    assert it.unwatched(4.4) == "" and "for 2.1 s" in it.unwatched(4.6)
+
+
+def test_who_may_move_the_robot_is_refused_by_name_and_a_viewer_always():
+    it = authority()
+    assert it.refusal(BOB, "operator") == ""
+    assert "viewer" in it.refusal(BOB, "viewer")
+    it.claim(ADA, 0.0)
+    assert it.refusal(ADA, "operator") == ""
+    assert "Ada holds control" in it.refusal(BOB, "supervisor")
+    assert "viewer" in it.refusal(ADA, "viewer")
 
 
 def test_the_servers_word_renews_the_lease_and_its_silence_ends_it():
@@ -65,16 +93,16 @@ def test_a_server_that_still_lists_somebody_does_not_renew_control_without_a_wor
 
 def test_a_repeated_or_older_word_renews_nothing():
     it = authority()
-    it.claim(ADA, 0.0)
-    it.review(presence(5, 0.1, ada()), False, 0.1)
-    it.review(presence(5, 0.6, ada()), False, 0.6)
-    it.review(presence(4, 0.9, ada()), False, 0.9)
-    assert it.review(None, False, 1.1)
+    it.claim(ADA, 7.0)
+    it.review(presence(5, 7.1, ada()), False, 7.1)
+    it.review(presence(5, 7.6, ada()), False, 7.6)
+    it.review(presence(4, 7.9, ada()), False, 7.9)
+    assert it.review(None, False, 8.1)
 
 
 def test_a_server_that_has_started_again_counts_from_one():
     it = authority()
-    it.review(presence(900, 0.0, ada()), True, 0.0)
+    it.review(presence(900, 4.0, ada()), True, 4.0)
     it.claim(ADA, 5.0)
     it.review(presence(1, 5.1, ada()), True, 5.1)
     assert it.review(presence(2, 5.9, ada()), True, 6.05) == ""
@@ -82,7 +110,7 @@ def test_a_server_that_has_started_again_counts_from_one():
 
 def test_work_is_watched_by_who_may_operate_and_sees_the_robot():
     it = authority()
-    assert "yet" in it.unwatched(0.0)
+    assert "seen the robot yet, " in it.unwatched(0.0)
     it.review(presence(1, 1.0, ada(role="viewer")), True, 1.0)
     assert it.unwatched(1.0)
     it.review(presence(2, 2.0, ada(age=0.3)), True, 2.0)

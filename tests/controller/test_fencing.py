@@ -4,6 +4,7 @@ import itertools
 
 from controller.supervision.fencing import FencingToken
 from rolling_panda import messages as m
+from tests.support.fake_wire import as_received
 
 
 def drawn():
@@ -40,6 +41,7 @@ def test_it_is_held_when_the_bridge_says_so_and_lost_when_that_names_another_one
 
 def test_before_the_bridge_has_said_who_commands_a_controller_keeps_silent_for_a_second():
     it = drawn()
+    assert it.token is None and it.waits
     for now in (7.0, 7.9):
         it.update(None, now)
         assert it.waits and not it.overruled
@@ -55,7 +57,13 @@ def test_who_gives_it_back_says_so_at_once_asks_under_another_one_and_is_not_ove
     assert given == m.TokenRequest(token="t0", releases=True) and it.token is None
     assert it.request(1, "READY", 0.01) == given
     assert it.request(1, "READY", 0.02).token == "t1"
-    it.update(bridge("t0"), 0.03)
-    assert it.token is None and not it.overruled
+    for holder in ("t0", ""):
+        it.update(bridge(holder), 0.03)
+        assert it.token is None and not it.overruled
     it.update(bridge("t1", 2), 0.05)
     assert it.token.epoch == 2
+
+
+def test_each_start_draws_a_token_of_its_own_that_the_wire_carries():
+    asked = [as_received(FencingToken().request(1, "IDLE", 0.0)) for _ in range(2)]
+    assert asked[0].token != asked[1].token and all(len(each.token) == 16 for each in asked)

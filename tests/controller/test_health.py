@@ -1,12 +1,16 @@
 from dataclasses import replace
 
+import msgspec
 import pytest
 
 from controller.config import ControllerConfig
 from controller.inputs import Inputs, Sample
-from controller.supervision.health import FINE, Health, check, health
+from controller.supervision.health import FINE, Health, cause, check, health
 from rolling_panda import messages as m
+from rolling_panda import topics
 from rolling_panda.messages.perception import Obstacles
+from rolling_panda.messages.robot import RejectionCount
+from tests.support.fake_wire import bridge_state, joints
 
 CONFIG = ControllerConfig()
 ALL = frozenset({"bridge", "controller", "perception", "server"})
@@ -26,9 +30,9 @@ def test_all_is_well(mode):
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"joints": 0.21}, "joint states"),
-        ({"odometry": 0.26}, "odometry"),
-        ({"bridge": 0.6}, "bridge"),
+        ({"joints": 0.21}, "joint states are 0.21 s old"),
+        ({"odometry": 0.26}, "odometry is 0.26 s old"),
+        ({"bridge": 0.6}, "the bridge's state is 0.60 s old"),
         ({"joints": float("inf")}, "are endlessly old"),
         ({"watchdog": True}, "watchdog"),
     ],
@@ -59,6 +63,11 @@ def test_without_perception_only_automatic_work_pauses(changes):
     assert verdict("TELEOP", **changes) == FINE
 
 
+def test_work_goes_on_where_the_server_is_too_slow_for_a_hand():
+    assert verdict("TELEOP", server=0.5).reason == "the server process is silent for 0.50 s, allowed are 0.3 s"
+    assert verdict("AUTO", server=1.9) == FINE
+
+
 def test_a_jitter_of_a_tenth_of_a_second_stops_nothing():
     jitter = {"joints": 0.11, "odometry": 0.12, "bridge": 0.15, "server": 0.15, "perception": 0.6}
     assert verdict("AUTO", **jitter) == FINE
@@ -72,8 +81,28 @@ def test_nothing_is_demanded_of_a_robot_that_does_not_move():
 
 def test_the_most_severe_of_several_counts():
     found = verdict("AUTO", present=frozenset(), joints=1.0, overruled=True)
-    assert found.action == "fault"
+    assert (found.action, found.reason) == ("fault", "another controller commands this robot")
+    assert verdict("IDLE", overruled=True) == FINE
     assert verdict("AUTO", present=frozenset(), joints=1.0).action == "protect"
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"ledger": "the disk is full"},
+        {"overruled": True},
+        {"tracking_error": "joint 3 does not follow"},
+        {"joints": 1.0},
+        {"odometry": 1.0},
+        {"bridge": 1.0},
+        {"watchdog": True},
+    ],
+)
+def test_a_stop_or_fault_cannot_be_left_while_its_cause_is_there(changes):
+    assert cause(replace(HEALTHY, **changes), CONFIG)
+    assert cause(HEALTHY, CONFIG) == ""
+    # These end motion, and are no cause of a stop.
+    assert cause(replace(HEALTHY, server=9.0, perception=9.0, obstacles=9.0), CONFIG) == ""
 
 
 def test_old_pictures_of_what_stands_around_stop_automatic_work_alone():
@@ -84,9 +113,9 @@ def test_old_pictures_of_what_stands_around_stop_automatic_work_alone():
 
 def test_the_age_of_a_picture_is_told_by_its_stamp_however_often_it_is_repeated():
     def seen(stamp, at=100.0):
-        joints = m.JointState(header=m.Header(50.0), sequence=1, position=(0.0,) * 9, velocity=(0.0,) * 9)
+        measured = msgspec.structs.replace(joints(), header=m.Header(50.0))
         told = Obstacles(header=m.Header(stamp), capsules=())
-        return health(Inputs(joints=Sample(joints, 100.0), obstacles=Sample(told, at)), False, 100.0).obstacles
+        return health(Inputs(joints=Sample(measured, 100.0), obstacles=Sample(told, at)), False, 100.0).obstacles
 
     assert seen(49.0) == 1.0
     assert seen(40.0) == 10.0
@@ -104,3 +133,32 @@ def test_without_a_ledger_there_is_a_fault_in_every_mode(mode):
 def test_a_robot_that_does_not_follow_is_stopped_protectively():
     found = verdict("AUTO", tracking_error="joint 3 does not follow")
     assert found.action == "protect" and "joint 3" in found.reason
+
+
+def test_the_age_of_each_input_is_counted_from_its_arrival_and_what_never_came_is_endless():
+    header = m.Header(3.0)
+    refused = (
+        RejectionCount(topic=topics.MOTION.name, reason="old sequence", count=4),
+        RejectionCount(topic=topics.MOTION.name, reason="another token", count=1),
+        RejectionCount(topic=topics.CUT.name, reason="another token", count=7),
+    )
+    bridge = msgspec.structs.replace(bridge_state(), header=header, watchdog=True, rejections=refused)
+    odometry = m.Odometry(header=header, sequence=1, pose=m.PlanarPose(0.0), linear=0.0, angular=0.0)
+    inputs = Inputs(
+        joints=Sample(joints(), 9.5),
+        odometry=Sample(odometry, 9.25),
+        bridge=Sample(bridge, 9.0),
+        server_seen=8.5,
+        perception_seen=8.0,
+        present=ALL,
+    )
+    found = health(inputs, True, 10.0, "the disk is full", "joint 3 does not follow")
+    ages = (found.joints, found.odometry, found.bridge, found.server, found.perception)
+    assert ages == (0.5, 0.75, 1.0, 1.5, 2.0)
+    assert (found.present, found.watchdog, found.overruled, found.refused) == (ALL, True, True, 5)
+    assert (found.ledger, found.tracking_error) == ("the disk is full", "joint 3 does not follow")
+    nothing = health(Inputs(), False, 10.0)
+    ages = (nothing.joints, nothing.odometry, nothing.bridge, nothing.server, nothing.perception)
+    assert ages == (float("inf"),) * 5
+    assert (nothing.present, nothing.watchdog, nothing.overruled, nothing.refused) == (frozenset(), False, False, 0)
+    assert (nothing.ledger, nothing.tracking_error) == ("", "")

@@ -43,6 +43,7 @@ def test_what_was_paused_is_told_until_something_is_begun(begun, told):
     r.teleop = None
     r.run(0.1)
     assert (r.state.mode, r.state.interrupted) == ("PAUSED", told)
+    assert (r.state.phase, r.state.active_point_id) == ("", "")
     assert r.ask(intents.Resume(user="ada")).ok
     r.run(0.1)
     assert (r.state.mode, r.state.interrupted) == ("READY", told)

@@ -30,8 +30,8 @@ def test_a_lease_lives_one_second_without_being_renewed():
         assert it.review(False, tick / 3) == ""
     assert it.review(False, 3.0 + 0.99) == ""
     lost = it.review(False, 3.0 + LIFE_S)
-    assert "Ada" in lost and "1 s" in lost
-    assert it.holder is None
+    assert "Ada" in lost and "1 s" in lost and it.notice == lost
+    assert it.holder is None and it.left(3.5) == 0.0
     # Who comes back has to take it again: nothing resumes by itself.
     it.renew({"a": 4.1})
     assert not it.held_by(ADA)
@@ -74,6 +74,13 @@ def test_taking_over_needs_a_confirmation_and_a_robot_at_rest():
     assert it.notice == "Bob holds control, before Ada"
 
 
+def test_who_takes_what_nobody_holds_follows_nobody():
+    it = Lease()
+    assert it.take(BOB, False) == ""
+    it.review(True, 0.1)
+    assert it.notice == "Bob holds control"
+
+
 def test_of_two_who_take_at_once_the_first_gets_it():
     it = held()
     assert it.take(BOB, True) == ""
@@ -97,12 +104,14 @@ def test_a_request_is_granted_by_the_holder_alone():
 
 
 def test_a_request_is_forgotten_in_time():
-    it = held()
-    it.request(BOB, 0.0)
-    for tick in range(400):
-        it.renew({"a": tick / 10})
-        it.review(True, tick / 10)
-    assert it.requested is None and it.held_by(ADA)
+    it = Lease()
+    it.claim(ADA, 100.0)
+    it.request(BOB, 100.0)
+    for tick in range(302):
+        now = 100.0 + tick / 10
+        it.renew({"a": now})
+        it.review(True, now)
+        assert it.held_by(ADA) and it.requested == (BOB if tick <= 300 else None)
 
 
 def test_control_is_given_back_by_its_holder():
@@ -112,6 +121,7 @@ def test_control_is_given_back_by_its_holder():
     assert it.give_back(ADA) == ""
     assert it.holder is None
     assert (it.notice, it.notice_number) == ("Ada gave control back", before + 1)
+    assert it.left(0.1) == 0.0
     assert it.review(True, 0.1) == "Ada gave control back"
     assert "take it" in it.request(BOB, 0.1)
 

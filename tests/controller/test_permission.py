@@ -44,3 +44,49 @@ def test_each_thing_that_is_missing_is_said() -> None:
 def test_a_pause_ends_the_way_home_in_ready() -> None:
     assert "Pause" not in allowed(0.0, situation())
     assert "Pause" in allowed(0.0, situation(homing=True))
+
+
+def test_who_may_not_operate_is_refused_everything() -> None:
+    for command in (COMMAND_OF[intents.AcceptAll], COMMAND_OF[intents.Pause]):
+        viewer = situation("AUTO", rights=modes.ANYBODY)
+        assert refusal(command, 0.0, viewer) == "this needs the role operator or supervisor"
+        assert refusal(command, 0.0, replace(viewer, not_theirs="a viewer may look")) == "a viewer may look"
+
+
+def test_what_another_holds_is_not_moved_and_a_fault_is_left_by_any_supervisor() -> None:
+    others = {"rights": modes.OPERATOR - {"holder"}, "not_theirs": "ada holds control"}
+    assert refusal(COMMAND_OF[intents.Home], 0.0, situation(**others)) == "ada holds control"
+    assert refusal(COMMAND_OF[intents.AcceptAll], 0.0, situation(**others)) == ""
+    fault = situation("FAULT", **others)
+    fault = replace(fault, state=modes.observe(fault.state, "", 0.0))
+    assert refusal(COMMAND_OF[intents.Acknowledge], 2.0, fault) == ""
+
+
+def test_a_stop_is_acknowledged_a_second_after_its_cause_is_gone() -> None:
+    stopped = situation("PROTECTIVE_STOP")
+    stopped = replace(stopped, state=modes.observe(stopped.state, "", 5.0))
+    assert "Acknowledge" not in allowed(5.5, stopped) and "Acknowledge" in allowed(6.5, stopped)
+
+
+def test_without_measurements_nothing_begins_to_move_and_all_else_goes_on() -> None:
+    for late in ({"joints": 9.0}, {"watchdog": True}):
+        blind = situation(health=replace(WELL, **late))
+        for command in (COMMAND_OF[intents.Start], COMMAND_OF[intents.Survey], COMMAND_OF[intents.Home]):
+            assert refusal(command, 0.0, blind)
+        assert refusal(COMMAND_OF[intents.Arm], 0.0, replace(blind, state=modes.boot()))
+        assert refusal(COMMAND_OF[intents.AcceptAll], 0.0, blind) == ""
+        assert refusal(COMMAND_OF[intents.Pause], 0.0, replace(blind, state=modes.State("AUTO", ""))) == ""
+
+
+def test_a_link_that_is_too_slow_for_a_hand_lets_work_begin_and_without_a_server_the_robot_can_be_armed() -> None:
+    assert refusal(COMMAND_OF[intents.Start], 0.0, situation(health=replace(WELL, server=1.0))) == ""
+    gone = situation(health=replace(WELL, server=9.0))
+    assert "server" in refusal(COMMAND_OF[intents.Start], 0.0, gone)
+    assert refusal(COMMAND_OF[intents.Arm], 0.0, replace(gone, state=modes.boot())) == ""
+
+
+def test_a_survey_needs_neither_accepted_points_nor_an_approved_preview() -> None:
+    for missing in ({"waits": "no point is accepted"}, {"approval": "approve the preview"}):
+        (why,) = missing.values()
+        assert refusal(COMMAND_OF[intents.Start], 0.0, situation(**missing)) == why
+        assert refusal(COMMAND_OF[intents.Survey], 0.0, situation(**missing)) == ""

@@ -1,7 +1,11 @@
+import msgspec
+import pytest
+
 from controller.inputs import Sample
 from controller.interface import StepInputs
 from controller.supervision.stale_messages import StaleMessageFilter
 from rolling_panda import messages as m
+from tests.support.fake_wire import bridge_state
 
 
 def joints(made, at):
@@ -36,11 +40,24 @@ def test_a_bridge_that_has_started_again_with_another_clock_is_believed_soon():
     assert taken(newest, joints(0.17, 10.26)).message.header.stamp == 0.17
 
 
-def test_each_of_what_the_robot_says_is_kept_by_itself():
+def odometry(made, at):
+    pose = m.PlanarPose(0.0)
+    return Sample(m.Odometry(header=m.Header(made), sequence=1, pose=pose, linear=0.0, angular=0.0), at)
+
+
+def bridge(made, at):
+    return Sample(msgspec.structs.replace(bridge_state(), header=m.Header(made)), at)
+
+
+@pytest.mark.parametrize(("name", "made"), [("joints", joints), ("odometry", odometry), ("bridge", bridge)])
+def test_each_of_what_the_robot_says_is_kept_by_itself(name, made):
     newest = StaleMessageFilter()
-    odometry = Sample(
-        m.Odometry(header=m.Header(2.0), sequence=1, pose=m.PlanarPose(0.0), linear=0.0, angular=0.0), 2.0
-    )
-    assert newest.of(StepInputs(joints=joints(3.0, 3.0), odometry=odometry)).odometry is odometry
-    given = StepInputs(joints=joints(3.1, 3.1), odometry=odometry)
+    first = {"joints": joints(3.0, 3.0), "odometry": odometry(2.0, 3.0), "bridge": bridge(1.0, 3.0)}
+    given = StepInputs(**first)
     assert newest.of(given) is given
+    late = {**first, name: made(0.5, 3.1)}
+    found = newest.of(StepInputs(**late))
+    assert {each: getattr(found, each) for each in first} == first
+    after = {**first, name: made(3.5, 3.2)}
+    found = newest.of(StepInputs(**after))
+    assert getattr(found, name) is after[name]

@@ -3,7 +3,8 @@ import msgspec
 from controller.supervision.stop_latch import StopLatch
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
-from tests.support.fake_wire import bridge_state
+from rolling_panda.messages.supervision import StopRecord
+from tests.support.fake_wire import as_received, bridge_state
 
 BRIDGE = bridge_state()
 RESET = intents.Reset(user="ada", role="supervisor", reason="looked at it")
@@ -24,7 +25,28 @@ def test_a_stop_latches_once_and_says_who_and_why():
 
 
 def test_a_stop_that_only_the_bridge_has_seen_latches_too():
-    assert StopLatch().update((), bridge("a")) == "software stop: eve: dog in the row"
+    latch = StopLatch()
+    assert latch.update((), bridge("a"), 7.0) == "software stop: eve: dog in the row"
+    assert latch.update((), bridge("a"), 8.0) == ""
+    (record,) = latch.message().stops
+    assert record == StopRecord("a", "bridge", "", "eve: dog in the row", 7.0)
+
+
+def test_a_clock_before_1970_spoils_no_record():
+    latch = StopLatch()
+    latch.update((stop("a"),), BRIDGE, -5.0)
+    latch.update((), bridge("b"), -5.0)
+    latch.update((stop("c"),), bridge("b"), 0.5)
+    latch.update((), bridge("d"), 0.5)
+    assert [record.wall_time for record in as_received(latch.message()).stops] == [0.5, 0.5, 0.0, 0.0]
+
+
+def test_what_was_latched_before_a_start_is_not_released_by_itself():
+    before = StopLatch()
+    before.update((stop("a"),), BRIDGE)
+    latch = StopLatch(before.message().stops)
+    assert not latch.released(BRIDGE) and latch.latched
+    assert latch.message().released_by == ""
 
 
 def test_an_emergency_stop_is_told_from_a_software_stop_and_a_process_stands_for_a_person():
@@ -65,6 +87,11 @@ def test_echoes_of_a_released_stop_latch_nothing_but_the_bridges_latch_always_co
     latch.release_due()
     assert latch.released(BRIDGE)
     assert latch.update((stop("a"),), BRIDGE) == ""
+    latch.update((stop("b"),), bridge("b"))
+    latch.ask_release(RESET, bridge("b"), 3.0)
+    latch.release_due()
+    assert latch.released(BRIDGE)
+    assert latch.update((stop("a"), stop("b")), BRIDGE) == ""
     assert latch.update((), bridge("a")) != ""
 
 
@@ -98,6 +125,15 @@ def test_a_reset_of_a_stop_that_is_not_the_newest_any_more_is_refused():
     assert latch.release_due().stop_id == "b"
     assert latch.released(BRIDGE)
     assert latch.message().released_by == "ada: looked at it"
+
+
+def test_a_long_reason_of_a_reset_is_cut_to_what_the_wire_carries():
+    latch = StopLatch()
+    latch.update((stop("a"),), bridge("a"))
+    latch.ask_release(msgspec.structs.replace(RESET, reason="x" * 500), bridge("a"), 1.0)
+    latch.release_due()
+    assert latch.released(BRIDGE)
+    assert as_received(latch.message()).released_by == "ada: " + "x" * 495
 
 
 def test_before_the_bridge_has_said_what_it_holds_a_reset_is_refused_and_later_it_is_not_lost():

@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 
 from controller.inputs import Sample
+from controller.interface import StepInputs
+from controller.ledger.journal import LedgerState
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda import topics
@@ -240,3 +242,92 @@ def test_a_watchdog_that_holds_the_robot_without_refusing_commands_changes_no_to
     (first,) = tokens(outputs(r, 0.5))
     refusing(r, 0)
     assert tokens(outputs(r, 5.0)) == {first}
+
+
+def test_before_anything_was_measured_all_motion_is_refused():
+    r = robot()
+    answer = r.controller.answer(intents.Arm(user="ada", role="operator"), 0.0)
+    assert not answer.ok and "joint states are endlessly old" in answer.reason
+
+
+def test_at_the_start_nothing_was_interrupted():
+    r = robot()
+    r.step()
+    assert r.state.interrupted == ""
+
+
+def test_a_controller_without_a_bridge_is_silent_for_a_second():
+    controller = robot().controller
+    for now, waits in ((7.0, True), (7.9, True), (8.1, False)):
+        controller.step(StepInputs(), now)
+        assert controller.waits == waits
+
+
+def driven(r):
+    r.teleop = TeleopTarget(sequence=1, hold=True, user="ada", base=BaseVelocity(0.1, 0.0))
+    r.run(0.1)
+    assert r.controller.mode == "TELEOP"
+
+
+def test_a_protective_stop_says_why_and_what_it_interrupted_and_is_left_a_second_after_its_cause():
+    r = ready()
+    driven(r)
+    r.frozen_sensors = True
+    r.run(0.5)
+    assert (r.state.mode, r.state.interrupted) == ("PROTECTIVE_STOP", "teleoperation")
+    assert r.state.reason.startswith("joint states are")
+    r.teleop = None
+    r.run(2.0)
+    assert "the cause is still there" in r.ask(intents.Acknowledge(user="ada")).reason
+    r.frozen_sensors = False
+    r.run(0.5)
+    assert "must be gone for 1 s" in r.ask(intents.Acknowledge(user="ada")).reason
+    r.run(0.7)
+    assert r.ask(intents.Acknowledge(user="ada")).ok
+    r.run(0.1)
+    assert r.state.mode == "PAUSED"
+
+
+def test_without_a_server_a_hand_moves_nothing_and_the_reason_is_told():
+    r = ready()
+    driven(r)
+    inputs = r.inputs
+    r.inputs = lambda: replace(inputs(), present=frozenset({"bridge", "perception"}))
+    r.run(0.2)
+    assert (r.state.mode, r.state.reason) == ("PAUSED", "the server process is gone")
+
+
+def test_the_way_home_needs_measurements():
+    r = ready()
+    assert r.ask(intents.Home(user="ada")).ok
+    r.run(0.1)
+    r.frozen_sensors = True
+    r.run(0.5)
+    assert r.state.mode == "PROTECTIVE_STOP"
+
+
+def test_a_ledger_that_takes_nothing_is_a_fault():
+    r = ready()
+    r.ledger = LedgerState(failure="the disk is full")
+    r.run(0.1)
+    assert (r.state.mode, r.state.reason) == ("FAULT", "the disk is full")
+
+
+def test_a_stop_that_only_the_bridge_knows_is_kept_with_its_time_and_reset_through_the_bridge():
+    r = ready()
+    inputs = r.inputs
+    r.inputs = lambda: replace(inputs(), wall_time=1e9)
+    r.stop_id = "pressed-there"
+    kept = [out.stops for out in outputs(r, 0.1) if out.stops is not None][-1].stops
+    assert [(stop.stop_id, stop.source, stop.wall_time) for stop in kept] == [("pressed-there", "bridge", 1e9)]
+    assert (r.state.mode, r.state.reason) == ("ESTOP_LATCHED", "software stop: ada")
+    assert r.ask(intents.Reset(user="ada", role="supervisor", reason="looked")).ok
+    assert ("info", "ESTOP_LATCHED → IDLE: reset by ada: looked") in told(outputs(r, 0.2))
+    assert r.state.mode == "IDLE"
+
+
+def test_who_is_heard_keeps_control_and_at_rest_it_goes_over_at_once():
+    r = ready()
+    assert [out.control.user for out in outputs(r, 3.0) if out.control is not None][-1] == "ada"
+    assert r.ask(intents.TakeControl(user="bob", confirm=True)).ok
+    assert [out.control.user for out in outputs(r, 0.1) if out.control is not None][-1] == "bob"

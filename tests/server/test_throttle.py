@@ -47,6 +47,16 @@ def test_a_million_names_do_not_fill_the_memory():
     assert attempts.wait(("address 1",), 0.0) > 0.0
 
 
+def test_who_goes_on_guessing_is_not_forgotten_among_others():
+    attempts = LoginThrottle()
+    for block in range(3):
+        for _ in range(FREE):
+            attempts.failed(("name ada",), 0.0)
+        for number in range(5_000):
+            attempts.failed((f"name {block} {number}",), 0.0)
+    assert attempts.wait(("name ada",), 0.0) == MAX_DELAY_S
+
+
 @given(st.lists(st.floats(0.0, 100.0)))
 def test_never_more_guesses_than_the_delays_allow(gaps):
     attempts, now, made = LoginThrottle(), 0.0, 0
