@@ -32,7 +32,6 @@ def lines(server):
 
 
 def test_who_does_not_hold_control_cannot_keep_the_tool_from_who_does(server):
-    sent = server.wire.sent[topics.TELEOP.name]
     with (
         server.client("operator", "ann") as ann,
         server.client("operator", "eve") as eve,
@@ -41,12 +40,12 @@ def test_who_does_not_hold_control_cannot_keep_the_tool_from_who_does(server):
     ):
         server.wire.deliver(topics.CONTROL, control(ann.get("/api/state").json()["client"]))
         try:
-            for page in (holder, other):
-                page.look()
-                page.say("ShowGizmo", visible=True)
+            other.look()
+            other.say("ShowGizmo", visible=True)
             other.hold(True)
             other.hear_event("hold by eve refused: somebody else holds control")
-            holder.hold_until_sent(sent)
+            assert not any(message.hold for message in server.wire.sent[topics.TELEOP.name])
+            sent = holder.hold_until_sent(server)
             assert {message.user for message in sent if message.hold} == {"ann"}
         finally:
             server.wire.deliver(topics.CONTROL, control(""))

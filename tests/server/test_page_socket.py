@@ -76,8 +76,15 @@ class Page:
         while not any(text in event["text"] for event in self.hear("PageEvents")["events"]):
             pass
 
-    def hold_until_sent(self, sent):
-        """Hold, as a page does with a pressed button, until the server has told the robot so."""
+    def hold_until_sent(self, server):
+        """Hold, as a page does with a pressed button, until the server has told the robot so; returns what it is told.
+
+        The gizmo is shown.
+        """
+        sent = server.wire.sent[topics.TELEOP.name]
+        sent.clear()
+        self.look()
+        self.say("ShowGizmo", visible=True)
 
         def told():
             for _ in range(10):
@@ -90,6 +97,7 @@ class Page:
             return False
 
         eventually(told)
+        return sent
 
     def hold(self, hold):
         self.sequence += 1
@@ -173,27 +181,18 @@ def test_a_page_that_breaks_the_rules_is_closed(page, text):
     assert caught.value.rcvd.code == 1008
 
 
-def test_a_frame_that_is_too_long_closes_the_socket(page):
-    longest = ServerConfig().max_body_bytes
+@pytest.mark.parametrize(
+    "text", [["x" * 30_000] * 3, "x" * (ServerConfig().max_body_bytes + 1)], ids=["parts", "too long"]
+)
+def test_a_message_in_too_many_parts_or_too_long_closes_the_socket(page, text):
     with pytest.raises(ConnectionClosed) as caught:
-        page.socket.send("x" * (longest + 1))
-        page.hear("never")
-    assert caught.value.rcvd.code == 1009
-
-
-def test_a_frame_in_too_many_parts_closes_the_socket(page):
-    with pytest.raises(ConnectionClosed) as caught:
-        page.socket.send("x" * 30_000 for _ in range(3))
+        page.socket.send(text)
         page.hear("never")
     assert caught.value.rcvd.code == 1009
 
 
 def test_the_tool_follows_while_the_page_holds_and_stops_when_it_falls_silent(server, page):
-    sent = server.wire.sent[topics.TELEOP.name]
-    sent.clear()
-    page.look()
-    page.say("ShowGizmo", visible=True)
-    page.hold_until_sent(sent)
+    sent = page.hold_until_sent(server)
     eventually(lambda: not sent[-1].hold)
     assert {message.user for message in sent if message.hold} == {"ann"}
 
@@ -270,23 +269,15 @@ def test_a_page_that_draws_a_robot_that_has_fallen_silent_may_not_hold():
 
 
 def test_letting_go_is_said_at_once(server, page):
-    sent = server.wire.sent[topics.TELEOP.name]
-    sent.clear()
-    page.look()
-    page.say("ShowGizmo", visible=True)
-    page.hold_until_sent(sent)
+    sent = page.hold_until_sent(server)
     page.hold(False)
     eventually(lambda: not sent[-1].hold)
     page.hear_event("ann let go of the robot")
 
 
 def test_a_page_that_closes_ends_its_hold(server, open_page):
-    sent = server.wire.sent[topics.TELEOP.name]
-    sent.clear()
     with open_page() as page:
-        page.look()
-        page.say("ShowGizmo", visible=True)
-        page.hold_until_sent(sent)
+        sent = page.hold_until_sent(server)
     eventually(lambda: not sent[-1].hold)
 
 
@@ -324,13 +315,10 @@ def test_an_old_hold_that_arrives_late_is_ignored(server, page):
 
 
 def test_a_second_person_cannot_take_the_tool_from_the_holder(server, page):
-    sent = server.wire.sent[topics.TELEOP.name]
-    sent.clear()
     with server.client(user="bob") as other, Page(server, other) as second:
-        for each in (page, second):
-            each.look()
-            each.say("ShowGizmo", visible=True)
-        page.hold_until_sent(sent)
+        second.look()
+        second.say("ShowGizmo", visible=True)
+        sent = page.hold_until_sent(server)
         page.hold(True)
         second.hold(True)
         second.hear_event("ann is holding")

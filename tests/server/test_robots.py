@@ -201,9 +201,7 @@ def test_a_stop_of_one_leaves_the_other_alone_and_the_one_at_the_root_stops_all(
 def test_signing_out_of_one_signs_out_of_all_and_lets_everything_go(robots, client):
     one, other = robots
     with Page(one, client) as first, Page(other, client) as second:
-        second.look()
-        second.say("ShowGizmo", visible=True)
-        second.hold_until_sent(other.wire.sent[topics.TELEOP.name])
+        second.hold_until_sent(other)
         assert client.post("/robots/rp1/api/sign-out", json={}).status_code == 200
         for page in (first, second):
             with pytest.raises(ConnectionClosed):

@@ -67,10 +67,10 @@ def hear(view, condition, patience_s=PATIENCE_S):
     return heard
 
 
-def hear_selected(page):
-    while (message := json.loads(page.recv(timeout=PATIENCE_S)))["type"] != "Selected":
-        pass
-    return message["point_id"]
+def never(view, condition):
+    """Nothing that fulfils `condition` comes soon."""
+    with pytest.raises(TimeoutError):
+        hear(view, condition, patience_s=0.4)
 
 
 def replayed(message):
@@ -82,18 +82,22 @@ def say(view, message):
 
 
 @contextmanager
-def two_views(server):
-    """Ann's page, her view and Bob's, both drawn."""
+def page_and_view(server, role="supervisor", user="test"):
+    """Somebody's page and their view, which is drawn."""
     with (
-        server.client(user="ann") as client,
-        server.client(user="bob") as other,
+        server.client(role=role, user=user) as client,
         open_socket(server, client, "/ws") as page,
         open_view(server, client) as view,
-        open_view(server, other) as other_view,
     ):
-        for each in (view, other_view):
-            hear(each, replayed)
-            say(each, CAMERA)
+        hear(view, replayed)
+        say(view, CAMERA)
+        yield page, view
+
+
+@contextmanager
+def two_views(server, role="supervisor"):
+    """Ann's page, her view and Bob's, both drawn."""
+    with page_and_view(server, role, "ann") as (page, view), page_and_view(server, user="bob") as (_, other_view):
         yield page, view, other_view
 
 
@@ -109,8 +113,7 @@ def test_the_view_shows_the_robot_and_the_points(server):
 def test_every_movement_is_shown_and_nothing_is_sent_at_rest(server):
     with server.client() as client, open_view(server, client) as view:
         hear(view, replayed)
-        with pytest.raises(TimeoutError):
-            hear(view, lambda message: message["type"].startswith("Set"), patience_s=0.4)
+        never(view, lambda message: message["type"].startswith("Set"))
         for step in range(1, 11):
             server.wire.deliver(topics.ODOMETRY, odometry(sequence=step, x=0.01 * step))
             moved = [message for message in hear(view, places_robot) if message["type"].startswith("Set")]
@@ -134,7 +137,7 @@ def test_a_click_on_a_point_selects_it_on_the_pages_of_that_session_alone(server
         hear(view, replayed)
         say(view, CAMERA)
         say(view, CLICK)
-        assert hear_selected(page) == "p1"
+        assert hear_kind(page, "Selected")["point_id"] == "p1"
         hear(view, lambda message: message.get("name") == "/selection")
         kinds = [json.loads(other_page.recv(timeout=PATIENCE_S))["type"] for _ in range(5)]
         assert "Selected" not in kinds
@@ -157,13 +160,7 @@ def hear_clicks(view):
 
 
 def test_clicks_into_the_view_are_lines_of_sight_while_a_page_places_points(server):
-    with (
-        server.client() as client,
-        open_socket(server, client, "/ws") as page,
-        open_view(server, client) as view,
-    ):
-        hear(view, replayed)
-        say(view, CAMERA)
+    with page_and_view(server) as (page, view):
         page.send(json.dumps({"type": "PlaceByHand", "active": True}))
         assert hear_clicks(view)
         say(view, POINTER)
@@ -177,16 +174,25 @@ def test_clicks_into_the_view_are_lines_of_sight_while_a_page_places_points(serv
         assert not hear_clicks(view), "nobody is left who places"
 
 
-def test_a_viewer_takes_no_clicks(server):
-    with (
-        server.client(role="viewer") as client,
-        open_socket(server, client, "/ws") as page,
-        open_view(server, client) as view,
-    ):
-        hear(view, replayed)
-        page.send(json.dumps({"type": "PlaceByHand", "active": True}))
-        with pytest.raises(TimeoutError):
-            hear(view, enables_clicks, patience_s=0.4)
+class Holding:
+    """A page that holds, as a person's does: each state that comes is rendered, and the hold renewed."""
+
+    def __init__(self, page):
+        self.page, self.sequence = page, 0
+
+    def answer(self, **wanted):
+        """Answer the next message; a hold that was refused, as its view was not current, is pressed anew."""
+        message = json.loads(self.page.recv(timeout=PATIENCE_S))
+        if message["type"] not in ("PageState", "HoldEnded"):
+            return False
+        ping = {"type": "Ping", "number": self.sequence + 1, "rendered": message.get("number", 0)}
+        self.page.send(json.dumps(ping))
+        self.send(hold=message["type"] == "PageState", **wanted)
+        return True
+
+    def send(self, **fields):
+        self.sequence += 1
+        self.page.send(json.dumps({"type": "Hold", "sequence": self.sequence, **fields}))
 
 
 def test_the_gizmo_is_on_the_holders_view_alone_and_its_drags_become_targets(server):
@@ -194,38 +200,24 @@ def test_the_gizmo_is_on_the_holders_view_alone_and_its_drags_become_targets(ser
     with telling(server.wire), two_views(server) as (page, view, other_view):
         page.send('{"type":"ShowGizmo","visible":true}')
         (gizmo,) = [each for each in hear(view, is_gizmo) if is_gizmo(each)]
-        with pytest.raises(TimeoutError):
-            hear(other_view, is_gizmo, patience_s=0.4)
+        never(other_view, is_gizmo)
         say(view, GRAB | {"owner": gizmo["owner"]})
-        sequence = 0
+        holding = Holding(page)
 
         def hold():
-            nonlocal sequence
-            message = json.loads(page.recv(timeout=PATIENCE_S))
-            if message["type"] in ("PageState", "HoldEnded"):
-                sequence += 1
-                # Where a hold lapses, the gizmo goes back to the tool.
-                say(view, DRAG | {"owner": gizmo["owner"], "position": [0.31, 0.52, 0.93]})
-                page.send(json.dumps({"type": "Ping", "number": sequence, "rendered": message.get("number", 0)}))
-                # A hold that was refused, as its view was not current, is let go and pressed anew.
-                page.send(json.dumps({"type": "Hold", "sequence": sequence, "hold": message["type"] == "PageState"}))
+            # Where a hold lapses, the gizmo goes back to the tool.
+            say(view, DRAG | {"owner": gizmo["owner"], "position": [0.31, 0.52, 0.93]})
+            holding.answer()
             return any(each.hold and each.target.position == (0.31, 0.52, 0.93) for each in sent)
 
         eventually(hold)
-        page.send(json.dumps({"type": "Hold", "sequence": sequence + 1, "hold": False}))
+        holding.send(hold=False)
         say(view, LET_GO | {"owner": gizmo["owner"]})
         assert hear_gizmo(view) != [0.31, 0.52, 0.93]
 
 
 def test_where_a_drag_ended_after_the_hold_leads_nobody(server):
-    with (
-        telling(server.wire),
-        server.client(user="liz") as client,
-        open_socket(server, client, "/ws") as page,
-        open_view(server, client) as view,
-    ):
-        hear(view, replayed)
-        say(view, CAMERA)
+    with telling(server.wire), page_and_view(server, user="liz") as (page, view):
         page.send('{"type":"ShowGizmo","visible":true}')
         shown = hear(view, places_gizmo)
         (owner,) = {each["owner"] for each in shown if is_gizmo(each)}
@@ -240,17 +232,11 @@ def test_a_page_holds_base_or_joints_at_a_share_of_the_speed(server):
     sent = server.wire.sent[topics.TELEOP.name]
     del sent[:]
     with telling(server.wire), server.client(user="eve") as client, open_socket(server, client, "/ws") as page:
-        sequence = 0
+        holding = Holding(page)
 
         def holds(**wanted):
             def once():
-                nonlocal sequence
-                message = json.loads(page.recv(timeout=PATIENCE_S))
-                if message["type"] in ("PageState", "HoldEnded"):
-                    sequence += 1
-                    page.send(json.dumps({"type": "Ping", "number": sequence, "rendered": message.get("number", 0)}))
-                    held = {"hold": message["type"] == "PageState", **wanted, "speed_scale": 0.5}
-                    page.send(json.dumps({"type": "Hold", "sequence": sequence, **held}))
+                holding.answer(**wanted, speed_scale=0.5)
                 newest = [each for each in sent if each.hold and each.speed_scale == 0.5][-1:]
                 return bool(newest) and msgspec.to_builtins(newest[0]).items() >= wanted.items()
 
@@ -259,8 +245,7 @@ def test_a_page_holds_base_or_joints_at_a_share_of_the_speed(server):
         drive = {"linear": 0.2, "angular": -0.1}
         eventually(holds(base=drive))
         eventually(holds(joints=(0.0, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0)))
-        both = {"type": "Hold", "sequence": sequence + 1, "hold": True, "base": drive, "joints": [0.0] * 7}
-        page.send(json.dumps(both))
+        holding.send(hold=True, base=drive, joints=[0.0] * 7)
         with pytest.raises(ConnectionClosed):
             while True:
                 page.recv(timeout=PATIENCE_S)
@@ -301,13 +286,9 @@ def test_a_forged_message_never_reaches_viser_and_is_logged(server, monkeypatch)
 
 
 def test_a_viewer_cannot_click(server):
-    with (
-        server.client(role="viewer") as client,
-        open_socket(server, client, "/ws") as page,
-        open_view(server, client) as view,
-    ):
-        hear(view, replayed)
-        say(view, CAMERA)
+    with page_and_view(server, role="viewer") as (page, view):
+        page.send(json.dumps({"type": "PlaceByHand", "active": True}))
+        never(view, enables_clicks)
         say(view, CLICK)
         kinds = [json.loads(page.recv(timeout=PATIENCE_S))["type"] for _ in range(6)]
         assert "Selected" not in kinds
