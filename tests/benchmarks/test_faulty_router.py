@@ -12,6 +12,7 @@ from rolling_panda.errors import ServiceError
 from rolling_panda.topics import CONTROLLER, MOTION, RELEASE, STOP
 from rolling_panda.transport.zenoh import Transport
 from tests.support.processes.local_router import free_port
+from tests.support.running_server import eventually
 
 pytestmark = pytest.mark.alone
 COMMAND = m.MotionCommand(epoch=1, token="a", sequence=1, echo=1, xi=(0.0,) * 9)
@@ -32,14 +33,6 @@ def wire():
     router.close()
 
 
-def wait(condition, limit_s=5.0):
-    """What `condition()` gave when it was first true, or last."""
-    end = time.monotonic() + limit_s
-    while not (value := condition()) and time.monotonic() < end:
-        time.sleep(0.01)
-    return value
-
-
 def test_messages_requests_and_presence_pass_and_nobody_hears_themselves(wire):
     router, s = wire
     bridge, own = s["bridge"].feed(MOTION, 100), s["controller"].feed(MOTION, 100)
@@ -47,12 +40,12 @@ def test_messages_requests_and_presence_pass_and_nobody_hears_themselves(wire):
     s["bridge"].serve(RELEASE, lambda request: m.Answer(ok=False, reason=request.reason))
     time.sleep(0.3)
     publisher.put(COMMAND)
-    assert wait(bridge.drain)
+    assert eventually(bridge.drain)
     time.sleep(0.1)
     # Zenoh itself hands a session what it publishes, once; the router sends nothing back.
     assert len(own.drain()) == 1
     assert s["controller"].call(RELEASE, ASKED).reason == "trial"
-    assert wait(lambda: s["server"].present() == {"bridge", "controller", "server"})
+    assert eventually(lambda: s["server"].present() == {"bridge", "controller", "server"})
 
 
 def test_a_way_is_cut_for_one_topic_and_one_direction(wire):
@@ -76,12 +69,12 @@ def test_a_way_is_cut_for_one_topic_and_one_direction(wire):
         heard.extend(server.drain())
         return len(heard) >= 20
 
-    assert wait(another_is_heard), len(heard)
-    assert wait(stops.drain) and len(heard) <= sent, "none comes twice"
+    assert eventually(another_is_heard), len(heard)
+    assert eventually(stops.drain) and len(heard) <= sent, "none comes twice"
     assert not bridge.drain()
     obey(router, '{"clear": true}')
     publisher.put(COMMAND)
-    assert wait(bridge.drain)
+    assert eventually(bridge.drain)
 
 
 def test_a_request_that_is_lost_is_not_answered(wire):
@@ -94,7 +87,7 @@ def test_a_request_that_is_lost_is_not_answered(wire):
 
 def test_whoever_leaves_is_seen_to_leave(wire):
     router, s = wire
-    assert wait(lambda: "bridge" in s["server"].present())
+    assert eventually(lambda: "bridge" in s["server"].present())
     s["bridge"].close()
-    assert wait(lambda: "bridge" not in s["server"].present())
+    assert eventually(lambda: "bridge" not in s["server"].present())
     assert not s["server"].slot(CONTROLLER).peek()
