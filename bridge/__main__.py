@@ -113,7 +113,7 @@ def _work(context: ProcessContext) -> None:
 
 def _core(context: ProcessContext, cuts: CutFile, memory: KeptValue[Remembered]) -> BridgeCore:
     arguments, rejections = context.arguments, context.transport.rejections
-    # Here and not above: a bridge to a real robot must not need the simulator, nor the other way round.
+    # Imported here: the real bridge must not need the simulator, and vice versa.
     if arguments.kind == "real":
         from bridge.real.build import real_bridge
 

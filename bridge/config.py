@@ -58,9 +58,9 @@ class BridgeConfig(Struct, frozen=True, forbid_unknown_fields=True):
     start_arm: ArmPosture = (1.57, -1.2, 0.0, -2.6, 0.0, 1.9, 0.785)
     max_age_s: Annotated[float, at_most(0.2)] = 0.2
     fade_s: Annotated[float, at_most(0.1)] = 0.07
-    # The 0.2 s that are promised: what is wider leaves no time for a step that is late.
+    # The required 0.2 s: a larger value leaves no time for a late step.
     deadline_s: Annotated[float, at_most(0.2)] = 0.19
-    # From the vendor's limit down to what brakes from 0.3 m/s before the deadline.
+    # From the vendor's limit down to the deceleration that stops from 0.3 m/s before the deadline.
     wheel_acceleration: Annotated[float, at_most(17.9, 12.5)] = 13.5
     joint_margin: Annotated[float, at_least(0.005, 0.2)] = 0.01
     arm_lag_s: Positive = 0.02

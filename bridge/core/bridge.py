@@ -40,17 +40,17 @@ TICK_S = 0.001
 _ODOMETRY_TICKS = round(1 / ODOMETRY.rate_hz / TICK_S)
 _STATE_TICKS = round(1 / BRIDGE.rate_hz / TICK_S)
 _STOPS_TICKS = round(1 / STOPS.rate_hz / TICK_S)
-# At most so fast (rad/s) are wheels and joints when the blades may begin to close: 5 mm/s at the axle, and what holding
-# the tool in place takes.
+# Speed limits of wheels and joints for closing the blades (rad/s): 5 mm/s at the axle, and the motion that holding
+# the tool in place needs.
 _CUT_WHEELS, _CUT_JOINTS = 0.04, 0.1
 MOVING_CUT = "the robot is not at rest"
 # A robot without a step for this long (s) has stopped by its own deadlines, or is stopping: what is sent
-# begins with how it really moves.
+# starts from its measured motion.
 _STANDSTILL_S = 0.05
-# In these modes of its holder nothing moves, but for braking (s).
+# Modes of the holder in which nothing moves, except for braking, and the time limit of braking (s).
 _STILL: tuple[m.Mode, ...] = ("IDLE", "FAULT", "ESTOP_LATCHED")
 _BRAKING_S = 0.3
-# Faster than this (rad/s) is motion that the camera should follow.
+# Speed above which the camera uses its moving rate (rad/s).
 _MOVING = 0.01
 
 SceneryOf = Callable[[], tuple[int, tuple[Capsule, ...]]]
@@ -279,7 +279,7 @@ class BridgeCore:
 
     def _watch_robot(self, now: float) -> None:
         measured = self._measured
-        # A bridge that cannot remember stops and tokens would not know after a restart what must not move.
+        # A bridge that cannot store stops and tokens could move the robot after a restart.
         fault = measured.fault or self._memory.failure
         change = self._faults.follow(fault, measured.severe, bool(self._latch.stop_id), now)
         if change is not None:

@@ -8,9 +8,9 @@ from rolling_panda import messages as m
 from rolling_panda.messages.perception import CloseUpRequest
 from rolling_panda.messages.robot import CameraFrame
 
-# After motion or a cut the plant model wants some more pictures before the camera rests (s).
+# Time at the moving rate after motion or a cut, for the plant model (s).
 _AWAKE_S = 4.0
-# A picture that is older than this (s) gets the oldest posture that is remembered.
+# Length of the stored postures (s); an older picture gets the oldest one.
 _REMEMBERED_S = 2.0
 
 

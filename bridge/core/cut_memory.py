@@ -11,7 +11,7 @@ from rolling_panda.runtime.scheduling import set_priority
 from rolling_panda.runtime.state_folder import sync_folder
 
 FILE = "cuts"
-#: At the end the last entry is waited for this long (s).
+#: Time limit for the last entry at the end (s).
 _END_S = 2.0
 
 Kept = Literal["kept", "waiting", "failed"]
@@ -93,7 +93,7 @@ class CutFile:
         self._thread.join(_END_S)
 
     def _run(self) -> None:
-        # Scheduling is a thread's own: the disk comes after the control loop.
+        # Scheduling is per thread: the disk has a lower priority than the control loop.
         set_priority("interface")
         while True:
             with self._some:
@@ -110,7 +110,7 @@ class CutFile:
         try:
             descriptor = os.open(self._path, os.O_WRONLY | os.O_APPEND)
             try:
-                # A line that was cut off by a full disk or a killed process stays for itself.
+                # A line that was truncated by a full disk or a killed process stays a separate line.
                 line = f"\n{cut_id}\n".encode()
                 if os.write(descriptor, line) != len(line):
                     return False

@@ -5,7 +5,7 @@ from typing import Final
 from rolling_panda.messages.robot import fingerprint
 from rolling_panda.messages.types import MOST_EPOCHS
 
-#: A holder that has sent nothing valid for so long has lost the token to the next one who asks (s). Longer than the
+#: Time without a valid message after which another controller gets the token (s). Longer than the
 #: watchdog's deadline, so that the robot has come to rest before.
 SILENT_S: Final = 1.0
 
@@ -54,7 +54,7 @@ class Fence:
             at_rest: Whether the last commands are zero; only then the token changes hands.
         """
         if self._heard is None:
-            # Who held it before a restart of the bridge has as long as ever to be heard.
+            # The holder from before a restart of the bridge has the full time to send a message.
             self._heard = now
         if token != self.token:
             if self.token is not None and now - self._heard < SILENT_S:

@@ -26,7 +26,7 @@ class StopLatch:
         self.stops = stops
         self.released_by = released_by
         self._over = dict.fromkeys(released)
-        #: The hardware stop is pressed: nothing is released before it is not.
+        #: Whether the hardware stop is pressed. Nothing is released while it is.
         self.hardware = False
 
     @property
@@ -57,7 +57,7 @@ class StopLatch:
         if request.stop_id in self._over or any(stop.stop_id == request.stop_id for stop in self.stops):
             return False
         record = StopRecord(request.stop_id, request.source, request.user, request.reason, max(0.0, wall_time))
-        # Of very many the first ones stay beside the newest: they say how it began.
+        # Beyond the limit the first stops are kept beside the newest: they show the cause.
         self.stops = (record, *(self.stops if len(self.stops) < _MOST else (*self.stops[: _MOST - 2], self.stops[-1])))
         return True
 

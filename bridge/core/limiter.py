@@ -6,7 +6,7 @@ from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.jerk_limit import largest_rise
 from rolling_panda.model.robot import ARM_Q, ARM_XI, Limits
 
-# Share of the acceleration that braking ahead of a joint's limit counts on: the servos lag.
+# Fraction of the acceleration that is assumed for braking before a joint's limit, because the servos lag.
 _BRAKING = 0.5
 
 

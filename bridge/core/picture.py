@@ -10,7 +10,7 @@ from PIL import Image
 
 from rolling_panda.messages.robot import Intrinsics
 
-#: Metres a depth count: 0.5 mm resolves the sensor's noise at 0.3 m and reaches 32 m.
+#: Depth of one count (m): 0.5 mm resolves the sensor's noise at 0.3 m and reaches 32 m.
 DEPTH_UNIT = 0.0005
 _FARTHEST = 65535 * DEPTH_UNIT
 _JPEG_QUALITY = 80

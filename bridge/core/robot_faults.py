@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from rolling_panda.messages.robot import StopRequest
 
-# So long after a person's release (s) the robot may take to recover before it is stopped anew.
+# Time for the robot to recover after a person's release, before it is stopped again (s).
 _RECOVERY_S = 3.0
 
 
@@ -36,7 +36,7 @@ class RobotFaults:
             now: Present time.
         """
         new = fault != self.current
-        # What a person has released and the robot has not recovered from is a stop of its own again.
+        # A fault that persists after its release latches a new stop.
         again = bool(fault) and severe and not stopped and now >= self._recovering_until
         if not new and not again:
             return None

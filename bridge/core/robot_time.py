@@ -3,9 +3,9 @@
 from collections import deque
 from typing import Protocol
 
-# A bridge that has fallen behind takes no more than this many steps at once.
+# Largest number of steps at once for a bridge that is late.
 _BURST = 20
-#: Of the real-time factor (s).
+#: Window of the real-time factor (s).
 _WINDOW_S = 1.0
 
 
@@ -29,7 +29,7 @@ class SteppedTime:
     A machine that was suspended or is too slow only loses simulated time.
     """
 
-    # Behind by more than this (s), time runs slower instead of hurrying.
+    # Delay beyond which time is lost instead of made up (s).
     _CATCH_UP_S = 0.1
 
     def __init__(self, clock: float, tick_s: float) -> None:

@@ -3,7 +3,7 @@
 from collections import OrderedDict, deque
 
 _WINDOW_S = 1.0
-# As many as go out in a second at the highest rate: what is not answered by then is not waited for.
+# Joint states in a second at the highest rate. Older ones are not expected to be answered.
 _REMEMBERED = 1000
 
 

@@ -16,9 +16,9 @@ NOT_AT_REST = "the first setpoint after a standstill must be zero"
 
 #: Speed below which a setpoint means rest (rad/s).
 _REST = 1e-3
-# 2 s of joint states at 1 kHz: what is older is too old whatever the configuration.
+# 2 s of joint states at 1 kHz: older ones are too old for any configuration.
 _REMEMBERED = 2000
-# A controller that works exactly at the limit must not be refused for its last bit.
+# Tolerance for rounding: a command exactly at the limit must not be refused.
 _ROUNDING = 1.0 + 1e-9
 
 

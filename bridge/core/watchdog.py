@@ -1,6 +1,6 @@
 """Watchdog: fades the last setpoint to zero when commands stop."""
 
-#: No setpoint fades earlier than this (s), two periods of control: it would never be followed.
+#: Earliest start of fading (s): two control periods. Earlier, no setpoint would be followed.
 _ALWAYS_S = 0.02
 
 

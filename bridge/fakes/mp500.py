@@ -13,7 +13,7 @@ from rolling_panda.model.differential_drive import DifferentialDrive
 from rolling_panda.transport.zenoh import ForeignWire
 
 RATE_HZ = 50.0
-# The maker's own.
+# The maker's values.
 _WATCHDOG_S = 1.0
 # Limits of the base (maker's figures: m/s, m/s²).
 _SPEED, _ACCELERATION = 1.5, 2.4
@@ -34,7 +34,7 @@ class FakeMp500:
             wheels: Mechanics of the wheels.
             drive: Geometry of the base.
         """
-        # Zenoh closes a session that nobody holds.
+        # Zenoh closes a session without references.
         self._wire, self._wheels, self._drive = wire, wheels, drive
         self._lock = threading.Lock()
         self._command, self._command_at, self._commands = (0.0, 0.0), -math.inf, 0

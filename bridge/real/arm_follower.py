@@ -16,14 +16,14 @@ from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_XI, Limits
 
 TICK_S = 0.001
-# Targets that come in farther apart than this (s) are followed as if they had come so: the delay must stay small.
+# Longest assumed time between two targets (s), so that the delay stays small.
 _LONGEST_SPAN = 0.02
-# In a row; the next one stops the arm.
+# Lost packets in a row; one more stops the arm.
 _LOST = 19
-# Every joint's acceleration dies away in two periods, at half of it in the first: two rows of lost packets with one
-# command in between are the worst there can be.
+# Every joint's acceleration decays in two periods, to half of it in the first. The worst case is two series of
+# lost packets with one command in between.
 _REPEATS = 1.5 * _LOST
-# Of the arm's limits: nobody knows how its control box rounds.
+# Fraction of the arm's limits, because the rounding of its control box is unknown.
 _SHARE = 0.999
 
 
@@ -57,7 +57,7 @@ class ArmFollower:
 
     def aim(self, target: Array, at: float) -> None:
         """A target (7, rad/s) was written at `at`."""
-        # After silence it begins where the fading has led, not at the target from before.
+        # After silence it starts from the faded value, not from the earlier target.
         self._start = self._watchdog.trust(at) * self._goal(at)
         self._span = min(max(at - self._began, TICK_S), _LONGEST_SPAN)
         self._target, self._began = target, at

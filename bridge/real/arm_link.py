@@ -68,7 +68,7 @@ class SharedNote:
 
     def __init__(self, context: SpawnContext, size: int) -> None:
         """Room for `size` numbers, all zero."""
-        # Two counters stand before the numbers: writes begun and writes ended. They differ while a write is going on.
+        # Two counters precede the numbers: writes begun and writes ended. They differ during a write.
         self._numbers: Any = context.RawArray("d", size + 2)
         self._text: Any = context.RawArray("c", _TEXT)
 

@@ -182,7 +182,7 @@ def _reached(wire: TransportConfig, connect: str) -> TransportConfig:
 def _camera(wire: TransportConfig, config: CameraConfig, fakes: bool) -> RealSense:
     if not fakes:
         return open_realsense(config)
-    # Here and not above: nothing of the fakes is loaded where there are none.
+    # Imported here: without fakes none of their code is loaded.
     from bridge.real.software_realsense import open_fake_realsense
 
     return open_fake_realsense(ForeignWire(wire), config.rate_hz)

@@ -17,7 +17,7 @@ from rolling_panda.model.robot import ARM_Q, Limits, RobotModel
 _WATCH_S = 2.0
 # Long enough for the arm's process to start and connect.
 _SETTLE_S = 6.0
-# Half of the rate that the maker's node has by default.
+# Half of the default rate of the maker's node.
 _LEAST_WHEELS_HZ = 40.0
 _LEAST_BATTERY = 0.2
 _AT_REST = 0.02
@@ -44,7 +44,7 @@ def check(config_path: Path, wire: TransportConfig, fakes: bool = False) -> None
     model = RobotModel(load_section(config_path, "robot", RobotConfig))
     devices = open_devices(config_path, wire, model, False, fakes)
     try:
-        # Which of them is silent is in the table.
+        # The table shows which of them is silent.
         with contextlib.suppress(InputError):
             wait_for_states(devices, _SETTLE_S)
         findings = inspect(devices, load_section(config_path, "real", RealConfig), model.limits)
@@ -126,7 +126,7 @@ def _hand(devices: Devices, config: RealConfig, frames: int, lasted: float) -> l
         findings = [Finding("camera", "switched off", "[real.camera] enabled = true", False)]
     if isinstance(devices.blades, NoCutter):
         return [*findings, Finding("cutter", "none", '[real.cutter] service = "…"', False)]
-    # Whatever would be asked of it moves the blades.
+    # Any request would move the blades.
     return [*findings, Finding("cutter", f"{config.cutter.service}, not asked", "try it with the blades guarded", True)]
 
 

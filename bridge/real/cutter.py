@@ -49,7 +49,7 @@ class Cutter:
         """Whether the blades may close now; one that closes without it opens again."""
         if self._enabled and not blades and self._status.state == "closing":
             self._interrupted.set()
-            # Beside the request that is under way: the device must hear it at once.
+            # Concurrent with the request in progress: the device must get it at once.
             threading.Thread(target=self._call_service, args=(False,), name="cutter-open", daemon=True).start()
         self._enabled = blades
 

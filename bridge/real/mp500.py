@@ -27,9 +27,9 @@ COMMAND, WHEELS, ODOMETRY = "cmd_vel", "drives/joint_states", "odom"
 EMERGENCY, BATTERY = "emergency_stop_state", "battery_state"
 SOFT_STOP, SOFT_RELEASE = "set_EMstop", "unset_EMstop"
 FREE = 0
-# Slower than this (rad/s) a wheel is at rest: 7 mm/s.
+# Speed below which a wheel is at rest (rad/s): 7 mm/s.
 _REST = 0.05
-# A stamp that jumps by more than this (s) is no measure of the time between two messages.
+# Largest difference of stamps that counts as the time between two messages (s).
 _LONGEST_GAP = 0.25
 _SERVICE_S = 1.0
 # A service without arguments: CDR header, and one byte since a structure has at least one.
@@ -84,7 +84,7 @@ class Mp500:
         self._rest_since: float | None = None
         self._runaway = ""
         self._battery = float("nan")
-        #: Messages by topic, and those among them that were none.
+        #: Number of messages by topic, and of unreadable ones.
         self.heard: Counter[str] = Counter()
         self.rejected = 0
         prefix = f"{config.namespace}/" if config.namespace else ""
@@ -151,7 +151,7 @@ class Mp500:
     def _next(self, now: float) -> Array:
         fault, severe = self._fault(now)
         if severe:
-            # The motors have no power: what follows begins at zero, by a ramp.
+            # The motors have no power: the next motion starts from zero with a ramp.
             self._sent = np.zeros(2)
         else:
             trust = 0.0 if fault else min(self._watchdog.trust(now), self._wheels.trust(now))
@@ -167,10 +167,10 @@ class Mp500:
         """Whether wheels turn that were told to rest; True once."""
         if self._runaway or self._rest_since is None or now - self._rest_since < self._config.runaway_s:
             return False
-        # Old speeds are no sign of anything.
+        # Stale speeds show nothing.
         if now - self._wheels_at > self._config.stale_s:
             return False
-        # By hand, with the motors off, it may be pushed about.
+        # With the motors off the base may be pushed by hand.
         if self._emergency != FREE or float(np.abs(self._velocity).max()) <= _REST:
             return False
         self._runaway = "the wheels turn though zero is commanded; the relay board was told to stop the motors"
@@ -239,7 +239,7 @@ class Mp500:
             self._battery = float(message.percentage)
 
     def _on_odometry(self, data: bytes, at: float) -> None:
-        # The base's own odometry is not used: the bridge has its own from the wheels. It tells that the node is alive.
+        # The base's odometry is not used, because the bridge integrates the wheels. It shows that the node is alive.
         self.heard[ODOMETRY] += 1
 
     def _call(self, service: str) -> None:

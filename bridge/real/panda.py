@@ -14,7 +14,7 @@ from rolling_panda.errors import InputError
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import Limits
 
-# A state older than this (s) is a fault: the control box tells a thousand a second, and stops an arm that lost 20.
+# Age limit of a state (s): the control box sends 1,000 a second, and stops an arm that lost 20.
 _STALE_S = 0.08
 _CLOSE_S = 2.0
 
@@ -82,7 +82,7 @@ class Panda:
 
 
 def _serve(config: ArmConfig, limits: Limits, link: ArmLink, moving: bool, parent: int) -> None:
-    # Here and not above: only the arm's process loads libfranka.
+    # Imported here: only the arm's process loads libfranka.
     from bridge.real.panda_process import run
 
     run(config, limits, link, moving, parent)

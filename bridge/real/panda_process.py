@@ -45,7 +45,7 @@ def run(config: ArmConfig, limits: Limits, link: ArmLink, moving: bool, parent: 
         try:
             session.serve()
         except RuntimeError as error:
-            # Every error of libfranka comes as this one.
+            # Base class of all errors of libfranka.
             session.say(f"arm: {_words(error)}")
             time.sleep(_RETRY_S)
 

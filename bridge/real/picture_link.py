@@ -5,7 +5,7 @@ import msgspec
 from bridge.core.picture import Picture
 from rolling_panda.messages.robot import Intrinsics
 
-#: Key that the pictures travel under.
+#: Key of the pictures.
 KEY = "fake-camera/exposure"
 
 

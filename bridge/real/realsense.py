@@ -13,7 +13,7 @@ from rolling_panda.errors import InputError
 from rolling_panda.messages.robot import Intrinsics
 
 _WAIT_MS = 1000
-# No frame for so long (s) is a fault worth telling: at 30 frames a second, sixty of them.
+# Time without a frame that counts as a fault (s): sixty frames at 30 a second.
 _STALE_S = 2.0
 
 
@@ -82,7 +82,7 @@ class RealSense:
                     self._asked.clear()
                     self._ready = replace(self._picture(frames), taken_at=taken_at)
             except RuntimeError as error:
-                # librealsense tells everything so: no frame in time, a cable that was pulled.
+                # librealsense reports all errors like this: a missing frame, a disconnected cable.
                 self._fault = "" if "arrive" in str(error) else f"camera: {error}"
 
     def _picture(self, frames: Any) -> Picture:

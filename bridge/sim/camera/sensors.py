@@ -11,7 +11,7 @@ from bridge.sim.vineyard.row import Array
 
 #: Relative depth step of an edge.
 _STEP = 0.04
-#: Shares of the pixels with edge artifacts that get the foreground depth and a mixture; the rest gets none.
+#: Fractions of the pixels with edge artifacts that get the foreground depth and a mixture; the rest gets none.
 _NEARER, _MIXED = 0.45, 0.15
 #: Size of the patches without depth (px).
 _PATCH = 6

@@ -35,7 +35,7 @@ ROW = np.dtype(
     ]
 )
 CUTTER = ("open", "closing", "opening", "jammed")
-#: The robot stands below these speeds (m/s, rad/s).
+#: Speeds below which the robot is at rest (m/s, rad/s).
 _STANDSTILL = 0.01
 _ROWS_PER_BLOCK = 100
 _BLOCK_HEADER = struct.Struct("<cI")
