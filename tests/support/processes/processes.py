@@ -94,7 +94,7 @@ class Processes:
             if ended or time.monotonic() > end:
                 why = f"{', '.join(ended)} ended" if ended else f"waited {limit_s:.0f} s for {what}"
                 raise RollingPandaError(f"{why}; {self.describe()}\n{self.logs()}")
-            time.sleep(0.02)
+            time.sleep(0.05)
         return value
 
     def ended(self) -> list[str]:
