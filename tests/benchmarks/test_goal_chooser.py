@@ -1,35 +1,15 @@
 import numpy as np
-import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks.control.goal_planner import GoalChooser
-from controller.motion.speed_limits import plan_limits
-from controller.whole_body.collision import CollisionModel
 from controller.whole_body.manipulability import arm_omega
 from controller.whole_body.obstacle import Obstacle
-from rolling_panda.model.robot import ARM_Q, RobotModel
+from rolling_panda.model.robot import ARM_Q
+from tests.benchmarks.test_goal_planner import COLLISION, LIMITS, ROBOT, pose, start
 
-ROBOT = RobotModel()
-COLLISION = CollisionModel(ROBOT)
-LIMITS = plan_limits(ROBOT, base_speed=0.8, base_yaw_rate=0.6)
 CHOOSER = GoalChooser(ROBOT, COLLISION, LIMITS)
-HOME = np.array([-0.2784, -0.1128, -0.0354, -2.0055, 1.6759, 1.2124, -0.269])
-
-
-def start(base=(0.0, 0.0, 0.0)):
-    q = np.zeros(12)
-    q[:3], q[3:5], q[ARM_Q] = base, (1.0, 2.0), HOME
-    return q
-
-
-def pose(x, y, z, yaw=0.0, tilt=0.0, roll=0.0):
-    """The tool's z horizontal along yaw, tilted down by tilt."""
-    R = pin.rpy.rpyToMatrix(0, 0, yaw) @ pin.rpy.rpyToMatrix(0, np.pi / 2 + tilt, 0) @ pin.rpy.rpyToMatrix(0, 0, roll)
-    return pin.SE3(R, np.array([x, y, z]))
-
-
 angle = st.floats(-3.2, 3.2)
 
 
@@ -64,7 +44,7 @@ def test_a_near_goal_needs_no_driving():
 
 
 def test_with_a_fixed_base_only_the_arm_moves():
-    found = CHOOSER.find(start((1.0, 2.0, 0.5)), pose(1.5, 2.3, 0.9, yaw=0.5), base_fixed=True)
+    found = CHOOSER.find(start(base=(1.0, 2.0, 0.5)), pose(1.5, 2.3, 0.9, yaw=0.5), base_fixed=True)
     assert found.stands
     for stand in found.stands:
         np.testing.assert_array_equal(stand.q[:5], [1.0, 2.0, 0.5, 1.0, 2.0])

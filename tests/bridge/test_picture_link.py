@@ -17,16 +17,9 @@ from rolling_panda.config import load_section
 from rolling_panda.messages.types import WOOD_CLASSES, WoodClass
 from rolling_panda.model.robot import ARM_Q, RobotModel
 from rolling_panda.resources import resource
+from tests.support.cameras import looking_left
 
 EXACT = CameraConfig(width=424, height=240, depth_unit=0.0001).ideal()
-
-
-def looking_left(x: float = 0.0, y: float = 0.0, z: float = 1.0) -> Array:
-    """Level, towards +y: image right is +x, image down is -z."""
-    T = np.eye(4)
-    T[:3, :3] = np.column_stack([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
-    T[:3, 3] = [x, y, z]
-    return T
 
 
 def upright_rod(kind: WoodClass, x: float, y: float, radius: float) -> Rod:

@@ -6,37 +6,24 @@ import pytest
 
 from bridge.config import BridgeConfig
 from bridge.core.interface import Setpoint
-from bridge.core.picture import Picture
 from bridge.sim.robot.robot import SimulatedRobot, VelocityServos
 from bridge.sim.robot.trace import TraceWriter, read
-from bridge.sim.vineyard.row import Array, Rod, Row
+from bridge.sim.vineyard.row import Rod, Row
 from rolling_panda.config import load_section
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.resources import resource
+from tests.support.cameras import Blind
 
 CONFIG = load_section(resource("assets/config/sim.toml"), "bridge", BridgeConfig)
 DRIVE = RobotModel().drive
-
-
-class Blind:
-    """A renderer without a camera."""
-
-    def expose(self, row: Row, T_world_camera: Array) -> bool:
-        return False
-
-    def ready(self) -> Picture | None:
-        return None
-
-    def close(self) -> None:
-        pass
 
 
 def robot(row: Row | None = None, trace: TraceWriter | None = None) -> SimulatedRobot:
     return SimulatedRobot(CONFIG, row or Row(()), Blind(), trace)
 
 
-def setpoint(v: float = 0.0, omega: float = 0.0, arm: tuple[float, ...] = (0.0,) * 7, blades: bool = True) -> Setpoint:
-    return Setpoint(np.array([*DRIVE.wheels(v, omega), *arm]), blades, 1, 1, 0.0)
+def setpoint(v: float = 0.0, omega: float = 0.0, arm: tuple[float, ...] = (0.0,) * 7) -> Setpoint:
+    return Setpoint(np.array([*DRIVE.wheels(v, omega), *arm]), True, 1, 1, 0.0)
 
 
 @pytest.mark.parametrize(("v", "omega"), [(0.3, 0.0), (-0.3, 0.0), (0.0, 0.6), (0.25, -0.4)])

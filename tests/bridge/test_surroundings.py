@@ -8,16 +8,10 @@ from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from rolling_panda.messages.types import WOOD_CLASSES
+from tests.support.cameras import looking_left
 
 CONFIG = VineyardConfig()
 BARE = msgspec.structs.replace(CONFIG, hose_height=0.0, rows_behind=0, ties_a_vine=(0, 0), old_cuts_a_vine=(0, 0))
-
-
-def looking_left(x: float, y: float, z: float):
-    T = np.eye(4)
-    T[:3, :3] = np.column_stack([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
-    T[:3, 3] = [x, y, z]
-    return T
 
 
 def test_the_wood_of_the_year_does_not_depend_on_what_stands_beside_it():

@@ -10,6 +10,7 @@ from controller.whole_body.hierarchy import Hierarchy
 from controller.whole_body.saturation import Saturation
 from controller.whole_body.task import ActuatorTask, IkProblem, Inequalities, Posture, ToolTask
 from rolling_panda.model.robot import ARM_Q, ARM_XI, RobotModel
+from tests.controller.test_follower import integrate
 
 ROBOT, CONFIG, DT = RobotModel(), ControllerConfig(), 0.01
 LIMITS = ROBOT.limits
@@ -57,13 +58,6 @@ def settled(method, make, ticks=80):
         out = method.solve(make(sent))
         sent = out.xi
     return out
-
-
-def integrate(q, xi):
-    q = q.copy()
-    q[:3] = ROBOT.drive.integrate(q[:3], xi[0] * DT, xi[1] * DT)
-    q[3:] += xi * DT
-    return q
 
 
 @pytest.mark.parametrize("base", MODES)

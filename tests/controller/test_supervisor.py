@@ -25,6 +25,13 @@ def ready():
     return r
 
 
+def on_the_way_home():
+    r = ready()
+    assert r.ask(intents.Home(user="ada")).ok
+    r.run(0.1)
+    return r
+
+
 def stays(r):
     """The arm stays where it is, armed and with somebody who holds control."""
     before = r.q.copy()
@@ -33,9 +40,7 @@ def stays(r):
 
 
 def test_what_ends_a_mode_ends_what_moved_in_it():
-    r = ready()
-    assert r.ask(intents.Home(user="ada")).ok
-    r.run(0.1)
+    r = on_the_way_home()
     assert r.state.reason == "homing the arm"
     r.stop()
     r.run(0.2)
@@ -47,9 +52,7 @@ def test_what_ends_a_mode_ends_what_moved_in_it():
 
 
 def test_a_lost_server_ends_the_way_home_without_a_change_of_mode():
-    r = ready()
-    assert r.ask(intents.Home(user="ada")).ok
-    r.run(0.1)
+    r = on_the_way_home()
     r.server = False
     r.run(3.0)
     assert sum("homing was stopped" in text for text in r.events) == 1, r.events
@@ -58,9 +61,7 @@ def test_a_lost_server_ends_the_way_home_without_a_change_of_mode():
 
 
 def test_who_is_heard_no_more_ends_the_way_home_with_a_warning_and_is_not_told_so_where_nothing_moves():
-    r = ready()
-    assert r.ask(intents.Home(user="ada")).ok
-    r.run(0.1)
+    r = on_the_way_home()
     r.people.clear()
     said = told(outputs(r, 1.5))
     assert [severity for severity, text in said if "homing was stopped: control by ada has ended" in text] == [
@@ -76,9 +77,7 @@ def test_who_is_heard_no_more_ends_the_way_home_with_a_warning_and_is_not_told_s
 
 
 def test_an_operator_stops_the_way_home_and_is_named():
-    r = ready()
-    assert r.ask(intents.Home(user="ada")).ok
-    r.run(0.1)
+    r = on_the_way_home()
     assert r.ask(intents.Pause(user="ada")).ok
     r.run(0.1)
     assert r.state.mode == "READY"
@@ -298,9 +297,7 @@ def test_without_a_server_a_hand_moves_nothing_and_the_reason_is_told():
 
 
 def test_the_way_home_needs_measurements():
-    r = ready()
-    assert r.ask(intents.Home(user="ada")).ok
-    r.run(0.1)
+    r = on_the_way_home()
     r.frozen_sensors = True
     r.run(0.5)
     assert r.state.mode == "PROTECTIVE_STOP"

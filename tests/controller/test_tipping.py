@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 
 from bridge.config import BridgeConfig
 from bridge.core.interface import Setpoint
-from bridge.core.picture import Picture
 from bridge.sim.robot.robot import SimulatedRobot
-from bridge.sim.vineyard.row import Array, Row
+from bridge.sim.vineyard.row import Row
 from controller.whole_body.tipping import MARGIN, Tipping
 from rolling_panda.model.robot import ARM_Q, RobotModel
+from tests.support.cameras import Blind
 
 ROBOT = RobotModel()
 TIPPING = Tipping(ROBOT)
@@ -139,19 +139,6 @@ def test_whatever_is_asked_for_the_bound_keeps_the_robot_on_its_wheels(seed):
 
 def test_without_the_bound_the_same_rides_tip_the_robot():
     assert min(ride(seed, bounded=False) for seed in range(10)) < 0.0
-
-
-class Blind:
-    """A photographer without a camera."""
-
-    def expose(self, row: Row, T_world_camera: Array) -> bool:
-        return False
-
-    def ready(self) -> Picture | None:
-        return None
-
-    def close(self) -> None:
-        pass
 
 
 def base_tilt(sim):

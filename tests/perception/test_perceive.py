@@ -16,12 +16,11 @@ from perception.perceive import main
 from rolling_panda.messages.types import WOOD_CLASSES
 from rolling_panda.runtime.launch import child_environment, python_command
 from tests.support import onnx_by_hand
+from tests.support.cameras import looking_left
 
 #: For a machine that is busy with other things.
 PATIENCE_S = 120.0
-PLACE = np.eye(4)
-PLACE[:3, :3] = np.column_stack([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
-PLACE[:3, 3] = [0.5, -0.05, 1.05]
+PLACE = looking_left(0.5, -0.05, 1.05)
 
 
 @pytest.fixture(scope="module")

@@ -14,10 +14,9 @@ from bridge.sim.vineyard.truth import judge
 from perception.config import PerceptionConfig
 from perception.single_image import Photograph, find_cuts, load_photograph
 from rolling_panda.errors import InputError
+from tests.support.cameras import looking_left
 
-PLACE = np.eye(4)
-PLACE[:3, :3] = np.column_stack([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
-PLACE[:3, 3] = [0.5, -0.05, 1.05]
+PLACE = looking_left(0.5, -0.05, 1.05)
 
 
 @pytest.fixture(scope="module")

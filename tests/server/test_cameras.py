@@ -25,6 +25,14 @@ def view(client_id=1):
     return SimpleNamespace(client_id=client_id, camera=camera, atomic=nullcontext)
 
 
+def placed():
+    """Cameras that have seen one view, which stands beside the row."""
+    cameras, mine = SceneCameras(SERVER), view()
+    mine.camera.position = np.array([-1.0, -2.0, 2.0])
+    cameras.step([mine], 0.0)
+    return cameras, mine
+
+
 @pytest.mark.parametrize("preset", get_args(CameraPreset))
 def test_a_preset_goes_with_the_robot(preset):
     here, there = preset_pose(preset, at(), TOOL), preset_pose(preset, at(3.0, 0.2), TOOL + [3.0, 0.2, 0.0])
@@ -142,9 +150,7 @@ def test_from_wherever_it_comes_it_rests_near_the_point_before_the_row_and_above
 
 
 def test_who_has_just_moved_the_camera_is_taken_along_a_while_later_and_at_once_by_choosing():
-    cameras, mine = SceneCameras(SERVER), view()
-    mine.camera.position = np.array([-1.0, -2.0, 2.0])
-    cameras.step([mine], 0.0)
+    cameras, mine = placed()
     mine.camera.position = np.array([-1.2, -2.0, 2.0])
     cameras.step([mine], 10.0)
     cameras.fly([mine], POINT, wait_for_user=True)
@@ -160,9 +166,7 @@ def test_who_has_just_moved_the_camera_is_taken_along_a_while_later_and_at_once_
 
 
 def test_a_hand_at_the_camera_ends_its_flight():
-    cameras, mine = SceneCameras(SERVER), view()
-    mine.camera.position = np.array([-1.0, -2.0, 2.0])
-    cameras.step([mine], 0.0)
+    cameras, mine = placed()
     cameras.fly([mine], POINT)
     brought(cameras, [mine], 0.0, 0.2)
     mine.camera.position = np.array([0.0, -3.0, 3.0])
@@ -183,9 +187,7 @@ def test_a_preset_is_kept_for_a_while_too():
 
 
 def test_late_reports_of_a_flight_are_not_taken_for_a_hand():
-    cameras, mine = SceneCameras(SERVER), view()
-    mine.camera.position = np.array([-1.0, -2.0, 2.0])
-    cameras.step([mine], 0.0)
+    cameras, mine = placed()
     cameras.fly([mine], POINT)
     there = mine.camera.position.copy()
     late = [there] * 3

@@ -1,0 +1,27 @@
+"""Cameras for tests: where one is, and one that sees nothing."""
+
+import numpy as np
+
+from bridge.core.picture import Picture
+from bridge.sim.vineyard.row import Array, Row
+
+
+def looking_left(x: float = 0.0, y: float = 0.0, z: float = 1.0) -> Array:
+    """Level, towards +y: image right is +x, image down is -z."""
+    T = np.eye(4)
+    T[:3, :3] = np.column_stack([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
+    T[:3, 3] = [x, y, z]
+    return T
+
+
+class Blind:
+    """A renderer without a camera."""
+
+    def expose(self, row: Row, T_world_camera: Array) -> bool:
+        return False
+
+    def ready(self) -> Picture | None:
+        return None
+
+    def close(self) -> None:
+        pass
