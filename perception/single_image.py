@@ -20,7 +20,7 @@ from perception.skeleton.topology import perceive_plant
 from rolling_panda.errors import InputError
 from rolling_panda.messages.robot import Intrinsics
 
-#: Wider photographs are scaled down to this, the width of the training images; least width and height (px).
+#: Wider photographs are scaled down to this, the width of the training images; smallest width and height (px).
 MAX_WIDTH, _MIN_SIZE = 848, 64
 #: Horizontal field of view without intrinsics (degrees): the colour camera of a RealSense D435i.
 _DEFAULT_FIELD_OF_VIEW = 69.0
@@ -28,7 +28,7 @@ _DEFAULT_FIELD_OF_VIEW = 69.0
 _PLAUSIBLE_DEPTH = (0.1, 20.0)
 #: Diameter of a common cane (m): the scale of a photograph without depth.
 _COMMON_DIAMETER = 0.008
-#: Least width of canes, and least number of cane pixels (px).
+#: Smallest width of canes, and smallest number of cane pixels (px).
 _MIN_CANE_WIDTH, _MIN_CANE_PIXELS = 2.0, 40
 #: Without depth all lengths are uncertain by this factor: a common cane is 5 to 13 mm thick.
 _SCALE_UNCERTAINTY = 1.6

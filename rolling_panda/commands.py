@@ -484,7 +484,7 @@ COMMANDS: Final[tuple[Command, ...]] = (
     Command(ReturnControl, "control", "/control/return"),
 )
 COMMAND_OF: Final[dict[type[Struct], Command]] = {command.message: command for command in COMMANDS}
-#: Messages to the controller, told apart by their tags.
+#: Messages to the controller, distinguished by their tags.
 INTENTS: Final = tuple(command.message for command in COMMANDS if issubclass(command.message, Intent))
 
 if TYPE_CHECKING:

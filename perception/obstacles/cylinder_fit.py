@@ -34,7 +34,7 @@ _MIN_REPORTED = 20
 _UPRIGHT_WIDTH, _ALONG_WIDTH, _RESOLUTION = 0.06, 0.04, 0.01
 #: Across a gap longer than this a wire continues only at the same height, within this (m).
 _MAX_GAP, _SAME_HEIGHT = 0.5, 0.03
-#: Least share of the levels of a wire with cells (true wires of 0.5 to 5.3 m had 0.47 and more).
+#: Smallest fraction of the levels of a wire with cells (true wires of 0.5 to 5.3 m had 0.47 and more).
 _MIN_DENSITY = 0.25
 #: Most iterations of a fit.
 _ITERATIONS = 8

@@ -26,7 +26,7 @@ _WINDOW = 50
 _BITS = 21
 #: Standard deviation of a stereo camera's depth at 1 m (m); it grows with the square of the distance.
 _DEPTH_NOISE = 0.004
-#: Least share of valid depth in the image of an uncovered camera.
+#: Smallest fraction of valid depth in the image of an uncovered camera.
 _MIN_VALID_DEPTH = 0.2
 #: Smallest depth at which a cell can be checked (m).
 _MIN_DEPTH = 0.1
@@ -158,7 +158,7 @@ class OccupancyGrid:
         steps = np.arange(-half, half + 1)
         y, x = rows[:, None, None] + steps[:, None], cols[:, None, None] + steps
         depth, classes = view.depth[y, x], labels[y, x]
-        # An invalid depth on sky or ground is a long ray, unless the camera is covered. Any other one tells nothing.
+        # An invalid depth on sky or ground is a long ray, unless the camera is covered. Any other one is ignored.
         far = (depth <= 0.0) & ((classes == BACKGROUND) | (classes == GROUND))
         if np.count_nonzero(view.depth[::4, ::4]) > _MIN_VALID_DEPTH * view.depth[::4, ::4].size:
             depth = np.where(far, np.float32(np.inf), depth)

@@ -24,7 +24,7 @@ _SAME_NODE = 0.018
 _MIN_SHARE = 0.4
 #: Observations that a mean covers.
 _WINDOW = 20
-#: Points of a cane's line for display, and its least length (m).
+#: Number of points of a cane's line for display, and its smallest length (m).
 _LINE_POINTS, _MIN_LINE = 9, 0.02
 
 

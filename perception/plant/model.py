@@ -9,7 +9,7 @@ from perception.arrays import Array, interpolate
 
 #: Mean distance of the visible half of a cylinder from its axis, in radii.
 SURFACE_OFFSET = np.pi / 4
-#: To either side, of the chord that tells a direction (m).
+#: Half the length of the chord that defines a direction (m).
 _CHORD = 0.01
 #: Why a cane's axis ends: the wood ends, something occludes it, or the image ends.
 CaneEnd = Literal["free", "hidden", "image border"]

@@ -12,7 +12,7 @@ from perception.arrays import Labels
 from perception.config import SkeletonConfig
 from perception.segmentation.frame import CANE, NODE, SPUR, View, class_pixels
 
-#: Neighbours, of eight, that must share the depth of a valid pixel.
+#: Number of neighbours, of eight, that must have the depth of a valid pixel.
 _MIN_SUPPORT = 3
 #: Half the side of the window from which a median is taken (px).
 _HALF_WINDOW = 2

@@ -89,5 +89,5 @@ def choose_segmenter(name: str, weights: Path | None = None, threads: int = 2) -
     try:
         return NetworkSegmenter(resource(SHIPPED), threads)
     except ModelError as error:
-        # Without the shipped file the program still runs, and every frame says what is missing.
+        # Without the shipped file the program still runs, and every frame reports the missing file.
         return NoSegmenter(f"no segmentation without the network's weights: {error}")

@@ -20,7 +20,7 @@ _CONNECTIVITY = np.ones((3, 3), dtype=bool)
 _MIN_SPUR, _MIN_TRUNK = 12, 300
 #: Blobs of spur nearer than this, with centres nearer than this, are one spur behind something thin (m).
 _SAME_SPUR, _NEAR_SPUR = 0.025, 0.08
-#: Every so many cordon pixels are used, and so many make a direction.
+#: Stride of the cordon pixels, and number of pixels for a direction.
 _CORDON_STRIDE, _MIN_CORDON = 4, 50
 
 

@@ -31,9 +31,9 @@ _BLADES = 0.010
 _POSITION_TOLERANCE, _RADIUS_TOLERANCE = 0.008, 0.001
 #: Largest distance of the axis from its capsules (m).
 _MAX_DEVIATION = 0.004
-#: Spacing of axis samples (m); every so many are checked for presence.
+#: Spacing of axis samples (m), and stride of the samples that are checked for presence.
 _SPACING, _PRESENCE_STRIDE = 0.005, 4
-#: A cane is gone when this share of its visible samples, and at least so many, are gone in so many frames in a row.
+#: A cane is gone if this fraction of its visible samples, and at least this number, is gone in this many frames.
 _GONE_SHARE, _MIN_VISIBLE, _GONE_FRAMES = 0.7, 3, 3
 #: Canes whose base is farther from the camera are not checked (m).
 _MAX_RANGE = 1.6

@@ -58,7 +58,7 @@ def _row(seed: int) -> list[tuple[NDArray[np.uint8], NDArray[np.float16], NDArra
     camera = Camera(_camera(rng), seed)
     out = []
     for view in range(VIEWS):
-        # Surveys from an arm's length, and closer looks; nobody holds a camera quite level.
+        # Survey views from an arm's length, and close-ups; cameras are not exactly level.
         away = rng.uniform(0.55, 1.1) if view else rng.uniform(0.3, 0.6)
         place = np.eye(4)
         tilt = rng.normal(0.0, np.radians([5.0, 6.0, 3.0]))

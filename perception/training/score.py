@@ -12,7 +12,7 @@ from perception.training.scenes import Scenes
 from rolling_panda.messages.types import WOOD_CLASSES
 
 _CANE = (WOOD_CLASSES.index("cane"), WOOD_CLASSES.index("node"))
-#: Every so many lines of a picture are looked at; wider stretches are canes side by side (px).
+#: Stride of the evaluated lines; wider stretches are canes side by side (px).
 _EVERY, _ALONE = 4, 9
 
 

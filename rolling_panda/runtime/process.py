@@ -23,7 +23,7 @@ from rolling_panda.topics import ROBOT_ID as ROBOT_ID
 from rolling_panda.transport.settings import add_wire_arguments
 from rolling_panda.transport.zenoh import Transport
 
-#: After its parent has ended a process has so long to end in order (s).
+#: Time limit for an orderly end after the parent has ended (s).
 _GRACE_S = 2.0
 _PRIORITY: dict[m.Process, Priority] = {
     "bridge": "control",

@@ -12,7 +12,7 @@ from uvicorn.server import ServerState
 
 from server.connections.listener import Connection, Connections, refusal
 
-#: Whoever still sends would be reset before they have read why it ends; so it stays open for so long, unread (s).
+#: Time for which a refused connection stays open (s): a reset would discard the reason before the client reads it.
 LINGER_S = 1.0
 _EARLIEST = 0.8
 

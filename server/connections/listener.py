@@ -18,11 +18,11 @@ import msgspec
 from rolling_panda.runtime.token_bucket import TokenBucket
 from server.config import ServerConfig
 
-#: WebSockets may be so much of what an address, or everybody, may have open: the rest is for requests, as the stop is.
+#: Fraction of the connections that may be WebSockets; the rest is for requests such as the stop.
 _SOCKETS_SHARE = 2 / 3
 #: Accepted in one turn of the loop; a stop that was accepted before is served between the turns.
 _A_TURN = 16
-#: What a session may say at once through all of its WebSockets, in seconds of its rate.
+#: Burst of a session over all of its WebSockets, in seconds of its rate.
 _BURST_S = 2.0
 #: How many WebSockets a session may open a second and at once: a new 3-D view is sent all that is in it.
 _OPEN_HZ, _OPEN_AT_ONCE = 10.0, 20.0
@@ -81,7 +81,7 @@ class Connections:
         """Count a connection that was accepted; False, and it does not count, where there is no room to be made."""
         crowded = self._of_address[new.address] >= self.limits.connections_per_address
         if crowded or len(self._open) >= self.limits.connections:
-            # Whoever has had an answer is less likely to be one of many that say nothing.
+            # A client that has had an answer is less likely to be part of a flood of idle connections.
             address = new.address if crowded else ""
             idle = self._first_idle(address, served=False) or self._first_idle(address, served=True)
             whose = new.address if crowded else "all addresses together"
@@ -92,7 +92,7 @@ class Connections:
             self.gone(idle)
             idle.end()
         if new.peer in self._open:
-            # Its port is used anew before the server has heard that the old connection is over.
+            # The port is reused before the server has noticed the end of the old connection.
             self.gone(self._open[new.peer])
         self._open[new.peer] = new
         self._of_address[new.address] += 1
@@ -164,7 +164,7 @@ class Listener(socket.socket):
                 return super().accept()
             self._accepted = (self._accepted + 1) % (_A_TURN + 1)
             if self._accepted == 0:
-                # What asyncio takes for "no more for now"; it asks again in its next turn.
+                # For asyncio this means "no more for now"; it retries in its next iteration.
                 raise BlockingIOError
             plain, peer = super().accept()
             accepted = _Counted(plain.family, plain.type, plain.proto, plain.detach())

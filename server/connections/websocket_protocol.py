@@ -19,7 +19,7 @@ _ENDED = "ended"
 _POLICY, _TRY_AGAIN = 1008, 1013
 #: What a browser that hung for a moment had to keep back may come at once, in seconds of the rate.
 _BURST_S = 2.0
-#: So many bytes are looked at before the messages in them are counted.
+#: Number of bytes that are parsed before their messages are counted.
 _PIECE = 4096
 _TURN_S = 0.05
 

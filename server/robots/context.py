@@ -30,7 +30,7 @@ from server.scene.viser_filter import GizmoDragEnd, GizmoUpdate
 _CONFIRM_POLL_S = 0.01
 #: A dragged gizmo's target is sent at once, but no sooner than this after the last one (s).
 _MIN_TARGET_PERIOD_S = 0.02
-#: Rate limit of a session's requests for motion; a busy browser may send so many at once.
+#: Rate limit and burst of a session's motion commands; a busy browser sends several at once.
 MOTION_RATE_HZ, _MOTION_BURST = 60.0, 20.0
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from rolling_panda.messages.supervision import NEVER_SEEN_S, Person, Presence
 from server.auth.sessions import Session
 
-#: A session that has sent nothing for so long (s) is absent.
+#: A session is absent this long after its last message (s).
 PRESENT_S = 1.0
 #: The first activity after a longer silence (s) is published at once; the next period could be too late for the lease.
 _SILENCE_S = 0.4

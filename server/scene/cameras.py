@@ -14,7 +14,7 @@ from rolling_panda.model.differential_drive import Array
 _STEP = 0.004
 #: The initial camera of new views is updated when the base has moved so far (m) or turned so far (rad).
 _INITIAL_CAMERA_STEP = 0.3
-#: Duration of a flight (s). A camera that the user has moved is not flown without being asked for so long (s).
+#: Duration of a flight (s), and time for which a camera moved by the user is not flown automatically (s).
 _FLIGHT_S, USER_PRIORITY_S = 0.5, 8.0
 #: Smallest and largest distance from the point at the end of a flight (m).
 _NEAREST, _FARTHEST = 0.5, 1.0

@@ -22,7 +22,7 @@ _DEADBAND = 2e-5
 _BASE_DEADBAND = 1e-3
 _GHOST_COLOR, _GHOST_OPACITY = (120, 190, 255), 0.35
 _TRAIL = "/trail/line"
-#: A point is added when the tool has moved so far (m); the trail has at most so many.
+#: Distance between two points of the trail (m), and their largest number.
 _TRAIL_STEP, _TRAIL_POINTS = 0.01, 200
 _TRAIL_NEW, _TRAIL_OLD = np.array([150, 205, 255.0]), np.array([62, 72, 84.0])
 

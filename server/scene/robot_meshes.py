@@ -114,7 +114,7 @@ def simplified(vertices: Array, faces: NDArray[Any]) -> trimesh.Trimesh:
         faces: (F, 3), indices of vertices.
     """
     mesh = trimesh.Trimesh(vertices, faces, process=False)
-    # Exporters part the vertices at every edge that is shaded sharp, and what is parted cannot collapse.
+    # Exporters split the vertices at every sharp edge, and split vertices cannot be merged by the simplification.
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
     wanted = max(_FEWEST_FACES, round(_DENSITY * mesh.area))
     if len(mesh.faces) <= wanted:

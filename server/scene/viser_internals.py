@@ -19,7 +19,7 @@ from viser.infra import _async_message_buffer as viser_buffer
 
 VISER_VERSION = viser.__version__
 _PATCHED = "_event_thread_patched"
-#: With more views than this, a viewer's view waits so long (s) between two updates.
+#: Number of views from which viewers' views are updated less often, and the time between two updates (s).
 _FEW_VIEWS, _VIEWER_PAUSE_S = 8, 0.2
 
 
