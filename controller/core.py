@@ -274,7 +274,7 @@ class Controller:
         return self._supervisor.situation(self._queue.waits, refused, now, intent)
 
     def _change_mode(self, asked: intents.Intent, now: float) -> str:
-        """Put the command's event to the mode machine; whoever moves a robot that nobody holds gets control."""
+        """Process the command's event. A client that moves a robot without a holder gets control."""
         command, authority = COMMAND_OF[type(asked)], self._supervisor.authority
         client = client_of(asked)
         if command.control:

@@ -116,7 +116,7 @@ class PlannerProcess:
 
 
 def _plan(connection: Connection, config: ControllerConfig, robot_config: RobotConfig) -> None:
-    """The process: answers requests until nobody is there to ask any more."""
+    """The planner process: answers requests until its parent has ended."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, name="parent-watch", daemon=True).start()
     # Only this process imports the planners.

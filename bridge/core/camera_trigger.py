@@ -54,7 +54,7 @@ class CameraTrigger:
         return self._waiting is None and (self._wanted is not None or ticks - self._last >= period)
 
     def follow(self, posture: Posture) -> None:
-        """The robot is here now: a camera that exposes at moments of its own tells later when that was."""
+        """Store the current posture. A free-running camera reports the time of its exposure later."""
         self._postures.append(posture)
         while posture.clock - self._postures[0].clock > _REMEMBERED_S:
             self._postures.popleft()

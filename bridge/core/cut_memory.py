@@ -22,7 +22,7 @@ class CutMemory(Protocol):
 
     @property
     def known(self) -> frozenset[str]:
-        """What was kept before this start."""
+        """Cut ids stored before this start."""
 
     def keep(self, cut_id: str) -> Kept:
         """Ask for a cut to be remembered, as often as wished; `kept` once it can no longer be forgotten."""
@@ -48,7 +48,7 @@ class CutFile:
     """
 
     def __init__(self, folder: Path) -> None:
-        """Read what was kept in a folder.
+        """Read the stored cuts of a folder.
 
         Raises:
             InputError: The file cannot be read or written.
@@ -73,7 +73,7 @@ class CutFile:
 
     @property
     def known(self) -> frozenset[str]:
-        """What was kept before this start."""
+        """Cut ids stored before this start."""
         return self._known
 
     def keep(self, cut_id: str) -> Kept:
@@ -86,7 +86,7 @@ class CutFile:
             return self._told[cut_id]
 
     def close(self) -> None:
-        """Write what waits and end."""
+        """Write the pending entries and end."""
         with self._some:
             self._closing = True
             self._some.notify()

@@ -15,7 +15,7 @@ class CutOrders:
     """Remembers every ordered cut; with a durable memory, also across restarts."""
 
     def __init__(self, memory: CutMemory | None = None) -> None:
-        """Start with what the memory knows."""
+        """Start with the stored cuts."""
         self._memory = memory or ForLife()
         self._known: set[str] = set(self._memory.known)
 

@@ -32,7 +32,7 @@ class Fence:
 
     @property
     def holder(self) -> str:
-        """Fingerprint of the token; empty when nobody holds it."""
+        """Fingerprint of the token; empty without a holder."""
         return "" if self.token is None else fingerprint(self.token)
 
     def refuse(self, epoch: int, token: str) -> str | None:

@@ -31,7 +31,7 @@ class StopLatch:
 
     @property
     def stop_id(self) -> str:
-        """The newest one, empty when none is latched."""
+        """Id of the newest latched stop; empty without one."""
         return self.stops[0].stop_id if self.stops else ""
 
     @property

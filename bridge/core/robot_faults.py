@@ -27,7 +27,7 @@ class RobotFaults:
         self._recovering_until = float("-inf")
 
     def follow(self, fault: str, severe: bool, stopped: bool, now: float) -> FaultChange | None:
-        """What the newest measurement changes; None for nothing.
+        """Change of the fault by the newest measurement; None without one.
 
         Args:
             fault: Why the robot does not move; empty when it does.

@@ -28,7 +28,7 @@ class RoundTrip:
             self._samples.append((clock, max(0.0, clock - sent)))
 
     def forget(self, clock: float) -> None:
-        """Leave out what is older than a second."""
+        """Remove times older than a second."""
         while self._samples and clock - self._samples[0][0] > _WINDOW_S:
             self._samples.popleft()
 

@@ -73,7 +73,7 @@ class SharedNote:
         self._text: Any = context.RawArray("c", _TEXT)
 
     def write(self, values: Array, text: str = "") -> None:
-        """Replace what is held; one writer only."""
+        """Replace the content; one writer only."""
         numbers = np.frombuffer(self._numbers)
         numbers[0] += 1
         numbers[2:] = values

@@ -99,7 +99,7 @@ class Cutter:
             time.sleep(self._config.retry_s)
 
     def _call_service(self, shut: bool) -> str | None:
-        """Close or open: empty when the blades are there, else why not; None when nobody answers in time."""
+        """Close or open. Returns the reason of a failure, empty on success, None without an answer in time."""
         config = self._config
         try:
             data = self._wire.ask(config.service, ros.encode(ros.make(ros.SET_BOOL, data=shut)), config.timeout_s)

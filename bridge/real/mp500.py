@@ -119,7 +119,7 @@ class Mp500:
             self._watchdog.feed(time.monotonic())
 
     def release(self) -> None:
-        """A person says that the relay board's soft stop may end; returns at once."""
+        """Release the relay board's soft stop, on behalf of a person; returns at once."""
         with self._lock:
             self._runaway = ""
             self._rest_since = None
@@ -243,7 +243,7 @@ class Mp500:
         self.heard[ODOMETRY] += 1
 
     def _call(self, service: str) -> None:
-        """Ask the relay board from a thread: the answer may take a second; what came of it is in the stop state."""
+        """Call the relay board from a thread: the answer may take a second. The stop state shows the result."""
 
         def ask() -> None:
             with contextlib.suppress(ServiceError):

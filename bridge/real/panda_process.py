@@ -96,7 +96,7 @@ class _Session:
                 self._follow(robot)
 
     def _check(self, state: Any) -> None:
-        """Whether the arm can be commanded as it is; what a person has to release stays until then."""
+        """Check whether the arm can be commanded. A fault that needs a release stays until the release."""
         if state.robot_mode == _MODE.kReflex:
             reasons = str(state.last_motion_errors) + str(state.current_errors)
             self._fault, self._severe = self._fault if self._severe else f"arm: reflex {reasons}", True

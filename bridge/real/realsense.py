@@ -98,7 +98,7 @@ class RealSense:
 
 
 def _taken_at(frame: Any) -> float | None:
-    """When it was exposed on the machine's monotonic clock (s); None where only the camera's own clock tells."""
+    """Time of exposure on the machine's monotonic clock (s); None if only the camera's clock is known."""
     if frame.get_frame_timestamp_domain().name == "hardware_clock":
         return None
     return time.monotonic() - (time.time() - 1e-3 * float(frame.get_timestamp()))

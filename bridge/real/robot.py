@@ -50,7 +50,7 @@ class Blades(Protocol):
     """Interface of `bridge.real.cutter.Cutter`."""
 
     def read(self) -> CutterStatus:
-        """What the blades do."""
+        """State of the blades."""
 
     def enable(self, blades: bool) -> None:
         """Whether they may close."""

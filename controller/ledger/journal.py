@@ -95,7 +95,7 @@ class Journal:
 
     @property
     def failure(self) -> str:
-        """Why nothing is being recorded; empty when it is."""
+        """Reason why the ledger cannot record; empty if it can."""
         return self._state.failure
 
     def add(self, kind: Kind, name: str, body: msgspec.Struct) -> int:
@@ -112,12 +112,12 @@ class Journal:
                 self.add("stop", stop.user or stop.source, stop)
 
     def drain(self) -> tuple[Record, ...]:
-        """What was added since the last time, for the ledger."""
+        """Return and remove the records since the last call, for the ledger."""
         records, self._waiting = tuple(self._waiting), []
         return records
 
     def observe(self, state: LedgerState, now: float) -> None:
-        """Take in how far the ledger is."""
+        """Update the durability of the records."""
         if state.durable > self._state.durable or state.durable >= self._number:
             self._unwritten_since = None
         if state.durable < self._number and self._unwritten_since is None:
@@ -129,7 +129,7 @@ class Journal:
         return number <= self._state.durable
 
     def trouble(self, now: float, patience_s: float) -> str:
-        """Why the ledger cannot be relied on; empty when it can."""
+        """Reason why the ledger is not reliable; empty if it is."""
         if self._state.failure:
             return self._state.failure
         if self._unwritten_since is not None and now - self._unwritten_since > patience_s:

@@ -38,7 +38,7 @@ class SessionReportBuilder:
         self._refused = 0
 
     def add(self, at: str, body: msgspec.Struct) -> bool:
-        """A row was written at a time (ISO 8601). Returns whether it is one that the report tells of."""
+        """Add a row with its time (ISO 8601). Returns whether it changes the report."""
         when = datetime.fromisoformat(at).timestamp()
         first = self._began == 0.0
         self._began, self._written = self._began or when, when

@@ -210,7 +210,7 @@ def read_head(head: Path) -> str | OSError | ValueError:
 
 
 def head_problem(database: sqlite3.Connection, head: str | OSError | ValueError) -> str:
-    """Why the row that the head names is not in the ledger; empty when it is, or nothing was ever written.
+    """Reason why the row named by the head is missing; empty if it is there, or if the ledger is empty.
 
     Args:
         database: The ledger.

@@ -88,7 +88,7 @@ class LedgerWriter:
         self.write([Record(0, "event", line.process, line)])
 
     def close(self) -> None:
-        """Write what waits, if that is possible soon, and close the ledger."""
+        """Write the waiting records within the time limit, and close the ledger."""
         with self._some:
             self._closing = True
             self._some.notify()

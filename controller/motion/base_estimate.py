@@ -58,7 +58,7 @@ class BaseEstimate:
         return q
 
     def _roll(self, stamp: float, left: float, right: float, odometry: m.Odometry) -> None:
-        """Go on by what the wheels have turned."""
+        """Integrate the motion of the wheels."""
         past = self._past
         if past and stamp < past[-1][0]:
             past.clear()

@@ -191,7 +191,7 @@ class ArmMotion:
         return self.time >= self.duration
 
     def step(self, robot: Measured, follower: Follower, dt: float) -> Tracking:
-        """One period of `dt` (s); what holds the joints back slows the motion's clock."""
+        """One period of `dt` (s). Limits of the joints slow the motion's clock."""
         progress = quintic(self.time, self.duration)
         xi = np.zeros(NXI)
         xi[ARM_XI] = self._span * progress.rate + self._gain * (self._start + self._span * progress.s - robot.q[ARM_Q])

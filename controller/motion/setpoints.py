@@ -30,15 +30,15 @@ class Setpoints:
 
     @property
     def at_rest(self) -> bool:
-        """Whether nothing moves by what was sent last."""
+        """Whether the last commands are zero."""
         return not np.any(self.sent)
 
     def admits(self, xi: Array) -> bool:
-        """Whether ξ̇ (9) is finite and inside the limits, after what was sent last."""
+        """Whether ξ̇ (9) is finite and within the limits, given the last command."""
         return self._saturation.admits(xi, self.sent)
 
     def smooth(self, xi: Array) -> Array:
-        """The last gate: what `admits` refuses becomes braking, and the arm's jerk is kept."""
+        """Final check: a command that `admits` refuses becomes braking. Keeps the arm's jerk limit."""
         if not self.admits(xi):
             xi = self._saturation.brake(self.sent)
         return self._saturation.smooth(xi, self.sent, self.before)

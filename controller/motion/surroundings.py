@@ -60,7 +60,7 @@ class Surroundings:
 
 
 def touchable(canes: Sequence[Capsule], axes: Axes, places: Sequence[Array]) -> set[int]:
-    """Which canes the blades may touch when they cut at these places: the spurs there, and what may yet be cut off.
+    """Canes that the blades may touch in cuts at these positions: those of the spurs there, and undecided ones.
 
     Args:
         canes: That stay, or of which it is not decided.

@@ -31,7 +31,7 @@ class Teleoperation:
         self.client = Client("", "")
 
     def holding(self, teleop: Sample[TeleopTarget] | None, now: float) -> bool:
-        """Whether the operator holds now: the newest demand says so, is fresh, and is one that can be followed."""
+        """Whether the operator holds: the newest target is fresh, held and valid."""
         newest = self._newest_target(teleop)
         if newest is None or not newest.message.hold or now - newest.at > self._config.hold_max_age_s:
             self.pressed = True
@@ -62,11 +62,11 @@ class Teleoperation:
         return self._newest
 
     def refuse(self) -> None:
-        """What is held now counts no more; it must be released first."""
+        """Void the current hold; it has to be released first."""
         self.pressed = False
 
     def step(self, robot: Measured) -> Tracking:
-        """One period of what is held."""
+        """One period of the held motion."""
         message = self._message
         assert message is not None
         xi, speed_scale = np.zeros(NXI), message.speed_scale * latency_speed_scale(message.round_trip_s)

@@ -121,7 +121,7 @@ class ToolMotion:
 
     @property
     def base(self) -> BaseMode:
-        """What the base is for now."""
+        """Current role of the base."""
         if self._free is None:
             return "frozen"
         return "row" if self._free[0] <= self.time < max(self._free[1], self._waits_until) else "frozen"
@@ -268,7 +268,7 @@ def _placed(
 
 
 def _free(legs: tuple[_Timed, ...]) -> tuple[float, float] | None:
-    """From when to when the base may move (s). Of two legs that overlap the later one says."""
+    """Start and end of the base's motion (s). In an overlap the later segment decides."""
     ends = (*(leg.begin for leg in legs[1:]), math.inf)
     times = [free for leg, end in zip(legs, ends, strict=True) if (free := leg.free(end)) is not None]
     return (times[0][0], times[-1][1]) if times else None

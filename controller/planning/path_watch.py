@@ -88,7 +88,7 @@ class PathWatch:
         return words
 
     def _new_spots(self, fresh: Sequence[Capsule]) -> Array:
-        """Places on what is new (m×5): where, the radius there, and of which capsule; only near the motion."""
+        """Samples of the new obstacles near the motion (m×5): position, radius and index of the capsule."""
         rows = [_spots(capsule, number) for number, capsule in enumerate(fresh)]
         spots = np.vstack([*rows, np.empty((0, 5))])
         room = spots[:, 3:4] + self._most
@@ -107,7 +107,7 @@ class PathWatch:
         return np.ascontiguousarray(needed[:, spots[:, 4].astype(int)])
 
     def _worst(self, way: "_Way", spots: Array, needed: Array) -> tuple[float, int, int, float]:
-        """By how much the nearest is too near (m), of which part and spot it is, and its distance (m)."""
+        """Largest violation of the required distance (m), its part and spot, and the distance (m)."""
         shapes, out = self._swept.shapes, np.zeros(5)
         spots = np.ascontiguousarray(spots[:, :4])
         _largest_violation(way.placed, way.low, way.high, shapes.half, shapes.around, spots, needed, out)

@@ -58,11 +58,11 @@ class PreviewManager:
         self._said_at = self._moved_at = -np.inf
 
     def restore(self, row: PreviewRequiredRow) -> None:
-        """Take up what was required before a restart."""
+        """Restore the requirement of an earlier start."""
         self.required = row.required
 
     def handlers(self) -> Handlers:
-        """Handlers of the commands about previews; each returns why it is refused, empty when done."""
+        """Handlers of the commands about previews; each returns the reason of a refusal, empty if done."""
         return {
             intents.RequirePreview: lambda asked, now: self._require(asked.required, asked.user),
             intents.RequestPreview: lambda asked, now: self._want(asked.point_id, now),
@@ -70,7 +70,7 @@ class PreviewManager:
         }
 
     def start_refused(self) -> str:
-        """Why work may not begin for want of an approval; empty when it may."""
+        """Reason why the start lacks an approval; empty if it does not."""
         if not self.required or self._phase == "approved":
             return ""
         if self._phase == "ready":
@@ -84,7 +84,7 @@ class PreviewManager:
         self._begun = self._phase == "approved"
 
     def permit(self, ticket: Ticket) -> str:
-        """Why the way to a cut may not begin or go on for want of an approval; empty when it may."""
+        """Reason why the motion to a cut lacks an approval; empty if it does not."""
         if not self.required:
             return ""
         name, preview = ticket.point.point_id, self._preview

@@ -113,7 +113,7 @@ class _Run:
         return Preview(self._request, cuts, self._plans, tuple(rows), now, self._digest(), swept=swept)
 
     def _period(self, number: int, now: float) -> MotionResult:
-        """One control period, and what the robot does of it."""
+        """One control period, with the robot's response."""
         movement, sequence = self._movement, self._movement.sequence
         inputs = self._inputs(number, now)
         self._journal.drain()
@@ -169,7 +169,7 @@ class _Run:
         )
 
     def _shown(self, number: int, point_id: str) -> CloseUpResult:
-        """A picture that shows what is expected."""
+        """A close-up result that confirms the expectation."""
         ticket, header = self._queue.get(point_id), m.Header(0.0, "odom")
         if ticket is None or point_id in self._cut:
             return CloseUpResult(header=header, point_id=point_id, number=number, finding="severed")
@@ -253,7 +253,7 @@ class CutLog:
                 least.closed = now
 
     def cuts(self, now: float, why: str) -> tuple[PreviewedCut, ...]:
-        """All of them, the work having ended `now`, early for the reason `why`; empty when nothing was left."""
+        """All cuts, after the end of the work at `now`. `why` is the reason of an early end; empty otherwise."""
         ends = [each.begins for each in self._points[1:]] + [now]
         return tuple(self._cut(each, end, why) for each, end in zip(self._points, ends, strict=True))
 

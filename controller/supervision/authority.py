@@ -28,7 +28,7 @@ class Authority:
 
     @property
     def held(self) -> bool:
-        """Whether somebody holds control and no transfer is pending."""
+        """Whether a person has control and no transfer is pending."""
         return self._lease.holder is not None and self._lease.next_holder is None
 
     def review(self, presence: Sample[Presence] | None, at_rest: bool, now: float) -> str:
@@ -78,7 +78,7 @@ class Authority:
         return frozenset(out)
 
     def refusal(self, client: Client, role: Role) -> str:
-        """Why a client may not move the robot; empty when it may."""
+        """Reason why a client may not move the robot; empty if it may."""
         return "a viewer may look and stop, not operate" if role == "viewer" else self._lease.refusal(client)
 
     def claim(self, client: Client, now: float) -> None:
@@ -86,7 +86,7 @@ class Authority:
         self._lease.claim(client, now)
 
     def handlers(self) -> Handlers:
-        """Handlers of the commands about control itself; each returns why it is refused, empty when done."""
+        """Handlers of the commands about control itself; each returns the reason of a refusal, empty if done."""
         return {
             intents.TakeControl: lambda asked, now: self._lease.take(client_of(asked), asked.confirm),
             intents.RequestControl: lambda asked, now: self._lease.request(client_of(asked), now),

@@ -132,7 +132,7 @@ def check(mode: Mode, moving: bool, health: Health, config: ControllerConfig) ->
 
 
 def cause(health: Health, config: ControllerConfig) -> str:
-    """Why a PROTECTIVE_STOP or FAULT could not be left now; empty when its cause is gone."""
+    """Cause that still blocks the end of a PROTECTIVE_STOP or FAULT; empty if it is gone."""
     return health.ledger or sensors(health, config) or ("watchdog" if health.watchdog else "")
 
 
@@ -165,7 +165,7 @@ def supervision(health: Health, config: ControllerConfig, teleoperated: bool) ->
 
 
 def perception(health: Health, config: ControllerConfig) -> str:
-    """Why perception does not allow automatic work; empty when it does."""
+    """Reason why perception's state forbids automatic work; empty if it allows it."""
     if health.obstacles > config.obstacles_max_age_s:
         return (
             f"the newest camera frame with the obstacles is {_age(health.obstacles)} old, "

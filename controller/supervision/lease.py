@@ -25,11 +25,11 @@ class Lease:
         self.notice_number = 0
 
     def held_by(self, client: Client) -> bool:
-        """Whether this client holds control and nobody is about to take it."""
+        """Whether this client has control and no transfer is pending."""
         return self.next_holder is None and self.holder is not None and self.holder.key == client.key
 
     def refusal(self, client: Client) -> str:
-        """Why a client may neither move the robot nor get control by the way; empty when it may."""
+        """Reason why a client may not move the robot or claim control; empty if it may."""
         if self.next_holder is not None:
             return f"control passes to {self.next_holder.user}; wait until the robot is at rest"
         if self.holder is None or self.holder.key == client.key:
@@ -53,7 +53,7 @@ class Lease:
         return ""
 
     def request(self, client: Client, now: float) -> str:
-        """Ask the holder to grant control; why not, empty when asked."""
+        """Ask the holder for control. Returns the reason of a refusal; empty if asked."""
         if self.holder is None:
             return "nobody holds control: take it"
         if self.holder.key == client.key:
@@ -65,7 +65,7 @@ class Lease:
         return ""
 
     def grant(self, client: Client) -> str:
-        """The holder gives control to who has asked; why not, empty when it goes over."""
+        """Grant control to the client that has asked. Returns the reason of a refusal; empty if granted."""
         if not self.held_by(client):
             return "only the person in control can grant it"
         if self.requested is None:
@@ -74,7 +74,7 @@ class Lease:
         return ""
 
     def give_back(self, client: Client) -> str:
-        """The holder gives control up; why not, empty when done."""
+        """Give up control. Returns the reason of a refusal; empty if done."""
         if self.holder is None or self.holder.key != client.key:
             return "you do not hold control"
         self._lost = f"{client.user} gave control back"

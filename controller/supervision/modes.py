@@ -108,7 +108,7 @@ def observe(state: State, cause: str, now: float) -> State:
 
 
 def _unlisted(state: State, event: Event, reason: str) -> Transition:
-    """What an event does that leads nowhere else from here."""
+    """Result of an event that has no transition from this mode."""
     if event is Event.PROTECT and state.mode == "PROTECTIVE_STOP":
         # A new cause, or the old one again: the time without a cause starts again.
         return Transition(State("PROTECTIVE_STOP", reason or state.reason))

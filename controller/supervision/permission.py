@@ -56,7 +56,7 @@ _CHECKS: Final[dict[Condition, Callable[[Situation], str]]] = {
 
 
 def refusal(command: Command, now: float, situation: Situation) -> str:
-    """Why a command would be refused now, apart from the content of its message; empty when it would not.
+    """Reason why a command is refused now, apart from its content; empty if it is allowed.
 
     Args:
         command: Row of the table.

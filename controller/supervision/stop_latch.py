@@ -17,7 +17,7 @@ class StopLatch:
     """
 
     def __init__(self, stops: tuple[StopRecord, ...] = ()) -> None:
-        """Start with what was latched before, the newest first."""
+        """Start with the stored stops, newest first."""
         self._pending: dict[str, StopRecord] = {stop.stop_id: stop for stop in reversed(stops)}
         self._over: set[str] = set()
         self._asked: intents.Reset | None = None
@@ -28,12 +28,12 @@ class StopLatch:
 
     @property
     def reset_reason(self) -> str:
-        """Why the last stop was reset, in words."""
+        """Reason of the last reset, as text."""
         return f"reset by {self._asked.user}: {self._asked.reason}" if self._asked is not None else "reset"
 
     @property
     def latched(self) -> str:
-        """Why the robot is stopped, empty when it is not."""
+        """Reason of the latched stop; empty without one."""
         return _words(next(reversed(self._pending.values()))) if self._pending else ""
 
     @property
@@ -42,7 +42,7 @@ class StopLatch:
         return self._told != tuple(self._pending)
 
     def message(self) -> StopState:
-        """What is latched here, for the wire and for the next start."""
+        """The latched stops, for the wire and for the next start."""
         self._told = tuple(self._pending)
         stops = tuple(reversed(self._pending.values()))[:_MOST]
         return StopState(process="controller", stops=stops, released_by=self._released_by)

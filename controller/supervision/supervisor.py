@@ -131,7 +131,7 @@ class Supervisor:
         self.state = replace(self.state, reason=reason)
 
     def busy(self) -> str:
-        """What has to end before a motion may begin; empty when nothing."""
+        """Action that has to end before a motion may begin; empty without one."""
         return self._movement.busy(self.bridge)
 
     def situation(self, waits: str, approval: str, now: float, intent: intents.Intent | None = None) -> Situation:

@@ -370,7 +370,7 @@ def _damper(n: Array, at: Array, J: Array, moves: Array, S: Array, jacobian: Arr
 
 
 def _support(model: Any, joint: int) -> Array:
-    """1 for each coordinate of q that moves what hangs on a joint, else 0 (12)."""
+    """1 for each coordinate of q that moves the bodies on a joint, else 0 (12)."""
     out = np.zeros(NQ)
     for ancestor in model.supports[joint]:
         if ancestor:

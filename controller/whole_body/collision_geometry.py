@@ -91,7 +91,7 @@ def shapes_of(objects: Sequence[Any]) -> Shapes:
 
 
 def _core(shape: Any) -> tuple[tuple[float, float, float], float]:
-    """Half sizes of the box (m) that a capsule, sphere or box is drawn around, and by how much it is larger (m)."""
+    """Half sizes of the inner box of a capsule, sphere or box (m), and the radius around it (m)."""
     if isinstance(shape, pin.coal.Capsule):
         return (0.0, 0.0, float(shape.halfLength)), float(shape.radius)
     if isinstance(shape, pin.coal.Sphere):

@@ -32,7 +32,7 @@ class Obstacle:
     radius: float
 
     def __post_init__(self) -> None:
-        """Refuse what is no capsule.
+        """Refuse an invalid capsule.
 
         Raises:
             InputError: A coordinate or the radius is not finite, or the radius is not positive.
@@ -48,7 +48,7 @@ class Axes:
     """The axes of n obstacles as arrays, for the distances of many spheres from all of them at once."""
 
     def __init__(self, obstacles: tuple[Obstacle, ...]) -> None:
-        """Precompute what does not depend on the spheres."""
+        """Precompute the terms that do not depend on the spheres."""
         self._start = np.array([o.start for o in obstacles], dtype=np.float64).reshape(-1, 3)
         self._along = np.array([o.end for o in obstacles], dtype=np.float64).reshape(-1, 3) - self._start
         square = np.sum(self._along * self._along, axis=1)

@@ -194,7 +194,7 @@ class SecondaryTask(Protocol):
     rows: int
 
     def prepare(self, jacobian: Array) -> None:
-        """Write what is the same in every period. Called once, with all zeros."""
+        """Write the constant entries. Called once, with zeros."""
         ...
 
     def write(self, problem: IkProblem, jacobian: Array, target: Array) -> None:

@@ -123,7 +123,7 @@ class Tipping:
         return float(np.sum(self.normals * (zmp - self.points), axis=1).min())
 
     def _pressed(self, q: Array, xi: Array, S: Array) -> Array:
-        """ḣ (6) at ξ̈ = 0: what the speeds alone press with."""
+        """ḣ (6) at ξ̈ = 0: the part of the velocities."""
         v, a = np.empty(NQ), np.zeros(NQ)
         _motion(S, xi, v, a)
         change = pin.computeCentroidalMomentumTimeVariation(self._robot.model, self._robot.data, q, v, a)
@@ -171,7 +171,7 @@ def _condition(edges: Array, q: Array, center: Array, L: Array) -> None:
 
 @compiled(NOTHING(MATRIX, MATRIX, MATRIX, VECTOR, NUMBER, MATRIX, VECTOR))
 def _rows(L: Array, A_g: Array, S: Array, pressed: Array, weight: float, matrix: Array, bound: Array) -> None:
-    """L A_g S (3×9) into matrix, and what the speeds and the weight leave of it (3) into bound, per weight."""
+    """Write L A_g S (3×9) into matrix and the bound from velocities and gravity (3), divided by the weight."""
     over_q = np.zeros(12)
     for i in range(3):
         left = weight * L[i, 2]

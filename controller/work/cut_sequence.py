@@ -89,12 +89,12 @@ class CutSequence:
 
     @property
     def active(self) -> str:
-        """Point being worked on, empty when none."""
+        """Current point of the work; empty without one."""
         return self._point_id
 
     @property
     def in_canes(self) -> str:
-        """Point that the tool hides from the camera now, empty when none."""
+        """Point that the tool hides from the camera now; empty without one."""
         return self._point_id if self._stage in (Stage.ADVANCE, Stage.CUT, Stage.RETREAT) else ""
 
     @property
@@ -109,7 +109,7 @@ class CutSequence:
 
     @property
     def close_up_s(self) -> float:
-        """From asking for a picture to knowing what it shows, as it was last (s)."""
+        """Time from the request of the last close-up to its result (s)."""
         return self._close_ups.took_s
 
     def clear_of_canes(self, q: Array) -> Array:

@@ -89,7 +89,7 @@ class Movement:
 
     @property
     def at_rest(self) -> bool:
-        """Whether nothing moves by what was sent last."""
+        """Whether the last commands are zero."""
         return self._setpoints.at_rest
 
     def unknown_motion(self, bridge: m.BridgeState) -> bool:
@@ -111,14 +111,14 @@ class Movement:
         self._homing = None
 
     def leave(self, mode: m.Mode) -> None:
-        """A mode has ended, and with it what moved the robot in it."""
+        """End the motion source of a mode that has ended."""
         self._homing = None
         if mode == "AUTO":
             self.sequence.abort()
         self.teleoperation.refuse()
 
     def busy(self, bridge: m.BridgeState | None) -> str:
-        """What has to end before a motion may begin; empty when nothing."""
+        """Action that has to end before a motion may begin; empty without one."""
         if self._homing is not None:
             return "the arm is being brought home; wait until it is there"
         if self.sequence.cutting or (bridge is not None and bridge.cutter == "closing"):

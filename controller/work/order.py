@@ -65,7 +65,7 @@ class WorkOrder:
         return ""
 
     def give_back(self, revision: int) -> str:
-        """Work in the plan's order again; returns why not, empty when done."""
+        """Return to the plan's order. Returns the reason of a refusal; empty if done."""
         if why := self._outdated(revision):
             return why
         if not self._by_hand:
@@ -137,7 +137,7 @@ class Approaches:
             self._put(point_id, row.azimuth)
 
     def turn(self, point_id: str, azimuth: float | None, user: str) -> str:
-        """Approach a point so from now on; returns why not, empty when done."""
+        """Set the approach of a point. Returns the reason of a refusal; empty if done."""
         if azimuth is not None and not abs(azimuth) <= LARGEST:
             return (
                 f"the approach cannot be turned by {math.degrees(azimuth):.0f}°; at most {math.degrees(LARGEST):.0f}°"

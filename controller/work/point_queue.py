@@ -133,7 +133,7 @@ class PointQueue:
         return None if points.rule == before.rule else (before.rule, points.rule)
 
     def undo_rule(self, rule: PruningRule) -> str:
-        """Accept again what the change to `rule` made void, now or as soon as perception prunes by the former one.
+        """Restore the acceptances that the change to `rule` made void, now or when perception reports the former rule.
 
         Returns:
             Why that cannot be; empty when it is done or will be.
@@ -202,7 +202,7 @@ class PointQueue:
         return ""
 
     def reject(self, point_id: str, user: str, reason: str) -> str:
-        """Take a point off; returns why not, empty when rejected."""
+        """Reject a point. Returns the reason of a refusal; empty if done."""
         ticket = self._tickets.get(point_id)
         if ticket is None:
             return f"there is no point {point_id!r}"
@@ -212,7 +212,7 @@ class PointQueue:
         return ""
 
     def reconsider(self, point_id: str, user: str) -> str:
-        """ACCEPTED, UNREACHABLE or REJECTED → PROPOSED; returns why not, empty when done."""
+        """ACCEPTED, UNREACHABLE or REJECTED → PROPOSED. Returns the reason of a refusal; empty if done."""
         ticket = self._tickets.get(point_id)
         if ticket is None:
             return f"there is no point {point_id!r}"
@@ -255,7 +255,7 @@ class PointQueue:
 
     @property
     def waits(self) -> str:
-        """Why no accepted point can be worked on now; empty when one can."""
+        """Reason why no accepted point is workable; empty if one is."""
         if self.next() is not None:
             return ""
         beyond = self.count("UNREACHABLE")
@@ -327,11 +327,11 @@ class PointQueue:
         self._put(point_id, replace(self._tickets[point_id], state="ACCEPTED", reason=reason))
 
     def void(self, point_id: str, why: str) -> None:
-        """ACCEPTED or UNREACHABLE → PROPOSED: it is not what was accepted."""
+        """ACCEPTED or UNREACHABLE → PROPOSED: the point differs from the accepted one."""
         self._put(point_id, self._void(self._tickets[point_id], why, []))
 
     def restore(self, rows: Iterable[TicketRow]) -> None:
-        """Take up what was recorded before a restart; nothing is worked on before perception has seen it again."""
+        """Restore the points of an earlier start. A point is workable after perception has reported it again."""
         for row in rows:
             if row.state == "WITHDRAWN" or row.state == "PROPOSED":
                 continue
@@ -398,7 +398,7 @@ class PointQueue:
         return self.order.move(point_id, before, revision, user, accepted) or self.sort()
 
     def turn(self, point_id: str, azimuth: float | None, user: str) -> str:
-        """Approach a point with this turn about its cane (rad), None as the search finds; why not, empty when done."""
+        """Set the turn of the approach (rad); None leaves it to the search. Returns the reason of a refusal."""
         ticket = self._tickets.get(point_id)
         if ticket is None:
             return f"there is no point {point_id!r}"
@@ -474,7 +474,7 @@ def _by_rule(known: Ticket, point: PruningPoint, rule: str) -> str:
 
 
 def _recorded(ticket: Ticket) -> tuple[object, ...]:
-    """What of a ticket is worth a record when it changes."""
+    """The fields of a ticket whose changes are recorded."""
     return ticket.state, ticket.user, ticket.accepted, ticket.cut_id, ticket.point.revision
 
 

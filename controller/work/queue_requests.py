@@ -14,7 +14,7 @@ class QueueRequests:
         self._queue, self._event_log = queue, event_log
 
     def handlers(self) -> Handlers:
-        """Handler of each decision; it returns why it is refused, empty when done."""
+        """Handler of each decision; it returns the reason of a refusal, empty if done."""
         queue = self._queue
         decide: Handlers = {
             intents.AcceptPoint: lambda asked, _: queue.accept(

@@ -25,7 +25,7 @@ class LaggedRobot:
         self._gain = TICK_S / np.array([0.05] * 2 + [0.02] * 7)
 
     def read(self) -> Measurement:
-        """What was measured last."""
+        """The newest measurement."""
         return self.now
 
     def write(self, setpoint: Setpoint) -> None:

@@ -28,7 +28,7 @@ class CollisionGuard:
     name = "collision"
 
     def __init__(self, model: CollisionModel, config: HierarchyConfig, dt: float) -> None:
-        """Guard what `model` watches, for a control period of `dt` (s)."""
+        """Guard the pairs that `model` monitors, for a control period of `dt` (s)."""
         self.model = model
         self._influence, self._kept = config.collision_influence, config.kept
         self._usual = config.collision_speed, config.collision_braking
