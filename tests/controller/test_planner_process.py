@@ -17,8 +17,6 @@ from rolling_panda.generate.__main__ import ROOT
 from tests.controller.test_cuts import CONFIG, PLANNER, POST, point, request
 from tests.support.waiting import until
 
-pytestmark = pytest.mark.alone
-
 
 @pytest.fixture
 def worker():

@@ -46,8 +46,9 @@ class Devices:
     def __init__(self, address: str = ADDRESS) -> None:
         self._begun = ExitStack()
         self.endpoint = self._begun.enter_context(local_router())
-        self.base = DeviceProcess("base", "--plain-wire", "--connect", self.endpoint)
+        self.base = DeviceProcess("base", "--plain-wire", "--connect", self.endpoint, wait=False)
         self.arm = DeviceProcess("arm", "--arm", address)
+        self.base.wait_until_ready()
 
     def breaches(self) -> list[str]:
         return [*self.base.tell()["breaches"], *self.arm.tell()["breaches"]]

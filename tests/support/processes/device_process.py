@@ -8,8 +8,11 @@ from rolling_panda.runtime.launch import child_environment, python_command
 
 
 class DeviceProcess:
-    def __init__(self, device: str, *options: str) -> None:
-        """Of `bridge.fakes`: `arm` at `--arm ADDRESS`, or `base` (beside it the cutter) behind `--connect ENDPOINT`."""
+    def __init__(self, device: str, *options: str, wait: bool = True) -> None:
+        """Of `bridge.fakes`: `arm` at `--arm ADDRESS`, or `base` (beside it the cutter) behind `--connect ENDPOINT`.
+
+        Without `wait` it only begins to start; `wait_until_ready` has to follow.
+        """
         self.device = device
         self.process = subprocess.Popen(
             python_command("bridge.fakes", options),
@@ -18,6 +21,10 @@ class DeviceProcess:
             text=True,
             env=child_environment(),
         )
+        if wait:
+            self.wait_until_ready()
+
+    def wait_until_ready(self) -> None:
         assert self._line() == "ready"
 
     def tell(self, line: str = "report") -> dict[str, Any]:
