@@ -1,6 +1,6 @@
 import pytest
 
-from bridge.core.state_memory import Remembered, open_memory
+from bridge.core.state_memory import Remembered, begin_anew, open_memory
 from rolling_panda.errors import InputError
 from rolling_panda.messages.supervision import StopRecord
 
@@ -18,5 +18,13 @@ def test_what_is_kept_is_known_after_a_restart(tmp_path):
 
 def test_a_memory_that_cannot_be_read_starts_nothing(tmp_path):
     (tmp_path / "bridge.json").write_text('{"epoch": "nine"}')
-    with pytest.raises(InputError, match="look whether the robot may move"):
+    with pytest.raises(InputError, match="check that the robot may move"):
         open_memory(tmp_path)
+
+
+def test_a_bridge_without_a_memory_begins_anew_with_a_stop(tmp_path):
+    begin_anew(tmp_path)
+    memory = open_memory(tmp_path)
+    (stop,) = memory.value.stops
+    assert (stop.source, stop.user) == ("bridge", "") and stop.reason
+    memory.close()

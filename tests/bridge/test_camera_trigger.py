@@ -57,7 +57,8 @@ def test_a_picture_that_is_asked_for_is_taken_at_once_and_once_and_carries_its_p
     assert not shutter.due(30), "an older request comes too late"
     shutter.exposed(600, posture(0.6))
     usual = shutter.frame(PICTURE)
-    assert usual is not None and usual.point_id == ""
+    assert usual is not None and (usual.point_id, usual.number) == ("", 0)
+    assert usual.sequence == frame.sequence + 1
 
 
 def test_a_picture_that_knows_when_it_was_taken_gets_the_posture_of_that_moment() -> None:
@@ -72,3 +73,21 @@ def test_a_picture_that_knows_when_it_was_taken_gets_the_posture_of_that_moment(
     shutter.exposed(3000, posture(3.0, 0.9))
     frame = shutter.frame(replace(PICTURE, taken_at=-5.0))
     assert frame is not None and frame.header.stamp == 0.99, "of two seconds the oldest"
+
+
+def test_a_picture_that_does_not_know_when_it_was_taken_gets_the_posture_of_its_exposure() -> None:
+    shutter = CameraTrigger(2.0, 0.5, 1e-3)
+    for k in range(100):
+        shutter.follow(posture(k * 0.01, k * 0.003))
+    shutter.exposed(500, posture(0.5, 0.15))
+    frame = shutter.frame(PICTURE)
+    assert frame is not None and (frame.header.stamp, frame.base.x) == (0.5, 0.15)
+
+
+def test_a_frame_carries_all_of_its_picture() -> None:
+    shutter, picture = CameraTrigger(2.0, 0.5, 1e-3), replace(PICTURE, depth_unit=0.001)
+    shutter.exposed(0, posture(0.0))
+    frame = shutter.frame(picture)
+    assert frame is not None
+    assert (frame.intrinsics, frame.depth_unit) == (picture.intrinsics, 0.001)
+    assert (frame.color_jpeg, frame.depth_zlib, frame.labels_zlib) == (b"c", b"d", b"l")

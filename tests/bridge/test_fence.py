@@ -210,3 +210,17 @@ def test_the_token_changes_hands_at_rest_alone() -> None:
     assert not fence.give_way("bb") and fence.give_way("aa")
     assert fence.ask("bb", 0.2, at_rest=False) == f.MOVING
     assert (fence.epoch, fence.token) == (1, None)
+
+
+def test_an_older_epoch_is_told_from_one_that_was_never_issued() -> None:
+    fence = Fence(3, "aa")
+    assert [fence.refuse(epoch, "aa") for epoch in (2, 3, 4)] == [f.OLD_EPOCH, None, f.UNKNOWN_EPOCH]
+    assert fence.refuse(3, "bb") == f.OTHER_TOKEN
+
+
+def test_the_token_is_free_a_second_after_the_holders_last_valid_command() -> None:
+    fence = Fence()
+    assert fence.ask("aa", 0.0, at_rest=True) == ""
+    fence.hear(5.0)
+    assert fence.ask("bb", 5.5, at_rest=True) == f.HELD
+    assert fence.ask("bb", 6.1, at_rest=True) == ""

@@ -66,6 +66,15 @@ def test_what_the_controller_may_send_a_thousand_times_a_second_is_sent_on_uncha
         np.testing.assert_allclose(bound.step(sent, arm), sent, atol=1e-12)
 
 
+def test_towards_a_limit_a_joint_is_as_fast_as_half_its_acceleration_can_still_stop() -> None:
+    for away in (0.02, 0.1, 0.3):
+        bound, arm = limiter(), UPPER - 0.01 - away
+        for _ in range(1500):
+            sent = bound.step(np.full(9, 1e6), arm)
+        most = np.minimum(LIMITS.velocity[ARM_XI], np.sqrt(LIMITS.acceleration[ARM_XI] * away))
+        np.testing.assert_allclose(sent[ARM_XI], most, rtol=1e-6)
+
+
 def test_from_what_the_arm_took_it_goes_on_without_a_jerk() -> None:
     bound, arm = limiter(), (LOWER + UPPER) / 2
     velocity, change = np.full(7, 0.5), np.full(7, 2e-4)

@@ -27,6 +27,9 @@ def drive(config: OdometryConfig, seed: int = 0, v: float = 0.3, omega: float = 
 
 
 def test_it_follows_the_wheels_on_their_arc() -> None:
+    told = [message for _, message in drive(OdometryConfig())]
+    assert [message.sequence for message in told] == list(range(1, 101))
+    assert {message.header.frame_id for message in told} == {"odom"}
     tick, last = drive(OdometryConfig())[-1]
     turned = 0.2 * tick * TICK
     assert last.pose.phi == pytest.approx(turned, abs=1e-9)
@@ -47,5 +50,7 @@ def test_noise_is_white_and_its_seeds_repeat() -> None:
     assert noisy == drive(config, 3) != drive(config, 4)
     x = np.array([b.pose.x - a.pose.x for (_, a), (_, b) in zip(clean, noisy, strict=True)])
     speed = np.array([message.linear for _, message in noisy])
+    turn = np.array([message.angular for _, message in noisy])
+    assert 0.014 < turn.std() < 0.026 and abs(np.corrcoef(speed, turn)[0, 1]) < 0.5
     assert 0.0007 < x.std() < 0.0013 and abs(x.mean()) < 0.0004
     assert 0.007 < speed.std() < 0.013 and abs(speed.mean() - 0.3) < 0.004

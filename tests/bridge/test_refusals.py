@@ -3,7 +3,7 @@ from rolling_panda.transport.zenoh import Rejections
 
 
 def test_the_first_of_a_kind_is_said_at_once_and_the_rest_summed_up() -> None:
-    refusals = Refusals(quiet_s=5.0)
+    refusals = Refusals()
     for _ in range(3):
         refusals.add("command/motion", "too old")
     refusals.add("command/cut", "busy")
@@ -13,6 +13,12 @@ def test_the_first_of_a_kind_is_said_at_once_and_the_rest_summed_up() -> None:
     assert refusals.lines(1.0) == []
     assert refusals.lines(5.0) == ["refused on command/motion: too old (7 times)"]
     assert {(row.topic, row.count) for row in refusals.counts()} == {("command/motion", 10), ("command/cut", 1)}
+
+
+def test_a_long_reason_is_cut() -> None:
+    refusals = Refusals()
+    refusals.add("command/motion", "x" * 400)
+    assert refusals.lines(0.0) == ["refused on command/motion: " + "x" * 300]
 
 
 def test_what_the_transport_counted_is_in_the_same_table_once() -> None:

@@ -1,6 +1,7 @@
 import pytest
 
 from bridge.core.robot_faults import RobotFaults
+from tests.support.fake_wire import as_received
 
 STALE, REFLEX = "base: no wheel speeds", "arm: reflex"
 
@@ -23,7 +24,7 @@ def test_a_fault_is_told_once_when_it_begins_and_once_when_it_ends(faults: Robot
 def test_a_severe_fault_latches_a_stop_that_says_why(faults: RobotFaults) -> None:
     change = faults.follow(REFLEX, True, False, 1.0)
     assert change is not None and change.stop is not None
-    assert (change.stop.reason, change.stop.source) == (REFLEX, "robot")
+    assert (change.stop.reason, change.stop.source, change.stop.user) == (REFLEX, "robot", "")
     assert faults.follow(REFLEX, True, True, 2.0) is None
 
 
@@ -43,3 +44,15 @@ def test_a_fault_during_a_stop_latches_when_that_stop_is_released(faults: RobotF
     assert change is not None and change.stop is None
     again = faults.follow(REFLEX, True, False, 2.0)
     assert again is not None and again.stop is not None
+
+
+def test_a_stop_with_a_long_reason_is_one_that_the_wire_carries(faults: RobotFaults) -> None:
+    change = faults.follow("x" * 600, True, False, 1.0)
+    assert change is not None and change.stop is not None
+    assert as_received(change.stop).reason == "x" * 500
+
+
+def test_releases_are_counted(faults: RobotFaults) -> None:
+    for count in (1, 2, 3):
+        faults.released(count * 1.0)
+        assert faults.releases == count

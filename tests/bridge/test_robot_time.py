@@ -67,3 +67,12 @@ def test_the_factor_is_robot_time_over_the_clock_of_the_last_second() -> None:
     for i in range(1, 100):
         fast = pace.factor(99 * 0.025 + i * 0.05, 14.95 + i * 0.05)
     assert fast == pytest.approx(1.0)
+
+
+def test_the_factor_compares_with_what_was_a_second_ago_or_as_little_more_as_there_is() -> None:
+    pace = TimeRatio()
+    samples = ((0.0, 0.0), (0.25, 0.5), (2.0, 2.0), (3.0, 4.0))
+    assert [pace.factor(*sample) for sample in samples] == [1.0, 0.5, pytest.approx(1.75 / 1.5), 0.5]
+    pace = TimeRatio()
+    told = [pace.factor(0.0 if k < 5 else 1.0, 0.25 * k) for k in range(10)]
+    assert told == [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0]

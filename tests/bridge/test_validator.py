@@ -117,6 +117,31 @@ def test_a_state_sent_long_ago_is_too_old_and_not_unknown() -> None:
     assert gate.refuse(command(1, REST, echo=1), 9.99) == g.TOO_OLD
 
 
+def test_after_a_start_of_the_bridge_a_known_token_wakes_nothing_but_at_rest() -> None:
+    gate = CommandValidator(LIMIT, 0.2, Fence(1, "aa"))
+    gate.sent(1, 0.0)
+    assert gate.refuse(command(1), 0.1) == g.NOT_AT_REST
+    assert gate.refuse(command(2, REST), 0.1) is None
+    assert gate.refuse(command(3), 0.1) is None
+
+
+def test_before_any_joint_state_was_sent_every_echo_is_unknown() -> None:
+    gate = CommandValidator(LIMIT, 0.2, Fence(1, "aa"))
+    assert gate.refuse(command(1, REST, echo=0), 0.0) == g.UNSENT_ECHO
+
+
+def test_of_very_many_joint_states_the_last_two_thousand_are_remembered_whatever_age_is_allowed() -> None:
+    def answered(sent: int, echo: int) -> str | None:
+        gate = CommandValidator(LIMIT, 1e9, Fence(1, "aa"))
+        for number in range(1, sent + 1):
+            gate.sent(number, number * 1e-3)
+        return gate.refuse(command(1, REST, echo=echo), 9.0)
+
+    assert answered(2000, 1) is None
+    assert answered(2001, 1) == g.TOO_OLD
+    assert answered(2001, 2) is None and answered(2001, 2001) is None
+
+
 @settings(max_examples=60, deadline=None)
 @given(
     st.lists(
