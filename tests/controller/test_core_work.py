@@ -263,4 +263,4 @@ def test_a_rule_that_is_taken_back_brings_its_acceptances_and_the_log_says_so():
     r.run(0.1)
     assert (entry(r, "a").state, entry(r, "a").user) == ("ACCEPTED", "ada")
     assert any("accepted again after the rule was undone: a" in text for text in r.events)
-    assert any("eve: took the rule back" in text for text in r.events)
+    assert any("eve: undid the rule" in text for text in r.events)

@@ -31,6 +31,7 @@ from tests.support.fake_wire import (
     pruning_points,
     telling,
 )
+from tests.support.points import point
 from tests.support.running_server import eventually, running_server
 
 
@@ -407,7 +408,7 @@ def test_who_reads_the_state_and_starts_at_once_is_not_told_that_nobody_has_seen
     at_work = controller_at_work.robot()
     at_work.watching = False
     at_work.step()
-    at_work.show((controller_at_work.point("a", (0.4, 0.75, 1.0)),))
+    at_work.show((point("a", (0.4, 0.75, 1.0)),))
     at_work.step()
     server.wire.answer = at_work.ask
     assert client.post("/api/arm").status_code == 200
