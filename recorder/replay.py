@@ -19,6 +19,7 @@ from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.cli.child_processes import ChildProcesses
 from rolling_panda.cli.demo import choose_router_port, write_secret
+from rolling_panda.closing import Closing
 from rolling_panda.commands import SeekReplay
 from rolling_panda.config import TransportConfig
 from rolling_panda.errors import InputError, RollingPandaError
@@ -80,7 +81,7 @@ def _run(arguments: argparse.Namespace, stopping: threading.Event) -> int:
     return 0
 
 
-class Replay:
+class Replay(Closing):
     """Publishes a recording in place of the recorded processes, and refuses requests to them."""
 
     def __init__(self, config: TransportConfig, player: Player) -> None:
@@ -99,12 +100,8 @@ class Replay:
         self._wires["perception"].serve(topics.PLANT, lambda request: _REFUSED)
         self._state_sent = float("-inf")
 
-    def __enter__(self) -> "Replay":
-        """Return itself."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Close."""
+    def close(self) -> None:
+        """Close the connections."""
         for wire in self._wires.values():
             wire.close()
 

@@ -12,9 +12,8 @@ import sqlite3
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
+from rolling_panda.closing import Closing
 from rolling_panda.errors import LedgerError
 from rolling_panda.runtime.state_folder import sync_folder
 
@@ -58,7 +57,7 @@ class Row:
     hash: bytes
 
 
-class Ledger:
+class Ledger(Closing):
     """A ledger open for writing. Not thread-safe."""
 
     def __init__(self, folder: Path) -> None:
@@ -121,16 +120,6 @@ class Ledger:
     def close(self) -> None:
         """Close the file."""
         self._database.close()
-
-    def __enter__(self) -> Self:
-        """Return the open ledger."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Close."""
-        self.close()
 
     def _point_head_at(self, number: int, hashed: bytes) -> None:
         # One write of one length, so that a process that is killed leaves the old head or the new one. Not flushed:

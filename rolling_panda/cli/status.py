@@ -4,12 +4,11 @@ import argparse
 import time
 import urllib.error
 import urllib.request
-from types import TracebackType
-from typing import Self
 
 import msgspec
 
 from rolling_panda import messages as m
+from rolling_panda.closing import Closing
 from rolling_panda.config import TransportConfig
 from rolling_panda.errors import InputError, TransportError
 from rolling_panda.runtime.process import ROBOT_ID
@@ -66,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if up.issuperset(processes) else 1
 
 
-class Readiness:
+class Readiness(Closing):
     """Which processes are up, as seen on the wire. Use as a context manager, or call `close`.
 
     A process counts as up once its loop has sent a message, which is later than its connection.
@@ -94,16 +93,6 @@ class Readiness:
     def close(self) -> None:
         """Stop watching."""
         self._onlooker.close()
-
-    def __enter__(self) -> Self:
-        """Return itself."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Close."""
-        self.close()
 
     def _on_heartbeat(self, message: m.Heartbeat, at: float) -> None:
         self._up.add(message.process)

@@ -10,13 +10,13 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Generic, Self, TypeVar
+from typing import Generic, TypeVar
 
 import zenoh
 from msgspec import Struct
 
 from rolling_panda import messages as m
+from rolling_panda.closing import Closing
 from rolling_panda.config import TransportConfig
 from rolling_panda.errors import MessageError, ServiceError, TransportError
 from rolling_panda.topics import Service, Topic, key
@@ -121,7 +121,7 @@ class Rejections:
         return tuple(m.RejectionCount(topic, reason, count) for (topic, reason), count in rows)
 
 
-class Onlooker:
+class Onlooker(Closing):
     """A read-only session on the wire of one robot, without liveliness. Use as a context manager, or call `close`."""
 
     def __init__(self, config: TransportConfig, robot_id: str, name: str = ONLOOKER) -> None:
@@ -179,16 +179,6 @@ class Onlooker:
         """Close the session; safe to call twice."""
         if not self._session.is_closed():
             self._session.close()
-
-    def __enter__(self) -> Self:
-        """Return the open transport."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Close."""
-        self.close()
 
     def _reject(self, topic: str, reason: str) -> None:
         self.rejections.add(topic, reason)

@@ -27,7 +27,7 @@ def server(endpoint: str) -> Iterator[tuple[Replay, Transport]]:
     )
     until(lambda: {"bridge", "controller", "perception"} <= server.present())
     yield replay, server
-    replay.__exit__()
+    replay.close()
     server.close()
 
 

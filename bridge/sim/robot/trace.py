@@ -9,11 +9,12 @@ import json
 import struct
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rolling_panda.closing import Closing
 from rolling_panda.errors import ConfigError, InputError
 
 #: Fields of a row. Velocities are true ones, not measured ones; `setpoint` is what the servos were given.
@@ -59,7 +60,7 @@ class Trace:
         return float(after["time"][last[-1] + 1] - after["time"][0]) if len(last) else 0.0
 
 
-class TraceWriter:
+class TraceWriter(Closing):
     """Writes a trace. Fill `row` and call `commit` for each step."""
 
     def __init__(self, path: Path) -> None:
@@ -103,14 +104,6 @@ class TraceWriter:
         if not self._file.closed:
             self.flush()
             self._file.close()
-
-    def __enter__(self) -> Self:
-        """Return the writer."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Close."""
-        self.close()
 
     def _block(self, kind: bytes, data: bytes) -> None:
         self._file.write(_BLOCK_HEADER.pack(kind, len(data)) + data)

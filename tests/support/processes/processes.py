@@ -5,14 +5,14 @@ import subprocess
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
+from rolling_panda.closing import Closing
 from rolling_panda.errors import RollingPandaError
 from rolling_panda.runtime.launch import child_environment, python_command
 
 
-class Processes:
+class Processes(Closing):
     """Use as a context manager: leaving it ends everything.
 
     Attributes:
@@ -25,16 +25,6 @@ class Processes:
         """Start nothing yet."""
         self.folder, self.environment = folder, child_environment()
         self.processes: dict[str, subprocess.Popen[str]] = {}
-
-    def __enter__(self) -> Self:
-        """Return itself."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """End everything."""
-        self.close()
 
     def launch(self, name: str, module: str, words: Sequence[str], answers: bool = False) -> "subprocess.Popen[str]":
         """Start (or start again) a process; what it says goes to its log, or with `answers` to `answer`."""

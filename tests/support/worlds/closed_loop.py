@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import msgspec
 
@@ -23,6 +23,7 @@ from perception.pipeline import Perception
 from perception.segmentation.segmenter import choose_segmenter
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
+from rolling_panda.closing import Closing
 from rolling_panda.config import RobotConfig, load_section
 from rolling_panda.messages.perception import CloseUpResult, Obstacles
 from rolling_panda.messages.supervision import Person, Presence
@@ -39,7 +40,7 @@ _LOOK_S = 0.08
 _PLANNING_S = 1.0
 
 
-class ClosedLoop(World):
+class ClosedLoop(World, Closing):
     """A simulated robot with an operator who is always present. `now` is simulated time (s)."""
 
     def __init__(
@@ -125,14 +126,6 @@ class ClosedLoop(World):
     def close(self) -> None:
         """Close the trace."""
         self.bridge.robot.close()
-
-    def __enter__(self) -> Self:
-        """Return the loop."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Close the trace."""
-        self.close()
 
     def receive(self, outputs: BridgeOutputs) -> None:
         """What the bridge sends, and what perception makes of its pictures."""
