@@ -47,7 +47,7 @@ test-training: training
 	$(BIN)/pytest tests/perception/test_training.py
 
 # Fewer random examples than `make test` has.
-FAST = HYPOTHESIS_PROFILE=fast $(BIN)/pytest -n auto -m "not alone and not slow and not browser" \
+FAST = HYPOTHESIS_PROFILE=fast $(BIN)/pytest -n auto -m "not alone and not slow and not browser and not processes" \
 	$(WITHOUT_TRAINING) tests/bridge tests/controller tests/perception tests/recorder tests/rolling_panda tests/server
 fast: $(VENV)/.project
 	$(FAST)

@@ -17,6 +17,8 @@ from rolling_panda.generate.__main__ import ROOT
 from tests.controller.test_cuts import CONFIG, PLANNER, POST, point, request
 from tests.support.waiting import until
 
+pytestmark = pytest.mark.processes
+
 
 @pytest.fixture
 def worker():
