@@ -29,7 +29,6 @@ class FaultyRobot(LiveRobot):
         self._doors = {name: f"tcp/127.0.0.1:{free_port()}" for name in PROCESSES if name != "router"}
         self.traces: list[Path] = []
         self.wall_clock = WallClock(folder)
-        self.environment |= self.wall_clock.environment
 
     def start(self, name: str) -> None:
         """Start (or start again) one process."""
@@ -37,6 +36,8 @@ class FaultyRobot(LiveRobot):
             doors = [word for name, endpoint in self._doors.items() for word in ("--door", f"{name}={endpoint}")]
             self.launch(name, "benchmarks.faults.faulty_router", doors, answers=True)
             self.answer(name)
+            # The others' wall clock can be set.
+            self.environment |= self.wall_clock.environment
             return
         if name == "bridge":
             self.trace = self.folder / f"trace{len(self.traces)}"
