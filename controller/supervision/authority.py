@@ -64,7 +64,7 @@ class Authority:
         if age <= self._supervision_s:
             return ""
         since = "yet" if age == math.inf else f"for {age:.1f} s"
-        return f"no operator has seen the robot {since}, allowed are {self._supervision_s} s"
+        return f"no operator has seen the robot {since}; the limit is {self._supervision_s} s"
 
     def rights(self, client: Client, role: Role) -> Rights:
         """Rights of a client in the mode table. Without a holder every operator counts as the holder."""

@@ -168,8 +168,8 @@ def perception(health: Health, config: ControllerConfig) -> str:
     """Reason why perception's state forbids automatic work; empty if it allows it."""
     if health.obstacles > config.obstacles_max_age_s:
         return (
-            f"the newest camera frame with the obstacles is {_age(health.obstacles)} old, "
-            f"allowed are {config.obstacles_max_age_s} s"
+            f"the newest camera frame with the obstacles is {_age(health.obstacles)} old; "
+            f"the limit is {config.obstacles_max_age_s} s"
         )
     return _process("perception", health.perception, config.perception_max_age_s, health.present)
 
@@ -178,7 +178,7 @@ def _process(name: str, age: float, allowed: float, present: frozenset[str]) -> 
     if name not in present:
         return f"the {name} process is gone"
     if age > allowed:
-        return f"the {name} process is silent for {_age(age)}, allowed are {allowed} s"
+        return f"the {name} process is silent for {_age(age)}; the limit is {allowed} s"
     return ""
 
 

@@ -64,7 +64,7 @@ def test_without_perception_only_automatic_work_pauses(changes):
 
 
 def test_work_goes_on_where_the_server_is_too_slow_for_a_hand():
-    assert verdict("TELEOP", server=0.5).reason == "the server process is silent for 0.50 s, allowed are 0.3 s"
+    assert verdict("TELEOP", server=0.5).reason == "the server process is silent for 0.50 s; the limit is 0.3 s"
     assert verdict("AUTO", server=1.9) == FINE
 
 
