@@ -110,7 +110,7 @@ def test_a_server_that_has_started_again_counts_from_one():
 
 def test_work_is_watched_by_who_may_operate_and_sees_the_robot():
     it = authority()
-    assert "seen the robot yet, " in it.unwatched(0.0)
+    assert "seen the robot yet; " in it.unwatched(0.0)
     it.review(presence(1, 1.0, ada(role="viewer")), True, 1.0)
     assert it.unwatched(1.0)
     it.review(presence(2, 2.0, ada(age=0.3)), True, 2.0)

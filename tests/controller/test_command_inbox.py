@@ -32,4 +32,4 @@ def test_a_failure_and_a_silence_are_told():
     waiting.settle(LedgerState(0), 10.5)
     assert len(said) == 1
     waiting.settle(LedgerState(0), 10.7)
-    assert "not taken it within 0.6 s" in said[1]
+    assert "not written it within 0.6 s" in said[1]
