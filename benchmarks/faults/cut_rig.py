@@ -76,7 +76,7 @@ class CutRig(Processes):
         certificates.make(folder / "certificates", ("127.0.0.1",), None)
         self.told = Told()
         self.controller: m.ControllerState | None = None
-        self.controller_at = self.joints_at = 0.0
+        self.controller_at = 0.0
         self.bridge: m.BridgeState | None = None
         self.latched: dict[str, set[str]] = {}
         self._joints: m.JointState | None = None
@@ -182,7 +182,7 @@ class CutRig(Processes):
         self.latched[state.process] = {stop.stop_id for stop in state.stops}
 
     def _on_joints(self, joints: m.JointState, at: float) -> None:
-        self._joints, self.joints_at = joints, at
+        self._joints = joints
 
     def _on_picture(self, request: CloseUpRequest, at: float) -> None:
         """A camera that always sees the point: standing, or off once the blades have bitten."""
