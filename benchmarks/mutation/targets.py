@@ -45,8 +45,8 @@ TARGETS = {
         ("bridge/core/*",),
         _tests(
             "bridge",
-            "fence validator latch limiter watchdog cut_memory cut_orders bridge_core bridge_memory odometer picture "
-            "camera_trigger refusals robot_faults robot_time round_trip",
+            "fence validator latch limiter watchdog cut_memory cut_orders bridge_state bridge_core bridge_memory "
+            "odometer picture camera_trigger refusals robot_faults robot_time round_trip",
         ),
     ),
     "bridge": Target(

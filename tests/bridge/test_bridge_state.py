@@ -1,0 +1,219 @@
+"""What the bridge tells of itself and of its robot, and that it tells at once what a person waits for."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bridge.config import BridgeConfig
+from bridge.core.bridge import MOVING_CUT, TICK_S, BridgeCore, BridgeOutputs
+from bridge.core.cut_orders import BUSY
+from bridge.core.interface import Measurement
+from rolling_panda import messages as m
+from rolling_panda.model.differential_drive import Array
+from rolling_panda.topics import CUT
+from tests.bridge.test_bridge_core import FORWARD, Bench, IdealRobot, cut, odometer, release, stop
+from tests.support.bridge_rig import MODEL, REST
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
+
+
+def tick(bench: Bench) -> BridgeOutputs:
+    """The next tick of 1 ms."""
+    bench.now += TICK_S
+    bench.hear(out := bench.core.step(bench.now), None)
+    return out
+
+
+def lines(out: BridgeOutputs) -> list[tuple[str, str]]:
+    return [(event.severity, event.text) for event in out.events]
+
+
+def refused_cuts(bench: Bench) -> dict[str, int]:
+    return {row.reason: row.count for row in bench.core.refusals.counts() if row.topic == CUT.name}
+
+
+def test_limits_that_are_less_strict_are_reported_at_the_start_and_in_every_state() -> None:
+    bench = Bench()
+    bench.core = BridgeCore(
+        bench.robot, BridgeConfig(), MODEL.limits, odometer(), "fakes", relaxed_limits=("fade_s 0.1",)
+    )
+    out = tick(bench)
+    assert lines(out)[0] == ("warning", "less strict than usual: fade_s 0.1")
+    assert out.state is not None
+    assert (out.state.relaxed_limits, out.state.kind) == (("fade_s 0.1",), "fakes")
+
+
+def test_before_any_command_the_robot_is_held_and_told_to_rest(bench: Bench) -> None:
+    state = tick(bench).state
+    assert state is not None
+    assert (state.watchdog, state.moving, state.holder, state.sequence, state.epoch) == (True, False, "", 0, 0)
+    assert (state.cut_id, state.outcome, state.stop_id, state.header.stamp) == ("", "", "", bench.now)
+    sent = bench.robot.sent[-1]
+    assert not sent.xi.any() and not sent.blades
+
+
+def test_what_is_measured_is_in_the_state_and_the_joint_states(bench: Bench) -> None:
+    bench.drive_on()
+    bench.robot.now = replace(bench.robot.now, battery=0.5)
+    bench.run(0.05, FORWARD)
+    assert (bench.state.battery, bench.state.cutter, bench.state.kind) == (0.5, "open", "sim")
+    assert bench.state.moving and bench.state.sequence == bench.sequence - 1
+    joints = next(out.joints for out in reversed(bench.outputs) if out.joints is not None)
+    assert joints.position == pytest.approx(bench.robot.now.position, abs=0.01)
+    assert joints.velocity == pytest.approx(FORWARD)
+    assert joints.header.stamp == pytest.approx(bench.now, abs=0.011)
+
+
+def test_how_fast_time_runs_and_how_long_an_answer_takes_are_counted_on_the_machines_clock(bench: Bench) -> None:
+    for number in range(1, 3001):
+        bench.now, clock = number * TICK_S, number * TICK_S * 2 + 50.0
+        bench.hear(out := bench.core.step(bench.now, clock), None)
+        if out.joints is not None:
+            bench.ask()
+            bench.core.on_motion(bench.message(REST), bench.now, clock + (0.03 if number == 2500 else 0.01))
+    assert bench.state.real_time_factor == pytest.approx(0.5)
+    assert bench.state.round_trip_s == pytest.approx(0.01)
+    assert bench.state.round_trip_worst_s == pytest.approx(0.03)
+
+
+def test_an_answer_without_a_time_of_its_own_came_at_the_last_tick(bench: Bench) -> None:
+    bench.run(0.2, REST)
+    assert bench.state.round_trip_worst_s == 0.0
+
+
+def test_a_stop_its_release_and_who_did_both_are_told_in_the_next_tick(bench: Bench) -> None:
+    bench.run(0.1, REST)
+    bench.core.on_stop(stop(), bench.now, 5.0)
+    out = tick(bench)
+    assert lines(out) == [("warning", "software stop by ada: button")]
+    assert out.state is not None and out.state.stop_id == "s1"
+    assert out.stops is not None and out.stops.process == "bridge" and not out.stops.hardware
+    assert [(each.stop_id, each.wall_time) for each in out.stops.stops] == [("s1", 5.0)]
+    assert not bench.robot.sent[-1].blades
+    bench.core.on_stop(stop(), bench.now)
+    assert lines(tick(bench)) == []
+    assert bench.core.on_release(release(), bench.now) == m.Answer(ok=True)
+    out = tick(bench)
+    assert lines(out) == [("info", "software stop released by ada: checked")]
+    assert out.state is not None and out.state.stop_id == ""
+    assert out.stops is not None and (out.stops.stops, out.stops.released_by) == ((), "ada: checked")
+    assert bench.robot.sent[-1].releases == 1
+    refused = bench.core.on_release(release(), bench.now)
+    assert not refused.ok and refused.reason
+
+
+def test_the_emergency_stop_button_is_told_by_its_name_with_its_time(bench: Bench) -> None:
+    bench.run(0.1, REST)
+    bench.robot.now = replace(bench.robot.now, emergency=True)
+    bench.core.step(bench.now + TICK_S, wall_time=9.0)
+    bench.now += 2 * TICK_S
+    out = bench.core.step(bench.now, wall_time=9.0)
+    assert out.stops is None or out.stops.hardware
+    bench.run(0.6, None)
+    (pressed,) = bench.stops.stops
+    assert (pressed.source, pressed.user, pressed.wall_time) == ("hardware", "", 9.0)
+    assert bench.stops.hardware and bench.state.stop_id == pressed.stop_id
+
+
+def test_who_gets_the_token_and_gives_it_back_is_told_at_once_and_the_robot_comes_to_rest(bench: Bench) -> None:
+    bench.run(0.1, None)
+    bench.ask()
+    out = tick(bench)
+    assert ("info", "a controller has the token: epoch 1") in lines(out)
+    assert out.state is not None and (out.state.epoch, out.state.holder) == (1, m.fingerprint(bench.token))
+    bench.drive_on()
+    bench.core.on_token(m.TokenRequest(token="other", releases=True), bench.now)
+    assert lines(tick(bench)) == [] and bench.robot.sent[-1].xi.any()
+    bench.core.on_token(m.TokenRequest(token=bench.token, releases=True), bench.now)
+    out = tick(bench)
+    ((severity, text),) = lines(out)
+    assert severity == "info" and "epoch 1" in text
+    assert out.state is not None and out.state.holder == ""
+    bench.run(0.5, None)
+    assert 0.0 < bench.moved_within(0.5) <= 0.3
+
+
+def test_an_end_of_a_cut_is_told_at_once_and_a_bad_one_is_a_warning(bench: Bench) -> None:
+    bench.run(0.105, REST)
+    bench.core.on_cut(cut(bench, "c1"), bench.now)
+    out = tick(bench)
+    assert out.state is not None and (out.state.cut_id, out.state.outcome, out.state.cutter) == ("c1", "", "closing")
+    bench.robot.end_cut("FAILED_NOT_CUT")
+    tick(bench)
+    told = [line for out in bench.outputs for line in lines(out) if "c1" in line[1]]
+    assert told == [("warning", "cut c1: FAILED_NOT_CUT, said the robot")]
+    assert (bench.state.cut_id, bench.state.outcome) == ("c1", "FAILED_NOT_CUT")
+
+
+def test_of_two_orders_in_one_tick_one_is_cut(bench: Bench) -> None:
+    bench.run(0.1, REST)
+    bench.core.on_cut(cut(bench, "c1"), bench.now)
+    bench.core.on_cut(cut(bench, "c2"), bench.now)
+    assert bench.robot.cuts == ["c1"] and refused_cuts(bench) == {BUSY: 1}
+
+
+def test_a_robot_that_cannot_move_cuts_nothing_and_the_order_is_used_up(bench: Bench) -> None:
+    bench.run(0.1, REST)
+    bench.robot.now = replace(bench.robot.now, fault="arm: reflex")
+    bench.run(0.02, REST)
+    bench.core.on_cut(cut(bench, "c1"), bench.now)
+    assert refused_cuts(bench) == {"arm: reflex": 1}
+    assert tick(bench).state is not None
+    assert (bench.state.cut_id, bench.state.outcome, bench.robot.cuts) == ("c1", "FAILED_NOT_CUT", [])
+    assert not bench.robot.sent[-1].blades
+
+
+class Drifting(IdealRobot):
+    """Is measured to move a little, whatever it is told."""
+
+    drift: Array = np.zeros(9)
+
+    def read(self) -> Measurement:
+        return replace(self.now, velocity=self.drift)
+
+
+@pytest.mark.parametrize(
+    ("actuator", "speed", "cuts"),
+    [(0, 0.039, True), (1, 0.041, False), (1, -0.041, False), (2, 0.099, True), (8, 0.11, False), (2, -0.11, False)],
+)
+def test_the_blades_close_only_while_wheels_and_joints_are_slow(actuator: int, speed: float, cuts: bool) -> None:
+    bench, robot = Bench(), Drifting()
+    robot.drift = np.zeros(9)
+    bench.robot, bench.core = robot, BridgeCore(robot, BridgeConfig(), MODEL.limits, odometer(), "sim")
+    bench.run(0.1, REST)
+    robot.drift[actuator] = speed
+    bench.run(0.02, REST)
+    bench.core.on_cut(cut(bench, "c1"), bench.now)
+    assert robot.cuts == (["c1"] if cuts else [])
+    assert refused_cuts(bench) == ({} if cuts else {MOVING_CUT: 1})
+
+
+def test_following_and_its_end_are_told_at_once(bench: Bench) -> None:
+    bench.run(0.1, None)
+    bench.ask()
+    bench.core.on_motion(bench.message(REST), bench.now)
+    out = tick(bench)
+    assert ("info", "setpoints arrive: the robot follows") in lines(out)
+    assert out.state is not None and not out.state.watchdog
+    outs = [tick(bench) for _ in range(300)]
+    (ended,) = [out for out in outs if lines(out)]
+    assert lines(ended) == [("warning", "no valid setpoint: base 0, arm holds, cutter inhibited")]
+    assert ended.state is not None and ended.state.watchdog
+
+
+def test_a_fault_is_told_once_as_a_warning_and_its_end_as_information(bench: Bench) -> None:
+    bench.drive_on()
+    told = len(bench.log)
+    bench.robot.now = replace(bench.robot.now, fault="base: no wheel speeds")
+    bench.run(0.1, FORWARD)
+    bench.robot.now = replace(bench.robot.now, fault="")
+    bench.run(0.1, FORWARD)
+    events = [event for out in bench.outputs for event in out.events][told:]
+    own = [(event.severity, event.text) for event in events if "no wheel speeds" in event.text or "ready" in event.text]
+    assert [severity for severity, _ in own] == ["warning", "info"]
+    assert "base: no wheel speeds" in own[0][1]
+    assert all((event.process, event.header.stamp > 0.0) == ("bridge", True) for event in events)
