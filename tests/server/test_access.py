@@ -1,8 +1,13 @@
 """What the server's options let in: what does not fit is one clear line, before anything is served."""
 
 import argparse
+import os
+import pty
+import signal
+import time
 
 import pytest
+from cryptography.hazmat.primitives import serialization
 
 from rolling_panda.errors import InputError
 from server.__main__ import add_arguments
@@ -57,3 +62,29 @@ def test_a_certificate_needs_its_own_key(tmp_path):
     ):
         with pytest.raises(InputError, match=f"cannot use the certificate .* with the key [^:]*: {why}"):
             told("--tls-cert", certificate, "--tls-key", wrong)
+
+
+def test_a_key_with_a_passphrase_is_refused_and_nobody_is_asked_for_it(tmp_path):
+    certificate, key = self_signed(tmp_path)
+    plain = serialization.load_pem_private_key(key.read_bytes(), None)
+    locked = serialization.BestAvailableEncryption(b"secret")
+    key.write_bytes(plain.private_bytes(serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, locked))
+    # OpenSSL itself would ask on the terminal, which a service has nobody at.
+    child, terminal = pty.fork()
+    if child == 0:
+        try:
+            told("--tls-cert", certificate, "--tls-key", key)
+        except InputError:
+            os._exit(7)
+        finally:
+            os._exit(8)
+    end, status = time.monotonic() + 20.0, None
+    while status is None and time.monotonic() < end:
+        done, code = os.waitpid(child, os.WNOHANG)
+        status = os.waitstatus_to_exitcode(code) if done else None
+        time.sleep(0.01)
+    if status is None:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+    os.close(terminal)
+    assert status == 7

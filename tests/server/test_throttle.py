@@ -31,7 +31,7 @@ def test_a_good_attempt_ends_it():
     attempts = LoginThrottle()
     for _ in range(FREE - 1):
         attempts.failed(("a",), 0.0)
-    attempts.succeeded(("a",))
+    attempts.succeeded(("a", "b"))
     attempts.failed(("a",), 0.0)
     assert attempts.wait(("a",), 0.0) == 0.0
 
