@@ -9,8 +9,10 @@ from bridge.config import BridgeConfig
 from bridge.core.bridge import MOVING_CUT, TICK_S, BridgeCore, BridgeOutputs
 from bridge.core.cut_orders import BUSY
 from bridge.core.interface import Measurement
+from bridge.core.state_memory import Remembered
 from rolling_panda import messages as m
 from rolling_panda.model.differential_drive import Array
+from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.topics import CUT
 from tests.bridge.test_bridge_core import FORWARD, Bench, IdealRobot, cut, odometer, release, stop
 from tests.support.bridge_rig import MODEL, REST
@@ -48,12 +50,21 @@ def test_limits_that_are_less_strict_are_reported_at_the_start_and_in_every_stat
 
 
 def test_before_any_command_the_robot_is_held_and_told_to_rest(bench: Bench) -> None:
-    state = tick(bench).state
-    assert state is not None
+    out = tick(bench)
+    state = out.state
+    assert state is not None and out.stops is not None and lines(out) == []
     assert (state.watchdog, state.moving, state.holder, state.sequence, state.epoch) == (True, False, "", 0, 0)
     assert (state.cut_id, state.outcome, state.stop_id, state.header.stamp) == ("", "", "", bench.now)
     sent = bench.robot.sent[-1]
     assert not sent.xi.any() and not sent.blades
+
+
+def test_who_released_the_last_stops_is_told_after_a_restart() -> None:
+    bench = Bench()
+    memory = KeptValue(Remembered(released=("s1",), released_by="ada: checked"))
+    bench.core = BridgeCore(bench.robot, BridgeConfig(), MODEL.limits, odometer(), "sim", memory=memory)
+    out = tick(bench)
+    assert out.stops is not None and (out.stops.stops, out.stops.released_by) == ((), "ada: checked")
 
 
 def test_what_is_measured_is_in_the_state_and_the_joint_states(bench: Bench) -> None:
@@ -66,6 +77,13 @@ def test_what_is_measured_is_in_the_state_and_the_joint_states(bench: Bench) -> 
     assert joints.position == pytest.approx(bench.robot.now.position, abs=0.01)
     assert joints.velocity == pytest.approx(FORWARD)
     assert joints.header.stamp == pytest.approx(bench.now, abs=0.011)
+
+
+def test_odometry_counts_from_the_start_of_the_bridge(bench: Bench) -> None:
+    bench.robot.now = replace(bench.robot.now, position=bench.robot.now.position + [1.0, 1.0, *(0.0,) * 7])
+    bench.run(0.03, None)
+    odometry = next(out.odometry for out in bench.outputs if out.odometry is not None)
+    assert odometry.pose.x == pytest.approx(MODEL.drive.wheel_radius)
 
 
 def test_how_fast_time_runs_and_how_long_an_answer_takes_are_counted_on_the_machines_clock(bench: Bench) -> None:

@@ -2,6 +2,7 @@
 
 from controller.ledger.journal import EventLogger, Journal, LedgerState
 from rolling_panda import messages as m
+from tests.support.fake_wire import as_received
 
 BODY = m.Header()
 
@@ -27,6 +28,8 @@ def test_a_ledger_that_takes_nothing_is_trouble_after_its_time_and_no_sooner():
     journal.add("event", "x", BODY)
     journal.observe(LedgerState(0), 10.0)
     assert journal.trouble(10.5, 0.6) == ""
+    for now in (10.2, 10.4, 10.6):
+        journal.observe(LedgerState(0), now)
     assert "written nothing for 0.7 s" in journal.trouble(10.7, 0.6)
     journal.observe(LedgerState(1), 10.8)
     assert journal.trouble(20.0, 0.6) == ""
@@ -71,3 +74,13 @@ def test_what_is_said_is_told_once_and_recorded():
     assert (told.header.stamp, told.severity, len(told.text)) == (3.0, "warning", 500)
     assert lines.drain() == ()
     assert [record.body for record in journal.drain()] == [told]
+
+
+def test_a_line_before_the_first_step_is_one_that_the_wire_carries():
+    journal = Journal()
+    lines = EventLogger(journal)
+    lines.say("info", "started")
+    (event,) = lines.drain()
+    assert as_received(event) == m.LogEvent(header=m.Header(0.0), process="controller", severity="info", text="started")
+    (record,) = journal.drain()
+    assert (record.kind, record.name, record.body) == ("event", "controller", event)
