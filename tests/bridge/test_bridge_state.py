@@ -1,6 +1,7 @@
 """What the bridge tells of itself and of its robot, and that it tells at once what a person waits for."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,12 +9,13 @@ import pytest
 from bridge.config import BridgeConfig
 from bridge.core.bridge import MOVING_CUT, TICK_S, BridgeCore, BridgeOutputs
 from bridge.core.cut_orders import BUSY
+from bridge.core.fence import HELD, MOVING
 from bridge.core.interface import Measurement
 from bridge.core.state_memory import Remembered
 from rolling_panda import messages as m
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.runtime.latest_file import KeptValue
-from rolling_panda.topics import CUT
+from rolling_panda.topics import CUT, TOKEN, Topic
 from tests.bridge.test_bridge_core import FORWARD, Bench, IdealRobot, cut, odometer, release, stop
 from tests.support.bridge_rig import MODEL, REST
 
@@ -34,8 +36,12 @@ def lines(out: BridgeOutputs) -> list[tuple[str, str]]:
     return [(event.severity, event.text) for event in out.events]
 
 
+def refused(bench: Bench, topic: Topic[Any]) -> dict[str, int]:
+    return {row.reason: row.count for row in bench.core.refusals.counts() if row.topic == topic.name}
+
+
 def refused_cuts(bench: Bench) -> dict[str, int]:
-    return {row.reason: row.count for row in bench.core.refusals.counts() if row.topic == CUT.name}
+    return refused(bench, CUT)
 
 
 def test_limits_that_are_less_strict_are_reported_at_the_start_and_in_every_state() -> None:
@@ -151,8 +157,51 @@ def test_who_gets_the_token_and_gives_it_back_is_told_at_once_and_the_robot_come
     ((severity, text),) = lines(out)
     assert severity == "info" and "epoch 1" in text
     assert out.state is not None and out.state.holder == ""
+    bench.run(0.04, None)
+    assert abs(bench.robot.sent[-1].xi[0]) < 0.9 * abs(FORWARD[0]), "before the watchdog's time"
+    bench.ask("b2")
+    assert bench.state.epoch == 1 and refused(bench, TOKEN) == {MOVING: 1}
     bench.run(0.5, None)
-    assert 0.0 < bench.moved_within(0.5) <= 0.3
+    bench.ask("b2")
+    tick(bench)
+    assert (bench.state.epoch, bench.state.holder) == (2, m.fingerprint("b2"))
+    bench.ask("c3")
+    assert refused(bench, TOKEN) == {MOVING: 1, HELD: 1}
+
+
+def test_a_token_is_told_at_once_and_its_holder_when_the_disk_has_it() -> None:
+    class SlowDisk(KeptValue[Remembered]):
+        kept = False
+
+    bench, disk = Bench(), SlowDisk(Remembered())
+    bench.core = BridgeCore(bench.robot, BridgeConfig(), MODEL.limits, odometer(), "sim", memory=disk)
+    bench.run(0.105, None)
+    bench.ask()
+    state = tick(bench).state
+    assert state is not None and (state.epoch, state.holder) == (1, "")
+    assert (disk.value.epoch, disk.value.token) == (1, bench.token)
+    disk.kept = True
+    state = tick(bench).state
+    assert state is not None and state.holder == m.fingerprint(bench.token)
+
+
+def test_why_the_cutter_is_inhibited_is_counted_and_the_order_is_used_up(bench: Bench) -> None:
+    bench.run(0.1, REST)
+    bench.core.on_stop(stop(), bench.now)
+    bench.core.on_cut(cut(bench, "c1"), bench.now)
+    assert refused_cuts(bench) == {"the software stop is latched": 1}
+    assert bench.core.on_release(release(), bench.now).ok
+    # Nothing at rest has come since.
+    bench.core.on_cut(cut(bench, "c2"), bench.now)
+    assert refused_cuts(bench) == {
+        "the software stop is latched": 1,
+        "no valid setpoint keeps the cutter enabled": 1,
+    }
+    tick(bench)
+    assert (bench.state.cut_id, bench.state.outcome, bench.robot.cuts) == ("c2", "FAILED_NOT_CUT", [])
+    bench.run(0.1, REST)
+    bench.core.on_cut(cut(bench, "c3"), bench.now)
+    assert (bench.robot.cuts, bench.robot.points) == (["c3"], ["p1"])
 
 
 def test_an_end_of_a_cut_is_told_at_once_and_a_bad_one_is_a_warning(bench: Bench) -> None:

@@ -14,6 +14,7 @@ from rolling_panda.messages.robot import RejectionCount
 from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
 from rolling_panda.model.robot import ARM_Q
 from tests.support.controller_at_work import CONFIG, robot, run_until
+from tests.support.fake_wire import as_received
 
 
 def ready():
@@ -139,7 +140,7 @@ def test_a_robot_that_moves_by_commands_of_others_is_stopped_under_another_token
     moved_by_others(r)
     assert all(out.stop is None for out in outputs(r, SHORT)), "the robot may be braking"
     outs = outputs(r, LONG - SHORT)
-    (stop,) = {out.stop for out in outs} - {None}
+    (stop,) = {as_received(out.stop) for out in outs if out.stop is not None}
     assert (stop.source, stop.user) == ("controller", "") and "of another sender" in stop.reason
     assert r.controller.mode == "ESTOP_LATCHED"
     [given_back] = [out.token for out in outs if out.token is not None and out.token.releases]
