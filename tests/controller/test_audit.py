@@ -31,11 +31,24 @@ def test_a_whole_ledger_is_said_to_be_whole_and_its_hash_can_be_asked_for_again(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     code, out, _ = run(capsys, "verify", "--state", str(folder))
-    assert code == 0 and "2 rows are as written; newest hash " in out
+    assert code == 0 and "2 rows are as written; newest hash " in out and "--expect HASH" in out
     head = out.split("newest hash ")[1].split()[0]
     assert run(capsys, "verify", "--state", str(folder), "--expect", head)[0] == 0
     code, out, err = run(capsys, "verify", "--state", str(folder), "--expect", "0" * 63 + "1")
     assert code == 1 and "NOT as it was written: no row has the hash" in err
+
+
+def test_one_row_is_one_row(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with Ledger(tmp_path) as ledger:
+        ledger.append([Entry("t", "event", "bridge", "{}")])
+    assert "1 row is as written" in run(capsys, "verify", "--state", str(tmp_path))[1]
+
+
+@pytest.mark.parametrize("text", ["zz", "00", ""])
+def test_what_is_no_hash_is_refused_in_words(text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(("verify", "--expect", text))
+    assert ended.value.code == 2 and "give 64 hexadecimal digits" in capsys.readouterr().err
 
 
 def test_a_changed_ledger_fails(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -5,6 +5,7 @@ import json
 import sqlite3
 
 import msgspec
+import pytest
 
 from controller.config import ControllerConfig
 from controller.ledger.check import verify
@@ -12,6 +13,7 @@ from controller.ledger.journal import ApproachRow, Journal, OrderRow, PreviewReq
 from controller.ledger.start import Restored, restored, start_record
 from controller.ledger.store import FILE, Entry, Ledger
 from controller.work.point_queue import PointQueue
+from rolling_panda.errors import LedgerError
 from tests.support.fake_wire import pruning_point
 
 
@@ -61,3 +63,23 @@ def test_a_cut_under_way_in_a_ledger_of_schema_1_is_restored(tmp_path):
     queue.restore(restored(tmp_path).tickets)
     assert queue.entries()[0].state == "UNKNOWN", "somebody has to look how it ended"
     assert verify(tmp_path).problem == "", "the row itself is as it was written"
+
+
+def started(name, version):
+    return Entry("t", "start", name, json.dumps({"program": {"version": version}}))
+
+
+@pytest.mark.parametrize(
+    ("starts", "told"),
+    [
+        ((started("first", "0.1"), started("second", "0.2"), started("third", "0.3")), "last written by version 0.3:"),
+        ((), "a version that did not say which:"),
+        ((Entry("t", "start", "controller", "{}"),), "a version that did not say which:"),
+    ],
+)
+def test_a_row_that_this_version_does_not_understand_is_named_with_the_version_that_wrote_it(tmp_path, starts, told):
+    with Ledger(tmp_path) as ledger:
+        ledger.append([*starts, Entry("t", "ticket", "p9", '{"state": "ELSEWHERE"}')])
+    with pytest.raises(LedgerError) as caught:
+        restored(tmp_path)
+    assert "ticket p9" in str(caught.value) and told in str(caught.value)
