@@ -195,7 +195,7 @@ class BridgeCore:
             self.refusals.add(CUT.name, reason)
         if verdict == "cut":
             self.robot.cut(command.cut_id, command.point_id)
-            self._measured = replace(self._measured, cutter="closing", cut_id=command.cut_id, outcome="", detail="")
+            self._measured = replace(self._measured, cutter="closing")
             self._begin_cut(command.cut_id, "")
         elif verdict == "refuse" and reason in (inhibited, FORGETFUL):
             self._begin_cut(command.cut_id, "FAILED_NOT_CUT")

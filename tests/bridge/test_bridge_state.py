@@ -12,12 +12,14 @@ from bridge.core.cut_orders import BUSY
 from bridge.core.fence import HELD, MOVING
 from bridge.core.interface import Measurement
 from bridge.core.state_memory import Remembered
+from bridge.core.validator import OLD_SEQUENCE
 from rolling_panda import messages as m
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.runtime.latest_file import KeptValue
-from rolling_panda.topics import CUT, TOKEN, Topic
+from rolling_panda.topics import CUT, MOTION, TOKEN, Topic
 from tests.bridge.test_bridge_core import FORWARD, Bench, IdealRobot, cut, odometer, release, stop
 from tests.support.bridge_rig import MODEL, REST
+from tests.support.fake_wire import as_received
 
 
 @pytest.fixture
@@ -127,7 +129,7 @@ def test_a_stop_its_release_and_who_did_both_are_told_in_the_next_tick(bench: Be
     assert out.stops is not None and (out.stops.stops, out.stops.released_by) == ((), "ada: checked")
     assert bench.robot.sent[-1].releases == 1
     refused = bench.core.on_release(release(), bench.now)
-    assert not refused.ok and refused.reason
+    assert refused.ok is False and refused.reason
 
 
 def test_the_emergency_stop_button_is_told_by_its_name_with_its_time(bench: Bench) -> None:
@@ -135,12 +137,13 @@ def test_the_emergency_stop_button_is_told_by_its_name_with_its_time(bench: Benc
     bench.robot.now = replace(bench.robot.now, emergency=True)
     bench.core.step(bench.now + TICK_S, wall_time=9.0)
     bench.now += 2 * TICK_S
-    out = bench.core.step(bench.now, wall_time=9.0)
-    assert out.stops is None or out.stops.hardware
-    bench.run(0.6, None)
-    (pressed,) = bench.stops.stops
+    bench.hear(out := bench.core.step(bench.now, wall_time=9.0), None)
+    ((severity, text),) = lines(out)
+    assert severity == "warning" and text.startswith("emergency stop by hardware: ")
+    assert out.stops is not None and out.stops.hardware
+    (pressed,) = as_received(out.stops).stops
     assert (pressed.source, pressed.user, pressed.wall_time) == ("hardware", "", 9.0)
-    assert bench.stops.hardware and bench.state.stop_id == pressed.stop_id
+    assert "button" in pressed.reason and bench.state.stop_id == pressed.stop_id
 
 
 def test_who_gets_the_token_and_gives_it_back_is_told_at_once_and_the_robot_comes_to_rest(bench: Bench) -> None:
@@ -157,8 +160,8 @@ def test_who_gets_the_token_and_gives_it_back_is_told_at_once_and_the_robot_come
     ((severity, text),) = lines(out)
     assert severity == "info" and "epoch 1" in text
     assert out.state is not None and out.state.holder == ""
-    bench.run(0.04, None)
-    assert abs(bench.robot.sent[-1].xi[0]) < 0.9 * abs(FORWARD[0]), "before the watchdog's time"
+    bench.run(0.01, None)
+    assert abs(bench.robot.sent[-1].xi[0]) < 0.99 * abs(FORWARD[0]), "before the watchdog's time"
     bench.ask("b2")
     assert bench.state.epoch == 1 and refused(bench, TOKEN) == {MOVING: 1}
     bench.run(0.5, None)
@@ -220,7 +223,24 @@ def test_of_two_orders_in_one_tick_one_is_cut(bench: Bench) -> None:
     bench.run(0.1, REST)
     bench.core.on_cut(cut(bench, "c1"), bench.now)
     bench.core.on_cut(cut(bench, "c2"), bench.now)
+    bench.core.on_cut(cut(bench, "c1"), bench.now)
     assert bench.robot.cuts == ["c1"] and refused_cuts(bench) == {BUSY: 1}
+    tick(bench)
+    assert (bench.state.cut_id, bench.state.outcome) == ("c1", "")
+
+
+def test_braking_that_takes_longer_than_the_deadline_leaves_begins_at_once(bench: Bench) -> None:
+    bench.drive_on()
+    bench.run(0.05, None)
+    assert abs(bench.robot.sent[-1].xi[0]) < 0.98 * abs(FORWARD[0])
+    assert bench.robot.sent[-1].xi[2] < FORWARD[2]
+
+
+def test_what_is_refused_is_counted_under_its_topic(bench: Bench) -> None:
+    bench.run(0.1, REST)
+    bench.sequence -= 1
+    bench.core.on_motion(bench.message(REST), bench.now)
+    assert refused(bench, MOTION) == {OLD_SEQUENCE: 1}
 
 
 def test_a_robot_that_cannot_move_cuts_nothing_and_the_order_is_used_up(bench: Bench) -> None:

@@ -138,3 +138,15 @@ def test_points_out_of_reach_are_counted_by_vine_until_they_are_in_reach_or_take
     assert told.cut_count == 1, "nothing was tried where nothing can be reached"
     account = SessionReportBuilder()
     assert account.add(at(1.0), row("a", "UNREACHABLE", 1)) and account.add(at(2.0), row("a", "ACCEPTED", 1))
+
+
+def test_only_the_newest_changes_of_control_go_over_the_wire():
+    told = report(*((float(n), asked(intents.TakeControl(user=f"user {n}"))) for n in range(150)))
+    assert [change.user for change in told.control] == [f"user {n}" for n in range(50, 150)]
+
+
+def test_a_refusal_and_a_change_of_control_change_the_report():
+    account = SessionReportBuilder()
+    account.add(at(0.0), Answer(ok=True))
+    assert account.add(at(1.0), asked(intents.Start(user="bob"), "no point is accepted"))
+    assert account.add(at(2.0), asked(intents.TakeControl(user="bob")))
