@@ -85,6 +85,8 @@ def test_what_is_measured_is_in_the_state_and_the_joint_states(bench: Bench) -> 
     assert joints.position == pytest.approx(bench.robot.now.position, abs=0.01)
     assert joints.velocity == pytest.approx(FORWARD)
     assert joints.header.stamp == pytest.approx(bench.now, abs=0.011)
+    sent = bench.robot.sent[-1]
+    assert sent.blades and (sent.epoch, sent.sequence, sent.at) == (1, bench.sequence - 1, bench.now)
 
 
 def test_odometry_counts_from_the_start_of_the_bridge(bench: Bench) -> None:
@@ -304,3 +306,32 @@ def test_a_fault_is_told_once_as_a_warning_and_its_end_as_information(bench: Ben
     assert [severity for severity, _ in own] == ["warning", "info"]
     assert "base: no wheel speeds" in own[0][1]
     assert all((event.process, event.header.stamp > 0.0) == ("bridge", True) for event in events)
+
+
+def fails(bench: Bench, fault: str) -> None:
+    bench.robot.now = replace(bench.robot.now, fault=fault, severe=bool(fault))
+
+
+def test_a_severe_fault_is_a_stop_once_and_again_where_the_robot_does_not_recover_from_it(bench: Bench) -> None:
+    bench.run(0.1, REST)
+    fails(bench, "arm: reflex")
+    bench.run(0.005, REST)
+    (first,) = bench.stops.stops
+    assert (first.source, first.reason, bench.state.stop_id) == ("robot", "arm: reflex", first.stop_id)
+    assert bench.core.on_release(release(first.stop_id), bench.now).ok
+    bench.run(2.5, REST)
+    assert bench.state.stop_id == "", "it may take a while to recover"
+    bench.run(1.0, REST)
+    (second,) = bench.stops.stops
+    assert second.source == "robot" and second.stop_id != first.stop_id
+    fails(bench, "")
+    bench.run(0.1, REST)
+    assert bench.state.stop_id == second.stop_id, "a person has to look first"
+
+
+def test_a_severe_fault_under_a_stop_adds_none(bench: Bench) -> None:
+    bench.run(0.1, REST)
+    bench.core.on_stop(stop(), bench.now)
+    fails(bench, "arm: reflex")
+    bench.run(0.1, REST)
+    assert [each.stop_id for each in bench.stops.stops] == ["s1"]

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from controller.ledger.audit import main
-from controller.ledger.store import FILE, SCHEMA_VERSION, Entry, Ledger
+from controller.ledger.check import verify
+from controller.ledger.store import FILE, ORIGIN, SCHEMA_VERSION, Entry, Ledger
 from rolling_panda.runtime.state_folder import usual_state_folder
 
 
@@ -36,6 +37,7 @@ def test_a_whole_ledger_is_said_to_be_whole_and_its_hash_can_be_asked_for_again(
     assert run(capsys, "verify", "--state", str(folder), "--expect", head)[0] == 0
     code, out, err = run(capsys, "verify", "--state", str(folder), "--expect", "0" * 63 + "1")
     assert code == 1 and "NOT as it was written: no row has the hash" in err
+    assert verify(folder, ORIGIN).problem == "", "that of the beginning is in every ledger"
 
 
 def test_one_row_is_one_row(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -55,7 +57,8 @@ def test_a_changed_ledger_fails(folder: Path, capsys: pytest.CaptureFixture[str]
     path = folder / FILE
     path.write_bytes(path.read_bytes().replace(b"IDLE", b"AUTO"))
     code, out, err = run(capsys, "verify", "--state", str(folder))
-    assert (code, out) == (1, "") and "row 1 is not as it was written" in err
+    assert (code, out) == (1, "") and "row 1 is not as it was written. 0 rows are whole before" in err
+    assert verify(folder).head == ORIGIN
 
 
 @pytest.mark.parametrize("command", ["verify", "export"])
@@ -68,7 +71,12 @@ def test_a_ledger_of_a_newer_version_is_not_called_changed(
     database.close()
     code, out, err = run(capsys, command, "--state", str(folder))
     assert (code, out) == (1, "")
-    assert "newer version" in err and "Use that version" in err and "NOT as it was written" not in err
+    assert (
+        "newer version" in err
+        and str(folder / FILE) in err
+        and "Use that version" in err
+        and "NOT as it was written" not in err
+    )
 
 
 def test_json_has_every_row_with_its_body(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
