@@ -310,7 +310,7 @@ class BridgeCore:
             self._state_due = True
 
     def _log(self, severity: m.Severity, text: str) -> None:
-        self._events.append((severity, text[:500]))
+        self._events.append((severity, text))
 
     def _outputs(self, now: float) -> BridgeOutputs:
         joints = odometry = state = frame = None

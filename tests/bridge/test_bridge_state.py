@@ -315,9 +315,12 @@ def fails(bench: Bench, fault: str) -> None:
 def test_a_severe_fault_is_a_stop_once_and_again_where_the_robot_does_not_recover_from_it(bench: Bench) -> None:
     bench.run(0.1, REST)
     fails(bench, "arm: reflex")
-    bench.run(0.005, REST)
+    for _ in range(3):
+        bench.now += TICK_S
+        bench.hear(bench.core.step(bench.now, wall_time=9.0), REST)
     (first,) = bench.stops.stops
-    assert (first.source, first.reason, bench.state.stop_id) == ("robot", "arm: reflex", first.stop_id)
+    assert (first.source, first.reason, first.wall_time) == ("robot", "arm: reflex", 9.0)
+    assert bench.state.stop_id == first.stop_id
     assert bench.core.on_release(release(first.stop_id), bench.now).ok
     bench.run(2.5, REST)
     assert bench.state.stop_id == "", "it may take a while to recover"
@@ -335,3 +338,35 @@ def test_a_severe_fault_under_a_stop_adds_none(bench: Bench) -> None:
     fails(bench, "arm: reflex")
     bench.run(0.1, REST)
     assert [each.stop_id for each in bench.stops.stops] == ["s1"]
+
+
+def test_what_must_survive_a_restart_is_kept(bench: Bench) -> None:
+    memory = KeptValue(Remembered())
+    bench.core = BridgeCore(bench.robot, BridgeConfig(), MODEL.limits, odometer(), "sim", memory=memory)
+    bench.run(0.1, REST)
+    bench.core.on_stop(stop("s1"), bench.now, 5.0)
+    assert [each.stop_id for each in memory.value.stops] == ["s1"]
+    assert bench.core.on_release(release("s1"), bench.now).ok
+    bench.core.on_stop(stop("s2"), bench.now, 6.0)
+    kept = memory.value
+    assert (kept.epoch, kept.token, kept.released, kept.released_by) == (1, bench.token, ("s1",), "ada: checked")
+    assert [(each.stop_id, each.wall_time) for each in kept.stops] == [("s2", 6.0)]
+
+
+def test_a_long_reason_is_cut_to_what_the_wire_carries(bench: Bench) -> None:
+    bench.core.on_stop(m.StopRequest(stop_id="s1", source="page", user="ada", reason="x" * 500), bench.now)
+    (event,) = tick(bench).events
+    assert len(as_received(event).text) == 500
+
+
+def test_after_a_cut_the_camera_looks_more_often_again(bench: Bench) -> None:
+    def pictures(seconds: float) -> int:
+        before = len(bench.outputs)
+        bench.run(seconds, REST)
+        return sum(out.frame is not None for out in bench.outputs[before:])
+
+    bench.run(6.5, REST)
+    assert pictures(2.0) == 1
+    bench.core.on_cut(cut(bench, "c1"), bench.now)
+    bench.robot.end_cut("DONE")
+    assert pictures(2.0) >= 4
