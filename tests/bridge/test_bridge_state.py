@@ -16,7 +16,7 @@ from bridge.core.validator import OLD_SEQUENCE
 from rolling_panda import messages as m
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.runtime.latest_file import KeptValue
-from rolling_panda.topics import CUT, MOTION, TOKEN, Topic
+from rolling_panda.topics import CUT, MOTION, STOPS, TOKEN, Topic
 from tests.bridge.test_bridge_core import FORWARD, Bench, IdealRobot, cut, odometer, release, stop
 from tests.support.bridge_rig import MODEL, REST
 from tests.support.fake_wire import as_received
@@ -243,6 +243,21 @@ def test_what_is_refused_is_counted_under_its_topic(bench: Bench) -> None:
     bench.sequence -= 1
     bench.core.on_motion(bench.message(REST), bench.now)
     assert refused(bench, MOTION) == {OLD_SEQUENCE: 1}
+    bench.run(0.1, REST)
+    told = [line for out in bench.outputs for line in lines(out) if OLD_SEQUENCE in line[1]]
+    assert [severity for severity, _ in told] == ["warning"]
+
+
+def test_stops_are_repeated_at_their_rate_and_no_more_often(bench: Bench) -> None:
+    bench.run(2.0, REST)
+    told = [out for out in bench.outputs if out.stops is not None]
+    assert len(told) == pytest.approx(2.0 * STOPS.rate_hz, abs=1)
+
+
+def test_scenery_has_the_time_at_which_it_was_told() -> None:
+    core = BridgeCore(IdealRobot(), BridgeConfig(), MODEL.limits, odometer(), "sim", scenery=lambda: (1, ()))
+    scenery = core.step(7.5).scenery
+    assert scenery is not None and scenery.header.stamp == 7.5
 
 
 def test_a_robot_that_cannot_move_cuts_nothing_and_the_order_is_used_up(bench: Bench) -> None:

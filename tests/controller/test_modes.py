@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from controller.supervision import modes
 from controller.supervision.modes import ANYBODY, MOVING, OPERATOR, SEVERITY, SYSTEM, Event
+from rolling_panda.mode_table import FIRST
 
 ALL = SYSTEM | OPERATOR
 EVENTS = tuple(Event)
@@ -183,3 +184,23 @@ def test_a_repeated_stop_or_fault_is_no_refusal_and_a_fault_under_a_stop_says_wh
         assert modes.step(state, event, 0.0, "again") == modes.Transition(state)
     told = modes.step(reach("ESTOP_LATCHED"), Event.FAULT, 0.0, "the ledger")
     assert told.refused == "a fault changes nothing: the robot is in ESTOP_LATCHED"
+
+
+def test_a_transition_without_a_reason_has_its_event_for_one():
+    assert modes.step(reach("IDLE"), Event.ARM, 0.0, by=ALL).state.reason == Event.ARM.value
+
+
+def test_the_second_counts_from_when_the_cause_went_away_and_in_stops_and_faults_alone():
+    state = modes.observe(modes.observe(reach("PROTECTIVE_STOP"), "again", 9.0), "", 10.0)
+    assert modes.observe(state, "", 10.9).clear_since == 10.0
+    for mode in ("IDLE", "READY", "AUTO", "PAUSED", "ESTOP_LATCHED"):
+        state = modes.State(mode, "")
+        assert modes.observe(state, "", 5.0) == state
+
+
+def test_where_there_is_nothing_to_advise_a_refusal_ends():
+    quiet = [mode for mode in SEVERITY if not FIRST[mode]]
+    assert quiet
+    for mode in quiet:
+        refused = modes.step(reach(mode), Event.RESET, 0.0, by=ALL).refused
+        assert refused == f"{Event.RESET.value} is not possible in {mode}"

@@ -28,6 +28,7 @@ def situation(mode: str = "READY", **changes: object) -> Situation:
 
 def test_a_ready_robot_with_work_may_start_and_go_home() -> None:
     assert {"Start", "Home"} <= set(allowed(0.0, situation()))
+    assert "TakeControl" not in allowed(0.0, situation()), "who may have control is told with it"
 
 
 def test_each_thing_that_is_missing_is_said() -> None:
