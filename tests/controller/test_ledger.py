@@ -5,6 +5,7 @@ import random
 import resource
 import signal
 import sqlite3
+import stat
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -169,6 +170,28 @@ def test_rows_of_a_newer_version_are_refused_by_naming_the_version(tmp_path: Pat
         ledger.append([Entry("t", "order", "order", '{"of_next_year": true}')])
     with pytest.raises(LedgerError, match=r"tells of order.*last written by version 7\.1\.0: use that version"):
         restored(tmp_path)
+
+
+def test_the_record_is_for_its_owner_alone_whatever_the_umask(tmp_path: Path) -> None:
+    before = os.umask(0)
+    try:
+        written(tmp_path, 1)
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE((tmp_path / FILE).stat().st_mode) == 0o600
+
+
+def test_a_ledger_that_cannot_be_opened_is_named(tmp_path: Path) -> None:
+    with pytest.raises(LedgerError, match=f"^cannot open the ledger .*none/{FILE}: "):
+        Ledger(tmp_path / "none")
+
+
+def test_another_table_in_the_file_is_found(tmp_path: Path) -> None:
+    written(tmp_path)
+    database = sqlite3.connect(tmp_path / FILE, isolation_level=None)
+    database.execute("CREATE TABLE more (x)")
+    database.close()
+    assert problem_of(tmp_path) == "its tables are not those of a ledger"
 
 
 def test_what_went_wrong_with_which_ledger_is_told(tmp_path: Path) -> None:

@@ -100,6 +100,11 @@ def test_a_ledger_that_cannot_be_opened_is_told_and_tried_again(tmp_path, writer
     until(lambda: writer.state.durable == 1)
 
 
+def test_a_disk_that_hangs_keeps_no_process_from_ending(writers):
+    writers(lambda: Disk())
+    assert [thread.daemon for thread in threading.enumerate() if thread.name == "ledger"] == [True]
+
+
 def test_the_end_writes_what_waits_and_closes(writers):
     disk = Disk()
     writer = writers(lambda: disk)
@@ -132,5 +137,6 @@ def test_a_flood_of_lines_is_counted_instead_of_recorded(writers):
     writer.note(line("after"))
     until(lambda: len(disk.rows) == 202)
     assert "refused 199" in disk.rows[199].body
+    assert (disk.rows[200].kind, disk.rows[200].name) == ("event", "controller")
     left_out = json.loads(disk.rows[200].body)
     assert left_out["lines"] == 800 and left_out["text"].startswith("800 log lines") and "after" in disk.rows[201].body
