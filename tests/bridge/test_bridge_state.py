@@ -385,3 +385,12 @@ def test_after_a_cut_the_camera_looks_more_often_again(bench: Bench) -> None:
     bench.core.on_cut(cut(bench, "c1"), bench.now)
     bench.robot.end_cut("DONE")
     assert pictures(2.0) >= 4
+
+
+def test_braking_after_its_controllers_mode_has_ended_is_no_motion_against_that_mode(bench: Bench) -> None:
+    bench.drive_on()
+    bench.mode = "IDLE"
+    bench.ask()
+    bench.run(0.05, FORWARD)
+    bench.run(0.5, REST)
+    assert not any("commanded to move" in line for line in bench.log) and not bench.state.moving
