@@ -150,3 +150,28 @@ def test_a_refusal_and_a_change_of_control_change_the_report():
     account.add(at(0.0), Answer(ok=True))
     assert account.add(at(1.0), asked(intents.Start(user="bob"), "no point is accepted"))
     assert account.add(at(2.0), asked(intents.TakeControl(user="bob")))
+
+
+def test_who_began_a_cut_is_told_with_its_end_and_a_cut_without_a_known_end_counts_for_its_vine():
+    told = report(
+        (0.0, asked(intents.Start(user="ada"))),
+        (0.2, ticket("a", "CUTTING", user="ada")),
+        (0.4, ticket("a", "UNKNOWN", reason="x" * 500)),
+    )
+    (cut,) = told.cuts
+    assert (cut.user, cut.outcome, round(cut.seconds, 3), cut.reason) == ("ada", "UNKNOWN", 0.4, "x" * 500)
+    assert [(vine.done, vine.not_cut, vine.unknown) for vine in told.vines] == [(0, 0, 1)]
+
+
+def test_points_that_are_given_up_one_after_the_other_take_the_time_since_the_one_before():
+    def row(name, state):
+        return replace(ticket(name, state, user="ada"), cut_id="")
+
+    account = SessionReportBuilder()
+    account.add(at(0.0), asked(intents.Start(user="ada")))
+    for name in ("a", "b"):
+        account.add(at(0.0), row(name, "ACCEPTED"))
+    assert account.add(at(0.5), row("a", "FAILED_NOT_CUT")) and account.add(at(2.5), row("b", "FAILED_NOT_CUT"))
+    told = account.report().cuts
+    assert [(cut.point_id, cut.seconds, cut.ended_at - BEGAN) for cut in told] == [("a", 0.5, 0.5), ("b", 2.0, 2.5)]
+    assert account.add(at(3.0), ticket("c", "CUTTING"))
