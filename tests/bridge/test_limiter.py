@@ -96,3 +96,20 @@ def test_where_packets_may_be_lost_the_arm_may_go_on_with_its_acceleration_and_s
             assert np.all(np.abs(sent + repeats * change) <= most + 1e-9)
             fastest = np.maximum(fastest, np.sign(goal) * sent)
         assert np.all(fastest > 0.9 * np.minimum(most, np.sqrt(LIMITS.acceleration[ARM_XI] * (UPPER - LOWER) / 2)))
+
+
+def test_after_a_standstill_it_goes_on_from_how_the_robot_moves_within_its_velocities() -> None:
+    bound, arm = limiter(), (LOWER + UPPER) / 2
+    bound.go_on_from(np.zeros(7), np.full(7, 2e-4))
+    moving = np.array([1.0, -1.0, 0.3, -0.3, 99.0, -99.0, 0.0, 0.0, 0.1])
+    bound.restart(moving)
+    np.testing.assert_array_equal(bound.sent, np.clip(moving, -LIMITS.velocity, LIMITS.velocity))
+    change = bound.step(bound.sent.copy(), arm) - np.clip(moving, -LIMITS.velocity, LIMITS.velocity)
+    assert np.all(np.abs(change[ARM_XI]) <= LIMITS.jerk[ARM_XI] * DT**2 + 1e-12)
+
+
+def test_braking_takes_as_long_as_that_of_the_slowest_actuator() -> None:
+    wheels = np.array([-2.7, 1.35, *(0.0,) * 7])
+    assert np.isclose(limiter().braking_s(wheels), 0.2)
+    joint = np.array([0.0, 0.0, 1.0, *(0.0,) * 6])
+    assert np.isclose(limiter().braking_s(joint), 1.0 / LIMITS.acceleration[2])
