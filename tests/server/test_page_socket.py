@@ -404,13 +404,13 @@ def test_a_page_that_does_not_read_is_dropped_and_one_that_reads_stays():
 
         # A page of the library's reads ahead a few messages, and answers pings only as far as it has read.
         with opened() as reading, opened():
-            scene_updater = threading.Thread(target=look, args=(reading,))
-            scene_updater.start()
+            reader = threading.Thread(target=look, args=(reading,))
+            reader.start()
             eventually(lambda: client.get("/api/state").json()["viewers"] == 2)
             eventually(lambda: client.get("/api/state").json()["viewers"] == 1)
             said = [line["text"] for line in client.get("/api/events").json()["events"]]
             assert [text for text in said if "did not read" in text] == [
                 "a page of ann was closed: it did not read what it was sent"
             ]
-            assert scene_updater.is_alive()
-        scene_updater.join()
+            assert reader.is_alive()
+        reader.join()

@@ -18,10 +18,22 @@ from tests.support.running_server import PATIENCE_S, eventually, running_server
 _PLACING = ("SetPositionMessage", "SetOrientationMessage")
 
 
+def listening():
+    """Ports that this process listens on; other tests' servers may be among them."""
+    return {c.laddr.port for c in psutil.Process().net_connections("tcp") if c.status == psutil.CONN_LISTEN}
+
+
 @pytest.fixture(scope="module")
-def server():
-    wire = FakeWire()
+def view_port():
+    """Port of viser behind `server`, known once that runs."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def server(view_port):
+    wire, before = FakeWire(), listening()
     with running_server(wire) as running:
+        view_port.extend(listening() - before - {int(running.address.rsplit(":", 1)[1])})
         wire.deliver(topics.JOINTS, joints())
         wire.deliver(topics.ODOMETRY, odometry())
         wire.deliver(topics.POINTS, pruning_points(pruning_point("p1")))
@@ -311,8 +323,9 @@ def test_signing_out_closes_the_view(server):
 
 
 def test_who_goes_around_the_proxy_is_thrown_out(server, view_port):
+    (port,) = view_port
     with pytest.raises(ConnectionClosed) as caught:
-        with connect(f"ws://127.0.0.1:{view_port}/", subprotocols=["viser-v1.1.1"], proxy=None) as view:
+        with connect(f"ws://127.0.0.1:{port}/", subprotocols=["viser-v1.1.1"], proxy=None) as view:
             while True:
                 view.recv(timeout=PATIENCE_S)
     assert caught.value.rcvd.code == 1008
@@ -348,16 +361,9 @@ def test_the_client_waits_for_the_pages_own_file_and_does_without_it_where_it_do
     page.add_init_script("""new MutationObserver((_, looking) => {
       if (!document.querySelector("#root > *")) return;
       window.beganWith = location.search;
-      scene_updater.disconnect();
+      looking.disconnect();
     }).observe(document, { childList: true, subtree: true });""")
     page.goto("/viser/")
     page.wait_for_function("window.beganWith !== undefined", timeout=1000 * PATIENCE_S)
     assert page.evaluate("beganWith").startswith("?fixedDpr=") == comes
     context.close()
-
-
-@pytest.fixture
-def view_port(server):
-    ours = {c.laddr.port for c in psutil.Process().net_connections("tcp") if c.status == psutil.CONN_LISTEN}
-    (port,) = ours - {int(server.address.rsplit(":", 1)[1])}
-    return port
