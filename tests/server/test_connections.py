@@ -238,8 +238,14 @@ def test_many_bytes_in_few_messages_are_too_much_as_well(plain):
         with contextlib.suppress(ConnectionClosed):
             for _ in range(100):
                 flood.send(b"x" * 60_000)
-        code, reason = closed(flood)
-        assert code == 1008 and "bytes a second" in reason
+        # The frame with code and reason may be lost: TCP resets a connection that is closed with data unread.
+        closed(flood)
+        eventually(
+            lambda: any(
+                "a view of amy was closed" in line["text"] and "bytes a second" in line["text"]
+                for line in amy.get("/api/events").json()["events"]
+            )
+        )
 
 
 def test_a_drag_at_sixty_a_second_is_never_too_much(plain):
