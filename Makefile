@@ -12,7 +12,7 @@ help:
 	@echo "make demo    start everything in simulation; prints a link to sign in with   (ARGS='--port 8001 --seed 3')"
 	@echo "make test    make check, then every test"
 	@echo "make test-training  the tests of the training, with PyTorch"
-	@echo "make fast    tests that only compute: no browser, no processes"
+	@echo "make fast    quick tests: no browser, no processes, none that computes for seconds"
 	@echo "make coverage  make fast, then lines and branches covered, by folder; make test COVERAGE=1 counts its first stage"
 	@echo "make format  format the code, write the generated files anew"
 	@echo "make check   formatting, types, import contracts, generated files, docs"
@@ -47,7 +47,7 @@ test-training: training
 	$(BIN)/pytest tests/perception/test_training.py
 
 # Fewer random examples than `make test` has.
-FAST = HYPOTHESIS_PROFILE=fast $(BIN)/pytest -n auto -m "not alone and not slow and not browser and not processes" \
+FAST = HYPOTHESIS_PROFILE=fast $(BIN)/pytest -n auto -m "not alone and not slow and not browser and not processes and not long" \
 	$(WITHOUT_TRAINING) tests/bridge tests/controller tests/perception tests/recorder tests/rolling_panda tests/server
 fast: $(VENV)/.project
 	$(FAST)

@@ -87,6 +87,7 @@ periods = st.tuples(
 )
 
 
+@pytest.mark.long
 @settings(max_examples=30)
 @given(st.lists(periods, max_size=12))
 def test_whatever_is_aimed_at_and_lost_or_late_no_limit_is_broken(

@@ -92,6 +92,7 @@ def test_depth_noise_grows_with_the_square_of_the_distance(distance):
     assert np.std(depth) == pytest.approx(sigma, rel=0.02)
 
 
+@pytest.mark.long
 def test_depth_is_in_whole_units_and_within_range():
     T = np.diag([1.0, -1.0, -1.0, 1.0])
     for distance, seen in ((0.15, False), (0.25, True), (3.5, True), (4.5, False)):
@@ -177,6 +178,7 @@ def test_thin_things_lose_depth_and_broad_ones_keep_it():
     assert np.all(image.depth[post] > 0.0)
 
 
+@pytest.mark.long
 def test_a_camera_is_as_far_off_as_its_calibration_and_always_alike():
     row, T = Row((upright_rod("post", 0.0, 1.0, 0.02),)), looking_left()
     config = msgspec.structs.replace(EXACT, width=848, height=480, calibration_angle=0.02)

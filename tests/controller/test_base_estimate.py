@@ -85,6 +85,7 @@ def test_wheels_come_to_what_they_were_told_with_their_lag():
     np.testing.assert_array_equal(wheels_ahead(wheels, sent, 0.1, 0.0), sent)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rates", [(100.0, 100.0), (1000.0, 50.0)])
 def test_the_tool_keeps_to_its_path_although_odometry_is_late_and_noisy(rates):
     """A base with a lag of 0.1 s, odometry 20 ms late: against taking the odometry as it comes."""

@@ -30,6 +30,7 @@ def check(motion, start, goal, drive=ROBOT.drive):
     assert np.abs(np.diff(v)).max() / dt <= 0.8 + 1e-9
 
 
+@pytest.mark.long
 @settings(max_examples=20, deadline=None)
 @given(place, place)
 def test_every_motion_ends_at_the_goal_within_the_limits(start, goal):

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
+import pytest
 
 from controller.config import ControllerConfig
 from controller.motion.surroundings import obstacles_of
@@ -16,6 +17,8 @@ from rolling_panda.messages.supervision import TeleopTarget
 from rolling_panda.model.robot import RobotModel, pose_message
 from tests.support.controller_at_work import entry, robot, run_until, working
 from tests.support.points import point
+
+pytestmark = pytest.mark.long
 
 CUT = (0.45, 0.75, 1.10)
 STAND_OFF = ControllerConfig().stand_off

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pinocchio as pin
+import pytest
 
 from controller.motion.surroundings import obstacles_of
 from controller.whole_body.collision import CollisionModel
@@ -19,6 +20,8 @@ from tests.controller.test_core_work import (
     robot,
     working,
 )
+
+pytestmark = pytest.mark.long
 
 MODEL = RobotModel()
 COLLISION = CollisionModel(MODEL)

@@ -13,6 +13,8 @@ from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
 from rolling_panda.model.robot import ARM_Q
 from tests.controller.test_core_work import CONFIG, entry, finish, point, robot
 
+pytestmark = pytest.mark.long
+
 PLANNER = CutPlanner(CONFIG, RobotConfig())
 POST = Capsule("post", (0.5, 0.75, 0.0), (0.5, 0.75, 2.0), 0.05, 0.05)
 

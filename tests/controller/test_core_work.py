@@ -46,6 +46,7 @@ def assert_limits_kept(r):
     assert speed.max() <= 0.3 + 1e-6
 
 
+@pytest.mark.long
 def test_random_points_before_the_row_are_reached_and_cut_within_the_limits():
     shown = points(20, seed=3)
     r = working(shown)
@@ -65,6 +66,7 @@ def test_random_points_before_the_row_are_reached_and_cut_within_the_limits():
     assert margin.min() > 0
 
 
+@pytest.mark.long
 def test_at_a_thousand_hertz_and_fifty_the_cuts_are_made_within_the_limits():
     shown = (point("a", (0.4, 0.75, 1.0)), point("b", (0.7, 0.75, 1.1)))
     r = working(shown, config=ControllerConfig(rate_hz=1000.0, base_rate_hz=50.0))

@@ -34,6 +34,7 @@ def answered(worker, asked):
     return worker.newest
 
 
+@pytest.mark.long
 def test_it_answers_as_the_planner_in_this_process_does_and_at_low_priority(worker) -> None:
     asked = request(point("a", 0.3), point("in", 0.5), point("b", 1.4), obstacles=(POST,))
     made = answered(worker, asked)
@@ -45,6 +46,7 @@ def test_it_answers_as_the_planner_in_this_process_does_and_at_low_priority(work
     assert psutil.Process(worker.pid).nice() >= 5
 
 
+@pytest.mark.long
 def test_what_cannot_be_planned_from_is_answered_with_a_failure_and_a_dead_process_is_replaced(worker) -> None:
     broken = request(point("a", 0.3), number=2)
     broken.q[0] = np.nan
@@ -57,6 +59,7 @@ def test_what_cannot_be_planned_from_is_answered_with_a_failure_and_a_dead_proce
     assert worker.pid != first
 
 
+@pytest.mark.long
 def test_it_ends_with_a_parent_that_is_killed() -> None:
     program = (
         "import time\n"
@@ -78,6 +81,7 @@ def test_it_ends_with_a_parent_that_is_killed() -> None:
     until(lambda: not psutil.pid_exists(child))
 
 
+@pytest.mark.long
 def test_a_preview_is_answered_as_the_rollout_in_this_process_does_before_a_plan_that_waits(worker) -> None:
     asked = request(point("a", 0.3), number=7)
     wanted = PreviewRequest(1, asked.q, asked.points)

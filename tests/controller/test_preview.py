@@ -147,6 +147,7 @@ def test_what_comes_into_the_way_ends_it_and_what_leaves_it_room_does_not(p):
     assert p.state.phase == "expired" and "a post is seen" in p.state.reason and "to a" in p.state.reason
 
 
+@pytest.mark.long
 def test_what_is_planned_or_accepted_meanwhile_leaves_the_order_that_was_shown(p):
     p.robot.show((*POINTS, point("c", (0.1, 0.75, 1.0))))
     shown = p.previewed("a", "b")

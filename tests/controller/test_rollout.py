@@ -16,6 +16,8 @@ from tests.support.controller_at_work import CONFIG, entry
 from tests.support.points import point
 from tests.support.previewed import ROLLOUT, Previewed
 
+pytestmark = pytest.mark.long
+
 POINTS = (point("a", (0.45, 0.75, 1.05)), point("b", (0.75, 0.75, 1.1), (0.1, 0.0, 0.995)))
 DRIVE = RobotModel(RobotConfig()).drive
 START = np.zeros(12)

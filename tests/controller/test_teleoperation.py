@@ -198,6 +198,7 @@ def held(r, **wanted):
     r.teleop = TeleopTarget(sequence=1, hold=True, user="ada", **wanted)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", ["hierarchy", "nullspace"])
 def test_joints_are_turned_alone_and_stop_before_their_limits(method):
     r = robot(method=method)

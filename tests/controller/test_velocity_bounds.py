@@ -57,6 +57,7 @@ SHARES = {"as configured": CONFIG, "hasty": ControllerConfig(arm_share=1.0, arm_
 SHARES["gentle"] = ControllerConfig(arm_jerk_share=0.05)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("shares", SHARES)
 @pytest.mark.parametrize("rate_hz", [100, 250, 1000])
 @settings(max_examples=15, deadline=None)

@@ -23,6 +23,8 @@ from rolling_panda.model.robot import RobotModel, configuration
 from rolling_panda.model.wire_values import vector3
 from tests.support.points import point as pruning_point
 
+pytestmark = pytest.mark.long
+
 SEED = 210
 MODEL = RobotModel()
 BASE, POSTURE = survey_place()

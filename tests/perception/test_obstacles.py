@@ -16,6 +16,8 @@ from perception.segmentation.segmenter import LabelImageSegmenter, choose_segmen
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.model.robot import RobotModel
 
+pytestmark = pytest.mark.long
+
 
 def distance(point, start, end):
     """From a point to a segment (m)."""

@@ -20,6 +20,8 @@ from perception.segmentation.frame import decode_frame
 from rolling_panda.messages.types import WOOD_CLASSES
 from rolling_panda.model.robot import RobotModel
 
+pytestmark = pytest.mark.long
+
 POST, TRUNK, CORDON = (WOOD_CLASSES.index(kind) for kind in ("post", "trunk", "cordon"))
 
 

@@ -29,6 +29,8 @@ from rolling_panda.commands import SetRule
 from rolling_panda.messages.robot import Intrinsics
 from rolling_panda.model.robot import RobotModel
 
+pytestmark = pytest.mark.long
+
 CONFIG, RULE = ObstacleConfig(), RuleConfig()
 GUYOT = RuleConfig(system="guyot")
 NUMBER = SpurNumber(2, 3)

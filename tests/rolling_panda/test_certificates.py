@@ -36,6 +36,7 @@ def ended(process: subprocess.Popen[str]) -> str:
     return said
 
 
+@pytest.mark.long
 @pytest.mark.processes
 @pytest.mark.parametrize("ahead", [TEN_YEARS, -TEN_YEARS, 6 * TEN_YEARS, -5 * TEN_YEARS])
 def test_with_a_runs_own_certificates_a_start_under_a_wrong_clock_finds_the_wire(tmp_path: Path, ahead: int) -> None:
@@ -52,6 +53,7 @@ def test_with_a_runs_own_certificates_a_start_under_a_wrong_clock_finds_the_wire
     assert "bridge" in said and "no wire" not in said
 
 
+@pytest.mark.long
 @pytest.mark.processes
 def test_a_certificate_that_has_ended_by_the_clock_is_said_with_both_dates(tmp_path: Path) -> None:
     folder, endpoint = tmp_path / "certificates", f"tls/127.0.0.1:{free_port()}"

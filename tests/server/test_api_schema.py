@@ -58,6 +58,7 @@ def send(client, case):
     return client.request(kwargs["method"], kwargs["url"], headers=headers, **body)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("examples", [3, pytest.param(200, marks=pytest.mark.slow)])
 def test_nothing_that_is_sent_makes_the_server_fail(server, operations, examples):
     for operation in operations:

@@ -117,6 +117,7 @@ def wrong(server, path, examples):
     return found, made
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("examples", [3, pytest.param(300, marks=pytest.mark.slow)])
 def test_everything_is_answered_as_it_is_described(examples):
     wire = Answering()
@@ -127,6 +128,7 @@ def test_everything_is_answered_as_it_is_described(examples):
     assert made > 50 * examples
 
 
+@pytest.mark.long
 def test_so_are_several_robots_and_each_description_says_where_its_robot_is():
     wires = Answering(), Answering()
     with running_server(wires[0], rp2=wires[1]) as server, telling(wires[0]), telling(wires[1]):

@@ -385,6 +385,7 @@ def test_a_viewer_hears_of_a_stop_a_mode_and_a_lost_process_at_once() -> None:
     assert not throttle.is_due(state(16, **other, processes=(ProcessPresence("bridge", False, 3.1),)), False)
 
 
+@pytest.mark.long
 def test_a_page_that_does_not_read_is_dropped_and_one_that_reads_stays():
     wire = FakeWire()
     config = ServerConfig(unread_s=2.0, page_rate_hz=100.0)

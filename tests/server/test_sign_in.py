@@ -80,6 +80,7 @@ def test_half_a_request_is_refused(visitor):
         assert answer.status_code == 422, body
 
 
+@pytest.mark.long
 def test_who_guesses_waits_and_who_is_in_can_stop_meanwhile(server, users):
     users.add("bob", "operator", PASSWORD)
     wire = server.wire

@@ -342,6 +342,7 @@ def test_the_client_page_is_compressed_and_kept_by_the_browser(server):
         assert again.status_code == 304
 
 
+@pytest.mark.long
 @pytest.mark.browser
 @pytest.mark.parametrize("comes", [True, False])
 def test_the_client_waits_for_the_pages_own_file_and_does_without_it_where_it_does_not_come(server, browser, comes):
