@@ -19,6 +19,8 @@ from rolling_panda.resources import resource
 from tests.support.bridge_rig import FORWARD, MODEL, REST, NoCamera, Parts, Rig, SimulatedPlant
 from tests.support.extras import need
 
+pytestmark = pytest.mark.long
+
 
 def simulated() -> Parts:
     config = load_section(resource("assets/config/sim.toml"), "bridge", BridgeConfig)

@@ -20,6 +20,8 @@ from rolling_panda.errors import MessageError
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.model.robot import RobotModel
 
+pytestmark = pytest.mark.long
+
 #: So many of the same frame show a point where the frame is good.
 AGAIN = 4
 REFUSED = (

@@ -23,6 +23,8 @@ from rolling_panda.messages.perception import point_digest
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.transport.codec import StrictDecoder, encode
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def model():
@@ -243,7 +245,6 @@ RULES = st.builds(
 )
 
 
-@pytest.mark.long
 @settings(max_examples=25)
 @given(st.lists(RULES, min_size=1, max_size=3))
 def test_what_a_rule_would_change_is_what_it_changes_and_taken_back_all_is_as_it_was(surveyed, rules):

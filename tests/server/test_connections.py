@@ -18,6 +18,8 @@ from tests.support.certificates import self_signed
 from tests.support.fake_wire import FakeWire, telling
 from tests.support.running_server import PATIENCE_S, eventually, running_server
 
+pytestmark = pytest.mark.long
+
 HEAD = b"GET /api/health HTTP/1.1\r\nHost: a\r\n"
 BODY = b"POST /api/sign-in HTTP/1.1\r\nHost: a\r\nOrigin: %s\r\nContent-Length: 100\r\n\r\n{"
 
