@@ -13,7 +13,7 @@ help:
 	@echo "make test    make check, then every test"
 	@echo "make test-training  the tests of the training, with PyTorch"
 	@echo "make fast    quick tests: no browser, no processes, none that computes for seconds"
-	@echo "make coverage  make fast, then lines and branches covered, by folder; make test COVERAGE=1 counts its first stage"
+	@echo "make coverage  make fast, then the lines and branches covered, by folder"
 	@echo "make format  format the code, write the generated files anew"
 	@echo "make check   formatting, types, import contracts, generated files, docs"
 	@echo "make docs    the documentation as a site, in build/site; without warnings, or it fails"
@@ -26,19 +26,14 @@ help:
 demo: $(VENV)/.project
 	@exec $(BIN)/rolling-panda demo $(ARGS)
 
-# First the tests that only compute, one on each core; then those that time would disturb, one after the other. Training
+# First the tests that others may run beside, one on each core; then those that time would disturb, one after the other. Training
 # has its own target, since nothing else needs PyTorch.
 WITHOUT_TRAINING := --ignore tests/perception/test_training.py
-COVERED := --cov --cov-report=
-COVERAGE_TABLE = $(BIN)/coverage json --quiet -o build/coverage/report.json && \
-	$(BIN)/python tests/support/coverage_table.py build/coverage/report.json
 test: check browser drivers
 ifdef ARGS
 	$(BIN)/pytest $(ARGS)
 else
-	@mkdir -p build/coverage
-	$(BIN)/pytest -n auto $(if $(COVERAGE),$(COVERED)) -m "not alone and not slow" $(WITHOUT_TRAINING)
-	$(if $(COVERAGE),@$(COVERAGE_TABLE))
+	$(BIN)/pytest -n auto -m "not alone and not slow" $(WITHOUT_TRAINING)
 	$(BIN)/pytest -m "alone and not slow" $(WITHOUT_TRAINING)
 	@echo "make test-training runs the tests of the training; it installs PyTorch"
 endif
@@ -54,8 +49,9 @@ fast: $(VENV)/.project
 
 coverage: $(VENV)/.project
 	@mkdir -p build/coverage
-	$(FAST) $(COVERED)
-	@$(COVERAGE_TABLE)
+	$(FAST) --cov --cov-report=
+	@$(BIN)/coverage json --quiet -o build/coverage/report.json
+	@$(BIN)/python tests/support/coverage_table.py build/coverage/report.json
 
 format: $(VENV)/.project
 	$(BIN)/ruff check --fix .

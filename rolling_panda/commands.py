@@ -122,7 +122,6 @@ class MovePoint(PlantRequest, frozen=True, kw_only=True):
     along: Annotated[float, Meta(ge=-0.1, le=0.1)]
 
 
-AnyPlantRequest = SetRule | EvaluateRule | UndoRule | AddPoint | AddPointInImage | MovePoint
 #: Default confidence from which `AcceptAll` accepts points.
 SURE: Final = 0.8
 

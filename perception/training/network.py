@@ -12,8 +12,6 @@ from torch import Tensor, nn
 
 #: Channels at 1/2, 1/4, 1/8 and 1/16 of the image's resolution.
 WIDTHS = (16, 32, 48, 64)
-#: Height and width of an image must be multiples of this.
-MULTIPLE = 16
 
 
 class _Block(nn.Sequential):
@@ -47,7 +45,7 @@ class Network(nn.Module):
         self.answer = nn.Sequential(nn.Conv2d(2 * a, 4 * classes, 1), nn.PixelShuffle(2))
 
     def forward(self, image: Tensor) -> Tensor:
-        """Logits of each pixel; height and width of `image` are multiples of `MULTIPLE`."""
+        """Logits of each pixel; height and width of `image` are multiples of 16."""
         half = self.at_2(self.fold(image))
         quarter = self.at_4(half)
         eighth = self.at_8(quarter)

@@ -156,8 +156,6 @@ class ControllerState(Message, frozen=True, kw_only=True):
 
 #: Public key of a client: a digest of its session, never the session itself. Empty = nobody.
 ClientKey = Annotated[str, Meta(max_length=64)]
-#: Random part of a token.
-Nonce = Annotated[str, Meta(max_length=32, pattern=r"^[0-9a-f]*(?!\n)$")]
 #: Age of the view of a client that has not seen any state yet (s).
 NEVER_SEEN_S = 1e6
 

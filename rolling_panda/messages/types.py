@@ -22,7 +22,6 @@ Text = Annotated[str, Meta(max_length=500)]
 Vector3 = tuple[Metre, Metre, Metre]
 UnitVector3 = tuple[Unit, Unit, Unit]
 QuatXyzw = tuple[Unit, Unit, Unit, Unit]
-ArmVector = tuple[Angle, Angle, Angle, Angle, Angle, Angle, Angle]
 #: θ_l, θ_r, q₁…q₇ (rad): the actuated coordinates ξ.
 Actuated = tuple[Angle, Angle, Angle, Angle, Angle, Angle, Angle, Angle, Angle]
 #: Velocities of ξ (rad/s).

@@ -50,8 +50,6 @@ export type ArmVelocities = [number, number, number, number, number, number, num
 
 export type QuatXyzw = [number, number, number, number];
 
-export type ArmVector = [number, number, number, number, number, number, number];
-
 export type Severity = "info"|"warning"|"error";
 
 export type GizmoAxes = "tool"|"base"|"world";
