@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 TYPESCRIPT := typescript@5.9.3
 
-.PHONY: help demo test test-training fast coverage check format docs bench mutation clean lock materials browser drivers training
+.PHONY: help demo test test-training fast coverage check format docs bench mutation clean lock materials browser systemd drivers training
 .DEFAULT_GOAL := help
 
 help:
@@ -29,7 +29,7 @@ demo: $(VENV)/.project
 # First the tests that others may run beside, one on each core; then those that time would disturb, one after the other. Training
 # has its own target, since nothing else needs PyTorch.
 WITHOUT_TRAINING := --ignore tests/perception/test_training.py
-test: check browser drivers
+test: check browser systemd drivers
 ifdef ARGS
 	$(BIN)/pytest $(ARGS)
 else
@@ -116,6 +116,16 @@ browser: $(VENV)/.project
 			|| $(BIN)/playwright install --with-deps chromium; \
 	else \
 		echo "Chromium is not installed; the browser tests may fail. Install it: sudo apt-get install chromium"; \
+	fi
+
+# The tests of the systemd units read them with systemd's own checker; without it they fail and say how to get it.
+systemd:
+	@if command -v systemd-analyze >/dev/null; then :; \
+	elif [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+		echo "installing systemd, for systemd-analyze"; apt-get update -qq; \
+		DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends systemd >/dev/null; \
+	else \
+		echo "systemd-analyze is not installed; its tests fail. Install it: sudo apt-get install systemd"; \
 	fi
 
 $(VENV)/.locked: requirements.lock

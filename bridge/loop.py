@@ -1,4 +1,4 @@
-"""Loop of the bridge: read the newest commands, step in real time, publish what is due."""
+"""Loop of the bridge: it reads the newest commands, steps in real time and publishes the due messages."""
 
 import threading
 import time

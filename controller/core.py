@@ -205,7 +205,7 @@ class Controller:
         """The handler of each command of the table."""
         decisions = QueueRequests(self._queue, self._event_log).handlers()
         turn = decisions[intents.SetApproach]
-        return {
+        handlers: Handlers = {
             **self._supervisor.authority.handlers(),
             **decisions,
             **self._previews.handlers(),
@@ -220,6 +220,10 @@ class Controller:
             intents.Home: self._home,
             intents.Reset: lambda asked, now: self._supervisor.stops.ask_release(asked, self._supervisor.bridge, now),
         }
+        # Asked for later, it would end the control loop.
+        if missing := [message.__name__ for message in intents.INTENTS if message not in handlers]:
+            raise ControlError(f"commands without a handler: {', '.join(missing)}; add one in controller/core.py")
+        return handlers
 
     def _update(self, inputs: StepInputs, now: float) -> None:
         self._inputs = inputs
@@ -281,7 +285,7 @@ class Controller:
             authority.claim(client, now)
         if command.event is None:
             return ""
-        reason = f"{command.name.lower()} by {asked.user}"
+        reason = f"{command.words} by {asked.user}"
         return self._supervisor.event(command.event, now, reason, authority.rights(client, asked.role))
 
     def _start(self, asked: intents.Start, now: float) -> str:

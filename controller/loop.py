@@ -157,7 +157,7 @@ class Loop:
         return LedgerState(state.durable, state.failure or self._stop_file.failure)
 
     def publish(self, outputs: Outputs, now: float) -> None:
-        """Send what is due. The state is sent when its content is durable.
+        """Send the due messages. The state waits until its content is durable.
 
         While another controller commands the robot, this one sends events only.
         """

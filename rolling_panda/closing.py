@@ -1,14 +1,15 @@
 """Context managers that close themselves."""
 
+from abc import ABC, abstractmethod
 from typing import Self
 
 
-class Closing:
+class Closing(ABC):
     """Closes itself at the end of its `with` block."""
 
+    @abstractmethod
     def close(self) -> None:
-        """Release what is held; subclasses define it."""
-        raise NotImplementedError
+        """Release all resources."""
 
     def __enter__(self) -> Self:
         """Return the object itself."""

@@ -4,6 +4,7 @@ REST routes and bodies, permissions, log texts, and the lists of the page and th
 generated from the table. The controller's handlers are in `controller/core.py`.
 """
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import degrees
@@ -405,6 +406,11 @@ class Command:
     def name(self) -> str:
         """Name of the command: that of its message."""
         return self.message.__name__
+
+    @property
+    def words(self) -> str:
+        """The name as words, for reasons: "look again"."""
+        return re.sub(r"(?<!^)(?=[A-Z])", " ", self.name).lower()
 
     def text(self, intent: Struct) -> str:
         """The text for the log."""

@@ -44,8 +44,8 @@ _STOPS_TICKS = round(1 / STOPS.rate_hz / TICK_S)
 # the tool in place needs.
 _CUT_WHEELS, _CUT_JOINTS = 0.04, 0.1
 MOVING_CUT = "the robot is not at rest"
-# A robot without a step for this long (s) has stopped by its own deadlines, or is stopping: what is sent
-# starts from its measured motion.
+# Time without a step (s) after which the robot's own deadlines have begun to stop it. The setpoint then restarts from
+# the measured motion.
 _STANDSTILL_S = 0.05
 # Modes of the holder in which nothing moves, except for braking, and the time limit of braking (s).
 _STILL: tuple[m.Mode, ...] = ("IDLE", "FAULT", "ESTOP_LATCHED")

@@ -27,7 +27,7 @@ _REALTIME = Path("/sys/kernel/realtime")
 
 @dataclass(frozen=True)
 class Finding:
-    """One row of the table: what is checked, the value found, the required value, and the verdict."""
+    """One row of the table: name of the check, measured value, required value, verdict."""
 
     what: str
     found: str

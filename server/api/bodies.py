@@ -23,7 +23,6 @@ POINT_ID: Any = Path(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9_.:\-]+$"
 STOP_REASON_LENGTH = 400
 #: Larger integers are not exact in every JSON parser.
 _MAX_INTEGER = 2**53
-_Text = Annotated[str, Field(max_length=500)]
 _Metre = Annotated[float, Field(ge=-1e4, le=1e4)]
 _Unit = Annotated[float, Field(ge=-1.001, le=1.001)]
 
