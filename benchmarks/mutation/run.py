@@ -26,9 +26,6 @@ JUSTIFIED = Path(__file__).with_name("justified.toml")
 _PYTHON = ROOT / "build/mutation/bin/python"
 _CODE = ("rolling_panda", "bridge", "controller", "perception", "server", "recorder", "benchmarks")
 _BESIDE = ("assets", "web", "docs", "deploy", "README.md")
-#: What every mutant's process finds imported. No test is among it: what a test makes when it is imported has to be made
-#: by the mutant.
-_PRELOADED = ("hypothesis.strategies", "tests.conftest", "bridge.core.bridge", "controller.core", "server.service")
 _SETTINGS = """
 [tool.mutmut]
 source_paths = {code}
@@ -36,10 +33,6 @@ only_mutate = {files}
 pytest_add_cli_args_test_selection = {tests}
 pytest_add_cli_args = ["-p", "no:cacheprovider", "-W", "ignore::pytest.PytestAssertRewriteWarning"]
 process_isolation = "forkserver"
-forkserver_warmup = "import"
-preload_modules_file = "preloaded"
-timeout_multiplier = 10.0
-timeout_constant = 3.0
 use_git_change_detection = false
 on_dependency_change = "ignore"
 """
@@ -140,7 +133,6 @@ def lay_out(name: str, target: Target) -> Path:
     }
     settings = (ROOT / "pyproject.toml").read_text(encoding="utf-8") + _SETTINGS.format(**words)
     (folder / "pyproject.toml").write_text(settings, encoding="utf-8")
-    (folder / "preloaded").write_text("\n".join(_PRELOADED), encoding="utf-8")
     return folder
 
 
