@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
+from hypothesis import Phase, settings
 from playwright.sync_api import sync_playwright
 
 from tests.support.played_page import browser, close_browser, page, server, tab
@@ -19,6 +19,9 @@ __all__ = ["browser", "page", "server", "tab"]
 settings.register_profile("same", deadline=None, derandomize=True, max_examples=40)
 settings.register_profile("explore", deadline=None, max_examples=500)
 settings.register_profile("fast", deadline=None, derandomize=True, max_examples=8)
+# A mutant is killed by the first example that fails; the smallest one is not looked for.
+_NO_SHRINKING = (Phase.explicit, Phase.reuse, Phase.generate)
+settings.register_profile("mutation", deadline=None, derandomize=True, max_examples=40, phases=_NO_SHRINKING)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
 
 

@@ -153,7 +153,7 @@ def tried(name: str, target: Target, sample: int, seed: int, workers: int) -> Fo
     worker = [str(_PYTHON), str(ROOT / "benchmarks/mutation/worker.py"), str(sample), str(seed), str(workers)]
     log = folder / "log"
     with log.open("w") as file:
-        environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+        environment = {**os.environ, "PYTHONPATH": str(ROOT), "HYPOTHESIS_PROFILE": "mutation"}
         done = subprocess.run(worker, cwd=folder, env=environment, stdout=file, stderr=subprocess.STDOUT)
     if done.returncode != 0:
         raise InputError(f"{name}: mutmut ended with {done.returncode}; what it said is in {log}")

@@ -26,6 +26,7 @@ from typing import Any
 import pytest
 from mutmut import __main__ as mutmut
 from mutmut.configuration import config
+from mutmut.mutation.data import SourceFileMutationData
 from mutmut.mutation.diff_apply import get_diff_for_mutant
 from mutmut.mutation.trampoline import get_mutant_under_test, set_mutant_under_test
 from mutmut.runners.harness import PytestRunner
@@ -40,12 +41,14 @@ _PASSED, _KILLED, _UNTESTED, _TIMEOUT = 0, 1, 33, 36
 _NOTHING = (None, 2, 4, 255)
 #: A trial's limits, in CPU seconds and in seconds: so many, and so many times what its tests take.
 _CPU_S, _WALL_S, _TIMES = 20, 60, 10.0
+#: Tries mutants and tells each one's exit code; returns its process's.
+Attempt = Callable[[list[str], Callable[[str, int], None]], int]
 #: Functions that run when tests are imported, a file beside mutmut's statistics.
 _IMPORTED = Path("mutants/imported.json").absolute()
 
 
 class _Imports:
-    """Finds the functions that run while tests are imported: a fork of a process that did so cannot try theirs."""
+    """Finds the functions that run while tests are imported."""
 
     def pytest_collection_finish(self) -> None:
         """All modules are imported."""
@@ -169,21 +172,24 @@ def tests_of(name: str) -> set[str]:
     return set(state().tests_by_mangled_function_name.get(mangled_name_from_mutant_name(name), ()))
 
 
-def try_all(names: list[str], register: Callable[[str, int], None]) -> int:
-    """Try mutants one after the other. A function that runs when tests are imported costs their imports each time."""
-    runner, imported = PytestRunner(), set(json.loads(_IMPORTED.read_text()))
-    early = [name for name in names if mangled_name_from_mutant_name(name) in imported]
-    for name in early:
-        register(name, try_one(name, [], lambda tests: runner.run_tests(mutant_name=None, tests=tests) == _PASSED))
-    late = [name for name in names if name not in early]
+def try_forked(names: list[str], tell: Callable[[str, int], None]) -> int:
+    """Try mutants one after the other, in forks of a process that has imported the tests without a mutant."""
     set_mutant_under_test("")
     with change_cwd("mutants"):
         words = ["-q", *config().pytest_add_cli_args_test_selection]
-        return int(runner.execute_pytest(words, plugins=[Trials(late, register)]))
+        return int(PytestRunner().execute_pytest(words, plugins=[Trials(names, tell)]))
 
 
-def results(names: list[str], workers: int) -> Iterator[tuple[str, int]]:
-    """Try mutants in `workers` processes; yields each with its exit code.
+def try_anew(names: list[str], tell: Callable[[str, int], None]) -> int:
+    """Try mutants one after the other, with the imports of the tests each time."""
+    runner = PytestRunner()
+    for name in names:
+        tell(name, try_one(name, [], lambda tests: runner.run_tests(mutant_name=None, tests=tests) == _PASSED))
+    return 0
+
+
+def results(names: list[str], workers: int, attempt: Attempt) -> Iterator[tuple[str, int]]:
+    """Try mutants with `attempt` in `workers` processes; yields each with its exit code.
 
     Raises:
         SystemExit: Not all could be tried.
@@ -194,7 +200,7 @@ def results(names: list[str], workers: int) -> Iterator[tuple[str, int]]:
         os.write(sink, f"{name} {code}\n".encode())
 
     shares = (names[i::workers] for i in range(workers))
-    processes = [fork(functools.partial(try_all, share, tell)) for share in shares if share]
+    processes = [fork(functools.partial(attempt, share, tell)) for share in shares if share]
     os.close(sink)
     with os.fdopen(source) as told:
         for line in told:
@@ -202,6 +208,14 @@ def results(names: list[str], workers: int) -> Iterator[tuple[str, int]]:
             yield name, int(code)
     if any([wait(process) for process in processes]):
         sys.exit("not all were tried")
+
+
+def keep(results: Iterable[tuple[str, int]], files: dict[str, SourceFileMutationData]) -> None:
+    """Write each result to the file of its mutants, and tell it."""
+    for number, (name, code) in enumerate(results, 1):
+        files[name].exit_code_by_key[name] = code
+        files[name].save()
+        print(f"{number} {name}: {status_by_exit_code[code]}", flush=True)
 
 
 def in_order(tests: Iterable[str]) -> list[str]:
@@ -247,10 +261,12 @@ def main() -> None:
     print(f"{len(known)} mutants, {len(chosen)} chosen, {len(left)} to be tried", flush=True)
     if left and workers:
         statistics()
-        for number, (name, code) in enumerate(results(left, workers), 1):
-            files[name].exit_code_by_key[name] = code
-            files[name].save()
-            print(f"{number}/{len(left)} {name}: {status_by_exit_code[code]}", flush=True)
+        keep(results(left, workers, try_forked), files)
+        # What runs while the tests are imported was made without the mutant so far.
+        imported = set(json.loads(_IMPORTED.read_text()))
+        alive = [name for name in left if status(files[name].exit_code_by_key[name]) in _AGAIN]
+        early = [name for name in alive if mangled_name_from_mutant_name(name) in imported]
+        keep(results(early, workers, try_anew), files)
     rows, _ = mutmut.collect_source_file_mutation_data(mutant_names=tuple(chosen))
     found = {name: (data.path, status(code)) for data, name, code in rows}
     alive = [change(name, path) for name, (path, said) in found.items() if said in ("survived", "no tests")]
