@@ -1,7 +1,6 @@
 """Followers of tool motions, arm motions and teleoperation."""
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,8 +16,7 @@ from rolling_panda.model.differential_drive import NXI, Array
 from rolling_panda.model.robot import ARM_Q, ARM_XI, Kinematics
 
 
-@dataclass(frozen=True)
-class Measured:
+class Measured(Struct, frozen=True):
     """State of the robot in one control period.
 
     Attributes:

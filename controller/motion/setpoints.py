@@ -31,7 +31,7 @@ class Setpoints:
     @property
     def at_rest(self) -> bool:
         """Whether the last commands are zero."""
-        return not np.any(self.sent)
+        return not self.sent.any()
 
     def admits(self, xi: Array) -> bool:
         """Whether ξ̇ (9) is finite and within the limits, given the last command."""

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from controller.inputs import Sample
-from controller.whole_body.collision import CollisionModel
+from controller.whole_body.collision import CollisionModel, same
 from controller.whole_body.obstacle import Axes, Obstacle
 from rolling_panda.messages.perception import Capsule, Obstacles
 from rolling_panda.model.differential_drive import Array
@@ -50,7 +50,7 @@ class Surroundings:
 
         Beside a cut they may also push aside canes of which it is not decided that they stay.
         """
-        if len(places) == len(self._places) and all(map(np.array_equal, places, self._places)):
+        if len(places) == len(self._places) and all(map(same, places, self._places)):
             return
         self._places = places
         self._allow()

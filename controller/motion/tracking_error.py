@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from controller.whole_body.compiled import COUNT, NOTHING, NUMBER, VECTOR, compiled
 from rolling_panda import messages as m
 from rolling_panda.model.differential_drive import NXI, Array
 
@@ -33,17 +34,34 @@ class TrackingErrorMonitor:
             if passed != 0.0:
                 self._behind = np.zeros(NXI)
             return
-        self._behind += passed * (sent - np.array(joints.velocity) - self._behind / _FORGETS_S)
+        _integrate(self._behind, sent, np.array(joints.velocity), passed)
 
     @property
     def reason(self) -> str:
         """Description of the largest tracking error above its limit; empty without one."""
-        excess = np.abs(self._behind) - _LIMIT
-        worst = int(np.argmax(excess))
-        if excess[worst] <= 0.0:
+        worst = _worst(self._behind, _LIMIT)
+        if worst < 0:
             return ""
         name = ("the left wheel", "the right wheel")[worst] if worst < 2 else f"joint {worst - 1}"
         return (
             f"the robot does not follow: {name} is {abs(self._behind[worst]):.2f} rad from its command; "
             f"the limit is {_LIMIT[worst]}"
         )
+
+
+@compiled(NOTHING(VECTOR, VECTOR, VECTOR, NUMBER))
+def _integrate(behind: Array, sent: Array, velocity: Array, passed: float) -> None:
+    """Advance the tracking error `behind` (9, rad) by `passed` (s) of commands and measurements (9, rad/s)."""
+    for i in range(len(behind)):
+        behind[i] += passed * (sent[i] - velocity[i] - behind[i] / _FORGETS_S)
+
+
+@compiled(COUNT(VECTOR, VECTOR))
+def _worst(behind: Array, limit: Array) -> int:
+    """Index of the tracking error (9, rad) that is furthest beyond its limit (9, rad); -1 if none is."""
+    worst, excess = -1, 0.0
+    for i in range(len(behind)):
+        # Written so that an error that is no number counts as one.
+        if not abs(behind[i]) - limit[i] <= excess:
+            worst, excess = i, abs(behind[i]) - limit[i]
+    return worst

@@ -4,6 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from msgspec import Struct
+
 from controller.config import ControllerConfig
 from controller.inputs import Inputs
 from rolling_panda import topics
@@ -13,8 +15,7 @@ from rolling_panda.messages.types import Mode
 Action = Literal["none", "pause", "protect", "fault"]
 
 
-@dataclass(frozen=True)
-class Health:
+class Health(Struct, frozen=True):
     """Ages of the inputs (s, on this process's clock), infinite before the first; and other conditions.
 
     Attributes:

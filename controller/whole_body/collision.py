@@ -210,7 +210,7 @@ class CollisionModel:
         robot = self._robot
         if kinematics is None:
             kinematics = robot.kinematics(q)
-        elif not _same(kinematics.T_odom_tool.translation, self._tool.translation):
+        elif not same(kinematics.T_odom_tool.translation, self._tool.translation):
             raise ControlError("the robot model was moved after these kinematics; compute them again before dampers")
         pin.updateGeometryPlacements(robot.model, robot.data, self._geometry, self._data)
         if influence != self._known_for or _way(self.motion_bound, q, self._known_at) > _SLACK:
@@ -330,7 +330,7 @@ class CollisionModel:
 
 
 @compiled(FLAG(VECTOR, VECTOR))
-def _same(a: Array, b: Array) -> bool:
+def same(a: Array, b: Array) -> bool:
     """Whether all entries are equal."""
     for i in range(len(a)):
         if a[i] != b[i]:

@@ -6,9 +6,9 @@ The limits are those of the other methods.
 """
 
 import math
-from dataclasses import replace
 
 import numpy as np
+from msgspec.structs import replace
 
 from controller.config import ControllerConfig
 from controller.whole_body.actuation import Actuation

@@ -1,11 +1,10 @@
 """Problem and solution of a whole-body method, and the interfaces of methods, guards and tasks."""
 
 import math
-from dataclasses import dataclass, field
 from typing import ClassVar, Literal, Protocol
 
 import numpy as np
-from msgspec import Struct
+from msgspec import Struct, field
 
 from controller.whole_body.compiled import MATRIX, NUMBER, VECTOR, compiled
 from rolling_panda.model.differential_drive import NQ, NXI, Array
@@ -20,8 +19,7 @@ axle. `frozen`: it comes to rest and stays.
 """
 
 
-@dataclass(frozen=True)
-class ToolTask:
+class ToolTask(Struct, frozen=True):
     """First priority: a twist of the tool.
 
     Attributes:
@@ -36,8 +34,7 @@ class ToolTask:
     keep_path: bool = True
 
 
-@dataclass(frozen=True)
-class ActuatorTask:
+class ActuatorTask(Struct, frozen=True):
     """First priority in place of the tool: velocities of the actuators, slowed as a whole if the limits require it.
 
     Attributes:
@@ -48,8 +45,7 @@ class ActuatorTask:
     keep_path: ClassVar[bool] = True
 
 
-@dataclass(frozen=True)
-class Posture:
+class Posture(Struct, frozen=True):
     """Desired posture of base and arm, with lower priority than the tool.
 
     Attributes:
@@ -63,8 +59,7 @@ class Posture:
     goal: Array | None = None
 
 
-@dataclass(frozen=True)
-class IkProblem:
+class IkProblem(Struct, frozen=True):
     """Problem of one control period.
 
     Attributes:

@@ -8,9 +8,8 @@ base's, and the arm compensates the error of the base.
 Methods are stateless. This class gives them the previous commands and the measured wheel speeds.
 """
 
-from dataclasses import replace
-
 import numpy as np
+from msgspec.structs import replace
 
 from controller.whole_body.compiled import MATRIX, NOTHING, VECTOR, compiled
 from controller.whole_body.task import ActuatorTask, IkProblem, Method, Solution, ToolTask

@@ -4,6 +4,7 @@ After a cut the cutter reports whether the blades met resistance, and the camera
 both report an intact cane, it is cut once more. If they contradict each other, an operator decides.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -135,7 +136,7 @@ def camera_ready(robot: Measured, motion: ToolMotion, config: ControllerConfig) 
         motion: To where the tool is clear of the canes.
         config: How near, and how slow.
     """
-    away = robot.kinematics.T_odom_tool.translation - motion.goal.translation
-    speed = float(np.linalg.norm(robot.kinematics.J_xi[:3] @ robot.sent))
-    base = float(np.linalg.norm(robot.q[:2] - motion.q_goal[:2]))
-    return float(np.linalg.norm(away)) < config.close_up_within and base < _BASE_NEAR and speed < config.close_up_speed
+    away = math.dist(robot.kinematics.T_odom_tool.translation, motion.goal.translation)
+    if away >= config.close_up_within or math.dist(robot.q[:2], motion.q_goal[:2]) >= _BASE_NEAR:
+        return False
+    return math.hypot(*(robot.kinematics.J_xi[:3] @ robot.sent)) < config.close_up_speed

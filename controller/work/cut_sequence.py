@@ -164,8 +164,7 @@ class CutSequence:
         if self._stage is Stage.ADVANCE or (self._stage is Stage.TRAVEL and not self._config.pre_cut_check):
             self._refine()
         if self._stage in (Stage.RETREAT, Stage.TRAVEL):
-            away = robot.kinematics.T_odom_tool.translation - self._cut_at
-            if float(np.linalg.norm(away)) > self._config.close_up_from:
+            if math.dist(robot.kinematics.T_odom_tool.translation, self._cut_at) > self._config.close_up_from:
                 # During the retreat, without a stop: one picture is enough to see that the wood is gone.
                 self._post_cut_check.request_close_up(self._cut_point, now)
         work = _STEPS[self._stage](self, robot, now)

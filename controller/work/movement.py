@@ -1,6 +1,6 @@
 """Motion sources by mode: cut sequence, teleoperation and homing. Permission is not decided here."""
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from controller.config import ControllerConfig
 from controller.identity import Token
@@ -24,8 +24,7 @@ from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import RobotModel
 
 
-@dataclass(frozen=True)
-class MotionResult:
+class MotionResult(Struct, frozen=True):
     """Result of one period.
 
     Attributes:

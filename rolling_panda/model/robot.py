@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from msgspec import Struct
 
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
@@ -33,8 +34,7 @@ class Limits:
     jerk: Array
 
 
-@dataclass(frozen=True)
-class Kinematics:
+class Kinematics(Struct, frozen=True):
     """Tool kinematics at one q: the pose, J (6×12), S (12×9) and J_ξ = J S (6×9)."""
 
     T_odom_tool: Any

@@ -1,5 +1,3 @@
-from dataclasses import replace
-
 import msgspec
 import pytest
 
@@ -18,7 +16,7 @@ HEALTHY = Health(0.01, 0.02, 0.05, 0.05, 0.05, ALL, watchdog=False, overruled=Fa
 
 
 def verdict(mode, moving=False, **changes):
-    return check(mode, moving, replace(HEALTHY, **changes), CONFIG)
+    return check(mode, moving, msgspec.structs.replace(HEALTHY, **changes), CONFIG)
 
 
 @pytest.mark.parametrize("mode", ["IDLE", "READY", "TELEOP", "AUTO", "PAUSED"])
@@ -99,10 +97,10 @@ def test_the_most_severe_of_several_counts():
     ],
 )
 def test_a_stop_or_fault_cannot_be_left_while_its_cause_is_there(changes):
-    assert cause(replace(HEALTHY, **changes), CONFIG)
+    assert cause(msgspec.structs.replace(HEALTHY, **changes), CONFIG)
     assert cause(HEALTHY, CONFIG) == ""
     # These end motion, and are no cause of a stop.
-    assert cause(replace(HEALTHY, server=9.0, perception=9.0, obstacles=9.0), CONFIG) == ""
+    assert cause(msgspec.structs.replace(HEALTHY, server=9.0, perception=9.0, obstacles=9.0), CONFIG) == ""
 
 
 def test_old_pictures_of_what_stands_around_stop_automatic_work_alone():

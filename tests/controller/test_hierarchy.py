@@ -1,5 +1,4 @@
-import dataclasses
-
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -182,7 +181,7 @@ def test_any_numbers_at_all_get_an_answer_that_may_be_sent(seed):
     elif broken == 3:
         problem.kinematics.J[2, 6] = bad
     elif broken == 4:
-        problem = dataclasses.replace(problem, speed_cap=np.nan)
+        problem = msgspec.structs.replace(problem, speed_cap=np.nan)
     out = METHOD.solve(problem)
     assert np.isfinite(out.xi).all() and 0.0 <= out.scale <= 1.0
     assert (np.abs(out.xi - sent) <= LIMITS.acceleration * DT + 1e-9).all()
@@ -358,7 +357,7 @@ def test_velocities_of_the_actuators_are_sent_as_asked_except_to_a_frozen_base(b
     wanted = np.array([0.4, 0.5, 0.1, -0.1, 0.2, 0.0, 0.3, 0.0, -0.1])
 
     def make(sent):
-        return dataclasses.replace(ik_problem(q, sent=sent, base=base), tool=ActuatorTask(wanted))
+        return msgspec.structs.replace(ik_problem(q, sent=sent, base=base), tool=ActuatorTask(wanted))
 
     out = settled(METHOD, make)
     np.testing.assert_allclose(out.xi[ARM_XI], wanted[ARM_XI], atol=1e-6)
