@@ -94,9 +94,9 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         base_acceleration: Acceleration limit of the base (m/s²), low so that the stretched arm does not tip it.
         base_yaw_acceleration: Limit of the base's yaw acceleration (rad/s²).
         base_braking: Deceleration of the base when the robot has to stop (m/s²).
-        arm_share: Fraction of the arm's rated velocity that is used.
-        arm_acceleration_share: Fraction of the arm's rated acceleration that is used.
-        arm_jerk_share: Fraction of the arm's rated jerk that is used; braking for a reason may use all of it.
+        arm_velocity_scale: Fraction of the arm's rated velocity that is used.
+        arm_acceleration_scale: Fraction of the arm's rated acceleration that is used.
+        arm_jerk_scale: Fraction of the arm's rated jerk that is used; braking for a reason may use all of it.
         tool_speed: Speed limit of the tool between cuts (m/s).
         tool_turn: Limit of the tool's angular speed (rad/s).
         tool_acceleration: Acceleration limit of planned tool motions (m/s²).
@@ -168,9 +168,9 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
     base_acceleration: Annotated[float, at_most(1.5)] = 0.8
     base_yaw_acceleration: Annotated[float, at_most(6.0)] = 3.0
     base_braking: Annotated[float, within(1.5, 1.8)] = 1.5
-    arm_share: Annotated[float, at_most(1.0)] = 0.6
-    arm_acceleration_share: Annotated[float, at_most(1.0, 0.2)] = 0.5
-    arm_jerk_share: Annotated[float, at_most(1.0, 0.05)] = 0.5
+    arm_velocity_scale: Annotated[float, at_most(1.0)] = 0.6
+    arm_acceleration_scale: Annotated[float, at_most(1.0, 0.2)] = 0.5
+    arm_jerk_scale: Annotated[float, at_most(1.0, 0.05)] = 0.5
     tool_speed: Annotated[float, at_most(1.0)] = 0.7
     tool_turn: Annotated[float, at_most(2.5)] = 1.5
     tool_acceleration: Annotated[float, at_most(10.0)] = 3.0

@@ -184,8 +184,8 @@ def bench_config(method: MethodName) -> ControllerConfig:
         base_yaw_rate=BASE.yaw_rate,
         base_acceleration=0.8,
         base_yaw_acceleration=1.3,
-        arm_share=1.0,
-        arm_acceleration_share=1.0,
+        arm_velocity_scale=1.0,
+        arm_acceleration_scale=1.0,
         joint_margin=0.005,
         # 4√2 m in 30 s with the quintic's peak at 1.875 of the mean.
         tool_speed=0.8,

@@ -47,8 +47,8 @@ class StageClock:
         robot = RobotModel(RobotConfig())
         self._dt = 1.0 / self.config.rate_hz
         self._radius = robot.drive.wheel_radius
-        self._speed = robot.limits.velocity[ARM_XI] * self.config.arm_share
-        self._step = robot.limits.acceleration[ARM_XI] * self.config.arm_acceleration_share * self._dt
+        self._speed = robot.limits.velocity[ARM_XI] * self.config.arm_velocity_scale
+        self._step = robot.limits.acceleration[ARM_XI] * self.config.arm_acceleration_scale * self._dt
         self._sent: Array = np.zeros(9)
         self._last = math.nan
 

@@ -37,7 +37,7 @@ def write_problem(folder: Path, demands: Sequence[IkProblem], config: Controller
     wheels = np.abs(actuation.wheels) @ box.speed[:2]
     velocity = np.concatenate([[box.speed[0]] * 2, [box.speed[1]], wheels, box.speed[2:]])
     base = [config.base_acceleration] * 2
-    arm = robot.limits.acceleration[2:] * config.arm_acceleration_share
+    arm = robot.limits.acceleration[2:] * config.arm_acceleration_scale
     acceleration = np.concatenate([base, [config.base_yaw_acceleration], robot.limits.acceleration[:2], arm])
     np.savez(
         folder / "problem.npz",

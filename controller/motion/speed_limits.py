@@ -50,8 +50,8 @@ def plan_limits(
     base_speed: float,
     base_yaw_rate: float,
     base_acceleration: float = 0.8,
-    arm_share: float = 0.9,
-    arm_acceleration_share: float = 0.5,
+    arm_velocity_scale: float = 0.9,
+    arm_acceleration_scale: float = 0.5,
     joint_margin: float = 0.03,
     dt: float = 0.01,
 ) -> PlanLimits:
@@ -63,16 +63,16 @@ def plan_limits(
         base_yaw_rate: Yaw rate of the base (rad/s).
         base_acceleration: Acceleration of the base (m/s²). With the arm stretched forward the base tips at about 0.7 to
             1.7 m/s².
-        arm_share: Fraction of the arm's rated velocities.
-        arm_acceleration_share: Fraction of its rated accelerations.
+        arm_velocity_scale: Fraction of the arm's rated velocities.
+        arm_acceleration_scale: Fraction of its rated accelerations.
         joint_margin: Distance kept from every joint limit (rad).
         dt: Control period (s).
     """
     return PlanLimits(
         drive=Rates(0.95 * base_speed, base_acceleration, 4.0),
         turn=Rates(0.95 * base_yaw_rate, 1.2, 6.0),
-        arm_velocity=robot.limits.velocity[ARM_XI] * arm_share,
-        arm_acceleration=robot.limits.acceleration[ARM_XI] * arm_acceleration_share,
+        arm_velocity=robot.limits.velocity[ARM_XI] * arm_velocity_scale,
+        arm_acceleration=robot.limits.acceleration[ARM_XI] * arm_acceleration_scale,
         # A fiftieth: the acceleration rises within a tenth of a second, which shakes nothing.
         arm_jerk=0.02 * robot.limits.jerk[ARM_XI],
         lower=robot.limits.lower[ARM_Q] + joint_margin,

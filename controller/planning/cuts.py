@@ -48,8 +48,8 @@ class CutPlanner:
             base_speed=config.base_speed,
             base_yaw_rate=config.base_yaw_rate,
             base_acceleration=config.base_acceleration,
-            arm_share=config.arm_share,
-            arm_acceleration_share=config.arm_acceleration_share,
+            arm_velocity_scale=config.arm_velocity_scale,
+            arm_acceleration_scale=config.arm_acceleration_scale,
             joint_margin=config.joint_margin,
             dt=max(1.0 / config.rate_hz, _ROW_S),
         )
@@ -127,7 +127,7 @@ class CutPlanner:
             if not report.feasible:
                 return (
                     f"on the way {tightest.joint} would need {tightest.peak:.0f} Nm, it has {tightest.limit:.0f} Nm; "
-                    f"lower arm_share or arm_acceleration_share"
+                    f"lower arm_velocity_scale or arm_acceleration_scale"
                 )
         return PlannedCut(
             point=point,

@@ -40,7 +40,7 @@ class Nullspace:
         rated = np.array([config.base_speed, config.base_yaw_rate]) ** 2
         self._inverse_weight = np.zeros((NXI, NXI))
         self._inverse_weight[:2, :2] = self._wheels @ np.diag(rated) @ self._wheels.T
-        arm = (robot.limits.velocity[ARM_XI] * config.arm_share) ** 2
+        arm = (robot.limits.velocity[ARM_XI] * config.arm_velocity_scale) ** 2
         self._inverse_weight[ARM_XI, ARM_XI] = np.diag(arm)
         self._frozen_weight = self._inverse_weight.copy()
         self._frozen_weight[:2] = 0.0

@@ -44,10 +44,10 @@ class Saturation:
         limits = robot.limits
         self._lower = limits.lower[ARM_Q] + config.joint_margin
         self._upper = limits.upper[ARM_Q] - config.joint_margin
-        self.velocity = limits.velocity * config.arm_share
+        self.velocity = limits.velocity * config.arm_velocity_scale
         wheel = (config.base_speed + config.base_yaw_rate * robot.drive.half_track) / robot.drive.wheel_radius
         self.velocity[:2] = min(wheel, float(limits.velocity[0]))
-        self.acceleration = limits.acceleration * config.arm_acceleration_share
+        self.acceleration = limits.acceleration * config.arm_acceleration_scale
         base = config.base_acceleration / robot.drive.wheel_radius
         self.acceleration[:2] = min(base, float(limits.acceleration[0]))
         self._step = self.acceleration * dt

@@ -69,8 +69,8 @@ class VelocityBounds:
         #: Largest ν (9).
         self.speed: Array = np.empty(NXI)
         self.speed[:2] = config.base_speed, config.base_yaw_rate
-        self.speed[ARM_XI] = limits.velocity[ARM_XI] * config.arm_share
-        acceleration = limits.acceleration[ARM_XI] * config.arm_acceleration_share
+        self.speed[ARM_XI] = limits.velocity[ARM_XI] * config.arm_velocity_scale
+        acceleration = limits.acceleration[ARM_XI] * config.arm_acceleration_scale
         braking = min(max(config.base_braking, config.base_acceleration), float(limits.acceleration[0]) * R)
         base_step = min(config.base_acceleration, braking) * dt, config.base_yaw_acceleration * dt
         base_brake = braking * dt, max(braking / mu, config.base_yaw_acceleration) * dt
@@ -82,7 +82,7 @@ class VelocityBounds:
         k["highest"] = limits.upper[ARM_Q] - config.joint_margin
         k["lowest"] = limits.lower[ARM_Q] + config.joint_margin
         k["acceleration"], k["arm_step"], k["arm_speed"] = acceleration, self._arm_step, self.speed[ARM_XI]
-        k["jerk_step"] = limits.jerk[ARM_XI] * config.arm_jerk_share * dt * dt
+        k["jerk_step"] = limits.jerk[ARM_XI] * config.arm_jerk_scale * dt * dt
         k["base_speed"], k["base_step"], k["base_brake"] = self.speed[:2], base_step, base_brake
         self._wheel_speed, self._radius = float(limits.velocity[0]), R
         k["wheel_speed"], k["wheel_step"] = self._wheel_speed, self._wheel_step

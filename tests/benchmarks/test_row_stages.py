@@ -46,6 +46,6 @@ def test_every_second_has_one_stage_and_the_blades_take_theirs():
 
 def test_the_limit_that_binds_is_named():
     free, _ = work(ControllerConfig())
-    slow_joints, _ = work(ControllerConfig(arm_share=0.3))
+    slow_joints, _ = work(ControllerConfig(arm_velocity_scale=0.3))
     assert slow_joints.limits["joint velocity"] > 1.0 > free.limits["joint velocity"]
     assert np.argmax(list(slow_joints.limits.values())) == LIMITS.index("joint velocity")

@@ -44,7 +44,7 @@ def test_path_is_kept_when_the_limits_slow_the_motion():
     q, sent = start(), np.zeros(9)
     T = ROBOT.pose(q, ROBOT.tool_id)
     goal = pin.SE3(T.rotation, T.translation + np.array([0.2, 0.15, 0.1]))
-    hasty = ControllerConfig(tool_acceleration=50.0, tool_jerk=500.0, arm_share=0.15)
+    hasty = ControllerConfig(tool_acceleration=50.0, tool_jerk=500.0, arm_velocity_scale=0.15)
     saturation = Saturation(ROBOT, hasty, DT)
     follower = Follower(hasty, make_method(ROBOT, hasty, DT), DT)
     motion = ToolMotion(hasty, T, q, [Leg(goal, q, 3.0)])

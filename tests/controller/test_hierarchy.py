@@ -80,7 +80,7 @@ def test_with_one_velocity_for_every_twist_the_answer_is_the_closed_form():
     """Arm alone and bare of other tasks: the least velocity in shares of the limits, (J W⁻¹)⁺ in closed form."""
     q = home()
     J = ROBOT.kinematics(q).J_xi[:, ARM_XI]
-    speed = LIMITS.velocity[ARM_XI] * CONFIG.arm_share
+    speed = LIMITS.velocity[ARM_XI] * CONFIG.arm_velocity_scale
     closed = speed * (np.linalg.pinv(J * speed) @ TWIST)
     method = Hierarchy(ROBOT, BARE, DT)
     out = settled(method, lambda sent: ik_problem(q, sent=sent, base="frozen"))
@@ -281,7 +281,7 @@ def test_a_guard_that_cannot_be_kept_is_named_and_given_way_to_as_little_as_poss
         assert GATE.admits(out.xi, sent)
         assert not out.feasible and "blades and post 3" in out.reason
         sent = out.xi
-    best = -np.abs(ROBOT.kinematics(q).J_xi[0, ARM_XI]) @ (LIMITS.velocity[ARM_XI] * CONFIG.arm_share)
+    best = -np.abs(ROBOT.kinematics(q).J_xi[0, ARM_XI]) @ (LIMITS.velocity[ARM_XI] * CONFIG.arm_velocity_scale)
     assert (ROBOT.kinematics(q).J_xi @ out.xi)[0] < 0.9 * best
 
 

@@ -44,7 +44,7 @@ def test_something_is_possible_from_any_state(seed):
     brake = BOX.brake(xi, before)
     slowest = np.concatenate([brake[:2], np.clip(brake, *_reachable(bounds))[2:]])
     assert inside(bounds, slowest)
-    reach = ROBOT.limits.acceleration[ARM_XI] * CONFIG.arm_acceleration_share * DT + 1e-12
+    reach = ROBOT.limits.acceleration[ARM_XI] * CONFIG.arm_acceleration_scale * DT + 1e-12
     assert (np.abs(bounds.upper - ACTUATION.nu(xi))[ARM_XI] <= reach).all()
     assert (np.abs(bounds.lower - ACTUATION.nu(xi))[ARM_XI] <= reach).all()
 
@@ -53,8 +53,8 @@ def _reachable(bounds):
     return ACTUATION.xi(bounds.lower), ACTUATION.xi(bounds.upper)
 
 
-SHARES = {"as configured": CONFIG, "hasty": ControllerConfig(arm_share=1.0, arm_acceleration_share=1.0)}
-SHARES["gentle"] = ControllerConfig(arm_jerk_share=0.05)
+SHARES = {"as configured": CONFIG, "hasty": ControllerConfig(arm_velocity_scale=1.0, arm_acceleration_scale=1.0)}
+SHARES["gentle"] = ControllerConfig(arm_jerk_scale=0.05)
 
 
 @pytest.mark.long
@@ -66,9 +66,9 @@ def test_whatever_is_chosen_inside_the_bounds_no_limit_is_ever_broken(rate_hz, s
     """For seconds an end of every joint's interval, the worst that can be chosen, or anything between, for any time."""
     config, dt, rng = SHARES[shares], 1.0 / rate_hz, np.random.default_rng(seed)
     box, limits = VelocityBounds(ROBOT, config, dt), ROBOT.limits
-    most = limits.velocity[ARM_XI] * config.arm_share + 1e-9
-    acceleration = limits.acceleration[ARM_XI] * config.arm_acceleration_share + 1e-6
-    jerk = limits.jerk[ARM_XI] * config.arm_jerk_share * (1 + 1e-6)
+    most = limits.velocity[ARM_XI] * config.arm_velocity_scale + 1e-9
+    acceleration = limits.acceleration[ARM_XI] * config.arm_acceleration_scale + 1e-6
+    jerk = limits.jerk[ARM_XI] * config.arm_jerk_scale * (1 + 1e-6)
     margin = config.joint_margin - 1e-9
     q, sent, before = at(rng.uniform(LOWER + margin, UPPER - margin)), np.zeros(9), np.zeros(9)
     for i in range(round(3.0 * rate_hz)):
@@ -98,7 +98,7 @@ def test_a_joint_still_comes_to_its_limit_and_its_full_speed():
         before, sent = sent, nu
         fastest = np.maximum(fastest, nu[ARM_XI])
     assert (UPPER - CONFIG.joint_margin - q[ARM_Q] < 1e-3).all()
-    np.testing.assert_allclose(fastest, ROBOT.limits.velocity[ARM_XI] * CONFIG.arm_share, rtol=0.02)
+    np.testing.assert_allclose(fastest, ROBOT.limits.velocity[ARM_XI] * CONFIG.arm_velocity_scale, rtol=0.02)
 
 
 @pytest.mark.parametrize("rate_hz", [100, 1000])
@@ -107,7 +107,7 @@ def test_a_joint_still_comes_to_its_limit_and_its_full_speed():
 def test_braking_for_a_reason_keeps_the_rated_jerk_and_comes_to_rest(rate_hz, seed):
     dt, rng = 1.0 / rate_hz, np.random.default_rng(seed)
     box, sent = VelocityBounds(ROBOT, CONFIG, dt), rng.normal(0, 1, 9)
-    before = sent - rng.uniform(-1, 1, 9) * ROBOT.limits.acceleration * CONFIG.arm_acceleration_share * dt
+    before = sent - rng.uniform(-1, 1, 9) * ROBOT.limits.acceleration * CONFIG.arm_acceleration_scale * dt
     for _ in range(round(2.0 * rate_hz)):
         new = box.brake(sent, before)
         jerk = np.abs(new - 2 * sent + before)[ARM_XI] / dt**2

@@ -208,8 +208,8 @@ def test_the_bridge_and_the_controller_say_what_is_wider_at_the_start_and_in_eve
     assert f"less strict than usual: {line}" in [event.text for each in outputs for event in each.events]
     assert {each.state.relaxed_limits for each in outputs if each.state is not None} == {(line,)}
 
-    told = Controller(ControllerConfig(arm_share=0.9), RobotConfig())
+    told = Controller(ControllerConfig(arm_velocity_scale=0.9), RobotConfig())
     out = told.step(StepInputs(), 1.0)
-    words = "[controller] arm_share = 0.9, usually 0.6 (allowed: more than 0, at most 1)"
+    words = "[controller] arm_velocity_scale = 0.9, usually 0.6 (allowed: more than 0, at most 1)"
     assert f"less strict than usual: {words}" in [event.text for event in out.events]
     assert out.state is not None and out.state.relaxed_limits == (words,)
