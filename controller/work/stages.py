@@ -1,62 +1,525 @@
-"""Stages of the cut sequence and the result of one control period."""
+"""Stages of the cut sequence, one class each, with the data that the stage needs.
 
-from dataclasses import dataclass, replace
-from enum import Enum
+`step` answers with the stage of the next period and the result of this one.
+"""
 
-from controller.motion.follower import Tracking
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from controller.config import ControllerConfig
+from controller.motion.follower import Follower, Measured, Tracking
+from controller.motion.tool_motion import Leg, ToolMotion
+from controller.whole_body.saturation import Saturation
+from controller.work.approach_segments import ApproachSegments
+from controller.work.blades import Blades
+from controller.work.close_up import CloseUpClient
+from controller.work.cut_checks import PostCutCheck, camera_ready, not_as_accepted
+from controller.work.cut_pose import escape_pose
+from controller.work.homing import Withdrawal
+from controller.work.motion_timeout import MotionTimeout, missed
+from controller.work.next_cut import NextCut
+from controller.work.point_queue import PointQueue
+from controller.work.posture_search import CutPlan, Unreachable
+from controller.work.step_result import StepResult
+from controller.work.survey import Survey
 from rolling_panda import messages as m
 from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.robot import ARM_XI
+
+#: Smaller refinements of a point by perception are ignored (m).
+_REFINED = 0.0003
+#: Distance to the end of a motion at which the next one begins (m).
+_NEAR = 0.02
 
 
-class Stage(Enum):
-    """Step of the sequence."""
-
-    REST = "rest"
-    ESCAPE = "moving clear of the canes"
-    SEARCH = "looking for a posture"
-    TRAVEL = "on the way to the stand-off"
-    CLOSE_UP = "looking closely"
-    ADVANCE = "straight in"
-    CUT = "cutting"
-    RETREAT = "straight back"
-    SURVEY = "driving along the row"
-
-
-PHASES: dict[Stage, m.Phase] = {
-    Stage.REST: "",
-    Stage.ESCAPE: "RETREAT",
-    Stage.SEARCH: "APPROACH",
-    Stage.TRAVEL: "APPROACH",
-    Stage.CLOSE_UP: "CLOSE_UP",
-    Stage.ADVANCE: "ADVANCE",
-    Stage.CUT: "CUT",
-    Stage.RETREAT: "RETREAT",
-    Stage.SURVEY: "SURVEY",
-}
-
-
-@dataclass(frozen=True)
-class StepResult:
-    """Result of one period of work.
+@dataclass
+class Parts:
+    """Parts that all stages share, and the little that outlives a stage.
 
     Attributes:
-        xi: ξ̇ to send (9).
-        tracking: Tracking of the motion; None at rest.
-        cut: Cut to order, as (cut_id, point_id); None without one.
-        finished: True at the end of the work.
-        summary: Reason for the end, as text.
-        pause: Reason why the work has to pause; empty to continue.
-        events: Log lines.
+        config: Section `[controller]`.
+        follower: Follower of tool motions.
+        saturation: Braking to rest.
+        queue: The queue of points.
+        segments: Segments of the motion to a cut and out again.
+        close_ups: Client for pictures.
+        post_cut_check: Check of the last cuts.
+        blades: Orders the cuts.
+        next_cut: Posture search for the next point.
+        ending: Reason to begin no further cut; empty without one.
+        cut_point: Point of the last cut; empty before the first.
+        cut_at: Position of the tool at the last cut (3, m, odom).
     """
 
-    xi: Array
-    tracking: Tracking | None = None
-    cut: tuple[str, str] | None = None
-    finished: bool = False
-    summary: str = "no accepted point is left"
-    pause: str = ""
-    events: tuple[str, ...] = ()
+    config: ControllerConfig
+    follower: Follower
+    saturation: Saturation
+    queue: PointQueue
+    segments: ApproachSegments
+    close_ups: CloseUpClient
+    post_cut_check: PostCutCheck
+    blades: Blades
+    next_cut: NextCut
+    ending: str = ""
+    cut_point: str = ""
+    cut_at: Array = field(default_factory=lambda: np.zeros(3))
 
-    def with_events(self, events: tuple[str, ...]) -> "StepResult":
-        """The same, with more that happened."""
-        return replace(self, events=self.events + events)
+    def look_back(self, robot: Measured, now: float) -> None:
+        """Request the close-up of the last cut once the tool is far enough from it.
+
+        During the retreat, without a stop: one picture is enough to see that the wood is gone.
+        """
+        if math.dist(robot.kinematics.T_odom_tool.translation, self.cut_at) > self.config.close_up_from:
+            self.post_cut_check.request_close_up(self.cut_point, now)
+
+    def refine(self, point_id: str, motion: ToolMotion, known: m.Vector3 | None = None) -> None:
+        """Correct a motion to the newest, more accurate position of its point, unless that is the `known` one."""
+        ticket = self.queue.get(point_id)
+        if ticket is None or ticket.point.position == known:
+            return
+        _shift(motion, np.array(ticket.point.position))
+
+    def brake(self, robot: Measured, pause: str = "") -> StepResult:
+        """Come to rest, or stay there; with a reason the work pauses."""
+        return StepResult(self.saturation.ramp(robot.sent), pause=pause)
+
+
+class FollowedMotion:
+    """A tool motion under way, with its timeout."""
+
+    def __init__(self, parts: Parts, robot: Measured, *legs: Leg, to_cut: bool = False) -> None:
+        """Plan from the measured tool pose, not the desired one: a motion begins at rest.
+
+        Args:
+            parts: Of the sequence.
+            robot: Measured robot.
+            legs: Segments.
+            to_cut: Whether the last one ends at a cut, or at the close-up before one.
+        """
+        config, self._follower = parts.config, parts.follower
+        self.motion = ToolMotion(
+            config,
+            robot.kinematics.T_odom_tool,
+            robot.q,
+            legs,
+            slow_end=to_cut and not config.pre_cut_check,
+            flows=parts.follower.flows,
+            waits=to_cut and config.pre_cut_check,
+        )
+        self.timeout = MotionTimeout(config.reach_timeout_s, 1.0 / config.rate_hz)
+        self.timeout.start(self.motion.duration)
+
+    def track(self, robot: Measured) -> Tracking:
+        """Follow for one period."""
+        tracking = self._follower.follow(self.motion, robot)
+        self.timeout.note(tracking)
+        return tracking
+
+
+@dataclass(frozen=True, eq=False)
+class CutTask:
+    """A cut under way.
+
+    Attributes:
+        point_id: The point.
+        accepted: The point as accepted; the plan is for one acceptance.
+        plan: Poses and postures.
+    """
+
+    point_id: str
+    accepted: m.PruningPoint | None
+    plan: CutPlan
+
+
+class Stage:
+    """A stage of the sequence."""
+
+    #: Phase on the wire.
+    phase: m.Phase = ""
+    #: Whether the tool hides the point from the camera.
+    in_canes = False
+    #: Point of the stage; empty without one.
+    point_id = ""
+
+    def __init__(self, parts: Parts) -> None:
+        """Bind the parts."""
+        self._parts = parts
+
+    @property
+    def plan(self) -> CutPlan | None:
+        """Plan of the cut under way; None without one."""
+        return None
+
+    @property
+    def plans(self) -> tuple[CutPlan, ...]:
+        """Plans of the cuts that the motion begins or ends at."""
+        return ()
+
+    def step(self, robot: Measured, now: float) -> "Step":
+        """One period.
+
+        Args:
+            robot: Measured robot.
+            now: Monotonic time (s).
+        """
+        raise NotImplementedError
+
+    def _left(self, point_id: str, accepted: m.PruningPoint | None) -> str:
+        """Log line if the point may no longer be approached; empty if it may."""
+        ticket = self._parts.queue.get(point_id)
+        if ticket is None:
+            why = "the point has gone"
+        elif ticket.state != "ACCEPTED":
+            why = ticket.reason
+        elif ticket.accepted is not accepted:
+            why = "it was accepted again"
+        elif not (why := self._parts.next_cut.permit(ticket)):
+            return ""
+        return f"{point_id}: left: {why}"
+
+    def _escape(self, robot: Measured, now: float, text: str) -> "Step":
+        """Leave the point, from outside the canes."""
+        stage, result = Escape(self._parts).step(robot, now)
+        return stage, result.with_event(text)
+
+    def _fail(self, robot: Measured, point_id: str, reason: str) -> "Step":
+        self._parts.queue.resolve(point_id, "FAILED_NOT_CUT", reason)
+        return Escape(self._parts), self._parts.brake(robot).with_event(f"{point_id}: not cut: {reason}")
+
+
+#: Stage of the next period, and the result of this one.
+Step = tuple[Stage, StepResult]
+
+
+class Rest(Stage):
+    """At rest: choose the next point and search its posture."""
+
+    def step(self, robot: Measured, now: float) -> Step:
+        """One period."""
+        parts = self._parts
+        xi, following = parts.saturation.ramp(robot.sent), parts.next_cut
+        if following.search(robot.q):
+            return Search(parts, following.point_id, following.accepted), StepResult(xi)
+        # The last cut may still have to be made once more.
+        beyond = parts.queue.count("UNREACHABLE")
+        unreachable = f"; {beyond} cannot be reached" if beyond else ""
+        summary = following.refused or f"{StepResult.summary}{unreachable}"
+        return self, StepResult(xi, finished=not parts.post_cut_check.pending, summary=summary)
+
+
+class Escape(Stage):
+    """Begin to move the tool clear of the canes, if it is among them."""
+
+    phase: m.Phase = "RETREAT"
+
+    def step(self, robot: Measured, now: float) -> Step:
+        """One period."""
+        config, pose = self._parts.config, robot.kinematics.T_odom_tool
+        towards_row = np.array([-np.sin(config.row_heading), np.cos(config.row_heading), 0.0])
+        depth = float(pose.translation @ towards_row) - (config.row_distance - config.clearance) - 0.03
+        if depth <= 0.0:
+            return Rest(self._parts).step(robot, now)
+        leg = Leg(escape_pose(pose, towards_row, depth), robot.q, config.advance_speed, math.inf)
+        return Escaping(self._parts, FollowedMotion(self._parts, robot, leg)).step(robot, now)
+
+
+class Escaping(Stage):
+    """Moving the tool clear of the canes."""
+
+    phase: m.Phase = "RETREAT"
+
+    def __init__(self, parts: Parts, way: FollowedMotion) -> None:
+        """Along `way`."""
+        super().__init__(parts)
+        self._way = way
+
+    def step(self, robot: Measured, now: float) -> Step:
+        """One period."""
+        tracking = self._way.track(robot)
+        if self._way.timeout.over(tracking, now, _NEAR):
+            return Rest(self._parts).step(robot, now)
+        if self._way.timeout.late(now):
+            return self, self._parts.brake(robot, missed("a place clear of the canes", tracking))
+        return self, StepResult(tracking.xi, tracking)
+
+
+class Search(Stage):
+    """Posture search, with the robot at rest."""
+
+    phase: m.Phase = "APPROACH"
+
+    def __init__(self, parts: Parts, point_id: str, accepted: m.PruningPoint | None) -> None:
+        """For one acceptance of a point."""
+        super().__init__(parts)
+        self.point_id, self._accepted = point_id, accepted
+
+    def step(self, robot: Measured, now: float) -> Step:
+        """One period."""
+        parts = self._parts
+        if text := self._left(self.point_id, self._accepted):
+            return self._escape(robot, now, text)
+        if parts.ending:
+            return self, parts.brake(robot, parts.ending)
+        result = parts.brake(robot)
+        parts.next_cut.step()
+        found = parts.next_cut.found
+        if isinstance(found, Unreachable):
+            return self._fail(robot, self.point_id, f"not reachable: {found.reason}")
+        if found is None or np.any(robot.sent):
+            return self, result
+        legs = parts.segments.to(found, robot.kinematics.T_odom_tool, robot.q)
+        way = FollowedMotion(parts, robot, *legs, to_cut=True)
+        return Travel(parts, CutTask(self.point_id, self._accepted, found), way), result
+
+
+class TaskStage(Stage):
+    """A stage of a cut under way."""
+
+    def __init__(self, parts: Parts, task: CutTask) -> None:
+        """For one cut."""
+        super().__init__(parts)
+        self._task, self.point_id = task, task.point_id
+
+    @property
+    def plan(self) -> CutPlan:
+        """Plan of the cut under way."""
+        return self._task.plan
+
+    @property
+    def plans(self) -> tuple[CutPlan, ...]:
+        """Plans of the cuts that the motion begins or ends at."""
+        return (self._task.plan,)
+
+
+class MovingStage(TaskStage):
+    """A stage of a cut with a tool motion."""
+
+    def __init__(self, parts: Parts, task: CutTask, way: FollowedMotion) -> None:
+        """For one cut, along `way`."""
+        super().__init__(parts, task)
+        self._way = way
+
+    def _retreat(self, robot: Measured) -> "Retreat":
+        """Straight out of the canes, and on to the next cut where one is found."""
+        parts, following = self._parts, self._parts.next_cut
+        parts.cut_at, parts.cut_point = robot.kinematics.T_odom_tool.translation.copy(), self.point_id
+        back = parts.segments.out(self._task.plan, robot.q)
+        ticket, plan = parts.queue.get(self.point_id), following.found
+        unsure = ticket is not None and ticket.state == "UNKNOWN"
+        if isinstance(plan, CutPlan) and following.stands and not unsure and not parts.ending:
+            onwards = parts.segments.to(plan, back.goal, back.q_goal)
+            way = FollowedMotion(parts, robot, back, *onwards, to_cut=True)
+        else:
+            following.forget()
+            way = FollowedMotion(parts, robot, back)
+        return Retreat(parts, self._task, way)
+
+
+class Travel(MovingStage):
+    """On the way to the stand-off, or to the place of the close-up."""
+
+    phase: m.Phase = "APPROACH"
+
+    def step(self, robot: Measured, now: float) -> Step:
+        """One period."""
+        parts, config, timeout, motion = self._parts, self._parts.config, self._way.timeout, self._way.motion
+        if text := self._left(self.point_id, self._task.accepted):
+            return self._escape(robot, now, text)
+        if parts.ending:
+            return self, parts.brake(robot, parts.ending)
+        if not config.pre_cut_check:
+            parts.refine(self.point_id, motion)
+        parts.look_back(robot, now)
+        tracking = self._way.track(robot)
+        result = StepResult(tracking.xi, tracking)
+        last = motion.leg == motion.legs - 1
+        if last and not config.pre_cut_check:
+            return Advance(parts, self._task, self._way), result
+        if last and camera_ready(robot, motion, config):
+            parts.close_ups.ask(self.point_id, "seen", now)
+            timeout.again()
+            return CloseUp(parts, self._task, self._way), result
+        if not (config.pre_cut_check and timeout.over(tracking, now, 0.0)) and timeout.late(now):
+            return self._fail(robot, self.point_id, missed("the stand-off", tracking))
+        return self, result
+
+
+class CloseUp(MovingStage):
+    """Wait for the close-up before the canes are entered; its result decides whether the point is cut."""
+
+    phase: m.Phase = "CLOSE_UP"
+
+    def step(self, robot: Measured, now: float) -> Step:
+        """One period."""
+        parts, motion = self._parts, self._way.motion
+        if text := self._left(self.point_id, self._task.accepted):
+            return self._escape(robot, now, text)
+        if parts.ending:
+            return self, parts.brake(robot, parts.ending)
+        tracking, close_up = self._way.track(robot), parts.close_ups.answer(self.point_id, now)
+        result = StepResult(tracking.xi, tracking)
+        if close_up is None:
+            return self, result
+        parts.close_ups.forget(self.point_id)
+        ticket = parts.queue.get(self.point_id)
+        if why := not_as_accepted(close_up, ticket, parts.config.moved_tolerance):
+            parts.queue.void(self.point_id, why)
+            # The next period leaves it.
+            return self, result
+        motion.extend(parts.segments.into(self._task.plan))
+        _shift(motion, np.array(close_up.position))
+        self._way.timeout.start(motion.duration)
+        return Advance(parts, self._task, self._way, None if ticket is None else ticket.point.position), result
+
+
+class Advance(MovingStage):
+    """Straight into the canes."""
+
+    phase: m.Phase = "ADVANCE"
+    in_canes = True
+
+    def __init__(self, parts: Parts, task: CutTask, way: FollowedMotion, close_up_of: m.Vector3 | None = None) -> None:
+        """For one cut, along `way`.
+
+        Args:
+            parts: Of the sequence.
+            task: The cut.
+            way: The motion.
+            close_up_of: Perception's position at the time of the close-up, which is more accurate; None without one.
+        """
+        super().__init__(parts, task, way)
+        self._close_up_of = close_up_of
+
+    def step(self, robot: Measured, now: float) -> Step:
+        """One period."""
+        parts, config, timeout, motion = self._parts, self._parts.config, self._way.timeout, self._way.motion
+        text = self._left(self.point_id, self._task.accepted)
+        if text or parts.ending:
+            stage, result = self._retreat(robot).step(robot, now)
+            return stage, result.with_event(text) if text else result
+        parts.refine(self.point_id, motion, self._close_up_of)
+        tracking = self._way.track(robot)
+        result = StepResult(tracking.xi, tracking)
+        there = timeout.over(tracking, now, config.position_tolerance, config.rotation_tolerance)
+        # At the end of the motion, not during it.
+        rests = there and float(np.linalg.norm(robot.kinematics.J_xi[:3] @ tracking.xi)) < config.settle_speed
+        if rests and np.abs(tracking.xi[ARM_XI]).max() >= config.settle_joints:
+            # Remaining corrections beside the tool's path can wait: the blades close at rest.
+            motion.settle(robot.q)
+            rests = False
+        if rests:
+            parts.blades.start(self.point_id, now)
+            return Cutting(parts, self._task, self._way), result
+        if timeout.late(now):
+            reason = missed("the cut", tracking)
+            parts.queue.resolve(self.point_id, "FAILED_NOT_CUT", reason)
+            return self._retreat(robot), result.with_event(f"{self.point_id}: not cut: {reason}")
+        return self, result
+
+
+class Cutting(MovingStage):
+    """The blades close, while the posture for the next cut is searched."""
+
+    phase: m.Phase = "CUT"
+    in_canes = True
+
+    def step(self, robot: Measured, now: float) -> Step:
+        """One period."""
+        blades, following, tracking = self._parts.blades, self._parts.next_cut, self._way.track(robot)
+        if not blades.busy:
+            return self._retreat(robot), StepResult(tracking.xi, tracking)
+        if following.search(robot.q):
+            following.step()
+        return self, StepResult(tracking.xi, tracking, cut=blades.command(now))
+
+
+class LeavingStage(TaskStage):
+    """A stage of the retreat."""
+
+    phase: m.Phase = "RETREAT"
+    in_canes = True
+
+    @property
+    def plans(self) -> tuple[CutPlan, ...]:
+        """Plans of the cuts that the motion begins or ends at."""
+        onwards = self._parts.next_cut.found
+        return (self._task.plan, onwards) if isinstance(onwards, CutPlan) else (self._task.plan,)
+
+    def _out(self, robot: Measured, tracking: Tracking, now: float) -> Step:
+        """Clear of the canes, with no next cut under way."""
+        ticket = self._parts.queue.get(self.point_id)
+        if ticket is not None and ticket.state == "UNKNOWN":
+            return self, StepResult(tracking.xi, tracking, pause=f"{self.point_id} is UNKNOWN: {ticket.reason}")
+        return Rest(self._parts).step(robot, now)
+
+
+class Retreat(LeavingStage):
+    """Straight out of the canes, and on to the next cut."""
+
+    def __init__(self, parts: Parts, task: CutTask, way: FollowedMotion) -> None:
+        """From one cut, along `way`."""
+        super().__init__(parts, task)
+        self._way = way
+
+    def step(self, robot: Measured, now: float) -> Step:
+        """One period."""
+        parts, following, timeout = self._parts, self._parts.next_cut, self._way.timeout
+        parts.look_back(robot, now)
+        tracking = self._way.track(robot)
+        result = StepResult(tracking.xi, tracking)
+        if self._way.motion.leg > 0 and isinstance(following.found, CutPlan):
+            # Clear of the canes, and the motion to the next cut has begun.
+            task = CutTask(following.point_id, following.accepted, following.found)
+            return Travel(parts, task, self._way), result
+        if timeout.over(tracking, now, _NEAR):
+            return self._out(robot, tracking, now)
+        if timeout.late(now):
+            withdrawal = Withdrawal(parts.config, parts.follower, robot.q, self._task.plan.q_clear)
+            text = f"{self.point_id}: {missed('the way back', tracking)}; now by joints"
+            return Withdraw(parts, self._task, withdrawal), result.with_event(text)
+        return self, result
+
+
+class Withdraw(LeavingStage):
+    """Out of the canes by joints, after the straight retreat has failed."""
+
+    def __init__(self, parts: Parts, task: CutTask, withdrawal: Withdrawal) -> None:
+        """From one cut."""
+        super().__init__(parts, task)
+        self._withdrawal = withdrawal
+
+    def step(self, robot: Measured, now: float) -> Step:
+        """One period."""
+        self._parts.look_back(robot, now)
+        tracking = self._withdrawal.step(robot, now)
+        if self._withdrawal.late:
+            return self, self._parts.brake(robot, missed("the way back", tracking))
+        if self._withdrawal.done:
+            return self._out(robot, tracking, now)
+        return self, StepResult(tracking.xi, tracking)
+
+
+class Surveying(Stage):
+    """Driving along the row."""
+
+    phase: m.Phase = "SURVEY"
+
+    def __init__(self, parts: Parts, survey: Survey) -> None:
+        """With one survey."""
+        super().__init__(parts)
+        self._survey = survey
+
+    def step(self, robot: Measured, now: float) -> Step:
+        """One period."""
+        if self._parts.ending:
+            return self, self._parts.brake(robot, self._parts.ending)
+        return self, self._survey.step(robot, now)
+
+
+def _shift(motion: ToolMotion, position: Array) -> None:
+    """Move a motion's goal to a position (3, m, odom), unless it is there already."""
+    moved = position - motion.goal.translation
+    if float(np.linalg.norm(moved)) > _REFINED:
+        motion.shift(moved)

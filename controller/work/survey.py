@@ -13,7 +13,7 @@ from controller.motion.follower import Follower, Measured, Tracking
 from controller.whole_body.saturation import Saturation
 from controller.work.homing import Homing
 from controller.work.point_queue import PointQueue
-from controller.work.stages import StepResult
+from controller.work.step_result import StepResult
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.model.differential_drive import NXI, Array
