@@ -1,16 +1,17 @@
 """`rolling-panda bridge`: the bridge process between the wire and a robot."""
 
 import argparse
+import functools
 import gc
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from bridge.config import BridgeConfig
 from bridge.core.bridge import BridgeCore
 from bridge.core.cut_memory import CutFile
 from bridge.core.state_memory import Remembered, begin_anew, open_memory
-from bridge.loop import BridgeLoop
+from bridge.loop import bridge_runner
 from bridge.real.config import RealConfig
 from bridge.sim.camera.config import CameraConfig
 from bridge.sim.vineyard.config import VineyardConfig
@@ -100,10 +101,10 @@ def _run(context: ProcessContext) -> None:
 def _work(context: ProcessContext) -> None:
     cuts, memory = CutFile(context.state_folder), open_memory(context.state_folder)
     try:
-        core = _core(context, cuts, memory)
+        core, press = _core(context, cuts, memory)
         gc.freeze()
         try:
-            BridgeLoop(core, context.transport).run(context.stopping)
+            bridge_runner(core, context.transport, press).run(context.stopping)
         finally:
             core.robot.close()
     finally:
@@ -111,20 +112,23 @@ def _work(context: ProcessContext) -> None:
         memory.close()
 
 
-def _core(context: ProcessContext, cuts: CutFile, memory: KeptValue[Remembered]) -> BridgeCore:
+def _core(
+    context: ProcessContext, cuts: CutFile, memory: KeptValue[Remembered]
+) -> tuple[BridgeCore, Callable[[bool], None]]:
+    """The core, and what presses its robot's button."""
     arguments, rejections = context.arguments, context.transport.rejections
     # Imported here: the real bridge must not need the simulator, and vice versa.
     if arguments.kind == "real":
         from bridge.real.build import real_bridge
 
         moving, fakes = not arguments.readonly, arguments.fakes
-        return real_bridge(context.config_path, context.wire, moving, rejections, cuts, memory, fakes)
-    from bridge.sim.build import simulated_bridge, subscribe_button
+        core = real_bridge(context.config_path, context.wire, moving, rejections, cuts, memory, fakes)
+        return core, lambda pressed: None
+    from bridge.sim.build import press_button, simulated_bridge
 
     seed, trace = arguments.seed, arguments.trace
     core = simulated_bridge(context.config_path, seed, trace, "process", rejections, cuts=cuts, memory=memory)
-    subscribe_button(core, context.transport)
-    return core
+    return core, functools.partial(press_button, core)
 
 
 if __name__ == "__main__":

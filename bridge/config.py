@@ -51,7 +51,6 @@ class BridgeConfig(Struct, frozen=True, forbid_unknown_fields=True):
         joints_hz: Rate of the joint states (Hz); the topic table has the nominal rate.
         camera_moving_hz: Frame rate while the robot moves or just after the row has changed (Hz).
         camera_resting_hz: Frame rate otherwise (Hz).
-        scenery_s: Period of the `scenery` topic.
         odometry: Delay and noise of the simulated base's odometry.
     """
 
@@ -73,5 +72,4 @@ class BridgeConfig(Struct, frozen=True, forbid_unknown_fields=True):
     joints_hz: Annotated[float, at_least(50.0, 1000.0)] = JOINTS.rate_hz
     camera_moving_hz: Positive = 2.0
     camera_resting_hz: Positive = 0.5
-    scenery_s: Positive = 2.0
     odometry: OdometryConfig = OdometryConfig()

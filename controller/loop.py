@@ -21,7 +21,6 @@ from rolling_panda import messages as m
 from rolling_panda.errors import ServiceError
 from rolling_panda.messages.supervision import StopState
 from rolling_panda.runtime.latest_file import KeptValue
-from rolling_panda.runtime.loop_clock import LoopClock
 from rolling_panda.topics import (
     BRIDGE,
     CLOSE_UP,
@@ -49,6 +48,7 @@ from rolling_panda.topics import (
     TOKEN,
     Topic,
 )
+from rolling_panda.transport.loop_clock import LoopClock
 from rolling_panda.transport.zenoh import Msg, Slot, Transport
 
 #: Longest time that the loop's clock advances in one iteration, in periods.

@@ -35,6 +35,8 @@ class Topic(Generic[Msg]):
         congestion: Zenoh congestion control: whether a message is dropped or blocks when the connection is full.
         express: Sent at once, never batched.
         latched: The sender repeats the newest message at `rate_hz`, so that late joiners get it.
+        queue: Messages that a reader's inbox keeps in order; 0 = the newest only.
+        wakes: A message wakes its reader's loop at once.
         about: Description for the documentation.
     """
 
@@ -48,6 +50,8 @@ class Topic(Generic[Msg]):
     about: str
     express: bool = False
     latched: bool = False
+    queue: int = 0
+    wakes: bool = False
 
     def said_by(self, process: m.Process) -> bool:
         """Whether this process may publish it."""
@@ -80,23 +84,23 @@ class Service(Generic[Req]):
 # fmt: off
 MOTION = Topic(
     "command/motion", m.MotionCommand, "controller", "bridge", 100, "REAL_TIME", "DROP",
-    "velocity of every actuator; newest wins", express=True,
+    "velocity of every actuator; newest wins", express=True, wakes=True,
 )
 TOKEN = Topic(
     "command/token", m.TokenRequest, "controller", "bridge", 5, "REAL_TIME", "DROP",
-    "request for the fencing token, repeated while the controller wants to command the robot", express=True,
+    "request for the fencing token, repeated while the controller wants to command the robot", express=True, queue=32,
 )
 CUT = Topic(
     "command/cut", m.CutCommand, "controller", "bridge", 0, "REAL_TIME", "BLOCK",
-    "close the blades once; repeated until the bridge reports it", express=True,
+    "close the blades once; repeated until the bridge reports it", express=True, queue=32,
 )
 CLOSE_UP_REQUEST = Topic(
     "command/close-up", perception.CloseUpRequest, "controller", "bridge", 0, "REAL_TIME", "DROP",
-    "take a close-up of a point now; repeated until it was taken", express=True,
+    "take a close-up of a point now; repeated until it was taken", express=True, queue=8,
 )
 STOP = Topic(
     "command/stop", m.StopRequest, "any", "bridge, controller", 0, "REAL_TIME", "BLOCK",
-    "software stop; sent several times", express=True,
+    "software stop; sent several times", express=True, queue=32,
 )
 TELEOP = Topic(
     "operator/teleop", supervision.TeleopTarget, "server", "controller", 30, "REAL_TIME", "DROP",
@@ -115,7 +119,7 @@ BRIDGE = Topic(
     "stop latch, watchdog, cutter, refused messages",
 )
 CONTROLLER = Topic(
-    "state/controller", m.ControllerState, "controller", "bridge, server, onlooker", 20, "INTERACTIVE_HIGH", "DROP",
+    "state/controller", m.ControllerState, "controller", "server, onlooker", 20, "INTERACTIVE_HIGH", "DROP",
     "mode, queue, tracking error",
 )
 PRESENCE = Topic(
@@ -132,7 +136,7 @@ STOPS = Topic(
 )
 HARDWARE_STOP = Topic(
     "simulation/hardware-stop", supervision.HardwareStop, "any", "bridge, devices", 0, "INTERACTIVE_HIGH", "BLOCK",
-    "emergency stop button of the simulated robot",
+    "emergency stop button of the simulated robot", queue=8,
 )
 PLAN = Topic(
     "controller/plan", supervision.SessionPlan, "controller", "server", 0.2, "DATA_LOW", "DROP",
@@ -140,7 +144,7 @@ PLAN = Topic(
 )
 PREVIEW = Topic(
     "controller/preview", supervision.PreviewState, "controller", "server", 2, "DATA_LOW", "DROP",
-    "state and approval of the preview; also at once on change", latched=True,
+    "state and approval of the preview; also at once on change",
 )
 PREVIEW_MOTION = Topic(
     "controller/preview-motion", supervision.PreviewMotion, "controller", "server", 0.2, "DATA_LOW", "DROP",
@@ -152,11 +156,11 @@ REPORT = Topic(
 )
 HEARTBEAT = Topic(
     "heartbeat", m.Heartbeat, "any", "controller, server, onlooker", 20, "INTERACTIVE_HIGH", "DROP",
-    "the loop of a process runs",
+    "the loop of a process runs", queue=64,
 )
 EVENT = Topic(
     "event", m.LogEvent, "any", "controller, server", 0, "DATA_LOW", "BLOCK",
-    "log line: an event, or a refusal with its reason",
+    "log line: an event, or a refusal with its reason", queue=1000,
 )
 CAMERA = Topic(
     "camera/frame", robot.CameraFrame, "bridge", "perception, server", 2, "DATA_LOW", "DROP",
@@ -168,7 +172,7 @@ POINTS = Topic(
 )
 CROPS = Topic(
     "perception/crops", perception.PointCrop, "perception", "server", 2, "BACKGROUND", "DROP",
-    "picture of a point: at once when new, then one after the other", latched=True,
+    "picture of a point: at once when new, then one after the other",
 )
 CLOSE_UP = Topic(
     "perception/close-up", perception.CloseUpResult, "perception", "controller", 0, "INTERACTIVE_HIGH", "DROP",
@@ -192,6 +196,8 @@ TOPICS: tuple[Topic[Any], ...] = (
     EVENT, CAMERA, PREVIEW, PREVIEW_MOTION, POINTS, CROPS, CLOSE_UP, OBSTACLES, SCENERY, PRESENCE, CONTROL, STOPS,
     HARDWARE_STOP, REPLAY,
 )
+#: The topic of each type of message.
+TOPIC_OF: dict[type[Any], Topic[Any]] = {topic.message: topic for topic in TOPICS}
 
 
 INTENT: Service[commands.Intent] = Service(

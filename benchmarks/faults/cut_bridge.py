@@ -21,7 +21,7 @@ from bridge.core.interface import CutterState, Measurement, Setpoint
 from bridge.core.odometer import Odometer
 from bridge.core.picture import Picture
 from bridge.core.state_memory import open_memory
-from bridge.loop import BridgeLoop
+from bridge.loop import bridge_runner
 from controller.config import ControllerConfig
 from rolling_panda.config import load_section
 from rolling_panda.messages.types import Outcome
@@ -115,7 +115,7 @@ def _run(context: ProcessContext) -> None:
         )
         gc.freeze()
         try:
-            BridgeLoop(core, context.transport).run(context.stopping)
+            bridge_runner(core, context.transport).run(context.stopping)
         finally:
             robot.close()
             cuts.close()

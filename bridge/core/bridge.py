@@ -33,13 +33,12 @@ from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import Limits
 from rolling_panda.model.wire_values import actuated
 from rolling_panda.runtime.latest_file import KeptValue
-from rolling_panda.topics import BRIDGE, CLOSE_UP_REQUEST, CUT, MOTION, ODOMETRY, STOPS, TOKEN
+from rolling_panda.topics import BRIDGE, CLOSE_UP_REQUEST, CUT, MOTION, ODOMETRY, TOKEN
 from rolling_panda.transport.zenoh import Rejections
 
 TICK_S = 0.001
 _ODOMETRY_TICKS = round(1 / ODOMETRY.rate_hz / TICK_S)
 _STATE_TICKS = round(1 / BRIDGE.rate_hz / TICK_S)
-_STOPS_TICKS = round(1 / STOPS.rate_hz / TICK_S)
 # Speed limits of wheels and joints for closing the blades (rad/s): 5 mm/s at the axle, and the motion that holding
 # the tool in place needs.
 _CUT_WHEELS, _CUT_JOINTS = 0.04, 0.1
@@ -67,6 +66,12 @@ class BridgeOutputs:
     scenery: Scenery | None = None
     events: tuple[m.LogEvent, ...] = ()
     stops: StopState | None = None
+
+    @property
+    def messages(self) -> list[m.Message]:
+        """All of them, in the order in which they are sent."""
+        each = (self.joints, self.odometry, self.state, self.frame, self.stops, self.scenery, *self.events)
+        return [message for message in each if message is not None]
 
 
 class BridgeCore:
@@ -108,7 +113,6 @@ class BridgeCore:
         self.kind = kind
         self._odometer = odometer
         self._scenery = scenery
-        self._scenery_ticks = round(config.scenery_s / TICK_S)
         self._scenery_revision = -1
         self._memory = memory or KeptValue(Remembered())
         before = self._memory.value
@@ -330,7 +334,6 @@ class BridgeCore:
             state = self._state(now)
             self._events += [("warning", line) for line in self.refusals.lines(now)]
         stops = None
-        self._stops_due |= ticks % _STOPS_TICKS == 0
         # A stop is reported as latched when it is on disk. A failure of the disk is reported too.
         if self._stops_due and (self._memory.kept or self._memory.failure):
             self._stops_due = False
@@ -412,9 +415,7 @@ class BridgeCore:
         return None if picture is None else self._camera_trigger.frame(picture)
 
     def _scenery_is_due(self) -> bool:
-        if self._scenery is None:
-            return False
-        return self._ticks % self._scenery_ticks == 1 or self._scenery()[0] != self._scenery_revision
+        return self._scenery is not None and self._scenery()[0] != self._scenery_revision
 
     def _scenery_message(self, now: float) -> Scenery | None:
         if self._scenery is None:

@@ -14,13 +14,11 @@ from bridge.sim.robot.robot import SimulatedRobot
 from bridge.sim.robot.trace import TraceWriter
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
-from rolling_panda import topics
 from rolling_panda.bounds import wider
 from rolling_panda.config import RobotConfig, load_section
-from rolling_panda.messages.supervision import HardwareStop
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.runtime.latest_file import KeptValue
-from rolling_panda.transport.zenoh import Onlooker, Rejections
+from rolling_panda.transport.zenoh import Rejections
 
 
 def simulated_bridge(
@@ -78,12 +76,7 @@ def simulated_robot(
     return SimulatedRobot(config, row, renderer, writer)
 
 
-def subscribe_button(core: BridgeCore, transport: Onlooker) -> None:
-    """Connect the emergency stop button of the simulated robot to its topic."""
-    robot = core.robot
-
-    def press(message: HardwareStop, at: float) -> None:
-        if isinstance(robot, SimulatedRobot):
-            robot.emergency = message.pressed
-
-    transport.subscribe(topics.HARDWARE_STOP, press)
+def press_button(core: BridgeCore, pressed: bool) -> None:
+    """Press or release the emergency stop button of a simulated robot."""
+    if isinstance(core.robot, SimulatedRobot):
+        core.robot.emergency = pressed

@@ -1,20 +1,15 @@
-"""The bridge's loop: what wakes it."""
+"""The bridge as a process: what wakes it, and what does not wait for its next step."""
 
 import threading
 from types import SimpleNamespace
 
 from bridge.core.bridge import BridgeOutputs
-from bridge.loop import BridgeLoop
+from bridge.loop import bridge_runner
 from rolling_panda import messages as m
-from rolling_panda.topics import MOTION
+from rolling_panda.topics import MOTION, STOP
 from tests.support.fake_wire import FakeWire
 
 COMMAND = m.MotionCommand(epoch=1, token="a", sequence=1, echo=1, xi=(0.0,) * 9)
-
-
-class Wire(FakeWire):
-    def serve(self, service, answer):
-        pass
 
 
 class SleepyCore:
@@ -30,18 +25,24 @@ class SleepyCore:
         self.heard.append(command.sequence)
         self.any.set()
 
+    def on_stop(self, request, now, wall_time):
+        self.heard.append(request.stop_id)
+
     def step(self, now, clock, wall_time):
         return BridgeOutputs()
 
 
-def test_a_command_is_taken_when_it_comes_and_not_at_the_next_turn():
-    core, wire, stopping = SleepyCore(), Wire(), threading.Event()
-    thread = threading.Thread(target=BridgeLoop(core, wire).run, args=(stopping,))
+def test_a_command_is_taken_when_it_comes_and_a_stop_does_not_wait_for_a_step():
+    core, wire, stopping = SleepyCore(), FakeWire("bridge"), threading.Event()
+    runner = bridge_runner(core, wire)
+    wire.deliver(STOP, m.StopRequest(stop_id="s", source="server", user="eve", reason="dog"))
+    assert core.heard == ["s"]
+    thread = threading.Thread(target=runner.run, args=(stopping,))
     thread.start()
     try:
         wire.deliver(MOTION, COMMAND)
         assert core.any.wait(5.0)
-        assert core.heard == [1]
+        assert core.heard == ["s", 1]
     finally:
         stopping.set()
         wire.deliver(MOTION, COMMAND)

@@ -1,4 +1,4 @@
-"""A wire in memory for tests of the server: what is published can be read back, and services answer as told."""
+"""A wire in memory for tests of one process: what is published can be read back, and services answer as told."""
 
 import threading
 import time
@@ -35,13 +35,15 @@ class FakePublisher:
 class FakeWire:
     """Stands where a `Transport` stands; the test is the rest of the robot."""
 
-    def __init__(self):
+    def __init__(self, process="server"):
+        self.process = process
         self.plain = False
         self.sent = defaultdict(list)
         self.asked = []
         self.answer = lambda request: m.Answer(ok=True, reason="done")
         self.processes = {"bridge", "controller", "perception", "server"}
         self.on_reject = lambda topic, reason: None
+        self.services = {}
         self._stores = defaultdict(list)
 
     def publisher(self, topic):
@@ -59,6 +61,9 @@ class FakeWire:
         feed = Feed(capacity)
         self.subscribe(topic, feed.store)
         return feed
+
+    def serve(self, service, answer):
+        self.services[service.name] = answer
 
     def call(self, service, request):
         self.asked.append(request)

@@ -8,7 +8,7 @@ import numpy as np
 from bridge.config import BridgeConfig, OdometryConfig
 from bridge.core.bridge import TICK_S, BridgeCore
 from bridge.core.odometer import Odometer
-from bridge.loop import BridgeLoop
+from bridge.loop import bridge_runner
 from bridge.sim.robot.lagged import LaggedRobot
 from controller.config import ControllerConfig
 from controller.core import Controller
@@ -43,7 +43,7 @@ class LiveTwo:
         odometer = Odometer(MODEL.drive, OdometryConfig(), TICK_S)
         core = BridgeCore(self.robot, BridgeConfig(), MODEL.limits, odometer, "sim")
         with self.transport("bridge") as transport:
-            loop, stopping = BridgeLoop(core, transport), threading.Event()
+            loop, stopping = bridge_runner(core, transport), threading.Event()
             with running(loop.run, stopping):
                 yield
 

@@ -13,7 +13,7 @@ def lived(steps, seed, **changes):
     """A world after so many control periods; the judge has seen each of them."""
     with ExitStack() as stack:
         # One period of the bridge for one of the controller: what is told keeps its rate.
-        for name, ticks in (("_STATE_TICKS", 5), ("_ODOMETRY_TICKS", 2), ("_STOPS_TICKS", 50)):
+        for name, ticks in (("_STATE_TICKS", 5), ("_ODOMETRY_TICKS", 2)):
             stack.enter_context(patch(f"bridge.core.bridge.{name}", ticks))
         stack.enter_context(patch("controller.core._STATE_S", 0.0))
         stack.enter_context(patch("controller.core.Movement", Movement))

@@ -1,0 +1,237 @@
+"""Ties the pure core of a process to a wire: inputs, outputs, services, rate and clock from the topic table."""
+
+import functools
+import math
+import statistics
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
+from concurrent.futures import TimeoutError as FutureTimeoutError
+from typing import Any, Protocol
+
+from rolling_panda import messages as m
+from rolling_panda.errors import ServiceError
+from rolling_panda.topics import SERVICES, TOPICS, Service, Topic
+from rolling_panda.transport.access import CALLERS
+from rolling_panda.transport.inbox import Answered, Inbox, Rejected, Reply, Request
+from rolling_panda.transport.loop_clock import LoopClock
+
+#: Periods in the median of the step's duration, and how often it is computed (periods).
+_TIMED, _TIMED_EVERY = 200, 20
+#: A period is late from this multiple of its nominal length.
+_LATE = 1.5
+#: The process answers this long before its caller gives up (s).
+_ANSWER_MARGIN_S = 0.2
+#: Rejected messages and answers that wait for the loop, each at most.
+_OWN = 20
+
+
+class Core(Protocol):
+    """The pure core of a process."""
+
+    def step(self, inbox: Inbox, now: float) -> Sequence[object]:
+        """Advance to `now` (s, monotonic). Returns messages; the topic or service follows from the type."""
+
+    def end(self) -> Sequence[object]:
+        """The last messages."""
+
+
+class Sender(Protocol):
+    """Sends messages of one topic."""
+
+    def put(self, message: Any) -> None:
+        """Send one message."""
+
+
+class Wire(Protocol):
+    """A process's session: `transport.zenoh.Transport`, or `transport.memory.MemoryWire`."""
+
+    process: m.Process
+    on_reject: Callable[[str, str], None]
+
+    def publisher(self, topic: Topic[Any]) -> Sender:
+        """What sends messages of a topic."""
+
+    def subscribe(self, topic: Topic[Any], store: Callable[[Any, float], None]) -> None:
+        """Call `store(message, received_at)` for each message."""
+
+    def serve(self, service: Service[Any], answer: Callable[[Any], m.Answer | None]) -> None:
+        """Answer requests."""
+
+    def call(self, service: Service[Any], request: Any) -> m.Answer:
+        """Call a service."""
+
+    def present(self) -> frozenset[str]:
+        """Connected processes."""
+
+
+class Runner:
+    """Runs one core on one wire.
+
+    Messages arrive on threads of the wire. The loop's thread moves them into the inbox, calls `step` and sends what it
+    returns. The newest message of a latched topic is repeated at the topic's rate.
+    """
+
+    def __init__(
+        self,
+        core: Core,
+        wire: Wire,
+        period_s: float,
+        longest_turn_s: float = math.inf,
+        at_once: Mapping[type[Any], Callable[[Any], None]] | None = None,
+        clock: Callable[[], float] = time.monotonic,
+        wall_clock: Callable[[], float] = time.time,
+    ) -> None:
+        """Subscribe, advertise and serve what the topic table says of the wire's process.
+
+        Args:
+            core: The process.
+            wire: Open session.
+            period_s: Time between steps (s).
+            longest_turn_s: Longest time that the clock of `step` advances in one period (s); see `LoopClock`.
+            at_once: Handlers of messages that do not wait for the next step. They run on a thread of the wire, never
+                during a step.
+            clock: Monotonic clock (s).
+            wall_clock: Clock for texts (s since 1970).
+        """
+        self._core, self._wire, self._period = core, wire, period_s
+        self._time, self._wall_clock = clock, wall_clock
+        self._clock = LoopClock(clock(), longest_turn_s)
+        self._inbox = Inbox()
+        self._lock, self._wake = threading.Lock(), threading.Event()
+        self._arrived: dict[type[Any], tuple[Any, float]] = {}
+        self._queued: dict[type[Any], deque[tuple[Any, float]]] = {
+            own: deque(maxlen=_OWN) for own in (Rejected, Answered)
+        }
+        self._asked: deque[tuple[Any, float, Future[m.Answer | None]]] = deque()
+        self._latched: dict[type[Any], tuple[Any, float]] = {}
+        self._durations: deque[float] = deque(maxlen=min(max(1, round(1.0 / period_s)), _TIMED))
+        self._sends: dict[type[Any], Callable[[Any], None]] = {Reply: _reply}
+        immediate = at_once or {}
+        self._rates: dict[type[Any], float] = {}
+        wire.on_reject = self._reject
+        for topic in TOPICS:
+            if topic.said_by(wire.process):
+                self._sends[topic.message] = wire.publisher(topic).put
+                if topic.latched:
+                    self._rates[topic.message] = topic.rate_hz
+            if topic.read_by(wire.process):
+                handler = immediate.get(topic.message)
+                wire.subscribe(topic, self._receiver(topic) if handler is None else self._immediate(handler))
+        for service in SERVICES:
+            if service.server == wire.process:
+                wire.serve(service, functools.partial(self._ask, service))
+            if wire.process in CALLERS[service.name]:
+                for kind in service.requests:
+                    self._sends[kind] = functools.partial(self._call, service)
+
+    def run(self, stopping: threading.Event) -> None:
+        """Run until `stopping` is set. Missed periods are skipped."""
+        due = began = self._time()
+        while not stopping.is_set():
+            started = self._time()
+            self._inbox.late_ticks += started - began > _LATE * self._period
+            began = started
+            self.turn(started)
+            due += self._period
+            wait = due - self._time()
+            if wait <= 0.0:
+                due += int(-wait / self._period) * self._period
+            elif self._wake.wait(wait):
+                due = self._time()
+            self._wake.clear()
+        self._send(self._core.end())
+
+    def turn(self, clock: float) -> None:
+        """One period at `clock` (s, monotonic)."""
+        now = self._clock.turn(clock)
+        inbox = self._inbox
+        self._collect(inbox)
+        with self._lock:
+            out = self._core.step(inbox, now)
+        self._durations.append(self._time() - clock)
+        self._send(out)
+        for message in out:
+            if (rate := self._rates.get(type(message))) is not None:
+                self._latched[type(message)] = message, now + 1.0 / rate
+        for kind, (message, due) in self._latched.items():
+            if now >= due:
+                self._sends[kind](message)
+                self._latched[kind] = message, now + 1.0 / self._rates[kind]
+
+    def _collect(self, inbox: Inbox) -> None:
+        """Move what has arrived into the inbox, with times of the loop's clock."""
+        inbox.ticks += 1
+        if inbox.ticks % _TIMED_EVERY == 0:
+            inbox.tick_s = statistics.median(self._durations)
+        inbox.present, inbox.wall_time = self._wire.present(), self._wall_clock()
+        clock = self._clock
+        while self._arrived:
+            _, (message, at) = self._arrived.popitem()
+            inbox.put(message, clock.of(at))
+        for queue in self._queued.values():
+            while queue:
+                message, at = queue.popleft()
+                inbox.put(message, clock.of(at))
+        while self._asked:
+            message, at, future = self._asked.popleft()
+            accept = future.set_running_or_notify_cancel
+            inbox.requests.append(Request(message, clock.of(at), accept, future.set_result))
+
+    def _send(self, out: Sequence[object]) -> None:
+        for message in out:
+            self._sends[type(message)](message)
+
+    def _receiver(self, topic: Topic[Any]) -> Callable[[Any, float], None]:
+        """What takes the messages of a topic, on a thread of the wire."""
+        arrived, wake, kind = self._arrived, self._wake, topic.message
+
+        def newest(message: Any, at: float) -> None:
+            arrived[kind] = message, at
+            if topic.wakes:
+                wake.set()
+
+        if not topic.queue:
+            return newest
+        queue = self._queued[kind] = deque(maxlen=topic.queue)
+        return lambda message, at: queue.append((message, at))
+
+    def _immediate(self, handler: Callable[[Any], None]) -> Callable[[Any, float], None]:
+        def handle(message: Any, at: float) -> None:
+            with self._lock:
+                handler(message)
+
+        return handle
+
+    def _reject(self, topic: str, reason: str) -> None:
+        self._queued[Rejected].append((Rejected(topic, reason), self._time()))
+
+    def _ask(self, service: Service[Any], request: Any) -> m.Answer | None:
+        """Hand a request to the core and wait for its answer, on a thread of the wire."""
+        future: Future[m.Answer | None] = Future()
+        self._asked.append((request, self._time(), future))
+        self._wake.set()
+        try:
+            return future.result(service.timeout_s - _ANSWER_MARGIN_S)
+        except FutureTimeoutError:
+            if future.cancel():
+                return m.Answer(ok=False, reason=f"the {service.server} did not answer in time; nothing was done")
+            return m.Answer(ok=False, reason="it was decided, but not recorded in time: see the state")
+
+    def _call(self, service: Service[Any], request: Any) -> None:
+        """Call a service on a thread of its own, since it blocks."""
+
+        def call() -> None:
+            try:
+                answer = self._wire.call(service, request)
+            except ServiceError as error:
+                answer = m.Answer(ok=False, reason=str(error)[:500])
+            self._queued[Answered].append((Answered(request, answer), self._time()))
+
+        threading.Thread(target=call, daemon=True).start()
+
+
+def _reply(reply: Reply) -> None:
+    reply.request.reply(reply.answer)
