@@ -11,14 +11,16 @@ from bridge.core.bridge import MOVING_CUT, TICK_S, BridgeCore, BridgeOutputs
 from bridge.core.cut_orders import BUSY
 from bridge.core.fence import HELD, MOVING
 from bridge.core.interface import Measurement
+from bridge.core.picture import Picture
 from bridge.core.state_memory import Remembered
 from bridge.core.validator import OLD_SEQUENCE
 from rolling_panda import messages as m
+from rolling_panda.messages.perception import Capsule
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.topics import CUT, MOTION, TOKEN, Topic
 from tests.bridge.test_bridge_core import FORWARD, Bench, IdealRobot, cut, odometer, release, stop
-from tests.support.bridge_rig import MODEL, REST
+from tests.support.bridge_rig import MODEL, PICTURE, REST
 from tests.support.fake_wire import as_received
 
 
@@ -394,3 +396,54 @@ def test_braking_after_its_controllers_mode_has_ended_is_no_motion_against_that_
     bench.run(0.05, FORWARD)
     bench.run(0.5, REST)
     assert not any("commanded to move" in line for line in bench.log) and not bench.state.moving
+
+
+def test_after_a_fault_nothing_moves_before_a_setpoint_at_rest(bench: Bench) -> None:
+    bench.drive_on()
+    bench.robot.now = replace(bench.robot.now, fault="arm: reflex")
+    bench.run(0.5, REST)
+    bench.run(0.2, FORWARD)
+    bench.robot.now = replace(bench.robot.now, fault="")
+    # Longer than a fault is waited for to stay away.
+    bench.run(3.0, FORWARD)
+    assert bench.moved_within(3.0) == 0.0
+    bench.run(0.1, REST)
+    bench.run(0.5, FORWARD)
+    assert bench.moved_within(0.1) > 0.0
+
+
+def test_while_the_robot_moves_the_camera_looks_more_often(bench: Bench) -> None:
+    def pictures(seconds: float, xi: tuple[float, ...]) -> int:
+        before = len(bench.outputs)
+        bench.run(seconds, xi)
+        return sum(out.frame is not None for out in bench.outputs[before:])
+
+    bench.run(6.5, REST)
+    assert pictures(2.0, REST) == 1
+    assert pictures(6.0, FORWARD) >= 11
+
+
+class SlowCamera(IdealRobot):
+    """Has a picture only some time after it was asked for one."""
+
+    waits = 0
+
+    def capture(self, expose: bool) -> Picture | None:
+        self.waits = 40 if expose else self.waits - 1
+        return PICTURE if self.waits == 0 else None
+
+
+def test_a_frame_is_told_when_its_picture_has_come_and_not_before() -> None:
+    bench = Bench()
+    bench.core = BridgeCore(SlowCamera(), BridgeConfig(), MODEL.limits, odometer(), "sim")
+    bench.run(0.3, REST)
+    assert not any(out.frame for out in bench.outputs)
+    bench.run(0.3, REST)
+    assert [out.frame.color_jpeg for out in bench.outputs if out.frame is not None] == [PICTURE.color_jpeg]
+
+
+def test_scenery_tells_its_rods_in_odom() -> None:
+    rod = Capsule(start=(0.0, 0.0, 0.0), end=(0.0, 0.0, 1.0), start_radius=0.1, end_radius=0.1, kind="post")
+    core = BridgeCore(IdealRobot(), BridgeConfig(), MODEL.limits, odometer(), "sim", scenery=lambda: (1, (rod,)))
+    scenery = core.step(7.5).scenery
+    assert scenery is not None and (scenery.header.frame_id, scenery.capsules) == ("odom", (rod,))

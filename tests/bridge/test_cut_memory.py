@@ -127,6 +127,31 @@ def test_a_half_written_line_spoils_no_other(tmp_path: Path) -> None:
     again.close()
 
 
+def test_bytes_that_are_no_text_spoil_no_other_line(tmp_path: Path) -> None:
+    (tmp_path / FILE).write_bytes(b"\nrun-1\n\n\xff\xfe\n")
+    memory = CutFile(tmp_path)
+    assert "run-1" in memory.known
+    memory.close()
+
+
+def test_only_its_owner_reads_and_writes_the_memory_of_cuts(tmp_path: Path) -> None:
+    CutFile(tmp_path).close()
+    assert (tmp_path / FILE).stat().st_mode & 0o777 == 0o600
+
+
+def test_what_is_pending_at_the_end_is_written_and_the_writer_ends(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real, before = os.fsync, threading.active_count()
+    monkeypatch.setattr(os, "fsync", lambda descriptor: (time.sleep(0.1), real(descriptor)))
+    memory = CutFile(tmp_path)
+    for cut_id in ("a", "b", "c"):
+        memory.keep(cut_id)
+    memory.close()
+    assert threading.active_count() == before
+    assert {"a", "b", "c"} <= set((tmp_path / FILE).read_text().split())
+
+
 def test_a_folder_that_cannot_be_used_is_named(tmp_path: Path) -> None:
     (tmp_path / FILE).mkdir()
     with pytest.raises(InputError, match="cannot remember cuts in .*--state"):
