@@ -37,7 +37,7 @@ TARGETS = {
         _tests(
             "controller",
             "authority fencing modes permission supervisor health stale_messages stop_latch lease core_control "
-            "core_interruptions queue_requests tracking_error core_work interrupted",
+            "core_interruptions preview queue_requests tracking_error core_work interrupted",
         )
         + _tests("system", "two_operators"),
     ),

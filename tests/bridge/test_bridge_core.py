@@ -354,7 +354,9 @@ def test_the_bridge_says_it_when_it_moves_though_its_controllers_mode_moves_noth
     assert not any("commanded to move" in line for line in bench.log)
     bench.mode = mode
     bench.run(1.5, FORWARD)
-    assert sum(f"commanded to move, though the controller's mode is {mode}" in line for line in bench.log) == 1
+    events = [event for out in bench.outputs for event in out.events]
+    (said,) = [event for event in events if f"commanded to move, though the controller's mode is {mode}" in event.text]
+    assert said.severity == "error"
     bench.mode = "AUTO"
     bench.run(1.0, REST)
     bench.run(0.5, FORWARD)

@@ -18,7 +18,7 @@ from rolling_panda import messages as m
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.runtime.latest_file import KeptValue
-from rolling_panda.topics import CUT, MOTION, TOKEN, Topic
+from rolling_panda.topics import CUT, MOTION, ODOMETRY, STOPS, TOKEN, Topic
 from tests.bridge.test_bridge_core import FORWARD, Bench, IdealRobot, cut, odometer, release, stop
 from tests.support.bridge_rig import MODEL, PICTURE, REST
 from tests.support.fake_wire import as_received
@@ -440,6 +440,62 @@ def test_a_frame_is_told_when_its_picture_has_come_and_not_before() -> None:
     assert not any(out.frame for out in bench.outputs)
     bench.run(0.3, REST)
     assert [out.frame.color_jpeg for out in bench.outputs if out.frame is not None] == [PICTURE.color_jpeg]
+
+
+class RunningCamera(IdealRobot):
+    """Its pictures are a quarter of a second old."""
+
+    clock = 0.0
+
+    def capture(self, expose: bool) -> Picture | None:
+        return replace(PICTURE, taken_at=self.clock - 0.25) if expose else None
+
+
+def test_a_picture_is_told_with_the_posture_in_which_it_was_taken() -> None:
+    bench = Bench()
+    bench.robot = RunningCamera()
+    bench.core = BridgeCore(bench.robot, BridgeConfig(), MODEL.limits, odometer(), "sim")
+    for xi, seconds in ((REST, 0.1), (FORWARD, 2.0)):
+        for _ in range(round(seconds * 1000)):
+            bench.now += TICK_S
+            bench.robot.clock = bench.now
+            bench.hear(bench.core.step(bench.now), xi)
+    frame, told = next((out.frame, bench.now) for out in reversed(bench.outputs) if out.frame is not None)
+    (then,) = {
+        out.joints.position
+        for out in bench.outputs
+        if out.joints is not None and out.joints.header.stamp == frame.header.stamp
+    }
+    assert frame.header.stamp < told - 0.2 and frame.position == then
+
+
+def test_an_order_that_is_refused_for_itself_is_not_told_as_a_cut_that_failed(bench: Bench) -> None:
+    bench.drive_on()
+    bench.core.on_cut(cut(bench, "c1"), bench.now)
+    bench.run(0.1, FORWARD)
+    assert refused_cuts(bench) == {MOVING_CUT: 1}
+    assert (bench.state.cut_id, bench.state.outcome) == ("", "")
+
+
+def test_odometry_keeps_its_rate_however_often_the_joints_are_told() -> None:
+    bench = Bench()
+    bench.core = BridgeCore(bench.robot, BridgeConfig(joints_hz=500.0), MODEL.limits, odometer(), "sim")
+    bench.run(2.0, REST)
+    told = sum(out.odometry is not None for out in bench.outputs)
+    assert told == pytest.approx(2.0 * ODOMETRY.rate_hz, abs=2)
+
+
+def test_round_trips_are_those_of_the_last_second(bench: Bench) -> None:
+    bench.run(0.5, REST)
+    assert bench.state.round_trip_worst_s == 0.0
+    echo = bench.echo
+    bench.run(0.05, None)
+    bench.echo = echo
+    bench.command(REST)
+    bench.run(0.1, REST)
+    assert bench.state.round_trip_worst_s == pytest.approx(0.05, abs=0.01)
+    bench.run(1.2, REST)
+    assert bench.state.round_trip_worst_s < 0.01
 
 
 def test_scenery_tells_its_rods_in_odom() -> None:

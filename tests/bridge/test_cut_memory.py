@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from bridge.core import cut_memory
 from bridge.core.cut_memory import FILE, CutFile
 from bridge.core.cut_orders import FORGETFUL, CutOrders
 from rolling_panda.errors import InputError
@@ -137,6 +138,21 @@ def test_bytes_that_are_no_text_spoil_no_other_line(tmp_path: Path) -> None:
 def test_only_its_owner_reads_and_writes_the_memory_of_cuts(tmp_path: Path) -> None:
     CutFile(tmp_path).close()
     assert (tmp_path / FILE).stat().st_mode & 0o777 == 0o600
+
+
+def test_the_disk_waits_for_the_control_loop_and_keeps_no_process_alive(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given: list[tuple[str, str]] = []
+    monkeypatch.setattr(
+        cut_memory, "set_priority", lambda priority: given.append((priority, threading.current_thread().name))
+    )
+    before = set(threading.enumerate())
+    memory = CutFile(tmp_path)
+    (writer,) = set(threading.enumerate()) - before
+    assert judged(CutOrders(memory), "a") == ("cut", "")
+    assert writer.daemon and given == [("interface", writer.name)]
+    memory.close()
 
 
 def test_what_is_pending_at_the_end_is_written_and_the_writer_ends(

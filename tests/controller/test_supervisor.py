@@ -285,7 +285,16 @@ def test_a_protective_stop_says_why_and_what_it_interrupted_and_is_left_a_second
     r.run(0.7)
     assert r.ask(intents.Acknowledge(user="ada")).ok
     r.run(0.1)
-    assert r.state.mode == "PAUSED"
+    assert (r.state.mode, r.state.interrupted) == ("PAUSED", "teleoperation")
+    assert r.ask(intents.Resume(user="ada")).ok
+    assert r.ask(intents.Home(user="ada")).ok
+    r.run(0.1)
+    r.frozen_sensors = True
+    r.run(0.5)
+    assert (r.state.mode, r.state.interrupted) == ("PROTECTIVE_STOP", "teleoperation")
+    r.stop()
+    r.run(0.1)
+    assert (r.state.mode, r.state.interrupted) == ("ESTOP_LATCHED", "")
 
 
 def test_without_a_server_a_hand_moves_nothing_and_the_reason_is_told():
