@@ -166,17 +166,17 @@ class BridgeCore:
         """Give the fencing token out, let its holder keep it, or take it back."""
         epoch = self._fence.epoch
         if request.releases:
-            if self._fence.give_way(request.token):
+            if self._fence.release(request.token):
                 self._halt()
                 self._token_changed(f"the controller that held epoch {epoch} has given way")
             return
-        reason = self._validator.ask(request, now, not np.any(self._limiter.sent))
+        reason = self._validator.claim(request, now, not np.any(self._limiter.sent))
         if reason is not None:
             self.refusals.add(TOKEN.name, reason)
             return
         self._mode = request.mode, now
         if self._fence.epoch != epoch:
-            self._halt()
+            # The token changes hands at rest only, and the validator asks the new holder for rest first.
             self._token_changed(f"a controller has the token: epoch {self._fence.epoch}")
 
     def _token_changed(self, text: str) -> None:
@@ -343,7 +343,7 @@ class BridgeCore:
                 released_by=self._latch.released_by,
                 hardware=self._latch.hardware,
             )
-        scenery = self._scenery_message(now) if self._scenery_is_due() else None
+        scenery = None if self._scenery is None else self._scenery_message(self._scenery, now)
         events, self._events = self._events, []
         return BridgeOutputs(
             joints,
@@ -414,11 +414,10 @@ class BridgeCore:
         picture = self.robot.capture(expose)
         return None if picture is None else self._camera_trigger.frame(picture)
 
-    def _scenery_is_due(self) -> bool:
-        return self._scenery is not None and self._scenery()[0] != self._scenery_revision
-
-    def _scenery_message(self, now: float) -> Scenery | None:
-        if self._scenery is None:
+    def _scenery_message(self, scenery: SceneryOf, now: float) -> Scenery | None:
+        """What stands around, when it has changed."""
+        revision, capsules = scenery()
+        if revision == self._scenery_revision:
             return None
-        self._scenery_revision, capsules = self._scenery()
-        return Scenery(header=m.Header(now, "odom"), revision=self._scenery_revision, capsules=capsules)
+        self._scenery_revision = revision
+        return Scenery(header=m.Header(now, "odom"), revision=revision, capsules=capsules)

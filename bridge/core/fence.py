@@ -41,11 +41,11 @@ class Fence:
             return OLD_EPOCH if epoch < self.epoch else UNKNOWN_EPOCH
         return None if token == self.token else OTHER_TOKEN
 
-    def hear(self, now: float) -> None:
+    def renew(self, now: float) -> None:
         """The holder has sent something valid."""
         self._heard = now
 
-    def ask(self, token: str, now: float, at_rest: bool) -> str:
+    def claim(self, token: str, now: float, at_rest: bool) -> str:
         """Issue the token, or renew it for its holder. Returns the reason of a refusal; empty if granted.
 
         Args:
@@ -67,7 +67,7 @@ class Fence:
         self._heard = now
         return ""
 
-    def give_way(self, token: str) -> bool:
+    def release(self, token: str) -> bool:
         """The holder gives the token back; False from anybody else."""
         if token != self.token:
             return False

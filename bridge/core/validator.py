@@ -54,7 +54,7 @@ class CommandValidator:
         """Take nothing but a setpoint at rest from here on, until one has come."""
         self.must_rest = True
 
-    def ask(self, request: TokenRequest, now: float, at_rest: bool) -> str | None:
+    def claim(self, request: TokenRequest, now: float, at_rest: bool) -> str | None:
         """Issue the token, or renew it for its holder. Returns None, or the reason of a refusal.
 
         Args:
@@ -66,7 +66,7 @@ class CommandValidator:
         if reason is not None:
             return reason
         epoch = self._fence.epoch
-        reason = self._fence.ask(request.token, now, at_rest) or None
+        reason = self._fence.claim(request.token, now, at_rest) or None
         if self._fence.epoch != epoch:
             self.sequence, self.must_rest = -1, True
         return reason
@@ -81,7 +81,7 @@ class CommandValidator:
         reason = self._fault(command, now)
         if reason is None:
             self.sequence, self.must_rest = command.sequence, False
-            self._fence.hear(now)
+            self._fence.renew(now)
         return reason
 
     def refuse_cut(self, command: CutCommand, now: float) -> str | None:

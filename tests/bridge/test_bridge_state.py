@@ -18,7 +18,7 @@ from rolling_panda import messages as m
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.runtime.latest_file import KeptValue
-from rolling_panda.topics import CUT, MOTION, ODOMETRY, STOPS, TOKEN, Topic
+from rolling_panda.topics import CUT, MOTION, ODOMETRY, TOKEN, Topic
 from tests.bridge.test_bridge_core import FORWARD, Bench, IdealRobot, cut, odometer, release, stop
 from tests.support.bridge_rig import MODEL, PICTURE, REST
 from tests.support.fake_wire import as_received

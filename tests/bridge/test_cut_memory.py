@@ -136,8 +136,24 @@ def test_bytes_that_are_no_text_spoil_no_other_line(tmp_path: Path) -> None:
 
 
 def test_only_its_owner_reads_and_writes_the_memory_of_cuts(tmp_path: Path) -> None:
+    before = threading.active_count()
     CutFile(tmp_path).close()
     assert (tmp_path / FILE).stat().st_mode & 0o777 == 0o600
+    assert threading.active_count() == before
+
+
+def test_the_memory_of_cuts_survives_a_power_failure_and_keeps_no_file_open(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced: list[Path] = []
+    monkeypatch.setattr(cut_memory, "sync_folder", synced.append)
+    memory = CutFile(tmp_path)
+    assert synced == [tmp_path], "the name of a new file is in its folder, which has to be on the disk too"
+    before = len(os.listdir("/proc/self/fd"))
+    for number in range(20):
+        assert judged(CutOrders(memory), f"run-{number}") == ("cut", "")
+    assert len(os.listdir("/proc/self/fd")) <= before
+    memory.close()
 
 
 def test_the_disk_waits_for_the_control_loop_and_keeps_no_process_alive(

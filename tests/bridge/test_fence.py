@@ -198,17 +198,17 @@ def test_an_absurd_epoch_on_disk_is_told_with_its_cause_and_one_command_ends_it(
 
 def test_the_last_epoch_is_given_out_once_and_then_the_way_out_is_told() -> None:
     fence = Fence(MOST_EPOCHS - 1)
-    assert fence.ask("aa", 0.0, at_rest=True) == ""
-    assert fence.ask("bb", SILENT_S, at_rest=True) == f.USED_UP and "--begin-anew" in f.USED_UP
+    assert fence.claim("aa", 0.0, at_rest=True) == ""
+    assert fence.claim("bb", SILENT_S, at_rest=True) == f.USED_UP and "--begin-anew" in f.USED_UP
 
 
 def test_the_token_changes_hands_at_rest_alone() -> None:
     fence = Fence()
-    assert fence.ask("aa", 0.0, at_rest=False) == f.MOVING
-    assert fence.ask("aa", 0.0, at_rest=True) == ""
-    assert fence.ask("aa", 0.1, at_rest=False) == ""
-    assert not fence.give_way("bb") and fence.give_way("aa")
-    assert fence.ask("bb", 0.2, at_rest=False) == f.MOVING
+    assert fence.claim("aa", 0.0, at_rest=False) == f.MOVING
+    assert fence.claim("aa", 0.0, at_rest=True) == ""
+    assert fence.claim("aa", 0.1, at_rest=False) == ""
+    assert not fence.release("bb") and fence.release("aa")
+    assert fence.claim("bb", 0.2, at_rest=False) == f.MOVING
     assert (fence.epoch, fence.token) == (1, None)
 
 
@@ -220,7 +220,7 @@ def test_an_older_epoch_is_told_from_one_that_was_never_issued() -> None:
 
 def test_the_token_is_free_a_second_after_the_holders_last_valid_command() -> None:
     fence = Fence()
-    assert fence.ask("aa", 0.0, at_rest=True) == ""
-    fence.hear(5.0)
-    assert fence.ask("bb", 5.5, at_rest=True) == f.HELD
-    assert fence.ask("bb", 6.1, at_rest=True) == ""
+    assert fence.claim("aa", 0.0, at_rest=True) == ""
+    fence.renew(5.0)
+    assert fence.claim("bb", 5.5, at_rest=True) == f.HELD
+    assert fence.claim("bb", 6.1, at_rest=True) == ""

@@ -86,8 +86,10 @@ def test_from_what_the_arm_took_it_goes_on_without_a_jerk() -> None:
     assert not sent[:2].any()
 
 
-def test_where_packets_may_be_lost_the_arm_may_go_on_with_its_acceleration_and_stays_below_its_velocity() -> None:
-    repeats = 20
+@pytest.mark.parametrize("repeats", [1, 20])
+def test_where_packets_may_be_lost_the_arm_may_go_on_with_its_acceleration_and_stays_below_its_velocity(
+    repeats: int,
+) -> None:
     bound, arm = Limiter(LIMITS, 13.5, 0.01, DT, repeats), (LOWER + UPPER) / 2
     most, before = LIMITS.velocity[ARM_XI], np.zeros(7)
     for goal in (1e6, -1e6, 1e6):
@@ -98,6 +100,14 @@ def test_where_packets_may_be_lost_the_arm_may_go_on_with_its_acceleration_and_s
             assert np.all(np.abs(sent + repeats * change) <= most + 1e-9)
             fastest = np.maximum(fastest, np.sign(goal) * sent)
         assert np.all(fastest > 0.9 * np.minimum(most, np.sqrt(LIMITS.acceleration[ARM_XI] * (UPPER - LOWER) / 2)))
+
+
+def test_where_no_packet_is_lost_no_room_is_left_for_one() -> None:
+    def periods(bound: Limiter) -> int:
+        arm, goal = (LOWER + UPPER) / 2, np.full(9, 1e6)
+        return next(i for i in range(2000) if np.all(bound.step(goal, arm)[ARM_XI] > 0.9999 * LIMITS.velocity[ARM_XI]))
+
+    assert periods(limiter()) < periods(Limiter(LIMITS, 13.5, 0.01, DT, 1.0))
 
 
 def test_after_a_standstill_it_goes_on_from_how_the_robot_moves_within_its_velocities() -> None:

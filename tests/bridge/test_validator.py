@@ -71,7 +71,7 @@ def request(token: str = "bb", echo: int = 2) -> TokenRequest:
 def test_a_new_controller_starts_its_sequence_again_at_rest_and_silences_the_old_one(awake: CommandValidator) -> None:
     assert awake.refuse(command(500), 0.1) is None
     awake.sent(2, 1.2)
-    assert awake.ask(request(), 1.2, at_rest=True) is None
+    assert awake.claim(request(), 1.2, at_rest=True) is None
     assert awake.refuse(command(501, echo=2), 1.2) == f.OLD_EPOCH
     assert awake.refuse(command(1, epoch=2, token="bb", echo=2), 1.2) == g.NOT_AT_REST
     assert awake.refuse(command(1, REST, epoch=2, token="bb", echo=2), 1.2) is None
@@ -80,14 +80,14 @@ def test_a_new_controller_starts_its_sequence_again_at_rest_and_silences_the_old
 
 def test_who_asks_again_goes_on_with_its_sequence(awake: CommandValidator) -> None:
     assert awake.refuse(command(5), 0.1) is None
-    assert awake.ask(request("aa", 1), 0.1, at_rest=False) is None
+    assert awake.claim(request("aa", 1), 0.1, at_rest=False) is None
     assert awake.refuse(command(5), 0.1) == g.OLD_SEQUENCE
     assert awake.refuse(command(6), 0.1) is None
 
 
 def test_a_request_that_was_long_on_its_way_is_given_nothing(awake: CommandValidator) -> None:
-    assert awake.ask(request(echo=1), 9.0, at_rest=True) == g.TOO_OLD
-    assert awake.ask(request(echo=7), 9.0, at_rest=True) == g.UNSENT_ECHO
+    assert awake.claim(request(echo=1), 9.0, at_rest=True) == g.TOO_OLD
+    assert awake.claim(request(echo=7), 9.0, at_rest=True) == g.UNSENT_ECHO
 
 
 def test_a_cut_needs_the_token_and_a_fresh_view(awake: CommandValidator) -> None:

@@ -140,7 +140,7 @@ class KinematicRobot:
                 raise ValueError(f"a command of epoch {out.motion.epoch}, which is not the fence's")
             self._followed, self._moving = out.motion.sequence, bool(command.any())
         if out.token is not None:
-            self._fence.ask(out.token.token, self.now, not self._moving)
+            self._fence.claim(out.token.token, self.now, not self._moving)
         if out.picture is not None:
             self._close_up = self.close_up(out.picture)
         if out.cut is not None and out.cut.cut_id != self._cut_id:
