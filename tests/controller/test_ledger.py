@@ -1,5 +1,6 @@
 """What the ledger has acknowledged is there for good, in a chain that shows every change."""
 
+import hashlib
 import os
 import random
 import resource
@@ -16,7 +17,7 @@ import pytest
 from controller.ledger import check
 from controller.ledger.check import reading, verify
 from controller.ledger.start import restored
-from controller.ledger.store import FILE, HEAD, SCHEMA_VERSION, Entry, Ledger, Row, read
+from controller.ledger.store import FILE, HEAD, ORIGIN, SCHEMA_VERSION, Entry, Ledger, Row, chained, read
 from rolling_panda.errors import LedgerError
 from rolling_panda.runtime.launch import child_environment
 
@@ -137,6 +138,36 @@ def test_what_was_changed_by_hand_is_found(tmp_path: Path) -> None:
     assert "row 12, which ledger.head names as the newest, is not in it" in after(*cut)
     with pytest.raises(LedgerError, match="changed from outside.*keep the folder as evidence"):
         Ledger(tmp_path)
+
+
+@pytest.mark.parametrize("count", [1, 12])
+def test_a_ledger_whose_newest_row_was_changed_is_not_gone_on_with(tmp_path: Path, count: int) -> None:
+    database = sqlite3.connect(written(tmp_path, count), isolation_level=None)
+    database.execute("DROP TRIGGER no_update")
+    database.execute(f"UPDATE audit SET body = '{{}}' WHERE number = {count}")
+    database.close()
+    with pytest.raises(LedgerError, match=f"row {count} is not as it was written"):
+        Ledger(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("head", "problem"),
+    [(b"\xff\xfe", "cannot be read"), (b"0 abcd\n", "is not as it was written"), (None, "cannot be read")],
+)
+def test_a_head_that_cannot_be_trusted_is_refused_in_words(tmp_path: Path, head: bytes | None, problem: str) -> None:
+    written(tmp_path)
+    (tmp_path / HEAD).unlink()
+    if head is None:
+        (tmp_path / HEAD).mkdir()
+    else:
+        (tmp_path / HEAD).write_bytes(head)
+    with pytest.raises(LedgerError, match=f"{HEAD} {problem}"):
+        Ledger(tmp_path)
+
+
+def test_the_chain_is_that_of_the_text_in_utf_8_so_that_every_version_verifies_it() -> None:
+    text = '[7, "t", "event", "é", "{}"]'.encode()
+    assert chained(ORIGIN, 7, Entry("t", "event", "é", "{}")) == hashlib.sha256(ORIGIN + text).digest()
 
 
 def test_a_ledger_of_a_newer_version_is_called_newer_and_left_alone(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import time
 
 import pytest
 
+from controller.ledger import writer as writer_module
 from controller.ledger.check import reading, verify
 from controller.ledger.journal import Record, TicketRow
 from controller.ledger.store import Ledger, read
@@ -140,3 +141,33 @@ def test_a_flood_of_lines_is_counted_instead_of_recorded(writers):
     assert (disk.rows[200].kind, disk.rows[200].name) == ("event", "controller")
     left_out = json.loads(disk.rows[200].body)
     assert left_out["lines"] == 800 and left_out["text"].startswith("800 log lines") and "after" in disk.rows[201].body
+
+
+def test_a_line_of_another_process_is_recorded_under_its_name_and_makes_no_record_durable(writers):
+    disk = Disk()
+    writer = writers(lambda: disk)
+    writer.note(line("refused"))
+    until(lambda: disk.rows)
+    assert [(row.kind, row.name) for row in disk.rows] == [("event", "server")]
+    assert writer.state.durable == 0
+
+
+def test_the_disk_waits_for_the_control_loop(writers, monkeypatch):
+    given = []
+    monkeypatch.setattr(
+        writer_module, "set_priority", lambda priority: given.append((priority, threading.current_thread().name))
+    )
+    disk = Disk()
+    writers(lambda: disk).write([record(1)])
+    until(lambda: disk.rows)
+    assert given == [("interface", "ledger")]
+
+
+def test_at_the_end_a_full_disk_is_given_up_and_the_ledger_closed(writers):
+    disk, before = Disk(), threading.active_count()
+    disk.full = True
+    writer = writers(lambda: disk)
+    writer.write([record(1)])
+    until(lambda: writer.state.failure)
+    writer.close()
+    assert disk.closed and threading.active_count() == before
