@@ -1,5 +1,7 @@
 from dataclasses import replace
 
+import msgspec
+
 from controller.config import ControllerConfig
 from controller.inputs import Inputs
 from controller.supervision import health as safety
@@ -8,7 +10,7 @@ from controller.supervision.permission import Situation, allowed, refusal
 from rolling_panda import commands as intents
 from rolling_panda.commands import COMMAND_OF
 
-WELL = replace(
+WELL = msgspec.structs.replace(
     safety.health(Inputs(), None, 0.0),
     joints=0.0,
     odometry=0.0,
@@ -18,6 +20,10 @@ WELL = replace(
     obstacles=0.0,
     present=frozenset({"bridge", "controller", "perception", "server"}),
 )
+
+
+def well(**changes: object) -> safety.Health:
+    return msgspec.structs.replace(WELL, **changes)
 
 
 def situation(mode: str = "READY", **changes: object) -> Situation:
@@ -36,9 +42,9 @@ def test_each_thing_that_is_missing_is_said() -> None:
     assert refusal(start, 0.0, situation(waits="no point is accepted")) == "no point is accepted"
     assert refusal(home, 0.0, situation(waits="no point is accepted")) == ""
     assert refusal(start, 0.0, situation(busy="the blades are closing")) == "the blades are closing"
-    assert "perception" in refusal(start, 0.0, situation(health=replace(WELL, perception=9.0)))
-    assert "perception" not in refusal(home, 0.0, situation(health=replace(WELL, perception=9.0)))
-    assert "watchdog" in refusal(start, 0.0, situation(health=replace(WELL, watchdog=True)))
+    assert "perception" in refusal(start, 0.0, situation(health=well(perception=9.0)))
+    assert "perception" not in refusal(home, 0.0, situation(health=well(perception=9.0)))
+    assert "watchdog" in refusal(start, 0.0, situation(health=well(watchdog=True)))
     assert "PAUSED" in refusal(home, 0.0, situation("PAUSED"))
 
 
@@ -71,7 +77,7 @@ def test_a_stop_is_acknowledged_a_second_after_its_cause_is_gone() -> None:
 
 def test_without_measurements_nothing_begins_to_move_and_all_else_goes_on() -> None:
     for late in ({"joints": 9.0}, {"watchdog": True}):
-        blind = situation(health=replace(WELL, **late))
+        blind = situation(health=well(**late))
         for command in (COMMAND_OF[intents.Start], COMMAND_OF[intents.Survey], COMMAND_OF[intents.Home]):
             assert refusal(command, 0.0, blind)
         assert refusal(COMMAND_OF[intents.Arm], 0.0, replace(blind, state=modes.boot()))
@@ -80,8 +86,8 @@ def test_without_measurements_nothing_begins_to_move_and_all_else_goes_on() -> N
 
 
 def test_a_link_that_is_too_slow_for_a_hand_lets_work_begin_and_without_a_server_the_robot_can_be_armed() -> None:
-    assert refusal(COMMAND_OF[intents.Start], 0.0, situation(health=replace(WELL, server=1.0))) == ""
-    gone = situation(health=replace(WELL, server=9.0))
+    assert refusal(COMMAND_OF[intents.Start], 0.0, situation(health=well(server=1.0))) == ""
+    gone = situation(health=well(server=9.0))
     assert "server" in refusal(COMMAND_OF[intents.Start], 0.0, gone)
     assert refusal(COMMAND_OF[intents.Arm], 0.0, replace(gone, state=modes.boot())) == ""
 
