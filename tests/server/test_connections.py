@@ -9,7 +9,6 @@ import time
 import msgspec
 import pytest
 from websockets.exceptions import ConnectionClosed
-from websockets.sync.client import connect
 
 from server.auth.access import Access, Tls
 from server.config import ServerConfig
@@ -176,24 +175,9 @@ def is_ended(connection):
         return True
 
 
-def open_socket(server, client, path="/ws"):
-    protocols = ["viser-v1.1.1"] if path == "/viser" else None
-    headers = {"cookie": server.cookie(client)}
-    return connect(
-        server.socket_address + path,
-        origin=server.address,
-        additional_headers=headers,
-        proxy=None,
-        max_size=None,
-        max_queue=None,
-        close_timeout=0.1,
-        subprotocols=protocols,
-    )
-
-
 def test_websockets_leave_room_for_requests_and_are_told_why(plain):
     with contextlib.ExitStack() as stack, plain.client(user="zoe") as client:
-        pages = [stack.enter_context(open_socket(plain, client)) for _ in range(9)]
+        pages = [stack.enter_context(plain.socket(client)) for _ in range(9)]
         code, reason = closed(pages[-1])
         assert code == 1013 and "close some" in reason
         assert client.get("/api/me").json()["user"] == "zoe"
@@ -211,7 +195,7 @@ PING = '{"type":"Ping","number":1,"rendered":0}'
 
 @pytest.mark.parametrize(("path", "message"), [("/ws", PING), ("/viser", msgspec.msgpack.encode(CAMERA))])
 def test_a_socket_that_says_too_much_is_closed_with_the_reason_and_logged_once(plain, path, message):
-    with plain.client("viewer", "eve") as eve, open_socket(plain, eve, path) as flood:
+    with plain.client("viewer", "eve") as eve, plain.socket(eve, path) as flood:
         with contextlib.suppress(ConnectionClosed):
             for _ in range(20_000):
                 flood.send(message)
@@ -228,7 +212,7 @@ def test_a_socket_that_says_too_much_is_closed_with_the_reason_and_logged_once(p
 
 
 def test_pings_count_as_messages_do(plain):
-    with plain.client("viewer", "ida") as ida, open_socket(plain, ida) as flood:
+    with plain.client("viewer", "ida") as ida, plain.socket(ida) as flood:
         with contextlib.suppress(ConnectionClosed):
             for _ in range(20_000):
                 flood.ping()
@@ -236,7 +220,7 @@ def test_pings_count_as_messages_do(plain):
 
 
 def test_many_bytes_in_few_messages_are_too_much_as_well(plain):
-    with plain.client("viewer", "amy") as amy, open_socket(plain, amy, "/viser") as flood:
+    with plain.client("viewer", "amy") as amy, plain.socket(amy, "/viser") as flood:
         with contextlib.suppress(ConnectionClosed):
             for _ in range(100):
                 flood.send(b"x" * 60_000)
@@ -253,8 +237,8 @@ def test_many_bytes_in_few_messages_are_too_much_as_well(plain):
 def test_a_drag_at_sixty_a_second_is_never_too_much(plain):
     with (
         plain.client(user="pat") as client,
-        open_socket(plain, client) as page,
-        open_socket(plain, client, "/viser") as view,
+        plain.socket(client) as page,
+        plain.socket(client, "/viser") as view,
     ):
         begin = time.monotonic()
         for number in range(150):
@@ -270,8 +254,8 @@ def test_one_session_has_a_limit_through_all_of_its_sockets():
     config = ServerConfig(session_messages_hz=60.0)
     with running_server(FakeWire(), config) as server, contextlib.ExitStack() as stack:
         eve, ann = stack.enter_context(server.client("viewer", "eve")), stack.enter_context(server.client(user="ann"))
-        pages = [stack.enter_context(open_socket(server, eve)) for _ in range(4)]
-        other = stack.enter_context(open_socket(server, ann))
+        pages = [stack.enter_context(server.socket(eve)) for _ in range(4)]
+        other = stack.enter_context(server.socket(ann))
         with contextlib.suppress(ConnectionClosed):
             for _ in range(200):
                 for page in pages:

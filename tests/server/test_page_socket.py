@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from websockets.exceptions import ConnectionClosed
-from websockets.sync.client import connect
 
 from rolling_panda import messages as m
 from rolling_panda import topics
@@ -43,14 +42,7 @@ class Page:
     """The browser's side of `/ws`."""
 
     def __init__(self, server, client):
-        headers = {"cookie": server.cookie(client)}
-        self.socket = connect(
-            server.socket_address + "/ws",
-            origin=server.address,
-            additional_headers=headers,
-            proxy=None,
-            close_timeout=0.5,
-        )
+        self.socket = server.socket(client)
         self.rendered = 0
         self.sequence = 0
 
@@ -391,11 +383,6 @@ def test_a_page_that_does_not_read_is_dropped_and_one_that_reads_stays():
     config = ServerConfig(unread_s=2.0, page_rate_hz=100.0)
     with running_server(wire, config) as server, telling(wire), server.client(user="ann") as client:
 
-        def opened():
-            headers = {"cookie": server.cookie(client)}
-            address = server.socket_address + "/ws"
-            return connect(address, origin=server.address, additional_headers=headers, proxy=None, close_timeout=0.1)
-
         def look(page):
             try:
                 for _ in page:
@@ -404,7 +391,7 @@ def test_a_page_that_does_not_read_is_dropped_and_one_that_reads_stays():
                 pass
 
         # A page of the library's reads ahead a few messages, and answers pings only as far as it has read.
-        with opened() as reading, opened():
+        with server.socket(client, max_queue=16) as reading, server.socket(client, max_queue=16):
             reader = threading.Thread(target=look, args=(reading,))
             reader.start()
             eventually(lambda: client.get("/api/state").json()["viewers"] == 2)

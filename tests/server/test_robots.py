@@ -10,7 +10,7 @@ from rolling_panda import topics
 from rolling_panda.messages.supervision import StopRecord, StopState
 from tests.server.test_misuse import control
 from tests.server.test_page_socket import Page
-from tests.server.test_viser_proxy import drawn, open_socket
+from tests.server.test_viser_proxy import drawn
 from tests.support.fake_wire import FakeWire, bridge_state, controller_state, pruning_point, pruning_points, telling
 from tests.support.running_server import eventually, running_server
 
@@ -104,7 +104,7 @@ def test_without_a_robots_name_nothing_is_asked_of_any(server, robots, client):
         assert client.get(path).status_code == 404
     for path in ("/ws", "/viser", "/robots/rp3/ws"):
         with pytest.raises(InvalidStatus):
-            open_socket(server, client, path)
+            server.socket(client, path)
     assert not robots[0].wire.asked + robots[1].wire.asked
 
 

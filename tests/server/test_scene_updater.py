@@ -17,8 +17,6 @@ from tests.server.test_viser_proxy import (
     hear_kind,
     is_gizmo,
     never,
-    open_socket,
-    open_view,
     page_and_view,
     replayed,
     say,
@@ -50,13 +48,13 @@ def test_layers_are_those_of_one_session_and_stay_for_its_next_view(server):
     with (
         server.client(user="ann") as client,
         server.client(user="bob") as other,
-        open_socket(server, client, "/ws") as page,
-        open_view(server, other) as other_view,
+        server.socket(client) as page,
+        server.socket(other, "/viser") as other_view,
     ):
         hear(other_view, replayed)
         say(other_view, CAMERA)
         hear(other_view, shows("/row", True))
-        with open_view(server, client) as view:
+        with server.socket(client, "/viser") as view:
             hear(view, replayed)
             say(view, CAMERA)
             hear(view, shows("/row", True))
@@ -64,7 +62,7 @@ def test_layers_are_those_of_one_session_and_stay_for_its_next_view(server):
             heard = hear(view, shows("/row", False))
             assert any(map(shows("/plant", False), heard)) and any(map(shows("/points", True), heard))
             never(other_view, shows("/row", False))
-        with open_view(server, client) as view:
+        with server.socket(client, "/viser") as view:
             hear(view, replayed)
             say(view, CAMERA)
             hear(view, shows("/row", False))

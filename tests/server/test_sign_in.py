@@ -5,7 +5,6 @@ import time
 
 import pytest
 from websockets.exceptions import ConnectionClosed
-from websockets.sync.client import connect
 
 from rolling_panda import messages as m
 from rolling_panda import topics
@@ -106,13 +105,7 @@ def test_who_is_removed_is_out_within_a_second(server, users):
         assert eventually(lambda: sign_in(carl, "carl").status_code == 200)
         trust = ssl.create_default_context()
         trust.check_hostname, trust.verify_mode = False, ssl.CERT_NONE
-        with connect(
-            server.socket_address + "/ws",
-            ssl=trust,
-            origin=server.address,
-            additional_headers={"cookie": server.cookie(carl)},
-            proxy=None,
-        ) as page:
+        with server.socket(carl, ssl=trust) as page:
             page.recv(timeout=5)
             users.remove("carl")
             removed = time.monotonic()
@@ -175,12 +168,7 @@ def test_a_second_link_ends_the_old_session(link_server, link_visitor):
 def test_signing_out_closes_the_page_at_once(link_server, link_visitor):
     link_visitor.post("/api/sign-in", json={"token": link_server.sessions.invite("ann", "operator")})
     cookie = _header(link_visitor.cookies)
-    with connect(
-        link_server.socket_address + "/ws",
-        origin=link_server.address,
-        additional_headers={"cookie": cookie},
-        proxy=None,
-    ) as page:
+    with link_server.socket(link_visitor) as page:
         page.recv(timeout=5)
         assert link_visitor.post("/api/sign-out").json()["ok"]
         with pytest.raises(ConnectionClosed):

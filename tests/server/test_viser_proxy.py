@@ -44,23 +44,8 @@ def server(view_port):
 
 def drawn(server, client):
     """Names of what has been placed in the view."""
-    with open_view(server, client) as view:
+    with server.socket(client, "/viser") as view:
         return {message["name"] for message in hear(view, replayed) if message["type"] in _PLACING}
-
-
-def open_socket(server, client, path, **options):
-    return connect(
-        server.socket_address + path,
-        origin=server.address,
-        additional_headers={"cookie": server.cookie(client)},
-        proxy=None,
-        max_size=None,
-        **options,
-    )
-
-
-def open_view(server, client):
-    return open_socket(server, client, "/viser", subprotocols=["viser-v1.1.1"])
 
 
 def messages(frame):
@@ -98,8 +83,8 @@ def page_and_view(server, role="supervisor", user="test"):
     """Somebody's page and their view, which is drawn."""
     with (
         server.client(role=role, user=user) as client,
-        open_socket(server, client, "/ws") as page,
-        open_view(server, client) as view,
+        server.socket(client) as page,
+        server.socket(client, "/viser") as view,
     ):
         hear(view, replayed)
         say(view, CAMERA)
@@ -114,7 +99,7 @@ def two_views(server, role="supervisor"):
 
 
 def test_the_view_shows_the_robot_and_the_points(server):
-    with server.client() as client, open_view(server, client) as view:
+    with server.client() as client, server.socket(client, "/viser") as view:
         assert view.subprotocol == "viser-v1.1.1"
         names = {message.get("name") for message in hear(view, replayed)}
         assert "/robot" in names
@@ -123,7 +108,7 @@ def test_the_view_shows_the_robot_and_the_points(server):
 
 
 def test_every_movement_is_shown_and_nothing_is_sent_at_rest(server):
-    with server.client() as client, open_view(server, client) as view:
+    with server.client() as client, server.socket(client, "/viser") as view:
         hear(view, replayed)
         never(view, lambda message: message["type"].startswith("Set"))
         for step in range(1, 11):
@@ -142,9 +127,9 @@ def test_a_click_on_a_point_selects_it_on_the_pages_of_that_session_alone(server
     with (
         server.client() as client,
         server.client() as other,
-        open_socket(server, client, "/ws") as page,
-        open_socket(server, other, "/ws") as other_page,
-        open_view(server, client) as view,
+        server.socket(client) as page,
+        server.socket(other) as other_page,
+        server.socket(client, "/viser") as view,
     ):
         hear(view, replayed)
         say(view, CAMERA)
@@ -243,7 +228,7 @@ def test_where_a_drag_ended_after_the_hold_leads_nobody(server):
 def test_a_page_holds_base_or_joints_at_a_share_of_the_speed(server):
     sent = server.wire.sent[topics.TELEOP.name]
     del sent[:]
-    with telling(server.wire), server.client(user="eve") as client, open_socket(server, client, "/ws") as page:
+    with telling(server.wire), server.client(user="eve") as client, server.socket(client) as page:
         holding = Holding(page)
 
         def holds(**wanted):
@@ -286,7 +271,7 @@ def test_a_forged_message_never_reaches_viser_and_is_logged(server, monkeypatch)
         return message
 
     monkeypatch.setattr(_messages.Message, "deserialize", classmethod(spy))
-    with server.client() as client, open_view(server, client) as view:
+    with server.client() as client, server.socket(client, "/viser") as view:
         say(view, FORGED)
         say(view, {"type": "ShareUrlRequest"})
         say(view, CAMERA)
@@ -308,14 +293,14 @@ def test_a_viewer_cannot_click(server):
 
 def test_another_version_of_the_view_is_told_so(server):
     with server.client() as client, pytest.raises(ConnectionClosed) as caught:
-        with open_socket(server, client, "/viser", subprotocols=["viser-v0.0.1"]) as view:
+        with server.socket(client, "/viser", subprotocols=["viser-v0.0.1"]) as view:
             view.recv(timeout=PATIENCE_S)
     assert caught.value.rcvd.code == 1002
     assert "mismatch" in caught.value.rcvd.reason.lower()
 
 
 def test_signing_out_closes_the_view(server):
-    with server.client() as client, open_view(server, client) as view:
+    with server.client() as client, server.socket(client, "/viser") as view:
         hear(view, replayed)
         client.post("/api/sign-out")
         with pytest.raises(ConnectionClosed):

@@ -24,6 +24,14 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 ORIGIN = "http://panda.test"
 #: A page without scripts and requests.
 NOTHING = f"{ORIGIN}/nothing"
+#: Answers after as many seconds as its query says.
+_STILL = "/still"
+#: The page's thread stands still for some seconds, as in a long task, which would keep a processor from other tests.
+STAND_STILL = f"""seconds => {{
+  const asked = new XMLHttpRequest();
+  asked.open("GET", `{_STILL}?${{seconds}}`, false);
+  asked.send();
+}}"""
 _COOKIE = "played"
 
 
@@ -137,6 +145,9 @@ class PageHost:
 
     async def _answer(self, request: Request) -> Response:
         path, query, site = request.url.path, request.url.query, self._site(request)
+        if path == _STILL:
+            await asyncio.sleep(float(query))
+            return Response()
         if path == "/nothing":
             return Response("<!doctype html><link rel=icon href=data:,>", media_type="text/html")
         asked = PlayedRequest(request.method, f"{path}?{query}" if query else path, await request.body())

@@ -8,6 +8,7 @@ from functools import cache
 from unittest.mock import patch
 
 import httpx
+from websockets.sync.client import connect
 
 from rolling_panda.model.robot import RobotModel
 from server.auth.access import Access
@@ -53,6 +54,14 @@ class RunningServer:
 
     def cookie(self, client):
         return "; ".join(f"{name}={value}" for name, value in client.cookies.items())
+
+    def socket(self, client, path="/ws", **options):
+        """A WebSocket of this client, as a browser opens it; it need not be read to be closed."""
+        headers, limits = {"cookie": self.cookie(client)}, {"max_size": None, "max_queue": None, "close_timeout": 0.5}
+        if path == "/viser":
+            limits["subprotocols"] = ["viser-v1.1.1"]
+        address = self.socket_address + path
+        return connect(address, origin=self.address, additional_headers=headers, proxy=None, **limits | options)
 
     @property
     def socket_address(self):

@@ -7,6 +7,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from rolling_panda.messages import page as p
+from tests.support.page_host import STAND_STILL
 from tests.support.played_page import box_of, until
 from tests.support.played_server import ORIGIN, PlayedServer, bridge, controller, point
 
@@ -359,7 +360,7 @@ def test_the_sign_in_link_is_used_once_and_leaves_the_address(tab: Page) -> None
 
 
 def test_a_busy_page_does_not_take_its_own_pause_for_a_lost_link(page: Page, server: PlayedServer) -> None:
-    page.evaluate("() => { const end = performance.now() + 3500; while (performance.now() < end); }")
+    page.evaluate(STAND_STILL, 3.5)
     page.wait_for_timeout(500)
     assert len(server.sockets) == 1
 

@@ -6,6 +6,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from rolling_panda.messages.page import Ping
+from tests.support.page_host import STAND_STILL
 from tests.support.page_parts import held
 from tests.support.played_page import until
 from tests.support.played_server import PlayedServer
@@ -58,7 +59,7 @@ def test_who_holds_control_is_there_while_the_page_is_busy_but_not_when_it_hangs
     server.control = held("me", "Ada")
     until(page, lambda: server.heres > 0)
     # The thread that draws stands still, for good as far as this test goes.
-    page.evaluate("setTimeout(() => { const until = performance.now() + 4500; while (performance.now() < until); }, 0)")
+    page.evaluate(f"setTimeout({STAND_STILL}, 0, 4.5)")
     began = time.monotonic()
     before, spoken = server.heres, pings()
     told: list[float] = []

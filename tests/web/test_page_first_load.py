@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.support.page_host import PlayedSocket
+from tests.support.page_host import STAND_STILL, PlayedSocket
 from tests.support.played_page import until
 from tests.support.played_server import ORIGIN, PlayedServer
 
@@ -21,8 +21,6 @@ WATCH = """
   };
   new MutationObserver(look).observe(document, {subtree: true, childList: true, attributes: true, characterData: true});
 """
-#: Nothing of the page runs for so long, as while a browser takes the 3-D view apart.
-BUSY = "seconds => { const end = performance.now() + 1000 * seconds; while (performance.now() < end); }"
 
 
 class LateServer(PlayedServer):
@@ -90,7 +88,8 @@ def test_while_the_browser_itself_is_busy_the_server_is_not_said_to_be_silent(fr
     fresh.goto(f"{ORIGIN}/")
     expect(fresh.locator("#mode")).to_have_attribute("data-mode", "READY")
     for _ in range(4):
-        fresh.evaluate(BUSY, 1.4)
+        # As while a browser takes the 3-D view apart.
+        fresh.evaluate(STAND_STILL, 1.4)
         fresh.wait_for_timeout(300)
     assert not [text for text in fresh.evaluate("alarming") if "server" in text]
 
