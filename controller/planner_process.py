@@ -24,7 +24,7 @@ class PlannerProcess:
     """
 
     def __init__(self, config: ControllerConfig, robot_config: RobotConfig) -> None:
-        """Start the process; it is ready some seconds later.
+        """Wait for the first request, which starts the process: without work its memory is not needed.
 
         Args:
             config: Of the controller.
@@ -68,15 +68,18 @@ class PlannerProcess:
     def _run(self) -> None:
         # Scheduling is per thread, and the child process inherits it.
         set_priority("background")
-        connection = self._start()
-        while (request := self._next()) is not None and connection is not None:
+        connection: Connection | None = None
+        while (request := self._next()) is not None:
+            connection = connection or self._start()
+            if connection is None:
+                break
             try:
                 connection.send(request)
                 self._keep(connection.recv())
             except (EOFError, OSError):
-                self._keep(_failed(request, "the planning process ended; it is being started again"))
+                self._keep(_failed(request, "the planning process ended; the next request starts it again"))
                 connection.close()
-                connection = self._start()
+                connection = None
         if connection is not None:
             connection.close()
         if self._process is not None:
