@@ -2,7 +2,6 @@
 
 import argparse
 import functools
-import gc
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -20,6 +19,7 @@ from rolling_panda.errors import RollingPandaError
 from rolling_panda.resources import resource
 from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.runtime.process import ProcessContext, add_common_arguments, run_process, state_folder
+from rolling_panda.runtime.scheduling import freeze_heap
 from rolling_panda.runtime.state_folder import alone
 
 
@@ -102,7 +102,7 @@ def _work(context: ProcessContext) -> None:
     cuts, memory = CutFile(context.state_folder), open_memory(context.state_folder)
     try:
         core, press = _core(context, cuts, memory)
-        gc.freeze()
+        freeze_heap()
         try:
             bridge_runner(core, context.transport, press).run(context.stopping)
         finally:

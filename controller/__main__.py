@@ -1,7 +1,6 @@
 """`python -m controller`: the control process."""
 
 import argparse
-import gc
 import sys
 import uuid
 from collections.abc import Sequence
@@ -16,6 +15,7 @@ from controller.planner_process import PlannerProcess
 from controller.stop_file import open_stop_file
 from rolling_panda.config import RobotConfig, load_section
 from rolling_panda.runtime.process import ProcessContext, run_process
+from rolling_panda.runtime.scheduling import freeze_heap
 from rolling_panda.runtime.state_folder import alone
 
 
@@ -47,9 +47,7 @@ def _work(context: ProcessContext) -> None:
     ledger.write([start_record(context.config_path, run_id)])
     planner = PlannerProcess(config, robot_config)
     loop = Loop(controller, context.transport, config.rate_hz, ledger, planner, stop_file)
-    # All objects so far live until the end. The garbage collector then skips them, which keeps its pauses short.
-    gc.collect()
-    gc.freeze()
+    freeze_heap()
     try:
         loop.run(context.stopping)
     finally:

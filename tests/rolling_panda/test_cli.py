@@ -55,12 +55,14 @@ def test_a_process_replaces_the_command_with_all_its_arguments(monkeypatch: pyte
     calls = []
     monkeypatch.setattr(os, "execve", lambda *call: calls.append(call))
     monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    monkeypatch.delenv("MALLOC_ARENA_MAX", raising=False)
     with pytest.raises(SystemExit):
         cli.main(["bench", "tick", "--json", "x.json"])
     program, command, environment = calls[0]
     assert program == sys.executable
     assert command[1:] == ["-P", "-m", "benchmarks", "tick", "--json", "x.json"]
     assert environment["OMP_NUM_THREADS"] == "1"
+    assert environment["MALLOC_ARENA_MAX"] == "2"
 
 
 def test_linear_algebra_stays_on_one_thread_unless_the_user_says_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
