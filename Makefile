@@ -26,14 +26,15 @@ help:
 demo: $(VENV)/.project
 	@exec $(BIN)/rolling-panda demo $(ARGS)
 
-# First the tests that others may run beside, one on each core; then those that time would disturb, one after the other. Training
-# has its own target, since nothing else needs PyTorch.
+# First the tests that others may run beside, on every core; then those that keep real time, two at once; then those that
+# anything beside them would disturb. Training has its own target, since nothing else needs PyTorch.
 WITHOUT_TRAINING := --ignore tests/perception/test_training.py
 test: check browser systemd drivers
 ifdef ARGS
 	$(BIN)/pytest $(ARGS)
 else
-	$(BIN)/pytest -n auto -m "not alone and not slow" $(WITHOUT_TRAINING)
+	$(BIN)/pytest -n auto --dist worksteal -m "not (paced or alone or slow)" $(WITHOUT_TRAINING)
+	$(BIN)/pytest -n 2 --dist loadfile -m "paced and not slow" $(WITHOUT_TRAINING)
 	$(BIN)/pytest -m "alone and not slow" $(WITHOUT_TRAINING)
 	@echo "make test-training runs the tests of the training; it installs PyTorch"
 endif
@@ -42,7 +43,7 @@ test-training: training
 	$(BIN)/pytest tests/perception/test_training.py
 
 # Fewer random examples than `make test` has.
-FAST = HYPOTHESIS_PROFILE=fast $(BIN)/pytest -n auto -m "not alone and not slow and not browser and not processes and not long" \
+FAST = HYPOTHESIS_PROFILE=fast $(BIN)/pytest -n auto -m "not (paced or alone or slow or browser or processes or long)" \
 	$(WITHOUT_TRAINING) tests/bridge tests/controller tests/perception tests/recorder tests/rolling_panda tests/server
 fast: $(VENV)/.project
 	$(FAST)

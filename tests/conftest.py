@@ -33,6 +33,11 @@ def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> 
         close_browser()
 
 
+def pytest_xdist_auto_num_workers() -> int:
+    """Three workers for two cores: half of their time tests wait, for a browser or a time limit."""
+    return len(os.sched_getaffinity(0)) * 3 // 2
+
+
 @pytest.fixture(autouse=True, scope="session")
 def state_of_the_tests_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Processes that a test starts keep their state apart from that of this machine's user."""

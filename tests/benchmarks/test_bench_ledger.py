@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks.__main__ import main
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.processes
 
 
 def test_it_measures_three_kinds_of_disk(tmp_path):

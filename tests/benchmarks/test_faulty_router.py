@@ -14,7 +14,7 @@ from rolling_panda.transport.zenoh import Transport
 from tests.support.processes.local_router import free_port
 from tests.support.running_server import eventually
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.paced
 COMMAND = m.MotionCommand(epoch=1, token="a", sequence=1, echo=1, xi=(0.0,) * 9)
 ASKED = m.ReleaseStop(stop_id="s", user="ada", reason="trial")
 

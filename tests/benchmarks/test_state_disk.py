@@ -36,7 +36,7 @@ for _ in sys.stdin:
 """
 
 
-@pytest.mark.alone
+@pytest.mark.processes
 def test_a_read_only_folder_takes_nothing_through_open_files_either_and_is_writable_again(tmp_path):
     disk = StateDisk(tmp_path)
     child = subprocess.Popen(

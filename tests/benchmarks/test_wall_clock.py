@@ -12,7 +12,7 @@ from tests.support.processes.wall_clock import WallClock
 _ASK = "import sys, time\nfor _ in sys.stdin: print(time.time(), time.monotonic(), flush=True)"
 
 
-@pytest.mark.alone
+@pytest.mark.processes
 def test_a_childs_wall_clock_jumps_and_its_monotonic_clock_does_not(tmp_path):
     clock = WallClock(tmp_path)
     child = subprocess.Popen(

@@ -40,7 +40,7 @@ def real() -> Parts:
     return Parts(plant.start, plant, lambda: RealTime(time.monotonic(), TICK_S), real=True, close=plant.close)
 
 
-@pytest.fixture(params=[simulated, pytest.param(real, marks=pytest.mark.alone)])
+@pytest.fixture(params=[simulated, pytest.param(real, marks=pytest.mark.paced)])
 def rig(request: pytest.FixtureRequest) -> Iterator[Rig]:
     factory: Callable[[], Parts] = request.param
     rig = Rig(factory())

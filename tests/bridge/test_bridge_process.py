@@ -24,7 +24,7 @@ from rolling_panda.transport.zenoh import Feed, ForeignWire, Publisher, Slot, Tr
 from tests.support.processes.local_router import local_router
 from tests.support.waiting import until
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.paced
 
 ROOT = Path(__file__).resolve().parents[2]
 REST = (0.0,) * 9

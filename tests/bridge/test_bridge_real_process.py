@@ -24,7 +24,7 @@ from tests.support.waiting import until
 
 need("real")
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.paced
 
 ADDRESS = f"127.0.{os.getpid() % 250 + 1}.7"
 REST = (0.0,) * 9

@@ -15,7 +15,7 @@ from rolling_panda.runtime.launch import child_environment
 from tests.support.processes.device_process import DeviceProcess
 from tests.support.waiting import until
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.paced
 
 ADDRESS = f"127.0.{os.getpid() % 250 + 1}.6"
 CLIENT = str(Path(__file__).parents[1] / "support" / "control_client.py")

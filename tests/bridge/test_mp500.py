@@ -15,7 +15,7 @@ from rolling_panda.transport.zenoh import ForeignWire
 from tests.support.processes.device_process import DeviceProcess
 from tests.support.waiting import until
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.paced
 
 DRIVE = RobotModel().drive
 REST = np.zeros(2)

@@ -25,7 +25,7 @@ from tests.support.waiting import until
 
 need("real")
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.paced
 
 LIMITS = RobotModel().limits
 REST = np.zeros(7)

@@ -16,7 +16,7 @@ from tests.support.real_rig import RealPlant
 
 need("real")
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.paced
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from bridge.sim.camera.config import CameraConfig
 from bridge.sim.camera.render_process import CameraRenderer, InlineRenderer, RenderProcess
 from bridge.sim.vineyard.row import Rod, Row
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.paced
 
 LENS = CameraConfig(width=64, height=48)
 ROW = Row((Rod("post", np.array([0.0, 1.0, 0.0]), np.array([0.0, 1.0, 2.0]), 0.05, 0.05),))

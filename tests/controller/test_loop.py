@@ -68,7 +68,7 @@ class Rest:
         n, header = self._sequence, m.Header(time.monotonic(), "odom")
         joints, odometry, bridge = self._senders
         for request in self.asked.drain():
-            self.fence.ask(request.message.token, request.at, True)
+            self.fence.claim(request.message.token, request.at, True)
         joints.put(m.JointState(header=header, sequence=n, position=(0.0, 0.0, *CONFIG.home), velocity=(0.0,) * 9))
         odometry.put(m.Odometry(header=header, sequence=n, pose=m.PlanarPose(), linear=0.0, angular=0.0))
         bridge.put(

@@ -14,7 +14,7 @@ from rolling_panda.topics import CLOSE_UP, CROPS, EVENT, HEARTBEAT, OBSTACLES, P
 from rolling_panda.transport.zenoh import Slot
 from tests.support.points import point
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.processes
 
 
 class Recorder:

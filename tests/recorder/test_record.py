@@ -14,7 +14,7 @@ from rolling_panda.config import TransportConfig
 from rolling_panda.runtime.launch import child_environment, python_command
 from rolling_panda.transport.zenoh import Transport
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.processes
 
 
 def publish(transport: Transport, seconds: float, recorder: subprocess.Popen[str] | None = None) -> float:

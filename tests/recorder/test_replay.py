@@ -15,7 +15,7 @@ from rolling_panda.transport.zenoh import Transport
 from tests.recorder.test_player import event, joints, recording
 from tests.support.waiting import until
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.processes
 
 
 @pytest.fixture

@@ -22,7 +22,7 @@ from tests.support.processes.local_router import free_port
 from tests.support.processes.processes import Processes
 from tests.support.waiting import until
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.processes
 
 ROBOTS = ("rp1", "rp2")
 

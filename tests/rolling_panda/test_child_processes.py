@@ -15,7 +15,7 @@ from rolling_panda.cli.child_processes import ChildExit, ChildProcesses
 from rolling_panda.runtime.launch import child_environment
 from tests.support.waiting import until
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.processes
 
 PATIENT = [sys.executable, "-c", "import signal; signal.pause()"]
 STUBBORN = "import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN); print('deaf', flush=True); "

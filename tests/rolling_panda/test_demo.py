@@ -22,7 +22,7 @@ from tests.support.processes.demo import CHILDREN, STARTUP_S, running_demo
 from tests.support.processes.local_router import free_port
 
 
-@pytest.mark.alone
+@pytest.mark.paced
 def test_it_comes_up_with_a_link_that_works_once_and_ctrl_c_ends_it(tmp_path: Path) -> None:
     with running_demo(tmp_path) as demo:
         for name in CHILDREN:
@@ -51,7 +51,7 @@ def sign_in(page: str, token: str) -> int:
 
 # One more start of everything; what it is made of is tested in `test_child_processes.py`.
 @pytest.mark.slow
-@pytest.mark.alone
+@pytest.mark.paced
 def test_when_a_process_is_killed_it_says_which_and_ends_the_rest(tmp_path: Path) -> None:
     with running_demo(tmp_path) as demo:
         # The bridge has a process of its own for pictures, which must not be left either.
@@ -66,14 +66,14 @@ def test_when_a_process_is_killed_it_says_which_and_ends_the_rest(tmp_path: Path
 
 # Children that watch their parent are tested in test_child_processes.py, which takes less time.
 @pytest.mark.slow
-@pytest.mark.alone
+@pytest.mark.paced
 def test_when_the_demo_itself_is_killed_nothing_outlives_it(tmp_path: Path) -> None:
     with running_demo(tmp_path) as demo:
         os.kill(demo.pid, signal.SIGKILL)
         assert demo.ends() == -signal.SIGKILL
 
 
-@pytest.mark.alone
+@pytest.mark.paced
 def test_a_process_that_cannot_start_is_told_with_its_reason(tmp_path: Path) -> None:
     config = tmp_path / "robot.toml"
     config.write_text("[bridge]\nwatchdogs = 1\n")

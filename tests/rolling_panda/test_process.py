@@ -16,7 +16,7 @@ import server.__main__ as server
 from rolling_panda import __version__
 from rolling_panda.runtime.process import ProcessContext, run_process
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.processes
 
 ROOT = Path(__file__).resolve().parents[2]
 WAITING = """

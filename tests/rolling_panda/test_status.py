@@ -12,7 +12,7 @@ from rolling_panda.config import TransportConfig
 from rolling_panda.topics import HEARTBEAT
 from rolling_panda.transport.zenoh import Transport
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.processes
 
 
 @pytest.fixture

@@ -22,7 +22,7 @@ from rolling_panda.transport.zenoh import Feed, ForeignWire, Onlooker, Rejection
 from tests.support.processes.local_router import free_port
 from tests.support.waiting import until
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.processes
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -15,7 +15,7 @@ from rolling_panda.runtime.process import ROBOT_ID
 from rolling_panda.topics import MOTION, key
 from tests.support.processes.live_robot import LiveRobot
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.paced
 
 FAST = [0.5] * 9
 

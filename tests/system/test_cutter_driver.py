@@ -13,7 +13,7 @@ from rolling_panda.config import TransportConfig
 from rolling_panda.transport.zenoh import ForeignWire
 from tests.support.waiting import until
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.paced
 
 
 class Secateurs:

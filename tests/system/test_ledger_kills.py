@@ -19,7 +19,7 @@ from rolling_panda.transport.zenoh import Transport
 from tests.support.points import point
 from tests.support.processes.local_router import local_router
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.paced
 
 #: A controller process as it is, but for the model of the robot, whose start would take most of the test's time: queue,
 #: ledger, loop and wire are the product's.

@@ -24,7 +24,7 @@ from bridge.sim.robot.trace import read
 from rolling_panda.transport.certificates import make
 from tests.support.processes.demo import TracedDemo, running_demo
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.paced
 
 DOCUMENT = (Path(__file__).resolve().parents[2] / "docs/wire.md").read_text()
 ROOT = "rp/rp1/v2"
