@@ -330,6 +330,7 @@ class Controller:
             working=self.mode == "AUTO",
             now=now,
             busy=movement.sequence.active,
+            close_up_s=movement.sequence.close_up_s,
         )
 
     def _known(self, ticket: Ticket) -> Found:

@@ -13,10 +13,11 @@ import numpy as np
 from scipy.stats import qmc
 
 from benchmarks.control.arm_ik import ArmIk, wrapped
-from controller.motion.speed_limits import PlanLimits
-from controller.motion.trajectory import Rates, durations
-from controller.planning.base_path import BasePlanner
-from controller.planning.path import PathPlanner, Planned, Refused, Stand
+from benchmarks.control.base_path import BasePlanner
+from benchmarks.control.path import PathPlanner, Planned, Refused, Stand
+from benchmarks.control.plan_limits import PlanLimits
+from benchmarks.control.rest_to_rest import durations
+from controller.motion.trajectory import Rates
 from controller.whole_body.collision import CollisionModel
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_Q, RobotModel

@@ -8,8 +8,8 @@ from typing import Any
 
 import pinocchio as pin
 
+from benchmarks.control.plan import Plan
 from controller.motion.follower import tool_error
-from controller.planning.plan import Plan
 from controller.whole_body.task import IkProblem, Method, Posture, Solution, ToolTask
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import Kinematics, RobotModel

@@ -12,13 +12,13 @@ import msgspec
 import numpy as np
 
 from benchmarks.control.goal_planner import GOOD_OMEGA, GoalPlanner
+from benchmarks.control.path import Refused
 from benchmarks.control.plan_follower import PlanFollower
+from benchmarks.control.plan_limits import plan_limits
 from benchmarks.control.reach_judge import POSITION, ROTATION, BaseBounds, Trajectory, goal_error
 from controller.config import ControllerConfig, HierarchyConfig
 from controller.motion.follower import tool_error
-from controller.motion.speed_limits import plan_limits
 from controller.motion.trajectory import PoseTrajectory, Rates
-from controller.planning.path import Refused
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.registry import make_method
 from controller.whole_body.task import IkProblem, Method, Posture, Solution, ToolTask

@@ -12,12 +12,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from controller.config import HierarchyConfig
-from controller.motion.speed_limits import PlanLimits
 from controller.motion.surroundings import obstacles_of, touchable
 from controller.planning.preview_plan import STEP, Preview, SweptVolume
 from controller.whole_body.collision_geometry import BLADES
 from controller.whole_body.compiled import NOTHING, NUMBER, PACKED, VECTOR, compiled
 from controller.whole_body.obstacle import Axes
+from controller.work.cut_clearance import CLEARANCE
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.messages.supervision import PreviewedCut
 from rolling_panda.messages.types import WOOD_CLASSES
@@ -51,7 +51,7 @@ class PathWatch:
         self._kept = {
             kind: np.array([settings.kept((part, f"{kind} ")) + STEP for part in parts]) for kind in WOOD_CLASSES
         }
-        self._most = max(PlanLimits.clearance, *(float(kept.max()) for kept in self._kept.values()))
+        self._most = max(CLEARANCE, *(float(kept.max()) for kept in self._kept.values()))
         self._ways = [_Way(swept, cut) for cut in preview.cuts]
         self._low = np.min([way.low.min(axis=0, initial=np.inf) for way in self._ways], axis=0, initial=np.inf)
         self._high = np.max([way.high.max(axis=0, initial=-np.inf) for way in self._ways], axis=0, initial=-np.inf)
@@ -101,7 +101,7 @@ class PathWatch:
 
     def _needed(self, fresh: Sequence[Capsule], spots: Array, cut: PreviewedCut, touched: set[Capsule]) -> Array:
         """Required distance of each part from each spot on the motion to a cut (p×m, m); −∞ if contact is allowed."""
-        shown = min(cut.clearance, PlanLimits.clearance) - SAME
+        shown = min(cut.clearance, CLEARANCE) - SAME
         needed = np.maximum(np.column_stack([self._kept[capsule.kind] for capsule in fresh]), shown)
         needed[np.ix_(self._blades, [capsule in touched for capsule in fresh])] = -math.inf
         return np.ascontiguousarray(needed[:, spots[:, 4].astype(int)])

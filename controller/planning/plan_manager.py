@@ -18,6 +18,8 @@ _SETTLED_S = 0.3
 _PAUSE_S = 2.0
 #: Shortest time after a failure (s).
 _AGAIN_S = 10.0
+#: Number of next cuts that are rolled out at all times of the work.
+_NEXT = 5
 #: Period of the repeated message for late joiners (s).
 _REPEAT_S = 5.0
 
@@ -56,6 +58,7 @@ class PlanManager:
         working: bool,
         now: float,
         busy: str = "",
+        close_up_s: float = 0.5,
     ) -> PlanRequest | None:
         """Accept a new plan, check the current one, and request another if needed.
 
@@ -67,6 +70,7 @@ class PlanManager:
             working: Whether the robot executes the queue, which moves it away from the start of the plan.
             now: Monotonic time (s).
             busy: Current point of the work; empty without one.
+            close_up_s: Time from the request of the last close-up to its result (s).
 
         Returns:
             The next request; None without one.
@@ -83,11 +87,12 @@ class PlanManager:
             self._queue.reach(self._plan.request.points, refused, busy)
         pause = _AGAIN_S if self._plan is not None and self._plan.failure else _PAUSE_S
         due = self._asked is None and now - self._quiet_since >= _SETTLED_S and now - self._asked_at >= pause
-        if self.valid or not due or not accepted or q is None or not (at_rest or working):
+        wanted = not self.valid or (working and self._runs_out())
+        if not wanted or not due or not accepted or q is None or not (at_rest or working):
             return None
         self._number += 1
         self._asked_at = now
-        self._asked = PlanRequest(self._number, q.copy(), accepted, tuple(obstacles), order, turned)
+        self._asked = PlanRequest(self._number, q.copy(), accepted, tuple(obstacles), order, turned, close_up_s)
         self._check(why, True)
         return self._asked
 
@@ -120,6 +125,12 @@ class PlanManager:
         self._cuts = {cut.point.point_id: cut for cut in made.cuts}
         self._watch, self._compared = ObstacleWatch.of(made), None
         self._fresh = True
+        self._arrange()
+
+    def _runs_out(self) -> bool:
+        """Whether one of the next cuts of the work is not rolled out yet."""
+        left = [cut for name, cut in self._cuts.items() if (at := self._queue.get(name)) and at.state == "ACCEPTED"]
+        return any(cut.rollout is None for cut in left[:_NEXT])
 
     def _why_void(self, q: Array | None, obstacles: Sequence[Capsule], at_rest: bool, working: bool) -> str:
         plan = self._plan
@@ -152,6 +163,10 @@ class PlanManager:
         if (state, reason) == (self._state, self._reason):
             return
         self._state, self._reason, self._fresh = state, reason, True
+        self._arrange()
+
+    def _arrange(self) -> None:
+        """Put the queue in the order of a valid plan."""
         plan = self._plan
         if self.valid and plan is not None:
             self._queue.arrange(tuple(cut.point.point_id for cut in plan.cuts))

@@ -22,8 +22,6 @@ PLACE_TOLERANCE, TURN_TOLERANCE, JOINT_TOLERANCE = 0.05, 0.05, 0.1
 _REACH = 1.3
 #: Range around the tool's line into a cut in which a cane matters (m): half width with camera, and margin.
 _BESIDE_TOOL = 0.12
-#: Rows of a motion between two checked positions of the base.
-_LOOK = 20
 #: Positions along an obstacle's axis that are compared, as fractions of its length.
 _SHARES = np.linspace(0.0, 1.0, 9)
 #: States set by the work itself. They keep the plan of the other points valid.
@@ -97,8 +95,8 @@ class ObstacleWatch:
     @classmethod
     def of(cls, plan: WorkPlan) -> "ObstacleWatch":
         """For the session's plan."""
-        ways = [cut.way.q[:, :2] for cut in plan.cuts]
-        track = np.vstack([*(way[::_LOOK] for way in ways), *(way[-1:] for way in ways), np.empty((0, 2))])
+        stands = np.array([cut.cut.q_clear[:2] for cut in plan.cuts]).reshape(-1, 2)
+        track = np.vstack([plan.track, stands])
         lines = [(cut.cut.poses.clear.translation, cut.cut.poses.cut.translation) for cut in plan.cuts]
         return cls(plan.request.obstacles, track, lines)
 

@@ -63,6 +63,7 @@ class Preview:
     Attributes:
         request: The request.
         cuts: Cuts for the message, in the order of work, without those that were not reached.
+        refused: Reason for each point that was come to and not cut, by id.
         plans: Posture of each cut by point id. Work that follows the preview uses them.
         rows: The motion, downsampled.
         duration: Duration (s).
@@ -73,6 +74,7 @@ class Preview:
 
     request: PreviewRequest
     cuts: tuple[PreviewedCut, ...] = ()
+    refused: dict[str, str] = field(default_factory=dict)
     plans: dict[str, CutPlan] = field(default_factory=dict)
     rows: tuple[PreviewRow, ...] = ()
     duration: float = 0.0

@@ -17,7 +17,7 @@ from controller.identity import Token
 from controller.inputs import Inputs, Sample
 from controller.ledger.journal import EventLogger, Journal, LedgerState
 from controller.motion.follower import Measured
-from controller.planning.cuts import CLOSING_S
+from controller.motion.torque import JointTorque, torque_report
 from controller.planning.preview_plan import Preview, PreviewRequest, sweep
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.joint_limits import margin
@@ -32,11 +32,13 @@ from rolling_panda.messages.perception import CloseUpResult, Obstacles
 from rolling_panda.messages.supervision import PreviewedCut, PreviewRow
 from rolling_panda.mode_table import Event
 from rolling_panda.model.differential_drive import NXI, Array, DifferentialDrive
-from rolling_panda.model.robot import Limits
+from rolling_panda.model.robot import RobotModel
 from rolling_panda.model.wire_values import actuated, planar_pose, vector3
 
 #: Time between two rows of the preview (s).
 ROW_S = 0.1
+#: Time from the order to cut to its outcome (s).
+CLOSING_S = 0.5
 #: Time limit of each point (s).
 _LONGEST_S = 90.0
 _TOKEN = Token(1, "preview")
@@ -76,7 +78,7 @@ class _Run:
         self._movement = Movement(config, robot_config, self._queue, EventLogger(self._journal), "preview", self._known)
         robot = self._movement.body.robot
         self._actuators = ActuatorLag(robot.drive, request.q, config.base_lag_s, config.arm_lag_s, self._dt)
-        self._log = CutLog(robot.limits, self._movement.body.surroundings.model, self._queue)
+        self._log = CutLog(robot, self._movement.body.surroundings.model, self._queue)
         self._obstacles = Sample(Obstacles(header=m.Header(0.0, "odom"), capsules=request.obstacles), 0.0)
         self._asked: set[int] = set()
         self._pending: deque[tuple[float, CloseUpResult]] = deque()
@@ -91,6 +93,7 @@ class _Run:
         rows: list[PreviewRow] = []
         times: list[float] = []
         way: list[Array] = []
+        rates: list[Array] = []
         every = max(1, round(ROW_S / self._dt))
         longest = math.ceil(_LONGEST_S * len(self._request.points) / self._dt)
         self._movement.sequence.start()
@@ -103,14 +106,18 @@ class _Run:
                 rows.append(self._sample_at(now))
             times.append(now)
             way.append(self._actuators.q.copy())
+            rates.append(self._actuators.xi.copy())
             self._hash.update(np.ascontiguousarray(way[-1], dtype="<f8").tobytes())
             if moved.event is not None:
                 event, why = moved.event
                 why = "" if event is Event.FINISHED else why
                 break
-        cuts = self._log.cuts(now, why)
+        samples = Samples(np.array(times), np.array(way), np.array(rates))
+        cuts, refused = self._log.cuts(now, why, samples)
         swept = sweep(self._movement.body.surroundings.model, times, way)
-        return Preview(self._request, cuts, self._plans, tuple(rows), now, self._digest(), swept=swept)
+        # The robot did not come to any point.
+        failure = why if self._request.points and not cuts else ""
+        return Preview(self._request, cuts, refused, self._plans, tuple(rows), now, self._digest(), failure, swept)
 
     def _period(self, number: int, now: float) -> MotionResult:
         """One control period, with the robot's response."""
@@ -221,15 +228,15 @@ class _Least:
 class CutLog:
     """Collects the figures of each cut: call `sample` regularly and `cuts` at the end."""
 
-    def __init__(self, limits: Limits, collision: CollisionModel, queue: PointQueue) -> None:
+    def __init__(self, robot: RobotModel, collision: CollisionModel, queue: PointQueue) -> None:
         """Start without cuts.
 
         Args:
-            limits: Joint limits.
+            robot: Robot model.
             collision: Collision model with the obstacles and the allowed contacts of the blades.
             queue: The queue, for the outcome of each point.
         """
-        self._limits, self._collision, self._queue = limits, collision, queue
+        self._robot, self._collision, self._queue = robot, collision, queue
         self._points: list[_Least] = []
 
     def sample(self, robot: Measured, active: str, now: float) -> None:
@@ -244,7 +251,7 @@ class CutLog:
         if near.distance < least.clearance:
             least.clearance, least.between = near.distance, near.pair
         least.omega = min(least.omega, arm_omega(robot.kinematics.J))
-        least.margin = min(least.margin, margin(robot.q, self._limits))
+        least.margin = min(least.margin, margin(robot.q, self._robot.limits))
 
     def closed(self, point_id: str, now: float) -> None:
         """The blades close on a point."""
@@ -252,27 +259,63 @@ class CutLog:
             if least.point_id == point_id and least.closed is None:
                 least.closed = now
 
-    def cuts(self, now: float, why: str) -> tuple[PreviewedCut, ...]:
-        """All cuts, after the end of the work at `now`. `why` is the reason of an early end; empty otherwise."""
-        ends = [each.begins for each in self._points[1:]] + [now]
-        return tuple(self._cut(each, end, why) for each, end in zip(self._points, ends, strict=True))
+    def cuts(self, now: float, why: str, samples: "Samples") -> tuple[tuple[PreviewedCut, ...], dict[str, str]]:
+        """All cuts, and the reason for each that was not made, by id.
 
-    def _cut(self, least: _Least, ends: float, why: str) -> PreviewedCut:
-        ticket = self._queue.get(least.point_id)
-        done = least.closed is not None
-        reason = why if ticket is None or ticket.state in ("ACCEPTED", "CUTTING") else ticket.reason
-        return PreviewedCut(
-            point_id=least.point_id,
-            revision=0 if ticket is None else ticket.point.revision,
-            begins_s=least.begins,
-            cut_s=least.closed,
-            ends_s=ends,
-            result="cut" if done else f"not cut: {reason}"[:500],
-            clearance=least.clearance,
-            between=least.between,
-            manipulability=least.omega,
-            joint_margin=least.margin,
-        )
+        Args:
+            now: End of the work (s).
+            why: Reason of an early end, as text; empty otherwise.
+            samples: The whole motion.
+        """
+        refused: dict[str, str] = {}
+        out = []
+        for number, least in enumerate(self._points):
+            ends = now if number + 1 == len(self._points) else self._points[number + 1].begins
+            torque = samples.tightest(self._robot, least.begins, ends)
+            ticket, closed = self._queue.get(least.point_id), least.closed
+            if closed is None:
+                open_still = ticket is None or ticket.state in ("ACCEPTED", "CUTTING")
+                reason = why if ticket is None or open_still else ticket.reason
+                refused[least.point_id] = reason or "the work ended before it"
+            elif torque.margin < 0.0:
+                closed = None
+                refused[least.point_id] = (
+                    f"{torque.joint} would need {torque.peak:.0f} Nm on the way, it has {torque.limit:.0f} Nm; "
+                    f"lower arm_velocity_scale or arm_acceleration_scale"
+                )
+            out.append(
+                PreviewedCut(
+                    point_id=least.point_id,
+                    revision=0 if ticket is None else ticket.point.revision,
+                    begins_s=least.begins,
+                    cut_s=closed,
+                    ends_s=ends,
+                    result="cut" if closed is not None else f"not cut: {refused[least.point_id]}"[:500],
+                    clearance=least.clearance,
+                    between=least.between,
+                    manipulability=least.omega,
+                    joint_margin=least.margin,
+                    torque_margin=torque.margin,
+                    torque_joint=torque.joint,
+                )
+            )
+        return tuple(out), refused
+
+
+@dataclass(frozen=True)
+class Samples:
+    """A motion in every control period: times (T, s), configurations (T×12) and velocities ξ̇ (T×9)."""
+
+    times: Array
+    q: Array
+    xi: Array
+
+    def tightest(self, robot: RobotModel, begins: float, ends: float) -> JointTorque:
+        """The actuator that uses the largest fraction of its torque between two times (s)."""
+        first, last = np.searchsorted(self.times, [begins, ends])
+        first = min(int(first), len(self.times) - 2)
+        part = slice(first, max(int(last) + 1, first + 2))
+        return torque_report(robot, self.times[part], self.q[part], self.xi[part]).tightest
 
 
 class ActuatorLag:

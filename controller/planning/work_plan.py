@@ -1,19 +1,16 @@
 """The plan of the work as data, and its message."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-import pinocchio as pin
+import numpy as np
 
-from controller.planning.plan import Plan
 from controller.work.posture_search import CutPlan
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import Capsule, PruningPoint
-from rolling_panda.messages.supervision import PlannedPoint, PlanRow, PlanState, PointPlan, SessionPlan
+from rolling_panda.messages.supervision import PlanState, PointPlan, PreviewedCut, SessionPlan
 from rolling_panda.model.differential_drive import Array
-from rolling_panda.model.robot import pose_message
-from rolling_panda.model.wire_values import actuated, planar_pose
+from rolling_panda.model.wire_values import planar_pose
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +24,7 @@ class PlanRequest:
         obstacles: Obstacles.
         turned: Turn of the approach about the cane (rad) for points where a person has set it.
         order: Points in the order set by people; empty if the plan chooses the order.
+        close_up_s: Time from the request of a close-up to its result (s).
     """
 
     number: int
@@ -35,6 +33,7 @@ class PlanRequest:
     obstacles: tuple[Capsule, ...] = ()
     order: tuple[str, ...] = ()
     turned: tuple[tuple[str, float], ...] = ()
+    close_up_s: float = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,24 +43,12 @@ class PlannedCut:
     Attributes:
         point: The point as accepted.
         cut: Poses of the tool, with the robot's posture at each.
-        way: Motion to the pose clear of the canes.
-        begins: Start of the motion (s from the start of the work).
-        clearance: Smallest distance along the motion (m).
-        between: The two parts with that distance.
-        manipulability: Smallest ω of the arm along the motion and at the cut.
-        torque_margin: Remaining torque of the joint that uses the largest fraction of its limit (Nm).
-        torque_joint: Name of that joint.
+        rollout: Figures of the motion; None for a later cut, which is not rolled out yet.
     """
 
     point: PruningPoint
     cut: CutPlan
-    way: Plan
-    begins: float
-    clearance: float
-    between: tuple[str, str]
-    manipulability: float
-    torque_margin: float
-    torque_joint: str
+    rollout: PreviewedCut | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +59,7 @@ class WorkPlan:
         request: The request.
         cuts: Feasible cuts in the order of work.
         refused: Reason for each refused point, by id.
-        points: Plan of each point, for the message.
+        track: Positions of the base along the rollout (n×2, m).
         duration: Duration of the work (s).
         digest: SHA-256 of request, configuration and result; empty if planning failed.
         failure: Reason for the failure, as text; empty otherwise.
@@ -81,14 +68,10 @@ class WorkPlan:
     request: PlanRequest
     cuts: tuple[PlannedCut, ...] = ()
     refused: dict[str, str] = field(default_factory=dict)
-    points: tuple[PlannedPoint, ...] = ()
+    track: Array = field(default_factory=lambda: np.empty((0, 2)))
     duration: float = 0.0
     digest: str = ""
     failure: str = ""
-
-
-#: Shortest time between two rows of a preview (s), and the largest number of rows of one motion.
-_ROW_S, _MOST_ROWS = 0.1, 200
 
 
 def session_plan(plan: WorkPlan | None, state: PlanState, reason: str, now: float) -> SessionPlan:
@@ -109,54 +92,25 @@ def session_plan(plan: WorkPlan | None, state: PlanState, reason: str, now: floa
         reason=reason[:500],
         plan_hash=plan.digest,
         duration_s=plan.duration,
-        points=plan.points,
+        points=_point_plans(plan.request, plan.cuts, plan.refused),
     )
 
 
-def planned_points(
-    request: PlanRequest, cuts: Sequence[PlannedCut], refused: dict[str, str]
-) -> tuple[PlannedPoint, ...]:
+def _point_plans(request: PlanRequest, cuts: Sequence[PlannedCut], refused: dict[str, str]) -> tuple[PointPlan, ...]:
     """Plan of each point of a request: the cuts in their order, then the refused points."""
-    points = [planned_point(cut, number) for number, cut in enumerate(cuts, 1)]
+    points = [
+        PointPlan(
+            point_id=each.point.point_id,
+            revision=each.point.revision,
+            order=order,
+            base=planar_pose(each.cut.q_cut),
+            rollout=each.rollout,
+        )
+        for order, each in enumerate(cuts, 1)
+    ]
     revisions = {point.point_id: point.revision for point in request.points}
     points += [
-        PlannedPoint(PointPlan(point_id=point_id, revision=revisions[point_id], order=0, reason=why[:500]))
+        PointPlan(point_id=point_id, revision=revisions[point_id], order=0, reason=why[:500])
         for point_id, why in refused.items()
     ]
     return tuple(points)
-
-
-def planned_point(cut: PlannedCut, order: int) -> PlannedPoint:
-    """One cut of the plan with the way to it."""
-    return PlannedPoint(
-        PointPlan(
-            point_id=cut.point.point_id,
-            revision=cut.point.revision,
-            order=order,
-            begins_s=cut.begins,
-            duration_s=cut.way.duration,
-            clearance=cut.clearance,
-            between=cut.between,
-            manipulability=cut.manipulability,
-            torque_margin=cut.torque_margin,
-            torque_joint=cut.torque_joint,
-            base=planar_pose(cut.cut.q_cut),
-            plan_hash=cut.way.digest,
-        ),
-        preview(cut.way),
-    )
-
-
-def preview(way: Plan) -> tuple[PlanRow, ...]:
-    """Rows of a way for display: the first, some between, and the last."""
-    last = len(way.t) - 1
-    if not last:
-        return (_row(way, 0),)
-    step = max(math.ceil(_ROW_S / float(way.t[1]) - 1e-9), math.ceil(last / _MOST_ROWS))
-    return tuple(_row(way, row) for row in (*range(0, last, step), last))
-
-
-def _row(way: Plan, row: int) -> PlanRow:
-    T = way.T_odom_tool[row]
-    pose = pose_message(pin.SE3(T[:3, :3], T[:3, 3]))
-    return PlanRow(float(way.t[row]), planar_pose(way.q[row]), actuated(way.q[row, 3:]), pose)

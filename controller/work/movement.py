@@ -74,7 +74,7 @@ class Movement:
         self.body = body = Body(config, robot_config, method)
         self._saturation, self._setpoints = body.saturation, body.setpoints
         self._clearance = CutClearance(RobotModel(robot_config), config)
-        search = PostureSearch(RobotModel(robot_config), config, self._clearance.admits)
+        search = PostureSearch(RobotModel(robot_config), config, self._clearance.too_near)
         self.sequence = CutSequence(config, search, body.follower, body.saturation, queue, run_id, known, permit)
         self.teleoperation = Teleoperation(config, body.follower, body.robot.drive)
         self._homing: Homing | None = None

@@ -83,16 +83,20 @@ class PostureSearch:
     """Searches cut plans. It has its own robot model, so that a search can be suspended while control runs."""
 
     def __init__(
-        self, robot: RobotModel, config: ControllerConfig, admits: Callable[[CutPlan], bool] = lambda _: True
+        self,
+        robot: RobotModel,
+        config: ControllerConfig,
+        too_near: Callable[[CutPlan], tuple[float, str]] = lambda _: (0.0, ""),
     ) -> None:
         """Remember the model and the row's direction.
 
         Args:
             robot: Model of its own.
             config: Of the controller.
-            admits: Whether a plan will do for other reasons than reach; what it refuses is passed over.
+            too_near: How much of a required distance a plan lacks (m), with the parts as text; empty if it lacks none.
+                Another plan is not returned.
         """
-        self._robot, self._config, self._admits = robot, config, admits
+        self._robot, self._config, self._too_near = robot, config, too_near
         c, s = np.cos(config.row_heading), np.sin(config.row_heading)
         self._along, self._left = np.array([c, s, 0.0]), np.array([-s, c, 0.0])
         self._base_id = robot.frame_id("base_link")
@@ -117,7 +121,7 @@ class PostureSearch:
             azimuth: Turn of the approach about the cane (rad) set by a person; None leaves it to the search.
         """
         best: CutPlan | None = None
-        self._passed_over = False
+        passed_over: list[tuple[float, str]] = []
         seeds = (np.array(self._config.reach), np.array(self._config.home))
         base = np.array([q[0], q[1], 0.0])
         lateral = float(base @ self._left)
@@ -138,6 +142,10 @@ class PostureSearch:
                     plan = yield from self._try(poses, start, seed)
                     if plan is None:
                         continue
+                    lacking = self._too_near(plan)
+                    if lacking[1]:
+                        passed_over.append(lacking)
+                        continue
                     if plan.joint_margin >= _GOOD_MARGIN and plan.manipulability >= _GOOD_OMEGA:
                         return plan
                     if best is None or _quality(plan) > _quality(best):
@@ -145,7 +153,17 @@ class PostureSearch:
             # A good posture with the straight approach is preferred to a better one from the side.
             if best is not None:
                 return best
-        return Unreachable(self._why(position, lateral))
+        if passed_over:
+            _, words = min(passed_over, key=lambda lacking: lacking[0])
+            return Unreachable(
+                f"every posture that reaches it comes too near to an obstacle; in the best one, {words}: "
+                f"move the point along its cane, or cut this one by hand"
+            )
+        distance = float(position @ self._left) - lateral
+        return Unreachable(
+            f"no posture of the arm reaches it: it is {distance:.2f} m beside the robot's path and "
+            f"{position[2]:.2f} m high"
+        )
 
     def _too_far(self, goal: Any, q: Array) -> bool:
         """Whether the stretched arm would not get there, which saves most of a vain search."""
@@ -171,11 +189,7 @@ class PostureSearch:
         omega = min(stand_off.omega, cut.omega, clear.omega)
         if margin < _LEAST_MARGIN or omega < _LEAST_OMEGA:
             return None
-        plan = CutPlan(poses, clear.q, stand_off.q, cut.q, margin, omega)
-        if self._admits(plan):
-            return plan
-        self._passed_over = True
-        return None
+        return CutPlan(poses, clear.q, stand_off.q, cut.q, margin, omega)
 
     def _solve(self, q: Array, goal: Any, posture: Array) -> Generator[None, None, _Posture | None]:
         """Damped least squares for the arm alone, inside its limits, pulled towards `posture` in the null space."""
@@ -200,15 +214,16 @@ class PostureSearch:
             yield
         return None
 
-    def _why(self, position: Array, lateral: float) -> str:
-        if self._passed_over:
-            return "every posture that reaches it comes too near to an obstacle"
-        distance = float(position @ self._left) - lateral
-        return (
-            f"no posture of the arm reaches it: it is {distance:.2f} m beside the robot's path and "
-            f"{position[2]:.2f} m high"
-        )
-
 
 def _quality(plan: CutPlan) -> float:
     return min(plan.joint_margin / _GOOD_MARGIN, 1.0) + min(plan.manipulability / _GOOD_OMEGA, 1.0)
+
+
+def completed(search: Generator[None, None, CutPlan | Unreachable]) -> CutPlan | Unreachable:
+    """Result of a search, run to its end at once."""
+    while True:
+        try:
+            next(search)
+        except StopIteration as end:
+            found: CutPlan | Unreachable = end.value
+            return found

@@ -262,101 +262,13 @@ class HardwareStop(Message, frozen=True, kw_only=True):
     user: Text
 
 
-PlanState = Literal["none", "planning", "valid", "void"]
-
-
-class PointPlan(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Plan for one accepted point: the motion to it, or the reason for a refusal.
-
-    Attributes:
-        point_id: The point.
-        revision: Accepted revision that the plan is for.
-        order: Position in the order of work, from 1; 0 for a refused point.
-        reason: Reason for the refusal, as text; empty otherwise.
-        begins_s: Start of the motion to it, from the start of the work (s).
-        duration_s: Duration of that motion, up to where the tool is clear of the canes (s).
-        clearance: Smallest distance during that motion, among the robot's parts and to ground and obstacles (m).
-        between: The two parts with that distance.
-        manipulability: Smallest ω of the arm at the cut and on the motion to it.
-        torque_margin: Remaining torque of the joint that uses the largest fraction of its limit (Nm).
-        torque_joint: Name of that joint.
-        base: Pose of base_link in odom at the cut; None for a refused point.
-        plan_hash: SHA-256 of the motion in every control period; empty for a refused point.
-    """
-
-    point_id: Name
-    revision: Count
-    order: Count
-    reason: Text = ""
-    begins_s: NonNegative = 0.0
-    duration_s: NonNegative = 0.0
-    clearance: Finite = 0.0
-    between: tuple[Text, Text] = ("", "")
-    manipulability: NonNegative = 0.0
-    torque_margin: Finite = 0.0
-    torque_joint: Text = ""
-    base: PlanarPose | None = None
-    plan_hash: Digest = ""
-
-
-class PlanRow(Struct, frozen=True, forbid_unknown_fields=True):
-    """One sample of a planned motion.
-
-    Attributes:
-        time: Time from the start of the motion (s).
-        base: Pose of base_link in odom.
-        position: Actuated coordinates (rad).
-        T_odom_tool: Tool pose.
-    """
-
-    time: NonNegative
-    base: PlanarPose
-    position: Actuated
-    T_odom_tool: Pose
-
-
-class PlannedPoint(Struct, frozen=True, forbid_unknown_fields=True):
-    """One accepted point of the plan.
-
-    Attributes:
-        plan: Figures of the plan.
-        preview: Motion to the point, downsampled for display.
-    """
-
-    plan: PointPlan
-    preview: tuple[PlanRow, ...] = ()
-
-
-class SessionPlan(Message, frozen=True, kw_only=True):
-    """Controller → all: order and motions of the work on the accepted points.
-
-    Attributes:
-        header: `frame_id` is odom.
-        state: `valid` while the work follows the plan; `void` after a change; `planning` until the next plan is ready.
-        reason: Reason why the plan is void or missing, as text.
-        plan_hash: SHA-256 of the inputs and the content of the plan; empty without a plan.
-        duration_s: Duration of the work, including the cuts (s).
-        points: Points in the order of work, then the refused points.
-    """
-
-    header: Header
-    state: PlanState
-    reason: Text = ""
-    plan_hash: Digest = ""
-    duration_s: NonNegative = 0.0
-    points: tuple[PlannedPoint, ...] = ()
-
-
-PreviewPhase = Literal["none", "waiting", "rolling", "ready", "approved", "expired"]
-
-
 class PreviewedCut(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """One point of a preview, with the motion to it and out again.
+    """One point of a rollout of the work, with the motion to it and out again.
 
     Attributes:
         point_id: The point.
         revision: Accepted revision that is previewed.
-        begins_s: Start of the motion to it (s from the start of the preview).
+        begins_s: Start of the motion to it (s from the start).
         cut_s: Time at which the blades close (s from the start); None without a cut.
         ends_s: Start of the motion to the next point, or end of the work (s from the start).
         result: Outcome as text: cut, or the reason why not.
@@ -365,6 +277,8 @@ class PreviewedCut(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         between: The two parts with that distance.
         manipulability: Smallest ω of the arm in that time.
         joint_margin: Smallest distance of an arm joint to its limit in that time (rad).
+        torque_margin: Remaining torque of the joint that uses the largest fraction of its limit in that time (Nm).
+        torque_joint: Name of that joint.
     """
 
     point_id: Name
@@ -377,6 +291,55 @@ class PreviewedCut(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     between: tuple[Text, Text]
     manipulability: NonNegative
     joint_margin: Finite
+    torque_margin: Finite = 0.0
+    torque_joint: Text = ""
+
+
+PlanState = Literal["none", "planning", "valid", "void"]
+
+
+class PointPlan(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Plan for one accepted point: its place in the work, or the reason for a refusal.
+
+    Attributes:
+        point_id: The point.
+        revision: Accepted revision that the plan is for.
+        order: Position in the order of work, from 1; 0 for a refused point.
+        reason: Reason for the refusal, as text; empty otherwise.
+        base: Pose of base_link in odom at the cut; None for a refused point.
+        rollout: Figures of the motion to it and out again; None for a refused point, and for a later one
+            until the work comes near it.
+    """
+
+    point_id: Name
+    revision: Count
+    order: Count
+    reason: Text = ""
+    base: PlanarPose | None = None
+    rollout: PreviewedCut | None = None
+
+
+class SessionPlan(Message, frozen=True, kw_only=True):
+    """Controller → all: order and rollout of the work on the accepted points.
+
+    Attributes:
+        header: `frame_id` is odom.
+        state: `valid` while the work follows the plan; `void` after a change; `planning` until the next plan is ready.
+        reason: Reason why the plan is void or missing, as text.
+        plan_hash: SHA-256 of the inputs and the content of the plan; empty without a plan.
+        duration_s: Duration of the work (s). A point that is not rolled out yet counts as the mean of the others.
+        points: Points in the order of work, then the refused points.
+    """
+
+    header: Header
+    state: PlanState
+    reason: Text = ""
+    plan_hash: Digest = ""
+    duration_s: NonNegative = 0.0
+    points: tuple[PointPlan, ...] = ()
+
+
+PreviewPhase = Literal["none", "waiting", "rolling", "ready", "approved", "expired"]
 
 
 class PreviewState(Message, frozen=True, kw_only=True):

@@ -144,9 +144,7 @@ class PageView:
         ]
         pixels = project([point.position for point, _ in rows], camera, self._model)
         ahead = project([_ahead(point) for point, _ in rows], camera, self._model)
-        planned = (
-            {} if plan is None or plan.state != "valid" else {each.plan.point_id: each.plan for each in plan.points}
-        )
+        planned = {} if plan is None or plan.state != "valid" else {each.point_id: each for each in plan.points}
         return PagePoints(
             points=tuple(
                 PagePoint(

@@ -5,8 +5,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks.control.goal_planner import GoalPlanner
-from controller.motion.speed_limits import plan_limits
-from controller.planning.path import Planned, Refused
+from benchmarks.control.path import Planned, Refused
+from benchmarks.control.plan_limits import plan_limits
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.obstacle import Obstacle
 from rolling_panda.model.robot import ARM_Q, ARM_XI, RobotModel

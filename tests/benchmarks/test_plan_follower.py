@@ -4,7 +4,7 @@ import pytest
 
 from benchmarks.control.goal_planner import GoalPlanner
 from benchmarks.control.plan_follower import PlanFollower
-from controller.motion.speed_limits import plan_limits
+from benchmarks.control.plan_limits import plan_limits
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.task import Solution
 from rolling_panda.model.robot import ARM_Q, RobotModel

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from controller.planning import cuts, plan_manager
 from controller.planning.cuts import CutPlanner
 from rolling_panda import commands as intents
 from rolling_panda.config import RobotConfig
@@ -71,7 +72,7 @@ class Planned:
 
 
 def order(plan):
-    return [each.plan.point_id for each in plan.points if each.plan.order]
+    return [each.point_id for each in plan.points if each.order]
 
 
 def test_accepted_points_are_planned_and_what_the_plan_says_is_told() -> None:
@@ -79,13 +80,9 @@ def test_accepted_points_are_planned_and_what_the_plan_says_is_told() -> None:
     plan = p.accepted("a", "high").until_valid()
     assert len(p.requests) == 1 and len(plan.plan_hash) == 64
     done, refused = plan.points
-    assert (done.plan.point_id, done.plan.order, done.plan.reason) == ("a", 1, "")
-    assert done.plan.duration_s > 0.5 and done.plan.clearance > 0.015 and len(done.plan.plan_hash) == 64
-    times = [row.time for row in done.preview]
-    assert min(np.diff(times)[:-1]) >= 0.05 - 1e-9 and times[-1] == done.plan.duration_s
-    tool = done.preview[-1].T_odom_tool.position
-    assert np.linalg.norm(np.subtract(tool, (0.3, 0.75, 1.05))) == pytest.approx(CONFIG.clearance, abs=1e-3)
-    assert (refused.plan.point_id, refused.plan.order) == ("high", 0) and "no posture" in refused.plan.reason
+    assert (done.point_id, done.order, done.reason, done.rollout.result) == ("a", 1, "", "cut")
+    assert 0.0 == done.rollout.begins_s < 0.5 < done.rollout.cut_s < done.rollout.ends_s == plan.duration_s
+    assert (refused.point_id, refused.order, refused.rollout) == ("high", 0, None) and "no posture" in refused.reason
     p.robot.run(0.1)
     assert entry(p.robot, "high").state == "UNREACHABLE" and "no posture" in entry(p.robot, "high").reason
     assert [e.point_id for e in p.robot.state.queue if e.state == "ACCEPTED"] == ["a"]
@@ -115,8 +112,25 @@ def test_work_follows_the_plan_to_its_stands_and_in_its_order() -> None:
     p.start()
     finish(p.robot, 90.0)
     assert [point_id for point_id, _ in p.robot.cuts] == planned
-    last = plan.points[-1].plan.base
+    last = plan.points[-1].base
     assert np.hypot(p.robot.q[0] - last.x, p.robot.q[1] - last.y) < 0.05
+
+
+def test_later_cuts_are_rolled_out_during_the_work_and_the_plan_stays_valid(monkeypatch) -> None:
+    monkeypatch.setattr(cuts, "AHEAD", 2)
+    monkeypatch.setattr(plan_manager, "_NEXT", 2)
+    p = Planned(tuple(point(name, (x, 0.75, 1.05)) for name, x in (("a", 0.3), ("b", 0.6), ("c", 0.9))))
+    first = p.accepted("a", "b", "c").until_valid()
+    assert [each.rollout is None for each in first.points] == [False, False, True]
+    p.robot.run(3.0)
+    assert len(p.requests) == 1, "at rest the first cuts stay the next ones"
+    said = len(p.plans)
+    p.start()
+    finish(p.robot, 90.0)
+    assert [point_id for point_id, _ in p.robot.cuts] == ["a", "b", "c"]
+    assert len(p.requests) == 2 and [each.point_id for each in p.requests[1].points] == ["b", "c"]
+    assert {plan.state for plan in p.plans[said:]} <= {"valid", "none"}
+    assert all(each.rollout.result == "cut" for each in p.plans[-1].points)
 
 
 def test_a_point_that_the_plan_refuses_is_not_driven_to_and_the_ticket_says_why() -> None:
@@ -184,7 +198,7 @@ def test_what_comes_into_view_in_the_way_voids_the_plan_and_the_next_one_knows_i
     p.robot.obstacles = (POST,)
     p.robot.run(0.1)
     assert p.plans[-1].state in ("void", "planning") and "a post is seen at (0.5, 0.8," in p.plans[-1].reason
-    assert "post 0" in p.until_valid().points[0].plan.reason
+    assert "post 0" in p.until_valid().points[0].reason
 
 
 def test_without_a_planner_the_work_goes_on_along_the_row() -> None:

@@ -8,7 +8,7 @@ from controller.inputs import Sample
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.obstacle import Obstacle
 from controller.work.cut_clearance import CutClearance
-from controller.work.posture_search import CutPlan, PostureSearch, Unreachable
+from controller.work.posture_search import CutPlan, PostureSearch, Unreachable, completed
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import Capsule, Obstacles
 from rolling_panda.model.robot import ARM_Q, RobotModel
@@ -29,12 +29,8 @@ def find(*capsules):
     clearance.update(Sample(message, 0.0))
     q = np.zeros(12)
     q[ARM_Q] = CONFIG.home
-    search = PostureSearch(RobotModel(), CONFIG, clearance.admits).find(POINT, np.array([0.0, 0.1, 1.0]), q)
-    while True:
-        try:
-            next(search)
-        except StopIteration as end:
-            return end.value
+    search = PostureSearch(RobotModel(), CONFIG, clearance.too_near)
+    return completed(search.find(POINT, np.array([0.0, 0.1, 1.0]), q))
 
 
 def nearest(plan, capsule):
@@ -59,7 +55,7 @@ def test_a_wire_over_the_cut_is_passed_from_below():
 def test_a_wire_in_the_way_from_everywhere_is_said_to_be():
     plan = find(wire(POINT[2]))
     assert isinstance(plan, Unreachable)
-    assert "too near to an obstacle" in plan.reason
+    assert "too near to an obstacle; in the best one, at the cut" in plan.reason
 
 
 def test_what_is_far_away_changes_nothing():
@@ -100,8 +96,8 @@ def test_the_spur_that_is_cut_is_in_nothings_way_and_another_one_as_near_is():
     assert not isinstance(crossed, CutPlan) or not np.allclose(crossed.q_cut, free.q_cut)
 
 
-def test_clear_of_the_canes_there_is_room_for_a_plan_to_lead_on():
-    """The blades may come nearer to something at the cut than where ways begin and end."""
+def test_clear_of_the_canes_there_is_room_for_the_motion_to_lead_on():
+    """The blades may come nearer to something at the cut than where the motions between cuts begin and end."""
     free = find()
     x, y, z = free.poses.clear.translation.tolist()
     beside = Capsule("wire", (x + 0.047, y, z - 0.03), (x + 0.047, y, z + 0.03), 0.002, 0.002)
@@ -109,6 +105,7 @@ def test_clear_of_the_canes_there_is_room_for_a_plan_to_lead_on():
     clearance.update(Sample(Obstacles(header=m.Header(0.0, "odom"), capsules=(beside,)), 0.0))
     near, far = free.q_clear.copy(), free.q_clear.copy()
     far[0] += 1.0
-    assert clearance.admits(replace(free, q_clear=far, q_stand_off=far, q_cut=near))
-    assert not clearance.admits(replace(free, q_clear=near, q_stand_off=far, q_cut=far))
-    assert clearance.lacking.startswith("clear of it 17 mm") and "20 mm are needed" in clearance.lacking
+    assert clearance.too_near(replace(free, q_clear=far, q_stand_off=far, q_cut=near)) == (0.0, "")
+    lacking, words = clearance.too_near(replace(free, q_clear=near, q_stand_off=far, q_cut=far))
+    assert lacking == pytest.approx(0.003, abs=0.001)
+    assert words.startswith("clear of it 17 mm") and "20 mm are needed" in words

@@ -7,7 +7,10 @@ import numpy as np
 import pytest
 
 from controller.config import ControllerConfig
+from controller.planning import cuts
 from controller.planning.cuts import CutPlanner
+from controller.planning.preview_plan import PreviewRequest
+from controller.planning.rollout import Rollout
 from controller.planning.work_plan import PlanRequest
 from rolling_panda.config import RobotConfig
 from rolling_panda.messages.perception import Capsule
@@ -29,22 +32,45 @@ def request(*points, obstacles=(), number=1):
     return PlanRequest(number, q, points, obstacles)
 
 
-def test_cuts_come_in_the_order_along_the_row_with_what_they_cost() -> None:
-    plan = PLANNER.plan(request(point("far", 1.6), point("near", 0.2), point("middle", 0.9)))
+def test_cuts_come_in_the_order_along_the_row_as_they_will_be_driven() -> None:
+    asked = request(point("far", 1.6), point("near", 0.2), point("middle", 0.9))
+    plan = PLANNER.plan(asked)
     assert [cut.point.point_id for cut in plan.cuts] == ["near", "middle", "far"] and not plan.refused
-    at, ended = plan.request.q, 0.0
     for cut in plan.cuts:
-        np.testing.assert_array_equal(cut.way.q[0], at)
-        at = cut.way.q[-1]
-        for part in (slice(0, 3), ARM_Q):
-            np.testing.assert_allclose(at[part], cut.cut.q_clear[part], atol=1e-9)
         tool = ROBOT.pose(cut.cut.q_cut, ROBOT.tool_id).translation
         np.testing.assert_allclose(tool, cut.point.position, atol=3e-4)
-        assert cut.begins >= ended
-        ended = cut.begins + cut.way.duration
-        assert cut.clearance >= 0.015 and cut.manipulability >= 0.012 and cut.torque_margin > 0.0
-        assert "panda_joint" in cut.torque_joint or "wheel" in cut.torque_joint
-    assert plan.duration > ended
+        assert cut.rollout.torque_margin > 0.0 and cut.rollout.torque_joint in ROBOT.model.names
+    points, postures = tuple(cut.point for cut in plan.cuts), {cut.point.point_id: cut.cut for cut in plan.cuts}
+    shown = Rollout(CONFIG, RobotConfig()).roll(PreviewRequest(1, asked.q, points, (), postures))
+    assert tuple(cut.rollout for cut in plan.cuts) == shown.cuts, "what a preview of them shows"
+    assert plan.duration == shown.duration == plan.cuts[-1].rollout.ends_s
+    assert plan.track[0, 0] == 0.0 and plan.track[-1, 0] > 1.0
+
+
+def test_later_cuts_are_rolled_out_later(monkeypatch) -> None:
+    monkeypatch.setattr(cuts, "AHEAD", 2)
+    plan = PLANNER.plan(request(point("far", 1.6), point("near", 0.2), point("middle", 0.9)))
+    assert [cut.point.point_id for cut in plan.cuts] == ["near", "middle", "far"]
+    near, middle, far = (cut.rollout for cut in plan.cuts)
+    assert near is not None and far is None
+    assert plan.duration == pytest.approx(1.5 * middle.ends_s)
+
+
+def test_people_set_the_order() -> None:
+    points = point("a", 0.2), point("b", 0.6), point("c", 1.0)
+    plan = PLANNER.plan(replace(request(*points), order=("c", "a")))
+    assert [cut.point.point_id for cut in plan.cuts] == ["c", "a", "b"]
+
+
+def test_what_the_rollout_does_not_cut_is_refused_and_the_others_are_rolled_out_without_it() -> None:
+    """A bar between the two, at the height of the arm; where the cuts are made there is room."""
+    bar = Capsule("wire", (1.2, 0.3, 1.0), (1.2, 0.9, 1.0), 0.004, 0.004)
+    points = point("good", 0.3), point("behind", 2.4)
+    plan = PLANNER.plan(request(*points, obstacles=(bar,)))
+    assert list(plan.refused) == ["behind"] and "wire 0 holds the tool back" in plan.refused["behind"]
+    alone = PLANNER.plan(request(points[0], obstacles=(bar,)))
+    assert [cut.rollout for cut in plan.cuts] == [cut.rollout for cut in alone.cuts]
+    assert plan.duration == alone.duration and plan.digest != alone.digest
 
 
 @pytest.mark.parametrize(
@@ -66,7 +92,8 @@ def test_a_start_outside_a_joint_limit_is_planned_from() -> None:
     asked.q[8] = float(ROBOT.limits.upper[8]) + 0.05
     plan = PLANNER.plan(asked)
     assert [cut.point.point_id for cut in plan.cuts] == ["p"]
-    assert plan.cuts[0].way.q[0, 8] == asked.q[8] and plan.cuts[0].way.q[-1, 8] < ROBOT.limits.upper[8]
+    assert plan.cuts[0].rollout.result == "cut"
+    assert plan.cuts[0].rollout.joint_margin < 0.0 < plan.cuts[0].cut.joint_margin
 
 
 def test_the_same_request_has_the_same_hash_whoever_answers_it() -> None:
@@ -75,7 +102,7 @@ def test_the_same_request_has_the_same_hash_whoever_answers_it() -> None:
     PLANNER.plan(request(point("c", 0.7)))
     again, other = PLANNER.plan(asked), CutPlanner(CONFIG, RobotConfig()).plan(replace(asked, number=7))
     assert first.digest == again.digest == other.digest
-    assert [cut.way.digest for cut in first.cuts] == [cut.way.digest for cut in other.cuts]
+    assert [cut.rollout for cut in first.cuts] == [cut.rollout for cut in other.cuts]
 
 
 @pytest.mark.parametrize("what", ["place", "revision", "position", "obstacles", "points", "speed"])

@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
+from controller.motion.follower import Measured
 from controller.planning import preview as preview_module
 from controller.planning.preview_plan import PreviewRequest
-from controller.planning.rollout import ActuatorLag, Rollout
+from controller.planning.rollout import ActuatorLag, CutLog, Rollout, Samples
+from controller.whole_body.collision import CollisionModel
+from controller.work.point_queue import PointQueue
 from rolling_panda import commands as intents
 from rolling_panda.config import RobotConfig
 from rolling_panda.errors import ControlError
@@ -93,6 +96,32 @@ def test_where_pictures_take_long_a_look_back_does_not_keep_the_next_one_from_be
     near = (POINTS[0], point("b", (0.4, 0.77, 1.1)))
     made = ROLLOUT.roll(PreviewRequest(1, START, near, close_up_s=1.2))
     assert [cut.result for cut in made.cuts] == ["cut", "cut"]
+
+
+def test_where_the_tool_cannot_leave_the_canes_nothing_is_cut_and_no_point_is_to_blame():
+    stuck = START.copy()
+    stuck[1] = 0.5
+    x, y, z = RobotModel().pose(stuck, RobotModel().tool_id).translation.tolist()
+    behind = Capsule("wire", (x - 0.4, y - 0.15, z), (x + 0.4, y - 0.15, z), 0.02, 0.02)
+    made = ROLLOUT.roll(PreviewRequest(1, stuck, POINTS, (behind,)))
+    assert made.cuts == () and made.refused == {} and made.duration < 10.0
+    assert "a place clear of the canes was not reached in time" in made.failure
+
+
+def test_what_asks_for_more_torque_than_a_joint_has_is_not_cut_and_says_so():
+    robot, queue = RobotModel(), PointQueue(CONFIG)
+    log = CutLog(robot, CollisionModel(robot), queue)
+    log.sample(Measured(START, robot.kinematics(START), np.zeros(NXI)), "a", 0.0)
+    log.closed("a", 0.5)
+    times = np.linspace(0.0, 1.0, 101)
+    way, rates = np.tile(START, (101, 1)), np.zeros((101, NXI))
+    calm, refused = log.cuts(1.0, "", Samples(times, way, rates))
+    assert calm[0].result == "cut" and calm[0].torque_margin > 0.0 and refused == {}
+    rates[:, 3] = np.sin(20.0 * times) * 5.0
+    way[:, ARM_Q][:, 1] += 0.25 * (1.0 - np.cos(20.0 * times))
+    rushed, refused = log.cuts(1.0, "", Samples(times, way, rates))
+    assert rushed[0].cut_s is None and rushed[0].torque_margin < 0.0
+    assert f"{rushed[0].torque_joint} would need" in refused["a"] and refused["a"] in rushed[0].result
 
 
 def test_a_joint_ends_behind_its_command_by_the_lag_times_its_speed():

@@ -12,8 +12,6 @@ from rolling_panda.commands import SeekReplay
 from rolling_panda.errors import ServiceError
 from rolling_panda.messages.supervision import (
     BaseVelocity,
-    PlannedPoint,
-    PlanRow,
     PointPlan,
     ReplayState,
     SessionPlan,
@@ -31,7 +29,7 @@ from tests.support.fake_wire import (
     pruning_points,
     telling,
 )
-from tests.support.points import point
+from tests.support.points import point, rolled_out
 from tests.support.running_server import eventually, running_server
 
 
@@ -390,17 +388,15 @@ def _references(node):
 
 def test_the_plan_is_given_whole_and_its_absence_said(server, client):
     assert client.get("/api/plan").status_code == 503
-    row = PlanRow(0.1, m.PlanarPose(0.2), (0.0,) * 9, m.Pose((0.4, 0.5, 1.0), (0.0, 0.0, 0.0, 1.0)))
-    point = PointPlan(point_id="p1", revision=2, order=1, duration_s=3.0, base=m.PlanarPose(0.2), plan_hash="0f")
-    plan = SessionPlan(
-        header=m.Header(), state="valid", plan_hash="ab", duration_s=7.0, points=(PlannedPoint(point, (row,)),)
-    )
+    rolled = rolled_out("p1", 2, ends_s=3.0)
+    point = PointPlan(point_id="p1", revision=2, order=1, base=m.PlanarPose(0.2), rollout=rolled)
+    plan = SessionPlan(header=m.Header(), state="valid", plan_hash="ab", duration_s=7.0, points=(point,))
     server.wire.deliver(topics.PLAN, plan)
     given = client.get("/api/plan")
     assert given.status_code == 200
     assert msgspec.json.decode(given.content, type=SessionPlan) == plan
     schemas = client.get("/api/openapi.json").json()["components"]["schemas"]
-    assert "plan_hash" in schemas["PointPlan"]["properties"] and "SessionPlan" in schemas
+    assert "rollout" in schemas["PointPlan"]["properties"] and "SessionPlan" in schemas
 
 
 def test_who_reads_the_state_and_starts_at_once_is_not_told_that_nobody_has_seen_the_robot(server, robot, client):

@@ -6,7 +6,7 @@ from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.messages.page import PagePlan
 from rolling_panda.messages.robot import CameraFrame, Intrinsics, JointState
-from rolling_panda.messages.supervision import PlannedPoint, PointPlan, SessionPlan
+from rolling_panda.messages.supervision import PointPlan, SessionPlan
 from rolling_panda.model.robot import RobotModel, configuration
 from server.robots.link import RobotLink
 from server.robots.page_view import PageView, project, speed_ratios
@@ -144,7 +144,7 @@ def test_a_count_of_frames_alone_is_renewed_only_now_and_then(wire, view):
 def plan_of(*points, state="valid"):
     return SessionPlan(
         header=HEADER, state=state, reason="", plan_hash="ab", duration_s=9.0,
-        points=tuple(PlannedPoint(each) for each in points),
+        points=points,
     )  # fmt: skip
 
 
@@ -153,7 +153,7 @@ def test_an_accepted_point_comes_with_what_the_plan_that_holds_says_of_it(wire, 
     queue = (m.QueueEntry("a", "ACCEPTED"), m.QueueEntry("b", "UNREACHABLE"), m.QueueEntry("c", "DONE"))
     wire.deliver(topics.CONTROLLER, controller_state(queue))
     assert view.points(0.0).plan is None
-    first = PointPlan(point_id="a", revision=1, order=1, duration_s=2.5)
+    first = PointPlan(point_id="a", revision=1, order=1)
     refused = PointPlan(point_id="b", revision=1, order=0, reason="out of reach")
     done = PointPlan(point_id="c", revision=1, order=2)
     wire.deliver(topics.PLAN, plan_of(first, refused, done))

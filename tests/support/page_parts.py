@@ -9,6 +9,7 @@ from rolling_panda import messages as m
 from rolling_panda.messages import page as p
 from rolling_panda.messages.supervision import ControlState, PointPlan, PreviewState
 from tests.support.played_server import PlayedServer, controller, point
+from tests.support.points import rolled_out
 
 PLANNING = ("RequestPreview", "ApprovePreview", "RequirePreview", "SetApproach", "MoveInQueue", "ResetOrder", "Survey")
 
@@ -25,8 +26,7 @@ def planned(row: p.PagePoint, order: int, reason: str = "") -> p.PagePoint:
         revision=4,
         order=order,
         reason=reason,
-        duration_s=3.1 + 0.4 * order,
-        clearance=0.06,
+        rollout=rolled_out(row.point.point_id, 4, ends_s=3.1 + 0.4 * order),
     )
     return msgspec.structs.replace(row, plan=plan)
 

@@ -11,7 +11,6 @@ from rolling_panda.messages import page as p
 from rolling_panda.messages.supervision import (
     ControlReport,
     CutReport,
-    PreviewedCut,
     PreviewState,
     RefusalReport,
     ReplayState,
@@ -22,6 +21,7 @@ from rolling_panda.messages.supervision import (
 )
 from tests.support.page_parts import accepted, choose, held, planned, queue, ready, show, show_mode, working
 from tests.support.played_server import PlayedServer, bridge, controller, point
+from tests.support.points import rolled_out
 
 State = Callable[[Page, PlayedServer], None]
 #: When the report's morning was (s since 1970).
@@ -166,10 +166,9 @@ def _paused(page: Page, server: PlayedServer) -> None:
 def _preview(page: Page, server: PlayedServer) -> None:
     working(page, server)
     cuts = tuple(
-        PreviewedCut(
-            point_id=f"p{number}", revision=4, begins_s=5.0 * number - 5.0, cut_s=5.0 * number - 2.0,
-            ends_s=5.0 * number, result="cut", clearance=0.08 - 0.009 * number, between=("link5", "camera"),
-            manipulability=0.067, joint_margin=0.6,
+        rolled_out(
+            f"p{number}", 4, begins_s=5.0 * number - 5.0, cut_s=5.0 * number - 2.0, ends_s=5.0 * number,
+            clearance=0.08 - 0.009 * number,
         )
         for number in (1, 2)
     )  # fmt: skip

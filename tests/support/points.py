@@ -5,6 +5,7 @@ from typing import Any
 import msgspec
 
 from rolling_panda import messages as m
+from rolling_panda.messages.supervision import PreviewedCut
 
 
 def point(
@@ -23,5 +24,22 @@ def point(
         vine=0,
         spur=0,
         reason="test",
+    )
+    return msgspec.structs.replace(usual, **changes)
+
+
+def rolled_out(point_id: str, revision: int = 1, **changes: Any) -> PreviewedCut:
+    """Figures of a cut that takes 5 s from the start of the work; `changes` are other fields."""
+    usual = PreviewedCut(
+        point_id=point_id,
+        revision=revision,
+        begins_s=0.0,
+        cut_s=3.0,
+        ends_s=5.0,
+        result="cut",
+        clearance=0.06,
+        between=("link5", "camera"),
+        manipulability=0.067,
+        joint_margin=0.6,
     )
     return msgspec.structs.replace(usual, **changes)

@@ -7,16 +7,14 @@ from playwright.sync_api import Page, expect
 from rolling_panda.messages.supervision import PointPlan
 from tests.support.played_page import until
 from tests.support.played_server import PlayedServer, controller, point
+from tests.support.points import rolled_out
 
 pytestmark = pytest.mark.browser
 WAY = PointPlan(
     point_id="p1",
     revision=4,
     order=2,
-    duration_s=3.14,
-    clearance=0.122,
-    between=("link5", "camera"),
-    manipulability=0.07,
+    rollout=rolled_out("p1", 4, begins_s=5.0, ends_s=8.14, clearance=0.122, manipulability=0.07),
 )
 REFUSAL = PointPlan(point_id="p2", revision=4, order=0, reason="no posture of the arm reaches it")
 
@@ -34,11 +32,13 @@ def server() -> PlayedServer:
 
 def test_a_row_says_its_number_and_way_or_why_the_plan_refuses_it(page: Page) -> None:
     facts = page.locator('[data-point-id="p1"] .facts')
-    expect(page.locator('[data-point-id="p1"] .reason')).to_contain_text("no. 2, way 3.1 s")
-    assert "leaves 122 mm between link5 and camera, manipulability 0.070" in (facts.get_attribute("title") or "")
+    expect(page.locator('[data-point-id="p1"] .reason')).to_contain_text("no. 2, 3.1 s")
+    assert "the cut takes 3.1 s and leaves 122 mm between link5 and camera, manipulability 0.070" in (
+        facts.get_attribute("title") or ""
+    )
     expect(page.locator('[data-point-id="p2"] .reason')).to_contain_text("no posture of the arm reaches it")
     for other in ("p2", "p3"):
-        expect(page.locator(f'[data-point-id="{other}"] .reason')).not_to_contain_text("way 3")
+        expect(page.locator(f'[data-point-id="{other}"] .reason')).not_to_contain_text("no. ")
 
 
 def test_what_the_plan_refuses_neither_looks_accepted_nor_is_counted_so(page: Page, server: PlayedServer) -> None:

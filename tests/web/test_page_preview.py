@@ -9,24 +9,15 @@ from rolling_panda.messages import page as p
 from rolling_panda.messages.supervision import PreviewedCut, PreviewState
 from tests.support.played_page import until
 from tests.support.played_server import PlayedServer, controller, point
+from tests.support.points import rolled_out
 
 pytestmark = pytest.mark.browser
 ALLOWED = ("RequestPreview", "ApprovePreview", "RequirePreview", "MoveInQueue")
 
 
 def cut(name: str, begins: float) -> PreviewedCut:
-    return PreviewedCut(
-        point_id=name,
-        revision=4,
-        begins_s=begins,
-        cut_s=begins + 3.0,
-        ends_s=begins + 5.0,
-        result="cut",
-        clearance=0.072 - 0.01 * begins / 5.0,
-        between=("link5", "camera"),
-        manipulability=0.067,
-        joint_margin=0.6,
-    )
+    clearance = 0.072 - 0.01 * begins / 5.0
+    return rolled_out(name, 4, begins_s=begins, cut_s=begins + 3.0, ends_s=begins + 5.0, clearance=clearance)
 
 
 STATE = PreviewState(

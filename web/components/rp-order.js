@@ -1,6 +1,6 @@
 // The order of work, changed by dragging or keys. Only rows in view exist, so that thousands are possible.
 
-import { moveTo, orderWords, resetOrder, whyNoMove, whyNoResetOrder, workOrder } from "../js/control/order.js";
+import { cutTime, moveTo, orderWords, resetOrder, whyNoMove, whyNoResetOrder, workOrder } from "../js/control/order.js";
 import { select, selectAndReveal } from "../js/control/selection.js";
 import { inWords } from "../js/state/format.js";
 import { link, now, pageState, points, revealCount, selected } from "../js/state/page-state.js";
@@ -135,7 +135,7 @@ class RpOrder extends HTMLElement {
     const why = inWords(point.entry.reason);
     if (number) setText(number, `${at + 1}`);
     if (name) setText(name, `${point.point.point_id} · vine ${point.point.vine}, spur ${point.point.spur}`);
-    if (way) setText(way, point.plan ? `${point.plan.duration_s.toFixed(1)} s` : "");
+    if (way) setText(way, point.plan ? cutTime(point.plan) : "");
     setAttribute(row, "data-point-id", point.point.point_id);
     setAttribute(row, "title", why || point.point.reason);
     row.classList.toggle("dragged", point.point.point_id === this.dragged);

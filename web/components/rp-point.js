@@ -1,6 +1,7 @@
 // One row of the queue, with the form for the reason of a rejection.
 
 import { accept, isUncertain, isUnknown, reject, whyNotAccept, whyNotReject } from "../js/control/decisions.js";
+import { cutTime } from "../js/control/order.js";
 import { select, selectAndReveal } from "../js/control/selection.js";
 import { TEXT_MAX_LENGTH } from "../js/link/messages.js";
 import { POINT_WORDS, counted, inWords } from "../js/state/format.js";
@@ -79,8 +80,10 @@ customElements.define("rp-reject-form", RpRejectForm);
 /** @param {PagePoint} row */
 function planWords({ plan }) {
   if (!plan?.order) return "";
-  const clear = `${Math.round(1000 * plan.clearance)} mm between ${plan.between.join(" and ")}`;
-  return `; planned as no. ${plan.order}: the way takes ${plan.duration_s.toFixed(1)} s and leaves ${clear}, manipulability ${plan.manipulability.toFixed(3)}`;
+  const shown = plan.rollout;
+  if (!shown) return `; planned as no. ${plan.order}`;
+  const clear = `${Math.round(1000 * shown.clearance)} mm between ${shown.between.join(" and ")}`;
+  return `; planned as no. ${plan.order}: the cut takes ${cutTime(plan)} and leaves ${clear}, manipulability ${shown.manipulability.toFixed(3)}`;
 }
 
 export class RpPoint extends HTMLElement {
@@ -157,7 +160,7 @@ export class RpPoint extends HTMLElement {
     const thick = `${(2000 * point.radius).toFixed(1)} mm`;
     // Rounded down, so that a value shown as enough for "Accept all" is enough.
     const sure = `${Math.floor(100 * point.confidence + 1e-9)} %`;
-    const planned = row.plan?.order ? `no. ${row.plan.order}, way ${row.plan.duration_s.toFixed(1)} s` : "";
+    const planned = row.plan?.order ? [`no. ${row.plan.order}`, cutTime(row.plan)].filter(Boolean).join(", ") : "";
     setText(
       this.facts,
       `${point.nodes_kept}/${point.nodes_seen} nodes · ${thick} · ${isUncertain(row) ? "only " : ""}${sure}`,

@@ -6,6 +6,7 @@ import { pageState, points } from "../state/page-state.js";
 import { countOf, whyNot } from "./allowed.js";
 
 /** @typedef {import("../link/messages.js").PagePoint} PagePoint */
+/** @typedef {import("../link/messages.js").PointPlan} PointPlan */
 
 /** Accepted points in the order of work. @returns {PagePoint[]} */
 export function workOrder() {
@@ -33,6 +34,11 @@ export function orderWords() {
 function durationWords(seconds) {
   if (seconds < 120) return `${Math.round(seconds)} s`;
   return `${Math.floor(seconds / 60)} min ${Math.round(seconds % 60)} s`;
+}
+
+/** Time that a planned cut takes; empty until it is rolled out. @param {PointPlan} plan */
+export function cutTime({ rollout }) {
+  return rollout ? `${(rollout.ends_s - rollout.begins_s).toFixed(1)} s` : "";
 }
 
 /** Why the order cannot be changed. */

@@ -397,7 +397,35 @@ export interface PageState {
   plain_wire: boolean;
 }
 
-/** Plan for one accepted point: the motion to it, or the reason for a refusal. */
+/** One point of a rollout of the work, with the motion to it and out again. */
+export interface PreviewedCut {
+  /** The point. */
+  point_id: string;
+  /** Accepted revision that is previewed. */
+  revision: number;
+  /** Start of the motion to it (s from the start). */
+  begins_s: number;
+  /** Time at which the blades close (s from the start); None without a cut. */
+  cut_s: number|null;
+  /** Start of the motion to the next point, or end of the work (s from the start). */
+  ends_s: number;
+  /** Outcome as text: cut, or the reason why not. */
+  result: string;
+  /** Smallest distance from `begins_s` to `ends_s`, among the robot's parts and to ground and obstacles (m). */
+  clearance: number;
+  /** The two parts with that distance. */
+  between: [string, string];
+  /** Smallest ω of the arm in that time. */
+  manipulability: number;
+  /** Smallest distance of an arm joint to its limit in that time (rad). */
+  joint_margin: number;
+  /** Remaining torque of the joint that uses the largest fraction of its limit in that time (Nm). */
+  torque_margin: number;
+  /** Name of that joint. */
+  torque_joint: string;
+}
+
+/** Plan for one accepted point: its place in the work, or the reason for a refusal. */
 export interface PointPlan {
   /** The point. */
   point_id: string;
@@ -407,24 +435,10 @@ export interface PointPlan {
   order: number;
   /** Reason for the refusal, as text; empty otherwise. */
   reason: string;
-  /** Start of the motion to it, from the start of the work (s). */
-  begins_s: number;
-  /** Duration of that motion, up to where the tool is clear of the canes (s). */
-  duration_s: number;
-  /** Smallest distance during that motion, among the robot's parts and to ground and obstacles (m). */
-  clearance: number;
-  /** The two parts with that distance. */
-  between: [string, string];
-  /** Smallest ω of the arm at the cut and on the motion to it. */
-  manipulability: number;
-  /** Remaining torque of the joint that uses the largest fraction of its limit (Nm). */
-  torque_margin: number;
-  /** Name of that joint. */
-  torque_joint: string;
   /** Pose of base_link in odom at the cut; None for a refused point. */
   base: PlanarPose|null;
-  /** SHA-256 of the motion in every control period; empty for a refused point. */
-  plan_hash: string;
+  /** Figures of the motion to it and out again; None for a refused point, and for a later one until the work comes near it. */
+  rollout: PreviewedCut|null;
 }
 
 /** One row of the queue. */
@@ -498,30 +512,6 @@ export interface PagePoints {
   plan: PagePlan|null;
   /** Current pruning rule. */
   rule: PruningRule|null;
-}
-
-/** One point of a preview, with the motion to it and out again. */
-export interface PreviewedCut {
-  /** The point. */
-  point_id: string;
-  /** Accepted revision that is previewed. */
-  revision: number;
-  /** Start of the motion to it (s from the start of the preview). */
-  begins_s: number;
-  /** Time at which the blades close (s from the start); None without a cut. */
-  cut_s: number|null;
-  /** Start of the motion to the next point, or end of the work (s from the start). */
-  ends_s: number;
-  /** Outcome as text: cut, or the reason why not. */
-  result: string;
-  /** Smallest distance from `begins_s` to `ends_s`, among the robot's parts and to ground and obstacles (m). */
-  clearance: number;
-  /** The two parts with that distance. */
-  between: [string, string];
-  /** Smallest ω of the arm in that time. */
-  manipulability: number;
-  /** Smallest distance of an arm joint to its limit in that time (rad). */
-  joint_margin: number;
 }
 
 /** Controller → all: state, figures and approval of the preview. */

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller.motion.speed_limits import PlanLimits
-from controller.motion.trajectory import quickest
-from controller.planning.arm_path import ArmPath
-from controller.planning.base_path import BaseMotion
+from benchmarks.control.arm_path import ArmPath
+from benchmarks.control.base_path import BaseMotion
+from benchmarks.control.plan_limits import PlanLimits
+from benchmarks.control.rest_to_rest import quickest
 from rolling_panda.model.differential_drive import NQ, NXI, Array
 from rolling_panda.model.robot import ARM_Q, ARM_XI, RobotModel
 

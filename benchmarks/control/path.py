@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller.motion.speed_limits import PlanLimits
-from controller.planning.arm_path import ArmPath, ArmPathPlanner, Blocked
-from controller.planning.base_path import BaseMotion, BasePlanner
-from controller.planning.plan import Plan, Wait, arm_samples, assemble, orders
+from benchmarks.control.arm_path import ArmPath, ArmPathPlanner, Blocked
+from benchmarks.control.base_path import BaseMotion, BasePlanner
+from benchmarks.control.plan import Plan, Wait, arm_samples, assemble, orders
+from benchmarks.control.plan_limits import PlanLimits
 from controller.whole_body.collision import Clearance, CollisionModel
 from controller.whole_body.manipulability import arm_omega
 from rolling_panda.model.differential_drive import Array

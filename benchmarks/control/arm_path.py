@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller.motion.speed_limits import PlanLimits
+from benchmarks.control.plan_limits import PlanLimits
 from controller.whole_body.collision import CollisionModel, Pair
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_Q

@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from controller.motion.speed_limits import plan_limits
-from controller.planning.base_path import BasePlanner
+from benchmarks.control.base_path import BasePlanner
+from benchmarks.control.plan_limits import plan_limits
 from rolling_panda.config import RobotConfig
 from rolling_panda.model.robot import RobotModel
 

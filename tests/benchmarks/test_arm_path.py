@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from controller.motion.speed_limits import plan_limits
-from controller.planning.arm_path import ArmPath, ArmPathPlanner, Blocked
+from benchmarks.control.arm_path import ArmPath, ArmPathPlanner, Blocked
+from benchmarks.control.plan_limits import plan_limits
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.obstacle import Obstacle
 from rolling_panda.model.robot import ARM_Q, RobotModel
@@ -53,7 +53,7 @@ def test_round_a_post(collision):
 
 
 def test_the_search_finds_what_known_postures_do_not(collision, monkeypatch):
-    monkeypatch.setattr("controller.planning.arm_path._TUCKS", np.empty((0, 6)))
+    monkeypatch.setattr("benchmarks.control.arm_path._TUCKS", np.empty((0, 6)))
     collision.set_obstacles([POST])
     path = ArmPathPlanner(collision, LIMITS, seed=3).find(configuration(LEFT), RIGHT)
     assert isinstance(path, ArmPath)
