@@ -68,6 +68,7 @@ def test_a_key_with_a_passphrase_is_refused_and_nobody_is_asked_for_it(tmp_path)
     certificate, key = self_signed(tmp_path)
     plain = serialization.load_pem_private_key(key.read_bytes(), None)
     locked = serialization.BestAvailableEncryption(b"secret")
+    assert told("--tls-cert", certificate, "--tls-key", key).tls is not None
     key.write_bytes(plain.private_bytes(serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, locked))
     # OpenSSL itself would ask on the terminal, which a service has nobody at.
     child, terminal = pty.fork()

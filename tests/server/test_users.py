@@ -6,8 +6,9 @@ import stat
 import pytest
 
 from rolling_panda.errors import InputError
+from rolling_panda.runtime.state_folder import usual_state_folder
 from server.auth.user_command import main
-from server.auth.users import UserFile
+from server.auth.users import MAX_LENGTH, MIN_LENGTH, UserFile
 
 PASSWORD = "correct horse battery"
 
@@ -106,3 +107,55 @@ def test_who_gives_up_at_the_password_changes_nothing(tmp_path, monkeypatch, cap
     monkeypatch.setattr("getpass.getpass", ask)
     code, told = run(monkeypatch, capsys, "add", "ada", "--state", str(tmp_path))
     assert code == 1 and "nothing was changed" in told and not (tmp_path / "users.json").exists()
+
+
+def test_without_a_folder_the_users_are_those_of_the_robots_state(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    typed = {"typed": f"{PASSWORD}\r X\n"}
+    assert run(monkeypatch, capsys, "add", "ada", "--robot-id", "rp7", "--password-stdin", **typed)[0] == 0
+    file = UserFile(tmp_path / "rolling-panda" / "rp7" / "users.json")
+    assert file.check("ada", f"{PASSWORD}\r X") and file.check("ada", PASSWORD) is None
+    assert "supervisor" not in run(monkeypatch, capsys, "list", "--robot-id", "rp7")[1]
+
+
+def test_a_command_has_to_be_named_and_the_help_names_the_folder_of_the_users(capsys):
+    with pytest.raises(SystemExit) as refused:
+        main([])
+    assert refused.value.code == 2
+    assert "COMMAND" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["add", "--help"])
+    told = "".join(capsys.readouterr().out.split())
+    assert "".join(str(usual_state_folder("ROBOT_ID")).split()) in told
+
+
+def test_a_password_of_the_least_and_of_the_greatest_length_will_do(users):
+    for name, length in (("short", MIN_LENGTH), ("long", MAX_LENGTH)):
+        users.add(name, "viewer", "x" * length)
+        assert users.check(name, "x" * length)
+    for length in (MIN_LENGTH - 1, MAX_LENGTH + 1):
+        with pytest.raises(InputError, match=f"this one has {length}"):
+            users.add("other", "viewer", "x" * length)
+
+
+def test_folders_made_for_the_file_are_for_their_owner_alone(users):
+    assert stat.S_IMODE(users.path.parent.stat().st_mode) == 0o700
+
+
+def test_a_file_that_is_no_users_file_lets_nobody_in(tmp_path):
+    folder, binary = UserFile(tmp_path), UserFile(tmp_path / "binary")
+    with pytest.raises(InputError, match="cannot read the users file .*: Is a directory"):
+        folder.all()
+    (tmp_path / "link").symlink_to(tmp_path / "nowhere")
+    with pytest.raises(InputError, match="cannot write the users file .*: File exists"):
+        UserFile(tmp_path / "link" / "users.json").add("ada", "viewer", PASSWORD)
+    binary.path.write_bytes(b'{"users":[{"name":"\xff"}]}')
+    with pytest.raises(InputError, match="is no users file"):
+        binary.all()
+    binary.path.write_text('{"users":[{"name":"ada","role":"viewer","password":"as typed"}]}')
+    assert binary.check("ada", "as typed") is None
+
+
+def test_of_nobody_there_is_nobody_to_name(tmp_path):
+    with pytest.raises(InputError, match="there are nobody"):
+        UserFile(tmp_path / "users.json").remove("eve")
