@@ -10,7 +10,7 @@ from controller.core import Controller
 from controller.ledger.start import restored, start_record
 from controller.ledger.store import Ledger
 from controller.ledger.writer import LedgerWriter
-from controller.loop import Loop
+from controller.loop import controller_runner
 from controller.planner_process import PlannerProcess
 from controller.stop_file import open_stop_file
 from rolling_panda.config import RobotConfig, load_section
@@ -46,10 +46,10 @@ def _work(context: ProcessContext) -> None:
     ledger = LedgerWriter(lambda: Ledger(folder))
     ledger.write([start_record(context.config_path, run_id)])
     planner = PlannerProcess(config, robot_config)
-    loop = Loop(controller, context.transport, config.rate_hz, ledger, planner, stop_file)
+    runner = controller_runner(controller, context.transport, config.rate_hz, ledger, planner, stop_file)
     freeze_heap()
     try:
-        loop.run(context.stopping)
+        runner.run(context.stopping)
     finally:
         planner.close()
         ledger.close()

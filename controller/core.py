@@ -1,4 +1,4 @@
-"""Core of the controller: newest inputs and intents in, commands and state out. No clock, no thread, no wire.
+"""Core of the controller: what has arrived and intents in, messages out. No clock, no thread, no wire.
 
 Supervision (`controller/supervision/supervisor.py`) decides whether the robot may move, `controller/work/movement.py`
 how it moves, the queue what is cut. `Controller` calls them in order for each period and each request.
@@ -7,27 +7,29 @@ how it moves, the queue what is cut. `Controller` calls them in order for each p
 import math
 from collections.abc import Iterable
 
+import msgspec
+
 from controller.config import ControllerConfig
-from controller.interface import Outputs, StepInputs
 from controller.ledger.journal import (
     ApproachRow,
     EventLogger,
     Journal,
+    LedgerState,
     OrderRow,
     PreviewRequiredRow,
+    Records,
     RequestRow,
     TicketRow,
 )
 from controller.motion.follower import Tracking
 from controller.planning.plan_manager import PlanManager
 from controller.planning.preview import PreviewManager
-from controller.planning.preview_plan import PreviewRequest
-from controller.planning.work_plan import PlanRequest
+from controller.planning.preview_plan import Preview, PreviewRequest
+from controller.planning.work_plan import PlanRequest, WorkPlan
 from controller.report import controller_state
 from controller.supervision.authority import client_of
 from controller.supervision.modes import Event
 from controller.supervision.permission import Situation, allowed, refusal
-from controller.supervision.stale_messages import StaleMessageFilter
 from controller.supervision.supervisor import Supervisor
 from controller.whole_body.task import Method
 from controller.work.movement import MotionResult, Movement
@@ -41,10 +43,13 @@ from rolling_panda.bounds import wider
 from rolling_panda.commands import COMMAND_OF, Handlers
 from rolling_panda.config import RobotConfig
 from rolling_panda.errors import ControlError
-from rolling_panda.messages.perception import CloseUpRequest
+from rolling_panda.messages.perception import CloseUpRequest, CloseUpResult, Obstacles
 from rolling_panda.messages.supervision import StopRecord
+from rolling_panda.transport.inbox import Answered, Inbox, Rejected, Reply, Request
 
-_STATE_S, _STOPS_S = 0.05, 0.5
+_STATE_S = 0.05
+#: Refused messages that are reported, each period at most.
+_REPORTED = 20
 
 
 class Controller:
@@ -84,9 +89,9 @@ class Controller:
         )
         self._supervisor = Supervisor(config, self._movement, self._event_log)
         self._handlers = self._all_handlers()
-        self._inputs, self._stale_filter = StepInputs(), StaleMessageFilter()
+        self._inbox = Inbox()
         self._points_seen: object = None
-        self._state_due = self._stops_due = -math.inf
+        self._state_due = -math.inf
         self._relaxed_limits = (*wider("controller", config), *wider("robot", robot_config))
         for line in self._relaxed_limits:
             self._event_log.say("warning", f"less strict than usual: {line}")
@@ -100,10 +105,6 @@ class Controller:
     def waits(self) -> bool:
         """Whether another controller commands the robot. This one publishes nothing and refuses intents."""
         return self._supervisor.fencing.waits
-
-    def release_token(self) -> m.TokenRequest:
-        """The message that releases the fencing token when this controller ends."""
-        return self._supervisor.fencing.release_token()
 
     @property
     def recorded(self) -> int:
@@ -132,52 +133,72 @@ class Controller:
         self._queue.restore(rows)
         self._supervisor.restore(stops)
 
-    def step(self, inputs: StepInputs, now: float) -> Outputs:
+    def step(self, inbox: Inbox, now: float) -> list[object]:
         """One control period.
 
         Args:
-            inputs: Newest inputs.
-            now: Monotonic time (s), the clock of the inputs' arrival times.
+            inbox: What has arrived. The planner's `WorkPlan` and `Preview` and the ledger's `LedgerState` are in it.
+            now: Monotonic time (s), the clock of the arrival times.
+
+        Returns:
+            Messages and requests to other processes; `Reply` to operators; `Records` for the ledger; `PlanRequest` and
+            `PreviewRequest` for the planner.
         """
         self._event_log.now = now
-        inputs = self._stale_filter.of(inputs)
-        self._update(inputs, now)
+        replies = []
+        while (request := inbox.next_request()) is not None:
+            replies.append(Reply(request, self._reply(request, now)))
+        stops = self._update(inbox, now)
         supervisor = self._supervisor
-        supervisor.review(now)
+        supervisor.review(stops, now)
         moved = self._move(now)
         cut = self._cut(*moved.cut) if moved.cut is not None and self.mode == "AUTO" else None
-        joints, fencing = inputs.joints, supervisor.fencing
+        joints, fencing = inbox.newest(m.JointState), supervisor.fencing
         motion = self._movement.send(moved.xi, fencing.token, joints, self.mode == "ESTOP_LATCHED")
         token = None if joints is None else fencing.request(joints.message.sequence, self.mode, now)
         release = supervisor.stops.release_due()
-        state = control = stops = plan = request = preview = shown = wanted = None
+        due = (token, supervisor.stop_due, motion, cut, self._picture(now), release)
+        out: list[object] = [*replies, *(each for each in due if each is not None)]
         if now >= self._state_due:
             self._state_due = now + _STATE_S
-            request, wanted = self._review(now), self._review_preview(now)
-            preview, shown = self._previews.message(now), self._previews.motion(now)
-            plan, state, control = self._plans.message(now), self._report(now), supervisor.authority.message(now)
-        if supervisor.stops.changed or now >= self._stops_due:
-            self._stops_due, stops = now + _STOPS_S, supervisor.stops.message()
-        picture = self._picture(now)
-        events, records = self._event_log.drain(), self._journal.drain()
-        return Outputs(
-            motion=motion,
-            token=token,
-            cut=cut,
-            release=release,
-            stop=supervisor.stop_due,
-            state=state,
-            events=events,
-            plan=plan,
-            request=request,
-            records=records,
-            picture=picture,
-            control=control,
-            stops=stops,
-            preview=preview,
-            preview_motion=shown,
-            preview_request=wanted,
-        )
+            out += self._state(now)
+        if supervisor.stops.changed:
+            out.append(supervisor.stops.message())
+        out += self._refused(inbox, now)
+        out += self._event_log.drain()
+        if records := self._journal.drain():
+            out.append(Records(records))
+        return out
+
+    def end(self) -> list[object]:
+        """The last message: another controller may command the robot."""
+        return [self._supervisor.fencing.release_token()]
+
+    def _reply(self, request: Request, now: float) -> m.Answer | None:
+        """The answer of an operator's request; None where another controller has to answer."""
+        if self.waits:
+            return None
+        intent: intents.Intent = request.message
+        # The operator's view has aged while the request waited.
+        aged = msgspec.structs.replace(intent, view_age_s=intent.view_age_s + max(0.0, now - request.at))
+        return self.answer(aged, now)
+
+    def _state(self, now: float) -> list[object]:
+        """State for people, and requests to the planner."""
+        asked = self._review(now), self._review_preview(now)
+        preview, motion = self._previews.message(now), self._previews.motion(now)
+        plan, state, control = self._plans.message(now), self._report(now), self._supervisor.authority.message(now)
+        return [each for each in (state, control, preview, motion, plan, *asked) if each is not None]
+
+    def _refused(self, inbox: Inbox, now: float) -> list[m.LogEvent]:
+        """Log lines of refused messages and requests. They are not recorded: a flood must not fill the disk."""
+        rejected = (each.message for each in inbox.drain(Rejected)[:_REPORTED])
+        lines = [f"refused on {each.topic}: {each.reason}" for each in rejected]
+        for answered in inbox.drain(Answered):
+            if not answered.message.answer.ok:
+                lines.append(f"the stop is not released: {answered.message.answer.reason}")
+        header = m.Header(now)
+        return [m.LogEvent(header=header, process="controller", severity="warning", text=text[:500]) for text in lines]
 
     def answer(self, intent: intents.Intent, now: float) -> m.Answer:
         """Handle an intent. The answer has the reason of a refusal.
@@ -225,23 +246,27 @@ class Controller:
             raise ControlError(f"commands without a handler: {', '.join(missing)}; add one in controller/core.py")
         return handlers
 
-    def _update(self, inputs: StepInputs, now: float) -> None:
-        self._inputs = inputs
-        self._journal.observe(inputs.ledger, now)
-        self._journal.stops(inputs.stops)
-        self._movement.update(inputs)
-        self._supervisor.update(inputs, self._journal.trouble(now, self._config.ledger_max_age_s), now)
-        sequence = self._movement.sequence
-        if inputs.bridge is not None:
-            close_up = None if inputs.close_up is None else inputs.close_up.message
-            for text in sequence.watch(inputs.bridge.message, close_up, now):
+    def _update(self, inbox: Inbox, now: float) -> tuple[m.StopRequest, ...]:
+        """Take in what has arrived; returns the stops."""
+        self._inbox = inbox
+        recorded = inbox.newest(LedgerState)
+        self._journal.observe(LedgerState() if recorded is None else recorded.message, now)
+        stops = tuple(stop.message for stop in inbox.drain(m.StopRequest))
+        self._journal.stops(stops)
+        self._movement.update(inbox)
+        self._supervisor.update(inbox, self._journal.trouble(now, self._config.ledger_max_age_s), now)
+        sequence, bridge, points = self._movement.sequence, self._supervisor.bridge, inbox.newest(m.PruningPoints)
+        if bridge is not None:
+            close_up = inbox.newest(CloseUpResult)
+            for text in sequence.watch(bridge, None if close_up is None else close_up.message, now):
                 self._event_log.say("info", text)
-        if inputs.points is not None and inputs.points is not self._points_seen:
-            self._points_seen = inputs.points
-            for text in self._queue.update(inputs.points.message, sequence.in_canes):
+        if points is not None and points is not self._points_seen:
+            self._points_seen = points
+            for text in self._queue.update(points.message, sequence.in_canes):
                 self._event_log.say("warning", text)
         if back := self._queue.restored():
             self._event_log.say("info", f"accepted again after the rule was undone: {back}"[:500])
+        return stops
 
     def _move(self, now: float) -> MotionResult:
         """The motion of this period, and its effect on the mode."""
@@ -259,7 +284,7 @@ class Controller:
         return moved
 
     def _cut(self, cut_id: str, point_id: str) -> m.CutCommand | None:
-        token, joints = self._supervisor.fencing.token, self._inputs.joints
+        token, joints = self._supervisor.fencing.token, self._inbox.newest(m.JointState)
         if token is None or joints is None:
             return None
         return m.CutCommand(
@@ -320,10 +345,11 @@ class Controller:
 
     def _review(self, now: float) -> PlanRequest | None:
         """Update the session's plan; returns the next request to the planner."""
-        obstacles, movement = self._inputs.obstacles, self._movement
+        made = self._inbox.newest(WorkPlan)
+        obstacles, movement = self._inbox.newest(Obstacles), self._movement
         measured = movement.body.measured
         return self._plans.review(
-            made=self._inputs.plan,
+            made=None if made is None else made.message,
             q=None if measured is None else movement.sequence.clear_of_canes(measured.q),
             obstacles=() if obstacles is None else obstacles.message.capsules,
             at_rest=not movement.homing and self.mode != "TELEOP" and movement.at_rest,
@@ -339,10 +365,11 @@ class Controller:
 
     def _review_preview(self, now: float) -> PreviewRequest | None:
         """Update the preview; returns the next request to the planner."""
-        obstacles, movement = self._inputs.obstacles, self._movement
+        made = self._inbox.newest(Preview)
+        obstacles, movement = self._inbox.newest(Obstacles), self._movement
         measured = movement.body.measured
         return self._previews.review(
-            made=self._inputs.preview,
+            made=None if made is None else made.message,
             q=None if measured is None else measured.q,
             obstacles=() if obstacles is None else obstacles.message.capsules,
             cuts=self._plans.cuts,
@@ -363,7 +390,7 @@ class Controller:
             measured=movement.body.measured,
             tracking=movement.tracking,
             allowed=allowed(now, self._situation(now)),
-            inputs=self._inputs,
+            inbox=self._inbox,
             queue=self._queue.entries(),
             nearest=movement.body.surroundings.model.nearest,
             order=self._queue.order.state,

@@ -1,268 +1,142 @@
-"""The control loop on the wire: update, step, publish, at a fixed rate."""
+"""The controller as a process: its core with the ledger, the planner and the file of the latched stops."""
 
-import queue
-import statistics
 import sys
-import threading
-import time
-from collections import deque
-from dataclasses import replace
-from typing import Generic
+from collections.abc import Sequence
+from typing import Protocol
 
-from controller.command_inbox import CommandInbox, CommitBarrier
-from controller.core import Controller
-from controller.inputs import Sample
-from controller.interface import Outputs, StepInputs
-from controller.ledger.journal import LedgerState
+from controller.commit_barrier import CommitBarrier
+from controller.ledger.journal import LedgerState, Records
 from controller.ledger.writer import LedgerWriter
 from controller.planner_process import PlannerProcess
+from controller.planning.preview_plan import PreviewRequest
+from controller.planning.work_plan import PlanRequest
 from controller.stop_file import Stops
 from rolling_panda import messages as m
-from rolling_panda.errors import ServiceError
-from rolling_panda.messages.supervision import StopState
+from rolling_panda.messages.supervision import ControlState, PreviewMotion, PreviewState, StopState
 from rolling_panda.runtime.latest_file import KeptValue
-from rolling_panda.topics import (
-    BRIDGE,
-    CLOSE_UP,
-    CLOSE_UP_REQUEST,
-    CONTROL,
-    CONTROLLER,
-    CUT,
-    EVENT,
-    HEARTBEAT,
-    INTENT,
-    JOINTS,
-    MOTION,
-    OBSTACLES,
-    ODOMETRY,
-    PLAN,
-    POINTS,
-    PRESENCE,
-    PREVIEW,
-    PREVIEW_MOTION,
-    RELEASE,
-    REPORT,
-    STOP,
-    STOPS,
-    TELEOP,
-    TOKEN,
-    Topic,
-)
-from rolling_panda.transport.loop_clock import LoopClock
-from rolling_panda.transport.zenoh import Msg, Slot, Transport
+from rolling_panda.topics import REPORT
+from rolling_panda.transport.inbox import Inbox, Reply
+from rolling_panda.transport.runner import Runner, Standby, Wire
 
 #: Longest time that the loop's clock advances in one iteration, in periods.
 _LONGEST_TURN = 5
-#: Number of iterations in the median of the step time, at most.
-_TIMED = 200
-#: A period is late from this multiple of its nominal length.
-_LATE = 1.5
 
 
-class _Newest(Generic[Msg]):
-    """Newest message of a topic, with its arrival time on the loop's clock."""
+class Core(Protocol):
+    """The part of `controller.core.Controller` that the process needs."""
 
-    def __init__(self, slot: Slot[Msg], clock: LoopClock) -> None:
-        self._slot, self._clock = slot, clock
-        self._held: Sample[Msg] | None = None
+    @property
+    def waits(self) -> bool:
+        """Whether another controller commands the robot."""
 
-    def sample(self) -> Sample[Msg] | None:
-        """None before the first; the same object as long as it holds the same message."""
-        received = self._slot.peek()
-        if received is not None and (self._held is None or self._held.message is not received.message):
-            self._held = Sample(received.message, self._clock.of(received.at))
-        return self._held
+    @property
+    def recorded(self) -> int:
+        """Number of the newest record."""
+
+    def step(self, inbox: Inbox, now: float) -> list[object]:
+        """One control period."""
+
+    def end(self) -> list[object]:
+        """The last messages."""
 
 
-class Loop:
-    """Connects one `Controller` to the wire."""
+class ControllerProcess:
+    """Steps the core. What it says of its decisions is sent once the ledger and the file of stops hold them."""
 
     def __init__(
         self,
-        controller: Controller,
-        transport: Transport,
-        rate_hz: float,
+        core: Core,
         ledger: LedgerWriter,
         planner: PlannerProcess | None = None,
         stop_file: KeptValue[Stops] | None = None,
     ) -> None:
-        """Create subscribers and publishers. `run` starts the loop.
+        """Bind the parts.
 
         Args:
-            controller: The core.
-            transport: Open session.
-            rate_hz: Control rate.
+            core: The core.
             ledger: Writer of the records.
             planner: Planner of plans and previews; None works without them.
             stop_file: File of the latched stops; None keeps nothing.
         """
-        self._planner, self._ledger = planner, ledger
+        self._core, self._ledger, self._planner = core, ledger, planner
+        self._stop_file = stop_file or KeptValue(())
         self._barrier = CommitBarrier()
-        self._commands = CommandInbox(controller, self._barrier)
-        self._controller, self._transport, self._period = controller, transport, 1.0 / rate_hz
-        self._clock = LoopClock(time.monotonic(), _LONGEST_TURN * self._period)
-        self._joints, self._odometry = self._newest(JOINTS), self._newest(ODOMETRY)
-        self._bridge, self._points = self._newest(BRIDGE), self._newest(POINTS)
-        self._obstacles = self._newest(OBSTACLES)
-        self._presence = self._newest(PRESENCE)
-        self._teleop, self._stops = self._newest(TELEOP), transport.feed(STOP, 32)
-        self._beats: dict[m.Process, tuple[int, float]] = {}
-        transport.subscribe(HEARTBEAT, self._on_heartbeat)
-        self._said: queue.SimpleQueue[str] = queue.SimpleQueue()
-        transport.on_reject = lambda topic, reason: self._said.put(f"refused on {topic}: {reason}")
-        transport.serve(INTENT, self._commands.ask)
-        self._log_events = transport.feed(EVENT, 1000)
-        self._close_up, self._picture = self._newest(CLOSE_UP), transport.publisher(CLOSE_UP_REQUEST)
-        self._motion, self._cut = transport.publisher(MOTION), transport.publisher(CUT)
-        self._token, self._stop = transport.publisher(TOKEN), transport.publisher(STOP)
-        self._state, self._event = transport.publisher(CONTROLLER), transport.publisher(EVENT)
-        self._plan, self._control = transport.publisher(PLAN), transport.publisher(CONTROL)
-        self._preview = transport.publisher(PREVIEW)
-        self._preview_motion = transport.publisher(PREVIEW_MOTION)
-        self._latched, self._stop_file = transport.publisher(STOPS), stop_file or KeptValue(())
         self._stops_told: StopState | None = None
-        self._report, self._report_due = transport.publisher(REPORT), 0.0
-        self._ticks: deque[float] = deque(maxlen=min(round(rate_hz), _TIMED))
-        self._tick_s = 0.0
-        self._count = self._late = 0
+        self._report_due = 0.0
+        self._recorded = LedgerState()
+        self._waited = False
 
-    def update(self) -> StepInputs:
-        """Collect the newest inputs."""
-        beats = self._beats
-        return StepInputs(
-            joints=self._joints.sample(),
-            odometry=self._odometry.sample(),
-            bridge=self._bridge.sample(),
-            points=self._points.sample(),
-            obstacles=self._obstacles.sample(),
-            teleop=self._teleop.sample(),
-            presence=self._presence.sample(),
-            server_seen=beats["server"][1] if "server" in beats else None,
-            perception_seen=beats["perception"][1] if "perception" in beats else None,
-            present=self._transport.present(),
-            stops=tuple(stop.message for stop in self._stops.drain()),
-            wall_time=time.time(),
-            plan=None if self._planner is None else self._planner.newest,
-            preview=None if self._planner is None else self._planner.newest_preview,
-            ledger=self._recorded(),
-            close_up=self._close_up.sample(),
-            tick_s=self._tick_s,
-            ticks=self._count,
-            late_ticks=self._late,
-        )
+    def step(self, inbox: Inbox, now: float) -> list[object]:
+        """One control period; returns the messages for the wire.
 
-    def _recorded(self) -> LedgerState:
-        """Durability of the ledger and of the latched stops."""
-        state = self._ledger.state
-        return LedgerState(state.durable, state.failure or self._stop_file.failure)
-
-    def publish(self, outputs: Outputs, now: float) -> None:
-        """Send the due messages. The state waits until its content is durable.
-
-        While another controller commands the robot, this one sends events only.
+        While another controller commands the robot, no state is told, and events are printed too.
         """
-        self._ledger.write(outputs.records)
-        waits = self._controller.waits
-        if waits:
-            outputs = replace(outputs, state=None, control=None, plan=None, preview=None, preview_motion=None)
-        if outputs.token is not None:
-            self._token.put(outputs.token)
-        if outputs.stop is not None:
-            self._stop.put(outputs.stop)
-        if outputs.motion is not None:
-            self._motion.put(outputs.motion)
-        if outputs.cut is not None:
-            self._cut.put(outputs.cut)
-        if outputs.picture is not None:
-            self._picture.put(outputs.picture)
-        if outputs.release is not None:
-            threading.Thread(target=self._release, args=(outputs.release,), daemon=True).start()
-        if outputs.state is not None:
-            state = outputs.state
-            self._barrier.hold(self._controller.recorded, now, lambda _: self._state.put(state))
-            self._tick_s = statistics.median(self._ticks) if self._ticks else 0.0
-        if outputs.stops is not None:
-            self._stop_file.keep(outputs.stops.stops)
-            self._stops_told = outputs.stops
+        self._gather(inbox, now)
+        out: list[object] = []
+        told = self._core.step(inbox, now)
+        waits = self._core.waits
+        for message in told:
+            match message:
+                case m.ControllerState() | ControlState() | PreviewState() | PreviewMotion() if waits:
+                    pass
+                case Records():
+                    self._ledger.write(message.rows)
+                case m.ControllerState() | Reply():
+                    self._barrier.hold(self._core.recorded, now, message)
+                case StopState():
+                    self._stop_file.keep(message.stops)
+                    self._stops_told = message
+                case PlanRequest() | PreviewRequest():
+                    if self._planner is not None:
+                        self._planner.ask(message)
+                case _:
+                    out.append(message)
+        out += self._barrier.settle(self._ledger.state, now)
         # A stop is reported as latched when it is on disk, so that it is latched after a restart too.
         # If the disk fails, there is a fault.
         if self._stops_told is not None and (self._stop_file.kept or self._stop_file.failure):
-            if not waits:
-                self._latched.put(self._stops_told)
+            out.append(self._stops_told)
             self._stops_told = None
-        if outputs.control is not None:
-            self._control.put(outputs.control)
-        if outputs.request is not None and self._planner is not None:
-            self._planner.ask(outputs.request)
-        if outputs.preview_request is not None and self._planner is not None:
-            self._planner.ask(outputs.preview_request)
-        if outputs.plan is not None:
-            self._plan.put(outputs.plan)
-        if outputs.preview is not None:
-            self._preview.put(outputs.preview)
-        if outputs.preview_motion is not None:
-            self._preview_motion.put(outputs.preview_motion)
-        for event in outputs.events:
-            self._event.put(event)
-            if waits:
-                print(f"rolling-panda controller: {event.text}", file=sys.stderr, flush=True)
-        if now >= self._report_due and not waits:
+        if now >= self._report_due:
             self._report_due = now + 1.0 / REPORT.rate_hz
-            self._report.put(self._ledger.report)
+            out.append(self._ledger.report)
+        if waits:
+            for message in out:
+                if isinstance(message, m.LogEvent):
+                    print(f"rolling-panda controller: {message.text}", file=sys.stderr, flush=True)
+        if waits is not self._waited:
+            self._waited = waits
+            out.insert(0, Standby(waits))
+        return out
 
-    def run(self, stopping: threading.Event) -> None:
-        """Run until `stopping` is set. Late periods are counted; missed periods are skipped."""
-        due = began = time.monotonic()
-        while not stopping.is_set():
-            started = time.monotonic()
-            self._count += 1
-            self._late += started - began > _LATE * self._period
-            began = started
-            now = self._clock.turn(started)
-            self._commands.decide(now)
-            outputs = self._controller.step(self.update(), now)
-            self._ticks.append(time.monotonic() - started)
-            self.publish(outputs, now)
-            self._barrier.settle(self._ledger.state, now)
-            self._record_lines()
-            self._publish_said()
-            due += self._period
-            wait = due - time.monotonic()
-            if wait > 0:
-                time.sleep(wait)
-            else:
-                due += int(-wait / self._period) * self._period
-        self._token.put(self._controller.release_token())
+    def end(self) -> Sequence[object]:
+        """The last messages."""
+        return self._core.end()
 
-    def _newest(self, topic: Topic[Msg]) -> "_Newest[Msg]":
-        return _Newest(self._transport.slot(topic), self._clock)
-
-    def _on_heartbeat(self, beat: m.Heartbeat, at: float) -> None:
-        last = self._beats.get(beat.process)
-        # A heartbeat with an unchanged number comes from a loop that hangs.
-        if last is None or last[0] != beat.sequence:
-            self._beats[beat.process] = (beat.sequence, self._clock.of(at))
-
-    def _record_lines(self) -> None:
-        """Write the log lines of the other processes to the ledger. The controller's own lines are in its records."""
-        for line in self._log_events.drain():
-            if line.message.process != self._transport.process:
+    def _gather(self, inbox: Inbox, now: float) -> None:
+        """Put what the other parts have made into the inbox, and other processes' log lines into the ledger."""
+        state = self._ledger.state
+        recorded = LedgerState(state.durable, state.failure or self._stop_file.failure)
+        if recorded != self._recorded:
+            self._recorded = recorded
+            inbox.put(recorded, now)
+        if self._planner is not None:
+            for made in self._planner.take():
+                inbox.put(made, now)
+        # The controller's own lines are in its records.
+        for line in inbox.drain(m.LogEvent):
+            if line.message.process != "controller":
                 self._ledger.note(line.message)
 
-    def _release(self, release: m.ReleaseStop) -> None:
-        """Runs on its own thread, because the service call blocks."""
-        try:
-            answer = self._transport.call(RELEASE, release)
-        except ServiceError as error:
-            self._said.put(f"the stop is not released: {error}")
-            return
-        if not answer.ok:
-            self._said.put(f"the bridge does not release the stop: {answer.reason}")
 
-    def _publish_said(self) -> None:
-        for _ in range(20):
-            if self._said.empty():
-                return
-            text = self._said.get()[:500]
-            header = m.Header(time.monotonic())
-            self._event.put(m.LogEvent(header=header, process="controller", severity="warning", text=text))
+def controller_runner(
+    core: Core,
+    wire: Wire,
+    rate_hz: float,
+    ledger: LedgerWriter,
+    planner: PlannerProcess | None = None,
+    stop_file: KeptValue[Stops] | None = None,
+) -> Runner:
+    """The controller on a wire; arguments as of `ControllerProcess`, at `rate_hz`."""
+    process = ControllerProcess(core, ledger, planner, stop_file)
+    return Runner(process, wire, 1.0 / rate_hz, _LONGEST_TURN / rate_hz)

@@ -4,6 +4,7 @@ import multiprocessing
 import os
 import signal
 import threading
+from collections import deque
 from multiprocessing.connection import Connection
 
 from controller.config import ControllerConfig
@@ -20,7 +21,7 @@ _END_S = 2.0
 class PlannerProcess:
     """Processes the newest request of each kind, one at a time, previews first. Close it at the end.
 
-    `newest` is the last plan, `newest_preview` the last preview.
+    `take` has the results.
     """
 
     def __init__(self, config: ControllerConfig, robot_config: RobotConfig) -> None:
@@ -36,8 +37,7 @@ class PlannerProcess:
         self._preview: PreviewRequest | None = None
         self._process: multiprocessing.process.BaseProcess | None = None
         self._closing = False
-        self.newest: WorkPlan | None = None
-        self.newest_preview: Preview | None = None
+        self._made: deque[WorkPlan | Preview] = deque()
         self._thread = threading.Thread(target=self._run, name="planner", daemon=True)
         self._thread.start()
 
@@ -55,6 +55,11 @@ class PlannerProcess:
             else:
                 self._plan = request
             self._waiting.notify()
+
+    def take(self) -> list[WorkPlan | Preview]:
+        """Plans and previews since the last call, in the order in which they were made."""
+        made = self._made
+        return [made.popleft() for _ in range(len(made))]
 
     def close(self) -> None:
         """End the process, in the middle of a plan too."""
@@ -75,21 +80,15 @@ class PlannerProcess:
                 break
             try:
                 connection.send(request)
-                self._keep(connection.recv())
+                self._made.append(connection.recv())
             except (EOFError, OSError):
-                self._keep(_failed(request, "the planning process ended; the next request starts it again"))
+                self._made.append(_failed(request, "the planning process ended; the next request starts it again"))
                 connection.close()
                 connection = None
         if connection is not None:
             connection.close()
         if self._process is not None:
             self._process.join(_END_S)
-
-    def _keep(self, made: WorkPlan | Preview) -> None:
-        if isinstance(made, Preview):
-            self.newest_preview = made
-        else:
-            self.newest = made
 
     def _next(self) -> PlanRequest | PreviewRequest | None:
         """Waits for a request; None when closing."""

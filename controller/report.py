@@ -1,7 +1,6 @@
 """The message of the controller state."""
 
 from controller.config import ControllerConfig
-from controller.inputs import Inputs
 from controller.motion.follower import Measured, Tracking
 from controller.supervision.modes import State
 from controller.whole_body.collision import Clearance
@@ -9,6 +8,7 @@ from controller.whole_body.joint_limits import margin
 from controller.whole_body.manipulability import arm_omega
 from rolling_panda import messages as m
 from rolling_panda.model.robot import RobotModel, pose_message
+from rolling_panda.transport.inbox import Inbox
 
 
 def controller_state(
@@ -21,7 +21,7 @@ def controller_state(
     measured: Measured | None,
     tracking: Tracking | None,
     allowed: tuple[str, ...],
-    inputs: Inputs,
+    inbox: Inbox,
     queue: tuple[m.QueueEntry, ...],
     nearest: Clearance | None,
     order: m.QueueOrder,
@@ -40,7 +40,7 @@ def controller_state(
         measured: Measured state of the robot; None before the first joint state.
         tracking: Tracking of the current motion.
         allowed: Commands that are allowed.
-        inputs: Newest inputs.
+        inbox: What has arrived, with the pace of the loop.
         queue: Points in the order of work.
         nearest: Smallest distance in the last step.
         order: Origin of that order.
@@ -70,9 +70,9 @@ def controller_state(
         rotation_error=0.0 if tracking is None else tracking.rotation_error,
         manipulability=omega,
         joint_margin=0.0 if measured is None else margin(measured.q, robot.limits),
-        tick_s=inputs.tick_s,
-        ticks=inputs.ticks,
-        late_ticks=inputs.late_ticks,
+        tick_s=inbox.tick_s,
+        ticks=inbox.ticks,
+        late_ticks=inbox.late_ticks,
         queue=queue,
         limited_by="" if tracking is None else tracking.reason[:500],
         proximity=None if tracking is None or nearest is None else _proximity(nearest),

@@ -37,6 +37,7 @@ class Topic(Generic[Msg]):
         latched: The sender repeats the newest message at `rate_hz`, so that late joiners get it.
         queue: Messages that a reader's inbox keeps in order; 0 = the newest only.
         wakes: A message wakes its reader's loop at once.
+        ordered: A message with an older stamp, which arrives late, is dropped.
         about: Description for the documentation.
     """
 
@@ -52,6 +53,7 @@ class Topic(Generic[Msg]):
     latched: bool = False
     queue: int = 0
     wakes: bool = False
+    ordered: bool = False
 
     def said_by(self, process: m.Process) -> bool:
         """Whether this process may publish it."""
@@ -108,15 +110,15 @@ TELEOP = Topic(
 )
 JOINTS = Topic(
     "state/joints", m.JointState, "bridge", "controller, server", 100, "INTERACTIVE_HIGH", "DROP",
-    "measured position and velocity of wheels and arm joints", express=True,
+    "measured position and velocity of wheels and arm joints", express=True, ordered=True,
 )
 ODOMETRY = Topic(
     "state/odometry", m.Odometry, "bridge", "controller, server", 50, "INTERACTIVE_HIGH", "DROP",
-    "base pose in odom and twist, from the wheels", express=True,
+    "base pose in odom and twist, from the wheels", express=True, ordered=True,
 )
 BRIDGE = Topic(
     "state/bridge", m.BridgeState, "bridge", "controller, server, onlooker", 20, "INTERACTIVE_HIGH", "DROP",
-    "stop latch, watchdog, cutter, refused messages",
+    "stop latch, watchdog, cutter, refused messages", ordered=True,
 )
 CONTROLLER = Topic(
     "state/controller", m.ControllerState, "controller", "server, onlooker", 20, "INTERACTIVE_HIGH", "DROP",
@@ -148,7 +150,7 @@ PREVIEW = Topic(
 )
 PREVIEW_MOTION = Topic(
     "controller/preview-motion", supervision.PreviewMotion, "controller", "server", 0.2, "DATA_LOW", "DROP",
-    "motion of the preview; also at once on change", latched=True,
+    "motion of the preview; also at once on change",
 )
 REPORT = Topic(
     "controller/report", supervision.SessionReport, "controller", "server", 0.2, "BACKGROUND", "DROP",

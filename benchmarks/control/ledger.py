@@ -5,7 +5,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack, closing
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +13,13 @@ from benchmarks.common.documents import bench_parser, write
 from benchmarks.control.tick import working
 from benchmarks.control.tick_parts import Times
 from controller.ledger.check import verify
-from controller.ledger.journal import LedgerState, Record
+from controller.ledger.journal import LedgerState, Record, Records
 from controller.ledger.store import Entry, Ledger
 from controller.ledger.writer import LedgerWriter
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.runtime.scheduling import set_priority
+from tests.support.sent import every
 
 _PERIOD_S = 0.01
 _SLOW_S = 0.2
@@ -68,10 +69,12 @@ class Side:
         robot, ledger = self.robot, self.ledger
         if self._steps % _DECISION == 0:
             robot.ask(intents.RejectPoint(user="bench", point_id="p999"))
-        inputs = replace(robot.inputs(), ledger=ledger.state)
+        robot.ledger = ledger.state
+        inbox = robot.inputs()
         started = time.perf_counter()
-        out = robot.controller.step(inputs, robot.now)
-        ledger.write(out.records)
+        out = robot.controller.step(inbox, robot.now)
+        for records in every(out, Records):
+            ledger.write(records.rows)
         ended = time.perf_counter()
         if robot.controller.mode != "AUTO":
             return None

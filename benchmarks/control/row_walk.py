@@ -1,10 +1,9 @@
 """An operator who works along a whole row: accepts what is found, starts, drives on where nothing is left."""
 
 import math
-from dataclasses import replace
 
-from controller.inputs import Sample
 from rolling_panda import commands as intents
+from rolling_panda.messages.robot import Odometry
 from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
 from tests.support.worlds.closed_loop import ClosedLoop
 
@@ -52,7 +51,7 @@ def walk(loop: ClosedLoop, end: float, limit_s: float = 600.0) -> tuple[float, f
 
 
 def _place(loop: ClosedLoop) -> float:
-    odometry = loop.inputs.odometry
+    odometry = loop.inbox.newest(Odometry)
     return 0.0 if odometry is None else odometry.message.pose.x
 
 
@@ -67,7 +66,6 @@ def _go_on(loop: ClosedLoop, distance: float) -> None:
         left = goal - _place(loop)
         drive = BaseVelocity(linear=min(_SPEED, math.sqrt(0.4 * max(left, 0.0)) + 0.01), angular=0.0)
         held = TeleopTarget(sequence=round(100 * loop.now), hold=True, user=_USER, base=drive)
-        loop.inputs = replace(loop.inputs, teleop=Sample(held, loop.now))
+        loop.hear(held)
         loop.run(0.05)
-    loop.inputs = replace(loop.inputs, teleop=None)
     loop.run(_SURVEY_S)

@@ -5,18 +5,17 @@ other minute the ways between them have up to 100 ms of jitter. The clock is sim
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 
 import msgspec
 import numpy as np
 
 from benchmarks.common.documents import bench_parser, write
 from benchmarks.faults.judge import Rows, replays, violations
-from controller.inputs import Sample
-from controller.interface import Outputs
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from tests.support.points import point
+from tests.support.sent import every
 from tests.support.worlds.faulty_world import FaultyWorld
 
 _USER = "ada"
@@ -74,14 +73,13 @@ class EndlessRow(FaultyWorld):
         points = tuple(_point(number) for number in range(max(0, self._shown - _AHEAD), wanted))
         self._shown = wanted
         message = m.PruningPoints(header=m.Header(self.now, "odom"), segmenter="none", frames=1, points=points)
-        self.inputs = replace(self.inputs, points=Sample(message, self.now))
+        self.hear(message)
         self.run(0.02)
         self.ask(intents.AcceptAll(user=_USER, confidence=0.0))
 
-    def send(self, out: Outputs) -> None:
+    def send(self, out: list[object]) -> None:
         """Note the cut that is ordered."""
-        if out.cut is not None:
-            self.cut_ids.add(out.cut.cut_id)
+        self.cut_ids |= {cut.cut_id for cut in every(out, m.CutCommand)}
         super().send(out)
 
 

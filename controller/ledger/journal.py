@@ -27,6 +27,13 @@ class Record:
 
 
 @dataclass(frozen=True)
+class Records:
+    """Output of a control step: rows for the ledger, in order."""
+
+    rows: tuple[Record, ...]
+
+
+@dataclass(frozen=True)
 class LedgerState:
     """Durability of the records: all up to number `durable` are on disk. `failure` is the reason why others are not."""
 

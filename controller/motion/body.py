@@ -3,7 +3,6 @@
 import numpy as np
 
 from controller.config import ControllerConfig
-from controller.inputs import Inputs
 from controller.motion.base_estimate import BaseEstimate, wheels_ahead
 from controller.motion.follower import Follower, Measured
 from controller.motion.setpoints import Setpoints
@@ -15,7 +14,10 @@ from controller.whole_body.saturation import Saturation
 from controller.whole_body.task import Method
 from controller.whole_body.two_rates import TwoRates
 from rolling_panda.config import RobotConfig
+from rolling_panda.messages.perception import Obstacles
+from rolling_panda.messages.robot import JointState, Odometry
 from rolling_panda.model.robot import RobotModel
+from rolling_panda.transport.inbox import Inbox
 
 
 class Body:
@@ -47,17 +49,18 @@ class Body:
         self.tracking_error = TrackingErrorMonitor()
         self.measured: Measured | None = None
 
-    def update(self, inputs: Inputs) -> None:
-        """Update state and obstacles from the inputs."""
-        if inputs.joints is not None:
-            self.tracking_error.update(inputs.joints.message, self.setpoints.sent)
-        if inputs.joints is not None and inputs.odometry is not None:
+    def update(self, inbox: Inbox) -> None:
+        """Update state and obstacles from what has arrived."""
+        joints, odometry = inbox.newest(JointState), inbox.newest(Odometry)
+        if joints is not None:
+            self.tracking_error.update(joints.message, self.setpoints.sent)
+        if joints is not None and odometry is not None:
             sent = self.setpoints.sent
-            q = self._base.configuration(inputs.joints.message, inputs.odometry.message)
+            q = self._base.configuration(joints.message, odometry.message)
             # The arm executes this command after its lag. It has to match the base's velocity at that time.
             ahead = self._config.arm_lag_s + 0.5 * self.dt
-            measured = np.array(inputs.joints.message.velocity[:2])
+            measured = np.array(joints.message.velocity[:2])
             wheels = wheels_ahead(measured, sent[:2], ahead, self._config.base_lag_s)
             self.measured = Measured(q, self.robot.kinematics(q), sent)
             self._method.start_period(sent, self.setpoints.before, wheels)
-        self.surroundings.update(inputs.obstacles)
+        self.surroundings.update(inbox.newest(Obstacles))

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from controller.inputs import Sample
 from controller.whole_body.collision import CollisionModel, same
 from controller.whole_body.obstacle import Axes, Obstacle
 from rolling_panda.messages.perception import Capsule, Obstacles
 from rolling_panda.model.differential_drive import Array
+from rolling_panda.transport.inbox import Received
 
 #: Smallest radius of a rod in the collision model (m).
 _THINNEST = 0.001
@@ -23,13 +23,13 @@ class Surroundings:
     def __init__(self, model: CollisionModel) -> None:
         """Begin with nothing around."""
         self.model = model
-        self._seen: Sample[Obstacles] | None = None
+        self._seen: Received[Obstacles] | None = None
         self._places: tuple[Array, ...] = ()
         self._canes: tuple[Capsule, ...] = ()
         self._names: tuple[str, ...] = ()
         self._axes = Axes(())
 
-    def update(self, obstacles: Sample[Obstacles] | None) -> None:
+    def update(self, obstacles: Received[Obstacles] | None) -> None:
         """Take the newest message; one that was taken before costs nothing."""
         if obstacles is None or obstacles is self._seen:
             return

@@ -6,12 +6,12 @@ import numpy as np
 
 from controller.config import ControllerConfig
 from controller.identity import Client
-from controller.inputs import Sample
 from controller.motion.follower import Follower, Measured, Tracking
 from rolling_panda.errors import ModelError
 from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
 from rolling_panda.model.differential_drive import NXI, Array, DifferentialDrive
 from rolling_panda.model.robot import ARM_XI, placement
+from rolling_panda.transport.inbox import Received
 
 #: Delay of the view up to which the speed is full, and from which it is the lowest (s).
 _PROMPT_S, _LATE_S, _SLOWEST = 0.25, 0.5, 0.25
@@ -24,13 +24,13 @@ class Teleoperation:
         """Bind the parts."""
         self._config, self._follower, self._drive = config, follower, drive
         self._posture: Array = np.concatenate([[0.0, 0.0, config.row_heading, 0.0, 0.0], config.reach])
-        self._newest: Sample[TeleopTarget] | None = None
+        self._newest: Received[TeleopTarget] | None = None
         self._message: TeleopTarget | None = None
         self._goal: Any = None
         self.pressed = True
         self.client = Client("", "")
 
-    def holding(self, teleop: Sample[TeleopTarget] | None, now: float) -> bool:
+    def holding(self, teleop: Received[TeleopTarget] | None, now: float) -> bool:
         """Whether the operator holds: the newest target is fresh, held and valid."""
         newest = self._newest_target(teleop)
         if newest is None or not newest.message.hold or now - newest.at > self._config.hold_max_age_s:
@@ -47,7 +47,7 @@ class Teleoperation:
         self.client = Client(message.client or message.user, message.user)
         return self._message is not None and _means_something(message)
 
-    def _newest_target(self, teleop: Sample[TeleopTarget] | None) -> Sample[TeleopTarget] | None:
+    def _newest_target(self, teleop: Received[TeleopTarget] | None) -> Received[TeleopTarget] | None:
         """The newest target by its number. Late or repeated ones are ignored.
 
         After a timeout has ended the hold any number is accepted, because a restarted server counts from one.

@@ -7,7 +7,6 @@ import msgspec
 import numpy as np
 
 from controller.config import ControllerConfig
-from controller.inputs import Sample
 from controller.planning.order import shortest, travel_times
 from controller.planning.preview_plan import Preview, PreviewRequest
 from controller.planning.rollout import Rollout
@@ -20,6 +19,7 @@ from rolling_panda.errors import ControlError
 from rolling_panda.messages.perception import Obstacles
 from rolling_panda.messages.types import Header
 from rolling_panda.model.robot import RobotModel
+from rolling_panda.transport.inbox import Received
 
 #: Number of cuts that are rolled out; later ones when the work comes near them.
 AHEAD = 10
@@ -72,7 +72,7 @@ class CutPlanner:
 
     def _postures(self, request: PlanRequest) -> tuple[dict[str, CutPlan], dict[str, str]]:
         """A posture for each cut, and the reason where there is none."""
-        self._clearance.update(Sample(Obstacles(header=Header(), capsules=request.obstacles), 0.0))
+        self._clearance.update(Received(Obstacles(header=Header(), capsules=request.obstacles), 0.0))
         turned = dict(request.turned)
         cuts: dict[str, CutPlan] = {}
         refused: dict[str, str] = {}

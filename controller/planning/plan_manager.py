@@ -21,7 +21,6 @@ _AGAIN_S = 10.0
 #: Number of next cuts that are rolled out at all times of the work.
 _NEXT = 5
 #: Period of the repeated message for late joiners (s).
-_REPEAT_S = 5.0
 
 
 class PlanManager:
@@ -39,7 +38,6 @@ class PlanManager:
         self._quiet_since = self._asked_at = -np.inf
         self._wanted: tuple[object, ...] = ()
         self._fresh = True
-        self._said_at = -np.inf
         self._watch = ObstacleWatch((), np.empty((0, 2)), ())
         self._compared: object = None
         self._in_the_way = ""
@@ -114,10 +112,10 @@ class PlanManager:
         return cut.cut if cut is not None and self.valid else None
 
     def message(self, now: float) -> SessionPlan | None:
-        """The message of the plan when it is due: after a change, and periodically."""
-        if not self._fresh and now - self._said_at < _REPEAT_S:
+        """The message of the plan after a change."""
+        if not self._fresh:
             return None
-        self._fresh, self._said_at = False, now
+        self._fresh = False
         return session_plan(None if self._state == "none" else self._plan, self._state, self._reason, now)
 
     def _accept(self, made: WorkPlan) -> None:

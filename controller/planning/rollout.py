@@ -14,7 +14,6 @@ import numpy as np
 
 from controller.config import ControllerConfig
 from controller.identity import Token
-from controller.inputs import Inputs, Sample
 from controller.ledger.journal import EventLogger, Journal, LedgerState
 from controller.motion.follower import Measured
 from controller.motion.torque import JointTorque, torque_report
@@ -34,6 +33,7 @@ from rolling_panda.mode_table import Event
 from rolling_panda.model.differential_drive import NXI, Array, DifferentialDrive
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.model.wire_values import actuated, planar_pose, vector3
+from rolling_panda.transport.inbox import Inbox
 
 #: Time between two rows of the preview (s).
 ROW_S = 0.1
@@ -79,10 +79,10 @@ class _Run:
         robot = self._movement.body.robot
         self._actuators = ActuatorLag(robot.drive, request.q, config.base_lag_s, config.arm_lag_s, self._dt)
         self._log = CutLog(robot, self._movement.body.surroundings.model, self._queue)
-        self._obstacles = Sample(Obstacles(header=m.Header(0.0, "odom"), capsules=request.obstacles), 0.0)
+        self._inbox = Inbox()
+        self._inbox.put(Obstacles(header=m.Header(0.0, "odom"), capsules=request.obstacles), 0.0)
         self._asked: set[int] = set()
         self._pending: deque[tuple[float, CloseUpResult]] = deque()
-        self._close_up: Sample[CloseUpResult] | None = None
         self._closing: tuple[str, str, float] | None = None
         self._cut: set[str] = set()
         self._plans: dict[str, CutPlan] = {}
@@ -122,15 +122,16 @@ class _Run:
     def _period(self, number: int, now: float) -> MotionResult:
         """One control period, with the robot's response."""
         movement, sequence = self._movement, self._movement.sequence
-        inputs = self._inputs(number, now)
+        inbox, bridge = self._inbox, self._bridge(now)
+        self._measure(number, now)
+        inbox.put(bridge, now)
         self._journal.drain()
         self._journal.observe(LedgerState(self._journal.number), now)
-        movement.update(inputs)
-        close_up = None if inputs.close_up is None else inputs.close_up.message
-        assert inputs.bridge is not None
-        sequence.watch(inputs.bridge.message, close_up, now)
+        movement.update(inbox)
+        close_up = inbox.newest(CloseUpResult)
+        sequence.watch(bridge, None if close_up is None else close_up.message, now)
         moved = movement.step("AUTO", True, now)
-        command = movement.send(moved.xi, _TOKEN, inputs.joints, latched=False)
+        command = movement.send(moved.xi, _TOKEN, inbox.newest(m.JointState), latched=False)
         if moved.cut is not None and (self._closing is None or self._closing[0] != moved.cut[0]):
             self._closing = (*moved.cut, now)
             self._log.closed(moved.cut[1], now)
@@ -143,7 +144,8 @@ class _Run:
             self._actuators.step(np.array(command.xi))
         return moved
 
-    def _inputs(self, number: int, now: float) -> Inputs:
+    def _measure(self, number: int, now: float) -> None:
+        """The robot's state, and a close-up that has been taken by now, arrive."""
         header = m.Header(now, "odom")
         position, velocity = actuated(self._actuators.q[3:]), actuated(self._actuators.xi)
         linear, angular = self._movement.body.robot.drive.twist(*velocity[:2])
@@ -151,11 +153,9 @@ class _Run:
         base = planar_pose(self._actuators.q)
         odometry = m.Odometry(header=header, sequence=number, pose=base, linear=linear, angular=angular)
         if self._pending and now >= self._pending[0][0]:
-            self._close_up = Sample(self._pending.popleft()[1], now)
-        bridge = Sample(self._bridge(now), now)
-        return Inputs(
-            Sample(joints, now), Sample(odometry, now), bridge, obstacles=self._obstacles, close_up=self._close_up
-        )
+            self._inbox.put(self._pending.popleft()[1], now)
+        self._inbox.put(joints, now)
+        self._inbox.put(odometry, now)
 
     def _bridge(self, now: float) -> m.BridgeState:
         cut_id, point_id, since = self._closing or ("", "", now)

@@ -3,13 +3,13 @@
 import math
 
 from controller.identity import Client
-from controller.inputs import Sample
 from controller.supervision.lease import Lease
 from controller.supervision.modes import Rights, Who
 from rolling_panda import commands as intents
 from rolling_panda.commands import Handlers
 from rolling_panda.messages.supervision import NEVER_SEEN_S, ControlState, Presence
 from rolling_panda.messages.types import Role
+from rolling_panda.transport.inbox import Received
 
 
 class Authority:
@@ -23,7 +23,7 @@ class Authority:
         """
         self._lease = Lease()
         self._supervision_s = supervision_s
-        self._newest: Sample[Presence] | None = None
+        self._newest: Received[Presence] | None = None
         self._seen = -math.inf
 
     @property
@@ -31,7 +31,7 @@ class Authority:
         """Whether a person has control and no transfer is pending."""
         return self._lease.holder is not None and self._lease.next_holder is None
 
-    def review(self, presence: Sample[Presence] | None, at_rest: bool, now: float) -> str:
+    def review(self, presence: Received[Presence] | None, at_rest: bool, now: float) -> str:
         """Update the lease. Returns the reason why the robot must stop; empty without one.
 
         Args:

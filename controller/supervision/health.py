@@ -7,10 +7,11 @@ from typing import Literal
 from msgspec import Struct
 
 from controller.config import ControllerConfig
-from controller.inputs import Inputs
 from rolling_panda import topics
-from rolling_panda.messages.robot import BridgeState
+from rolling_panda.messages.perception import Obstacles
+from rolling_panda.messages.robot import BridgeState, JointState, Odometry
 from rolling_panda.messages.types import Mode
+from rolling_panda.transport.inbox import Inbox, Received
 
 Action = Literal["none", "pause", "protect", "fault"]
 
@@ -47,11 +48,11 @@ class Health(Struct, frozen=True):
     obstacles: float = 0.0
 
 
-def health(inputs: Inputs, overruled: bool, now: float, ledger: str = "", tracking_error: str = "") -> Health:
+def health(inbox: Inbox, overruled: bool, now: float, ledger: str = "", tracking_error: str = "") -> Health:
     """Compute the health of the inputs.
 
     Args:
-        inputs: Newest inputs.
+        inbox: What has arrived.
         overruled: Whether another controller has the bridge's token.
         now: Monotonic time (s).
         ledger: Reason why the ledger cannot record.
@@ -61,20 +62,20 @@ def health(inputs: Inputs, overruled: bool, now: float, ledger: str = "", tracki
     def age(at: float | None) -> float:
         return math.inf if at is None else now - at
 
-    bridge = inputs.bridge
+    joints, odometry, bridge = inbox.newest(JointState), inbox.newest(Odometry), inbox.newest(BridgeState)
     return Health(
-        joints=age(inputs.joints.at if inputs.joints is not None else None),
-        odometry=age(inputs.odometry.at if inputs.odometry is not None else None),
+        joints=age(joints.at if joints is not None else None),
+        odometry=age(odometry.at if odometry is not None else None),
         bridge=age(bridge.at if bridge is not None else None),
-        server=age(inputs.server_seen),
-        perception=age(inputs.perception_seen),
-        present=inputs.present,
+        server=age(inbox.heard("server")),
+        perception=age(inbox.heard("perception")),
+        present=inbox.present,
         watchdog=bridge is not None and bridge.message.watchdog,
         overruled=overruled,
         refused=0 if bridge is None else _refused(bridge.message),
         ledger=ledger,
         tracking_error=tracking_error,
-        obstacles=_picture_age(inputs, now),
+        obstacles=_picture_age(inbox.newest(Obstacles), joints, now),
     )
 
 
@@ -82,13 +83,12 @@ def _refused(bridge: BridgeState) -> int:
     return sum(each.count for each in bridge.rejections if each.topic == topics.MOTION.name)
 
 
-def _picture_age(inputs: Inputs, now: float) -> float:
+def _picture_age(obstacles: Received[Obstacles] | None, joints: Received[JointState] | None, now: float) -> float:
     """Age of the obstacles: the larger of the time since their arrival and their frame's stamp relative to the joints'.
 
     Both stamps are of the bridge's clock. Perception repeats its newest message, so the arrival alone is not enough.
     A stamp from the future counts like an old one.
     """
-    obstacles, joints = inputs.obstacles, inputs.joints
     if obstacles is None or joints is None:
         return math.inf
     return max(now - obstacles.at, abs(joints.message.header.stamp - obstacles.message.header.stamp))

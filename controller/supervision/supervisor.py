@@ -7,7 +7,6 @@ from typing import Final
 
 from controller.config import ControllerConfig
 from controller.identity import Client
-from controller.inputs import Inputs
 from controller.ledger.journal import EventLogger
 from controller.supervision import health as safety
 from controller.supervision import modes
@@ -19,7 +18,8 @@ from controller.supervision.stop_latch import StopLatch
 from controller.work.movement import Movement
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
-from rolling_panda.messages.supervision import StopRecord
+from rolling_panda.messages.supervision import Presence, StopRecord, TeleopTarget
+from rolling_panda.transport.inbox import Inbox
 
 #: A new token is requested when the bridge's watchdog has held the robot for this long (s).
 _ANEW_S: Final = 2.0
@@ -50,10 +50,10 @@ class Supervisor:
         self.state = modes.boot()
         #: Activity that a pause or a protective stop interrupted, until the next start.
         self.interrupted: m.Interrupted = ""
-        self._inputs = Inputs()
+        self._inbox = Inbox()
         #: Time of the last followed command, and the number of refused commands by then.
         self._obeyed, self._refused = 0.0, 0
-        self.health = safety.health(self._inputs, False, 0.0)
+        self.health = safety.health(self._inbox, False, 0.0)
 
     @property
     def mode(self) -> m.Mode:
@@ -63,38 +63,38 @@ class Supervisor:
     @property
     def bridge(self) -> m.BridgeState | None:
         """Newest word of the bridge."""
-        return self._inputs.bridge.message if self._inputs.bridge is not None else None
+        newest = self._inbox.newest(m.BridgeState)
+        return None if newest is None else newest.message
 
     def restore(self, stops: Iterable[StopRecord]) -> None:
         """Take up the latched stops of an earlier start."""
         self.stops = StopLatch(tuple(stops))
         self.state = modes.boot(self.stops.latched)
 
-    def update(self, inputs: Inputs, trouble: str, now: float) -> None:
+    def update(self, inbox: Inbox, trouble: str, now: float) -> None:
         """Take in how fresh everything is.
 
         Args:
-            inputs: Newest of everything.
+            inbox: What has arrived.
             trouble: Why the ledger cannot be relied on; empty when it can.
             now: Monotonic time (s).
         """
-        self._inputs = inputs
+        self._inbox = inbox
         if changed := self.fencing.update(self.bridge, now):
             self._event_log.say("warning" if self.fencing.overruled else "info", changed)
         tracking_error = self._movement.body.tracking_error.reason
-        self.health = safety.health(inputs, self.fencing.overruled, now, trouble, tracking_error)
+        self.health = safety.health(inbox, self.fencing.overruled, now, trouble, tracking_error)
 
-    def review(self, now: float) -> None:
-        """End the motion that is no longer allowed, and start motion by hand."""
+    def review(self, stops: tuple[m.StopRequest, ...], now: float) -> None:
+        """Latch new stops, end the motion that is no longer allowed, and start motion by hand."""
         self._review_token(now)
-        inputs, bridge = self._inputs, self.bridge
-        stops = (*inputs.stops, *self._review_motion())
-        latched = self.stops.update(stops, bridge, inputs.wall_time)
+        bridge = self.bridge
+        latched = self.stops.update((*stops, *self._review_motion()), bridge, self._inbox.wall_time)
         if latched:
             self.event(Event.STOP, now, latched)
         elif self.stops.released(bridge):
             self.event(Event.RESET, now, self.stops.reset_reason, modes.OPERATOR)
-        if lost := self.authority.review(inputs.presence, self._movement.at_rest, now):
+        if lost := self.authority.review(self._inbox.newest(Presence), self._movement.at_rest, now):
             self._pause(lost, now)
         verdict = safety.check(self.mode, self._movement.homing, self.health, self._config)
         if verdict.action == "fault":
@@ -197,7 +197,7 @@ class Supervisor:
 
     def _review_hold(self, now: float) -> None:
         hand = self._movement.teleoperation
-        holding = hand.holding(self._inputs.teleop, now)
+        holding = hand.holding(self._inbox.newest(TeleopTarget), now)
         client = hand.client
         not_theirs = self.authority.refusal(client, "operator") if holding else ""
         holding = holding and not (not_theirs and self.mode == "TELEOP")

@@ -1,12 +1,12 @@
 """Clearance check of a cut plan."""
 
 from controller.config import ControllerConfig
-from controller.inputs import Sample
 from controller.motion.surroundings import Surroundings
 from controller.whole_body.collision import CollisionModel
 from controller.work.posture_search import CutPlan
 from rolling_panda.messages.perception import Obstacles
 from rolling_panda.model.robot import RobotModel
+from rolling_panda.transport.inbox import Received
 
 #: Distance kept from everything where the tool is clear of the canes (m).
 CLEARANCE = 0.02
@@ -22,7 +22,7 @@ class CutClearance:
         self._settings = config.hierarchy
         self._surroundings = Surroundings(CollisionModel(robot))
 
-    def update(self, obstacles: Sample[Obstacles] | None) -> None:
+    def update(self, obstacles: Received[Obstacles] | None) -> None:
         """Take the newest message; one that was taken before costs nothing."""
         self._surroundings.update(obstacles)
 

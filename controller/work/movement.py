@@ -4,7 +4,6 @@ from msgspec import Struct
 
 from controller.config import ControllerConfig
 from controller.identity import Token
-from controller.inputs import Inputs, Sample
 from controller.ledger.journal import EventLogger
 from controller.motion.body import Body
 from controller.motion.follower import Measured, Tracking
@@ -19,9 +18,11 @@ from controller.work.point_queue import PointQueue
 from controller.work.posture_search import PostureSearch
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
+from rolling_panda.messages.perception import Obstacles
 from rolling_panda.mode_table import Event
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import RobotModel
+from rolling_panda.transport.inbox import Inbox, Received
 
 
 class MotionResult(Struct, frozen=True):
@@ -95,11 +96,11 @@ class Movement:
         """Whether the bridge moves the robot by a command that is none of this controller's, or was one to rest."""
         return bridge.moving and bridge.sequence > self._setpoints.moved
 
-    def update(self, inputs: Inputs) -> None:
-        """Update state and obstacles from the inputs."""
-        self.body.update(inputs)
+    def update(self, inbox: Inbox) -> None:
+        """Update state and obstacles from what has arrived."""
+        self.body.update(inbox)
         self.body.surroundings.work_at(self.sequence.places)
-        self._clearance.update(inputs.obstacles)
+        self._clearance.update(inbox.newest(Obstacles))
 
     def go_home(self) -> None:
         """Begin to bring the arm home."""
@@ -149,7 +150,7 @@ class Movement:
         return self._bring_home(robot) if mode == "READY" else self._work(robot, now)
 
     def send(
-        self, xi: Array, token: Token | None, joints: Sample[m.JointState] | None, latched: bool
+        self, xi: Array, token: Token | None, joints: Received[m.JointState] | None, latched: bool
     ) -> m.MotionCommand | None:
         """The command for ξ̇ (9). If it is not finite or outside the limits, the robot brakes instead.
 

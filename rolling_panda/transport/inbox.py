@@ -9,6 +9,8 @@ from rolling_panda import messages as m
 from rolling_panda.topics import TOPIC_OF
 
 T = TypeVar("T")
+#: A message with an older stamp is accepted after this time (s): its sender has restarted.
+_RESTART_S = 0.2
 
 
 @dataclass(frozen=True)
@@ -79,6 +81,7 @@ class Inbox:
         Rejected: 1000,
         **{kind: topic.queue for kind, topic in TOPIC_OF.items() if topic.queue},
     }
+    _ORDERED = frozenset(kind for kind, topic in TOPIC_OF.items() if topic.ordered)
 
     def __init__(self) -> None:
         """Start empty."""
@@ -101,7 +104,7 @@ class Inbox:
                 self._beats[message.process] = Received(message, at)
         elif (length := self._QUEUED.get(kind)) is not None:
             self._queues.setdefault(kind, deque(maxlen=length)).append(received)
-        else:
+        elif kind not in self._ORDERED or _newer(self._newest.get(kind), received):
             self._newest[kind] = received
 
     def newest(self, kind: type[T]) -> Received[T] | None:
@@ -129,3 +132,11 @@ class Inbox:
             if request.accept():
                 return request
         return None
+
+
+def _newer(kept: Received[Any] | None, offered: Received[Any]) -> bool:
+    if kept is None:
+        return True
+    ahead = offered.message.header.stamp - kept.message.header.stamp
+    # A repetition is never new, however late it arrives.
+    return bool(ahead > 0.0 or (ahead < 0.0 and offered.at - kept.at > _RESTART_S))

@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 from rolling_panda import messages as m
@@ -26,6 +27,13 @@ _LATE = 1.5
 _ANSWER_MARGIN_S = 0.2
 #: Rejected messages and answers that wait for the loop, each at most.
 _OWN = 20
+
+
+@dataclass(frozen=True)
+class Standby:
+    """Output of a `step`: whether latched messages are kept back, as another process says them meanwhile."""
+
+    on: bool
 
 
 class Core(Protocol):
@@ -108,15 +116,17 @@ class Runner:
         self._asked: deque[tuple[Any, float, Future[m.Answer | None]]] = deque()
         self._latched: dict[type[Any], tuple[Any, float]] = {}
         self._durations: deque[float] = deque(maxlen=min(max(1, round(1.0 / period_s)), _TIMED))
-        self._sends: dict[type[Any], Callable[[Any], None]] = {Reply: _reply}
+        self._sends: dict[type[Any], Callable[[Any], None]] = {Reply: _reply, Standby: self._stand_by}
         immediate = at_once or {}
-        self._rates: dict[type[Any], float] = {}
+        self._repeats: dict[type[Any], tuple[Callable[[Any], None], float]] = {}
+        self._standby = False
         wire.on_reject = self._reject
         for topic in TOPICS:
             if topic.said_by(wire.process):
-                self._sends[topic.message] = wire.publisher(topic).put
+                put = wire.publisher(topic).put
+                self._sends[topic.message] = self._latch if topic.latched else put
                 if topic.latched:
-                    self._rates[topic.message] = topic.rate_hz
+                    self._repeats[topic.message] = put, 1.0 / topic.rate_hz
             if topic.read_by(wire.process):
                 handler = immediate.get(topic.message)
                 wire.subscribe(topic, self._receiver(topic) if handler is None else self._immediate(handler))
@@ -153,13 +163,12 @@ class Runner:
             out = self._core.step(inbox, now)
         self._durations.append(self._time() - clock)
         self._send(out)
-        for message in out:
-            if (rate := self._rates.get(type(message))) is not None:
-                self._latched[type(message)] = message, now + 1.0 / rate
-        for kind, (message, due) in self._latched.items():
-            if now >= due:
-                self._sends[kind](message)
-                self._latched[kind] = message, now + 1.0 / self._rates[kind]
+        if not self._standby:
+            for kind, (message, due) in self._latched.items():
+                if now >= due:
+                    put, period = self._repeats[kind]
+                    put(message)
+                    self._latched[kind] = message, now + period
 
     def _collect(self, inbox: Inbox) -> None:
         """Move what has arrived into the inbox, with times of the loop's clock."""
@@ -179,6 +188,14 @@ class Runner:
             message, at, future = self._asked.popleft()
             accept = future.set_running_or_notify_cancel
             inbox.requests.append(Request(message, clock.of(at), accept, future.set_result))
+
+    def _latch(self, message: Any) -> None:
+        self._latched[type(message)] = message, -math.inf
+
+    def _stand_by(self, standby: Standby) -> None:
+        self._standby = standby.on
+        for message, _ in list(self._latched.values()):
+            self._latch(message)
 
     def _send(self, out: Sequence[object]) -> None:
         for message in out:

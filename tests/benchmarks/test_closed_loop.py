@@ -22,7 +22,8 @@ def surveyed(seed: int, path: Path) -> ClosedLoop:
 
 def accept(loop: ClosedLoop, count: int) -> list[m.QueueEntry]:
     """Accept the first `count` points; their entries."""
-    proposed = loop.inputs.points.message.points if loop.inputs.points is not None else ()
+    shown = loop.inbox.newest(m.PruningPoints)
+    proposed = () if shown is None else shown.message.points
     for point in proposed[:count]:
         assert loop.ask(intents.AcceptPoint(user="test", point_id=point.point_id, revision=point.revision)).ok
     loop.run(0.1)
@@ -53,7 +54,7 @@ def test_the_stop_halts_a_moving_robot_and_only_a_reset_with_a_start_moves_it_ag
     loop.ask(intents.Start(user="test"))
 
     def driving() -> bool:
-        odometry = loop.inputs.odometry
+        odometry = loop.inbox.newest(m.Odometry)
         return odometry is not None and abs(odometry.message.linear) > 0.05
 
     assert loop.run_until(driving, 15.0), "the base never moved"

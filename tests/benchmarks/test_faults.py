@@ -11,10 +11,14 @@ from msgspec.structs import replace as replace_field
 from benchmarks.faults.forked_trials import apart
 from benchmarks.faults.kinds import FAULTS
 from benchmarks.faults.run import deal, main, run_trial, start
+from controller.ledger.journal import LedgerState
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
+from rolling_panda.messages.perception import Obstacles
 from rolling_panda.messages.supervision import BaseVelocity
+from tests.support.sent import every
 from tests.support.worlds.faulty_world import FaultyWorld
+from tests.support.worlds.world import new_inbox
 
 NAMED = {fault.name: fault for fault in FAULTS}
 SHORT = ("software stop", "controller killed, base at full speed", "an older controller's commands")
@@ -28,7 +32,7 @@ def test_the_most_important_ones_hold(name):
 
 def bridge_state(world):
     """What the bridge has told last."""
-    return world.inputs.bridge.message
+    return world.inbox.newest(m.BridgeState).message
 
 
 def test_who_was_silent_and_has_lost_control_moves_the_robot_by_holding_anew():
@@ -101,15 +105,18 @@ def test_who_was_overruled_gets_the_token_back_when_the_other_has_ended_and_its_
 
 def second_controller(world):
     """Another controller that hears and is heard as the first one."""
-    other = world.new_controller()
+    other, inbox = world.new_controller(), new_inbox()
 
     def step(world):
         if world.ticks % 10 == 5:
-            out = other.step(replace(world.inputs, presence=None, teleop=None), world.now)
-            if out.token is not None:
-                world.bridge.on_token(out.token, world.now)
-            if out.motion is not None:
-                world.bridge.on_motion(out.motion, world.now)
+            for kind in (m.JointState, m.Odometry, m.BridgeState, Obstacles):
+                if (heard := world.inbox.newest(kind)) is not None:
+                    inbox.put(heard.message, heard.at)
+            inbox.put(LedgerState(other.recorded), world.now)
+            for process in ("server", "perception"):
+                inbox.put(m.Heartbeat(process=process, sequence=world.ticks), world.now)
+            out = other.step(inbox, world.now)
+            world.to_bridge(*every(out, m.TokenRequest), *every(out, m.MotionCommand))
 
     world.intruder = step
     return other
@@ -144,7 +151,7 @@ def test_a_second_controller_does_not_put_the_first_into_a_fault_that_stays():
     world.alive = True
     world.run(1.0)
     assert world.controller.mode == "FAULT" and world.controller.waits and not other.waits
-    world.bridge.on_token(other.release_token(), world.now)
+    world.to_bridge(*other.end())
     world.intruder = lambda world: None
     world.run(2.0)
     assert not world.controller.waits

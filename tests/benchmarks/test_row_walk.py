@@ -24,13 +24,10 @@ class Beside:
     now = property(lambda self: self.robot.now)
     state = property(lambda self: self.robot.state)
 
-    @property
-    def inputs(self):
-        return self.robot.inputs()
+    inbox = property(lambda self: self.robot.inbox)
 
-    @inputs.setter
-    def inputs(self, inputs):
-        self.robot.teleop = None if inputs.teleop is None else inputs.teleop.message
+    def hear(self, message):
+        self.robot.hear(message)
 
     def run(self, seconds):
         for step in range(round(seconds / self.robot.dt)):

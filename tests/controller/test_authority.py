@@ -1,8 +1,8 @@
 from controller.identity import Client
-from controller.inputs import Sample
 from controller.supervision.authority import Authority
 from rolling_panda import commands as intents
 from rolling_panda.messages.supervision import NEVER_SEEN_S, Person, Presence
+from rolling_panda.transport.inbox import Received
 
 ADA, BOB = Client("a", "Ada"), Client("b", "Bob")
 
@@ -16,7 +16,7 @@ def authority():
 
 
 def presence(number, at, *people):
-    return Sample(Presence(sequence=number, people=people), at)
+    return Received(Presence(sequence=number, people=people), at)
 
 
 def ada(age=0.0, role="operator", heard=0.0):

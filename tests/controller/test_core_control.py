@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from rolling_panda import commands as intents
-from rolling_panda.messages.supervision import BaseVelocity, StopRecord, TeleopTarget
+from rolling_panda import messages as m
+from rolling_panda.messages.supervision import BaseVelocity, ControlState, StopRecord, TeleopTarget
 from tests.support.controller_at_work import CONFIG, robot, run_until, working
 from tests.support.points import point
+from tests.support.sent import every, newest
 
 
 def far_at_work():
@@ -57,11 +59,11 @@ def test_who_takes_control_gets_a_robot_at_rest_and_has_to_resume():
     assert r.ask(intents.TakeControl(user="bob", confirm=True)).ok
     out = r.step()
     assert r.controller.mode == "PAUSED"
-    while out.control is None or out.control.user != "bob":
-        moving = np.abs(out.motion.xi).max()
+    while "bob" not in [control.user for control in every(out, ControlState)]:
+        moving = np.abs(newest(out, m.MotionCommand).xi).max()
         out = r.step()
         assert r.now < 10.0
-    assert moving < 0.05 and not np.any(out.motion.xi)
+    assert moving < 0.05 and not np.any(newest(out, m.MotionCommand).xi)
     assert "ada" not in r.ask(intents.Resume(user="bob")).reason
     assert "bob holds control" in r.ask(intents.Start(user="ada")).reason
     assert r.ask(intents.Start(user="bob")).ok

@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from controller.ledger.journal import LedgerState
+from controller.ledger.journal import LedgerState, Records
 from rolling_panda import commands as intents
 from tests.support.controller_at_work import entry, finish, run_until, working
 from tests.support.points import point
+from tests.support.sent import every
 
 SHOWN = (point("a", (0.6, 0.75, 1.0)), point("b", (0.9, 0.75, 1.0)))
 
@@ -51,7 +52,7 @@ def test_a_ledger_that_hangs_is_a_fault_within_a_second():
 def test_the_blades_wait_for_the_record_of_their_intent():
     r, frozen, waited = working(SHOWN), None, 0
     while waited < 40:
-        for record in r.step().records:
+        for record in (record for records in every(r.step(), Records) for record in records.rows):
             if record.kind == "ticket" and record.body.state == "CUTTING":
                 frozen = LedgerState(record.number - 1)
         if frozen is not None:

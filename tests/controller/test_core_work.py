@@ -9,6 +9,7 @@ from rolling_panda import messages as m
 from rolling_panda.model.robot import ARM_Q, ARM_XI, RobotModel
 from tests.support.controller_at_work import CONFIG, entry, finish, robot, run_until, working
 from tests.support.points import point
+from tests.support.sent import newest
 
 LIMITS = RobotModel().limits
 
@@ -197,7 +198,7 @@ def test_home_brings_the_arm_back_with_the_base_still():
     finish(r, 30.0)
     base = r.q[:5].copy()
     assert r.ask(intents.Home(user="ada")).ok
-    assert "Start" not in (r.step().state or r.state).allowed
+    assert "Start" not in (newest(r.step(), m.ControllerState) or r.state).allowed
     r.run(10.0)
     np.testing.assert_allclose(r.q[ARM_Q], CONFIG.home, atol=0.011)
     np.testing.assert_allclose(r.q[:5], base, atol=1e-3)

@@ -138,12 +138,12 @@ def looking(r, *, dx=0.0, finding="seen", point_id="a"):
     usual = r.close_up
 
     def looked(request):
-        sample = usual(request)
-        if request.point_id != point_id or sample.message.finding != "seen":
-            return sample
-        x, y, z = sample.message.position
+        found = usual(request)
+        if request.point_id != point_id or found.finding != "seen":
+            return found
+        x, y, z = found.position
         changed = {"position": (x + dx, y, z)} if finding == "seen" else {"finding": finding, "position": None}
-        return type(sample)(msgspec.structs.replace(sample.message, **changed), sample.at)
+        return msgspec.structs.replace(found, **changed)
 
     r.close_up = looked
     return r

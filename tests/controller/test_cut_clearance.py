@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from controller.config import ControllerConfig
-from controller.inputs import Sample
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.obstacle import Obstacle
 from controller.work.cut_clearance import CutClearance
@@ -12,6 +11,7 @@ from controller.work.posture_search import CutPlan, PostureSearch, Unreachable, 
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import Capsule, Obstacles
 from rolling_panda.model.robot import ARM_Q, RobotModel
+from rolling_panda.transport.inbox import Received
 
 CONFIG = ControllerConfig()
 SETTINGS = CONFIG.hierarchy
@@ -26,7 +26,7 @@ def find(*capsules):
     """A plan for the point, among these."""
     clearance = CutClearance(RobotModel(), CONFIG)
     message = Obstacles(header=m.Header(0.0, "odom"), capsules=capsules)
-    clearance.update(Sample(message, 0.0))
+    clearance.update(Received(message, 0.0))
     q = np.zeros(12)
     q[ARM_Q] = CONFIG.home
     search = PostureSearch(RobotModel(), CONFIG, clearance.too_near)
@@ -102,7 +102,7 @@ def test_clear_of_the_canes_there_is_room_for_the_motion_to_lead_on():
     x, y, z = free.poses.clear.translation.tolist()
     beside = Capsule("wire", (x + 0.047, y, z - 0.03), (x + 0.047, y, z + 0.03), 0.002, 0.002)
     clearance = CutClearance(RobotModel(), CONFIG)
-    clearance.update(Sample(Obstacles(header=m.Header(0.0, "odom"), capsules=(beside,)), 0.0))
+    clearance.update(Received(Obstacles(header=m.Header(0.0, "odom"), capsules=(beside,)), 0.0))
     near, far = free.q_clear.copy(), free.q_clear.copy()
     far[0] += 1.0
     assert clearance.too_near(replace(free, q_clear=far, q_stand_off=far, q_cut=near)) == (0.0, "")

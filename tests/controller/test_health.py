@@ -2,12 +2,12 @@ import msgspec
 import pytest
 
 from controller.config import ControllerConfig
-from controller.inputs import Inputs, Sample
 from controller.supervision.health import FINE, Health, cause, check, health
 from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.messages.perception import Obstacles
 from rolling_panda.messages.robot import RejectionCount
+from rolling_panda.transport.inbox import Inbox
 from tests.support.fake_wire import bridge_state, joints
 
 CONFIG = ControllerConfig()
@@ -113,13 +113,16 @@ def test_the_age_of_a_picture_is_told_by_its_stamp_however_often_it_is_repeated(
     def seen(stamp, at=100.0):
         measured = msgspec.structs.replace(joints(), header=m.Header(50.0))
         told = Obstacles(header=m.Header(stamp), capsules=())
-        return health(Inputs(joints=Sample(measured, 100.0), obstacles=Sample(told, at)), False, 100.0).obstacles
+        inbox = Inbox()
+        inbox.put(measured, 100.0)
+        inbox.put(told, at)
+        return health(inbox, False, 100.0).obstacles
 
     assert seen(49.0) == 1.0
     assert seen(40.0) == 10.0
     assert seen(60.0) == 10.0, "a stamp from the future is as wrong"
     assert seen(50.0, at=90.0) == 10.0
-    assert health(Inputs(), False, 0.0).obstacles == float("inf")
+    assert health(Inbox(), False, 0.0).obstacles == float("inf")
 
 
 @pytest.mark.parametrize("mode", ["IDLE", "READY", "AUTO"])
@@ -142,20 +145,18 @@ def test_the_age_of_each_input_is_counted_from_its_arrival_and_what_never_came_i
     )
     bridge = msgspec.structs.replace(bridge_state(), header=header, watchdog=True, rejections=refused)
     odometry = m.Odometry(header=header, sequence=1, pose=m.PlanarPose(0.0), linear=0.0, angular=0.0)
-    inputs = Inputs(
-        joints=Sample(joints(), 9.5),
-        odometry=Sample(odometry, 9.25),
-        bridge=Sample(bridge, 9.0),
-        server_seen=8.5,
-        perception_seen=8.0,
-        present=ALL,
-    )
-    found = health(inputs, True, 10.0, "the disk is full", "joint 3 does not follow")
+    inbox = Inbox()
+    inbox.present = ALL
+    for message, at in ((joints(), 9.5), (odometry, 9.25), (bridge, 9.0)):
+        inbox.put(message, at)
+    inbox.put(m.Heartbeat(process="server", sequence=1), 8.5)
+    inbox.put(m.Heartbeat(process="perception", sequence=1), 8.0)
+    found = health(inbox, True, 10.0, "the disk is full", "joint 3 does not follow")
     ages = (found.joints, found.odometry, found.bridge, found.server, found.perception)
     assert ages == (0.5, 0.75, 1.0, 1.5, 2.0)
     assert (found.present, found.watchdog, found.overruled, found.refused) == (ALL, True, True, 5)
     assert (found.ledger, found.tracking_error) == ("the disk is full", "joint 3 does not follow")
-    nothing = health(Inputs(), False, 10.0)
+    nothing = health(Inbox(), False, 10.0)
     ages = (nothing.joints, nothing.odometry, nothing.bridge, nothing.server, nothing.perception)
     assert ages == (float("inf"),) * 5
     assert (nothing.present, nothing.watchdog, nothing.overruled, nothing.refused) == (frozenset(), False, False, 0)

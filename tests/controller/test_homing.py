@@ -4,7 +4,6 @@ import numpy as np
 
 from controller.config import ControllerConfig
 from controller.core import Controller
-from controller.inputs import Sample
 from controller.motion.surroundings import Surroundings
 from controller.whole_body.collision import CollisionModel
 from rolling_panda import commands as intents
@@ -12,6 +11,7 @@ from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
 from rolling_panda.messages.perception import Capsule, Obstacles
 from rolling_panda.model.robot import ARM_Q, RobotModel
+from rolling_panda.transport.inbox import Received
 from tests.support.worlds.kinematic_robot import KinematicRobot
 
 CONFIG = ControllerConfig()
@@ -41,7 +41,7 @@ def test_a_post_in_the_way_stops_it_before_it_is_met_and_is_named() -> None:
     x, y, _ = at.model.kinematics(at.q).T_odom_tool.translation
     post = Capsule("post", (float(x), float(y), 0.0), (float(x), float(y), 1.9), 0.04, 0.04)
     judge = Surroundings(CollisionModel(RobotModel()))
-    judge.update(Sample(Obstacles(header=m.Header(0.0, "odom"), capsules=(post,)), 0.0))
+    judge.update(Received(Obstacles(header=m.Header(0.0, "odom"), capsules=(post,)), 0.0))
     robot, least = homing(post), 1.0
     for _ in range(1200):
         robot.step()

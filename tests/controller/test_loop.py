@@ -12,7 +12,7 @@ from controller.core import Controller
 from controller.ledger.check import reading, verify
 from controller.ledger.store import Ledger, read
 from controller.ledger.writer import LedgerWriter
-from controller.loop import Loop
+from controller.loop import controller_runner
 from controller.stop_file import open_stop_file
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
@@ -117,7 +117,9 @@ def rest(endpoint, tmp_path):
         ledger = LedgerWriter(lambda: Ledger(tmp_path))
         (tmp_path / "stops").mkdir()
         stop_file = open_stop_file(tmp_path / "stops")
-        loop = Loop(Controller(CONFIG, RobotConfig()), transport, CONFIG.rate_hz, ledger, stop_file=stop_file)
+        loop = controller_runner(
+            Controller(CONFIG, RobotConfig()), transport, CONFIG.rate_hz, ledger, stop_file=stop_file
+        )
         thread = threading.Thread(target=loop.run, args=(stopping,))
         thread.start()
         yield others

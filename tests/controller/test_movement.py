@@ -6,6 +6,7 @@ from controller.identity import Token
 from controller.ledger.journal import EventLogger, Journal
 from controller.work.movement import Movement
 from controller.work.point_queue import PointQueue
+from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
 from rolling_panda.model.robot import ARM_Q
 from tests.support.controller_at_work import CONFIG, robot
@@ -24,7 +25,7 @@ def test_an_unmeasured_robot_is_not_moved(movement):
 
 
 def test_without_a_token_nothing_is_sent_and_the_robot_counts_as_still(movement):
-    joints = robot().inputs().joints
+    joints = robot().inputs().newest(m.JointState)
     slowly = np.full(9, 1e-3)
     first = movement.send(slowly, Token(1, "t"), joints, latched=False)
     assert first.token == "t" and not any(first.xi)
@@ -37,7 +38,7 @@ def test_without_a_token_nothing_is_sent_and_the_robot_counts_as_still(movement)
 
 
 def test_under_a_latched_stop_braking_is_sent_and_rest_is_not(movement):
-    joints = robot().inputs().joints
+    joints = robot().inputs().newest(m.JointState)
     assert movement.send(np.full(9, 1e-3), Token(1, "t"), joints, latched=True) is not None
     assert movement.send(np.zeros(9), Token(1, "t"), joints, latched=True) is None
 
@@ -48,8 +49,8 @@ def test_nobody_in_control_means_rest_whatever_the_mode(movement):
     movement.update(r.inputs())
     movement.go_home()
     for _ in range(20):
-        moved, inputs = movement.step("READY", held=True, now=r.now), r.inputs()
-        out = movement.send(moved.xi, Token(1, "t"), inputs.joints, latched=False)
+        moved, inbox = movement.step("READY", held=True, now=r.now), r.inputs()
+        out = movement.send(moved.xi, Token(1, "t"), inbox.newest(m.JointState), latched=False)
         r.integrate(np.array(out.xi))
         r.now += r.dt
         movement.update(r.inputs())

@@ -3,15 +3,15 @@ from dataclasses import replace
 import msgspec
 
 from controller.config import ControllerConfig
-from controller.inputs import Inputs
 from controller.supervision import health as safety
 from controller.supervision import modes
 from controller.supervision.permission import Situation, allowed, refusal
 from rolling_panda import commands as intents
 from rolling_panda.commands import COMMAND_OF
+from rolling_panda.transport.inbox import Inbox
 
 WELL = msgspec.structs.replace(
-    safety.health(Inputs(), None, 0.0),
+    safety.health(Inbox(), None, 0.0),
     joints=0.0,
     odometry=0.0,
     bridge=0.0,

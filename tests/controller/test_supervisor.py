@@ -1,20 +1,17 @@
-from dataclasses import replace
-
-import msgspec
 import numpy as np
 import pytest
 
-from controller.inputs import Sample
-from controller.interface import StepInputs
 from controller.ledger.journal import LedgerState
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.messages.robot import RejectionCount
-from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
+from rolling_panda.messages.supervision import BaseVelocity, ControlState, StopState, TeleopTarget
 from rolling_panda.model.robot import ARM_Q
+from rolling_panda.transport.inbox import Inbox
 from tests.support.controller_at_work import CONFIG, robot, run_until
 from tests.support.fake_wire import as_received
+from tests.support.sent import every, newest
 
 
 def ready():
@@ -87,14 +84,7 @@ def test_an_operator_stops_the_way_home_and_is_named():
 
 def bridge_says(r, **changes):
     """The bridge's state has these values from now on."""
-    inputs = r.inputs
-
-    def changed():
-        given = inputs()
-        said = msgspec.structs.replace(given.bridge.message, **changes)
-        return replace(given, bridge=Sample(said, given.bridge.at))
-
-    r.inputs = changed
+    r.bridge_changes = changes
 
 
 def outputs(r, seconds):
@@ -102,8 +92,13 @@ def outputs(r, seconds):
     return [r.step() for _ in range(round(seconds / r.dt))]
 
 
+def said(outs, kind):
+    """The messages of a type in the order in which they were sent."""
+    return [message for out in outs for message in every(out, kind)]
+
+
 def told(outs):
-    return [(event.severity, event.text) for out in outs for event in out.events]
+    return [(event.severity, event.text) for out in outs for event in every(out, m.LogEvent)]
 
 
 def test_a_change_of_mode_is_a_warning_from_a_pause_on():
@@ -123,7 +118,7 @@ def test_who_commands_the_robot_is_told_and_that_another_controller_does_is_a_wa
     outs = outputs(r, 0.1)
     [severity] = [severity for severity, text in told(outs) if "another controller commands this robot; " in text]
     assert severity == "warning"
-    assert r.controller.mode == "FAULT" and outs[-1].motion is None
+    assert r.controller.mode == "FAULT" and newest(outs[-1], m.MotionCommand) is None
 
 
 #: Longer than braking takes, and shorter.
@@ -138,28 +133,27 @@ def moved_by_others(r):
 def test_a_robot_that_moves_by_commands_of_others_is_stopped_under_another_token():
     r = ready()
     moved_by_others(r)
-    assert all(out.stop is None for out in outputs(r, SHORT)), "the robot may be braking"
+    assert not said(outputs(r, SHORT), m.StopRequest), "the robot may be braking"
     outs = outputs(r, LONG - SHORT)
-    (stop,) = {as_received(out.stop) for out in outs if out.stop is not None}
+    (stop,) = {as_received(stop) for stop in said(outs, m.StopRequest)}
     assert (stop.source, stop.user) == ("controller", "") and "of another sender" in stop.reason
     assert r.controller.mode == "ESTOP_LATCHED"
-    [given_back] = [out.token for out in outs if out.token is not None and out.token.releases]
-    asked_anew = [out.token.token for out in outs if out.token is not None][-1]
+    [given_back] = [token for token in said(outs, m.TokenRequest) if token.releases]
+    asked_anew = said(outs, m.TokenRequest)[-1].token
     assert asked_anew != given_back.token
     # It is sent until the bridge has it, and no longer.
-    assert r.step().stop == stop
+    assert newest(r.step(), m.StopRequest) == stop
     r.stop_id = stop.stop_id
-    assert r.step().stop is None
+    assert newest(r.step(), m.StopRequest) is None
 
 
 def test_motion_that_ends_in_time_and_begins_again_is_no_motion_of_others():
     r = ready()
-    inputs = r.inputs
     for _ in range(3):
         moved_by_others(r)
-        assert all(out.stop is None for out in outputs(r, SHORT))
-        r.inputs = inputs
-        assert all(out.stop is None for out in outputs(r, 0.05))
+        assert not said(outputs(r, SHORT), m.StopRequest)
+        r.bridge_changes = {}
+        assert not said(outputs(r, 0.05), m.StopRequest)
 
 
 def test_a_hold_of_somebody_else_ends_the_motion_of_who_has_control():
@@ -179,16 +173,15 @@ def test_a_hold_gives_control_that_nobody_has_and_is_refused_once_where_the_robo
     assert r.ask(intents.ReturnControl(user="ada")).ok
     r.run(0.05)
     r.teleop = TeleopTarget(sequence=1, hold=True, user="bob", base=BaseVelocity(0.1, 0.0))
-    assert [out.control.user for out in outputs(r, 0.1) if out.control is not None][-1] == "bob"
+    assert said(outputs(r, 0.1), ControlState)[-1].user == "bob"
     assert r.controller.mode == "TELEOP"
     r = ready()
-    inputs = r.inputs
     bridge_says(r, cutter="closing")
     r.teleop = TeleopTarget(sequence=1, hold=True, user="ada", base=BaseVelocity(0.1, 0.0))
     refused = [(severity, text) for severity, text in told(outputs(r, 0.3)) if "teleoperation refused" in text]
     assert refused == [("warning", "teleoperation refused: the blades are closing; wait until the cut has ended")]
     # What was held all the time moves nothing when the cut has ended: it must be released first.
-    r.inputs = inputs
+    r.bridge_changes = {}
     r.run(0.3)
     assert r.controller.mode == "READY"
     r.teleop = TeleopTarget(sequence=1, hold=False, user="ada")
@@ -201,9 +194,7 @@ def test_a_hold_gives_control_that_nobody_has_and_is_refused_once_where_the_robo
 @pytest.mark.parametrize("missing", ["server", "odometry"])
 def test_a_hold_without_a_link_or_measurements_is_refused(missing):
     r = ready()
-    inputs = r.inputs
-    gone = {"server": {"server_seen": 0.0}, "odometry": {"odometry": Sample(inputs().odometry.message, -9.0)}}[missing]
-    r.inputs = lambda: replace(inputs(), **gone)
+    r.deaf.add({"server": m.Heartbeat, "odometry": m.Odometry}[missing])
     r.teleop = TeleopTarget(sequence=1, hold=True, user="ada", base=BaseVelocity(0.1, 0.0))
     r.now += 1.0
     said = [text for severity, text in told(outputs(r, 0.1)) if "teleoperation refused" in text]
@@ -217,23 +208,22 @@ def refusing(r, count):
 
 
 def tokens(outs):
-    return {out.token.token for out in outs if out.token is not None}
+    return {token.token for token in said(outs, m.TokenRequest)}
 
 
 def test_a_bridge_that_refuses_every_command_is_asked_for_another_token_after_two_seconds():
     r = ready()
-    inputs = r.inputs
     (first,) = tokens(outputs(r, 0.5))
     refusing(r, 1)
     assert tokens(outputs(r, 1.9)) == {first}
     outs = outputs(r, 0.3)
-    assert [out.token.token for out in outs if out.token is not None and out.token.releases] == [first]
+    assert [token.token for token in said(outs, m.TokenRequest) if token.releases] == [first]
     [severity] = [severity for severity, text in told(outs) if "another token is asked for" in text]
     assert severity == "warning"
     (second,) = tokens(outputs(r, 1.0))
     assert second != first
     # It obeys again, and keeps the token.
-    r.inputs = inputs
+    r.bridge_changes = {}
     assert tokens(outputs(r, 3.0)) == {second}
 
 
@@ -259,7 +249,7 @@ def test_at_the_start_nothing_was_interrupted():
 def test_a_controller_without_a_bridge_is_silent_for_a_second():
     controller = robot().controller
     for now, waits in ((7.0, True), (7.9, True), (8.1, False)):
-        controller.step(StepInputs(), now)
+        controller.step(Inbox(), now)
         assert controller.waits == waits
 
 
@@ -300,8 +290,7 @@ def test_a_protective_stop_says_why_and_what_it_interrupted_and_is_left_a_second
 def test_without_a_server_a_hand_moves_nothing_and_the_reason_is_told():
     r = ready()
     driven(r)
-    inputs = r.inputs
-    r.inputs = lambda: replace(inputs(), present=frozenset({"bridge", "perception"}))
+    r.server = False
     r.run(0.2)
     assert (r.state.mode, r.state.reason) == ("PAUSED", "the server process is gone")
 
@@ -322,10 +311,9 @@ def test_a_ledger_that_takes_nothing_is_a_fault():
 
 def test_a_stop_that_only_the_bridge_knows_is_kept_with_its_time_and_reset_through_the_bridge():
     r = ready()
-    inputs = r.inputs
-    r.inputs = lambda: replace(inputs(), wall_time=1e9)
+    r.inbox.wall_time = 1e9
     r.stop_id = "pressed-there"
-    kept = [out.stops for out in outputs(r, 0.1) if out.stops is not None][-1].stops
+    kept = said(outputs(r, 0.1), StopState)[-1].stops
     assert [(stop.stop_id, stop.source, stop.wall_time) for stop in kept] == [("pressed-there", "bridge", 1e9)]
     assert (r.state.mode, r.state.reason) == ("ESTOP_LATCHED", "software stop: ada")
     assert r.ask(intents.Reset(user="ada", role="supervisor", reason="looked")).ok
@@ -335,6 +323,6 @@ def test_a_stop_that_only_the_bridge_knows_is_kept_with_its_time_and_reset_throu
 
 def test_who_is_heard_keeps_control_and_at_rest_it_goes_over_at_once():
     r = ready()
-    assert [out.control.user for out in outputs(r, 3.0) if out.control is not None][-1] == "ada"
+    assert said(outputs(r, 3.0), ControlState)[-1].user == "ada"
     assert r.ask(intents.TakeControl(user="bob", confirm=True)).ok
-    assert [out.control.user for out in outputs(r, 0.1) if out.control is not None][-1] == "bob"
+    assert said(outputs(r, 0.1), ControlState)[-1].user == "bob"

@@ -5,7 +5,6 @@ import pytest
 
 from controller.config import ControllerConfig
 from controller.core import Controller
-from controller.inputs import Sample
 from controller.motion.surroundings import Surroundings
 from controller.whole_body.collision import CollisionModel
 from rolling_panda import commands as intents
@@ -14,14 +13,15 @@ from rolling_panda.config import RobotConfig
 from rolling_panda.messages.perception import Capsule, Obstacles
 from rolling_panda.messages.supervision import TeleopTarget
 from rolling_panda.model.robot import RobotModel, pose_message
+from rolling_panda.transport.inbox import Received
 from tests.support.worlds.kinematic_robot import KinematicRobot
 
 CONFIG = ControllerConfig()
 HOME = np.concatenate([np.zeros(5), CONFIG.home])
 
 
-def told(*capsules: Capsule) -> Sample[Obstacles]:
-    return Sample(Obstacles(header=m.Header(0.0, "odom"), capsules=capsules), 0.0)
+def told(*capsules: Capsule) -> Received[Obstacles]:
+    return Received(Obstacles(header=m.Header(0.0, "odom"), capsules=capsules), 0.0)
 
 
 def post(x: float, y: float, radius: float = 0.04) -> Capsule:

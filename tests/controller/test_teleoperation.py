@@ -1,5 +1,3 @@
-from dataclasses import replace
-
 import msgspec
 import numpy as np
 import pinocchio as pin
@@ -7,13 +5,13 @@ import pytest
 
 from controller.config import ControllerConfig
 from controller.core import Controller
-from controller.inputs import Sample
 from controller.motion.teleoperation import Teleoperation, latency_speed_scale
 from rolling_panda import commands as intents
 from rolling_panda.config import RobotConfig
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
 from rolling_panda.model.robot import pose_message
+from rolling_panda.transport.inbox import Received
 from tests.support.worlds.kinematic_robot import KinematicRobot
 
 CONFIG = ControllerConfig()
@@ -127,18 +125,12 @@ def test_letting_go_stops_at_once_and_a_new_hold_goes_on():
     assert r.state.mode == "TELEOP"
 
 
-def test_silence_ends_the_hold(monkeypatch):
+def test_silence_ends_the_hold():
     r = robot()
     hold(r, moved(tool(r), 0.5, 0, 0))
     r.run(1.0)
     # The newest target stays what it is; only its age grows.
-    inputs, at = r.inputs, r.now
-    held = r.teleop
-
-    def silent():
-        return replace(inputs(), teleop=Sample(held, at))
-
-    monkeypatch.setattr(r, "inputs", silent)
+    r.deaf.add(TeleopTarget)
     r.run(0.5)
     assert r.state.mode == "READY"
     assert np.abs(r.xi).max() < 1e-3
@@ -149,7 +141,7 @@ def test_a_demand_that_comes_late_or_twice_counts_for_nothing():
 
     def holding(sequence, at, hold=True, now=None):
         message = TeleopTarget(sequence=sequence, hold=hold, user="ada", base=BaseVelocity(0.1, 0.0))
-        return teleoperation.holding(Sample(message, at), at if now is None else now)
+        return teleoperation.holding(Received(message, at), at if now is None else now)
 
     assert holding(5, 1.0)
     assert not holding(6, 1.0 + 0.2 * age, hold=False)

@@ -14,14 +14,16 @@ from bridge.config import BridgeConfig
 from bridge.sim.build import simulated_bridge
 from controller.config import ControllerConfig
 from controller.core import Controller
-from controller.interface import StepInputs
+from rolling_panda import messages as m
 from rolling_panda.bounds import bound_of, numbers, wider
 from rolling_panda.config import RobotConfig, load_section
 from rolling_panda.errors import ConfigError
 from rolling_panda.generate.safety import SECTIONS, section
 from rolling_panda.model.robot import ARM_Q, RobotModel
 from rolling_panda.resources import resource
+from rolling_panda.transport.inbox import Inbox
 from server.config import ServerConfig
+from tests.support.sent import every
 
 SIM = resource("assets/config/sim.toml")
 KINDS = {name: section(name) for name in SECTIONS}
@@ -209,7 +211,7 @@ def test_the_bridge_and_the_controller_say_what_is_wider_at_the_start_and_in_eve
     assert {each.state.relaxed_limits for each in outputs if each.state is not None} == {(line,)}
 
     told = Controller(ControllerConfig(arm_velocity_scale=0.9), RobotConfig())
-    out = told.step(StepInputs(), 1.0)
+    out = told.step(Inbox(), 1.0)
     words = "[controller] arm_velocity_scale = 0.9, usually 0.6 (allowed: more than 0, at most 1)"
-    assert f"less strict than usual: {words}" in [event.text for event in out.events]
-    assert out.state is not None and out.state.relaxed_limits == (words,)
+    assert f"less strict than usual: {words}" in [event.text for event in every(out, m.LogEvent)]
+    assert [state.relaxed_limits for state in every(out, m.ControllerState)] == [(words,)]

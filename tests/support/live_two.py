@@ -15,7 +15,7 @@ from controller.core import Controller
 from controller.ledger.start import restored
 from controller.ledger.store import Ledger
 from controller.ledger.writer import LedgerWriter
-from controller.loop import Loop
+from controller.loop import controller_runner
 from controller.stop_file import open_stop_file
 from rolling_panda.config import RobotConfig, TransportConfig
 from rolling_panda.model.robot import RobotModel
@@ -59,7 +59,7 @@ class LiveTwo:
         ledger = LedgerWriter(lambda: Ledger(self.folder))
         stack.callback(ledger.close)
         transport = stack.enter_context(self.transport("controller"))
-        loop = Loop(controller, transport, CONFIG.rate_hz, ledger, stop_file=stop_file)
+        loop = controller_runner(controller, transport, CONFIG.rate_hz, ledger, stop_file=stop_file)
         stack.enter_context(running(loop.run, threading.Event()))
         self._running.append(stack)
 

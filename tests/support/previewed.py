@@ -3,12 +3,14 @@
 What it asks the planner is kept as `request`; a test that wants to answer sets `plan`.
 """
 
-from dataclasses import replace
-
+from controller.planning.preview_plan import PreviewRequest
 from controller.planning.rollout import Rollout
+from controller.planning.work_plan import PlanRequest
 from rolling_panda import commands as intents
 from rolling_panda.config import RobotConfig
+from rolling_panda.messages.supervision import PreviewMotion, PreviewState, SessionPlan
 from tests.support.controller_at_work import CONFIG, robot
+from tests.support.sent import newest
 
 ROLLOUT = Rollout(CONFIG, RobotConfig())
 
@@ -20,18 +22,22 @@ class Previewed:
         self.robot = robot(**changes)
         if controller is not None:
             self.robot.controller = controller
-        self.state = self.motion = self.request = self.plan = self.session_plan = self._answer = self._due = None
+        self.state = self.motion = self.request = self.plan = self.session_plan = self._due = None
         self.path = []
         step = self.robot.controller.step
 
-        def with_rollout(inputs, now):
+        def with_rollout(inbox, now):
             if self._due is not None:
-                self._answer, self._due = roll(self._due), None
-            out = step(replace(inputs, plan=self.plan, preview=self._answer), now)
-            self.request, self.session_plan = out.request or self.request, out.plan or self.session_plan
-            self._due = out.preview_request or self._due
-            self.state = out.preview or self.state
-            self.motion = out.preview_motion or self.motion
+                inbox.put(roll(self._due), now)
+                self._due = None
+            if self.plan is not None:
+                inbox.put(self.plan, now)
+            out = step(inbox, now)
+            self.request = newest(out, PlanRequest) or self.request
+            self.session_plan = newest(out, SessionPlan) or self.session_plan
+            self._due = newest(out, PreviewRequest)
+            self.state = newest(out, PreviewState) or self.state
+            self.motion = newest(out, PreviewMotion) or self.motion
             return out
 
         self.robot.controller.step = with_rollout

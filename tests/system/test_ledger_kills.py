@@ -26,17 +26,17 @@ pytestmark = pytest.mark.paced
 CHILD = """
 import sys, threading
 from pathlib import Path
-from controller.interface import Outputs
 from controller.config import ControllerConfig
-from controller.ledger.journal import EventLogger, Journal, RequestRow
+from controller.ledger.journal import EventLogger, Journal, LedgerState, Records, RequestRow
 from controller.ledger.store import Ledger
 from controller.ledger.start import restored
 from controller.ledger.writer import LedgerWriter
-from controller.loop import Loop
+from controller.loop import controller_runner
 from controller.work.queue_requests import QueueRequests
 from controller.work.point_queue import PointQueue
 from rolling_panda import messages as m
 from rolling_panda.config import TransportConfig
+from rolling_panda.transport.inbox import Reply
 from rolling_panda.transport.zenoh import Transport
 
 class Desk:
@@ -59,10 +59,15 @@ class Desk:
         self.journal.add("request", intent.user, RequestRow(asked=intent, ok=not refused, reason=refused, mode="READY"))
         return m.Answer(ok=not refused, reason=refused)
 
-    def step(self, inputs, now):
-        self.journal.observe(inputs.ledger, now)
-        if inputs.points is not None:
-            self.queue.update(inputs.points.message)
+    def step(self, inbox, now):
+        out = []
+        while (request := inbox.next_request()) is not None:
+            out.append(Reply(request, self.answer(request.message, now)))
+        recorded, points = inbox.newest(LedgerState), inbox.newest(m.PruningPoints)
+        if recorded is not None:
+            self.journal.observe(recorded.message, now)
+        if points is not None:
+            self.queue.update(points.message)
         ticket = self.queue.next()
         if self.intent is not None and self.journal.holds(self.intent[1]):
             self.queue.resolve(self.intent[0], "DONE", "cut")
@@ -74,12 +79,12 @@ class Desk:
         state = m.ControllerState(header=m.Header(), mode="READY", phase="", reason="", allowed=(), active_point_id="",
             method="test", T_odom_tool=None, T_odom_tool_desired=None, position_error=0.0, rotation_error=0.0,
             manipulability=0.0, joint_margin=0.0, tick_s=0.0, ticks=0, late_ticks=0, queue=self.queue.entries())
-        return Outputs(state=state, records=self.journal.drain())
+        return [*out, state, Records(self.journal.drain())]
 
 folder = Path(sys.argv[1])
 desk = Desk(restored(folder).tickets)
 with Transport(TransportConfig(connect=(sys.argv[2],), plain_wire=True), "controller", "rp1") as transport:
-    Loop(desk, transport, 100.0, LedgerWriter(lambda: Ledger(folder))).run(threading.Event())
+    controller_runner(desk, transport, 100.0, LedgerWriter(lambda: Ledger(folder))).run(threading.Event())
 """
 
 

@@ -24,14 +24,15 @@ def test_what_was_unclear_is_settled_by_looking_again(seed: int) -> None:
     """Slow: the camera takes some thirty pictures. A row that was looked at for nothing else."""
     with ClosedLoop(seed) as loop:
         loop.run(6.0)
-        assert loop.inputs.points is not None
-        open_places = unclear(loop.inputs.points.message)
+        points = loop.inbox.newest(m.PruningPoints)
+        assert points is not None
+        open_places = unclear(points.message)
         assert open_places, "this row has nothing unclear: take another seed"
         place = open_places[0]
         assert loop.ask(intents.Arm(user="ada")).ok
         assert loop.ask(intents.LookAgain(user="ada", vine=place.vine, spur=place.spur)).ok
         assert loop.run_until(lambda: loop.controller.mode == "READY", 60.0), loop.controller.mode
-        told = loop.inputs.points.message
+        told = loop.inbox.newest(m.PruningPoints).message
         assert (place.vine, place.spur) not in {(each.vine, each.spur) for each in unclear(told)}
         shown = [point for point in told.points if (point.vine, point.spur) == (place.vine, place.spur)]
         left = [each for each in told.undecided_sites if (each.vine, each.spur) == (place.vine, place.spur)]

@@ -1,9 +1,7 @@
 """The whole robot in one thread: the simulator, perception and the planner beside bridge and controller."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
@@ -12,12 +10,10 @@ from bridge.sim.build import simulated_bridge
 from bridge.sim.robot.robot import SimulatedRobot
 from controller.config import ControllerConfig
 from controller.core import Controller
-from controller.inputs import Sample
-from controller.interface import Outputs
 from controller.motion.base_estimate import BaseEstimate
 from controller.motion.follower import Tracking
 from controller.planning.cuts import CutPlanner
-from controller.planning.work_plan import WorkPlan
+from controller.planning.work_plan import PlanRequest, WorkPlan
 from perception.config import PerceptionConfig
 from perception.pipeline import Perception
 from perception.segmentation.segmenter import choose_segmenter
@@ -30,6 +26,7 @@ from rolling_panda.messages.supervision import Person, Presence
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.resources import resource
+from tests.support.sent import every, newest
 from tests.support.worlds.world import World
 
 # A frame takes perception about this long, so its points come later by as much.
@@ -38,6 +35,7 @@ _PERCEPTION_S = 0.15
 _LOOK_S = 0.08
 # A plan of some points takes about this long.
 _PLANNING_S = 1.0
+_BEATING: tuple[m.Process, ...] = ("server", "perception")
 
 
 class ClosedLoop(World, Closing):
@@ -88,11 +86,12 @@ class ClosedLoop(World, Closing):
         self._looked: tuple[float, CloseUpResult] | None = None
         self._seen: tuple[float, m.PruningPoints] | None = None
 
-    def control(self, **heard: Any) -> None:
+    def control(self) -> None:
         """One control period, for which everybody is there."""
         people = tuple(Person(name, name, "supervisor", 0.0, 0.0) for name in self._people)
-        presence = Sample(Presence(sequence=self.ticks, people=people), self.now)
-        super().control(server_seen=self.now, perception_seen=self.now, presence=presence, **heard)
+        beats = (m.Heartbeat(process=process, sequence=self.ticks) for process in _BEATING)
+        self.hear(Presence(sequence=self.ticks, people=people), *beats)
+        super().control()
         tracking = self.controller.tracking
         if self._watch is not None and tracking is not None and tracking.desired is not None:
             self._watch(self, tracking)
@@ -119,7 +118,7 @@ class ClosedLoop(World, Closing):
 
     def configuration(self) -> Array:
         """Configuration (12) as measured now; needs a joint state and an odometry."""
-        joints, odometry = self.inputs.joints, self.inputs.odometry
+        joints, odometry = self.inbox.newest(m.JointState), self.inbox.newest(m.Odometry)
         assert joints is not None and odometry is not None
         return BaseEstimate(self._drive).configuration(joints.message, odometry.message)
 
@@ -133,23 +132,25 @@ class ClosedLoop(World, Closing):
         if outputs.frame is not None and outputs.frame.point_id:
             self._looked = self.now + _LOOK_S, self.perception.check_close_up(outputs.frame)
         if self._looked is not None and self.now >= self._looked[0]:
-            self.inputs, self._looked = replace(self.inputs, close_up=Sample(self._looked[1], self.now)), None
+            self.hear(self._looked[1])
+            self._looked = None
         if outputs.frame is not None:
             self._seen = self.now + _PERCEPTION_S, self.perception.process(outputs.frame)
         if self._seen is not None and self.now >= self._seen[0]:
             points = self._seen[1]
             obstacles = Obstacles(header=points.header, capsules=self.perception.obstacles)
-            self.inputs = replace(self.inputs, points=Sample(points, self.now), obstacles=Sample(obstacles, self.now))
+            self.hear(points, obstacles)
             self._seen = None
         self.events.extend(outputs.events)
 
-    def send(self, outputs: Outputs) -> None:
+    def send(self, out: list[object]) -> None:
         """What the controller sends, and what the planner answers."""
-        super().send(outputs)
-        if outputs.state is not None:
-            self.state = outputs.state
-        if outputs.request is not None and self._planner is not None:
-            self._planned = self.now + _PLANNING_S, self._planner.plan(outputs.request)
+        super().send(out)
+        self.state = newest(out, m.ControllerState) or self.state
+        request = newest(out, PlanRequest)
+        if request is not None and self._planner is not None:
+            self._planned = self.now + _PLANNING_S, self._planner.plan(request)
         if self._planned is not None and self.now >= self._planned[0]:
-            self.inputs, self._planned = replace(self.inputs, plan=self._planned[1]), None
-        self.events.extend(outputs.events)
+            self.hear(self._planned[1])
+            self._planned = None
+        self.events += every(out, m.LogEvent)

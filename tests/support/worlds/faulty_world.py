@@ -6,7 +6,7 @@ the plant's actuators, in the form of the simulator's trace, and nothing that th
 
 import random
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, cast
 
 import msgspec
@@ -18,8 +18,6 @@ from bridge.core.state_memory import Remembered
 from bridge.sim.robot.lagged import LaggedRobot
 from controller.config import ControllerConfig
 from controller.core import Controller
-from controller.inputs import Sample
-from controller.interface import Outputs, StepInputs
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
@@ -30,7 +28,8 @@ from rolling_panda.runtime.latest_file import KeptValue
 from server.auth.sessions import Session
 from server.robots.presence import PresenceTracker
 from tests.support.points import point
-from tests.support.worlds.world import World
+from tests.support.sent import newest
+from tests.support.worlds.world import World, new_inbox
 
 MODEL = RobotModel()
 _USER = "ada"
@@ -101,14 +100,15 @@ class FaultyWorld(World):
     def restart_controller(self) -> None:
         """It ends and starts again, with no memory of what it was doing."""
         self.controller = self.new_controller()
-        self.inputs = StepInputs(present=self.inputs.present)
+        present, self.inbox = self.inbox.present, new_inbox()
+        self.inbox.present = present
 
     def receive(self, out: BridgeOutputs) -> None:
         """What the bridge sends goes its way; what has come over a way by now arrives."""
         for link, message in ((self.state, out.joints), (self.state, out.state), (self.odometry, out.odometry)):
             if message is not None:
                 link.push(message, self.now)
-        self.to_controller(*self.state.arrived(self.now), *self.odometry.arrived(self.now))
+        self.hear(*self.state.arrived(self.now), *self.odometry.arrived(self.now))
         self.to_bridge(*self.motion.arrived(self.now))
         self.intruder(self)
 
@@ -124,7 +124,7 @@ class FaultyWorld(World):
         self.run(0.3)
         far = point("p", (2.5, 0.75, 1.0))
         points = m.PruningPoints(header=m.Header(self.now, "odom"), segmenter="none", frames=1, points=(far,))
-        self.inputs = replace(self.inputs, points=Sample(points, self.now))
+        self.hear(points)
         self.run(0.02)
         for intent in (
             intents.Arm(user=_USER),
@@ -144,7 +144,7 @@ class FaultyWorld(World):
     def lead(self) -> None:
         """An operator leads the tool along the row, far ahead of it."""
         self.arm()
-        joints, odometry = self.inputs.joints, self.inputs.odometry
+        joints, odometry = self.inbox.newest(m.JointState), self.inbox.newest(m.Odometry)
         assert joints is not None and odometry is not None
         q = configuration(odometry.message.pose, joints.message.position)
         here = MODEL.pose(q, MODEL.tool_id)
@@ -166,27 +166,24 @@ class FaultyWorld(World):
                 return
         raise RuntimeError(f"the robot does not move: {self.controller.mode}")
 
-    def control(self, **heard: Any) -> None:
+    def control(self) -> None:
         """One control period, for which those say something who are there."""
         if not self.alive:
             return
-        changes: dict[str, Any] = {}
         if self.server:
-            changes["server_seen"] = self.now
+            self.hear(m.Heartbeat(process="server", sequence=self.ticks))
             if self.heard and self.ticks % _PAGE_TICKS == 0:
                 self._pages_speak()
             if self.ticks % _PRESENCE_TICKS == 0:
-                changes["presence"] = Sample(self._there.message(self.now), self.now)
+                self.hear(self._there.message(self.now))
             if self.held is not None and self.heard:
                 base = self.held if isinstance(self.held, BaseVelocity) else None
                 pose = None if base is not None else cast(m.Pose, self.held)
-                target = TeleopTarget(sequence=self.ticks, hold=self.holds, user=_USER, base=base, target=pose)
-                changes["teleop"] = Sample(target, self.now)
+                self.hear(TeleopTarget(sequence=self.ticks, hold=self.holds, user=_USER, base=base, target=pose))
         if self.perception:
-            stamp = m.Header(self.now, "odom")
-            changes["perception_seen"] = self.now
-            changes["obstacles"] = Sample(Obstacles(header=stamp, capsules=()), self.now)
-        super().control(**changes, **heard)
+            self.hear(m.Heartbeat(process="perception", sequence=self.ticks))
+            self.hear(Obstacles(header=m.Header(self.now, "odom"), capsules=()))
+        super().control()
         self.modes.append(self.controller.mode)
 
     def _pages_speak(self) -> None:
@@ -197,10 +194,11 @@ class FaultyWorld(World):
             if self.watched:
                 self._there.on_seen(session, self.now)
 
-    def send(self, out: Outputs) -> None:
+    def send(self, out: list[object]) -> None:
         """Motion and token go their way; the rest arrives at once."""
-        self.commanded, self.lease = out.motion or self.commanded, out.control or self.lease
-        for message in (out.motion, out.token):
-            if message is not None:
-                self.motion.push(message, self.now)
-        super().send(replace(out, motion=None, token=None))
+        self.commanded = newest(out, m.MotionCommand) or self.commanded
+        self.lease = newest(out, ControlState) or self.lease
+        delayed = [message for message in out if isinstance(message, m.MotionCommand | m.TokenRequest)]
+        for message in delayed:
+            self.motion.push(message, self.now)
+        super().send([message for message in out if message not in delayed])

@@ -1,15 +1,14 @@
 """A robot without mass or contact: velocities follow commands with a first-order lag. For control tests and timing."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import msgspec
 import numpy as np
 
 from bridge.core.fence import Fence
 from controller.core import Controller
-from controller.inputs import Sample
-from controller.interface import Outputs, StepInputs
-from controller.ledger.journal import LedgerState
+from controller.ledger.journal import LedgerState, Records
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import Capsule, CloseUpRequest, CloseUpResult, Obstacles
@@ -17,6 +16,7 @@ from rolling_panda.messages.supervision import Person, Presence, TeleopTarget
 from rolling_panda.model.differential_drive import NXI, Array
 from rolling_panda.model.robot import ARM_Q, RobotModel
 from rolling_panda.model.wire_values import actuated, planar_pose
+from rolling_panda.transport.inbox import Inbox
 
 _ALL = frozenset({"bridge", "controller", "perception", "server"})
 
@@ -37,6 +37,8 @@ class KinematicRobot:
         record: Velocities commanded (9 each).
         people: Names of who is there; whoever asks for something is.
         watching: Whether they see the robot.
+        deaf: Types of messages that do not arrive.
+        bridge_changes: What the bridge says in place of what is.
     """
 
     controller: Controller
@@ -58,6 +60,8 @@ class KinematicRobot:
     ledger: LedgerState = LedgerState()
     people: set[str] = field(default_factory=set)
     watching: bool = True
+    deaf: set[type] = field(default_factory=set)
+    bridge_changes: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Place the robot at the origin."""
@@ -69,12 +73,8 @@ class KinematicRobot:
         self._fence = Fence()
         self._cut_id, self._cut_at = "", 0.0
         self._told_presence = False
-        self._points: Sample[m.PruningPoints] | None = None
-        self._told: Sample[Obstacles] | None = None
-        self._stops: tuple[m.StopRequest, ...] = ()
-        self._close_up: Sample[CloseUpResult] | None = None
-        self._joints: Sample[m.JointState] | None = None
-        self._odometry: Sample[m.Odometry] | None = None
+        self.inbox = Inbox()
+        self._shown: tuple[m.PruningPoint, ...] = ()
 
     def show(
         self,
@@ -87,72 +87,71 @@ class KinematicRobot:
         message = m.PruningPoints(
             header=header, segmenter="none", frames=1, points=points, rule=rule, undecided_sites=undecided_sites
         )
-        self._points = Sample(message, self.now)
+        self._shown = points
+        self.hear(message)
 
     def stop(self, stop_id: str = "stop-1") -> None:
         """Press the software stop."""
-        self._stops = (m.StopRequest(stop_id=stop_id, source="test", user="ada", reason="test"),)
+        self.hear(m.StopRequest(stop_id=stop_id, source="test", user="ada", reason="test"))
         self.stop_id = stop_id
 
-    def inputs(self) -> StepInputs:
+    def hear(self, message: object) -> None:
+        """A message arrives at the controller."""
+        if type(message) not in self.deaf:
+            self.inbox.put(message, self.now)
+
+    def inputs(self) -> Inbox:
         """What the controller is given now."""
         self._sequence += 1
-        if not self.frozen_sensors or self._joints is None:
+        inbox, now = self.inbox, self.now
+        if not self.frozen_sensors or self._sequence == 1:
             self._measure()
-        seen = self.now
-        present = _ALL - ({"server"} if not self.server else set()) - ({"perception"} if not self.perception else set())
-        stops, self._stops = self._stops, ()
-        return StepInputs(
-            joints=self._joints,
-            odometry=self._odometry,
-            bridge=Sample(self._bridge(), self.now),
-            points=self._points,
-            obstacles=self._around(),
-            teleop=None if self.teleop is None else Sample(self._renewed(self.teleop), self.now),
-            presence=Sample(self._present(), self.now) if self.server else None,
-            server_seen=seen,
-            perception_seen=seen,
-            present=present,
-            stops=stops,
-            ledger=self.ledger,
-            close_up=self._close_up,
-        )
+        self.hear(self._bridge())
+        told = inbox.newest(Obstacles)
+        if told is None or told.message.capsules is not self.obstacles or now - told.at > 1.0:
+            self.hear(Obstacles(header=m.Header(now, "odom"), capsules=self.obstacles))
+        if self.teleop is not None:
+            self.hear(msgspec.structs.replace(self.teleop, sequence=round(now / self.dt)))
+        if self.server:
+            self.hear(self._present())
+        for process, there in (("server", self.server), ("perception", self.perception)):
+            if there:
+                self.hear(m.Heartbeat(process=process, sequence=self._sequence))
+        gone = {name for name, there in (("server", self.server), ("perception", self.perception)) if not there}
+        inbox.present = _ALL - gone
+        self.hear(self.ledger)
+        return inbox
 
-    def _renewed(self, teleop: TeleopTarget) -> TeleopTarget:
-        return msgspec.structs.replace(teleop, sequence=round(self.now / self.dt))
-
-    def _around(self) -> Sample[Obstacles] | None:
-        told = self._told
-        if told is None or told.message.capsules is not self.obstacles or self.now - told.at > 1.0:
-            self._told = Sample(Obstacles(header=m.Header(self.now, "odom"), capsules=self.obstacles), self.now)
-        return self._told
-
-    def step(self) -> Outputs:
+    def step(self) -> list[object]:
         """One control period: controller first, then the robot."""
         return self.take(self.controller.step(self.inputs(), self.now))
 
-    def take(self, out: Outputs) -> Outputs:
+    def take(self, out: list[object]) -> list[object]:
         """Act on what the controller sent, for one period."""
         command = np.zeros(NXI)
-        if out.motion is not None:
-            command = np.array(out.motion.xi)
-            if self._fence.refuse(out.motion.epoch, out.motion.token) is not None:
-                raise ValueError(f"a command of epoch {out.motion.epoch}, which is not the fence's")
-            self._followed, self._moving = out.motion.sequence, bool(command.any())
-        if out.token is not None:
-            self._fence.claim(out.token.token, self.now, not self._moving)
-        if out.picture is not None:
-            self._close_up = self.close_up(out.picture)
-        if out.cut is not None and out.cut.cut_id != self._cut_id:
-            self._cut_id, self._cut_at = out.cut.cut_id, self.now
-            self.cuts.append((out.cut.point_id, self.model.kinematics(self.q).T_odom_tool.homogeneous.copy()))
-        if out.release is not None and out.release.stop_id == self.stop_id:
-            self.stop_id = ""
-        if out.state is not None:
-            self.state = out.state
-        if out.records and not self.ledger.failure:
-            self.ledger = LedgerState(out.records[-1].number)
-        self.events += [event.text for event in out.events]
+        for message in out:
+            match message:
+                case m.MotionCommand():
+                    command = np.array(message.xi)
+                    if self._fence.refuse(message.epoch, message.token) is not None:
+                        raise ValueError(f"a command of epoch {message.epoch}, which is not the fence's")
+                    self._followed, self._moving = message.sequence, bool(command.any())
+                case m.TokenRequest():
+                    self._fence.claim(message.token, self.now, not self._moving)
+                case CloseUpRequest():
+                    self.hear(self.close_up(message))
+                case m.CutCommand() if message.cut_id != self._cut_id:
+                    self._cut_id, self._cut_at = message.cut_id, self.now
+                    place = self.model.kinematics(self.q).T_odom_tool.homogeneous.copy()
+                    self.cuts.append((message.point_id, place))
+                case m.ReleaseStop() if message.stop_id == self.stop_id:
+                    self.stop_id = ""
+                case m.ControllerState():
+                    self.state = message
+                case Records() if not self.ledger.failure:
+                    self.ledger = LedgerState(message.rows[-1].number)
+                case m.LogEvent():
+                    self.events.append(message.text)
         self.record.append(command)
         self.integrate(command)
         self.now += self.dt
@@ -178,12 +177,11 @@ class KinematicRobot:
         for _ in range(round(seconds / self.dt)):
             self.step()
 
-    def close_up(self, request: CloseUpRequest) -> Sample[CloseUpResult] | None:
+    def close_up(self, request: CloseUpRequest) -> CloseUpResult:
         """A camera that always sees the point: where it was shown, and off once its cut is done."""
-        shown = () if self._points is None else self._points.message.points
-        point = next((each for each in shown if each.point_id == request.point_id), None)
+        point = next((each for each in self._shown if each.point_id == request.point_id), None)
         off = self.outcome == "DONE" and any(cut[0] == request.point_id for cut in self.cuts)
-        look = CloseUpResult(
+        return CloseUpResult(
             header=m.Header(self.now, "odom"),
             point_id=request.point_id,
             number=request.number,
@@ -191,25 +189,18 @@ class KinematicRobot:
             position=None if off or point is None else point.position,
             tangent=None if off or point is None else point.tangent,
         )
-        return Sample(look, self.now)
 
     def _measure(self) -> None:
         header = m.Header(self.now, "odom")
         v, w = self.model.drive.twist(float(self.xi[0]), float(self.xi[1]))
-        self._joints = Sample(
-            m.JointState(
-                header=header, sequence=self._sequence, position=actuated(self.q[3:]), velocity=actuated(self.xi)
-            ),
-            self.now,
-        )
+        position, velocity = actuated(self.q[3:]), actuated(self.xi)
+        self.hear(m.JointState(header=header, sequence=self._sequence, position=position, velocity=velocity))
         pose = planar_pose(self.q)
-        self._odometry = Sample(
-            m.Odometry(header=header, sequence=self._sequence, pose=pose, linear=v, angular=w), self.now
-        )
+        self.hear(m.Odometry(header=header, sequence=self._sequence, pose=pose, linear=v, angular=w))
 
     def _bridge(self) -> m.BridgeState:
         done = self._cut_id != "" and self.now - self._cut_at > 0.5
-        return m.BridgeState(
+        state = m.BridgeState(
             header=m.Header(self.now),
             kind="sim",
             epoch=self._fence.epoch,
@@ -224,6 +215,7 @@ class KinematicRobot:
             sequence=self._followed,
             moving=self._moving,
         )
+        return msgspec.structs.replace(state, **self.bridge_changes)
 
     def integrate(self, command: Array) -> None:
         """What a command makes of the robot in one period."""

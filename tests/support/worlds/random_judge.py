@@ -5,7 +5,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from controller.ledger.journal import LedgerState
 from rolling_panda import commands as intents
+from rolling_panda import messages as m
 from rolling_panda.commands import COMMAND_OF
 
 #: A lease lives so long, a hold so long (s); and a period more.
@@ -133,17 +135,18 @@ class Judge:
         # Who presses, or asks for something, is heard from too.
         self.held_at, self.heard_at[name] = {name: now}, now
 
-    def delivered(self, inputs):
-        for stop in inputs.stops:
+    def delivered(self, inbox, stops):
+        for stop in stops:
             if stop.stop_id not in self.released:
                 self.at_controller.add(stop.stop_id)
                 self.reset_by = ""
-        if inputs.bridge is not None and inputs.bridge.message.stop_id:
-            self.at_controller.add(inputs.bridge.message.stop_id)
-        self.shown = inputs.bridge is not None and not inputs.bridge.message.stop_id
-        self.failure = inputs.ledger.failure
+        bridge, ledger = inbox.newest(m.BridgeState), inbox.newest(LedgerState)
+        if bridge is not None and bridge.message.stop_id:
+            self.at_controller.add(bridge.message.stop_id)
+        self.shown = bridge is not None and not bridge.message.stop_id
+        self.failure = "" if ledger is None else ledger.message.failure
 
-    def stepped(self, world, out):
+    def stepped(self, world, motion):
         now, mode = world.now, world.controller.mode
         self.mode(mode, "step", world)
         if self.at_controller:
@@ -151,15 +154,15 @@ class Judge:
         elif self.failure:
             assert mode in ("FAULT", "ESTOP_LATCHED"), f"{mode} without a ledger"
         self._perceived(world)
-        if out.motion is not None:
-            xi = np.array(out.motion.xi)
+        if motion is not None:
+            xi = np.array(motion.xi)
             grows = bool(np.any(np.abs(xi) > np.abs(self.last_sent) + 1e-9))
             self.last_sent = xi
             may = self._may_move(world, mode, now)
             assert not grows or may, f"the controller moves the robot in {mode} by {self.started_by!r}"
             # While the controller brakes, the bridge may still be on its way up to what it was told before.
             self.may_at = now if may else self.may_at
-            self.sent[out.motion.epoch, out.motion.sequence] = now - self.may_at < BRAKING_S
+            self.sent[motion.epoch, motion.sequence] = now - self.may_at < BRAKING_S
             if len(self.sent) > 1000:
                 self.sent = dict(list(self.sent.items())[-500:])
 
@@ -221,7 +224,7 @@ class Judge:
 
     def _perceived(self, world):
         """What moved or vanished is not accepted any more, unless its cut is under way."""
-        points = world.inputs.points
+        points = world.inbox.newest(m.PruningPoints)
         if points is None:
             return
         seen = {point.point_id: point.position for point in points.message.points}

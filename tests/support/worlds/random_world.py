@@ -16,20 +16,21 @@ from bridge.core.odometer import Odometer
 from bridge.core.state_memory import Remembered
 from controller.config import ControllerConfig
 from controller.core import Controller
-from controller.inputs import Sample
-from controller.interface import StepInputs
-from controller.ledger.journal import LedgerState
+from controller.ledger.journal import LedgerState, Records
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
 from rolling_panda.messages.perception import Obstacles
-from rolling_panda.messages.supervision import BaseVelocity, Person, Presence, TeleopTarget
+from rolling_panda.messages.supervision import BaseVelocity, ControlState, Person, Presence, StopState, TeleopTarget
 from rolling_panda.runtime.latest_file import KeptValue
+from rolling_panda.topics import TOPIC_OF
 from server.robots.presence import PRESENT_S
 from tests.support.fake_wire import as_received
 from tests.support.points import point
+from tests.support.sent import every, newest
 from tests.support.worlds.random_judge import Judge
 from tests.support.worlds.random_parts import MODEL, CutDisk, Movement, Robot
+from tests.support.worlds.world import new_inbox
 
 PEOPLE = {"ada": "supervisor", "bob": "operator", "vic": "viewer"}
 DT = 0.01
@@ -85,7 +86,7 @@ class RandomWorld:
         self.rows, self.durable = [], 0
         self.queue, self.holder = Movement.newest.queue, ""
         self.controller.restore(tuple(self.disk.values()), self.kept_stops)
-        self.inputs = StepInputs(present=frozenset(m.PROCESSES))
+        self.inbox, self.stops = new_inbox(), []
         self.judge.mode(self.controller.mode, "restart", self)
         self.judge.restored(self.queue)
 
@@ -107,38 +108,39 @@ class RandomWorld:
             assert message is None or as_received(message) == message
         self.mute = max(0, self.mute - 1)
         if not self.mute:
-            for name, message in (("joints", out.joints), ("bridge", out.state), ("odometry", out.odometry)):
-                if message is not None:
-                    self.inputs = replace(self.inputs, **{name: Sample(message, self.now)})
+            self.hear(*(message for message in (out.joints, out.state, out.odometry) if message is not None))
         self.control()
 
     def control(self):
-        changes = {"server_seen": self.now, "perception_seen": self.now}
-        obstacles = Obstacles(header=m.Header(self.now), capsules=())
-        changes["obstacles"] = Sample(obstacles, self.now)
         self.number += 1
+        self.hear(*(m.Heartbeat(process=process, sequence=self.number) for process in ("server", "perception")))
+        self.hear(Obstacles(header=m.Header(self.now), capsules=()))
         heard = [name for name, person in self.people.items() if self.steps >= person.unheard_until]
         for name in heard:
             self.people[name].said_at = self.now
         self.judge.heard(heard, self.now)
         if self.steps % 10 == 0:
-            changes["presence"] = Sample(Presence(sequence=self.number, people=self.there()), self.now)
+            self.hear(Presence(sequence=self.number, people=self.there()))
         holder = next((name for name, person in self.people.items() if person.holding), None)
         # The server lets no viewer hold.
         if holder is not None and PEOPLE[holder] != "viewer" and self.steps % 3 == 0:
             target = TeleopTarget(sequence=self.number, hold=True, user=holder, base=BaseVelocity(0.01, 0.0))
-            changes["teleop"] = Sample(target, self.now)
+            self.hear(target)
             self.judge.held(holder, self.now)
-        self.inputs = replace(self.inputs, **changes)
-        self.judge.delivered(self.inputs)
-        out = self.controller.step(self.inputs, self.now)
-        for message in (out.motion, out.token, out.cut, out.state, out.control, out.stops, out.preview, *out.events):
-            assert message is None or as_received(message) == message
-        self.holder = out.control.user
-        self.judge.stepped(self, out)
-        self.inputs = replace(self.inputs, stops=())
-        self.write(out.records)
+        self.judge.delivered(self.inbox, self.stops)
+        self.stops = []
+        out = [message for message in self.controller.step(self.inbox, self.now) if message is not None]
+        for message in out:
+            assert type(message) not in TOPIC_OF or as_received(message) == message
+        self.holder = newest(out, ControlState).user
+        self.judge.stepped(self, newest(out, m.MotionCommand))
+        self.write([record for records in every(out, Records) for record in records.rows])
         self.send(out)
+
+    def hear(self, *messages):
+        """Messages arrive at the controller."""
+        for message in messages:
+            self.inbox.put(message, self.now)
 
     def there(self):
         """Whom the server lists: who has said something within a second, and how long ago."""
@@ -156,26 +158,31 @@ class RandomWorld:
             for _, name, body in self.rows:
                 self.disk[name] = body
             self.rows = []
-        self.inputs = replace(self.inputs, ledger=LedgerState(self.durable, self.ledger_failure))
+        self.hear(LedgerState(self.durable, self.ledger_failure))
 
     def send(self, out):
         self.deaf = max(0, self.deaf - 1)
-        if out.token is not None and not self.deaf:
-            self.bridge.on_token(out.token, self.now)
-        if out.stop is not None and not self.deaf:
-            self.bridge.on_stop(out.stop, self.now)
-            self.judge.stop_at_bridge(out.stop.stop_id)
-        if out.motion is not None and not self.deaf:
-            self.motions = [*self.motions[-30:], out.motion]
-            self.bridge.on_motion(out.motion, self.now)
-        if out.cut is not None:
-            self.orders = [*self.orders[-10:], out.cut]
-            if not self.deaf:
-                self.bridge.on_cut(out.cut, self.now)
-        if out.release is not None and self.bridge.on_release(out.release, self.now).ok:
-            self.judge.bridge_released(self.robot.now.emergency)
-        if out.stops is not None:
-            self.kept_stops = out.stops.stops
+        for message in out:
+            match message:
+                case StopState():
+                    self.kept_stops = message.stops
+                case m.ReleaseStop() if self.bridge.on_release(message, self.now).ok:
+                    self.judge.bridge_released(self.robot.now.emergency)
+                case m.CutCommand():
+                    self.orders = [*self.orders[-10:], message]
+            if self.deaf:
+                continue
+            match message:
+                case m.TokenRequest():
+                    self.bridge.on_token(message, self.now)
+                case m.StopRequest():
+                    self.bridge.on_stop(message, self.now)
+                    self.judge.stop_at_bridge(message.stop_id)
+                case m.MotionCommand():
+                    self.motions = [*self.motions[-30:], message]
+                    self.bridge.on_motion(message, self.now)
+                case m.CutCommand():
+                    self.bridge.on_cut(message, self.now)
 
     # --- what happens --------------------------------------------------------------------------------------------
 
@@ -277,7 +284,7 @@ class RandomWorld:
             if self.chance.random() < 0.98
         )
         message = m.PruningPoints(header=m.Header(self.now), segmenter="test", frames=1, points=points)
-        self.inputs = replace(self.inputs, points=Sample(message, self.now))
+        self.hear(message)
 
     def stop(self):
         """A stop that reaches both, or the one, or one of them again much later."""
@@ -292,7 +299,8 @@ class RandomWorld:
             self.bridge.on_stop(request, self.now)
             self.judge.stop_at_bridge(stop_id)
         if where != "bridge":
-            self.inputs = replace(self.inputs, stops=(*self.inputs.stops, request))
+            self.stops.append(request)
+            self.hear(request)
         if self.chance.random() < 0.2:
             self.chance.choice((self.kill_bridge, self.kill_controller))()
 

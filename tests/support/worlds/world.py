@@ -1,16 +1,14 @@
 """Bridge and controller in one thread on one simulated clock, without sockets or sleeping."""
 
 from collections.abc import Callable
-from dataclasses import replace
-from typing import Any
 
 from bridge.core.bridge import TICK_S, BridgeCore, BridgeOutputs
 from controller.core import Controller
-from controller.inputs import Sample
-from controller.interface import Outputs, StepInputs
-from controller.ledger.journal import LedgerState
+from controller.ledger.journal import LedgerState, Records
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import CloseUpRequest
+from rolling_panda.transport.inbox import Inbox
+from tests.support.sent import every
 
 
 class World:
@@ -19,7 +17,7 @@ class World:
     Attributes:
         bridge: What moves the robot.
         controller: What commands it.
-        inputs: What the controller hears next.
+        inbox: What the controller hears.
         now: Simulated time (s).
         ticks: Milliseconds since the start.
     """
@@ -27,7 +25,7 @@ class World:
     def __init__(self, bridge: BridgeCore, controller: Controller, rate_hz: float) -> None:
         """Nothing is said yet; the controller steps at `rate_hz`."""
         self.bridge, self.controller = bridge, controller
-        self.inputs = StepInputs(present=frozenset(m.PROCESSES))
+        self.inbox = new_inbox()
         self.now, self.ticks = 0.0, 0
         self._control_ticks = max(1, round(1.0 / (rate_hz * TICK_S)))
 
@@ -57,27 +55,26 @@ class World:
         """Press the software stop: a message to both."""
         request = m.StopRequest(stop_id=f"stop-{self.ticks}", source="server", user="operator", reason=reason)
         self.bridge.on_stop(request, self.now)
-        self.inputs = replace(self.inputs, stops=(request,))
+        self.hear(request)
 
-    def control(self, **heard: Any) -> None:
-        """One control period, with these inputs anew."""
-        self.inputs = replace(self.inputs, **heard)
-        self.send(self.controller.step(self.inputs, self.now))
-        self.inputs = replace(self.inputs, stops=(), ledger=LedgerState(self.controller.recorded))
+    def hear(self, *messages: object) -> None:
+        """Messages arrive at the controller."""
+        for message in messages:
+            self.inbox.put(message, self.now)
+
+    def control(self) -> None:
+        """One control period."""
+        self.send(self.controller.step(self.inbox, self.now))
 
     def receive(self, out: BridgeOutputs) -> None:
         """What the bridge sends."""
-        self.to_controller(out.joints, out.odometry, out.state)
+        self.hear(*out.messages)
 
-    def send(self, out: Outputs) -> None:
+    def send(self, out: list[object]) -> None:
         """What the controller sends."""
-        self.to_bridge(out.motion, out.token, out.stop, out.cut, out.picture, out.release)
-
-    def to_controller(self, *messages: m.JointState | m.Odometry | m.BridgeState | None) -> None:
-        """Messages arrive at the controller."""
-        names = {m.JointState: "joints", m.Odometry: "odometry", m.BridgeState: "bridge"}
-        heard = {names[type(message)]: Sample(message, self.now) for message in messages if message is not None}
-        self.inputs = replace(self.inputs, **heard)  # type: ignore[arg-type]
+        self.to_bridge(*out)
+        for records in every(out, Records):
+            self.hear(LedgerState(records.rows[-1].number))
 
     def to_bridge(self, *messages: object) -> None:
         """Messages arrive at the bridge."""
@@ -95,3 +92,10 @@ class World:
                     self.bridge.on_picture(message)
                 case m.ReleaseStop():
                     self.bridge.on_release(message, self.now)
+
+
+def new_inbox() -> Inbox:
+    """An inbox of a controller that has just started, beside all other processes."""
+    inbox = Inbox()
+    inbox.present = frozenset(m.PROCESSES)
+    return inbox
