@@ -1,5 +1,6 @@
 """No screen size hides the view, the queue or the stop: what does not fit at once is reached by scrolling."""
 
+from collections.abc import Callable
 from itertools import combinations
 
 import pytest
@@ -77,25 +78,33 @@ def all_is_reached(page: Page, width: int, height: int, view: int = 240) -> None
     assert page.evaluate(COVERED) == []
 
 
-@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
 def test_view_queue_and_stop_are_there_and_every_control_can_be_reached(
-    page: Page, server: PlayedServer, size: tuple[int, int]
+    page: Page, server: PlayedServer, subtests: pytest.Subtests
 ) -> None:
-    page.set_viewport_size({"width": size[0], "height": size[1]})
+    def at_every_size(state: str, check: Callable[[int, int], None]) -> None:
+        for width, height in SIZES:
+            page.set_viewport_size({"width": width, "height": height})
+            with subtests.test(state=state, size=f"{width}x{height}"):
+                check(width, height)
+
     working(page, server)
-    all_is_reached(page, *size)
+    at_every_size("working", lambda width, height: all_is_reached(page, width, height))
     page.locator("#teleop").click()
     page.get_by_role("button", name="Base", exact=True).click()
     expect(page.locator("rp-drive-pad")).to_be_visible()
-    all_is_reached(page, *size, view=220)
+    at_every_size("base by hand", lambda width, height: all_is_reached(page, width, height, view=220))
     page.locator("#teleop").click()
     STATES["stopped"](page, server)
-    all_is_reached(page, *size, view=220)
+    at_every_size("stopped", lambda width, height: all_is_reached(page, width, height, view=220))
     server.bridge, server.stopped = PlayedServer().bridge, ()
     show_mode(page, server, controller("PAUSED", reason="nobody has looked at the robot for 2.0 s, and there is " * 3))
-    all_is_reached(page, *size)
+    at_every_size("paused", lambda width, height: all_is_reached(page, width, height))
     server.online = False
     server.sockets[-1].close()
     expect(page.locator("rp-link-banner")).to_contain_text("No link to the server")
-    stop_is_in_sight(page, *size)
-    assert page.locator("rp-scene").evaluate(SEEN)[1] >= 220
+
+    def without_a_link(width: int, height: int) -> None:
+        stop_is_in_sight(page, width, height)
+        assert page.locator("rp-scene").evaluate(SEEN)[1] >= 220
+
+    at_every_size("no link", without_a_link)
