@@ -42,6 +42,8 @@ class SessionReportBuilder:
         when = datetime.fromisoformat(at).timestamp()
         first = self._began == 0.0
         self._began, self._written = self._began or when, when
+        # What ends before any work was started took no time.
+        self._ready_since = self._ready_since or when
         match body:
             case TicketRow():
                 return self._ticket(body, when) or first
@@ -112,7 +114,6 @@ class SessionReportBuilder:
     def _give_up(self, row: TicketRow, when: float) -> None:
         point = row.point
         self._given_up.add(point.point_id)
-        self._accepted.discard(point.point_id)
         self._cuts[f"{point.point_id} given up at {when}"] = CutReport(
             point_id=point.point_id,
             vine=point.vine,

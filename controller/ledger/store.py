@@ -71,7 +71,7 @@ class Ledger(Closing):
         with _ledger_errors(self.path, "open"):
             # Created here, readable by its owner alone, whatever the umask is.
             os.close(os.open(self.path, os.O_RDWR | os.O_CREAT, 0o600))
-            self._database = sqlite3.connect(self.path, timeout=_BUSY_S, isolation_level=None, check_same_thread=False)
+            self._database = sqlite3.connect(self.path, timeout=_BUSY_S, isolation_level=None)
         try:
             with _ledger_errors(self.path, "open"):
                 self._prepare()
@@ -167,7 +167,7 @@ class Ledger(Closing):
 def chained(previous: bytes, number: int, entry: Entry) -> bytes:
     """Hash (32 bytes) of a row that follows the row with hash `previous`."""
     content = json.dumps([number, entry.at, entry.kind, entry.name, entry.body], ensure_ascii=False)
-    return hashlib.sha256(previous + content.encode("utf-8", "surrogatepass")).digest()
+    return hashlib.sha256(previous + content.encode()).digest()
 
 
 def read(database: sqlite3.Connection, rest: str = "ORDER BY number") -> Iterator[Row]:
@@ -215,7 +215,7 @@ def head_problem(database: sqlite3.Connection, head: str | OSError | ValueError)
             return "" if bytes.fromhex(hashed) == ORIGIN else f"{HEAD} is not as it was written"
         found = database.execute("SELECT hash FROM audit WHERE number = ?", (int(number),)).fetchone()
         same = found is not None and bytes(found[0]) == bytes.fromhex(hashed)
-    except (OSError, ValueError, TypeError, OverflowError) as error:
+    except (OSError, ValueError, OverflowError) as error:
         return f"{HEAD} cannot be read: {error}"
     return "" if same else f"row {int(number)}, which {HEAD} names as the newest, is not in it"
 

@@ -9,12 +9,14 @@ import sqlite3
 import stat
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from controller.ledger import check
+from controller.ledger import check, store
 from controller.ledger.check import reading, verify
 from controller.ledger.start import restored
 from controller.ledger.store import FILE, HEAD, ORIGIN, SCHEMA_VERSION, Entry, Ledger, Row, chained, read
@@ -209,12 +211,100 @@ def test_the_record_is_for_its_owner_alone_whatever_the_umask(tmp_path: Path) ->
         written(tmp_path, 1)
     finally:
         os.umask(before)
-    assert stat.S_IMODE((tmp_path / FILE).stat().st_mode) == 0o600
+    assert {stat.S_IMODE((tmp_path / name).stat().st_mode) for name in (FILE, HEAD)} == {0o600}
 
 
 def test_a_ledger_that_cannot_be_opened_is_named(tmp_path: Path) -> None:
     with pytest.raises(LedgerError, match=f"^cannot open the ledger .*none/{FILE}: "):
         Ledger(tmp_path / "none")
+
+
+def test_a_folder_in_the_ledgers_place_is_named(tmp_path: Path) -> None:
+    (tmp_path / FILE).mkdir()
+    with pytest.raises(LedgerError, match=f"^cannot open the ledger {tmp_path / FILE}: "):
+        Ledger(tmp_path)
+
+
+def test_a_page_that_is_damaged_is_told_when_the_ledger_is_opened_and_no_file_stays_open(tmp_path: Path) -> None:
+    path = written(tmp_path)
+    content = bytearray(path.read_bytes())
+    content[4096:8192] = bytes(4096)
+    path.write_bytes(content)
+    before = len(os.listdir("/proc/self/fd"))
+    with pytest.raises(LedgerError, match=f"^cannot read the ledger {path}: "):
+        Ledger(tmp_path)
+    assert len(os.listdir("/proc/self/fd")) == before
+
+
+def test_a_new_ledger_has_its_head_and_name_on_the_disk_and_asks_for_each_row_to_be_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced: list[Path] = []
+    statements: list[str] = []
+
+    def connect(*args: Any, **words: Any) -> sqlite3.Connection:
+        database = connected(*args, **words)
+        database.set_trace_callback(statements.append)
+        return database
+
+    connected = sqlite3.connect
+    monkeypatch.setattr(store, "sync_folder", synced.append)
+    monkeypatch.setattr(sqlite3, "connect", connect)
+    Ledger(tmp_path).close()
+    assert synced == [tmp_path] and (tmp_path / HEAD).exists()
+    assert "PRAGMA synchronous = FULL" in statements
+
+
+def test_a_writer_waits_half_a_second_for_a_program_that_holds_the_file(tmp_path: Path) -> None:
+    with Ledger(tmp_path) as ledger:
+        other = sqlite3.connect(tmp_path / FILE, isolation_level=None)
+        other.execute("BEGIN IMMEDIATE")
+        began = time.monotonic()
+        with pytest.raises(LedgerError, match="locked"):
+            ledger.append([entry(1)])
+        assert time.monotonic() - began < 3.0
+        other.close()
+        assert ledger.append([entry(1)]) == 1
+
+
+def test_of_rows_that_cannot_all_be_written_none_is(tmp_path: Path) -> None:
+    with Ledger(tmp_path) as ledger:
+        ledger.append([entry(1)])
+        with pytest.raises(LedgerError, match="cannot write"):
+            ledger.append([entry(2), Entry("t", "event", None, "{}")])  # type: ignore[arg-type]
+        assert ledger.append([entry(2)]) == 2
+    assert verify(tmp_path).problem == ""
+
+
+def test_a_head_that_cannot_be_written_keeps_no_row_out_and_no_file_open(tmp_path: Path) -> None:
+    with Ledger(tmp_path) as ledger:
+        assert ledger.append([entry(1)]) == 1
+        before = len(os.listdir("/proc/self/fd"))
+        for number in range(2, 22):
+            assert ledger.append([entry(number)]) == number
+        assert len(os.listdir("/proc/self/fd")) == before
+        (tmp_path / HEAD).unlink()
+        (tmp_path / HEAD).mkdir()
+        assert ledger.append([entry(22)]) == 22
+
+
+def test_an_index_without_one_of_its_rows_is_found(tmp_path: Path) -> None:
+    path = written(tmp_path)
+
+    def schema(*statements: tuple[str, tuple[Any, ...]]) -> list[Any]:
+        database = sqlite3.connect(path, isolation_level=None)
+        database.execute("PRAGMA writable_schema = ON")
+        found = database.execute("SELECT * FROM sqlite_schema WHERE name = 'newest'").fetchall()
+        for statement, values in statements:
+            database.execute(statement, values)
+        database.close()
+        return found
+
+    (index,) = schema(("DELETE FROM sqlite_schema WHERE name = 'newest'", ()))
+    with Ledger(tmp_path) as ledger:
+        ledger.append([entry(13)])
+    schema(("INSERT INTO sqlite_schema VALUES (?, ?, ?, ?, ?)", index))
+    assert verify(tmp_path).problem.startswith("the file is damaged: ")
 
 
 def test_another_table_in_the_file_is_found(tmp_path: Path) -> None:

@@ -175,3 +175,14 @@ def test_points_that_are_given_up_one_after_the_other_take_the_time_since_the_on
     told = account.report().cuts
     assert [(cut.point_id, cut.seconds, cut.ended_at - BEGAN) for cut in told] == [("a", 0.5, 0.5), ("b", 2.0, 2.5)]
     assert account.add(at(3.0), ticket("c", "CUTTING"))
+
+
+def test_a_point_that_stays_out_of_reach_changes_the_report_once():
+    builder = SessionReportBuilder()
+    beyond = TicketRow(point=pruning_point("a"), state="UNREACHABLE", cut_id="")
+    assert [builder.add(at(second), beyond) for second in (0.0, 1.0, 2.0)] == [True, False, False]
+
+
+def test_a_long_reason_for_giving_up_is_cut_to_what_the_wire_carries():
+    given_up = TicketRow(point=pruning_point("a"), state="FAILED_NOT_CUT", cut_id="", reason="x" * 600)
+    assert [len(cut.reason) for cut in report((0.0, given_up)).cuts] == [500]

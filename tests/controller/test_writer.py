@@ -42,11 +42,12 @@ class Disk:
     """A ledger whose disk can be full or slow."""
 
     def __init__(self):
-        self.rows, self.full, self.go, self.closed = [], False, threading.Event(), False
+        self.rows, self.full, self.go, self.closed, self.tries = [], False, threading.Event(), False, 0
         self.go.set()
 
     def append(self, entries):
         new = list(entries)
+        self.tries += 1
         self.go.wait(10.0)
         if self.full:
             raise LedgerError("cannot write: database or disk is full")
@@ -140,6 +141,7 @@ def test_a_flood_of_lines_is_counted_instead_of_recorded(writers):
     assert "refused 199" in disk.rows[199].body
     assert (disk.rows[200].kind, disk.rows[200].name) == ("event", "controller")
     left_out = json.loads(disk.rows[200].body)
+    assert writer.state.durable == 0
     assert left_out["lines"] == 800 and left_out["text"].startswith("800 log lines") and "after" in disk.rows[201].body
 
 
@@ -171,3 +173,33 @@ def test_at_the_end_a_full_disk_is_given_up_and_the_ledger_closed(writers):
     until(lambda: writer.state.failure)
     writer.close()
     assert disk.closed and threading.active_count() == before
+
+
+def test_each_flood_is_counted_for_itself(writers):
+    disk, now = Disk(), [0.0]
+    writer = writers(lambda: disk, clock=lambda: now[0])
+    for _ in range(2):
+        disk.rows.clear()
+        for number in range(1000):
+            writer.note(line(f"refused {number}"))
+        now[0] += 100.0
+        writer.note(line("after"))
+        until(lambda: any("after" in row.body for row in disk.rows))
+        assert [json.loads(row.body)["lines"] for row in disk.rows if row.name == "controller"] == [800]
+        now[0] += 100.0
+
+
+def test_a_writer_with_nothing_to_do_ends_at_once(writers):
+    before = threading.active_count()
+    writers(lambda: Disk()).close()
+    assert threading.active_count() == before
+
+
+def test_a_full_disk_is_tried_again_now_and_then(writers):
+    disk = Disk()
+    disk.full = True
+    writer = writers(lambda: disk)
+    writer.write([record(1)])
+    until(lambda: writer.state.failure)
+    time.sleep(0.2)
+    assert disk.tries < 20
