@@ -34,7 +34,7 @@ ifdef ARGS
 	$(BIN)/pytest $(ARGS)
 else
 	$(BIN)/pytest -n auto --dist worksteal -m "not (paced or alone or slow)" $(WITHOUT_TRAINING)
-	$(BIN)/pytest -n 2 --dist loadfile -m "paced and not slow" $(WITHOUT_TRAINING)
+	$(BIN)/pytest -n 2 --dist loadfile -m "paced and not (alone or slow)" $(WITHOUT_TRAINING)
 	$(BIN)/pytest -m "alone and not slow" $(WITHOUT_TRAINING)
 	@echo "make test-training runs the tests of the training; it installs PyTorch"
 endif

@@ -56,6 +56,7 @@ def release(stop_id: str = "s1") -> m.ReleaseStop:
     return m.ReleaseStop(stop_id=stop_id, user="ada", reason="checked")
 
 
+@pytest.mark.alone  # It counts what comes in real time.
 def test_telemetry_comes_at_its_rates_with_growing_sequences(rig: Rig) -> None:
     rig.run(2.0, REST)
     joints = [out.joints.sequence for out in rig.outputs if out.joints]

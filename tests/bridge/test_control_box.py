@@ -15,8 +15,6 @@ from rolling_panda.runtime.launch import child_environment
 from tests.support.processes.device_process import DeviceProcess
 from tests.support.waiting import until
 
-pytestmark = pytest.mark.paced
-
 ADDRESS = f"127.0.{os.getpid() % 250 + 1}.6"
 CLIENT = str(Path(__file__).parents[1] / "support" / "control_client.py")
 IDLE, MOVING, REFLEX = 1, 2, 4
@@ -57,6 +55,7 @@ def last_on_a_core(pid: int) -> Iterator[None]:
     os.sched_setaffinity(pid, cores)
 
 
+@pytest.mark.alone  # It takes a whole core from everybody.
 def test_a_client_that_waits_for_a_core_has_lost_nothing(box: DeviceProcess) -> None:
     with running(CLIENT, ADDRESS) as client:
         until(lambda: commands(box) > 0)
@@ -74,6 +73,7 @@ def test_a_client_that_waits_for_a_core_has_lost_nothing(box: DeviceProcess) -> 
         assert box.tell()["breaches"] == ["20 packets lost in a row"]
 
 
+@pytest.mark.paced
 def test_rows_of_packets_to_lose_are_never_one_longer_row(box: DeviceProcess) -> None:
     """A box that comes slowly through its milliseconds would otherwise lose more in a row than anybody asked for."""
     with running(CLIENT, ADDRESS):
@@ -88,6 +88,7 @@ def test_rows_of_packets_to_lose_are_never_one_longer_row(box: DeviceProcess) ->
         until(lambda: box.tell()["mode"] == REFLEX)
 
 
+@pytest.mark.paced
 def test_a_killed_client_leaves_a_box_that_the_next_one_can_move(box: DeviceProcess) -> None:
     """Also one that has not read what it was told, which breaks the connection instead of ending it."""
     for _ in range(3):
