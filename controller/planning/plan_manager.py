@@ -20,7 +20,6 @@ _PAUSE_S = 2.0
 _AGAIN_S = 10.0
 #: Number of next cuts that are rolled out at all times of the work.
 _NEXT = 5
-#: Period of the repeated message for late joiners (s).
 
 
 class PlanManager:

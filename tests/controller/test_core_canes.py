@@ -1,14 +1,12 @@
 """Canes that stay among accepted cuts: the controller with a robot that has no mass goes round them or says why not."""
 
-from dataclasses import replace
-
 import numpy as np
 import pinocchio as pin
 import pytest
 
 from controller.config import ControllerConfig
 from controller.motion.surroundings import obstacles_of
-from controller.planning.work_plan import WorkPlan
+from controller.planning.work_plan import PlanRequest, WorkPlan
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.collision_geometry import BLADES
 from rolling_panda import commands as intents
@@ -17,6 +15,7 @@ from rolling_panda.messages.supervision import TeleopTarget
 from rolling_panda.model.robot import RobotModel, pose_message
 from tests.support.controller_at_work import entry, robot, run_until, working
 from tests.support.points import point
+from tests.support.sent import newest
 
 pytestmark = pytest.mark.long
 
@@ -170,14 +169,15 @@ def test_the_way_in_beside_a_cane_is_not_left():
 
 def test_while_the_tool_is_in_the_canes_a_plan_is_asked_for_from_where_it_will_be_clear():
     r = working((point("a", CUT), OTHER), obstacles=(OWN,))
-    made, asked, shown = None, [], False
+    answered, asked, shown = False, [], False
     while not asked:
-        out = r.take(r.controller.step(replace(r.inputs(), plan=made), r.now))
-        if out.request is not None and made is None:
+        request = newest(r.step(), PlanRequest)
+        if request is not None and not answered:
             # It says nothing of any point, and is void as soon as another one is accepted.
-            made = WorkPlan(out.request)
-        elif out.request is not None:
-            asked.append(out.request.q)
+            r.hear(WorkPlan(request))
+            answered = True
+        elif request is not None:
+            asked.append(request.q)
         if not shown and r.state is not None and r.state.phase == "CUT":
             shown = True
             r.show((point("a", CUT), OTHER, point("c", (1.0, 0.75, 1.1))))
