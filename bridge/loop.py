@@ -54,9 +54,9 @@ class BridgeProcess:
             out += core.step(self._time.tick(), now, inbox.wall_time).messages
         return out
 
-    def stop(self, request: m.StopRequest) -> None:
-        """Latch a stop at once, between two steps."""
-        self._core.on_stop(request, self._time.now, time.time())
+    def stop(self, request: m.StopRequest, wall_time: float) -> None:
+        """Latch a stop at once, between two steps, at `wall_time` (s since 1970)."""
+        self._core.on_stop(request, self._time.now, wall_time)
 
     def end(self) -> Sequence[object]:
         """Nothing: the watchdogs of the robot stop it."""

@@ -5,7 +5,7 @@ how it moves, the queue what is cut. `Controller` calls them in order for each p
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import msgspec
 
@@ -28,6 +28,7 @@ from controller.planning.preview_plan import Preview, PreviewRequest
 from controller.planning.work_plan import PlanRequest, WorkPlan
 from controller.report import controller_state
 from controller.supervision.authority import client_of
+from controller.supervision.fencing import draw_nonce
 from controller.supervision.modes import Event
 from controller.supervision.permission import Situation, allowed, refusal
 from controller.supervision.supervisor import Supervisor
@@ -64,6 +65,7 @@ class Controller:
         robot_config: RobotConfig,
         run_id: str = "cut",
         method: Method | None = None,
+        draw: Callable[[], str] = draw_nonce,
     ) -> None:
         """Build the robot's model and start in IDLE.
 
@@ -72,6 +74,7 @@ class Controller:
             robot_config: Section `[robot]`.
             run_id: Prefix that makes the cut ids of this start unique; letters, digits, `_.:-`.
             method: Whole-body method in place of the configured one.
+            draw: Draws the random parts of tokens and stops.
 
         Raises:
             ConfigError: There is no such method.
@@ -87,7 +90,7 @@ class Controller:
         self._movement = Movement(
             config, robot_config, self._queue, self._event_log, run_id, self._known, method, permit
         )
-        self._supervisor = Supervisor(config, self._movement, self._event_log)
+        self._supervisor = Supervisor(config, self._movement, self._event_log, draw)
         self._handlers = self._all_handlers()
         self._inbox = Inbox()
         self._points_seen: object = None

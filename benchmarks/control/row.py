@@ -88,12 +88,12 @@ def cut_row(
             begin, other_s = loop.now, 0.0
             if along:
                 loop.run(_SURVEY_S)
-                loop.ask(intents.Arm(user="bench"))
+                loop.command(intents.Arm(user="bench"))
                 clock.begin(loop.now)
                 work_s, other_s = walk(loop, along)
                 accepted, durations = [entry for entry in loop.queue() if entry.accepted_position is not None], {}
             else:
-                loop.ask(intents.Start(user="bench"))
+                loop.command(intents.Start(user="bench"))
                 clock.begin(begin)
                 durations = _work(loop, [entry.point_id for entry in accepted])
                 work_s = sum(durations.values()) if durations else loop.now - begin
@@ -171,12 +171,12 @@ def _named(touched: dict[Cane, set[str]]) -> dict[str, str]:
 
 def _accept(loop: ClosedLoop, points: int) -> list[m.QueueEntry]:
     loop.run(_SURVEY_S)
-    loop.ask(intents.Arm(user="bench"))
-    loop.ask(intents.AcceptAll(user="bench", confidence=0.0))
+    loop.command(intents.Arm(user="bench"))
+    loop.command(intents.AcceptAll(user="bench", confidence=0.0))
     loop.run(0.2)
     accepted = list(loop.queue("ACCEPTED"))
     for entry in accepted[points:]:
-        loop.ask(intents.RejectPoint(user="bench", point_id=entry.point_id, reason="not in this run"))
+        loop.command(intents.RejectPoint(user="bench", point_id=entry.point_id, reason="not in this run"))
     # An operator looks at the queue, with or without a plan, before starting.
     loop.run(_LOOK_S)
     return accepted[:points]

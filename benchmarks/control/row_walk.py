@@ -30,16 +30,16 @@ def walk(loop: ClosedLoop, end: float, limit_s: float = 600.0) -> tuple[float, f
     working = other = 0.0
     until = loop.now + limit_s
     while loop.now < until:
-        loop.ask(intents.AcceptAll(user=_USER, confidence=0.0))
+        loop.command(intents.AcceptAll(user=_USER, confidence=0.0))
         if loop.controller.mode == "PAUSED":
-            loop.ask(intents.Resume(user=_USER))
+            loop.command(intents.Resume(user=_USER))
             loop.run(0.05)
-        if loop.ask(intents.Start(user=_USER)).ok:
+        if loop.command(intents.Start(user=_USER)).ok:
             begin = loop.now
             while loop.now < until and (loop.controller.mode == "AUTO" or loop.now - begin < 0.1):
                 loop.run(_LOOK_S)
                 # What comes into view on the way is accepted too, and worked on without a stop.
-                loop.ask(intents.AcceptAll(user=_USER, confidence=0.0))
+                loop.command(intents.AcceptAll(user=_USER, confidence=0.0))
             working += loop.now - begin
             continue
         if _place(loop) >= end:
@@ -57,7 +57,7 @@ def _place(loop: ClosedLoop) -> float:
 
 def _go_on(loop: ClosedLoop, distance: float) -> None:
     """Arm home, drive on by hand, look."""
-    if loop.ask(intents.Home(user=_USER)).ok:
+    if loop.command(intents.Home(user=_USER)).ok:
         loop.run(0.1)
         loop.run_until(lambda: loop.state is not None and "home" in loop.state.reason, _PATIENCE_S)
         loop.run_until(lambda: loop.state is not None and loop.state.reason != "homing the arm", _PATIENCE_S)
@@ -66,6 +66,6 @@ def _go_on(loop: ClosedLoop, distance: float) -> None:
         left = goal - _place(loop)
         drive = BaseVelocity(linear=min(_SPEED, math.sqrt(0.4 * max(left, 0.0)) + 0.01), angular=0.0)
         held = TeleopTarget(sequence=round(100 * loop.now), hold=True, user=_USER, base=drive)
-        loop.hear(held)
+        loop.say(held)
         loop.run(0.05)
     loop.run(_SURVEY_S)

@@ -15,7 +15,6 @@ from benchmarks.faults.judge import Rows, replays, violations
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from tests.support.points import point
-from tests.support.sent import every
 from tests.support.worlds.faulty_world import FaultyWorld
 
 _USER = "ada"
@@ -60,9 +59,9 @@ class EndlessRow(FaultyWorld):
         self._shown = 0
         self.people = (_USER,)
         self.run(0.3)
-        self.ask(intents.Arm(user=_USER))
+        self.command(intents.Arm(user=_USER))
         self.offer()
-        self.ask(intents.Start(user=_USER))
+        self.command(intents.Start(user=_USER))
         self.run(0.02)
 
     def offer(self) -> None:
@@ -73,14 +72,15 @@ class EndlessRow(FaultyWorld):
         points = tuple(_point(number) for number in range(max(0, self._shown - _AHEAD), wanted))
         self._shown = wanted
         message = m.PruningPoints(header=m.Header(self.now, "odom"), segmenter="none", frames=1, points=points)
-        self.hear(message)
+        self.say(message)
         self.run(0.02)
-        self.ask(intents.AcceptAll(user=_USER, confidence=0.0))
+        self.command(intents.AcceptAll(user=_USER, confidence=0.0))
 
-    def send(self, out: list[object]) -> None:
-        """Note the cut that is ordered."""
-        self.cut_ids |= {cut.cut_id for cut in every(out, m.CutCommand)}
-        super().send(out)
+    def say(self, message: m.Message) -> None:
+        """Send a message; note the cut that is ordered."""
+        super().say(message)
+        if isinstance(message, m.CutCommand):
+            self.cut_ids.add(message.cut_id)
 
 
 def _point(number: int) -> m.PruningPoint:

@@ -134,7 +134,7 @@ def _stuck_wheel(world: FaultyWorld) -> None:
 
 def _taken_over(world: FaultyWorld) -> None:
     world.people = (*world.people, "bob")
-    world.ask(intents.TakeControl(user="bob", confirm=True))
+    world.command(intents.TakeControl(user="bob", confirm=True))
 
 
 def _bad_link(world: FaultyWorld) -> None:

@@ -8,9 +8,10 @@ import numpy as np
 
 from benchmarks.control.row_walk import walk
 from benchmarks.perception.obstacles import Place, Track
-from bridge.core.bridge import BridgeOutputs
 from bridge.sim.robot.robot import SimulatedRobot
 from rolling_panda import commands as intents
+from rolling_panda.messages import Message
+from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.resources import resource
 from tests.support.worlds.closed_loop import ClosedLoop
 
@@ -26,13 +27,13 @@ class _Watched(ClosedLoop):
         super().__init__(seed, trace, resource("assets/config/sim.toml"), segmenter="labels")
         self.places: list[Place] = []
 
-    def receive(self, outputs: BridgeOutputs) -> None:
-        frame, robot = outputs.frame, self.bridge.robot
-        assert isinstance(robot, SimulatedRobot)
-        if frame is not None:
+    def say(self, message: Message) -> None:
+        super().say(message)
+        if isinstance(message, CameraFrame):
+            robot = self.bridge.robot
+            assert isinstance(robot, SimulatedRobot)
             camera = tuple(np.round(robot.true_camera(), 6).ravel().tolist())
-            self.places.append(Place(frame.base, frame.position, camera))
-        super().receive(outputs)
+            self.places.append(Place(message.base, message.position, camera))
 
 
 def record(seed: int, path: Path) -> str:
@@ -47,7 +48,7 @@ def record(seed: int, path: Path) -> str:
     """
     with tempfile.TemporaryDirectory() as folder, _Watched(seed, Path(folder) / "trace") as loop:
         loop.run(_SURVEY_S)
-        loop.ask(intents.Arm(user="bench"))
+        loop.command(intents.Arm(user="bench"))
         walk(loop, _END)
         places, seconds = loop.places, loop.now
     kept = [places[int(k * len(places) / _KEPT)] for k in range(min(_KEPT, len(places)))]

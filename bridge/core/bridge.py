@@ -3,7 +3,6 @@
 Latch, watchdog and limits belong to the bridge: no other process can override them.
 """
 
-import secrets
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -19,7 +18,7 @@ from bridge.core.latch import StopLatch
 from bridge.core.limiter import Limiter
 from bridge.core.odometer import Odometer
 from bridge.core.refusals import Refusals
-from bridge.core.robot_faults import RobotFaults
+from bridge.core.robot_faults import RobotFaults, draw_id
 from bridge.core.robot_time import TimeRatio
 from bridge.core.round_trip import RoundTrip
 from bridge.core.state_memory import Remembered
@@ -93,6 +92,7 @@ class BridgeCore:
         cuts: CutMemory | None = None,
         memory: KeptValue[Remembered] | None = None,
         relaxed_limits: tuple[str, ...] = (),
+        draw: Callable[[], str] = draw_id,
     ) -> None:
         """Start with the watchdog tripped, at rest, without a stop.
 
@@ -107,6 +107,7 @@ class BridgeCore:
             cuts: Durable memory of cuts; None keeps them for the life of the process.
             memory: State that survives a restart; None keeps nothing.
             relaxed_limits: Safety limits that the configuration sets less strictly than usual, to report.
+            draw: Draws the random part of the bridge's own stops.
         """
         self.robot = robot
         self.refusals = Refusals(rejections)
@@ -125,7 +126,8 @@ class BridgeCore:
         self._latch = StopLatch(before.stops, before.released, before.released_by)
         self._watchdog = Watchdog(config.fade_s, config.deadline_s)
         self._limiter = Limiter(limits, config.wheel_acceleration, config.joint_margin, TICK_S)
-        self._faults = RobotFaults()
+        self._draw = draw
+        self._faults = RobotFaults(draw)
         self._orders = CutOrders(cuts)
         self._camera_trigger = CameraTrigger(config.camera_moving_hz, config.camera_resting_hz, TICK_S)
         self._pace = TimeRatio()
@@ -230,7 +232,7 @@ class BridgeCore:
     def _watch_button(self, now: float) -> None:
         pressed = self._measured.emergency
         if pressed and not self._latch.hardware:
-            stop_id = f"hardware-{secrets.token_hex(8)}"
+            stop_id = f"hardware-{self._draw()}"
             reason = "the emergency stop button of the robot is pressed"
             self.on_stop(m.StopRequest(stop_id=stop_id, source="hardware", user="", reason=reason), now, self._wall)
         if pressed != self._latch.hardware:

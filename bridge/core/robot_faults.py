@@ -1,6 +1,7 @@
 """Faults that the robot reports: logged once, and latched if a person has to inspect them first."""
 
 import secrets
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from rolling_panda.messages.robot import StopRequest
@@ -17,11 +18,17 @@ class FaultChange:
     stop: StopRequest | None
 
 
+def draw_id() -> str:
+    """The random part of a stop's id, 64 bits."""
+    return secrets.token_hex(8)
+
+
 class RobotFaults:
     """Tracks the robot's faults from measurement to measurement. Times are the robot's (s)."""
 
-    def __init__(self) -> None:
-        """Start without a fault."""
+    def __init__(self, draw: Callable[[], str] = draw_id) -> None:
+        """Start without a fault; `draw` draws the random part of a stop's id."""
+        self._draw = draw
         self.current = ""
         self.releases = 0
         self._recovering_until = float("-inf")
@@ -45,7 +52,7 @@ class RobotFaults:
             return FaultChange("the robot is ready again; it waits for a setpoint at rest", None)
         stop = None
         if severe and not stopped and now >= self._recovering_until:
-            stop = StopRequest(stop_id=f"robot-{secrets.token_hex(8)}", source="robot", user="", reason=fault[:500])
+            stop = StopRequest(stop_id=f"robot-{self._draw()}", source="robot", user="", reason=fault[:500])
         return FaultChange(f"the robot does not move: {fault}", stop)
 
     def released(self, now: float) -> None:

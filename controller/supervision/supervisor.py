@@ -1,7 +1,6 @@
 """Supervision of one robot: mode, latched stops, control authority and health of the inputs."""
 
-import secrets
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Final
 
@@ -11,7 +10,7 @@ from controller.ledger.journal import EventLogger
 from controller.supervision import health as safety
 from controller.supervision import modes
 from controller.supervision.authority import Authority, client_of
-from controller.supervision.fencing import FencingToken
+from controller.supervision.fencing import FencingToken, draw_nonce
 from controller.supervision.modes import Event
 from controller.supervision.permission import Situation
 from controller.supervision.stop_latch import StopLatch
@@ -31,18 +30,26 @@ _BRAKING_S: Final = 0.4
 class Supervisor:
     """The supervision state machine and its inputs. Call `update` with the inputs of each period, then `review`."""
 
-    def __init__(self, config: ControllerConfig, movement: Movement, event_log: EventLogger) -> None:
+    def __init__(
+        self,
+        config: ControllerConfig,
+        movement: Movement,
+        event_log: EventLogger,
+        draw: Callable[[], str] = draw_nonce,
+    ) -> None:
         """Start in IDLE.
 
         Args:
             config: Section `[controller]`.
             movement: What is ended when a mode ends.
             event_log: Records events for people.
+            draw: Draws the random parts of tokens and stops.
         """
+        self._draw = draw
         self._config, self._movement, self._event_log = config, movement, event_log
         self.stops = StopLatch()
         self.authority = Authority(config.supervision_s)
-        self.fencing = FencingToken()
+        self.fencing = FencingToken(draw)
         #: The stop to send to the bridge, until it shows that it has latched one.
         self.stop_due: m.StopRequest | None = None
         #: Stamp of the newest bridge state without motion by another sender's commands.
@@ -181,7 +188,7 @@ class Supervisor:
         if bridge.header.stamp - self._explained <= _BRAKING_S:
             return ()
         reason = "the robot moves by commands of another sender"
-        stop = m.StopRequest(stop_id=f"motion-{secrets.token_hex(8)}", source="controller", user="", reason=reason)
+        stop = m.StopRequest(stop_id=f"motion-{self._draw()}", source="controller", user="", reason=reason)
         self.stop_due = stop
         # The other sender knows this token.
         self.fencing.release_token()

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from rolling_panda import messages as m
-from rolling_panda.errors import ServiceError
 from rolling_panda.topics import SERVICES, TOPICS, Service, Topic
 from rolling_panda.transport.access import CALLERS
 from rolling_panda.transport.inbox import Answered, Inbox, Rejected, Reply, Request
@@ -68,8 +67,8 @@ class Wire(Protocol):
     def serve(self, service: Service[Any], answer: Callable[[Any], m.Answer | None]) -> None:
         """Answer requests."""
 
-    def call(self, service: Service[Any], request: Any) -> m.Answer:
-        """Call a service."""
+    def ask(self, service: Service[Any], request: Any, done: Callable[[m.Answer], None]) -> None:
+        """Call a service without waiting; `done` gets its answer, on any thread."""
 
     def present(self) -> frozenset[str]:
         """Connected processes."""
@@ -80,6 +79,9 @@ class Runner:
 
     Messages arrive on threads of the wire. The loop's thread moves them into the inbox, calls `step` and sends what it
     returns. The newest message of a latched topic is repeated at the topic's rate.
+
+    Attributes:
+        inbox: What has arrived.
     """
 
     def __init__(
@@ -88,7 +90,7 @@ class Runner:
         wire: Wire,
         period_s: float,
         longest_turn_s: float = math.inf,
-        at_once: Mapping[type[Any], Callable[[Any], None]] | None = None,
+        at_once: Mapping[type[Any], Callable[[Any, float], None]] | None = None,
         clock: Callable[[], float] = time.monotonic,
         wall_clock: Callable[[], float] = time.time,
     ) -> None:
@@ -99,15 +101,15 @@ class Runner:
             wire: Open session.
             period_s: Time between steps (s).
             longest_turn_s: Longest time that the clock of `step` advances in one period (s); see `LoopClock`.
-            at_once: Handlers of messages that do not wait for the next step. They run on a thread of the wire, never
-                during a step.
+            at_once: Handlers of messages that do not wait for the next step. They get the message and the wall clock
+                (s since 1970), on a thread of the wire, never during a step.
             clock: Monotonic clock (s).
             wall_clock: Clock for texts (s since 1970).
         """
         self._core, self._wire, self._period = core, wire, period_s
         self._time, self._wall_clock = clock, wall_clock
         self._clock = LoopClock(clock(), longest_turn_s)
-        self._inbox = Inbox()
+        self.inbox = Inbox()
         self._lock, self._wake = threading.Lock(), threading.Event()
         self._arrived: dict[type[Any], tuple[Any, float]] = {}
         self._queued: dict[type[Any], deque[tuple[Any, float]]] = {
@@ -142,7 +144,7 @@ class Runner:
         due = began = self._time()
         while not stopping.is_set():
             started = self._time()
-            self._inbox.late_ticks += started - began > _LATE * self._period
+            self.inbox.late_ticks += started - began > _LATE * self._period
             began = started
             self.turn(started)
             due += self._period
@@ -157,7 +159,7 @@ class Runner:
     def turn(self, clock: float) -> None:
         """One period at `clock` (s, monotonic)."""
         now = self._clock.turn(clock)
-        inbox = self._inbox
+        inbox = self.inbox
         self._collect(inbox)
         with self._lock:
             out = self._core.step(inbox, now)
@@ -215,21 +217,26 @@ class Runner:
         queue = self._queued[kind] = deque(maxlen=topic.queue)
         return lambda message, at: queue.append((message, at))
 
-    def _immediate(self, handler: Callable[[Any], None]) -> Callable[[Any, float], None]:
+    def _immediate(self, handler: Callable[[Any, float], None]) -> Callable[[Any, float], None]:
         def handle(message: Any, at: float) -> None:
             with self._lock:
-                handler(message)
+                handler(message, self._wall_clock())
 
         return handle
 
     def _reject(self, topic: str, reason: str) -> None:
         self._queued[Rejected].append((Rejected(topic, reason), self._time()))
 
-    def _ask(self, service: Service[Any], request: Any) -> m.Answer | None:
-        """Hand a request to the core and wait for its answer, on a thread of the wire."""
+    def request(self, request: Any) -> "Future[m.Answer | None]":
+        """Hand a request to the core. Its answer is None where another process has to answer."""
         future: Future[m.Answer | None] = Future()
         self._asked.append((request, self._time(), future))
         self._wake.set()
+        return future
+
+    def _ask(self, service: Service[Any], request: Any) -> m.Answer | None:
+        """Hand a request to the core and wait for its answer, on a thread of the wire."""
+        future = self.request(request)
         try:
             return future.result(service.timeout_s - _ANSWER_MARGIN_S)
         except FutureTimeoutError:
@@ -238,16 +245,10 @@ class Runner:
             return m.Answer(ok=False, reason="it was decided, but not recorded in time: see the state")
 
     def _call(self, service: Service[Any], request: Any) -> None:
-        """Call a service on a thread of its own, since it blocks."""
-
-        def call() -> None:
-            try:
-                answer = self._wire.call(service, request)
-            except ServiceError as error:
-                answer = m.Answer(ok=False, reason=str(error)[:500])
+        def done(answer: m.Answer) -> None:
             self._queued[Answered].append((Answered(request, answer), self._time()))
 
-        threading.Thread(target=call, daemon=True).start()
+        self._wire.ask(service, request, done)
 
 
 def _reply(reply: Reply) -> None:

@@ -262,6 +262,18 @@ class Transport(Onlooker):
             f"{service.name} did not answer within {service.timeout_s} s: is the {service.server} running?"
         )
 
+    def ask(self, service: Service[Req], request: Req, done: Callable[[m.Answer], None]) -> None:
+        """Call a service without waiting; `done` gets its answer, or a refusal with the cause, on another thread."""
+
+        def call() -> None:
+            try:
+                answer = self.call(service, request)
+            except ServiceError as error:
+                answer = m.Answer(ok=False, reason=str(error)[:500])
+            done(answer)
+
+        threading.Thread(target=call, daemon=True).start()
+
 
 class ForeignWire:
     """A session for keys and bytes of other programs, such as a base that speaks ROS 2 through a Zenoh bridge."""

@@ -16,7 +16,7 @@ def surveyed(seed: int, path: Path) -> ClosedLoop:
     """A loop that has looked at the row long enough, armed."""
     loop = ClosedLoop(seed, path)
     assert loop.run_until(lambda: len(list(loop.queue("PROPOSED"))) >= 3, 15.0), "too few points were detected"
-    assert loop.ask(intents.Arm(user="test")).ok
+    assert loop.command(intents.Arm(user="test")).ok
     return loop
 
 
@@ -25,7 +25,7 @@ def accept(loop: ClosedLoop, count: int) -> list[m.QueueEntry]:
     shown = loop.inbox.newest(m.PruningPoints)
     proposed = () if shown is None else shown.message.points
     for point in proposed[:count]:
-        assert loop.ask(intents.AcceptPoint(user="test", point_id=point.point_id, revision=point.revision)).ok
+        assert loop.command(intents.AcceptPoint(user="test", point_id=point.point_id, revision=point.revision)).ok
     loop.run(0.1)
     return list(loop.queue("ACCEPTED"))
 
@@ -35,7 +35,7 @@ def test_nothing_moves_before_start_and_then_the_cane_is_severed_where_it_was_ac
     (entry,) = accept(loop, 1)
     loop.run(1.0)
     started = loop.now
-    assert loop.ask(intents.Start(user="test")).ok
+    assert loop.command(intents.Start(user="test")).ok
     assert loop.run_until(lambda: any(loop.queue("DONE", "FAILED_NOT_CUT", "UNKNOWN")), 40.0)
     assert [done.point_id for done in loop.queue("DONE")] == [entry.point_id]
     loop.close()
@@ -51,7 +51,7 @@ def test_nothing_moves_before_start_and_then_the_cane_is_severed_where_it_was_ac
 def test_the_stop_halts_a_moving_robot_and_only_a_reset_with_a_start_moves_it_again(tmp_path: Path) -> None:
     loop = surveyed(2, tmp_path / "trace")
     accept(loop, 2)
-    loop.ask(intents.Start(user="test"))
+    loop.command(intents.Start(user="test"))
 
     def driving() -> bool:
         odometry = loop.inbox.newest(m.Odometry)
@@ -62,9 +62,9 @@ def test_the_stop_halts_a_moving_robot_and_only_a_reset_with_a_start_moves_it_ag
     loop.stop("test")
     loop.run(2.0)
     assert loop.state is not None and loop.state.mode == "ESTOP_LATCHED"
-    refused = loop.ask(intents.Start(user="test"))
+    refused = loop.command(intents.Start(user="test"))
     assert not refused.ok and "stop" in refused.reason.lower()
-    assert loop.ask(intents.Reset(user="test", role="supervisor", reason="the test goes on")).ok
+    assert loop.command(intents.Reset(user="test", role="supervisor", reason="the test goes on")).ok
     loop.run(2.0)
     assert loop.state.mode == "IDLE"
     loop.close()
@@ -78,7 +78,7 @@ def test_the_same_seed_gives_the_same_trace(tmp_path: Path, seed: int) -> None:
     for name in ("first", "second"):
         loop = surveyed(seed, tmp_path / name)
         accept(loop, 1)
-        loop.ask(intents.Start(user="test"))
+        loop.command(intents.Start(user="test"))
         loop.run(2.0)
         loop.close()
         digests.append(hashlib.sha256((tmp_path / name).read_bytes()).hexdigest())

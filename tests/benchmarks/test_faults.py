@@ -11,14 +11,11 @@ from msgspec.structs import replace as replace_field
 from benchmarks.faults.forked_trials import apart
 from benchmarks.faults.kinds import FAULTS
 from benchmarks.faults.run import deal, main, run_trial, start
-from controller.ledger.journal import LedgerState
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
-from rolling_panda.messages.perception import Obstacles
 from rolling_panda.messages.supervision import BaseVelocity
-from tests.support.sent import every
 from tests.support.worlds.faulty_world import FaultyWorld
-from tests.support.worlds.world import new_inbox
+from tests.support.worlds.world import RecordedController
 
 NAMED = {fault.name: fault for fault in FAULTS}
 SHORT = ("software stop", "controller killed, base at full speed", "an older controller's commands")
@@ -72,8 +69,8 @@ def test_a_spoiled_number_that_was_accepted_does_not_keep_the_robot_still_for_go
     assert world.controller.mode == "PROTECTIVE_STOP" and abs(world.robot.now.velocity).max() < 1e-3
     world.held = None
     world.run(3.0)
-    world.ask(intents.Acknowledge(user="ada"))
-    world.ask(intents.Resume(user="ada"))
+    world.command(intents.Acknowledge(user="ada"))
+    world.command(intents.Resume(user="ada"))
     world.run(0.5)
     assert abs(world.robot.now.velocity).max() < 1e-3, "nothing wakes by itself"
     world.held = BaseVelocity(0.1, 0.0)
@@ -99,33 +96,20 @@ def test_who_was_overruled_gets_the_token_back_when_the_other_has_ended_and_its_
         world.run(0.2)
         assert abs(world.robot.now.velocity).max() < 1e-3
     assert not world.controller.waits and bridge_state(world).epoch == epoch + 2
-    world.ask(intents.Acknowledge(user="ada", role="supervisor"))
+    world.command(intents.Acknowledge(user="ada", role="supervisor"))
     assert world.controller.mode == "IDLE"
 
 
 def second_controller(world):
-    """Another controller that hears and is heard as the first one."""
-    other, inbox = world.new_controller(), new_inbox()
-
-    def step(world):
-        if world.ticks % 10 == 5:
-            for kind in (m.JointState, m.Odometry, m.BridgeState, Obstacles):
-                if (heard := world.inbox.newest(kind)) is not None:
-                    inbox.put(heard.message, heard.at)
-            inbox.put(LedgerState(other.recorded), world.now)
-            for process in ("server", "perception"):
-                inbox.put(m.Heartbeat(process=process, sequence=world.ticks), world.now)
-            out = other.step(inbox, world.now)
-            world.to_bridge(*every(out, m.TokenRequest), *every(out, m.MotionCommand))
-
-    world.intruder = step
-    return other
+    """Another controller that hears and is heard as the first one; returns its core and its process."""
+    other = world.new_controller()
+    return other, world.add("controller", RecordedController(other), 1.0 / world.config.rate_hz, 5.0)
 
 
 def test_a_second_controller_waits_while_the_first_works_and_takes_over_when_that_one_is_gone():
     world = FaultyWorld(0)
     world.drive()
-    other = second_controller(world)
+    other, process = second_controller(world)
     world.modes.clear()
     world.run(3.0)
     assert set(world.modes) == {"TELEOP"} and abs(world.robot.now.velocity[:2]).min() > 0.5
@@ -137,25 +121,25 @@ def test_a_second_controller_waits_while_the_first_works_and_takes_over_when_tha
     epoch = world.commanded.epoch
     world.alive = False
     world.run(1.4)
-    assert not other.waits and bridge_state(world).epoch == epoch + 1
+    assert not other.waits and process.runner.inbox.newest(m.BridgeState).message.epoch == epoch + 1
     assert abs(world.robot.now.velocity).max() < 1e-3
 
 
 def test_a_second_controller_does_not_put_the_first_into_a_fault_that_stays():
     world = FaultyWorld(0)
     world.arm()
-    other = second_controller(world)
+    other, process = second_controller(world)
     # The first one hangs for so long that the second takes over, and goes on.
     world.alive = False
     world.run(2.0)
     world.alive = True
     world.run(1.0)
     assert world.controller.mode == "FAULT" and world.controller.waits and not other.waits
-    world.to_bridge(*other.end())
-    world.intruder = lambda world: None
+    process.suspended = True
+    world.say(other.end()[0])
     world.run(2.0)
     assert not world.controller.waits
-    world.ask(intents.Acknowledge(user="ada", role="supervisor"))
+    world.command(intents.Acknowledge(user="ada", role="supervisor"))
     assert world.controller.mode == "IDLE"
 
 
@@ -168,7 +152,7 @@ def test_commands_by_somebody_else_under_the_robots_own_token_are_seen_stopped_a
         world.drive()
         world.held = None
     world.intruder, said, step = partial(thief, world.commanded), [], world.bridge.step
-    world.bridge.step = lambda now: (out := step(now), said.extend(event.text for event in out.events))[0]
+    world.bridge.step = lambda *now: (out := step(*now), said.extend(event.text for event in out.events))[0]
     before = world.robot.now.position
     world.run(1.0)
     assert world.controller.mode == "ESTOP_LATCHED" and abs(world.robot.now.velocity).max() < 1e-3
@@ -180,9 +164,9 @@ def test_commands_by_somebody_else_under_the_robots_own_token_are_seen_stopped_a
     stop_id = bridge_state(world).stop_id
     world.people = ("ada",)
     world.run(0.3)
-    world.ask(intents.Reset(user="ada", role="supervisor", reason="looked", stop_id=stop_id))
-    assert world.bridge.on_release(m.ReleaseStop(stop_id=stop_id, user="ada", reason="looked"), world.now).ok
+    world.command(intents.Reset(user="ada", role="supervisor", reason="looked", stop_id=stop_id))
     world.run(2.0)
+    assert bridge_state(world).stop_id == ""
     assert world.controller.mode == "IDLE" and abs(world.robot.now.velocity).max() < 1e-3
     world.intruder = lambda world: None
     world.run(0.5)

@@ -16,17 +16,17 @@ class Beside:
 
     def __init__(self, row):
         self.robot = KinematicRobot(Controller(CONFIG, RobotConfig()), CONFIG.home)
-        self.controller, self.ask = self.robot.controller, self.robot.ask
+        self.controller, self.command = self.robot.controller, self.robot.ask
         self._row, self._seen = row, {}
         self.run(0.1)
-        assert self.ask(intents.Arm(user="bench")).ok
+        assert self.command(intents.Arm(user="bench")).ok
 
     now = property(lambda self: self.robot.now)
     state = property(lambda self: self.robot.state)
 
     inbox = property(lambda self: self.robot.inbox)
 
-    def hear(self, message):
+    def say(self, message):
         self.robot.hear(message)
 
     def run(self, seconds):
@@ -49,7 +49,7 @@ def test_what_comes_into_view_on_the_way_is_cut_and_gaps_are_driven_over():
     # The third comes into view while the second is cut, the last only after a gap that is driven over by hand.
     row = {"a": 0.4, "b": 0.7, "c": 1.0, "d": 2.1}
     loop = Beside(row)
-    assert loop.ask(intents.AcceptAll(user="bench")).ok and len(loop.state.queue) < 3
+    assert loop.command(intents.AcceptAll(user="bench")).ok and len(loop.state.queue) < 3
     working, other = walk(loop, end=2.0, limit_s=120.0)
     assert {e.point_id for e in loop.state.queue if e.state == "DONE"} == set(row)
     assert loop.robot.q[0] == pytest.approx(2.0, abs=0.2)

@@ -69,6 +69,9 @@ class FakeWire:
         self.asked.append(request)
         return self.answer(request)
 
+    def ask(self, service, request, done):
+        done(self.call(service, request))
+
     def present(self):
         return frozenset(self.processes)
 

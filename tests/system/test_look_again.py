@@ -29,8 +29,8 @@ def test_what_was_unclear_is_settled_by_looking_again(seed: int) -> None:
         open_places = unclear(points.message)
         assert open_places, "this row has nothing unclear: take another seed"
         place = open_places[0]
-        assert loop.ask(intents.Arm(user="ada")).ok
-        assert loop.ask(intents.LookAgain(user="ada", vine=place.vine, spur=place.spur)).ok
+        assert loop.command(intents.Arm(user="ada")).ok
+        assert loop.command(intents.LookAgain(user="ada", vine=place.vine, spur=place.spur)).ok
         assert loop.run_until(lambda: loop.controller.mode == "READY", 60.0), loop.controller.mode
         told = loop.inbox.newest(m.PruningPoints).message
         assert (place.vine, place.spur) not in {(each.vine, each.spur) for each in unclear(told)}

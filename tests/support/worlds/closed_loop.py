@@ -1,11 +1,11 @@
 """The whole robot in one thread: the simulator, perception and the planner beside bridge and controller."""
 
-from collections.abc import Callable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import msgspec
 
-from bridge.core.bridge import BridgeOutputs
 from bridge.sim.build import simulated_bridge
 from bridge.sim.robot.robot import SimulatedRobot
 from controller.config import ControllerConfig
@@ -13,7 +13,6 @@ from controller.core import Controller
 from controller.motion.base_estimate import BaseEstimate
 from controller.motion.follower import Tracking
 from controller.planning.cuts import CutPlanner
-from controller.planning.work_plan import PlanRequest, WorkPlan
 from perception.config import PerceptionConfig
 from perception.pipeline import Perception
 from perception.segmentation.segmenter import choose_segmenter
@@ -21,24 +20,55 @@ from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.closing import Closing
 from rolling_panda.config import RobotConfig, load_section
-from rolling_panda.messages.perception import CloseUpResult, Obstacles
+from rolling_panda.messages.perception import Obstacles
+from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.messages.supervision import Person, Presence
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.resources import resource
-from tests.support.sent import every, newest
-from tests.support.worlds.world import World
+from rolling_panda.transport.inbox import Inbox, Received
+from tests.support.worlds.world import RobotWorld
 
 # A frame takes perception about this long, so its points come later by as much.
 _PERCEPTION_S = 0.15
 # A closer look is at a part of a frame, and comes before the rest of it.
 _LOOK_S = 0.08
-# A plan of some points takes about this long.
-_PLANNING_S = 1.0
-_BEATING: tuple[m.Process, ...] = ("server", "perception")
+# Period of perception's loop.
+_PERCEPTION_PERIOD_S = 0.01
 
 
-class ClosedLoop(World, Closing):
+class PerceptionInTime:
+    """Perception as a process whose frames take their time."""
+
+    def __init__(self, perception: Perception) -> None:
+        """Bind the pipeline."""
+        self._perception = perception
+        self._frame: Received[CameraFrame] | None = None
+        self._made: deque[tuple[float, m.Message]] = deque()
+        self._beats = 0
+
+    def step(self, inbox: Inbox, now: float) -> list[object]:
+        """Take the newest frame, and say what earlier ones have given by now."""
+        frame = inbox.newest(CameraFrame)
+        if frame is not None and frame is not self._frame:
+            self._frame = frame
+            if frame.message.point_id:
+                self._made.append((now + _LOOK_S, self._perception.check_close_up(frame.message)))
+            points = self._perception.process(frame.message)
+            obstacles = Obstacles(header=points.header, capsules=self._perception.obstacles)
+            self._made += ((now + _PERCEPTION_S, points), (now + _PERCEPTION_S, obstacles))
+        self._beats += 1
+        out: list[object] = [m.Heartbeat(process="perception", sequence=self._beats)]
+        out += [message for due, message in self._made if now >= due]
+        self._made = deque(each for each in self._made if now < each[0])
+        return out
+
+    def end(self) -> Sequence[object]:
+        """Nothing."""
+        return ()
+
+
+class ClosedLoop(RobotWorld, Closing):
     """A simulated robot with an operator who is always present. `now` is simulated time (s)."""
 
     def __init__(
@@ -71,38 +101,46 @@ class ClosedLoop(World, Closing):
             config = msgspec.structs.replace(config, method=method)
         if not looks:
             config = msgspec.structs.replace(config, pre_cut_check=False, post_cut_check=False)
-        super().__init__(simulated_bridge(path, seed, trace), Controller(config, robot), config.rate_hz)
+        plan = CutPlanner(config, robot).plan if plans else None
+        super().__init__(simulated_bridge(path, seed, trace), Controller(config, robot), config.rate_hz, plan, seed)
         self._drive = RobotModel(robot).drive
-        self._control_hz = config.rate_hz
+        self._control_ticks = round(1.0 / (config.rate_hz * self.tick_s))
         self._people: tuple[str, ...] = ()
         self._watch = watch
-        self._planner = CutPlanner(config, robot) if plans else None
-        self._planned: tuple[float, WorkPlan] | None = None
         seeing = load_section(path, "perception", PerceptionConfig)
         weights = Path(seeing.weights) if seeing.weights else None
         self.perception = Perception(seeing, choose_segmenter(segmenter or seeing.segmenter, weights))
+        self.add("perception", PerceptionInTime(self.perception), _PERCEPTION_PERIOD_S)
         self.state: m.ControllerState | None = None
         self.events: list[m.LogEvent] = []
-        self._looked: tuple[float, CloseUpResult] | None = None
-        self._seen: tuple[float, m.PruningPoints] | None = None
 
-    def control(self) -> None:
-        """One control period, for which everybody is there."""
-        people = tuple(Person(name, name, "supervisor", 0.0, 0.0) for name in self._people)
-        beats = (m.Heartbeat(process=process, sequence=self.ticks) for process in _BEATING)
-        self.hear(Presence(sequence=self.ticks, people=people), *beats)
-        super().control()
-        tracking = self.controller.tracking
-        if self._watch is not None and tracking is not None and tracking.desired is not None:
-            self._watch(self, tracking)
+    def tick(self) -> None:
+        """Advance one tick, in which everybody is there."""
+        if (self.ticks + 1) % self._control_ticks == 0:
+            people = tuple(Person(name, name, "supervisor", 0.0, 0.0) for name in self._people)
+            self.say(Presence(sequence=self.ticks, people=people))
+            self.say(m.Heartbeat(process="server", sequence=self.ticks))
+        super().tick()
+        if self.ticks % self._control_ticks == 0:
+            tracking = self.controller.tracking
+            if self._watch is not None and tracking is not None and tracking.desired is not None:
+                self._watch(self, tracking)
 
-    def ask(self, intent: intents.Intent) -> m.Answer:
-        """What an operator asks for, answered at once."""
+    def say(self, message: m.Message) -> None:
+        """Send a message; the controller's state and all events are kept."""
+        super().say(message)
+        if isinstance(message, m.ControllerState):
+            self.state = message
+        elif isinstance(message, m.LogEvent):
+            self.events.append(message)
+
+    def command(self, intent: intents.Intent) -> m.Answer:
+        """What an operator asks for."""
         if intent.user not in self._people:
             # Who asks is there, which the controller hears in its next period.
             self._people = (*self._people, intent.user)
-            self.run(1.0 / self._control_hz)
-        return self.controller.answer(intent, self.now)
+            self.run(self._control_ticks * self.tick_s)
+        return super().command(intent)
 
     def queue(self, *states: m.PointState) -> Iterator[m.QueueEntry]:
         """Entries of the queue in these states, in the order of work; all without states."""
@@ -125,32 +163,3 @@ class ClosedLoop(World, Closing):
     def close(self) -> None:
         """Close the trace."""
         self.bridge.robot.close()
-
-    def receive(self, outputs: BridgeOutputs) -> None:
-        """What the bridge sends, and what perception makes of its pictures."""
-        super().receive(outputs)
-        if outputs.frame is not None and outputs.frame.point_id:
-            self._looked = self.now + _LOOK_S, self.perception.check_close_up(outputs.frame)
-        if self._looked is not None and self.now >= self._looked[0]:
-            self.hear(self._looked[1])
-            self._looked = None
-        if outputs.frame is not None:
-            self._seen = self.now + _PERCEPTION_S, self.perception.process(outputs.frame)
-        if self._seen is not None and self.now >= self._seen[0]:
-            points = self._seen[1]
-            obstacles = Obstacles(header=points.header, capsules=self.perception.obstacles)
-            self.hear(points, obstacles)
-            self._seen = None
-        self.events.extend(outputs.events)
-
-    def send(self, out: list[object]) -> None:
-        """What the controller sends, and what the planner answers."""
-        super().send(out)
-        self.state = newest(out, m.ControllerState) or self.state
-        request = newest(out, PlanRequest)
-        if request is not None and self._planner is not None:
-            self._planned = self.now + _PLANNING_S, self._planner.plan(request)
-        if self._planned is not None and self.now >= self._planned[0]:
-            self.hear(self._planned[1])
-            self._planned = None
-        self.events += every(out, m.LogEvent)

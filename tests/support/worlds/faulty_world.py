@@ -6,13 +6,12 @@ the plant's actuators, in the form of the simulator's trace, and nothing that th
 
 import random
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Any, cast
+from typing import cast
 
 import msgspec
 
 from bridge.config import BridgeConfig, OdometryConfig
-from bridge.core.bridge import TICK_S, BridgeCore, BridgeOutputs
+from bridge.core.bridge import TICK_S, BridgeCore
 from bridge.core.odometer import Odometer
 from bridge.core.state_memory import Remembered
 from bridge.sim.robot.lagged import LaggedRobot
@@ -20,16 +19,17 @@ from controller.config import ControllerConfig
 from controller.core import Controller
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
+from rolling_panda import topics
 from rolling_panda.config import RobotConfig
 from rolling_panda.messages.perception import Obstacles
 from rolling_panda.messages.supervision import BaseVelocity, ControlState, TeleopTarget
 from rolling_panda.model.robot import RobotModel, configuration, pose_message
 from rolling_panda.runtime.latest_file import KeptValue
+from rolling_panda.transport.memory import Link
 from server.auth.sessions import Session
 from server.robots.presence import PresenceTracker
 from tests.support.points import point
-from tests.support.sent import newest
-from tests.support.worlds.world import World, new_inbox
+from tests.support.worlds.world import RobotWorld
 
 MODEL = RobotModel()
 _USER = "ada"
@@ -37,53 +37,34 @@ _USER = "ada"
 _PAGE_TICKS, _PRESENCE_TICKS = 50, 200
 
 
-@dataclass
-class Link:
-    """A hop. `loss`, `twice` are shares, `delay` and `jitter` seconds; `held` keeps everything back until it ends."""
-
-    rng: random.Random
-    loss: float = 0.0
-    twice: float = 0.0
-    delay: float = 0.001
-    jitter: float = 0.0
-    held: bool = False
-    waiting: list[tuple[float, Any]] = field(default_factory=list)
-
-    def push(self, message: Any, now: float) -> None:
-        """Something is sent."""
-        if self.rng.random() < self.loss:
-            return
-        for _ in range(2 if self.rng.random() < self.twice else 1):
-            self.waiting.append((now + self.delay + self.rng.random() * self.jitter, message))
-
-    def arrived(self, now: float) -> list[Any]:
-        """What comes out now, in the order in which it comes."""
-        if self.held:
-            return []
-        due = sorted((item for item in self.waiting if item[0] <= now), key=lambda item: item[0])
-        self.waiting = [item for item in self.waiting if item[0] > now]
-        return [message for _, message in due]
-
-
-class FaultyWorld(World):
+class FaultyWorld(RobotWorld):
     """Bridge, controller and what the server and perception say, stepped by milliseconds."""
 
     def __init__(self, seed: int, hand_speed: float | None = None) -> None:
         """Everything is well; nothing moves yet. `hand_speed` (m/s) is in place of the configured one."""
-        self.rng = random.Random(seed)
         self.config = ControllerConfig()
         if hand_speed is not None:
             self.config = msgspec.structs.replace(self.config, teleop_base_speed=hand_speed)
         self.robot = LaggedRobot(self.config.home)
         self.memory = KeptValue(Remembered())
-        super().__init__(self.new_bridge(), self.new_controller(), self.config.rate_hz)
-        self.motion, self.state, self.odometry = (Link(self.rng) for _ in range(3))
-        self.alive = self.server = self.heard = self.watched = self.perception = True
-        self.held: BaseVelocity | m.Pose | None = None
-        self.holds = True
+        chance = random.Random(seed)
+        self._draw = lambda: f"{chance.getrandbits(64):016x}"
         self.modes: list[str] = []
         self.commanded: m.MotionCommand | None = None
         self.lease: ControlState | None = None
+        super().__init__(self.new_bridge(), self.new_controller(), self.config.rate_hz, seed=seed)
+        self._control_ticks = round(1.0 / (self.config.rate_hz * self.tick_s))
+        self.motion, self.state, self.odometry = (Link(self.rng) for _ in range(3))
+        self.links = {
+            topics.MOTION.name: self.motion,
+            topics.TOKEN.name: self.motion,
+            topics.JOINTS.name: self.state,
+            topics.BRIDGE.name: self.state,
+            topics.ODOMETRY.name: self.odometry,
+        }
+        self.server = self.heard = self.watched = self.perception = True
+        self.held: BaseVelocity | m.Pose | None = None
+        self.holds = True
         self.intruder: Callable[[FaultyWorld], None] = lambda world: None
         self.people: tuple[str, ...] = ()
         self._there = PresenceTracker()
@@ -91,32 +72,33 @@ class FaultyWorld(World):
     def new_bridge(self) -> BridgeCore:
         """A bridge that remembers what the last one did."""
         odometer = Odometer(MODEL.drive, OdometryConfig(), TICK_S)
-        return BridgeCore(self.robot, BridgeConfig(), MODEL.limits, odometer, "sim", memory=self.memory)
+        return BridgeCore(
+            self.robot, BridgeConfig(), MODEL.limits, odometer, "sim", memory=self.memory, draw=self._draw
+        )
 
     def new_controller(self) -> Controller:
         """A controller that has just started."""
-        return Controller(self.config, RobotConfig())
+        return Controller(self.config, RobotConfig(), draw=self._draw)
 
     def restart_controller(self) -> None:
         """It ends and starts again, with no memory of what it was doing."""
         self.controller = self.new_controller()
-        present, self.inbox = self.inbox.present, new_inbox()
-        self.inbox.present = present
 
-    def receive(self, out: BridgeOutputs) -> None:
-        """What the bridge sends goes its way; what has come over a way by now arrives."""
-        for link, message in ((self.state, out.joints), (self.state, out.state), (self.odometry, out.odometry)):
-            if message is not None:
-                link.push(message, self.now)
-        self.hear(*self.state.arrived(self.now), *self.odometry.arrived(self.now))
-        self.to_bridge(*self.motion.arrived(self.now))
-        self.intruder(self)
+    @property
+    def alive(self) -> bool:
+        """Whether the controller runs; what is sent to it arrives all the same."""
+        return not self.controller_node.suspended
 
-    def ask(self, intent: intents.Intent) -> None:
+    @alive.setter
+    def alive(self, alive: bool) -> None:
+        self.controller_node.suspended = not alive
+
+    def command(self, intent: intents.Intent) -> m.Answer:
         """What the operator asks must be granted here."""
-        answer = self.controller.answer(intent, self.now)
+        answer = super().command(intent)
         if not answer.ok:
             raise RuntimeError(f"{type(intent).__name__}: {answer.reason}")
+        return answer
 
     def work(self) -> None:
         """Automatic work on a point that is far away, until base and arm move."""
@@ -124,14 +106,14 @@ class FaultyWorld(World):
         self.run(0.3)
         far = point("p", (2.5, 0.75, 1.0))
         points = m.PruningPoints(header=m.Header(self.now, "odom"), segmenter="none", frames=1, points=(far,))
-        self.hear(points)
+        self.say(points)
         self.run(0.02)
         for intent in (
             intents.Arm(user=_USER),
             intents.AcceptAll(user=_USER, confidence=0.0),
             intents.Start(user=_USER),
         ):
-            self.ask(intent)
+            self.command(intent)
         self.until_it_moves(1.2)
 
     def drive(self) -> None:
@@ -155,7 +137,7 @@ class FaultyWorld(World):
     def arm(self) -> None:
         self.people = (_USER,)
         self.run(0.3)
-        self.ask(intents.Arm(user=_USER))
+        self.command(intents.Arm(user=_USER))
         # A hold from before arming would count for nothing.
         self.run(0.05)
 
@@ -166,25 +148,38 @@ class FaultyWorld(World):
                 return
         raise RuntimeError(f"the robot does not move: {self.controller.mode}")
 
-    def control(self) -> None:
-        """One control period, for which those say something who are there."""
-        if not self.alive:
-            return
+    def tick(self) -> None:
+        """Advance one tick, for which those say something who are there."""
+        if (self.ticks + 1) % self._control_ticks == 0:
+            self._others_speak()
+        super().tick()
+        self.intruder(self)
+        if self.ticks % self._control_ticks == 0 and self.alive:
+            self.modes.append(self.controller.mode)
+
+    def say(self, message: m.Message) -> None:
+        """Send a message; the newest command and state of control are kept."""
+        super().say(message)
+        if isinstance(message, m.MotionCommand):
+            self.commanded = message
+        elif isinstance(message, ControlState):
+            self.lease = message
+
+    def _others_speak(self) -> None:
+        number = self.ticks + 1
         if self.server:
-            self.hear(m.Heartbeat(process="server", sequence=self.ticks))
-            if self.heard and self.ticks % _PAGE_TICKS == 0:
+            self.say(m.Heartbeat(process="server", sequence=number))
+            if self.heard and number % _PAGE_TICKS == 0:
                 self._pages_speak()
-            if self.ticks % _PRESENCE_TICKS == 0:
-                self.hear(self._there.message(self.now))
+            if number % _PRESENCE_TICKS == 0:
+                self.say(self._there.message(self.now))
             if self.held is not None and self.heard:
                 base = self.held if isinstance(self.held, BaseVelocity) else None
                 pose = None if base is not None else cast(m.Pose, self.held)
-                self.hear(TeleopTarget(sequence=self.ticks, hold=self.holds, user=_USER, base=base, target=pose))
+                self.say(TeleopTarget(sequence=number, hold=self.holds, user=_USER, base=base, target=pose))
         if self.perception:
-            self.hear(m.Heartbeat(process="perception", sequence=self.ticks))
-            self.hear(Obstacles(header=m.Header(self.now, "odom"), capsules=()))
-        super().control()
-        self.modes.append(self.controller.mode)
+            self.say(m.Heartbeat(process="perception", sequence=number))
+            self.say(Obstacles(header=m.Header(self.now, "odom"), capsules=()))
 
     def _pages_speak(self) -> None:
         """Each page says that it is there, and which state it has drawn."""
@@ -193,12 +188,3 @@ class FaultyWorld(World):
             self._there.on_activity(session, self.now)
             if self.watched:
                 self._there.on_seen(session, self.now)
-
-    def send(self, out: list[object]) -> None:
-        """Motion and token go their way; the rest arrives at once."""
-        self.commanded = newest(out, m.MotionCommand) or self.commanded
-        self.lease = newest(out, ControlState) or self.lease
-        delayed = [message for message in out if isinstance(message, m.MotionCommand | m.TokenRequest)]
-        for message in delayed:
-            self.motion.push(message, self.now)
-        super().send([message for message in out if message not in delayed])

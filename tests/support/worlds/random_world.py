@@ -24,13 +24,13 @@ from rolling_panda.messages.perception import Obstacles
 from rolling_panda.messages.supervision import BaseVelocity, ControlState, Person, Presence, StopState, TeleopTarget
 from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.topics import TOPIC_OF
+from rolling_panda.transport.inbox import Inbox
 from server.robots.presence import PRESENT_S
 from tests.support.fake_wire import as_received
 from tests.support.points import point
 from tests.support.sent import every, newest
 from tests.support.worlds.random_judge import Judge
 from tests.support.worlds.random_parts import MODEL, CutDisk, Movement, Robot
-from tests.support.worlds.world import new_inbox
 
 PEOPLE = {"ada": "supervisor", "bob": "operator", "vic": "viewer"}
 DT = 0.01
@@ -86,7 +86,8 @@ class RandomWorld:
         self.rows, self.durable = [], 0
         self.queue, self.holder = Movement.newest.queue, ""
         self.controller.restore(tuple(self.disk.values()), self.kept_stops)
-        self.inbox, self.stops = new_inbox(), []
+        self.inbox, self.stops = Inbox(), []
+        self.inbox.present = frozenset(m.PROCESSES)
         self.judge.mode(self.controller.mode, "restart", self)
         self.judge.restored(self.queue)
 

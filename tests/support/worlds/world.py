@@ -1,101 +1,101 @@
-"""Bridge and controller in one thread on one simulated clock, without sockets or sleeping."""
+"""Bridge and controller as processes of a simulated world, without sockets or sleeping."""
 
+from collections import deque
 from collections.abc import Callable
 
-from bridge.core.bridge import TICK_S, BridgeCore, BridgeOutputs
+from bridge.core.bridge import TICK_S, BridgeCore
+from bridge.loop import BridgeProcess
 from controller.core import Controller
 from controller.ledger.journal import LedgerState, Records
+from controller.planning.preview_plan import PreviewRequest
+from controller.planning.work_plan import PlanRequest, WorkPlan
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
-from rolling_panda.messages.perception import CloseUpRequest
 from rolling_panda.transport.inbox import Inbox
-from tests.support.sent import every
+from rolling_panda.transport.memory import World
+
+#: A plan of some points takes about this long (s).
+_PLANNING_S = 1.0
 
 
-class World:
-    """Steps both at their rates and hands over what they send; the same seed and operator give the same trace.
+class RecordedController:
+    """A controller whose records are durable at once, and whose plans take a second; no `plan` leaves them away."""
 
-    Attributes:
-        bridge: What moves the robot.
-        controller: What commands it.
-        inbox: What the controller hears.
-        now: Simulated time (s).
-        ticks: Milliseconds since the start.
-    """
+    def __init__(self, controller: Controller, plan: Callable[[PlanRequest], WorkPlan] | None = None) -> None:
+        """Bind the core."""
+        self.controller, self._plan = controller, plan
+        self._planned: deque[tuple[float, WorkPlan]] = deque()
 
-    def __init__(self, bridge: BridgeCore, controller: Controller, rate_hz: float) -> None:
-        """Nothing is said yet; the controller steps at `rate_hz`."""
-        self.bridge, self.controller = bridge, controller
-        self.inbox = new_inbox()
-        self.now, self.ticks = 0.0, 0
-        self._control_ticks = max(1, round(1.0 / (rate_hz * TICK_S)))
+    def step(self, inbox: Inbox, now: float) -> list[object]:
+        """One control period."""
+        while self._planned and now >= self._planned[0][0]:
+            inbox.put(self._planned.popleft()[1], now)
+        out: list[object] = []
+        for message in self.controller.step(inbox, now):
+            match message:
+                case Records():
+                    inbox.put(LedgerState(message.rows[-1].number), now)
+                case PlanRequest():
+                    if self._plan is not None:
+                        self._planned.append((now + _PLANNING_S, self._plan(message)))
+                case PreviewRequest():
+                    pass
+                case _:
+                    out.append(message)
+        return out
 
-    def tick(self) -> None:
-        """Advance one millisecond."""
-        self.ticks += 1
-        self.now = self.ticks * TICK_S
-        self.receive(self.bridge.step(self.now))
-        if self.ticks % self._control_ticks == 0:
-            self.control()
+    def end(self) -> list[object]:
+        """The last messages."""
+        return self.controller.end()
 
-    def run(self, seconds: float) -> None:
-        """Advance by simulated seconds."""
-        for _ in range(round(seconds / TICK_S)):
-            self.tick()
 
-    def run_until(self, condition: Callable[[], bool], limit_s: float) -> bool:
-        """Advance until `condition()` holds; False when it does not within `limit_s` simulated seconds."""
-        end = self.now + limit_s
-        while self.now < end:
-            self.run(10 * TICK_S)
-            if condition():
-                return True
-        return False
+class RobotWorld(World):
+    """A robot with an operator; the same seed and operator give the same messages."""
+
+    def __init__(
+        self,
+        bridge: BridgeCore,
+        controller: Controller,
+        rate_hz: float,
+        plan: Callable[[PlanRequest], WorkPlan] | None = None,
+        seed: int = 0,
+    ) -> None:
+        """Start both; the controller steps at `rate_hz`."""
+        super().__init__(seed, TICK_S)
+        self._plan = plan
+        self.bridge_node = self.add("bridge", BridgeProcess(bridge, 0.0), TICK_S, at_once={m.StopRequest: "stop"})
+        self.controller_node = self.add("controller", RecordedController(controller, plan), 1.0 / rate_hz, 5.0)
+        self._bridge, self._controller = bridge, controller
+
+    @property
+    def bridge(self) -> BridgeCore:
+        """The bridge's core; another one is a restart."""
+        return self._bridge
+
+    @bridge.setter
+    def bridge(self, core: BridgeCore) -> None:
+        self._bridge = core
+        self.bridge_node.start(BridgeProcess(core, self.now))
+
+    @property
+    def controller(self) -> Controller:
+        """The controller's core; another one is a restart."""
+        return self._controller
+
+    @controller.setter
+    def controller(self, core: Controller) -> None:
+        self._controller = core
+        self.controller_node.start(RecordedController(core, self._plan))
+
+    @property
+    def inbox(self) -> Inbox:
+        """What has arrived at the controller."""
+        return self.controller_node.runner.inbox
 
     def stop(self, reason: str = "trial") -> None:
-        """Press the software stop: a message to both."""
-        request = m.StopRequest(stop_id=f"stop-{self.ticks}", source="server", user="operator", reason=reason)
-        self.bridge.on_stop(request, self.now)
-        self.hear(request)
+        """Press the software stop."""
+        self.say(m.StopRequest(stop_id=f"stop-{self.ticks}", source="server", user="operator", reason=reason))
 
-    def hear(self, *messages: object) -> None:
-        """Messages arrive at the controller."""
-        for message in messages:
-            self.inbox.put(message, self.now)
-
-    def control(self) -> None:
-        """One control period."""
-        self.send(self.controller.step(self.inbox, self.now))
-
-    def receive(self, out: BridgeOutputs) -> None:
-        """What the bridge sends."""
-        self.hear(*out.messages)
-
-    def send(self, out: list[object]) -> None:
-        """What the controller sends."""
-        self.to_bridge(*out)
-        for records in every(out, Records):
-            self.hear(LedgerState(records.rows[-1].number))
-
-    def to_bridge(self, *messages: object) -> None:
-        """Messages arrive at the bridge."""
-        for message in messages:
-            match message:
-                case m.MotionCommand():
-                    self.bridge.on_motion(message, self.now)
-                case m.TokenRequest():
-                    self.bridge.on_token(message, self.now)
-                case m.StopRequest():
-                    self.bridge.on_stop(message, self.now)
-                case m.CutCommand():
-                    self.bridge.on_cut(message, self.now)
-                case CloseUpRequest():
-                    self.bridge.on_picture(message)
-                case m.ReleaseStop():
-                    self.bridge.on_release(message, self.now)
-
-
-def new_inbox() -> Inbox:
-    """An inbox of a controller that has just started, beside all other processes."""
-    inbox = Inbox()
-    inbox.present = frozenset(m.PROCESSES)
-    return inbox
+    def command(self, intent: intents.Intent) -> m.Answer:
+        """Ask the controller, and advance until it answers."""
+        return self.ask("controller", intent)
