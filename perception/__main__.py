@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from perception.config import PerceptionConfig
-from perception.loop import Loop
+from perception.loop import perception_runner
 from perception.pipeline import Perception
 from perception.segmentation.segmenter import choose_segmenter
 from rolling_panda.config import RobotConfig, load_section
@@ -29,7 +29,7 @@ def run(context: ProcessContext) -> None:
     config = load_section(context.config_path, "perception", PerceptionConfig)
     model = RobotModel(load_section(context.config_path, "robot", RobotConfig))
     segmenter = choose_segmenter(config.segmenter, Path(config.weights) if config.weights else None, config.threads)
-    Loop(context.transport, config, Perception(config, segmenter, model)).run(context.stopping)
+    perception_runner(context.transport, config, Perception(config, segmenter, model)).run(context.stopping)
 
 
 if __name__ == "__main__":

@@ -1,11 +1,8 @@
-"""The process's loop: newest frame in, points out, one heartbeat a cycle. Frames are processed on a worker thread."""
+"""Perception as a process: newest frame in, points out, one heartbeat a step. A worker thread processes the frames."""
 
-import queue
 import threading
-import time
-from collections.abc import Callable
-from concurrent.futures import Future
-from concurrent.futures import TimeoutError as FutureTimeoutError
+from collections import deque
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -13,17 +10,15 @@ from perception.config import PerceptionConfig
 from perception.pipeline import Perception
 from rolling_panda import messages as m
 from rolling_panda import topics
-from rolling_panda.commands import PlantRequest
 from rolling_panda.errors import RollingPandaError
 from rolling_panda.messages.perception import CloseUpResult, Obstacles, PointCrop
 from rolling_panda.messages.robot import CameraFrame
-from rolling_panda.transport.zenoh import Received, Transport
+from rolling_panda.transport.inbox import Inbox, Received, Reply, Request
+from rolling_panda.transport.runner import Runner, Wire
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
 
-#: Time that an operator's request waits for the worker (s); less than the timeout of the service.
-_REQUEST_TIMEOUT_S = 1.8
 #: Least time between log entries about rejected wood (s).
 _REJECTED_PERIOD_S = 60.0
 
@@ -88,103 +83,90 @@ class _Output:
     obstacles: Obstacles
     crops: tuple[PointCrop, ...]
     rejected_wood: str
+    reply: Reply | None
 
 
-@dataclass(frozen=True)
-class _Request:
-    request: PlantRequest
-    answer: Future[m.Answer]
+class PerceptionProcess:
+    """Steps at `rate_hz`. A frame that takes too long stops the count of the heartbeat."""
 
-
-class Loop:
-    """Runs at `rate_hz`. A frame that takes too long stops the count of the heartbeat."""
-
-    def __init__(self, transport: Transport, config: PerceptionConfig, perception: Perception) -> None:
-        """Subscribe and advertise.
+    def __init__(self, config: PerceptionConfig, perception: Perception) -> None:
+        """Start the worker.
 
         Args:
-            transport: Open connection.
             config: Section `[perception]`.
             perception: The pipeline; used by the worker only from now on.
         """
         self._config = config
-        self._frames = transport.slot(topics.CAMERA)
-        self._points = transport.publisher(topics.POINTS)
-        self._obstacles = transport.publisher(topics.OBSTACLES)
-        self._crops = transport.publisher(topics.CROPS)
-        self._heartbeat = transport.publisher(topics.HEARTBEAT)
-        self._events = transport.publisher(topics.EVENT)
-        checks = transport.publisher(topics.CLOSE_UP)
-        # The controller waits for a close-up check: it is published before the rest of the frame is processed.
-        self._worker: Worker[CameraFrame | _Request, _Output] = Worker(lambda job: _work(perception, job, checks.put))
-        self._requests: queue.SimpleQueue[_Request] = queue.SimpleQueue()
-        transport.serve(topics.PLANT, self._request)
+        #: Called when the worker has something to send; it ends the wait for the next step.
+        self.wake: Callable[[], None] = lambda: None
+        # The controller waits for a close-up check: it is sent before the rest of the frame is processed.
+        self._checks: deque[CloseUpResult] = deque()
+        self._worker: Worker[CameraFrame | Request, _Output] = Worker(lambda job: _work(perception, job, self._checked))
         self._newest: _Output | None = None
         self._crop_cycle: dict[tuple[str, int], PointCrop] = {}
         """Crops in the order of their repetition, the next one first."""
         self._camera_rays = perception.camera_rays
-        self._last_frame: Received[CameraFrame] | None = None
+        self._frame: Received[CameraFrame] | None = None
+        self._submitted: Received[CameraFrame] | None = None
         self._sequence = 0
-        self._points_sent = self._obstacles_sent = self._crop_sent = self._rejected_logged = -1e9
+        self._obstacles_sent = self._crop_sent = self._rejected_logged = -1e9
+        self._started = False
         self._last_error = ""
         self._rejected_wood = ""
         self._point_ids: frozenset[str] = frozenset()
         self._timed_out = False
+        self._out: list[object] = []
 
-    def run(self, stopping: threading.Event) -> None:
-        """Run until `stopping` is set."""
-        period = 1.0 / self._config.rate_hz
-        due = time.monotonic()
-        self._log("info", "perception is up and waits for camera frames", due)
-        while not stopping.is_set():
-            self.step(time.monotonic())
-            due = max(due + period, time.monotonic())
-            stopping.wait(max(0.0, due - time.monotonic()))
-
-    def step(self, now: float) -> None:
+    def step(self, inbox: Inbox, now: float) -> list[object]:
         """One cycle at `now` (s, monotonic)."""
+        self._out = []
+        if not self._started:
+            self._started = True
+            self._log("info", "perception is up and waits for camera frames", now)
+        while self._checks:
+            self._out.append(self._checks.popleft())
         done = self._worker.poll()
         if isinstance(done, RollingPandaError):
             self._log_refused(str(done), now)
         elif done is not None:
             self._accept(done, now)
-        frame = self._frames.peek()
-        if frame is not None and frame is not self._last_frame:
+        frame = inbox.newest(CameraFrame)
+        if frame is not None and frame is not self._frame:
             # The page shows frames that are never processed too, and they can be clicked.
-            self._last_frame = frame
+            self._frame = frame
             self._camera_rays.add(frame.message)
         if self._worker.busy_for(now) == 0.0:
-            if not self._requests.empty():
-                self._worker.submit(self._requests.get(), now)
-            elif (frame := self._frames.take()) is not None:
+            if (request := inbox.next_request()) is not None:
+                self._worker.submit(request, now)
+            elif frame is not None and frame is not self._submitted:
+                self._submitted = frame
                 self._worker.submit(frame.message, now)
-        if self._newest is not None:
-            if now - self._points_sent >= 1.0 / topics.POINTS.rate_hz:
-                self._publish_points(self._newest.points, now)
-            if now - self._obstacles_sent >= 1.0 / topics.OBSTACLES.rate_hz:
-                self._obstacles.put(self._newest.obstacles)
-                self._obstacles_sent = now
+        if self._newest is not None and now - self._obstacles_sent >= 1.0 / topics.OBSTACLES.rate_hz:
+            self._out.append(self._newest.obstacles)
+            self._obstacles_sent = now
         if self._crop_cycle and now - self._crop_sent >= 1.0 / topics.CROPS.rate_hz:
             key = next(iter(self._crop_cycle))
             self._crop_cycle[key] = self._crop_cycle.pop(key)
-            self._crops.put(self._crop_cycle[key])
+            self._out.append(self._crop_cycle[key])
             self._crop_sent = now
         self._beat(now)
+        return self._out
 
-    def _request(self, request: PlantRequest) -> m.Answer:
-        """Wait for the worker's answer, on a thread of the transport."""
-        job = _Request(request, Future())
-        self._requests.put(job)
-        try:
-            return job.answer.result(_REQUEST_TIMEOUT_S)
-        except FutureTimeoutError:
-            job.answer.cancel()
-            return m.Answer(ok=False, reason="perception is busy with a frame; nothing was done, ask again")
+    def end(self) -> Sequence[object]:
+        """Nothing."""
+        return ()
+
+    def _checked(self, check: CloseUpResult) -> None:
+        """Runs on the worker's thread."""
+        self._checks.append(check)
+        self.wake()
 
     def _accept(self, output: _Output, now: float) -> None:
         self._newest, self._last_error = output, ""
-        self._publish_points(output.points, now)
-        self._publish_new_crops(output.crops)
+        self._out.append(output.points)
+        if output.reply is not None:
+            self._out.append(output.reply)
+        self._add_new_crops(output.crops)
         ids = frozenset(point.point_id for point in output.points.points)
         if new := len(ids - self._point_ids):
             self._log("info", f"{new} new pruning point{'' if new == 1 else 's'}, {len(ids)} in all", now)
@@ -197,15 +179,10 @@ class Loop:
             if output.rejected_wood:
                 self._log("info", f"implausible wood left out of the obstacles: {output.rejected_wood}", now)
 
-    def _publish_points(self, points: m.PruningPoints, now: float) -> None:
-        self._points.put(points)
-        self._points_sent = now
-
-    def _publish_new_crops(self, crops: tuple[PointCrop, ...]) -> None:
+    def _add_new_crops(self, crops: tuple[PointCrop, ...]) -> None:
         wanted = {(crop.point_id, crop.revision): crop for crop in crops}
         new = {key: crop for key, crop in wanted.items() if key not in self._crop_cycle}
-        for crop in new.values():
-            self._crops.put(crop)
+        self._out += new.values()
         self._crop_cycle = {key: crop for key, crop in self._crop_cycle.items() if key in wanted} | new
 
     def _log_refused(self, reason: str, now: float) -> None:
@@ -222,23 +199,30 @@ class Loop:
         self._timed_out = timed_out
         if not timed_out:
             self._sequence += 1
-        self._heartbeat.put(
+        self._out.append(
             m.Heartbeat(process="perception", sequence=self._sequence, status="hangs in a frame" if timed_out else "")
         )
 
     def _log(self, severity: m.Severity, text: str, now: float) -> None:
-        self._events.put(m.LogEvent(header=m.Header(now), process="perception", severity=severity, text=text[:500]))
+        self._out.append(m.LogEvent(header=m.Header(now), process="perception", severity=severity, text=text[:500]))
 
 
-def _work(perception: Perception, job: CameraFrame | _Request, publish: Callable[[CloseUpResult], None]) -> _Output:
-    if isinstance(job, _Request):
-        # A request that timed out is not executed.
-        if job.answer.set_running_or_notify_cancel():
-            job.answer.set_result(perception.answer(job.request))
+def perception_runner(wire: Wire, config: PerceptionConfig, perception: Perception) -> Runner:
+    """Perception on a wire; arguments as of `PerceptionProcess`."""
+    process = PerceptionProcess(config, perception)
+    runner = Runner(process, wire, 1.0 / config.rate_hz)
+    process.wake = runner.wake
+    return runner
+
+
+def _work(perception: Perception, job: CameraFrame | Request, send: Callable[[CloseUpResult], None]) -> _Output:
+    reply = None
+    if isinstance(job, Request):
+        reply = Reply(job, perception.answer(job.message))
         points = perception.points()
     else:
         if job.point_id:
-            publish(perception.check_close_up(job))
+            send(perception.check_close_up(job))
         points = perception.process(job)
     obstacles = Obstacles(header=points.header, capsules=perception.obstacles)
-    return _Output(points, perception.withdrawn, obstacles, perception.crops, perception.rejected_wood)
+    return _Output(points, perception.withdrawn, obstacles, perception.crops, perception.rejected_wood, reply)

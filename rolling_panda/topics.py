@@ -182,7 +182,7 @@ CLOSE_UP = Topic(
 )
 OBSTACLES = Topic(
     "perception/obstacles", perception.Obstacles, "perception", "controller, server", 1, "DATA_LOW", "DROP",
-    "posts, trunks, cordons, wires and retained canes seen so far", latched=True,
+    "posts, trunks, cordons, wires and retained canes seen so far",
 )
 SCENERY = Topic(
     "scenery", perception.Scenery, "bridge", "server", 0.5, "BACKGROUND", "DROP",

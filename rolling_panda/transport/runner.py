@@ -227,6 +227,10 @@ class Runner:
     def _reject(self, topic: str, reason: str) -> None:
         self._queued[Rejected].append((Rejected(topic, reason), self._time()))
 
+    def wake(self) -> None:
+        """End the wait for the next step; from any thread."""
+        self._wake.set()
+
     def request(self, request: Any) -> "Future[m.Answer | None]":
         """Hand a request to the core. Its answer is None where another process has to answer."""
         future: Future[m.Answer | None] = Future()
@@ -241,8 +245,10 @@ class Runner:
             return future.result(service.timeout_s - _ANSWER_MARGIN_S)
         except FutureTimeoutError:
             if future.cancel():
-                return m.Answer(ok=False, reason=f"the {service.server} did not answer in time; nothing was done")
-            return m.Answer(ok=False, reason="it was decided, but not recorded in time: see the state")
+                return m.Answer(
+                    ok=False, reason=f"{service.server} did not answer in time; nothing was done, ask again"
+                )
+            return m.Answer(ok=False, reason="it was taken up, but there is no answer in time: see the state")
 
     def _call(self, service: Service[Any], request: Any) -> None:
         def done(answer: m.Answer) -> None:

@@ -5,48 +5,43 @@ from types import SimpleNamespace
 import pytest
 
 from perception.config import PerceptionConfig
-from perception.loop import Loop, Worker
+from perception.loop import PerceptionProcess, Worker
 from rolling_panda import messages as m
 from rolling_panda.commands import SetRule
 from rolling_panda.errors import MessageError
-from rolling_panda.messages.perception import Capsule, PointCrop
-from rolling_panda.topics import CLOSE_UP, CROPS, EVENT, HEARTBEAT, OBSTACLES, PLANT, POINTS
-from rolling_panda.transport.zenoh import Slot
+from rolling_panda.messages.perception import Capsule, CloseUpResult, PointCrop
+from rolling_panda.messages.robot import CameraFrame, Intrinsics
+from rolling_panda.topics import CAMERA, CLOSE_UP, CROPS, EVENT, HEARTBEAT, OBSTACLES, PLANT, POINTS
+from rolling_panda.transport.runner import Runner
+from tests.support.fake_wire import FakeWire
 from tests.support.points import point
 
 pytestmark = pytest.mark.processes
 
 
-class Recorder:
-    def __init__(self):
-        self.sent = []
-
-    def put(self, message):
-        self.sent.append(message)
-
-
-class Wire:
-    """Stands where the transport is: one slot in, lists out."""
-
-    def __init__(self):
-        self.frames = Slot()
-        self.out = {topic.name: Recorder() for topic in (POINTS, CLOSE_UP, CROPS, OBSTACLES, HEARTBEAT, EVENT)}
-
-    def slot(self, topic):
-        return self.frames
-
-    def serve(self, service, answer):
-        assert service is PLANT
-        self.ask = answer
-
-    def publisher(self, topic):
-        return self.out[topic.name]
-
-
-class Frame(str):
+def frame(what, point_id=""):
     """A frame that says what is to become of it."""
+    lens = Intrinsics(4, 4, 1.0, 1.0, 2.0, 2.0)
+    return CameraFrame(
+        header=m.Header(0.0, what), sequence=1, intrinsics=lens, base=m.PlanarPose(), position=(0.0,) * 9,
+        color_jpeg=b"", depth_zlib=b"", depth_unit=1e-3, point_id=point_id,
+    )  # fmt: skip
 
-    point_id = ""
+
+class Turned:
+    """The process on a wire, stepped by the test."""
+
+    def __init__(self, perception):
+        self.wire = FakeWire("perception")
+        process = PerceptionProcess(PerceptionConfig(frame_timeout_s=1.0), perception)
+        self.runner, self.woken = Runner(process, self.wire, 0.05, clock=lambda: 0.0), threading.Event()
+        process.wake = self.woken.set
+
+    def step(self, now):
+        self.runner.turn(now)
+
+    def see(self, what, now=0.0, point_id=""):
+        self.wire.deliver(CAMERA, frame(what, point_id), now)
 
 
 class FakePerception:
@@ -58,28 +53,34 @@ class FakePerception:
     obstacles = (Capsule("wire", (0.0, 0.75, 1.2), (2.0, 0.75, 1.2), 0.004, 0.004),)
 
     def __init__(self):
-        self.release, self.noted, self.newest = threading.Event(), [], None
-        self.camera_rays = SimpleNamespace(add=self.noted.append)
+        self.release, self.noted, self.newest, self.processed = threading.Event(), [], None, 0
+        self.camera_rays = SimpleNamespace(add=lambda frame: self.noted.append(frame.header.frame_id))
 
     def answer(self, request):
         return m.Answer(ok=True, reason=f"kept {request.rule.nodes_kept}")
+
+    def check_close_up(self, frame):
+        return CloseUpResult(header=m.Header(), point_id=frame.point_id, number=1, finding="unseen")
 
     def points(self):
         return m.PruningPoints(header=m.Header(), segmenter="s", frames=7, points=())
 
     def process(self, frame):
-        if frame == "hang":
+        what = frame.header.frame_id
+        self.processed += 1
+        if what == "hang":
             self.release.wait(10.0)
-        if frame == "corrupt":
+        if what == "corrupt":
             raise MessageError("frame 1: the depth image is corrupt")
-        self.newest = m.PruningPoints(header=m.Header(), segmenter="s", frames=1, points=())
+        self.newest = m.PruningPoints(header=m.Header(), segmenter="s", frames=self.processed, points=())
         return self.newest
 
 
 @pytest.fixture
 def parts():
-    wire, perception = Wire(), FakePerception()
-    yield wire, perception, Loop(wire, PerceptionConfig(frame_timeout_s=1.0), perception)
+    perception = FakePerception()
+    loop = Turned(perception)
+    yield loop.wire, perception, loop
     perception.release.set()
 
 
@@ -93,21 +94,21 @@ def step_until(loop, done, now=0.0):
 
 def test_points_are_sent_when_they_are_new_and_again_at_two_hertz(parts):
     wire, _, loop = parts
-    points = wire.out[POINTS.name].sent
-    wire.frames.store(Frame("frame"), 0.0)
+    points = wire.sent[POINTS.name]
+    loop.see("frame", 0.0)
     step_until(loop, lambda: points)
     for tick in range(1, 41):
         loop.step(tick / 20.0)
     assert 4 <= len(points) - 1 <= 5
-    assert len({id(message) for message in points}) == 1
+    assert len({message.frames for message in points}) == 1
 
 
 def test_obstacles_are_sent_once_a_second_from_the_first_frame_on(parts):
     wire, perception, loop = parts
-    obstacles = wire.out[OBSTACLES.name].sent
+    obstacles = wire.sent[OBSTACLES.name]
     loop.step(0.0)
     assert not obstacles
-    wire.frames.store(Frame("frame"), 0.0)
+    loop.see("frame", 0.0)
     step_until(loop, lambda: obstacles)
     for tick in range(1, 62):
         loop.step(tick / 20.0)
@@ -121,10 +122,12 @@ def test_what_was_left_out_is_told_when_it_changes_and_at_most_once_a_minute(par
     def told(rejected_wood, second):
         perception.rejected_wood = rejected_wood
         before = perception.newest
-        wire.frames.store(Frame(str(second)), float(second))
-        sent = wire.out[POINTS.name].sent
-        step_until(loop, lambda: sent and sent[-1] is perception.newest is not before, float(second))
-        return [event.text for event in wire.out[EVENT.name].sent if "left out" in event.text]
+        loop.see(str(second), float(second))
+        sent = wire.sent[POINTS.name]
+        step_until(
+            loop, lambda: sent and perception.newest is not before and sent[-1] == perception.newest, float(second)
+        )
+        return [event.text for event in wire.sent[EVENT.name] if "left out" in event.text]
 
     assert "1 trunk leaning" in told("1 trunk leaning", 0)[0]
     for second in range(2, 130, 2):
@@ -136,40 +139,40 @@ def test_what_was_left_out_is_told_when_it_changes_and_at_most_once_a_minute(par
 
 def test_the_heartbeat_counts_turns_and_stops_counting_when_a_frame_hangs(parts):
     wire, perception, loop = parts
-    beats = wire.out[HEARTBEAT.name].sent
-    wire.frames.store(Frame("hang"), 0.0)
+    beats = wire.sent[HEARTBEAT.name]
+    loop.see("hang", 0.0)
     for tick in range(60):
         loop.step(tick / 20.0)
     counted = [beat.sequence for beat in beats]
     assert counted[:21] == list(range(1, 22))
     assert counted[-1] == counted[22] and beats[-1].status
-    assert any("1 s" in event.text for event in wire.out[EVENT.name].sent)
+    assert any("1 s" in event.text for event in wire.sent[EVENT.name])
     perception.release.set()
     step_until(loop, lambda: beats[-1].sequence > counted[-1], now=3.1)
 
 
 def test_a_corrupt_frame_is_told_once_and_sends_no_points(parts):
     wire, _, loop = parts
-    events = wire.out[EVENT.name].sent
-    wire.frames.store(Frame("corrupt"), 0.0)
-    step_until(loop, lambda: events)
-    wire.frames.store(Frame("corrupt"), 0.1)
+    events = wire.sent[EVENT.name]
+    loop.see("corrupt", 0.0)
+    step_until(loop, lambda: len(events) == 2)
+    loop.see("corrupt", 0.1)
     for _ in range(20):
         loop.step(0.2)
         time.sleep(0.001)
-    assert [event.severity for event in events] == ["error"]
-    assert not wire.out[POINTS.name].sent
+    assert [event.severity for event in events] == ["info", "error"]
+    assert not wire.sent[POINTS.name]
 
 
 def test_new_points_and_points_that_were_cut_are_no_warnings(parts):
     wire, perception, loop = parts
-    events = wire.out[EVENT.name].sent
+    events = wire.sent[EVENT.name]
     shown = m.PruningPoints(header=m.Header(), segmenter="s", frames=1, points=(point("p1", (0.3, 0.8, 1.0)),))
     perception.process = lambda frame: shown
     perception.withdrawn = ("p2 withdrawn: it has been cut",)
-    wire.frames.store(Frame("frame"), 0.0)
-    step_until(loop, lambda: len(events) == 2)
-    assert [event.text for event in events] == ["1 new pruning point, 1 in all", "p2 withdrawn: it has been cut"]
+    loop.see("frame", 0.0)
+    step_until(loop, lambda: len(events) == 3)
+    assert [event.text for event in events[1:]] == ["1 new pruning point, 1 in all", "p2 withdrawn: it has been cut"]
     assert {event.severity for event in events} == {"info"}
 
 
@@ -204,34 +207,45 @@ def turns(loop, until, start=0.0):
     assert until()
 
 
+def test_a_close_up_wakes_the_loop_and_is_sent_before_the_rest_of_its_frame(parts):
+    wire, _, loop = parts
+    loop.see("hang", point_id="p1")
+    loop.step(0.0)
+    assert loop.woken.wait(5.0)
+    loop.step(0.1)
+    assert [check.point_id for check in wire.sent[CLOSE_UP.name]] == ["p1"]
+    assert wire.sent[POINTS.name] == []
+
+
 def test_a_request_is_answered_between_frames_and_its_points_are_sent_at_once(parts):
     wire, _, loop = parts
     said = []
     asking = threading.Thread(
-        target=lambda: said.append(wire.ask(SetRule(user="Ada", rule=m.PruningRule(nodes_kept=3))))
+        target=lambda: said.append(wire.services[PLANT.name](SetRule(user="Ada", rule=m.PruningRule(nodes_kept=3))))
     )
     asking.start()
-    turns(loop, lambda: wire.out[POINTS.name].sent)
+    turns(loop, lambda: wire.sent[POINTS.name])
     asking.join(5.0)
     assert said == [m.Answer(ok=True, reason="kept 3")]
-    assert wire.out[POINTS.name].sent[-1].frames == 7
+    assert wire.sent[POINTS.name][-1].frames == 7
 
 
 def test_a_request_that_waits_too_long_is_not_done_later(parts, monkeypatch):
     wire, perception, loop = parts
-    monkeypatch.setattr("perception.loop._REQUEST_TIMEOUT_S", 0.05)
+    monkeypatch.setattr("rolling_panda.transport.runner._ANSWER_MARGIN_S", PLANT.timeout_s - 0.05)
     done = []
     monkeypatch.setattr(perception, "answer", lambda request: done.append(request) or m.Answer(ok=True))
-    assert not wire.ask(SetRule(user="Ada")).ok
-    turns(loop, lambda: wire.out[POINTS.name].sent)
+    assert not wire.services[PLANT.name](SetRule(user="Ada")).ok
+    loop.see("frame")
+    turns(loop, lambda: wire.sent[POINTS.name])
     assert done == []
 
 
 def test_a_picture_is_sent_when_it_is_new_and_again_now_and_then(parts):
     wire, perception, loop = parts
-    sent = wire.out[CROPS.name].sent
+    sent = wire.sent[CROPS.name]
     perception.crops = tuple(PointCrop(point_id=name, revision=1, sequence=1, jpeg=b"x") for name in ("p1", "p2"))
-    wire.frames.store(Frame("frame"), 0.0)
+    loop.see("frame", 0.0)
     turns(loop, lambda: len(sent) >= 2)
     for tick in range(21):
         loop.step(tick / 20.0)
@@ -239,7 +253,7 @@ def test_a_picture_is_sent_when_it_is_new_and_again_now_and_then(parts):
     assert {crop.point_id for crop in sent[2:]} == {"p1", "p2"} and len(sent) <= 6
     perception.crops = (PointCrop(point_id="p2", revision=2, sequence=5, jpeg=b"y"),)
     before = len(sent)
-    wire.frames.store(Frame("frame"), 2.0)
+    loop.see("frame", 2.0)
     turns(loop, lambda: len(sent) > before, start=1.05)
     for tick in range(21):
         loop.step(2.0 + tick / 20.0)
@@ -249,11 +263,11 @@ def test_a_picture_is_sent_when_it_is_new_and_again_now_and_then(parts):
 def test_a_frame_that_is_never_worked_on_can_be_clicked_all_the_same(parts):
     wire, perception, loop = parts
     noted = perception.noted
-    wire.frames.store(Frame("hang"), 0.0)
+    loop.see("hang", 0.0)
     turns(loop, lambda: noted)
-    wire.frames.store(Frame("shown"), 0.1)
+    loop.see("shown", 0.1)
     loop.step(0.2)
-    wire.frames.store(Frame("newer"), 0.3)
+    loop.see("newer", 0.3)
     loop.step(0.4)
     assert noted == ["hang", "shown", "newer"]
     perception.release.set()
