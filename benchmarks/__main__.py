@@ -25,6 +25,7 @@ BENCHMARKS = {
     "real": ("benchmarks.faults.real", "random commands and faults, the real bridge on fakes with monitors"),
     "faults": ("benchmarks.faults.run", "random faults in motion, judged by what the actuators were sent"),
     "clean": ("benchmarks.faults.clean", "an hour of automatic work without a fault: nothing stops by itself"),
+    "replay": ("benchmarks.replay", "a recording played into a process as it is now; what it says is compared"),
     "mutation": ("benchmarks.mutation.run", "small changes of what safety rests on: a test has to fail for each"),
     "pictures": ("benchmarks.page.pictures", "the operator's page in each of its states, for the documents"),
     "plots": ("benchmarks.common.plots", "pictures of what the others wrote with --json"),

@@ -4,7 +4,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from perception.config import PerceptionConfig
 from perception.pipeline import Perception
@@ -89,19 +89,22 @@ class _Output:
 class PerceptionProcess:
     """Steps at `rate_hz`. A frame that takes too long stops the count of the heartbeat."""
 
-    def __init__(self, config: PerceptionConfig, perception: Perception) -> None:
+    def __init__(
+        self, config: PerceptionConfig, perception: Perception, worker: Callable[..., Worker[Any, Any]] = Worker
+    ) -> None:
         """Start the worker.
 
         Args:
             config: Section `[perception]`.
             perception: The pipeline; used by the worker only from now on.
+            worker: What makes the worker from its work.
         """
         self._config = config
         #: Called when the worker has something to send; it ends the wait for the next step.
         self.wake: Callable[[], None] = lambda: None
         # The controller waits for a close-up check: it is sent before the rest of the frame is processed.
         self._checks: deque[CloseUpResult] = deque()
-        self._worker: Worker[CameraFrame | Request, _Output] = Worker(lambda job: _work(perception, job, self._checked))
+        self._worker: Worker[CameraFrame | Request, _Output] = worker(lambda job: _work(perception, job, self._checked))
         self._newest: _Output | None = None
         self._crop_cycle: dict[tuple[str, int], PointCrop] = {}
         """Crops in the order of their repetition, the next one first."""
