@@ -33,7 +33,7 @@ from rolling_panda.model.robot import Limits
 from rolling_panda.model.wire_values import actuated
 from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.topics import BRIDGE, CLOSE_UP_REQUEST, CUT, MOTION, ODOMETRY, TOKEN
-from rolling_panda.transport.zenoh import Rejections
+from rolling_panda.transport.rejections import Rejections
 
 TICK_S = 0.001
 _ODOMETRY_TICKS = round(1 / ODOMETRY.rate_hz / TICK_S)

@@ -4,7 +4,7 @@ import threading
 from dataclasses import dataclass
 
 from rolling_panda.messages.robot import RejectionCount
-from rolling_panda.transport.zenoh import Rejections
+from rolling_panda.transport.rejections import Rejections
 
 _KINDS = 50
 _OTHER = "refused for other reasons"

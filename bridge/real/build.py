@@ -25,7 +25,8 @@ from rolling_panda.errors import InputError
 from rolling_panda.messages.types import BridgeKind
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.runtime.latest_file import KeptValue
-from rolling_panda.transport.zenoh import ForeignWire, Rejections
+from rolling_panda.transport.rejections import Rejections
+from rolling_panda.transport.zenoh import ForeignWire
 
 _FIRST_STATE_S = 15.0
 _LOOPBACK = "127."

@@ -18,7 +18,7 @@ from rolling_panda.bounds import wider
 from rolling_panda.config import RobotConfig, load_section
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.runtime.latest_file import KeptValue
-from rolling_panda.transport.zenoh import Rejections
+from rolling_panda.transport.rejections import Rejections
 
 
 def simulated_bridge(

@@ -7,9 +7,8 @@ import json
 import re
 import threading
 import time
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 import zenoh
@@ -22,19 +21,13 @@ from rolling_panda.errors import MessageError, ServiceError, TransportError
 from rolling_panda.topics import Service, Topic, key
 from rolling_panda.transport.access import ONLOOKER
 from rolling_panda.transport.codec import StrictDecoder, encode
+from rolling_panda.transport.inbox import Received
+from rolling_panda.transport.rejections import Rejections
 from rolling_panda.transport.settings import certificate_folder, wire_settings
 
 Msg = TypeVar("Msg", bound=m.Message)
 Req = TypeVar("Req", bound=Struct)
 _MAX_MESSAGE_BYTES = 8 << 20
-
-
-@dataclass(frozen=True)
-class Received(Generic[Msg]):
-    """A message and its time of arrival (s, this process's monotonic clock)."""
-
-    message: Msg
-    at: float
 
 
 class Publisher(Generic[Msg]):
@@ -99,26 +92,6 @@ class Feed(Generic[Msg]):
         while self._queue:
             out.append(self._queue.popleft())
         return out
-
-
-class Rejections:
-    """Counts rejected messages by topic and reason."""
-
-    def __init__(self) -> None:
-        """Start at zero."""
-        self._counts: Counter[tuple[str, str]] = Counter()
-        self._lock = threading.Lock()
-
-    def add(self, topic: str, reason: str) -> None:
-        """Count one rejection; the reason is truncated."""
-        with self._lock:
-            self._counts[topic, reason[:200]] += 1
-
-    def counts(self) -> tuple[m.RejectionCount, ...]:
-        """All counts, most frequent first."""
-        with self._lock:
-            rows = self._counts.most_common(50)
-        return tuple(m.RejectionCount(topic, reason, count) for (topic, reason), count in rows)
 
 
 class Onlooker(Closing):

@@ -18,7 +18,8 @@ from rolling_panda.messages.page import ProcessPresence
 from rolling_panda.messages.perception import PointCrop
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.messages.supervision import Presence, StopState, TeleopTarget
-from rolling_panda.transport.zenoh import Received, Transport
+from rolling_panda.transport.inbox import Received
+from rolling_panda.transport.zenoh import Transport
 
 _STOP_REPEATS = 5
 _STOP_SPACING_S = 0.025

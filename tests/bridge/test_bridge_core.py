@@ -18,7 +18,7 @@ from rolling_panda.messages.supervision import StopState
 from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.topics import TOKEN
 from rolling_panda.transport.codec import StrictDecoder, encode
-from rolling_panda.transport.zenoh import Rejections
+from rolling_panda.transport.rejections import Rejections
 from tests.support.bridge_rig import MODEL, PICTURE, REST, Commander
 
 MIDDLE = (MODEL.limits.lower[5:] + MODEL.limits.upper[5:]) / 2

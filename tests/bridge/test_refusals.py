@@ -1,5 +1,5 @@
 from bridge.core.refusals import Refusals
-from rolling_panda.transport.zenoh import Rejections
+from rolling_panda.transport.rejections import Rejections
 
 
 def test_the_first_of_a_kind_is_said_at_once_and_the_rest_summed_up() -> None:

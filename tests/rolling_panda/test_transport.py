@@ -18,7 +18,8 @@ from rolling_panda.errors import ServiceError, TransportError
 from rolling_panda.messages.robot import CameraFrame, Intrinsics
 from rolling_panda.topics import CAMERA, HEARTBEAT, INTENT, MOTION, Service, Topic, key
 from rolling_panda.transport.codec import StrictDecoder
-from rolling_panda.transport.zenoh import Feed, ForeignWire, Onlooker, Rejections, Slot, Transport
+from rolling_panda.transport.rejections import Rejections
+from rolling_panda.transport.zenoh import Feed, ForeignWire, Onlooker, Slot, Transport
 from tests.support.processes.local_router import free_port
 from tests.support.waiting import until
 

@@ -47,6 +47,7 @@ def test_a_socket_is_opened_by_few() -> None:
         ("rolling_panda", "import server", "rolling_panda imports no process"),
         ("server", "import zenoh", "zenoh behind rolling_panda.transport.zenoh"),
         ("server", "import mujoco", "MuJoCo behind bridge.sim"),
+        ("bridge/core", "import rolling_panda.transport.zenoh", "the cores of processes have no wire"),
         ("controller", "import viser", "viser behind the server's scene"),
         ("bridge", "import tests.support.chromium", "nothing that is shipped to run imports benchmarks or tests"),
         ("tests/support", "import benchmarks.page", "only the tests of the benchmarks import them"),
