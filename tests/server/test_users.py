@@ -109,12 +109,13 @@ def test_who_gives_up_at_the_password_changes_nothing(tmp_path, monkeypatch, cap
     assert code == 1 and "nothing was changed" in told and not (tmp_path / "users.json").exists()
 
 
-def test_without_a_folder_the_users_are_those_of_the_robots_state(tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize("password", [f"{PASSWORD}\r ", f"{PASSWORD} X"])
+def test_without_a_folder_the_users_are_those_of_the_robots_state(tmp_path, monkeypatch, capsys, password):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    typed = {"typed": f"{PASSWORD}\r X\n"}
-    assert run(monkeypatch, capsys, "add", "ada", "--robot-id", "rp7", "--password-stdin", **typed)[0] == 0
+    words = ("add", "ada", "--robot-id", "rp7", "--password-stdin")
+    assert run(monkeypatch, capsys, *words, typed=f"{password}\n")[0] == 0
     file = UserFile(tmp_path / "rolling-panda" / "rp7" / "users.json")
-    assert file.check("ada", f"{PASSWORD}\r X") and file.check("ada", PASSWORD) is None
+    assert file.check("ada", password) and file.check("ada", PASSWORD) is None
     assert "supervisor" not in run(monkeypatch, capsys, "list", "--robot-id", "rp7")[1]
 
 
