@@ -71,7 +71,7 @@ class Ledger(Closing):
         with _ledger_errors(self.path, "open"):
             # Created here, readable by its owner alone, whatever the umask is.
             os.close(os.open(self.path, os.O_RDWR | os.O_CREAT, 0o600))
-            self._database = sqlite3.connect(self.path, timeout=_BUSY_S, isolation_level=None)
+            self._database = sqlite3.connect(self.path, timeout=_BUSY_S, isolation_level=None, check_same_thread=False)
         try:
             with _ledger_errors(self.path, "open"):
                 self._prepare()

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -265,6 +266,11 @@ def test_a_writer_waits_half_a_second_for_a_program_that_holds_the_file(tmp_path
         assert time.monotonic() - began < 3.0
         other.close()
         assert ledger.append([entry(1)]) == 1
+
+
+def test_it_may_be_opened_on_one_thread_and_written_on_another(tmp_path: Path) -> None:
+    with Ledger(tmp_path) as ledger, ThreadPoolExecutor(1) as other:
+        assert other.submit(ledger.append, [entry(1)]).result() == 1
 
 
 def test_of_rows_that_cannot_all_be_written_none_is(tmp_path: Path) -> None:
