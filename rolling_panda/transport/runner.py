@@ -234,8 +234,8 @@ class Runner:
     def request(self, request: Any) -> "Future[m.Answer | None]":
         """Hand a request to the core. Its answer is None where another process has to answer."""
         future: Future[m.Answer | None] = Future()
+        # It waits for the next step: a step before its time would move the robot further than its period allows.
         self._asked.append((request, self._time(), future))
-        self._wake.set()
         return future
 
     def _ask(self, service: Service[Any], request: Any) -> m.Answer | None:

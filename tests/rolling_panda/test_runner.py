@@ -1,6 +1,8 @@
 """What ties a core to a wire: newest wins or a queue, services, repetitions and the clock, by the topic table."""
 
 import threading
+import time
+from contextlib import contextmanager
 
 import pytest
 
@@ -35,6 +37,23 @@ class Clock:
 
     def __call__(self):
         return self.now
+
+
+@contextmanager
+def running(core, wire):
+    """A loop that steps once, and again in 20 s."""
+    stopping, runner = threading.Event(), Runner(core, wire, 20.0)
+    thread = threading.Thread(target=runner.run, args=(stopping,))
+    thread.start()
+    try:
+        while not core.times:
+            thread.join(0.001)
+        yield runner
+    finally:
+        stopping.set()
+        runner.wake()
+        thread.join(5.0)
+    assert not thread.is_alive()
 
 
 @pytest.fixture
@@ -166,6 +185,29 @@ def test_a_request_to_another_process_is_answered_in_the_inbox(parts):
     runner.turn(clock.now)
     (answered,) = core.inbox.drain(Answered)
     assert answered.message == Answered(release, wire.answer(release))
+
+
+def test_what_arrives_starts_no_step_before_its_time(monkeypatch):
+    core, wire = Core(), FakeWire("controller")
+    monkeypatch.setattr("rolling_panda.transport.runner._ANSWER_MARGIN_S", topics.INTENT.timeout_s - 0.05)
+    with running(core, wire):
+        wire.deliver(topics.JOINTS, joints())
+        wire.deliver(topics.STOP, STOP)
+        assert not wire.services[topics.INTENT.name]("please").ok
+        assert len(core.times) == 1
+
+
+@pytest.mark.parametrize("woken", ["by a motion command", "by the process itself"])
+def test_a_motion_command_and_the_process_itself_end_the_wait(woken):
+    core, wire = Core(), FakeWire("bridge")
+    with running(core, wire) as runner:
+        if woken == "by a motion command":
+            wire.deliver(topics.MOTION, m.MotionCommand(epoch=1, token="a", sequence=1, echo=1, xi=(0.0,) * 9))
+        else:
+            runner.wake()
+        end = time.monotonic() + 5.0
+        while len(core.times) < 2:
+            assert time.monotonic() < end
 
 
 def test_of_what_could_not_be_decoded_the_newest_is_in_the_inbox(parts):
