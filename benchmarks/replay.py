@@ -2,7 +2,8 @@
 
 The process runs as it is now, on a simulated clock, with the recorded messages of the others as its input. Commands of
 operators are on no topic, so a controller says the same until the first of them. Stamps and durations of the loop are
-left out of the comparison.
+left out of the comparison. A recording that begins later than the process differs in sequence numbers and in what the
+process had learned by then.
 """
 
 import secrets
@@ -49,6 +50,7 @@ class Comparison:
         replayed: Messages of the replay.
         equal: Recorded messages that the replay has too.
         differs_at: Time of the first one that it has not (s); None without one.
+        fields: Fields in which that one differs from what the replay said next to it in time.
     """
 
     topic: str
@@ -56,6 +58,7 @@ class Comparison:
     replayed: int
     equal: int
     differs_at: float | None
+    fields: tuple[str, ...] = ()
 
 
 class _World(World):
@@ -95,17 +98,23 @@ def compare(recorded: Iterable[Said], replayed: Iterable[Said], process: m.Proce
     """What a process said then and now, by topic."""
     then = [each for each in recorded if sender(each[1]) == process]
     rows = []
-    for name in sorted({TOPIC_OF[type(message)].name for _, message in then}):
-        before = [(at, _content(message)) for at, message in then if TOPIC_OF[type(message)].name == name]
-        now = Counter(_content(message) for _, message in replayed if TOPIC_OF[type(message)].name == name)
-        count, equal, differs_at = now.total(), 0, None
-        for at, content in before:
-            if now[content] > 0:
-                now[content] -= 1
-                equal += 1
-            elif differs_at is None:
-                differs_at = at
-        rows.append(Comparison(name, len(before), count, equal, differs_at))
+    for kind in sorted({type(message) for _, message in then}, key=lambda kind: TOPIC_OF[kind].name):
+        before = [(at, _comparable(message)) for at, message in then if type(message) is kind]
+        now = [(at, _comparable(message)) for at, message in replayed if type(message) is kind]
+        left = Counter(encode(message) for _, message in now)
+        differing = []
+        for at, message in before:
+            content = encode(message)
+            if left[content] > 0:
+                left[content] -= 1
+            else:
+                differing.append((at, message))
+        first = differing[0] if differing else None
+        fields = (
+            () if first is None or not now else _fields(first[1], min(now, key=lambda each: abs(each[0] - first[0]))[1])
+        )
+        equal, differs_at = len(before) - len(differing), None if first is None else first[0]
+        rows.append(Comparison(TOPIC_OF[kind].name, len(before), len(now), equal, differs_at, fields))
     return rows
 
 
@@ -117,13 +126,19 @@ def sender(message: m.Message) -> str:
     return str(said) or TOPIC_OF[type(message)].sender
 
 
-def _content(message: m.Message) -> bytes:
+def _fields(one: m.Message, other: m.Message) -> tuple[str, ...]:
+    """Names of the fields in which two messages of one type differ."""
+    return tuple(name for name in one.__struct_fields__ if getattr(one, name) != getattr(other, name))
+
+
+def _comparable(message: m.Message) -> m.Message:
+    """The message without stamp and durations."""
     changes: dict[str, Any] = {}
     if isinstance(header := getattr(message, "header", None), m.Header):
         changes["header"] = replace(header, stamp=0.0)
     if isinstance(message, m.ControllerState):
         changes |= {"tick_s": 0.0, "ticks": 0, "late_ticks": 0}
-    return encode(replace(message, **changes))
+    return replace(message, **changes)
 
 
 class _AtOnce(Worker[Job, Result]):
@@ -181,7 +196,7 @@ def main(argv: Sequence[str]) -> int:
     rows = compare(messages, replay(messages, process, core, period_s), process)
     print(f"{'topic':<24}{'recorded':>10}{'replayed':>10}{'equal':>8}  first difference")
     for row in rows:
-        first = "" if row.differs_at is None else f"{row.differs_at:.2f} s"
+        first = "" if row.differs_at is None else f"{row.differs_at:.2f} s: {', '.join(row.fields)}"
         print(f"{row.topic:<24}{row.recorded:>10}{row.replayed:>10}{row.equal:>8}  {first}")
     write(arguments.json, {"process": process, "topics": [asdict(row) for row in rows]})
     return 0 if all(row.equal == row.recorded for row in rows) else 1

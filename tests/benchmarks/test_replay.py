@@ -58,6 +58,14 @@ def test_a_controller_says_the_same_again_and_something_else_without_the_stop():
     assert {"state/controller", "state/stops"} <= changed
 
 
+def test_the_fields_that_differ_are_named():
+    said = [(1.0, m.Heartbeat(process="perception", sequence=number)) for number in (1, 2)]
+    again = [said[0], (1.1, m.Heartbeat(process="perception", sequence=3))]
+    (row,) = compare(said, again, "perception")
+    assert (row.recorded, row.replayed, row.equal, row.differs_at, row.fields) == (2, 2, 1, 1.0, ("sequence",))
+    assert compare(said, said, "controller") == []
+
+
 def test_a_recording_file_is_replayed_and_the_comparison_is_written(tmp_path, capsys):
     file, figures = tmp_path / "a.mcap", tmp_path / "a.json"
     writer = RecordingWriter(file, "rp1")
