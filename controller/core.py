@@ -46,6 +46,7 @@ from rolling_panda.config import RobotConfig
 from rolling_panda.errors import ControlError
 from rolling_panda.messages.perception import CloseUpRequest, CloseUpResult, Obstacles
 from rolling_panda.messages.supervision import StopRecord
+from rolling_panda.reasons import text_of
 from rolling_panda.transport.inbox import Answered, Inbox, Rejected, Reply, Request
 
 _STATE_S = 0.05
@@ -216,11 +217,13 @@ class Controller:
         if command is None:
             return m.Answer(ok=False, reason=f"{type(intent).__name__} is not something this controller does")
         refused = refusal(command, now, self._situation(now, intent)) or self._handlers[command.message](intent, now)
-        row = RequestRow(asked=intent, ok=not refused, reason=refused[:500], mode=self.mode)
+        reason = refused if isinstance(refused, m.Reason) else None
+        told = text_of(reason) if reason is not None else str(refused or "")[:500]
+        row = RequestRow(asked=intent, ok=not refused, reason=told, mode=self.mode)
         self._journal.add("request", intent.user, row)
         if refused:
-            self._event_log.say("warning", f"{intent.user}: {command.name} refused: {refused}")
-            return m.Answer(ok=False, reason=refused[:500])
+            self._event_log.say("warning", f"{intent.user}: {command.name} refused: {told}")
+            return m.Answer(ok=False, reason=told, refused=reason)
         if text := command.text(intent):
             self._event_log.say("info", f"{intent.user}: {text}")
         return m.Answer(ok=True)

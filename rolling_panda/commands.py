@@ -23,6 +23,7 @@ from rolling_panda.messages.types import (
     Name,
     NonNegative,
     Process,
+    Reason,
     Role,
     Text,
     UnitVector3,
@@ -361,8 +362,8 @@ class ReturnControl(Intent, frozen=True, kw_only=True):
     """Give up control. Motion is paused."""
 
 
-#: Handles a command at a monotonic time (s). Returns the reason of a refusal; empty if done.
-Handler = Callable[[Any, float], str]
+#: Handles a command at a monotonic time (s). Returns the reason of a refusal; None or empty if done.
+Handler = Callable[[Any, float], Reason | str | None]
 Handlers = dict[type[Struct], Handler]
 
 #: Condition of a command beside its mode; `controller/supervision/permission.py` checks each.

@@ -6,9 +6,10 @@ from controller.identity import Client
 from controller.supervision.lease import Lease
 from controller.supervision.modes import Rights, Who
 from rolling_panda import commands as intents
+from rolling_panda import reasons
 from rolling_panda.commands import Handlers
 from rolling_panda.messages.supervision import NEVER_SEEN_S, ControlState, Presence
-from rolling_panda.messages.types import Role
+from rolling_panda.messages.types import Reason, Role
 from rolling_panda.transport.inbox import Received
 
 
@@ -77,16 +78,16 @@ class Authority:
             out.add("supervisor")
         return frozenset(out)
 
-    def refusal(self, client: Client, role: Role) -> str:
-        """Reason why a client may not move the robot; empty if it may."""
-        return "a viewer may look and stop, not operate" if role == "viewer" else self._lease.refusal(client)
+    def refusal(self, client: Client, role: Role) -> Reason | None:
+        """Reason why a client may not move the robot; None if it may."""
+        return reasons.viewer_only() if role == "viewer" else self._lease.refusal(client)
 
     def claim(self, client: Client, now: float) -> None:
         """Give control to a client that moves a robot without a holder."""
         self._lease.claim(client, now)
 
     def handlers(self) -> Handlers:
-        """Handlers of the commands about control itself; each returns the reason of a refusal, empty if done."""
+        """Handlers of the commands about control itself; each returns the reason of a refusal, None if done."""
         return {
             intents.TakeControl: lambda asked, now: self._lease.take(client_of(asked), asked.confirm),
             intents.RequestControl: lambda asked, now: self._lease.request(client_of(asked), now),

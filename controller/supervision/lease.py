@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from typing import Final
 
 from controller.identity import Client
+from rolling_panda import reasons
+from rolling_panda.messages.types import Reason
 
 #: The lease ends this long after the holder's last message (s).
 LIFE_S: Final = 1.0
@@ -28,58 +30,58 @@ class Lease:
         """Whether this client has control and no transfer is pending."""
         return self.next_holder is None and self.holder is not None and self.holder.key == client.key
 
-    def refusal(self, client: Client) -> str:
-        """Reason why a client may not move the robot or claim control; empty if it may."""
+    def refusal(self, client: Client) -> Reason | None:
+        """Reason why a client may not move the robot or claim control; None if it may."""
         if self.next_holder is not None:
-            return f"control passes to {self.next_holder.user}; wait until the robot is at rest"
+            return reasons.control_passes(self.next_holder.user)
         if self.holder is None or self.holder.key == client.key:
-            return ""
-        return f"{self.holder.user} holds control of this robot; ask for it, or take it"
+            return None
+        return reasons.control_held(self.holder.user)
 
     def claim(self, client: Client, now: float) -> None:
         """Give control to a client that `refusal` lets through; the robot is at rest."""
         if self.holder is None:
             self._give(client, now, f"{client.user} holds control")
 
-    def take(self, client: Client, confirmed: bool) -> str:
-        """Take control; from a holder only if confirmed. Returns the reason of a refusal; empty if granted."""
+    def take(self, client: Client, confirmed: bool) -> Reason | None:
+        """Take control; from a holder only if confirmed. Returns the reason of a refusal; None if granted."""
         if self.held_by(client):
-            return ""
+            return None
         if self.next_holder is not None and self.next_holder.key != client.key:
-            return f"{self.next_holder.user} is taking control already"
+            return reasons.control_being_taken(self.next_holder.user)
         if self.holder is not None and not confirmed:
-            return f"{self.holder.user} holds control; confirm to take it from them: the robot stops first"
+            return reasons.control_unconfirmed(self.holder.user)
         self.next_holder = client
-        return ""
+        return None
 
-    def request(self, client: Client, now: float) -> str:
-        """Ask the holder for control. Returns the reason of a refusal; empty if asked."""
+    def request(self, client: Client, now: float) -> Reason | None:
+        """Ask the holder for control. Returns the reason of a refusal; None if asked."""
         if self.holder is None:
-            return "nobody holds control: take it"
+            return reasons.control_free()
         if self.holder.key == client.key:
-            return "you hold control already"
+            return reasons.control_yours()
         if self.requested is not None and self.requested.key != client.key:
-            return f"{self.requested.user} has asked already"
+            return reasons.control_requested(self.requested.user)
         self.requested, self._asked = client, now
         self._notify(f"{client.user} asks {self.holder.user} for control")
-        return ""
+        return None
 
-    def grant(self, client: Client) -> str:
-        """Grant control to the client that has asked. Returns the reason of a refusal; empty if granted."""
+    def grant(self, client: Client) -> Reason | None:
+        """Grant control to the client that has asked. Returns the reason of a refusal; None if granted."""
         if not self.held_by(client):
-            return "only the person in control can grant it"
+            return reasons.control_not_yours()
         if self.requested is None:
-            return "nobody asks for control"
+            return reasons.control_not_requested()
         self.next_holder = self.requested
-        return ""
+        return None
 
-    def give_back(self, client: Client) -> str:
-        """Give up control. Returns the reason of a refusal; empty if done."""
+    def give_back(self, client: Client) -> Reason | None:
+        """Give up control. Returns the reason of a refusal; None if done."""
         if self.holder is None or self.holder.key != client.key:
-            return "you do not hold control"
+            return reasons.control_not_yours()
         self._lost = f"{client.user} gave control back"
         self._drop(self._lost)
-        return ""
+        return None
 
     def renew(self, heard: Mapping[str, float]) -> None:
         """When (s) each client, by its key, said something last: the holder's lease lives from then on."""

@@ -8,7 +8,9 @@ from controller.config import ControllerConfig
 from controller.supervision import health as safety
 from controller.supervision import modes
 from controller.supervision.modes import Event
+from rolling_panda import reasons
 from rolling_panda.commands import COMMANDS, Command, Condition
+from rolling_panda.messages.types import Reason
 
 
 @dataclass(frozen=True)
@@ -23,7 +25,7 @@ class Situation:
         busy: Action that blocks a new motion; empty when none.
         waits: Reason why no accepted point is workable; empty when one is.
         rights: Rights of the client.
-        not_theirs: Reason why the client may not move the robot; empty when it may.
+        not_theirs: Reason why the client may not move the robot; None when it may.
         approval: Reason why a start needs an approved preview first; empty when it does not.
         unwatched: Reason why automatic work lacks an attentive operator; empty when it has one.
     """
@@ -35,17 +37,15 @@ class Situation:
     busy: str
     waits: str
     rights: modes.Rights = modes.ANYBODY
-    not_theirs: str = ""
+    not_theirs: Reason | None = None
     unwatched: str = ""
     approval: str = ""
 
 
-#: Check of each condition: the reason why it does not hold, empty if it does.
-_CHECKS: Final[dict[Condition, Callable[[Situation], str]]] = {
+#: Check of each condition: the reason why it does not hold, None or empty if it does.
+_CHECKS: Final[dict[Condition, Callable[[Situation], Reason | str | None]]] = {
     "fresh sensors": lambda now: safety.sensors(now.health, now.config),
-    "bridge obeys": lambda now: (
-        "the bridge's watchdog holds the robot: wait until it accepts commands" if now.health.watchdog else ""
-    ),
+    "bridge obeys": lambda now: reasons.watchdog_holds() if now.health.watchdog else None,
     "server": lambda now: safety.supervision(now.health, now.config, False),
     "at rest": lambda now: now.busy,
     "workable point": lambda now: now.waits,
@@ -55,8 +55,8 @@ _CHECKS: Final[dict[Condition, Callable[[Situation], str]]] = {
 }
 
 
-def refusal(command: Command, now: float, situation: Situation) -> str:
-    """Reason why a command is refused now, apart from its content; empty if it is allowed.
+def refusal(command: Command, now: float, situation: Situation) -> Reason | str | None:
+    """Reason why a command is refused now, apart from its content; None if it is allowed.
 
     Args:
         command: Row of the table.
@@ -65,7 +65,7 @@ def refusal(command: Command, now: float, situation: Situation) -> str:
     """
     mode, event = situation.state.mode, command.event
     if "operator" not in situation.rights:
-        return situation.not_theirs or "this needs the role operator or supervisor"
+        return situation.not_theirs or reasons.operator_needed()
     # Acknowledging a fault moves nothing.
     if command.control and mode != "FAULT" and situation.not_theirs:
         return situation.not_theirs
@@ -74,8 +74,8 @@ def refusal(command: Command, now: float, situation: Situation) -> str:
         if refused:
             return refused
     if command.modes and mode not in command.modes:
-        return f"{command.name} is possible in {' and '.join(command.modes)}; the mode is {mode}"
-    return next((why for condition in command.conditions if (why := _CHECKS[condition](situation))), "")
+        return reasons.wrong_mode(command.name, " and ".join(command.modes), mode)
+    return next((why for condition in command.conditions if (why := _CHECKS[condition](situation))), None)
 
 
 def allowed(now: float, situation: Situation) -> tuple[str, ...]:

@@ -18,6 +18,7 @@ from controller.work.movement import Movement
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.messages.supervision import Presence, StopRecord, TeleopTarget
+from rolling_panda.reasons import text_of
 from rolling_panda.transport.inbox import Inbox
 
 #: A new token is requested when the bridge's watchdog has held the robot for this long (s).
@@ -153,7 +154,7 @@ class Supervisor:
         client, authority = Client("", "") if intent is None else client_of(intent), self.authority
         return Situation(
             rights=modes.OPERATOR if intent is None else authority.rights(client, intent.role),
-            not_theirs="" if intent is None else authority.refusal(client, intent.role),
+            not_theirs=None if intent is None else authority.refusal(client, intent.role),
             unwatched=authority.unwatched(now),
             config=self._config,
             state=self.state,
@@ -206,12 +207,12 @@ class Supervisor:
         hand = self._movement.teleoperation
         holding = hand.holding(self._inbox.newest(TeleopTarget), now)
         client = hand.client
-        not_theirs = self.authority.refusal(client, "operator") if holding else ""
+        not_theirs = self.authority.refusal(client, "operator") if holding else None
         holding = holding and not (not_theirs and self.mode == "TELEOP")
         if self.mode == "TELEOP" and not holding:
             self.event(Event.RELEASE, now, "the hold was released")
         elif self.mode == "READY" and holding and hand.pressed:
-            why = not_theirs or self.busy() or safety.sensors(self.health, self._config)
+            why = (not_theirs and text_of(not_theirs)) or self.busy() or safety.sensors(self.health, self._config)
             why = why or safety.supervision(self.health, self._config, True)
             if why:
                 hand.refuse()

@@ -135,15 +135,29 @@ class RuleEffect(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     added: Count = 0
 
 
+class Reason(Struct, frozen=True, kw_only=True):
+    """A reason as data; `rolling_panda/reasons.py` has the text of each code.
+
+    Attributes:
+        code: The code.
+        values: Name and value of each value in the text.
+    """
+
+    code: Name
+    values: tuple[tuple[Name, Text | float], ...] = ()
+
+
 class Answer(Message, frozen=True, kw_only=True):
     """Reply of every service.
 
     Attributes:
         ok: Whether the request was executed.
         reason: Reason for a refusal, as text.
+        refused: The same as data, where its code is in the catalogue.
         effect: Answer to `EvaluateRule`.
     """
 
     ok: bool
     reason: Text = ""
+    refused: Reason | None = None
     effect: RuleEffect | None = None

@@ -239,6 +239,8 @@ class Outcome(BaseModel):
 
     ok: bool
     reason: str
+    code: str = ""
+    values: dict[str, str | float] = {}
 
 
 class Invited(Outcome):

@@ -81,7 +81,7 @@ def commands_router(robot: RobotContext) -> APIRouter:
             result = await robot.link.call(topics.SEEK, SeekReplay(**wanted))
         except ServiceError as error:
             return answer(Result(503, False, str(error)))
-        return answer(Result(200, result.ok, result.reason))
+        return answer(Result(200, result.ok, result.reason, refused=result.refused))
 
     return router
 

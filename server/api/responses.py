@@ -48,8 +48,11 @@ def query(content: type[msgspec.Struct] | str, *others: Responses) -> Responses:
 
 
 def answer(result: Result) -> JSONResponse:
-    """A result as `{ok, reason}`, which answers every command."""
-    return JSONResponse({"ok": result.ok, "reason": result.reason}, result.status)
+    """A result as `{ok, reason}`, with `code` and `values` of a refusal that is in the catalogue."""
+    content: dict[str, Any] = {"ok": result.ok, "reason": result.reason}
+    if result.refused is not None:
+        content |= {"code": result.refused.code, "values": dict(result.refused.values)}
+    return JSONResponse(content, result.status)
 
 
 def message(content: msgspec.Struct) -> Response:

@@ -42,6 +42,7 @@ class Result:
     ok: bool
     reason: str
     effect: m.RuleEffect | None = None
+    refused: m.Reason | None = None
 
 
 class Page(Protocol):
@@ -165,7 +166,7 @@ class RobotContext:
         except ServiceError as error:
             self.note("error", f"{type(request).__name__} by {session.user}: no answer from {process}", session.client)
             return Result(503, False, f"{process[0].upper()}{process[1:]} does not answer: {error}")
-        return Result(200 if answer.ok else 409, answer.ok, answer.reason, answer.effect)
+        return Result(200 if answer.ok else 409, answer.ok, answer.reason, answer.effect, answer.refused)
 
     async def stop(self, session: Session, reason: str) -> Result:
         """Send the software stop at once, and wait until bridge and controller report it latched."""

@@ -1,6 +1,7 @@
 from controller.identity import Client
 from controller.supervision.authority import Authority
 from rolling_panda import commands as intents
+from rolling_panda import reasons
 from rolling_panda.messages.supervision import NEVER_SEEN_S, Person, Presence
 from rolling_panda.transport.inbox import Received
 
@@ -60,12 +61,12 @@ def test_what_an_operator_saw_when_they_asked_counts_and_what_a_viewer_saw_does_
 
 def test_who_may_move_the_robot_is_refused_by_name_and_a_viewer_always():
     it = authority()
-    assert it.refusal(BOB, "operator") == ""
-    assert "viewer" in it.refusal(BOB, "viewer")
+    assert it.refusal(BOB, "operator") is None
+    assert it.refusal(BOB, "viewer") == reasons.viewer_only()
     it.claim(ADA, 0.0)
-    assert it.refusal(ADA, "operator") == ""
-    assert "Ada holds control" in it.refusal(BOB, "supervisor")
-    assert "viewer" in it.refusal(ADA, "viewer")
+    assert it.refusal(ADA, "operator") is None
+    assert it.refusal(BOB, "supervisor") == reasons.control_held("Ada")
+    assert it.refusal(ADA, "viewer") == reasons.viewer_only()
 
 
 def test_the_servers_word_renews_the_lease_and_its_silence_ends_it():
@@ -124,14 +125,14 @@ def test_work_is_watched_by_who_may_operate_and_sees_the_robot():
 def test_a_viewer_has_no_say_in_control():
     it = authority()
     eve = Client("e", "eve")
-    assert "operator" not in it.rights(eve, "viewer") and "viewer" in it.refusal(eve, "viewer")
+    assert "operator" not in it.rights(eve, "viewer") and it.refusal(eve, "viewer") == reasons.viewer_only()
 
 
 def test_the_old_holder_is_told_before_and_after_control_goes_over():
     it = authority()
     it.claim(ADA, 0.0)
     before = it.message(0.0)
-    assert ask(it, intents.TakeControl(user="Bob", client="b", confirm=True), 0.1) == ""
+    assert ask(it, intents.TakeControl(user="Bob", client="b", confirm=True), 0.1) is None
     assert it.message(0.1).next_user == "Bob" and it.message(0.1).holder == "a"
     assert it.review(None, False, 0.1) == "Bob takes control"
     it.review(None, True, 0.2)
@@ -143,21 +144,21 @@ def test_the_old_holder_is_told_before_and_after_control_goes_over():
 def test_a_request_for_control_is_told_granted_and_forgotten_in_time():
     it = authority()
     it.claim(ADA, 0.0)
-    assert ask(it, intents.RequestControl(user="Bob", client="b"), 0.1) == ""
+    assert ask(it, intents.RequestControl(user="Bob", client="b"), 0.1) is None
     assert (it.message(0.1).requested_by, it.message(0.1).requested_key) == ("Bob", "b")
     for second in range(40):
         assert it.review(presence(second + 1, second * 0.9, ada()), True, second * 0.9) == ""
     assert (it.message(36.0).requested_by, it.message(36.0).holder) == ("", "a")
-    assert ask(it, intents.RequestControl(user="Bob", client="b"), 36.0) == ""
-    assert ask(it, intents.GrantControl(user="Ada", client="a"), 36.0) == ""
+    assert ask(it, intents.RequestControl(user="Bob", client="b"), 36.0) is None
+    assert ask(it, intents.GrantControl(user="Ada", client="a"), 36.0) is None
     assert it.message(36.0).next_user == "Bob"
 
 
 def test_control_is_given_back_by_who_holds_it():
     it = authority()
     it.claim(ADA, 0.0)
-    assert ask(it, intents.ReturnControl(user="Bob", client="b"), 0.1) == "you do not hold control"
-    assert ask(it, intents.ReturnControl(user="Ada", client="a"), 0.1) == ""
+    assert ask(it, intents.ReturnControl(user="Bob", client="b"), 0.1) == reasons.control_not_yours()
+    assert ask(it, intents.ReturnControl(user="Ada", client="a"), 0.1) is None
     assert not it.held
 
 

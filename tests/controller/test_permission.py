@@ -7,6 +7,7 @@ from controller.supervision import health as safety
 from controller.supervision import modes
 from controller.supervision.permission import Situation, allowed, refusal
 from rolling_panda import commands as intents
+from rolling_panda import reasons
 from rolling_panda.commands import COMMAND_OF
 from rolling_panda.transport.inbox import Inbox
 
@@ -40,12 +41,12 @@ def test_a_ready_robot_with_work_may_start_and_go_home() -> None:
 def test_each_thing_that_is_missing_is_said() -> None:
     start, home = COMMAND_OF[intents.Start], COMMAND_OF[intents.Home]
     assert refusal(start, 0.0, situation(waits="no point is accepted")) == "no point is accepted"
-    assert refusal(home, 0.0, situation(waits="no point is accepted")) == ""
+    assert refusal(home, 0.0, situation(waits="no point is accepted")) is None
     assert refusal(start, 0.0, situation(busy="the blades are closing")) == "the blades are closing"
     assert "perception" in refusal(start, 0.0, situation(health=well(perception=9.0)))
-    assert "perception" not in refusal(home, 0.0, situation(health=well(perception=9.0)))
-    assert "watchdog" in refusal(start, 0.0, situation(health=well(watchdog=True)))
-    assert "PAUSED" in refusal(home, 0.0, situation("PAUSED"))
+    assert refusal(home, 0.0, situation(health=well(perception=9.0))) is None
+    assert refusal(start, 0.0, situation(health=well(watchdog=True))) == reasons.watchdog_holds()
+    assert refusal(home, 0.0, situation("PAUSED")) == reasons.wrong_mode("Home", "READY", "PAUSED")
 
 
 def test_a_pause_ends_the_way_home_in_ready() -> None:
@@ -56,17 +57,17 @@ def test_a_pause_ends_the_way_home_in_ready() -> None:
 def test_who_may_not_operate_is_refused_everything() -> None:
     for command in (COMMAND_OF[intents.AcceptAll], COMMAND_OF[intents.Pause]):
         viewer = situation("AUTO", rights=modes.ANYBODY)
-        assert refusal(command, 0.0, viewer) == "this needs the role operator or supervisor"
-        assert refusal(command, 0.0, replace(viewer, not_theirs="a viewer may look")) == "a viewer may look"
+        assert refusal(command, 0.0, viewer) == reasons.operator_needed()
+        assert refusal(command, 0.0, replace(viewer, not_theirs=reasons.viewer_only())) == reasons.viewer_only()
 
 
 def test_what_another_holds_is_not_moved_and_a_fault_is_left_by_any_supervisor() -> None:
-    others = {"rights": modes.OPERATOR - {"holder"}, "not_theirs": "ada holds control"}
-    assert refusal(COMMAND_OF[intents.Home], 0.0, situation(**others)) == "ada holds control"
-    assert refusal(COMMAND_OF[intents.AcceptAll], 0.0, situation(**others)) == ""
+    others = {"rights": modes.OPERATOR - {"holder"}, "not_theirs": reasons.control_held("ada")}
+    assert refusal(COMMAND_OF[intents.Home], 0.0, situation(**others)) == others["not_theirs"]
+    assert refusal(COMMAND_OF[intents.AcceptAll], 0.0, situation(**others)) is None
     fault = situation("FAULT", **others)
     fault = replace(fault, state=modes.observe(fault.state, "", 0.0))
-    assert refusal(COMMAND_OF[intents.Acknowledge], 2.0, fault) == ""
+    assert refusal(COMMAND_OF[intents.Acknowledge], 2.0, fault) is None
 
 
 def test_a_stop_is_acknowledged_a_second_after_its_cause_is_gone() -> None:
@@ -81,19 +82,19 @@ def test_without_measurements_nothing_begins_to_move_and_all_else_goes_on() -> N
         for command in (COMMAND_OF[intents.Start], COMMAND_OF[intents.Survey], COMMAND_OF[intents.Home]):
             assert refusal(command, 0.0, blind)
         assert refusal(COMMAND_OF[intents.Arm], 0.0, replace(blind, state=modes.boot()))
-        assert refusal(COMMAND_OF[intents.AcceptAll], 0.0, blind) == ""
-        assert refusal(COMMAND_OF[intents.Pause], 0.0, replace(blind, state=modes.State("AUTO", ""))) == ""
+        assert refusal(COMMAND_OF[intents.AcceptAll], 0.0, blind) is None
+        assert refusal(COMMAND_OF[intents.Pause], 0.0, replace(blind, state=modes.State("AUTO", ""))) is None
 
 
 def test_a_link_that_is_too_slow_for_a_hand_lets_work_begin_and_without_a_server_the_robot_can_be_armed() -> None:
-    assert refusal(COMMAND_OF[intents.Start], 0.0, situation(health=well(server=1.0))) == ""
+    assert refusal(COMMAND_OF[intents.Start], 0.0, situation(health=well(server=1.0))) is None
     gone = situation(health=well(server=9.0))
     assert "server" in refusal(COMMAND_OF[intents.Start], 0.0, gone)
-    assert refusal(COMMAND_OF[intents.Arm], 0.0, replace(gone, state=modes.boot())) == ""
+    assert refusal(COMMAND_OF[intents.Arm], 0.0, replace(gone, state=modes.boot())) is None
 
 
 def test_a_survey_needs_neither_accepted_points_nor_an_approved_preview() -> None:
     for missing in ({"waits": "no point is accepted"}, {"approval": "approve the preview"}):
         (why,) = missing.values()
         assert refusal(COMMAND_OF[intents.Start], 0.0, situation(**missing)) == why
-        assert refusal(COMMAND_OF[intents.Survey], 0.0, situation(**missing)) == ""
+        assert refusal(COMMAND_OF[intents.Survey], 0.0, situation(**missing)) is None

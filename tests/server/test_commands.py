@@ -7,7 +7,7 @@ import pytest
 
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
-from rolling_panda import topics
+from rolling_panda import reasons, topics
 from rolling_panda.commands import SeekReplay
 from rolling_panda.errors import ServiceError
 from rolling_panda.messages.supervision import (
@@ -98,6 +98,13 @@ def test_each_request_becomes_its_intent(server, client, path, body, intent):
     # The role comes from the session, whatever a request says; the client is a key that is not the cookie's.
     assert asked.role == "supervisor" and asked.client and asked.client not in server.cookie(client)
     assert msgspec.structs.replace(asked, client="", role="operator") == intent
+
+
+def test_a_refusal_of_the_catalogue_comes_with_its_code_and_values(server, client):
+    server.wire.answer = lambda request: m.Answer(ok=False, reason="words", refused=reasons.control_held("bob"))
+    content = {"ok": False, "reason": "words", "code": "control_held", "values": {"user": "bob"}}
+    answer = client.post("/api/arm")
+    assert (answer.status_code, answer.json()) == (409, content)
 
 
 def test_a_refusal_comes_with_its_reason_and_is_left_to_the_controller_to_log(server, client):

@@ -1,0 +1,45 @@
+import ast
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from rolling_panda import reasons
+from rolling_panda.errors import MessageError
+from rolling_panda.messages import Reason
+
+ROOT = Path(reasons.__file__).resolve().parents[1]
+
+
+def test_every_code_is_used_by_the_product():
+    used = set()
+    for package in ("bridge", "controller", "perception", "recorder", "server"):
+        for path in (ROOT / package).rglob("*.py"):
+            tree = ast.parse(path.read_text(encoding="utf-8"))
+            used |= {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
+    assert reasons.CATALOGUE and set(reasons.CATALOGUE) <= used
+
+
+def test_a_text_names_exactly_the_values():
+    def lacks(user: str) -> None:
+        """Somebody holds control."""
+
+    def invents() -> None:
+        """{user} holds control."""
+
+    for wrong in (lacks, invents):
+        with pytest.raises(MessageError, match=wrong.__name__):
+            reasons.entry_of("info", "wait", wrong)
+
+
+def test_a_reason_survives_the_wire_and_has_its_values_in_the_text():
+    reason = reasons.wrong_mode("Home", "READY", mode="IDLE")
+    assert reason == Reason(code="wrong_mode", values=(("command", "Home"), ("modes", "READY"), ("mode", "IDLE")))
+    assert msgspec.json.decode(msgspec.json.encode(reason), type=Reason) == reason
+    text = reasons.text_of(reason)
+    assert all(str(value) in text for _, value in reason.values)
+
+
+@pytest.mark.parametrize("reason", [Reason(code="of-tomorrow", values=(("n", 3.0),)), Reason(code="control_held")])
+def test_a_reason_of_another_version_is_shown_as_it_is(reason):
+    assert reason.code in reasons.text_of(reason)
