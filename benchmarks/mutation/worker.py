@@ -43,6 +43,8 @@ _NOTHING = (None, 2, 4, 255)
 _CPU_S, _WALL_S, _TIMES = 20, 60, 10.0
 #: Tries mutants and tells each one's exit code; returns its process's.
 Attempt = Callable[[list[str], Callable[[str, int], None]], int]
+#: mutmut's statistics: which tests run a function.
+_STATISTICS = Path("mutants/mutmut-stats.json").absolute()
 #: Functions that run when tests are imported, a file beside mutmut's statistics.
 _IMPORTED = Path("mutants/imported.json").absolute()
 
@@ -58,12 +60,16 @@ class _Imports:
             state()._stats.clear()
 
 
-def statistics() -> None:
+def statistics(names: list[str]) -> None:
     """Run the tests without a mutant, in a fork, and keep which functions each runs.
+
+    mutmut runs only tests that are new. All are run where none is known to run the function of a mutant of `names`.
 
     Raises:
         SystemExit: A test fails.
     """
+    if load_stats() and not all(map(tests_of, names)):
+        _STATISTICS.unlink()
     execute = PytestRunner.execute_pytest
 
     def executed(runner: PytestRunner, words: list[str], **others: Any) -> int:
@@ -260,7 +266,7 @@ def main() -> None:
     left = [name for name in chosen if known[name] in _AGAIN]
     print(f"{len(known)} mutants, {len(chosen)} chosen, {len(left)} to be tried", flush=True)
     if left and workers:
-        statistics()
+        statistics(left)
         keep(results(left, workers, try_forked), files)
         # What runs while the tests are imported was made without the mutant so far.
         imported = set(json.loads(_IMPORTED.read_text()))
