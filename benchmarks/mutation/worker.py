@@ -63,7 +63,7 @@ class _Imports:
 def statistics(names: list[str]) -> None:
     """Run the tests without a mutant, in a fork, and keep which functions each runs.
 
-    mutmut runs only tests that are new. All are run where none is known to run the function of a mutant of `names`.
+    mutmut runs only tests that are new. All are run where none is known for the function of a mutant of `names`.
 
     Raises:
         SystemExit: A test fails.
@@ -254,6 +254,10 @@ def main() -> None:
     """Make the mutants, choose, try those of them that no test is known to kill, and tell."""
     sample, seed, workers = (int(word) for word in sys.argv[1:4])
     Path("mutants").mkdir(exist_ok=True)
+    # mutmut leaves a copy as it is, though the file has changed since, unless it mutates the file.
+    for copy in Path("mutants").rglob("*.py"):
+        if not copy.with_name(f"{copy.name}.meta").exists():
+            copy.unlink()
     set_mutant_under_test("mutant_generation")
     with mutmut.CatchOutput():
         mutmut.copy_src_dir()
