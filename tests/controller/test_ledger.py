@@ -155,7 +155,12 @@ def test_a_ledger_whose_newest_row_was_changed_is_not_gone_on_with(tmp_path: Pat
 
 @pytest.mark.parametrize(
     ("head", "problem"),
-    [(b"\xff\xfe", "cannot be read"), (b"0 abcd\n", "is not as it was written"), (None, "cannot be read")],
+    [
+        (b"\xff\xfe", "cannot be read"),
+        (b"0 abcd\n", "is not as it was written"),
+        (None, "cannot be read"),
+        (b"9" * 30 + b" 00\n", "cannot be read"),
+    ],
 )
 def test_a_head_that_cannot_be_trusted_is_refused_in_words(tmp_path: Path, head: bytes | None, problem: str) -> None:
     written(tmp_path)
@@ -165,6 +170,13 @@ def test_a_head_that_cannot_be_trusted_is_refused_in_words(tmp_path: Path, head:
     else:
         (tmp_path / HEAD).write_bytes(head)
     with pytest.raises(LedgerError, match=f"{HEAD} {problem}"):
+        Ledger(tmp_path)
+
+
+def test_rows_without_a_head_are_not_gone_on_with(tmp_path: Path) -> None:
+    written(tmp_path)
+    (tmp_path / HEAD).unlink()
+    with pytest.raises(LedgerError, match=f"{HEAD} is missing"):
         Ledger(tmp_path)
 
 
@@ -179,7 +191,7 @@ def test_a_ledger_of_a_newer_version_is_called_newer_and_left_alone(tmp_path: Pa
     as_it_was = path.read_bytes()
     for attempt in (Ledger, verify):
         with pytest.raises(
-            LedgerError, match=f"newer version.*its schema is {SCHEMA_VERSION + 1}.*Use that"
+            LedgerError, match=f"{path} is of a newer version.*its schema is {SCHEMA_VERSION + 1}.*Use that"
         ) as refused:
             attempt(tmp_path)
         assert "changed" not in str(refused.value)
@@ -381,7 +393,7 @@ def test_what_is_no_ledger_is_refused_in_words(tmp_path: Path) -> None:
     with pytest.raises(LedgerError, match="there is no ledger.*--state"):
         verify(tmp_path)
     (tmp_path / FILE).write_bytes(b"something else" * 100)
-    with pytest.raises(LedgerError, match="cannot open the ledger"):
+    with pytest.raises(LedgerError, match=f"cannot open the ledger {tmp_path / FILE}: "):
         Ledger(tmp_path)
     assert "not a database" in verify(tmp_path).problem
 

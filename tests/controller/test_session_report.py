@@ -186,3 +186,8 @@ def test_a_point_that_stays_out_of_reach_changes_the_report_once():
 def test_a_long_reason_for_giving_up_is_cut_to_what_the_wire_carries():
     given_up = TicketRow(point=pruning_point("a"), state="FAILED_NOT_CUT", cut_id="", reason="x" * 600)
     assert [len(cut.reason) for cut in report((0.0, given_up)).cuts] == [500]
+
+
+def test_a_long_reason_of_a_cut_is_cut_to_what_the_wire_carries():
+    told = report((0.0, ticket("a", "CUTTING")), (1.0, ticket("a", "FAILED_NOT_CUT", reason="x" * 600)))
+    assert [len(cut.reason) for cut in told.cuts] == [500]

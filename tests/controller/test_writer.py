@@ -203,3 +203,14 @@ def test_a_full_disk_is_tried_again_now_and_then(writers):
     until(lambda: writer.state.failure)
     time.sleep(0.2)
     assert disk.tries < 20
+
+
+def test_a_disk_that_hangs_is_given_up_at_the_end(writers):
+    disk = Disk()
+    disk.go.clear()
+    writer = writers(lambda: disk)
+    writer.write([record(1)])
+    began = time.monotonic()
+    writer.close()
+    assert time.monotonic() - began < 8.0
+    disk.go.set()
