@@ -239,6 +239,11 @@ class Outcome(BaseModel):
 
     ok: bool
     reason: str
+
+
+class Refusal(Outcome):
+    """Why a command was refused: as text, and as a code of the catalogue with its values where it has one."""
+
     code: str = ""
     values: dict[str, str | float] = {}
 

@@ -12,8 +12,8 @@ from server.robots.context import Result
 Responses = dict[int | str, dict[str, Any]]
 
 
-def _outcome(status: int, description: str) -> Responses:
-    return {status: {"model": body.Outcome, "description": description}}
+def _outcome(status: int, description: str, model: type[body.Outcome] = body.Outcome) -> Responses:
+    return {status: {"model": model, "description": description}}
 
 
 _DONE = _outcome(200, "Done.")
@@ -29,7 +29,7 @@ SIGN_OUT = _DONE | SIGNED_IN | _FOREIGN
 COMMAND = (
     SIGN_OUT
     | _outcome(403, "The role may not, or the Origin header is missing or foreign.")
-    | _outcome(409, "Refused in the present state; `reason` says why.")
+    | _outcome(409, "Refused in the present state; `reason` says why.", body.Refusal)
     | INVALID
     | _outcome(503, "The responsible process does not answer.")
 )
