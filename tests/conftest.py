@@ -38,6 +38,14 @@ def pytest_xdist_auto_num_workers() -> int:
     return len(os.sched_getaffinity(0)) * 3 // 2
 
 
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """The stages of `make test` that run few tests import only the files with their marker."""
+    stage = str(config.getoption("markexpr")).partition(" ")[0]
+    if stage in ("paced", "alone") and collection_path.name.startswith("test_"):
+        return f"mark.{stage}" not in collection_path.read_text(encoding="utf-8") or None
+    return None
+
+
 @pytest.fixture(autouse=True, scope="session")
 def state_of_the_tests_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Processes that a test starts keep their state apart from that of this machine's user."""
