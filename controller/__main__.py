@@ -15,7 +15,7 @@ from controller.planner_process import PlannerProcess
 from controller.stop_file import open_stop_file
 from rolling_panda.config import RobotConfig, load_section
 from rolling_panda.runtime.process import ProcessContext, run_process
-from rolling_panda.runtime.scheduling import freeze_heap
+from rolling_panda.runtime.scheduling import freeze_heap, release_library
 from rolling_panda.runtime.state_folder import alone
 
 
@@ -48,6 +48,8 @@ def _work(context: ProcessContext) -> None:
     planner = PlannerProcess(config, robot_config)
     runner = controller_runner(controller, context.transport, config.rate_hz, ledger, planner, stop_file)
     freeze_heap()
+    # The compiled functions are loaded; the compiler is not used again.
+    release_library("libllvmlite")
     try:
         runner.run(context.stopping)
     finally:

@@ -38,8 +38,8 @@ from server.robots.link import RobotLink
 from server.robots.page_view import PageView
 from server.robots.presence import PresenceTracker
 from server.robots.teleop import TeleopHold
-from server.scene.robot_meshes import Part, robot_parts
 from server.scene.scene import Scene
+from server.scene.solids import Solids, build_solids
 
 _POLL_S = 0.05
 #: File descriptors of a connection; a 3-D view has three.
@@ -147,9 +147,9 @@ async def serve(
         None if access_options.users is None else Passwords(access_options.users),
     )
     model = RobotModel()
-    parts = robot_parts(model.model)
+    solids = build_solids()
     for name, wire in wires.items():
-        app_state.robots[name] = _robot_context(config, wire, model, parts, app_state)
+        app_state.robots[name] = _robot_context(config, wire, model, solids, app_state)
     own = {f"{access_options.scheme}://{name}:{port}" for name in ("127.0.0.1", "localhost")}
     origins = frozenset({*own, *config.origins})
     app = create_app(app_state, origins)
@@ -178,7 +178,7 @@ async def serve(
 
 
 def _robot_context(
-    config: ServerConfig, wire: Transport, model: RobotModel, parts: list[Part], app_state: AppState
+    config: ServerConfig, wire: Transport, model: RobotModel, solids: Solids, app_state: AppState
 ) -> RobotContext:
     """The context of the robot on this wire, with its own 3-D view."""
     loop = asyncio.get_running_loop()
@@ -190,7 +190,7 @@ def _robot_context(
 
     scene = Scene(
         model.model,
-        parts,
+        solids,
         call_soon,
         # Called only once a page is served, when `robot` is bound.
         on_select=lambda owner, point_id: robot.on_point_clicked(owner, point_id),

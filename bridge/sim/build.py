@@ -9,7 +9,7 @@ from bridge.core.cut_memory import CutMemory
 from bridge.core.odometer import Odometer
 from bridge.core.state_memory import Remembered
 from bridge.sim.camera.config import CameraConfig
-from bridge.sim.camera.render_process import CameraRenderer, InlineRenderer, RenderProcess
+from bridge.sim.camera.render_process import CameraRenderer, RenderProcess
 from bridge.sim.robot.robot import SimulatedRobot
 from bridge.sim.robot.trace import TraceWriter
 from bridge.sim.vineyard.config import VineyardConfig
@@ -68,11 +68,14 @@ def simulated_robot(
     row = grow(load_section(config_path, "vineyard", VineyardConfig), seed)
     lens = load_section(config_path, "camera", CameraConfig)
     writer = None if trace is None else TraceWriter(trace)
-    renderer: CameraRenderer = (
-        InlineRenderer(lens, seed)
-        if camera == "inline"
-        else RenderProcess(lens, seed, "interface" if camera == "device" else "background")
-    )
+    renderer: CameraRenderer
+    if camera == "inline":
+        # Imported here for the same reason as in the process.
+        from bridge.sim.camera.renderer import InlineRenderer
+
+        renderer = InlineRenderer(lens, seed)
+    else:
+        renderer = RenderProcess(lens, seed, "interface" if camera == "device" else "background")
     return SimulatedRobot(config, row, renderer, writer)
 
 

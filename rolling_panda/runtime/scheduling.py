@@ -1,4 +1,4 @@
-"""Scheduling of a process: its priority, and the pauses of its garbage collector.
+"""Scheduling of a process: its priority, the pauses of its garbage collector, and the memory that it has done with.
 
 A bridge or controller that stalls stops the robot, so on a busy machine they run before everything else. Without the
 permission to raise priorities they run like any other program, and only the other processes lower theirs.
@@ -8,11 +8,14 @@ import contextlib
 import ctypes
 import gc
 import os
+from pathlib import Path
 from typing import Literal
 
 Priority = Literal["control", "interface", "perception", "background"]
 #: Low among real-time priorities: above every ordinary program, below the kernel's own threads.
 _REAL_TIME = 10
+#: `madvise`: the kernel may reclaim these pages now; those of a file are read from it again where they are used.
+_MADV_PAGEOUT = 21
 _NICE = {"interface": -10, "perception": -5, "background": 5}
 
 
@@ -43,3 +46,18 @@ def freeze_heap() -> None:
     # Only the GNU C library has it.
     with contextlib.suppress(OSError, AttributeError):
         ctypes.CDLL(None).malloc_trim(0)
+
+
+def release_library(name: str) -> None:
+    """Free the memory of a loaded library that is not used from now on; its file has it again where it is.
+
+    Args:
+        name: A part of its file's name.
+    """
+    with contextlib.suppress(OSError, AttributeError):
+        madvise = ctypes.CDLL(None).madvise
+        for line in Path("/proc/self/maps").read_text(encoding="utf-8").splitlines():
+            addresses, *_, path = line.split(maxsplit=5)
+            if name in Path(path).name:
+                start, end = (int(address, 16) for address in addresses.split("-"))
+                madvise(ctypes.c_void_p(start), ctypes.c_size_t(end - start), _MADV_PAGEOUT)

@@ -54,6 +54,8 @@ def wire_settings(config: TransportConfig, name: str, robot_id: str = "", foreig
         "connect/exit_on_failure": True,
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
+        # Otherwise every process, and the router, keeps a segment of it for large messages; sockets are fast enough.
+        "transport/shared_memory/enabled": False,
     }
     if config.certificates:
         return settings | _secure(config, name, robot_id)

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import viser
-from scipy.spatial import cKDTree
 
 from rolling_panda import messages as m
 from rolling_panda.messages.page import PagePoint
@@ -60,10 +59,10 @@ def standing(lines: Sequence[Line], cuts: dict[str, Cut]) -> tuple[list[Line], d
         return left, off
     start = np.array([lines[number][k] for number, k in pairs])
     along = np.array([lines[number][k + 1] for number, k in pairs]) - start
-    tree, reach = cKDTree(start + along / 2), float(np.linalg.norm(along, axis=1).max()) / 2 + _MAX_DISTANCE
+    middle, reach = start + along / 2, float(np.linalg.norm(along, axis=1).max()) / 2 + _MAX_DISTANCE
     ends: dict[int, float] = {}
     for name, (position, direction) in cuts.items():
-        near = np.array(tree.query_ball_point(position, reach), dtype=int)
+        near = np.flatnonzero(np.linalg.norm(middle - position, axis=1) <= reach)
         found = _nearest(start[near], along[near], np.array(position), np.array(direction))
         if found is None:
             continue

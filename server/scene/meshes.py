@@ -1,10 +1,7 @@
 """Meshes of the 3-D view: the plant's capsules, the markers of pruning points, and their colours."""
 
-import math
-
 import numpy as np
 import pinocchio as pin
-import trimesh
 from numpy.typing import NDArray
 
 from rolling_panda import messages as m
@@ -23,10 +20,6 @@ STATE_COLORS: dict[m.PointState, Color] = {
     "UNKNOWN": (160, 96, 255),
     "REJECTED": (130, 136, 142),
 }
-_DISC_RADIUS = 0.034
-_DISC_HEIGHT = 0.004
-_BALL_RADIUS = 0.016
-_CROSS = (0.25 * math.pi, -0.25 * math.pi)
 #: Kinds of capsules that are drawn: colour, and number of sides of the mesh.
 _KINDS: dict[m.WoodClass, tuple[Color, int]] = {
     "post": ((150, 140, 125), 8),
@@ -89,26 +82,6 @@ def _prism_faces(sides: int) -> NDArray[np.int64]:
     fan = np.arange(1, sides - 1)
     lid = np.stack([np.zeros_like(fan), fan, fan + 1], 1)
     return np.concatenate([walls, lid[:, ::-1], lid + sides])
-
-
-def cut_marker() -> trimesh.Trimesh:
-    """A disc in the cutting plane around a ball; the cane's tangent is z, the origin is the cut (m)."""
-    disc = trimesh.creation.cylinder(radius=_DISC_RADIUS, height=_DISC_HEIGHT, sections=24)
-    ball = trimesh.creation.icosphere(subdivisions=1, radius=_BALL_RADIUS)
-    return trimesh.util.concatenate([disc, ball])
-
-
-def unreachable_marker() -> trimesh.Trimesh:
-    """Two crossed bars in the cutting plane, in the frame of a cut marker (m)."""
-    length, width = 2.4 * _DISC_RADIUS, 0.014
-    bar = trimesh.creation.box((length, width, width))
-    bars = [bar.copy().apply_transform(trimesh.transformations.rotation_matrix(turn, (0, 0, 1))) for turn in _CROSS]
-    return trimesh.util.concatenate(bars)
-
-
-def selection_ring() -> trimesh.Trimesh:
-    """A ring around a cut marker, in the same frame."""
-    return trimesh.creation.torus(major_radius=0.052, minor_radius=0.004, major_sections=32, minor_sections=8)
 
 
 def quat_wxyz_of_axis(axis: m.UnitVector3) -> NDArray[np.float64]:

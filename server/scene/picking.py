@@ -5,12 +5,12 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import trimesh
 import viser
 
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.model.differential_drive import Array
+from server.scene.solids import Solid
 
 #: A ray that passes the axis of a cane within this distance (m) picks it: a cane is thinner than a fingertip.
 _TOLERANCE = 0.012
@@ -137,8 +137,9 @@ class PickedPoint:
 class DistanceTool:
     """Measures the distance between two points that a session picks; a third one starts again."""
 
-    def __init__(self) -> None:
-        """No session measures."""
+    def __init__(self, ball: Solid) -> None:
+        """No session measures; `ball` is drawn at both ends."""
+        self._ball = ball
         self._picked: dict[str, list[PickedPoint]] = {}
 
     def start(self, owner: str) -> None:
@@ -158,7 +159,7 @@ class DistanceTool:
                 _clear(client)
         points.append(point)
         for client in clients:
-            _draw(client, points)
+            _draw(client, points, self._ball)
         return (points[0], points[1]) if len(points) == 2 else None
 
     def stop(self, owner: str, clients: list[viser.ClientHandle]) -> None:
@@ -168,8 +169,7 @@ class DistanceTool:
                 _clear(client)
 
 
-def _draw(client: viser.ClientHandle, points: list[PickedPoint]) -> None:
-    ball = trimesh.creation.icosphere(subdivisions=1, radius=0.012)
+def _draw(client: viser.ClientHandle, points: list[PickedPoint], ball: Solid) -> None:
     for number, point in enumerate(points):
         name = f"{_MEASURE}/end{number}"
         client.scene.add_mesh_simple(

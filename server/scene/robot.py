@@ -13,7 +13,8 @@ from rolling_panda import messages as m
 from rolling_panda.messages.supervision import PreviewMotion, PreviewRow
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import configuration
-from server.scene.robot_meshes import Color, Part
+from server.scene.meshes import Color
+from server.scene.solids import Part
 
 _BASE_JOINT = "base_phi"
 #: Smaller motions (m, and quaternion components) are not sent: they are invisible, and noise would be sent for ever.
@@ -30,7 +31,7 @@ _TRAIL_NEW, _TRAIL_OLD = np.array([150, 205, 255.0]), np.array([62, 72, 84.0])
 class SceneRobot:
     """The robot as measured: one frame for each moving body, sent only when it has moved."""
 
-    def __init__(self, server: viser.ViserServer, model: Any, parts: list[Part]) -> None:
+    def __init__(self, server: viser.ViserServer, model: Any, parts: Sequence[Part]) -> None:
         """Put the bodies into the scene at q = 0; `model` is the Pinocchio model."""
         self._server = server
         self._model = model
@@ -96,7 +97,7 @@ class SceneRobot:
 class PreviewGhost:
     """The robot at a time of the preview, see-through, with the path of the tool; each session has its own time."""
 
-    def __init__(self, model: Any, parts: list[Part]) -> None:
+    def __init__(self, model: Any, parts: Sequence[Part]) -> None:
         """Bind the robot's Pinocchio model and its meshes."""
         self._model, self._parts = model, parts
         self._data = model.createData()

@@ -1,5 +1,7 @@
 """The 3-D view: a viser server on a loopback port of its own, seen by browsers through the filtering proxy alone."""
 
+import contextlib
+import io
 from collections.abc import Callable, Collection
 from typing import Any, Protocol
 
@@ -18,11 +20,8 @@ from server.scene.meshes import (
     STATE_COLORS,
     capsules_mesh,
     color_of,
-    cut_marker,
     drawn_kinds,
     quat_wxyz_of_axis,
-    selection_ring,
-    unreachable_marker,
 )
 from server.scene.picking import (
     ClickListener,
@@ -35,8 +34,14 @@ from server.scene.picking import (
     nearest,
 )
 from server.scene.robot import PreviewGhost, SceneRobot, ToolTrail
-from server.scene.robot_meshes import Part
-from server.scene.viser_adapter.view_server import ViewServer
+from server.scene.solids import Solids
+from server.scene.viser_internals import (
+    ViewConnections,
+    limit_frame_rate,
+    patch_event_thread,
+    set_node_visibility,
+    update_pause_s,
+)
 
 _SKY_TOP, _SKY_BOTTOM = np.array([22.0, 27.0, 34.0]), np.array([58.0, 66.0, 76.0])
 _CANE_LINES = "/plant/canes"
@@ -68,7 +73,7 @@ class Scene:
     def __init__(
         self,
         model: Any,
-        parts: list[Part],
+        solids: Solids,
         call_soon: CallSoon,
         on_select: Callable[[str, str], object],
         on_ray: Callable[[str, m.Vector3, m.Vector3], object],
@@ -78,19 +83,25 @@ class Scene:
 
         Args:
             model: Pinocchio model of the robot.
-            parts: Its meshes.
+            solids: Meshes of the robot and of the markers.
             call_soon: Schedules the callbacks below on the loop from which the scene is used.
             on_select: Called with (owner, point_id) when `owner` clicked a point.
             on_ray: Called with (owner, origin, direction) when `owner`, who places points or measures, clicked.
             on_refusal: Called when a connection that did not come through the proxy was refused.
         """
+        patch_event_thread()
+        with contextlib.redirect_stdout(io.StringIO()):
+            self._server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        self.port = int(self._server.get_port())
         self._call_soon = call_soon
-        self.views = ViewServer(lambda: call_soon(on_refusal))
-        self._server = self.views.viser
+        self.connections = ViewConnections(self._server, lambda: call_soon(on_refusal))
+        limit_frame_rate(
+            self._server, lambda client_id: update_pause_s(self.view_count, self.connections.may_operate(client_id))
+        )
         self.gizmos = SceneGizmos()
         self._clicks = ClickListener(lambda *ray: call_soon(on_ray, *ray))
         self._on_select = on_select
-        self._cut_marker, self._unreachable_marker = cut_marker(), unreachable_marker()
+        self._solids = solids
         self._points: dict[str, tuple[PagePoint, viser.MeshHandle]] = {}
         self._canes: tuple[Line, ...] = ()
         self._cuts: dict[str, Cut] = {}
@@ -108,9 +119,9 @@ class Scene:
         self.cameras = SceneCameras(self._server)
         self.trail = ToolTrail(self._server)
         self.falling = FallingPieces(self._server)
-        self._distance_tool = DistanceTool()
-        self.robot = SceneRobot(self._server, model, parts)
-        self.ghost = PreviewGhost(model, parts)
+        self._distance_tool = DistanceTool(solids.end_ball)
+        self.robot = SceneRobot(self._server, model, solids.robot)
+        self.ghost = PreviewGhost(model, solids.robot)
         self._server.on_client_connect(self._on_connect)
         self._server.on_client_disconnect(self._on_disconnect)
 
@@ -274,13 +285,13 @@ class Scene:
     @property
     def shows_camera_frames(self) -> bool:
         """Whether any view shows the frustum or the point cloud of the eye-in-hand camera."""
-        owners = {self.views.owner(client_id) for client_id in self._server.get_clients()}
+        owners = {self.connections.owner(client_id) for client_id in self._server.get_clients()}
         return any(self._layers_of(owner) & {"camera", "cloud"} for owner in owners if owner is not None)
 
     def show_camera_frame(self, frame: DecodedFrame, wxyz: Array, position: Array) -> None:
         """Draw a frame of the eye-in-hand camera, taken from a pose in odom, on the views that show it."""
         for client_id, client in self._server.get_clients().items():
-            owner = self.views.owner(client_id)
+            owner = self.connections.owner(client_id)
             layers = frozenset[Layer]() if owner is None else self._layers_of(owner)
             if "camera" in layers:
                 draw_frustum(client, frame, wxyz, position)
@@ -321,7 +332,8 @@ class Scene:
 
     def close(self) -> None:
         """Stop viser."""
-        self.views.close()
+        with contextlib.redirect_stdout(io.StringIO()):
+            self._server.stop()
 
     def _show_point(self, point_id: str, row: PagePoint) -> None:
         color = STATE_COLORS[row.entry.state]
@@ -331,7 +343,7 @@ class Scene:
         if known is None or (known[0].entry.state == "UNREACHABLE") != unreachable:
             if known is not None:
                 known[1].remove()
-            mesh = self._unreachable_marker if unreachable else self._cut_marker
+            mesh = self._solids.unreachable_marker if unreachable else self._solids.cut_marker
             handle = self._server.scene.add_mesh_simple(
                 f"/points/{point_id}",
                 mesh.vertices,
@@ -345,7 +357,7 @@ class Scene:
             )
 
             async def clicked(event: viser.SceneNodePointerEvent[Any]) -> None:
-                owner = self.views.owner(event.client_id)
+                owner = self.connections.owner(event.client_id)
                 if owner is not None:
                     self._call_soon(self._on_select, owner, point_id)
 
@@ -369,7 +381,7 @@ class Scene:
             point = shown[0].point
             ring = client.scene.get_handle_by_name(_SELECTION)
             if ring is None:
-                mesh = selection_ring()
+                mesh = self._solids.selection_ring
                 ring = client.scene.add_mesh_simple(
                     _SELECTION, mesh.vertices, mesh.faces, color=(255, 255, 255), cast_shadow=False
                 )
@@ -382,11 +394,11 @@ class Scene:
     def _apply_layers(self, owner: str, client: viser.ClientHandle) -> None:
         shown = self._layers_of(owner)
         for layer, name in _SHARED_LAYERS.items():
-            self.views.set_visible(client.client_id, name, layer in shown)
+            set_node_visibility(client, name, layer in shown)
 
     def _clients(self, owner: str) -> list[viser.ClientHandle]:
         clients = self._server.get_clients()
-        return [client for client_id, client in clients.items() if self.views.owner(client_id) == owner]
+        return [client for client_id, client in clients.items() if self.connections.owner(client_id) == owner]
 
     async def _on_connect(self, client: viser.ClientHandle) -> None:
         self._call_soon(self._attach, client)
@@ -395,7 +407,7 @@ class Scene:
         self._call_soon(self._detach, client.client_id)
 
     def _attach(self, client: viser.ClientHandle) -> None:
-        owner = self.views.owner(client.client_id)
+        owner = self.connections.owner(client.client_id)
         if owner is not None:
             self.gizmos.attach(owner, client)
             self._clicks.attach(owner, client)

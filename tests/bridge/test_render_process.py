@@ -6,7 +6,8 @@ import pytest
 
 from bridge.core.picture import Picture
 from bridge.sim.camera.config import CameraConfig
-from bridge.sim.camera.render_process import CameraRenderer, InlineRenderer, RenderProcess
+from bridge.sim.camera.render_process import CameraRenderer, RenderProcess
+from bridge.sim.camera.renderer import InlineRenderer
 from bridge.sim.vineyard.row import Rod, Row
 
 pytestmark = pytest.mark.paced

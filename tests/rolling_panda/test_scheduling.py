@@ -1,10 +1,14 @@
 """Priority of a process, and its garbage collector."""
 
+import mmap
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+
+from rolling_panda.runtime.scheduling import release_library
 
 SHOW = """
 import os, sys
@@ -69,3 +73,27 @@ print(len(gc.get_objects()) < 1000, before() is None, after() is None)
 def test_what_is_there_is_left_alone_and_what_becomes_garbage_is_not() -> None:
     done = subprocess.run([sys.executable, "-c", GARBAGE], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["True"] * 3
+
+
+def resident_kib(name: str) -> int:
+    """Memory of the mapped files of this name (KiB)."""
+    mapped, size = False, 0
+    for line in Path("/proc/self/smaps").read_text().splitlines():
+        if "-" in line.partition(" ")[0]:
+            mapped = line.endswith(name)
+        elif mapped and line.startswith("Rss:"):
+            size += int(line.split()[1])
+    return size
+
+
+def test_a_released_library_takes_no_memory_and_still_works(tmp_path: Path) -> None:
+    content = os.urandom(1 << 20)
+    with (tmp_path / "libvine.so").open("w+b") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+        with mmap.mmap(file.fileno(), 0, mmap.MAP_PRIVATE, mmap.PROT_READ) as library:
+            assert library[:] == content and resident_kib("libvine.so") == 1024
+            release_library("libvine")
+            assert resident_kib("libvine.so") == 0
+            assert library[:] == content

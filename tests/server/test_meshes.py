@@ -13,11 +13,9 @@ from server.scene.meshes import (
     STATE_COLORS,
     capsules_mesh,
     color_of,
-    cut_marker,
     drawn_kinds,
     quat_wxyz,
     quat_wxyz_of_axis,
-    unreachable_marker,
 )
 
 
@@ -85,17 +83,3 @@ def test_viser_takes_the_scalar_first():
 def test_every_state_has_a_colour_of_its_own():
     assert set(STATE_COLORS) == set(get_args(m.PointState))
     assert len(set(STATE_COLORS.values())) == len(STATE_COLORS)
-
-
-def test_the_marker_is_wider_than_a_cane_and_centred_on_the_cut():
-    low, high = cut_marker().bounds
-    assert high[0] > 0.015
-    assert low == pytest.approx(-high, abs=1e-6)
-
-
-def test_what_cannot_be_reached_has_a_shape_of_its_own_in_the_same_place():
-    cut, beyond = cut_marker(), unreachable_marker()
-    assert beyond.bounds[0] == pytest.approx(-beyond.bounds[1], abs=1e-6)
-    assert np.ptp(beyond.bounds[:, 0]) == pytest.approx(np.ptp(cut.bounds[:, 0]), rel=0.2), "as large"
-    # A disc has a surface between the bars of a cross.
-    assert beyond.volume > 0 and not beyond.contains([[0.03, 0.0, 0.0]])[0] and cut.contains([[0.03, 0.0, 0.0]])[0]

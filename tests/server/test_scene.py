@@ -1,6 +1,7 @@
 """The 3-D view as a whole, without a browser: what viser is told of points."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,9 @@ import pytest
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import Capsule, Scenery
 from rolling_panda.model.robot import RobotModel
-from server.scene.meshes import STATE_COLORS, cut_marker, unreachable_marker
+from server.scene.meshes import STATE_COLORS
 from server.scene.scene import Scene
+from server.scene.solids import build_solids
 from tests.support.played_server import bridge, point
 
 
@@ -33,7 +35,7 @@ def scene() -> Iterator[Drawn]:
     def nothing(*_: object) -> None:
         return None
 
-    made = Drawn(RobotModel().model, [], soon, nothing, nothing, nothing)
+    made = Drawn(RobotModel().model, replace(build_solids(), robot=()), soon, nothing, nothing, nothing)
     yield made
     made.close()
 
@@ -49,7 +51,8 @@ def shown(scene: Drawn, state: m.PointState) -> tuple[Any, tuple[int, ...]]:
 
 
 def test_a_point_that_cannot_be_reached_has_another_marker_until_it_can(scene: Drawn) -> None:
-    for state, shape in (("ACCEPTED", cut_marker()), ("UNREACHABLE", unreachable_marker()), ("ACCEPTED", cut_marker())):
+    cut, cross = build_solids().cut_marker, build_solids().unreachable_marker
+    for state, shape in (("ACCEPTED", cut), ("UNREACHABLE", cross), ("ACCEPTED", cut)):
         vertices, color = shown(scene, state)
         assert np.allclose(vertices, shape.vertices) and color == STATE_COLORS[state]
     scene.show_points((point(2, "PROPOSED"),))

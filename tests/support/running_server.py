@@ -4,27 +4,18 @@ import asyncio
 import contextlib
 import threading
 import time
-from functools import cache
-from unittest.mock import patch
 
 import httpx
 from websockets.sync.client import connect
 
-from rolling_panda.model.robot import RobotModel
 from server.auth.access import Access
 from server.auth.sessions import Sessions
 from server.config import ServerConfig
-from server.scene.robot_meshes import robot_parts
+from server.scene.solids import build_solids
 from server.service import listen, serve
 
 #: For a machine that is busy with other things; a test that passes never waits this long.
 PATIENCE_S = 60.0
-
-
-@cache
-def parts():
-    """The robot's looks take two seconds to prepare: once is enough for all tests."""
-    return robot_parts(RobotModel().model)
 
 
 class RunningServer:
@@ -71,10 +62,11 @@ class RunningServer:
 @contextlib.contextmanager
 def running_server(wire, config=None, access=None, **others):
     """`wire` is that of the robot `rp1`; further robots are given by their names."""
-    parts()
+    # Otherwise the first test would wait for them while its server starts.
+    build_solids()
     sessions = Sessions(3600.0)
     stopping = threading.Event()
-    with listen("127.0.0.1", 0) as listener, patch("server.service.robot_parts", lambda model: parts()):
+    with listen("127.0.0.1", 0) as listener:
         access = access or Access()
         address = f"{access.scheme}://127.0.0.1:{listener.getsockname()[1]}"
         work = serve(config or ServerConfig(), {"rp1": wire, **others}, sessions, listener, address, stopping, access)

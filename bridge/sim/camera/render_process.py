@@ -7,9 +7,8 @@ from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 from typing import Protocol
 
-from bridge.core.picture import Picture, encode_picture
+from bridge.core.picture import Picture
 from bridge.sim.camera.config import CameraConfig
-from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.row import Row
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.runtime.scheduling import Priority, set_priority
@@ -26,31 +25,6 @@ class CameraRenderer(Protocol):
 
     def close(self) -> None:
         """Close; idempotent."""
-
-
-class InlineRenderer:
-    """Renders inside `expose`, so that the same calls give the same pictures."""
-
-    def __init__(self, config: CameraConfig, seed: int) -> None:
-        """Prepare the camera."""
-        self._camera = Camera(config, seed)
-        self._frame = 0
-        self._picture: Picture | None = None
-
-    def expose(self, row: Row, T_world_camera: Array) -> bool:
-        """Render and encode now."""
-        image = self._camera.render(row, T_world_camera, self._frame)
-        self._frame += 1
-        self._picture = encode_picture(self._camera.intrinsics, image.color, image.depth, image.labels)
-        return True
-
-    def ready(self) -> Picture | None:
-        """The rendered picture, once."""
-        picture, self._picture = self._picture, None
-        return picture
-
-    def close(self) -> None:
-        """Nothing to close."""
 
 
 class RenderProcess:
@@ -135,6 +109,9 @@ class RenderProcess:
 
 
 def _render_until_closed(pipe: Connection, config: CameraConfig, seed: int, priority: Priority) -> None:
+    # Imported here, since ray casting and its filters are a lot of memory, which the bridge does without.
+    from bridge.sim.camera.renderer import InlineRenderer
+
     set_priority(priority)
     renderer, row = InlineRenderer(config, seed), Row(())
     try:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bridge.core.picture import Picture, encode_picture
 from bridge.sim.camera.config import CameraConfig
 from bridge.sim.camera.mesh import Floats, Indices, RodMesh
 from bridge.sim.camera.palette import Bytes, Palette
@@ -106,3 +107,28 @@ class Camera:
         normal = offset - along[:, None] * axis
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
         return self._palette.wood(rods, mesh.kind[rods], along, normal)
+
+
+class InlineRenderer:
+    """Renders inside `expose`, so that the same calls give the same pictures."""
+
+    def __init__(self, config: CameraConfig, seed: int) -> None:
+        """Prepare the camera."""
+        self._camera = Camera(config, seed)
+        self._frame = 0
+        self._picture: Picture | None = None
+
+    def expose(self, row: Row, T_world_camera: Array) -> bool:
+        """Render and encode now."""
+        image = self._camera.render(row, T_world_camera, self._frame)
+        self._frame += 1
+        self._picture = encode_picture(self._camera.intrinsics, image.color, image.depth, image.labels)
+        return True
+
+    def ready(self) -> Picture | None:
+        """The rendered picture, once."""
+        picture, self._picture = self._picture, None
+        return picture
+
+    def close(self) -> None:
+        """Nothing to close."""

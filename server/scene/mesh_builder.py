@@ -1,7 +1,12 @@
-"""Meshes of the robot: triangles of each moving body, from the visuals of our URDFs and of the Panda's."""
+"""Builds the scene's meshes: of the robot from the visuals of our URDFs and of the Panda's, and of the markers.
 
+The server does not import this module, which brings a mesh library: `solids.py` runs it in a process of its own.
+"""
+
+import math
+import pickle
+import sys
 import xml.etree.ElementTree as ET
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +16,12 @@ import trimesh
 from numpy.typing import NDArray
 
 from rolling_panda.errors import ModelError
-from rolling_panda.model.robot import panda_urdf
+from rolling_panda.model.robot import RobotModel, panda_urdf
 from rolling_panda.resources import resource
+from server.scene.meshes import Color
+from server.scene.solids import Part, Solid, Solids
 
 Array = NDArray[np.float64]
-Color = tuple[int, int, int]
 
 #: The Panda's meshes have about 125,000 faces, most of them in fillets. Every view draws them all in every frame, so a
 #: mesh keeps about as many as its surface needs to look round (faces a m²), and a small one not too few for its shape.
@@ -23,23 +29,10 @@ _DENSITY = 14_000
 _FEWEST_FACES = 48
 #: Edges sharper than this (rad) stay sharp when shaded.
 _CREASE = 0.6
-
-
-@dataclass(frozen=True)
-class Part:
-    """Triangles of one colour on one moving body.
-
-    Attributes:
-        joint: Index in the Pinocchio model of the joint that moves the body.
-        color: sRGB, 0…255.
-        vertices: (V, 3), m, in the joint's frame.
-        faces: (F, 3), indices of vertices.
-    """
-
-    joint: int
-    color: Color
-    vertices: NDArray[np.float32]
-    faces: NDArray[np.uint32]
+_DISC_RADIUS = 0.034
+_DISC_HEIGHT = 0.004
+_BALL_RADIUS = 0.016
+_CROSS = (0.25 * math.pi, -0.25 * math.pi)
 
 
 def robot_parts(model: Any) -> list[Part]:
@@ -139,3 +132,44 @@ def _color(visual: ET.Element) -> Color:
 
 def _numbers(text: str) -> Array:
     return np.array([float(value) for value in text.split()])
+
+
+def cut_marker() -> trimesh.Trimesh:
+    """A disc in the cutting plane around a ball; the cane's tangent is z, the origin is the cut (m)."""
+    disc = trimesh.creation.cylinder(radius=_DISC_RADIUS, height=_DISC_HEIGHT, sections=24)
+    ball = trimesh.creation.icosphere(subdivisions=1, radius=_BALL_RADIUS)
+    return trimesh.util.concatenate([disc, ball])
+
+
+def unreachable_marker() -> trimesh.Trimesh:
+    """Two crossed bars in the cutting plane, in the frame of a cut marker (m)."""
+    length, width = 2.4 * _DISC_RADIUS, 0.014
+    bar = trimesh.creation.box((length, width, width))
+    bars = [bar.copy().apply_transform(trimesh.transformations.rotation_matrix(turn, (0, 0, 1))) for turn in _CROSS]
+    return trimesh.util.concatenate(bars)
+
+
+def selection_ring() -> trimesh.Trimesh:
+    """A ring around a cut marker, in the same frame."""
+    return trimesh.creation.torus(major_radius=0.052, minor_radius=0.004, major_sections=32, minor_sections=8)
+
+
+def end_ball() -> trimesh.Trimesh:
+    """A ball for an end of a measured distance."""
+    return trimesh.creation.icosphere(subdivisions=1, radius=0.012)
+
+
+def _solid(mesh: trimesh.Trimesh) -> Solid:
+    return Solid(np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.uint32))
+
+
+def main() -> None:
+    """Write all meshes to the standard output."""
+    solids = Solids(
+        robot=tuple(robot_parts(RobotModel().model)),
+        cut_marker=_solid(cut_marker()),
+        unreachable_marker=_solid(unreachable_marker()),
+        selection_ring=_solid(selection_ring()),
+        end_ball=_solid(end_ball()),
+    )
+    pickle.dump(solids, sys.stdout.buffer)
