@@ -30,7 +30,7 @@ from server.api.state import camera_router, state_router
 from server.auth.sessions import Session
 from server.robots.app_state import AppState
 from server.robots.context import Result, RobotContext
-from server.scene.viser_proxy import viser_router
+from server.scene.viser_adapter.proxy import viser_router
 
 _ABOUT = (
     "Everything that the page can do. Sign in with `POST /api/sign-in` and the token of a sign-in link, keep the "
@@ -100,7 +100,7 @@ def robot_app(app_state: AppState, robot: RobotContext, origins: frozenset[str],
         preview_router(robot),
         control_router(robot),
         page_socket_router(robot),
-        viser_router(robot.scene, robot.may_move, robot.on_gizmo, log_dropped, log_closed),
+        viser_router(robot.scene.views, robot.may_move, robot.on_gizmo, log_dropped, log_closed),
     )
     return _application(routers, files, app_state, origins, robot.note, path)
 

@@ -67,9 +67,9 @@ TARGETS = {
             "controller/motion/teleoperation.py",
             "server/robots/teleop.py",
             "server/robots/event_log.py",
-            "server/scene/viser_filter.py",
+            "server/scene/viser_adapter/client_messages.py",
         ),
-        _tests("controller", "teleoperation") + _tests("server", "teleop event_log viser_filter"),
+        _tests("controller", "teleoperation") + _tests("server", "teleop event_log client_messages"),
     ),
     "server.middleware": Target(("server/api/middleware.py",), _tests("server", "middleware sign_in")),
 }

@@ -13,7 +13,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.typing import Origin, Subprotocol
 
-from server.scene.viser_internals import VISER_VERSION
+from server.scene.viser_adapter.contract import VERSION as VISER_VERSION
 
 _CAMERA = msgspec.msgpack.encode(
     {

@@ -17,7 +17,7 @@ from websockets.typing import Origin, Subprotocol
 
 from rolling_panda.errors import RollingPandaError
 from rolling_panda.runtime.launch import child_environment, python_command
-from server.scene.viser_internals import VISER_VERSION
+from server.scene.viser_adapter.contract import VERSION as VISER_VERSION
 
 _OPEN_S, _CLOSE_S = 30.0, 0.2
 _FRAME = re.compile(r'"camera_frame":(\d+)')

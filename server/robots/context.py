@@ -25,7 +25,7 @@ from server.robots.presence import PresenceTracker
 from server.robots.scene_updater import SceneUpdater
 from server.robots.teleop import TeleopHold
 from server.scene.scene import Scene
-from server.scene.viser_filter import GizmoDragEnd, GizmoUpdate
+from server.scene.viser_adapter.client_messages import GizmoDragEnd, GizmoUpdate
 
 _CONFIRM_POLL_S = 0.01
 #: A dragged gizmo's target is sent at once, but no sooner than this after the last one (s).

@@ -11,6 +11,7 @@ import viser
 from rolling_panda import messages as m
 from rolling_panda.messages.page import GizmoAxes
 from rolling_panda.model.robot import placement
+from server.scene.viser_adapter.view_server import adopt_pose
 
 #: Length of the gizmo's arrows, seen from the side (CSS px).
 GIZMO_PX = 110.0
@@ -75,8 +76,7 @@ class SceneGizmos:
         if gizmo is None or drawn.norm() < 1e-9:
             return None
         for handle in gizmo.handles.values():
-            # Viser sends differences to what it last set, so its copy has to follow the browser's drag.
-            handle.position[:], handle.wxyz[:] = position, wxyz
+            adopt_pose(handle, position, wxyz)
         drawn.normalize()
         gizmo.drawn = drawn
         qx, qy, qz, qw = ((drawn * gizmo.offset).coeffs()).tolist()

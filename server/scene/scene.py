@@ -1,7 +1,5 @@
 """The 3-D view: a viser server on a loopback port of its own, seen by browsers through the filtering proxy alone."""
 
-import contextlib
-import io
 from collections.abc import Callable, Collection
 from typing import Any, Protocol
 
@@ -35,13 +33,7 @@ from server.scene.picking import (
 )
 from server.scene.robot import PreviewGhost, SceneRobot, ToolTrail
 from server.scene.solids import Solids
-from server.scene.viser_internals import (
-    ViewConnections,
-    limit_frame_rate,
-    patch_event_thread,
-    set_node_visibility,
-    update_pause_s,
-)
+from server.scene.viser_adapter.view_server import ViewServer
 
 _SKY_TOP, _SKY_BOTTOM = np.array([22.0, 27.0, 34.0]), np.array([58.0, 66.0, 76.0])
 _CANE_LINES = "/plant/canes"
@@ -89,15 +81,9 @@ class Scene:
             on_ray: Called with (owner, origin, direction) when `owner`, who places points or measures, clicked.
             on_refusal: Called when a connection that did not come through the proxy was refused.
         """
-        patch_event_thread()
-        with contextlib.redirect_stdout(io.StringIO()):
-            self._server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-        self.port = int(self._server.get_port())
         self._call_soon = call_soon
-        self.connections = ViewConnections(self._server, lambda: call_soon(on_refusal))
-        limit_frame_rate(
-            self._server, lambda client_id: update_pause_s(self.view_count, self.connections.may_operate(client_id))
-        )
+        self.views = ViewServer(lambda: call_soon(on_refusal))
+        self._server = self.views.viser
         self.gizmos = SceneGizmos()
         self._clicks = ClickListener(lambda *ray: call_soon(on_ray, *ray))
         self._on_select = on_select
@@ -285,13 +271,13 @@ class Scene:
     @property
     def shows_camera_frames(self) -> bool:
         """Whether any view shows the frustum or the point cloud of the eye-in-hand camera."""
-        owners = {self.connections.owner(client_id) for client_id in self._server.get_clients()}
+        owners = {self.views.owner(client_id) for client_id in self._server.get_clients()}
         return any(self._layers_of(owner) & {"camera", "cloud"} for owner in owners if owner is not None)
 
     def show_camera_frame(self, frame: DecodedFrame, wxyz: Array, position: Array) -> None:
         """Draw a frame of the eye-in-hand camera, taken from a pose in odom, on the views that show it."""
         for client_id, client in self._server.get_clients().items():
-            owner = self.connections.owner(client_id)
+            owner = self.views.owner(client_id)
             layers = frozenset[Layer]() if owner is None else self._layers_of(owner)
             if "camera" in layers:
                 draw_frustum(client, frame, wxyz, position)
@@ -332,8 +318,7 @@ class Scene:
 
     def close(self) -> None:
         """Stop viser."""
-        with contextlib.redirect_stdout(io.StringIO()):
-            self._server.stop()
+        self.views.close()
 
     def _show_point(self, point_id: str, row: PagePoint) -> None:
         color = STATE_COLORS[row.entry.state]
@@ -357,7 +342,7 @@ class Scene:
             )
 
             async def clicked(event: viser.SceneNodePointerEvent[Any]) -> None:
-                owner = self.connections.owner(event.client_id)
+                owner = self.views.owner(event.client_id)
                 if owner is not None:
                     self._call_soon(self._on_select, owner, point_id)
 
@@ -394,11 +379,11 @@ class Scene:
     def _apply_layers(self, owner: str, client: viser.ClientHandle) -> None:
         shown = self._layers_of(owner)
         for layer, name in _SHARED_LAYERS.items():
-            set_node_visibility(client, name, layer in shown)
+            self.views.set_visible(client.client_id, name, layer in shown)
 
     def _clients(self, owner: str) -> list[viser.ClientHandle]:
         clients = self._server.get_clients()
-        return [client for client_id, client in clients.items() if self.connections.owner(client_id) == owner]
+        return [client for client_id, client in clients.items() if self.views.owner(client_id) == owner]
 
     async def _on_connect(self, client: viser.ClientHandle) -> None:
         self._call_soon(self._attach, client)
@@ -407,7 +392,7 @@ class Scene:
         self._call_soon(self._detach, client.client_id)
 
     def _attach(self, client: viser.ClientHandle) -> None:
-        owner = self.connections.owner(client.client_id)
+        owner = self.views.owner(client.client_id)
         if owner is not None:
             self.gizmos.attach(owner, client)
             self._clicks.attach(owner, client)

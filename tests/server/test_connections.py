@@ -12,7 +12,7 @@ from websockets.exceptions import ConnectionClosed
 
 from server.auth.access import Access, Tls
 from server.config import ServerConfig
-from tests.server.test_viser_filter import CAMERA
+from tests.server.test_client_messages import CAMERA
 from tests.support.certificates import self_signed
 from tests.support.fake_wire import FakeWire, telling
 from tests.support.running_server import PATIENCE_S, eventually, running_server

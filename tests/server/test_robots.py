@@ -10,7 +10,7 @@ from rolling_panda import topics
 from rolling_panda.messages.supervision import StopRecord, StopState
 from tests.server.test_misuse import control
 from tests.server.test_page_socket import Page
-from tests.server.test_viser_proxy import drawn
+from tests.server.test_proxy import drawn
 from tests.support.fake_wire import FakeWire, bridge_state, controller_state, pruning_point, pruning_points, telling
 from tests.support.running_server import eventually, running_server
 

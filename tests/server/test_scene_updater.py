@@ -9,8 +9,8 @@ import pytest
 from rolling_panda import topics
 from server.config import ServerConfig
 from tests.server.test_camera_view import HEIGHT, WIDTH, frame
-from tests.server.test_viser_filter import CAMERA, CLICK, DRAG, GRAB, POINTER
-from tests.server.test_viser_proxy import (
+from tests.server.test_client_messages import CAMERA, CLICK, DRAG, GRAB, POINTER
+from tests.server.test_proxy import (
     Holding,
     enables_clicks,
     hear,

@@ -1,60 +1,74 @@
-"""Everything that uses viser's internals, at the exact version that pyproject.toml names.
+"""A viser server that serves the views of signed-in sessions alone.
 
-- `ViewConnections`: viser accepts anybody who finds its port; here only the proxy's connections pass.
-- `patch_event_thread`: a fix of a race between viser's threads.
-- `limit_frame_rate`: viewers are sent fewer updates where many views are open.
-- `set_node_visibility`: shows or hides a shared node in one view alone.
-- `client_page`: the page of viser's client.
+- Viser accepts anybody who finds its port; here only the proxy's connections pass.
+- A race between viser's threads is fixed.
+- Viewers are sent fewer updates where many views are open.
 """
 
 import asyncio
+import contextlib
+import io
 from collections.abc import AsyncGenerator, Callable, Sequence
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any
 
 import viser
-from viser import _messages as viser_messages
-from viser.infra import WebsockClientConnection
-from viser.infra import _async_message_buffer as viser_buffer
 
-VISER_VERSION = viser.__version__
+from server.scene.viser_adapter import contract
+
 _PATCHED = "_event_thread_patched"
 #: Number of views from which viewers' views are updated less often, and the time between two updates (s).
 _FEW_VIEWS, _VIEWER_PAUSE_S = 8, 0.2
 
 
-def client_page() -> bytes:
-    """The client's page: one self-contained HTML file."""
-    return (Path(viser.__file__).parent / "client" / "build" / "index.html").read_bytes()
+@dataclass(frozen=True)
+class _Owner:
+    """The session that owns a connection, and whether it may operate the robot."""
+
+    session_id: str
+    may_operate: bool
 
 
-def set_node_visibility(client: viser.ClientHandle, name: str, visible: bool) -> None:
-    """Show or hide in one view a node that all views share."""
-    message = viser_messages.SetSceneNodeVisibilityMessage(name, visible)
-    client._websock_connection.queue_message(message)
-
-
-class ViewConnections:
-    """Accepts the proxy's connections alone, and knows which session owns each.
+class ViewServer:
+    """Viser on a loopback port of its own, and the session that owns each of its views.
 
     The proxy announces the local port of each connection before it connects. A connection from any other port is closed
     before viser reads a byte of it.
+
+    Attributes:
+        viser: For viser's public interface: the scene and the views.
+        port: Of viser on the loopback address.
     """
 
-    def __init__(self, server: viser.ViserServer, on_refusal: Callable[[], object]) -> None:
-        """Guard `server`; `on_refusal` is called on viser's thread when a connection was refused."""
-        self._server = server._websock_server
+    def __init__(self, on_refusal: Callable[[], object]) -> None:
+        """Start viser; `on_refusal` is called on viser's thread when a connection was refused.
+
+        Raises:
+            ViserChangedError: This version of viser is not as the server needs it.
+        """
+        patch_event_thread()
+        with contextlib.redirect_stdout(io.StringIO()):
+            self.viser = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        contract.check(self.viser)
+        self.port = int(self.viser.get_port())
+        self._server = self.viser._websock_server
         self._on_refusal = on_refusal
-        self._expected: dict[int, tuple[str, bool]] = {}
-        self._owners: dict[int, tuple[str, bool]] = {}
+        self._expected: dict[int, _Owner] = {}
+        self._owners: dict[int, _Owner] = {}
+        self._connections: dict[int, Any] = {}
         # A request of this type would publish the view through a public tunnel.
-        for kind in (viser_messages.ShareUrlRequest, viser_messages.ShareUrlDisconnect):
+        for kind in (contract.messages.ShareUrlRequest, contract.messages.ShareUrlDisconnect):
             self._server.unregister_handler(kind)
         self._server.on_client_connect(self._check)
+        self._server.on_client_disconnect(self._forget_client)
+        limit_frame_rate(
+            self._server._broadcast_buffer,
+            lambda client_id: update_pause_s(len(self.viser.get_clients()), self._may_operate(client_id)),
+        )
 
     def expect(self, port: int, owner: str, may_operate: bool) -> None:
-        """Announce a connection from this local port that belongs to `owner`."""
-        self._expected[port] = owner, may_operate
+        """Announce a connection from this local port that belongs to the session `owner`."""
+        self._expected[port] = _Owner(owner, may_operate)
 
     def forget(self, port: int) -> None:
         """That connection has ended."""
@@ -62,13 +76,25 @@ class ViewConnections:
 
     def owner(self, client_id: int) -> str | None:
         """The session that owns a viser client; None for a refused one."""
-        return self._owners.get(client_id, (None, False))[0]
+        owner = self._owners.get(client_id)
+        return None if owner is None else owner.session_id
 
-    def may_operate(self, client_id: int) -> bool:
-        """Whether the session that owns a viser client may operate the robot."""
-        return self._owners.get(client_id, ("", False))[1]
+    def set_visible(self, client_id: int, name: str, visible: bool) -> None:
+        """Show or hide in one view a node that all views share."""
+        connection = self._connections.get(client_id)
+        if connection is not None:
+            connection.queue_message(contract.messages.SetSceneNodeVisibilityMessage(name, visible))
 
-    async def _check(self, connection: WebsockClientConnection) -> None:
+    def close(self) -> None:
+        """Stop viser."""
+        with contextlib.redirect_stdout(io.StringIO()):
+            self.viser.stop()
+
+    def _may_operate(self, client_id: int) -> bool:
+        owner = self._owners.get(client_id)
+        return owner is not None and owner.may_operate
+
+    async def _check(self, connection: Any) -> None:
         client_id = int(connection.client_id)
         socket = self._server._live_connections[connection.client_id]
         owner = self._expected.get(socket.remote_address[1])
@@ -76,7 +102,16 @@ class ViewConnections:
             self._on_refusal()
             await socket.close(1008, "connect through the page")
         else:
-            self._owners[client_id] = owner
+            self._connections[client_id], self._owners[client_id] = connection, owner
+
+    async def _forget_client(self, connection: Any) -> None:
+        self._connections.pop(int(connection.client_id), None)
+        self._owners.pop(int(connection.client_id), None)
+
+
+def adopt_pose(handle: Any, position: Sequence[float], wxyz: Sequence[float]) -> None:
+    """The browser has dragged this node to here: viser draws it elsewhere only where that differs from this."""
+    handle.position[:], handle.wxyz[:] = position, wxyz
 
 
 class SameThreadEvent(asyncio.Event):
@@ -104,7 +139,7 @@ def patch_event_thread() -> None:
     The first call iterates over the waiting tasks while they come and go. With dozens of views it fails in time ("deque
     mutated during iteration") and ends the server. The second call is enough.
     """
-    kind: Any = viser_buffer.AsyncMessageBuffer
+    kind: Any = contract.buffers.AsyncMessageBuffer
     if getattr(kind, _PATCHED, False):
         return
     original = kind.__init__
@@ -127,13 +162,12 @@ def update_pause_s(views: int, may_operate: bool) -> float:
     return 0.0 if may_operate or views <= _FEW_VIEWS else _VIEWER_PAUSE_S
 
 
-def limit_frame_rate(server: viser.ViserServer, pause_s: Callable[[int], float]) -> None:
-    """Let each view wait `pause_s(client_id)` seconds after an update; the initial scene comes without a wait.
+def limit_frame_rate(buffer: Any, pause_s: Callable[[int], float]) -> None:
+    """Let each view of a buffer wait `pause_s(client_id)` seconds after an update; the initial scene comes without.
 
     Each view's update is packed and sent separately, so dozens of views would delay the one that moves the robot.
     Nothing is queued meanwhile: after the wait a view is sent the newest value of everything.
     """
-    buffer = server._websock_server._broadcast_buffer
     original = buffer.window_generator
 
     async def limited(client_id: int, **more: Any) -> AsyncGenerator[Sequence[Any], None]:

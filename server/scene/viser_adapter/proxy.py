@@ -12,23 +12,22 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
-from rolling_panda.errors import RollingPandaError
 from server.auth.sessions import Session
 from server.connections.websocket_protocol import why_ended
-from server.scene.scene import Scene
-from server.scene.viser_filter import GizmoDragEnd, GizmoUpdate, admit, message_type
-from server.scene.viser_internals import VISER_VERSION, client_page
+from server.scene.viser_adapter.client_messages import GizmoDragEnd, GizmoUpdate, admit, message_type
+from server.scene.viser_adapter.contract import CLIENT_START, VERSION, client_page
+from server.scene.viser_adapter.view_server import ViewServer
 
 #: Viser's own panel and notifications are empty here and would cover the view.
 _STYLE = b"<style>[data-floating-window],.mantine-Notifications-root{display:none!important}</style>"
 #: A script of the page that configures the rendering; it has to run before the client's scripts.
 _SCRIPT = b'<script type="module" src="/js/scene/frame.js"></script>'
 #: The client starts as soon as it is unpacked; patched, it waits for that script, or for the failure to load it.
-_START, _PATCHED_START = b"await init();", b'await Promise.all([init(),import("/js/scene/frame.js").catch(()=>{})]);'
+_PATCHED_START = b'await Promise.all([init(),import("/js/scene/frame.js").catch(()=>{})]);'
 
 
 def viser_router(
-    scene: Scene,
+    views: ViewServer,
     may_move: Callable[[Session], bool],
     on_gizmo: Callable[[Session, GizmoUpdate | GizmoDragEnd], object],
     on_drop: Callable[[Session, str], None],
@@ -37,7 +36,7 @@ def viser_router(
     """Routes `/viser/` and the WebSocket `/viser`.
 
     Args:
-        scene: The 3-D view.
+        views: The viser server.
         may_move: Whether this session may move the robot now.
         on_gizmo: Called at once with a permitted drag of the gizmo, and with every release; viser's own callback would
             come two threads later.
@@ -50,7 +49,7 @@ def viser_router(
 
     @router.get("/viser/")
     def view(request: Request) -> Response:
-        headers = {"Cache-Control": "private, no-cache", "ETag": f'"viser-{VISER_VERSION}-{len(page)}"'}
+        headers = {"Cache-Control": "private, no-cache", "ETag": f'"viser-{VERSION}-{len(page)}"'}
         if request.headers.get("if-none-match") == headers["ETag"]:
             return Response(status_code=304, headers=headers)
         if "gzip" in request.headers.get("accept-encoding", ""):
@@ -77,11 +76,11 @@ def viser_router(
             local.setblocking(False)
             local.bind(("127.0.0.1", 0))
             port = int(local.getsockname()[1])
-            scene.connections.expect(port, session.session_id, session.may_operate)
+            views.expect(port, session.session_id, session.may_operate)
             try:
-                await asyncio.get_running_loop().sock_connect(local, ("127.0.0.1", scene.port))
+                await asyncio.get_running_loop().sock_connect(local, ("127.0.0.1", views.port))
                 async with connect(
-                    f"ws://127.0.0.1:{scene.port}/",
+                    f"ws://127.0.0.1:{views.port}/",
                     sock=local,
                     subprotocols=offered or None,
                     compression=None,
@@ -94,7 +93,7 @@ def viser_router(
             except (OSError, websockets.InvalidHandshake):
                 await websocket.close(1013, "the 3-D view is not running")
             finally:
-                scene.connections.forget(port)
+                views.forget(port)
                 if reason := why_ended(websocket.scope):
                     on_end(session, reason)
 
@@ -103,10 +102,7 @@ def viser_router(
 
 def _patched_client_page() -> bytes:
     """The client's page with our script and style."""
-    page = client_page()
-    if page.count(_START) != 1:
-        raise RollingPandaError(f"viser {VISER_VERSION} has an unknown client page")
-    return page.replace(_START, _PATCHED_START).replace(b"<head>", b"<head>" + _SCRIPT + _STYLE, 1)
+    return client_page().replace(CLIENT_START, _PATCHED_START).replace(b"<head>", b"<head>" + _SCRIPT + _STYLE, 1)
 
 
 async def _relay(

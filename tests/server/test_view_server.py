@@ -5,14 +5,13 @@ import dataclasses
 import threading
 import time
 from collections.abc import Iterator
-from types import SimpleNamespace
 
 import pytest
 from viser import _messages as viser_messages
 from viser.infra import Message
 from viser.infra._async_message_buffer import AsyncMessageBuffer
 
-from server.scene.viser_internals import limit_frame_rate, patch_event_thread, update_pause_s
+from server.scene.viser_adapter.view_server import limit_frame_rate, patch_event_thread, update_pause_s
 
 
 @dataclasses.dataclass
@@ -71,14 +70,10 @@ def test_operators_never_wait_and_viewers_only_beside_many_views(views: int, may
     assert (update_pause_s(views, may_operate) > 0.0) is waits
 
 
-def server_of(buffer: AsyncMessageBuffer) -> SimpleNamespace:
-    return SimpleNamespace(_websock_server=SimpleNamespace(_broadcast_buffer=buffer))
-
-
 async def _heard(pause: float, moves: int) -> tuple[list[list[float]], float]:
     """What a view is sent while the robot moves every 10 ms, window by window, and how long that took (s)."""
     buffer = AsyncMessageBuffer(asyncio.get_running_loop(), persistent_messages=True)
-    limit_frame_rate(server_of(buffer), lambda client_id: pause)
+    limit_frame_rate(buffer, lambda client_id: pause)
     heard: list[list[float]] = []
 
     async def view() -> None:
@@ -112,7 +107,7 @@ def test_what_a_view_gets_when_it_opens_comes_without_a_wait() -> None:
         buffer = AsyncMessageBuffer(asyncio.get_running_loop(), persistent_messages=True)
         for number in range(300):
             buffer.push(viser_messages.SetPositionMessage(f"/points/{number}", (0.0, 0.0, 0.0)))
-        limit_frame_rate(server_of(buffer), lambda client_id: 60.0)
+        limit_frame_rate(buffer, lambda client_id: 60.0)
         windows = buffer.window_generator(7)
         return sum([len(await asyncio.wait_for(anext(windows), 5.0)) for _ in range(3)])
 

@@ -5,7 +5,7 @@ limits and open public tunnels. So each frame is decoded strictly and encoded ag
 """
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 import msgspec
 from msgspec import Meta, Struct
@@ -84,6 +84,8 @@ class GizmoDragEnd(_ClientMessage, frozen=True, tag="TransformControlsDragEndMes
 
 
 _Message = ViewerCamera | SceneNodeClick | ScenePointer | GizmoUpdate | GizmoDragStart | GizmoDragEnd
+#: Every message that a browser may send.
+CLIENT_MESSAGES: tuple[type[Struct], ...] = get_args(_Message)
 _DECODER: msgspec.msgpack.Decoder[_Message] = msgspec.msgpack.Decoder(_Message, strict=True)
 _ENCODER = msgspec.msgpack.Encoder()
 

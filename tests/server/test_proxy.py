@@ -11,7 +11,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from rolling_panda import topics
-from tests.server.test_viser_filter import CAMERA, CLICK, DRAG, FORGED, GRAB, LET_GO, POINTER
+from tests.server.test_client_messages import CAMERA, CLICK, DRAG, FORGED, GRAB, LET_GO, POINTER
 from tests.support.fake_wire import FakeWire, joints, odometry, pruning_point, pruning_points, telling
 from tests.support.running_server import PATIENCE_S, eventually, running_server
 
