@@ -29,7 +29,8 @@ from server.api.sign_in import page_router, sign_in_router
 from server.api.state import camera_router, state_router
 from server.auth.sessions import Session
 from server.robots.app_state import AppState
-from server.robots.context import Result, RobotContext
+from server.robots.commands import Result
+from server.robots.context import RobotContext
 from server.scene.viser_adapter.proxy import viser_router
 
 _ABOUT = (
@@ -84,10 +85,10 @@ def robot_app(app_state: AppState, robot: RobotContext, origins: frozenset[str],
     """The application of one robot, at this path."""
 
     def log_dropped(session: Session, kind: str) -> None:
-        robot.note("warning", f"a view of {session.user} sent {kind!r} to the 3-D view; dropped", session.client)
+        robot.log.note("warning", f"a view of {session.user} sent {kind!r} to the 3-D view; dropped", session.client)
 
     def log_closed(session: Session, reason: str) -> None:
-        robot.note("warning", f"a view of {session.user} was closed: {reason}", session.client)
+        robot.log.note("warning", f"a view of {session.user} was closed: {reason}", session.client)
 
     files = PageFiles(web := resource("web"))
     routers = (
@@ -100,9 +101,9 @@ def robot_app(app_state: AppState, robot: RobotContext, origins: frozenset[str],
         preview_router(robot),
         control_router(robot),
         page_socket_router(robot),
-        viser_router(robot.scene.views, robot.may_move, robot.on_gizmo, log_dropped, log_closed),
+        viser_router(robot.scene.views, robot.teleop.may_move, robot.teleop.drag, log_dropped, log_closed),
     )
-    return _application(routers, files, app_state, origins, robot.note, path)
+    return _application(routers, files, app_state, origins, robot.log.note, path)
 
 
 def _common_app(app_state: AppState, origins: frozenset[str]) -> ASGIApp:

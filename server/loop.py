@@ -49,48 +49,37 @@ class Loop:
         self._robot.link.send_heartbeat(self._heartbeats)
 
     async def _send_presence(self, now: float) -> None:
-        self._robot.link.send_presence(self._robot.presence.message(now))
+        self._robot.pages.send_presence(now)
 
     async def _publish_state(self, now: float) -> None:
         self._states += 1
         robot = self._robot
-        robot.publish_state(robot.view.state(self._states, len(robot.pages), now), now)
-        robot.wake_pages()
+        robot.pages.show_state(robot.view.state(self._states, len(robot.pages.open), now), now)
 
     async def _send_teleop(self, now: float) -> None:
-        robot = self._robot
-        robot.end_lapsed_hold(now)
-        target = robot.teleop.next_message(now)
-        if target is not None:
-            robot.link.send_teleop(target)
+        self._robot.teleop.step(now)
 
     async def _update_points(self, now: float) -> None:
         robot = self._robot
         points = robot.view.points(now)
-        if points is not robot.points:
-            robot.points = points
-            robot.wake_pages()
-        tool = robot.view.tool(now)
-        if tool is not None:
-            holder = robot.teleop.holder if robot.teleop.follows_gizmo else None
-            for owner in robot.scene.gizmos.follow(tool, holder):
-                robot.teleop.set_target(owner, tool)
+        robot.pages.show_points(points)
+        robot.teleop.follow_tool(now)
         await robot.scene_updater.update(points, now)
 
     async def _update_log(self, now: float) -> None:
         robot = self._robot
-        before = robot.log.number
+        before = robot.log.lines.number
         for received in robot.link.events.drain():
             event = received.message
             if event.process != "server":
-                robot.log.add(event.process, event.severity, event.text, time.time() - (now - received.at))
+                robot.log.lines.add(event.process, event.severity, event.text, time.time() - (now - received.at))
         while robot.link.refused:
             topic, reason = robot.link.refused.popleft()
             if (topic, reason) not in self._warned and len(self._warned) < _MAX_WARNINGS:
                 self._warned.add((topic, reason))
-                robot.note("warning", f"refused a message on {topic}: {reason}")
-        if robot.log.number != before:
-            robot.wake_pages()
+                robot.log.note("warning", f"refused a message on {topic}: {reason}")
+        if robot.log.lines.number != before:
+            robot.pages.wake()
 
 
 def watch_accounts(app_state: AppState) -> Coroutine[Any, Any, None]:

@@ -33,11 +33,8 @@ from server.connections.websocket_protocol import LimitedSocket
 from server.loop import Loop, watch_accounts
 from server.robots.app_state import AppState
 from server.robots.context import RobotContext
-from server.robots.event_log import EventLog
 from server.robots.link import RobotLink
 from server.robots.page_view import PageView
-from server.robots.presence import PresenceTracker
-from server.robots.teleop import TeleopHold
 from server.scene.scene import Scene
 from server.scene.solids import Solids, build_solids
 
@@ -193,9 +190,9 @@ def _robot_context(
         solids,
         call_soon,
         # Called only once a page is served, when `robot` is bound.
-        on_select=lambda owner, point_id: robot.on_point_clicked(owner, point_id),
-        on_ray=lambda owner, origin, direction: robot.on_click(owner, origin, direction),
-        on_refusal=lambda: robot.note("warning", "refused a connection to the 3-D view from outside the page"),
+        on_select=lambda owner, point_id: robot.pages.on_point_clicked(owner, point_id),
+        on_ray=lambda owner, origin, direction: robot.pages.on_click(owner, origin, direction),
+        on_refusal=lambda: robot.log.note("warning", "refused a connection to the 3-D view from outside the page"),
     )
     link, widened = RobotLink(wire), wider("server", config)
     robot = RobotContext(
@@ -203,15 +200,12 @@ def _robot_context(
         link,
         scene,
         PageView(link, model, widened, wire.plain),
-        EventLog(config.log_lines),
-        TeleopHold(config),
-        PresenceTracker(),
         held_elsewhere=lambda session: app_state.held_elsewhere(session, robot),
     )
     for line in widened:
-        robot.note("warning", f"less strict than usual: {line}")
+        robot.log.note("warning", f"less strict than usual: {line}")
     if wire.plain:
-        robot.note("error", PLAIN_WARNING)
+        robot.log.note("error", PLAIN_WARNING)
     return robot
 
 

@@ -25,8 +25,9 @@ from server.api.dependencies import Caller, Operator, activity, operator, superv
 from server.api.preview import outdated_preview
 from server.api.responses import COMMAND, STOP_BODY, TOO_MANY, answer
 from server.auth.sessions import Session
-from server.robots.context import MOTION_RATE_HZ, Result, RobotContext
-from server.robots.teleop import TeleopCommand
+from server.robots.commands import Result
+from server.robots.context import RobotContext
+from server.robots.teleop import MOTION_RATE_HZ, TeleopCommand
 
 #: What the server itself refuses of a command, since it has newer data than the controller: the reason, or empty.
 _CHECKS: dict[type[msgspec.Struct], Callable[[RobotContext, Any], str]] = {intents.ApprovePreview: outdated_preview}
@@ -45,7 +46,7 @@ def commands_router(robot: RobotContext) -> APIRouter:
 
         `reason` says which of them have latched it. A missing or unreadable body does not prevent the stop.
         """
-        return answer(await robot.stop(session, body.Stop.read(await request.body()).reason))
+        return answer(await robot.commands.stop(session, body.Stop.read(await request.body()).reason))
 
     @router.post("/teleop", tags=["teleoperation"], responses=COMMAND | TOO_MANY)
     async def teleop(session: Operator, request: body.Teleop) -> Response:
@@ -56,11 +57,12 @@ def commands_router(robot: RobotContext) -> APIRouter:
         The caller has to fetch `GET /api/state` at least twice a second: motion needs a current view of the robot.
         """
         if not request.hold:
-            robot.release(session)
+            robot.teleop.release(session)
             return answer(Result(200, True, "released"))
         if request.target is not None and request.target.refused:
             return answer(Result(409, False, request.target.refused))
-        if not robot.motion_limiter.take(session.session_id, time.monotonic()):
+        now = time.monotonic()
+        if not robot.teleop.within_rate(session, now):
             limit = f"at most {MOTION_RATE_HZ:.0f} requests for motion a second; ask less often"
             return answer(Result(429, False, limit))
         command = TeleopCommand(
@@ -68,9 +70,9 @@ def commands_router(robot: RobotContext) -> APIRouter:
             None if request.base is None else BaseVelocity(request.base.linear, request.base.angular),
             request.joints,
         )
-        if command != TeleopCommand():
-            robot.teleop.set_command(session.session_id, command)
-        return answer(robot.hold(session, time.monotonic(), speed_scale=request.speed_scale))
+        given = None if command == TeleopCommand() else command
+        refused = robot.teleop.hold(session, now, given, speed_scale=request.speed_scale)
+        return answer(Result(409, False, refused) if refused else Result(200, True, "holding"))
 
     @router.post("/replay", tags=["replay"], responses=COMMAND)
     async def seek(session: Caller, wanted: Annotated[dict[str, Any], Depends(fields_of(SeekReplay))]) -> Response:
@@ -99,11 +101,11 @@ def _add(router: APIRouter, robot: RobotContext, command: Command) -> None:
         asked = command.message(user=session.user, **fields)
         refused = "" if check is None else check(robot, asked)
         if refused:
-            robot.note("warning", f"{session.user}: {command.name} refused: {refused}")
+            robot.log.note("warning", f"{session.user}: {command.name} refused: {refused}")
             return answer(Result(409, False, refused))
         if isinstance(asked, PlantRequest):
-            return answer(await robot.ask_perception(session, asked))
-        return answer(await robot.ask(session, asked))
+            return answer(await robot.commands.ask_perception(session, asked))
+        return answer(await robot.commands.ask(session, asked))
 
     router.post(
         command.path,

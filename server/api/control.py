@@ -6,7 +6,8 @@ from fastapi import APIRouter, Depends, Response
 from rolling_panda.messages.supervision import ClientKey, ControlState
 from server.api.dependencies import Caller, Operator, activity
 from server.api.responses import COMMAND, UNAVAILABLE, answer, message, query
-from server.robots.context import Result, RobotContext
+from server.robots.commands import Result
+from server.robots.context import RobotContext
 
 
 class Control(ControlState, frozen=True, kw_only=True, tag="ControlState"):

@@ -64,6 +64,6 @@ def activity(robot: RobotContext) -> Callable[[Request], Awaitable[None]]:
     async def record(request: Request) -> None:
         session = _session(request)
         if session is not None:
-            robot.on_activity(session, time.monotonic())
+            robot.pages.on_activity(session, time.monotonic())
 
     return record

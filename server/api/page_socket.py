@@ -31,7 +31,6 @@ from rolling_panda.messages.page import (
     ShowPreview,
 )
 from rolling_panda.messages.supervision import PreviewState
-from rolling_panda.messages.types import Pose
 from server.auth.sessions import Session
 from server.connections.websocket_protocol import why_ended
 from server.robots.context import RobotContext
@@ -74,7 +73,7 @@ class PageSocket:
     async def run(self) -> None:
         """Serve the page until it closes, sends an invalid message, or the session ends."""
         robot = self._robot
-        robot.pages.add(self)
+        robot.pages.open.add(self)
         self.wake()
         tasks = [
             asyncio.create_task(self._write()),
@@ -84,9 +83,7 @@ class PageSocket:
         try:
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
-            robot.page_closed(self, self._holding)
-            if not any(other.session is self.session for other in robot.pages):
-                robot.scene.show_ghost(self.session.session_id, None)
+            robot.pages.close(self, self._holding)
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
@@ -138,8 +135,9 @@ class PageSocket:
         if self._hold_ended is not None:
             ended, self._hold_ended = self._hold_ended, None
             return ended
-        if robot.state is not None and self._throttle.is_due(robot.state, self.session.may_operate):
-            return addressed(robot.state, self.session)
+        state, points, log = robot.pages.state, robot.pages.points, robot.log.lines
+        if state is not None and self._throttle.is_due(state, self.session.may_operate):
+            return addressed(state, self.session)
         if self._pick_ray is not None:
             ray, self._pick_ray = self._pick_ray, None
             return ray
@@ -149,16 +147,16 @@ class PageSocket:
         if self._selected is not None:
             point_id, self._selected = self._selected, None
             return Selected(point_id=point_id)
-        if robot.points is not None and robot.points is not self._points:
-            self._points = robot.points
-            return robot.points
+        if points is not None and points is not self._points:
+            self._points = points
+            return points
         preview = robot.link.preview.peek()
         if preview is not None and preview.message is not self._preview:
             self._preview = preview.message
             return PagePreview(preview=preview.message)
-        if robot.log.number > self._event_number:
-            events = robot.log.after(self._event_number, _MAX_EVENTS)
-            self._event_number = robot.log.number
+        if log.number > self._event_number:
+            events = log.after(self._event_number, _MAX_EVENTS)
+            self._event_number = log.number
             return PageEvents(events=events)
         return None
 
@@ -178,12 +176,12 @@ class PageSocket:
             return
 
     def _log_closed(self, reason: str) -> None:
-        self._robot.note("warning", f"a page of {self.session.user} was closed: {reason}", self.session.client)
+        self._robot.log.note("warning", f"a page of {self.session.user} was closed: {reason}", self.session.client)
 
     def _handle(self, message: FromPage) -> None:
         match message:
             case Ping(number=number, rendered=rendered):
-                self._robot.on_rendered(self.session, self.view, rendered, time.monotonic())
+                self._robot.pages.on_rendered(self.session, self.view, rendered, time.monotonic())
                 self._pong = Pong(number=number)
                 self.wake()
             case Hold(sequence=sequence, hold=hold):
@@ -194,11 +192,14 @@ class PageSocket:
                     self._renew(message, time.monotonic())
                 else:
                     self._holding = self._needs_release = False
-                    self._robot.release(self.session)
+                    self._robot.teleop.release(self.session)
             case ShowGizmo(visible=visible, axes=axes):
-                self._robot.show_gizmo(self.session, visible, axes)
+                if visible:
+                    self._robot.teleop.show_gizmo(self.session, axes)
+                else:
+                    self._robot.teleop.hide_gizmo(self.session)
             case PlaceByHand(active=active):
-                self._robot.place_by_hand(self, active)
+                self._robot.pages.place_by_hand(self, active)
             case ShowPreview(time=moment):
                 self._robot.scene.show_ghost(self.session.session_id, moment)
             case PlaceCamera(preset=preset):
@@ -206,28 +207,27 @@ class PageSocket:
             case ShowLayers(layers=layers):
                 self._robot.scene_updater.show_layers(self.session, layers)
             case Measure(active=active):
-                self._robot.measure(self, active)
+                self._robot.pages.measure(self, active)
             case Select(point_id=point_id, follow=follow):
                 self._robot.scene.select(self.session.session_id, point_id)
                 self._robot.scene.fly_to(self.session.session_id, point_id, follow)
 
     def _renew(self, message: Hold, now: float) -> None:
+        teleop = self._robot.teleop
         # A renewal over the rate limit is ignored: a later one follows, or the hold ends.
-        if not self._robot.motion_limiter.take(self.session.session_id, now) or self._needs_release:
+        if not teleop.within_rate(self.session, now) or self._needs_release:
             return
         # A short pause of a slow browser is resumed; a longer one needs a new press.
-        self._robot.end_lapsed_hold(now)
-        if self._holding and self._robot.teleop.must_release(self.session.session_id, now):
+        if teleop.must_release(self.session, now) and self._holding:
             self._end_hold("The hold ended: the page or its link was too slow. Press again to continue.")
             return
-        command = command_of(message, self._robot.scene.gizmos.pose(self.session.session_id))
-        if command is not None:
-            self._robot.teleop.set_command(self.session.session_id, command)
-        held = self._robot.hold(self.session, now, self.view, message.speed_scale)
-        if held.ok:
+        drives = message.base is not None or message.joints is not None
+        command = TeleopCommand(None, message.base, message.joints) if drives else None
+        refused = teleop.hold(self.session, now, command, self.view, message.speed_scale)
+        if not refused:
             self._holding = True
         elif not self._holding:
-            self._end_hold(held.reason)
+            self._end_hold(refused)
 
     def _end_hold(self, reason: str) -> None:
         self._holding, self._needs_release = False, True
@@ -263,13 +263,6 @@ class StateThrottle:
 def _urgent(state: PageState) -> tuple[object, ...]:
     mode = None if state.controller is None else state.controller.mode
     return mode, state.stops, [row.present for row in state.processes]
-
-
-def command_of(hold: Hold, gizmo: Pose | None) -> TeleopCommand | None:
-    """The command of a page that holds; None without velocities and gizmo."""
-    if hold.base is not None or hold.joints is not None:
-        return TeleopCommand(None, hold.base, hold.joints)
-    return None if gizmo is None else TeleopCommand(gizmo)
 
 
 def page_socket_router(robot: RobotContext) -> APIRouter:

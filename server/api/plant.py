@@ -14,7 +14,8 @@ from server.api import bodies as body
 from server.api.bodies import fields_of
 from server.api.dependencies import Caller, Operator, PointId
 from server.api.responses import COMMAND, INVALID, NOT_FOUND, answer, query
-from server.robots.context import Result, RobotContext
+from server.robots.commands import Result
+from server.robots.context import RobotContext
 
 
 def _rule(fields: Annotated[dict[str, Any], Depends(fields_of(PruningRule))]) -> PruningRule:
@@ -33,16 +34,16 @@ def plant_router(robot: RobotContext) -> APIRouter:
     async def set_rule(session: Operator, rule: RuleBody) -> Response:
         """Set the pruning rule. All points change at once; accepted ones may be removed."""
         wanted = ask.SetRule(user=session.user, rule=rule)
-        return answer(await robot.ask_perception(session, wanted))
+        return answer(await robot.commands.ask_perception(session, wanted))
 
     @router.post("/rule/what-if", responses=COMMAND | {200: {"model": body.RuleOutcome}})
     async def what_if(session: Operator, rule: RuleBody) -> Response:
         """What a rule would change, without setting it. `voided` counts the acceptances that would become void."""
         wanted = ask.EvaluateRule(user=session.user, rule=rule)
-        result = await robot.ask_perception(session, wanted)
+        result = await robot.commands.ask_perception(session, wanted)
         if not result.ok or result.effect is None:
             return answer(result)
-        return JSONResponse(rule_outcome(result.effect, robot.points).model_dump())
+        return JSONResponse(rule_outcome(result.effect, robot.pages.points).model_dump())
 
     @router.post("/rule/undo", responses=COMMAND)
     async def undo(session: Operator, rule: RuleBody) -> Response:
@@ -51,10 +52,10 @@ def plant_router(robot: RobotContext) -> APIRouter:
         The body has the rule that the caller saw; where it has changed since, the request is refused. Later cuts,
         decisions and points by hand stay.
         """
-        done = await robot.ask_perception(session, ask.UndoRule(user=session.user, rule=rule))
+        done = await robot.commands.ask_perception(session, ask.UndoRule(user=session.user, rule=rule))
         if not done.ok:
             return answer(done)
-        restored = await robot.ask(session, ask.RestoreAccepted(user=session.user, rule=rule))
+        restored = await robot.commands.ask(session, ask.RestoreAccepted(user=session.user, rule=rule))
         if not restored.ok:
             return answer(replace(restored, reason=f"the rule is restored, its acceptances are not: {restored.reason}"))
         return answer(done)
@@ -73,7 +74,7 @@ def plant_router(robot: RobotContext) -> APIRouter:
         """
         found = robot.link.crops.get(point_id)
         if found is None or revision not in (None, found.revision):
-            known = robot.points.points if robot.points is not None else ()
+            known = robot.pages.points.points if robot.pages.points is not None else ()
             if any(row.point.point_id == point_id for row in known):
                 # Not an error, which a browser's console would show.
                 return Response(status_code=204)

@@ -7,7 +7,7 @@ from fastapi import Response
 from fastapi.responses import JSONResponse
 
 from server.api import bodies as body
-from server.robots.context import Result
+from server.robots.commands import Result
 
 Responses = dict[int | str, dict[str, Any]]
 

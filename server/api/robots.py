@@ -12,7 +12,8 @@ from server.api.dependencies import Caller
 from server.api.responses import COMMAND, SIGNED_IN, STOP_BODY, answer
 from server.auth.sessions import Session
 from server.robots.app_state import AppState
-from server.robots.context import Result, RobotContext
+from server.robots.commands import Result
+from server.robots.context import RobotContext
 from server.robots.summary import RobotSummary, summarize
 
 #: Each robot's page and REST interface are below it.
@@ -32,7 +33,7 @@ def robots_router(app_state: AppState) -> APIRouter:
     async def robots(session: Caller) -> list[RobotSummary]:
         """A summary of every robot. The request counts neither as presence nor as a view of a robot."""
         return [
-            summarize(name, path_of(name), robot.state, robot.points, session.client)
+            summarize(name, path_of(name), robot.pages.state, robot.pages.points, session.client)
             for name, robot in app_state.robots.items()
         ]
 
@@ -60,7 +61,7 @@ def robots_router(app_state: AppState) -> APIRouter:
 
 async def stop_all(robots: dict[str, RobotContext], session: Session, reason: str) -> Result:
     """Stop every robot at once; the status is the worst, the reason has that of each."""
-    results = await asyncio.gather(*(robot.stop(session, reason) for robot in robots.values()))
+    results = await asyncio.gather(*(robot.commands.stop(session, reason) for robot in robots.values()))
     reasons = "; ".join(f"{name}: {result.reason}" for name, result in zip(robots, results, strict=True))
     return Result(max(result.status for result in results), all(result.ok for result in results), reasons)
 

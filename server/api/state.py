@@ -14,7 +14,8 @@ from rolling_panda.messages.page import PageEvents, PagePoints, PageState
 from rolling_panda.messages.supervision import CutReport, SessionPlan, SessionReport
 from server.api.dependencies import Caller, activity
 from server.api.responses import INVALID, NOT_FOUND, SIGNED_IN, UNAVAILABLE, answer, message, query
-from server.robots.context import Result, RobotContext
+from server.robots.commands import Result
+from server.robots.context import RobotContext
 from server.robots.page_view import addressed
 
 _CUT_COLUMNS = tuple(field.name for field in msgspec.structs.fields(CutReport))
@@ -33,15 +34,15 @@ def state_router(robot: RobotContext) -> APIRouter:
     @router.get("/state", tags=["state"], responses=query(PageState, UNAVAILABLE))
     async def state(session: Caller) -> Response:
         """The newest state of the robot: what the page gets 10 times a second."""
-        if robot.state is None:
+        if robot.pages.state is None:
             return answer(Result(503, False, "The server is starting; ask again."))
-        robot.on_state_fetched(session, time.monotonic())
-        return message(addressed(robot.state, session))
+        robot.pages.on_state_fetched(session, time.monotonic())
+        return message(addressed(robot.pages.state, session))
 
     @router.get("/points", tags=["state"], responses=query(PagePoints))
     async def points(session: Caller) -> Response:
         """Every pruning point in the order of work, with its life in the queue."""
-        return message(robot.points if robot.points is not None else robot.view.points(time.monotonic()))
+        return message(robot.pages.points if robot.pages.points is not None else robot.view.points(time.monotonic()))
 
     @router.get("/plan", tags=["state"], responses=query(SessionPlan, UNAVAILABLE))
     async def plan(session: Caller) -> Response:
@@ -54,7 +55,7 @@ def state_router(robot: RobotContext) -> APIRouter:
     @router.get("/events", tags=["state"], responses=query(PageEvents, INVALID))
     async def events(session: Caller, after: Annotated[int, Query(ge=0)] = 0) -> Response:
         """Log lines after line number `after`, oldest first."""
-        return message(PageEvents(events=robot.log.after(after, robot.config.log_lines)))
+        return message(PageEvents(events=robot.log.lines.after(after, robot.config.log_lines)))
 
     @router.get("/report", tags=["state"], responses=query(SessionReport, UNAVAILABLE))
     async def report(session: Caller) -> Response:

@@ -7,7 +7,8 @@ from rolling_panda import messages as m
 from rolling_panda.errors import InputError
 from server.auth.passwords import Passwords
 from server.auth.sessions import Session, Sessions
-from server.robots.context import Result, RobotContext
+from server.robots.commands import Result
+from server.robots.context import RobotContext
 
 
 @dataclass(eq=False)
@@ -34,9 +35,9 @@ class AppState:
     _users_error: str = ""
 
     def note(self, severity: m.Severity, text: str, by: str = "") -> None:
-        """Write a line into the log of every robot; see `RobotContext.note`."""
+        """Write a line into the log of every robot; see `RobotLog.note`."""
         for robot in self.robots.values():
-            robot.note(severity, text, by)
+            robot.log.note(severity, text, by)
 
     def sign_out(self, session: Session) -> None:
         """End a session; its holds of all robots are released."""

@@ -1,6 +1,8 @@
 """The log that the page shows: the last lines of every process, numbered, and a rate limit for each source of lines."""
 
+import time
 from collections import OrderedDict, deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from rolling_panda import messages as m
@@ -59,3 +61,25 @@ class LogRateLimiter:
             return ""
         left_out, known.left_out = known.left_out, 0
         return f"{text} (and {left_out} lines like it before)" if left_out else text
+
+
+class RobotLog:
+    """The log of one robot: lines of every process for its pages, and the server's own lines for its ledger too.
+
+    Attributes:
+        lines: The last lines.
+    """
+
+    def __init__(self, lines: int, send: Callable[[m.Severity, str, float], object]) -> None:
+        """Keep up to `lines` lines; `send(severity, text, now)` publishes a line of the server."""
+        self.lines = EventLog(lines)
+        self._send = send
+        self._limiter = LogRateLimiter()
+
+    def note(self, severity: m.Severity, text: str, by: str = "") -> None:
+        """Write a line of the server; `by` is the source whose rate is limited, empty for none."""
+        now = time.monotonic()
+        text = self._limiter.line(by, text, now) if by else text
+        if text:
+            self.lines.add("server", severity, text[:500], time.time())
+            self._send(severity, text, now)

@@ -1,12 +1,29 @@
-"""Hold-to-run: one session moves the robot while it renews its hold. No clock here: `now` is given (s)."""
+"""Hold-to-run: one session moves the robot while it renews its hold.
 
+`TeleopHold` decides who holds, without a clock. `Teleoperation` alone tells it the aim, and alone sends the target.
+"""
+
+import time
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from rolling_panda import messages as m
 from rolling_panda.errors import InputError
+from rolling_panda.messages.page import GizmoAxes
 from rolling_panda.messages.supervision import ArmVelocities, BaseVelocity, TeleopTarget
+from rolling_panda.runtime.token_bucket import TokenBuckets
+from server.auth.sessions import Session
 from server.config import ServerConfig
+from server.robots.event_log import RobotLog
+from server.robots.link import RobotLink
+from server.robots.page_view import PageView
+from server.scene.scene import Scene
+from server.scene.viser_adapter.client_messages import GizmoDragEnd, GizmoUpdate
 
+#: Rate limit and burst of a session's motion commands; a busy browser sends several at once.
+MOTION_RATE_HZ, _MOTION_BURST = 60.0, 20.0
+#: A dragged gizmo's target is sent at once, but no sooner than this after the last one (s).
+_MIN_TARGET_PERIOD_S = 0.02
 #: The end of a hold is sent this often, since a message may be lost.
 _RELEASE_REPEATS = 5
 
@@ -32,7 +49,7 @@ class _Hold:
 
 
 class TeleopHold:
-    """One holder at a time; the first wins.
+    """One holder at a time; the first wins. No clock here: `now` is given (s).
 
     A hold lapses unless it is renewed within `hold_timeout_s` and its view has rendered a state that is not older than
     `view_timeout_s`. A lapsed hold continues with a renewal within `hold_resume_s`; after that its holder has to
@@ -181,3 +198,212 @@ class TeleopHold:
             speed_scale=hold.speed_scale,
             round_trip_s=min(self._latency_s.get(hold.view, 0.0), 1e3),
         )
+
+
+class Teleoperation:
+    """The stream of one robot's teleoperation: the only writer of the aim, and the only sender of `TeleopTarget`.
+
+    The aim of a session comes from its gizmo, from the velocities that its page holds, or from its script.
+    """
+
+    def __init__(
+        self,
+        config: ServerConfig,
+        link: RobotLink,
+        scene: Scene,
+        view: PageView,
+        log: RobotLog,
+        held_elsewhere: Callable[[Session], str],
+        on_end: Callable[[str, str], None],
+    ) -> None:
+        """No session holds.
+
+        Args:
+            config: Time limits of a hold.
+            link: Takes the targets.
+            scene: Shows the gizmos.
+            view: Knows the tool's pose.
+            log: For holds, releases and refusals.
+            held_elsewhere: Name of another robot that a session holds now; empty where it holds none.
+            on_end: Called with a session's id and the reason when its hold was ended from elsewhere.
+        """
+        self._link, self._scene, self._view, self._log = link, scene, view, log
+        self._held_elsewhere, self._on_end = held_elsewhere, on_end
+        self._hold = TeleopHold(config)
+        self._limiter = TokenBuckets(MOTION_RATE_HZ, _MOTION_BURST)
+        self._refused: dict[str, str] = {}
+        self._sent_at = float("-inf")
+
+    @property
+    def holder(self) -> str | None:
+        """Key of the session that holds now."""
+        return self._hold.holder
+
+    def may_move(self, session: Session) -> bool:
+        """Whether this session may move the robot: its role may, and nobody else holds control."""
+        control = self._link.control.peek()
+        holder = "" if control is None else control.message.holder
+        return session.may_operate and holder in ("", session.client)
+
+    def view_rendered(self, view: str, seen_at: float, now: float) -> None:
+        """A view reports at `now` that it has rendered a state that was measured at `seen_at` (s)."""
+        self._hold.view_rendered(view, seen_at, now)
+
+    def forget_view(self, view: str) -> None:
+        """A view has closed."""
+        self._hold.forget_view(view)
+
+    def within_rate(self, session: Session, now: float) -> bool:
+        """Count a motion command of this session; False above the rate limit."""
+        return self._limiter.take(session.session_id, now)
+
+    def must_release(self, session: Session, now: float) -> bool:
+        """Whether this session has to release before its next hold, as its last one has lapsed long ago."""
+        self._expire(now)
+        return self._hold.must_release(session.session_id, now)
+
+    def hold(
+        self,
+        session: Session,
+        now: float,
+        command: TeleopCommand | None = None,
+        view: str = "",
+        speed_scale: float = 1.0,
+    ) -> str:
+        """Start or renew this session's hold on the robot.
+
+        Args:
+            session: Of the holder.
+            now: Monotonic time (s).
+            command: Where to move; None for the last target, or the gizmo of a page.
+            view: The page that holds; empty for a script.
+            speed_scale: Fraction of the usual speed.
+
+        Returns:
+            Why it is refused; empty where it holds.
+        """
+        key = session.session_id
+        if command is None and view and (pose := self._scene.gizmos.pose(key)) is not None:
+            command = TeleopCommand(pose)
+        if command is not None:
+            self._hold.set_command(key, command)
+        refused = self._refusal(session)
+        if not refused:
+            self._expire(now)
+            was_holding = self._hold.holder == key
+            try:
+                self._hold.hold(key, session.user, now, view or key, session.client, speed_scale)
+            except InputError as error:
+                refused = str(error)
+        if refused:
+            # Held buttons repeat at 20 Hz; each new reason is logged once.
+            if self._refused.get(key) != refused:
+                self._refused[key] = refused
+                self._log.note("warning", f"hold by {session.user} refused: {refused}", session.client)
+            return refused
+        self._refused.pop(key, None)
+        if not was_holding:
+            self._log.note("info", f"{session.user} holds the robot", session.client)
+        return ""
+
+    def _refusal(self, session: Session) -> str:
+        if not session.may_operate:
+            return f"a {session.role} may look and stop, not operate"
+        if not self.may_move(session):
+            # Otherwise the hold would block the session that has control.
+            return "somebody else holds control of the robot; ask for it, or take it"
+        other = self._held_elsewhere(session)
+        # One key or gamepad must not move two robots in two windows.
+        return f"you hold {other}: let go of it first" if other else ""
+
+    def drag(self, session: Session, gizmo: GizmoUpdate | GizmoDragEnd) -> None:
+        """A gizmo was dragged or released. While its owner holds, the target is sent at once.
+
+        At the end of a drag the 3-D client sends its last pose after the page has ended the hold. The gizmo is reset
+        then, so that the next hold does not move there.
+        """
+        owner = session.session_id
+        if isinstance(gizmo, GizmoDragEnd):
+            if self._hold.holder != owner:
+                self._reset_gizmo(owner)
+            return
+        target = self._scene.gizmos.drag(owner, gizmo.position, gizmo.wxyz)
+        if target is None:
+            return
+        self._hold.set_target(owner, target)
+        now = time.monotonic()
+        self._expire(now)
+        if self._hold.holder == owner and self._hold.follows_gizmo and now - self._sent_at >= _MIN_TARGET_PERIOD_S:
+            self._sent_at = now
+            self._send(now)
+
+    def show_gizmo(self, session: Session, axes: GizmoAxes = "tool") -> None:
+        """Show this session's gizmo at the tool, along these axes; its hold ends."""
+        tool = self._view.tool(time.monotonic())
+        if not session.may_operate or tool is None:
+            why = "the tool's place is not known, or the role is viewer"
+            self._log.note("warning", f"no gizmo for {session.user}: {why}", session.client)
+            return
+        self.release(session)
+        self._scene.show_gizmo(session.session_id, tool, axes)
+        self._hold.set_target(session.session_id, tool)
+
+    def hide_gizmo(self, session: Session) -> None:
+        """Hide this session's gizmo, and end its hold."""
+        self.release(session)
+        self._hold.clear_target(session.session_id)
+        self._scene.gizmos.hide(session.session_id)
+
+    def follow_tool(self, now: float) -> None:
+        """Move each gizmo that is not dragged to the tool."""
+        tool = self._view.tool(now)
+        if tool is not None:
+            holder = self._hold.holder if self._hold.follows_gizmo else None
+            for owner in self._scene.gizmos.follow(tool, holder):
+                self._hold.set_target(owner, tool)
+
+    def step(self, now: float) -> None:
+        """End a hold that has lapsed, and send what is due: the target, or the end of a hold."""
+        self._expire(now)
+        self._send(now)
+
+    def release(self, session: Session) -> None:
+        """End this session's hold at once; its gizmo returns to the tool."""
+        self._refused.pop(session.session_id, None)
+        if self._hold.release(session.session_id):
+            self._send(time.monotonic())
+            self._reset_gizmo(session.session_id, "The hold was ended from elsewhere. Press again to go on.")
+            self._log.note("info", f"{session.user} let go of the robot", session.client)
+
+    def stopped(self) -> None:
+        """The robot is being stopped: end the hold."""
+        holder = self._hold.holder
+        if holder is not None:
+            self._hold.release(holder)
+            self._reset_gizmo(holder, "The robot was stopped.")
+
+    def forget(self, session: Session) -> None:
+        """The session has ended: release its hold and forget it."""
+        self.release(session)
+        self._hold.forget(session.session_id)
+
+    def _send(self, now: float) -> None:
+        message = self._hold.next_message(now)
+        if message is not None:
+            self._link.send_teleop(message)
+
+    def _expire(self, now: float) -> None:
+        """End a hold that was not renewed in time, or whose page has no current view."""
+        ended = self._hold.expire(now)
+        if ended is not None:
+            self._log.note("info", "the hold ended: it was not renewed, or the page no longer sees the robot")
+            self._reset_gizmo(ended)
+
+    def _reset_gizmo(self, owner: str, reason: str = "") -> None:
+        """After a hold: the gizmo and its target return to the tool; pages that hold are sent a reason."""
+        if reason:
+            self._on_end(owner, reason)
+        tool = self._view.tool(time.monotonic())
+        self._scene.gizmos.reset(owner, tool)
+        if tool is not None and self._scene.gizmos.shown(owner):
+            self._hold.set_target(owner, tool)

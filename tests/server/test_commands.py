@@ -451,8 +451,8 @@ def test_a_recording_is_moved_in_and_a_robot_is_not():
 
 
 def test_requests_for_motion_over_the_rate_limit_are_refused_and_a_release_is_not(monkeypatch):
-    monkeypatch.setattr("server.robots.context.MOTION_RATE_HZ", 1e-3)
-    monkeypatch.setattr("server.robots.context._MOTION_BURST", 2.0)
+    monkeypatch.setattr("server.robots.teleop.MOTION_RATE_HZ", 1e-3)
+    monkeypatch.setattr("server.robots.teleop._MOTION_BURST", 2.0)
     velocity = {"hold": True, "base": {"linear": 0.1, "angular": 0.0}}
     with running_server(FakeWire()) as server, server.client() as client, server.client() as other:
         assert [client.post("/api/teleop", json=velocity).status_code for _ in range(3)] == [409, 409, 429]

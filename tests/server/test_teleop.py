@@ -1,3 +1,6 @@
+import ast
+from pathlib import Path
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -6,6 +9,7 @@ from rolling_panda import messages as m
 from rolling_panda.errors import InputError
 from rolling_panda.messages.supervision import BaseVelocity
 from server.config import ServerConfig
+from server.robots import teleop
 from server.robots.teleop import TeleopCommand, TeleopHold
 
 HERE = m.Pose((0.1, 0.2, 0.3), (0.0, 0.0, 0.0, 1.0))
@@ -213,3 +217,15 @@ def test_a_hold_that_lapsed_is_not_another_holders():
     teleop.set_target("b", THERE)
     teleop.hold("b", "bea", 12.0)
     assert teleop.next_message(12.0).user == "bea"
+
+
+def test_one_object_alone_writes_the_aim_and_sends_the_target():
+    package = Path(teleop.__file__).resolve().parents[1]
+    for name in ("set_target", "set_command", "clear_target", "next_message", "send_teleop"):
+        users = {
+            file.relative_to(package).as_posix()
+            for file in package.rglob("*.py")
+            for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+            if isinstance(node, ast.Attribute) and node.attr == name
+        }
+        assert users == {"robots/teleop.py"}, name
