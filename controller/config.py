@@ -77,18 +77,11 @@ def is_cane(pair: tuple[str, str]) -> bool:
     return pair[1].startswith("cane ")
 
 
-class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
-    """Settings of motion and supervision.
+class WholeBodyConfig(Struct, frozen=True, forbid_unknown_fields=True):
+    """Parameters of the whole-body control: the limits of base and arm, and the gains of the null space.
 
     Attributes:
-        home: Survey posture of the arm (rad), with the camera facing the row.
-        reach: Initial posture of the search for a cut posture (rad), elbow aside, tool to the left.
         method: Name of the whole-body method.
-        rate_hz: Control rate, that of the arm.
-        base_rate_hz: Rate of the base. A period of the base has `rate_hz` / `base_rate_hz` control periods, rounded.
-            Methods other than `hierarchy` run at one rate.
-        row_heading: Direction of the row in odom (rad); the base keeps parallel to it, the row on its left.
-        row_distance: Distance of the row from the line y = 0 along `row_heading` where the base drives (m).
         base_speed: Speed limit of the base in automatic work and teleoperation (m/s).
         base_yaw_rate: Limit of the base's yaw rate (rad/s).
         base_acceleration: Acceleration limit of the base (m/s²), low so that the stretched arm does not tip it.
@@ -97,7 +90,39 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         arm_velocity_scale: Fraction of the arm's rated velocity that is used.
         arm_acceleration_scale: Fraction of the arm's rated acceleration that is used.
         arm_jerk_scale: Fraction of the arm's rated jerk that is used; braking for a reason may use all of it.
-        tool_speed: Speed limit of the tool between cuts (m/s).
+        gain_posture: Gain of the null-space posture (1/s).
+        gain_heading: Gain of the base's heading error (1/s).
+        gain_manipulability: k₀ of the manipulability gradient.
+        gain_limits: k of the joint-limit repulsion.
+        limit_zone: γ_start, distance from a limit where repulsion begins (rad).
+        damping: λ of the damped pseudo-inverse, in units of the weighted Jacobian.
+        joint_margin: Distance from every joint limit that is never entered (rad).
+        hierarchy: Parameters of the method `hierarchy`.
+    """
+
+    method: Literal["hierarchy", "nullspace", "decoupled"] = "hierarchy"
+    base_speed: Annotated[float, at_most(0.3)] = 0.3
+    base_yaw_rate: Annotated[float, at_most(0.5)] = 0.2
+    base_acceleration: Annotated[float, at_most(1.5)] = 0.8
+    base_yaw_acceleration: Annotated[float, at_most(6.0)] = 3.0
+    base_braking: Annotated[float, within(1.5, 1.8)] = 1.5
+    arm_velocity_scale: Annotated[float, at_most(1.0)] = 0.6
+    arm_acceleration_scale: Annotated[float, at_most(1.0, 0.2)] = 0.5
+    arm_jerk_scale: Annotated[float, at_most(1.0, 0.05)] = 0.5
+    gain_posture: Gain = 1.0
+    gain_heading: Gain = 0.8
+    gain_manipulability: Gain = 0.2
+    gain_limits: Gain = 2.0
+    limit_zone: Annotated[float, at_least(0.1, 1.0)] = 0.25
+    damping: Positive = 0.01
+    joint_margin: Annotated[float, at_least(0.01, 0.5)] = 0.03
+    hierarchy: HierarchyConfig = HierarchyConfig()
+
+
+class MotionConfig(Struct, frozen=True, forbid_unknown_fields=True):
+    """Parameters of the motions that the robot follows.
+
+    Attributes:
         tool_turn: Limit of the tool's angular speed (rad/s).
         tool_acceleration: Acceleration limit of planned tool motions (m/s²).
         tool_jerk: Jerk limit of planned tool motions (m/s³).
@@ -105,6 +130,34 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         slow_zone: Length of the slow last stretch (m). The blades enter the canes inside it.
         slow_braking: Deceleration of the tool to `cut_speed` (m/s²).
         blend: Fraction of the shorter of two segments that overlaps with the other, where the tool rounds the corner.
+        base_lag_s: Time constant of the wheels' response (s).
+        arm_lag_s: Time constant of the arm's servos (s), without half a period of sampling.
+        gain_position: Gain of the tool's position error (1/s).
+        gain_rotation: Gain of the tool's rotation error (1/s).
+    """
+
+    tool_turn: Annotated[float, at_most(2.5)] = 1.5
+    tool_acceleration: Annotated[float, at_most(10.0)] = 3.0
+    tool_jerk: Annotated[float, at_most(500.0)] = 50.0
+    cut_speed: Annotated[float, at_most(0.1)] = 0.03
+    slow_zone: Annotated[float, at_least(0.01, 0.2)] = 0.025
+    slow_braking: Annotated[float, at_most(3.0)] = 1.2
+    blend: Annotated[float, Meta(ge=0.0, le=0.5)] = 0.4
+    base_lag_s: NotNegative = 0.05
+    arm_lag_s: NotNegative = 0.02
+    gain_position: Gain = 5.0
+    gain_rotation: Gain = 5.0
+
+
+class WorkConfig(Struct, frozen=True, forbid_unknown_fields=True):
+    """Parameters of the automatic work: the row, the cuts and their checks.
+
+    Attributes:
+        home: Survey posture of the arm (rad), with the camera facing the row.
+        reach: Initial posture of the search for a cut posture (rad), elbow aside, tool to the left.
+        row_heading: Direction of the row in odom (rad); the base keeps parallel to it, the row on its left.
+        row_distance: Distance of the row from the line y = 0 along `row_heading` where the base drives (m).
+        tool_speed: Speed limit of the tool between cuts (m/s).
         advance_speed: Speed limit along the approach line (m/s).
         stand_off: Distance of the stand-off from the cut (m); from there the approach is straight.
         arm_only: Distance to a cut (m) within which only the arm moves, in and out.
@@ -124,66 +177,17 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         close_up_from: Distance of the tool from the cut at the close-up after it (m).
         close_up_timeout_s: Time limit of a close-up (s).
         moved_tolerance: A point that moved further than this after its acceptance is not cut (m).
-        base_lag_s: Time constant of the wheels' response (s).
-        arm_lag_s: Time constant of the arm's servos (s), without half a period of sampling.
-        gain_position: Gain of the tool's position error (1/s).
-        gain_rotation: Gain of the tool's rotation error (1/s).
-        gain_posture: Gain of the null-space posture (1/s).
-        gain_heading: Gain of the base's heading error (1/s).
-        gain_manipulability: k₀ of the manipulability gradient.
-        gain_limits: k of the joint-limit repulsion.
-        limit_zone: γ_start, distance from a limit where repulsion begins (rad).
-        damping: λ of the damped pseudo-inverse, in units of the weighted Jacobian.
-        joint_margin: Distance from every joint limit that is never entered (rad).
         search_steps: Iterations of the posture search in 10 ms, distributed over the control periods.
-        joints_max_age_s: Age limit of joint states; a protective stop follows (s).
-        odometry_max_age_s: Age limit of odometry; a protective stop follows (s).
-        bridge_max_age_s: Age limit of bridge states; a protective stop follows (s).
-        server_max_age_s: Age limit of server heartbeats in automatic work (s).
-        supervision_s: Automatic work pauses when no operator has seen the robot for this long (s).
-        hold_link_max_age_s: Age limit of server heartbeats in teleoperation (s).
-        perception_max_age_s: Age limit of perception heartbeats in automatic work (s).
-        ledger_max_age_s: Work whose record is not durable after this long is a fault (s).
-        obstacles_max_age_s: Age limit of the camera frame behind the obstacles in automatic work (s). While nothing
-            moves, the camera sends a frame every 2 s.
-        hold_max_age_s: Teleoperation ends when the hold is not renewed for this long (s).
-        teleop_speed: Speed limit of the tool in teleoperation (m/s).
-        teleop_turn: Limit of the tool's angular speed in teleoperation (rad/s).
-        teleop_base_speed: Speed limit of each wheel on the ground in teleoperation (m/s). From it, `base_braking` stops
-            the base within 0.1 s, which leaves 50 ms for the message of the release.
-        teleop_base: Base in teleoperation: `free` keeps it parallel to the row; in `transit` the tool's sideways motion
-            steers it.
-        hierarchy: Parameters of the method `hierarchy`.
     """
 
     home: ArmPosture = (-0.2784, -0.1128, -0.0354, -2.0055, 1.6759, 1.2124, -0.269)
     reach: ArmPosture = (-0.3, -1.2, 1.1, -1.7, 2.25, 2.4, 0.55)
-    method: Literal["hierarchy", "nullspace", "decoupled"] = "hierarchy"
-    rate_hz: Annotated[float, at_least(50.0, 1000.0)] = 100.0
-    base_rate_hz: Annotated[float, at_least(50.0, 1000.0)] = 100.0
     row_heading: float = 0.0
     row_distance: Annotated[float, within(0.5, 3.0)] = 0.75
-    base_speed: Annotated[float, at_most(0.3)] = 0.3
-    base_yaw_rate: Annotated[float, at_most(0.5)] = 0.2
-    base_acceleration: Annotated[float, at_most(1.5)] = 0.8
-    base_yaw_acceleration: Annotated[float, at_most(6.0)] = 3.0
-    base_braking: Annotated[float, within(1.5, 1.8)] = 1.5
-    arm_velocity_scale: Annotated[float, at_most(1.0)] = 0.6
-    arm_acceleration_scale: Annotated[float, at_most(1.0, 0.2)] = 0.5
-    arm_jerk_scale: Annotated[float, at_most(1.0, 0.05)] = 0.5
     tool_speed: Annotated[float, at_most(1.0)] = 0.7
-    tool_turn: Annotated[float, at_most(2.5)] = 1.5
-    tool_acceleration: Annotated[float, at_most(10.0)] = 3.0
-    tool_jerk: Annotated[float, at_most(500.0)] = 50.0
-    cut_speed: Annotated[float, at_most(0.1)] = 0.03
-    slow_zone: Annotated[float, at_least(0.01, 0.2)] = 0.025
-    slow_braking: Annotated[float, at_most(3.0)] = 1.2
-    blend: Annotated[float, Meta(ge=0.0, le=0.5)] = 0.4
     advance_speed: Annotated[float, at_most(1.0)] = 0.7
     stand_off: Annotated[float, at_least(0.08, 0.4)] = 0.15
     arm_only: Annotated[float, at_least(0.03, 0.3)] = 0.05
-    base_lag_s: NotNegative = 0.05
-    arm_lag_s: NotNegative = 0.02
     clearance: Annotated[float, at_least(0.1, 0.5)] = 0.22
     position_tolerance: Annotated[float, at_most(0.005)] = 0.0015
     rotation_tolerance: Annotated[float, at_most(0.09)] = 0.0175
@@ -200,16 +204,25 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
     close_up_from: Annotated[float, at_most(0.5)] = 0.15
     close_up_timeout_s: Annotated[float, at_most(20.0)] = 8.0
     moved_tolerance: Annotated[float, at_most(0.005)] = 0.005
-    gain_position: Gain = 5.0
-    gain_rotation: Gain = 5.0
-    gain_posture: Gain = 1.0
-    gain_heading: Gain = 0.8
-    gain_manipulability: Gain = 0.2
-    gain_limits: Gain = 2.0
-    limit_zone: Annotated[float, at_least(0.1, 1.0)] = 0.25
-    damping: Positive = 0.01
-    joint_margin: Annotated[float, at_least(0.01, 0.5)] = 0.03
     search_steps: Annotated[int, Meta(ge=1, le=200)] = 10
+
+
+class SupervisionConfig(Struct, frozen=True, forbid_unknown_fields=True):
+    """Age limits of what the work relies on.
+
+    Attributes:
+        joints_max_age_s: Age limit of joint states; a protective stop follows (s).
+        odometry_max_age_s: Age limit of odometry; a protective stop follows (s).
+        bridge_max_age_s: Age limit of bridge states; a protective stop follows (s).
+        server_max_age_s: Age limit of server heartbeats in automatic work (s).
+        supervision_s: Automatic work pauses when no operator has seen the robot for this long (s).
+        hold_link_max_age_s: Age limit of server heartbeats in teleoperation (s).
+        perception_max_age_s: Age limit of perception heartbeats in automatic work (s).
+        ledger_max_age_s: Work whose record is not durable after this long is a fault (s).
+        obstacles_max_age_s: Age limit of the camera frame behind the obstacles in automatic work (s). While nothing
+            moves, the camera sends a frame every 2 s.
+    """
+
     joints_max_age_s: Annotated[float, at_most(0.25)] = 0.2
     odometry_max_age_s: Annotated[float, at_most(0.3)] = 0.25
     bridge_max_age_s: Annotated[float, at_most(0.5)] = 0.5
@@ -219,19 +232,56 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
     perception_max_age_s: Annotated[float, at_most(2.0)] = 1.0
     ledger_max_age_s: Annotated[float, at_most(0.8)] = 0.6
     obstacles_max_age_s: Annotated[float, at_most(10.0)] = 6.0
+
+
+class TeleoperationConfig(Struct, frozen=True, forbid_unknown_fields=True):
+    """Parameters of teleoperation.
+
+    Attributes:
+        hold_max_age_s: Teleoperation ends when the hold is not renewed for this long (s).
+        speed: Speed limit of the tool in teleoperation (m/s).
+        turn: Limit of the tool's angular speed in teleoperation (rad/s).
+        base_speed: Speed limit of each wheel on the ground in teleoperation (m/s). From it, `base_braking` stops
+            the base within 0.1 s, which leaves 50 ms for the message of the release.
+        base: Base in teleoperation: `free` keeps it parallel to the row; in `transit` the tool's sideways motion
+            steers it.
+    """
+
     hold_max_age_s: Annotated[float, at_most(0.15)] = 0.15
-    teleop_speed: Annotated[float, at_most(0.25)] = 0.25
-    teleop_turn: Annotated[float, at_most(1.0)] = 0.6
-    teleop_base_speed: Annotated[float, at_most(0.15)] = 0.15
-    teleop_base: Literal["free", "transit"] = "free"
-    hierarchy: HierarchyConfig = HierarchyConfig()
+    speed: Annotated[float, at_most(0.25)] = 0.25
+    turn: Annotated[float, at_most(1.0)] = 0.6
+    base_speed: Annotated[float, at_most(0.15)] = 0.15
+    base: Literal["free", "transit"] = "free"
+
+
+class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
+    """Settings of motion and supervision.
+
+    Attributes:
+        rate_hz: Control rate, that of the arm.
+        base_rate_hz: Rate of the base. A period of the base has `rate_hz` / `base_rate_hz` control periods, rounded.
+            Methods other than `hierarchy` run at one rate.
+        whole_body: Parameters of the whole-body control.
+        motion: Parameters of the motions that the robot follows.
+        work: Parameters of the automatic work.
+        supervision: Age limits.
+        teleoperation: Parameters of teleoperation.
+    """
+
+    rate_hz: Annotated[float, at_least(50.0, 1000.0)] = 100.0
+    base_rate_hz: Annotated[float, at_least(50.0, 1000.0)] = 100.0
+    whole_body: WholeBodyConfig = WholeBodyConfig()
+    motion: MotionConfig = MotionConfig()
+    work: WorkConfig = WorkConfig()
+    supervision: SupervisionConfig = SupervisionConfig()
+    teleoperation: TeleoperationConfig = TeleoperationConfig()
 
     @property
     def search_steps_each(self) -> int:
         """Iterations of the posture search in one control period."""
-        return max(1, round(100.0 * self.search_steps / self.rate_hz))
+        return max(1, round(100.0 * self.work.search_steps / self.rate_hz))
 
     @property
     def base_every(self) -> int:
         """How many control periods one of the base has."""
-        return max(1, round(self.rate_hz / self.base_rate_hz)) if self.method == "hierarchy" else 1
+        return max(1, round(self.rate_hz / self.base_rate_hz)) if self.whole_body.method == "hierarchy" else 1

@@ -84,14 +84,14 @@ class Controller:
         self._config = config
         self._journal = Journal()
         self._event_log = EventLogger(self._journal)
-        self._queue = PointQueue(config, self._journal)
+        self._queue = PointQueue(config.work, self._journal)
         self._plans = PlanManager(self._queue)
-        self._previews = PreviewManager(self._queue, self._journal, config.hierarchy)
+        self._previews = PreviewManager(self._queue, self._journal, config.whole_body.hierarchy)
         permit = self._previews.permit
         self._movement = Movement(
             config, robot_config, self._queue, self._event_log, run_id, self._known, method, permit
         )
-        self._supervisor = Supervisor(config, self._movement, self._event_log, draw)
+        self._supervisor = Supervisor(config.supervision, self._movement, self._event_log, draw)
         self._handlers = self._all_handlers()
         self._inbox = Inbox()
         self._points_seen: object = None
@@ -260,7 +260,7 @@ class Controller:
         stops = tuple(stop.message for stop in inbox.drain(m.StopRequest))
         self._journal.stops(stops)
         self._movement.update(inbox)
-        self._supervisor.update(inbox, self._journal.trouble(now, self._config.ledger_max_age_s), now)
+        self._supervisor.update(inbox, self._journal.trouble(now, self._config.supervision.ledger_max_age_s), now)
         sequence, bridge, points = self._movement.sequence, self._supervisor.bridge, inbox.newest(m.PruningPoints)
         if bridge is not None:
             close_up = inbox.newest(CloseUpResult)

@@ -63,7 +63,7 @@ def controller_state(
         reason=(held or state.reason)[:500],
         allowed=allowed,
         active_point_id=active if state.mode == "AUTO" else "",
-        method=config.method,
+        method=config.whole_body.method,
         T_odom_tool=None if measured is None else pose_message(measured.kinematics.T_odom_tool),
         T_odom_tool_desired=None if desired is None else pose_message(desired),
         position_error=0.0 if tracking is None else tracking.position_error,

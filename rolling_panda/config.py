@@ -144,10 +144,22 @@ def _check_keys(path: Path, name: str, table: Any, kind: Any) -> None:
     fields = {field.encode_name: field.type for field in msgspec.structs.fields(kind)}
     for item, value in table.items():
         if item not in fields:
-            raise ConfigError(f"{path}: [{name}] has no key {item!r}{_nearest(item, tuple(fields))}")
+            raise ConfigError(
+                f"{path}: [{name}] has no key {item!r}{_elsewhere(name, item, kind) or _nearest(item, tuple(fields))}"
+            )
         inner = fields[item]
         if isinstance(inner, type) and issubclass(inner, Struct):
             _check_keys(path, f"{name}.{item}", value, inner)
+
+
+def _elsewhere(name: str, item: str, kind: type[Struct]) -> str:
+    """The subsection that has such a key; empty without one."""
+    for field in msgspec.structs.fields(kind):
+        inner = field.type
+        if isinstance(inner, type) and issubclass(inner, Struct):
+            if item in {each.encode_name for each in msgspec.structs.fields(inner)}:
+                return f"; it stands in [{name}.{field.encode_name}]"
+    return ""
 
 
 def _nearest(got: str, known: tuple[str, ...]) -> str:

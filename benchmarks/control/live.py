@@ -76,7 +76,10 @@ def configured(rate_hz: float, base_rate_hz: float) -> str:
     """The simulation's configuration with the arm and joint states at `rate_hz` and the base at `base_rate_hz`."""
     text = resource("assets/config/sim.toml").read_text(encoding="utf-8")
     text = re.sub(r"^(base_)?rate_hz = .*\n", "", text, flags=re.MULTILINE)
-    text = text.replace("[controller]\n", f"[controller]\nrate_hz = {rate_hz}\nbase_rate_hz = {base_rate_hz}\n")
+    text = text.replace(
+        "[controller.work]\n",
+        f"[controller]\nrate_hz = {rate_hz}\nbase_rate_hz = {base_rate_hz}\n\n[controller.work]\n",
+    )
     return text.replace("[bridge]\n", f"[bridge]\njoints_hz = {rate_hz}\n")
 
 

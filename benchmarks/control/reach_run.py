@@ -73,8 +73,8 @@ class Runner:
         self.collision = CollisionModel(RobotModel())
         config = bench_config(method)
         self._config, self._method_name = config, method
-        self._method: Method = make_method(self.robot, config, DT)
-        limits = plan_limits(self.robot, BASE.speed, BASE.yaw_rate, config.base_acceleration, dt=DT)
+        self._method: Method = make_method(self.robot, config.whole_body, DT)
+        limits = plan_limits(self.robot, BASE.speed, BASE.yaw_rate, config.whole_body.base_acceleration, dt=DT)
         planning = RobotModel()
         self._planner = GoalPlanner(planning, CollisionModel(planning), limits, seed)
 
@@ -106,8 +106,8 @@ class Runner:
         trajectory = PoseTrajectory(
             self.robot.pose(q, self.robot.tool_id),
             goal,
-            Rates(config.tool_speed, config.tool_acceleration, config.tool_jerk),
-            Rates(config.tool_turn, 3.0 * config.tool_acceleration, 3.0 * config.tool_jerk),
+            Rates(config.work.tool_speed, config.motion.tool_acceleration, config.motion.tool_jerk),
+            Rates(config.motion.tool_turn, 3.0 * config.motion.tool_acceleration, 3.0 * config.motion.tool_jerk),
         )
         loop, clock = _Loop(self.robot, q), 0.0
         scale = 1.0

@@ -47,8 +47,8 @@ class StageClock:
         robot = RobotModel(RobotConfig())
         self._dt = 1.0 / self.config.rate_hz
         self._radius = robot.drive.wheel_radius
-        self._speed = robot.limits.velocity[ARM_XI] * self.config.arm_velocity_scale
-        self._step = robot.limits.acceleration[ARM_XI] * self.config.arm_acceleration_scale * self._dt
+        self._speed = robot.limits.velocity[ARM_XI] * self.config.whole_body.arm_velocity_scale
+        self._step = robot.limits.acceleration[ARM_XI] * self.config.whole_body.arm_acceleration_scale * self._dt
         self._sent: Array = np.zeros(9)
         self._last = math.nan
 
@@ -83,7 +83,7 @@ class StageClock:
         if tracking.done:
             return "settle"
         goal = next((e.accepted_position for e in state.queue if e.point_id == state.active_point_id), None)
-        near = goal is not None and math.dist(goal, tracking.desired.translation) <= self.config.slow_zone
+        near = goal is not None and math.dist(goal, tracking.desired.translation) <= self.config.motion.slow_zone
         return "slow" if near else "advance"
 
     def _limit(self, stage: str, tracking: Tracking) -> str:
@@ -96,10 +96,10 @@ class StageClock:
             return "joint velocity"
         if np.any(change[ARM_XI] >= _AT * self._step):
             return "joint acceleration"
-        if abs(float(xi[:2].sum())) * self._radius / 2 >= _AT * self.config.base_speed:
+        if abs(float(xi[:2].sum())) * self._radius / 2 >= _AT * self.config.whole_body.base_speed:
             return "base velocity"
         if abs(float((xi[:2] - self._sent[:2]).sum())) * self._radius / 2 >= (
-            _AT * self.config.base_acceleration * self._dt
+            _AT * self.config.whole_body.base_acceleration * self._dt
         ):
             return "base acceleration"
         return LIMITS[-1]

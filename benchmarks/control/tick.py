@@ -54,7 +54,7 @@ def recorded(steps: int) -> list[IkProblem]:
     config, robot_model = ControllerConfig(), RobotModel()
     collision = CollisionModel(robot_model)
     collision.set_obstacles(obstacles())
-    recorder = Recorder(make_method(robot_model, config, 1.0 / config.rate_hz, collision))
+    recorder = Recorder(make_method(robot_model, config.whole_body, 1.0 / config.rate_hz, collision))
     demands: list[IkProblem] = []
     while len(demands) < steps:
         recorder.demands.clear()
@@ -110,7 +110,7 @@ def _line(peer: dict[str, Any]) -> str:
 def working(method: Method | None = None) -> KinematicRobot:
     """A robot without mass that has begun to work on accepted points."""
     config = ControllerConfig()
-    robot = KinematicRobot(Controller(config, RobotConfig(), method=method), config.home)
+    robot = KinematicRobot(Controller(config, RobotConfig(), method=method), config.work.home)
     robot.step()
     robot.show(tuple(point(f"p{i}", (i * _SPACING, 0.75, 1.0 + 0.02 * (i % 5)), spur=i) for i in range(_COUNT)))
     robot.step()

@@ -80,13 +80,13 @@ def measure_parts(demands: Sequence[IkProblem]) -> dict[str, Times]:
     dt, robot = 1.0 / config.rate_hz, RobotModel()
     collision = CollisionModel(robot)
     collision.set_obstacles(obstacles())
-    rows = guards(robot, config, dt, collision)
+    rows = guards(robot, config.whole_body, dt, collision)
     full, bare, nullspace = (
-        Hierarchy(robot, config, dt, rows),
-        Hierarchy(robot, config, dt),
-        Nullspace(robot, config, dt),
+        Hierarchy(robot, config.whole_body, dt, rows),
+        Hierarchy(robot, config.whole_body, dt),
+        Nullspace(robot, config.whole_body, dt),
     )
-    manipulability, box = ArmManipulability(), VelocityBounds(robot, config, dt)
+    manipulability, box = ArmManipulability(), VelocityBounds(robot, config.whole_body, dt)
     parts: dict[str, Callable[[IkProblem], object]] = {
         "kinematics": lambda d: robot.kinematics(d.q),
         "manipulability and gradient": lambda d: manipulability.at(d.kinematics.J),

@@ -7,13 +7,13 @@ other minute the ways between them have up to 100 ms of jitter. The clock is sim
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
-import msgspec
 import numpy as np
 
 from benchmarks.common.documents import bench_parser, write
 from benchmarks.faults.judge import Rows, replays, violations
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
+from tests.support.controller_config import controller_config
 from tests.support.points import point
 from tests.support.worlds.faulty_world import FaultyWorld
 
@@ -53,7 +53,7 @@ class EndlessRow(FaultyWorld):
     def __init__(self, seed: int) -> None:
         """At work on the first points. There is no camera, so that nothing is looked at from near."""
         super().__init__(seed)
-        self.config = msgspec.structs.replace(self.config, pre_cut_check=False, post_cut_check=False)
+        self.config = controller_config(self.config, work__pre_cut_check=False, work__post_cut_check=False)
         self.controller = self.new_controller()
         self.cut_ids: set[str] = set()
         self._shown = 0

@@ -44,7 +44,7 @@ class BladesApart:
         new = not posture.exists()
         self._position = np.memmap(posture, float, "w+" if new else "r+", shape=(9,))
         if new:
-            self._position[2:] = ControllerConfig().home
+            self._position[2:] = ControllerConfig().work.home
         self._velocity = np.zeros(9)
         self._cutter: CutterState = "open"
         self._cut_id, self._rest = "", b""

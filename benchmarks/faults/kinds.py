@@ -13,7 +13,7 @@ from tests.support.worlds.faulty_world import FaultyWorld
 Inject = Callable[[FaultyWorld], None]
 _GO_ON = math.inf
 #: The configured speed by hand, and the most that the robot's own limits allow the base (m/s).
-_HAND, _FULL = ControllerConfig().teleop_base_speed, ControllerConfig().base_speed
+_HAND, _FULL = ControllerConfig().teleoperation.base_speed, ControllerConfig().whole_body.base_speed
 
 
 @dataclass(frozen=True)

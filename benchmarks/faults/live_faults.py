@@ -19,7 +19,7 @@ from rolling_panda.errors import RollingPandaError
 from tests.support.worlds.faulty_world import MODEL
 
 #: A base driven by hand moves at least this fast (rad/s of a wheel) before a fault, and base or arm at work.
-_DRIVEN = 0.95 * ControllerConfig().teleop_base_speed / MODEL.drive.wheel_radius
+_DRIVEN = 0.95 * ControllerConfig().teleoperation.base_speed / MODEL.drive.wheel_radius
 _WORKING = 0.3
 _PATIENCE_S = 10.0
 #: How much of the trace before a fault belongs to a trial (s), and what the trace may lag behind (s).

@@ -24,7 +24,7 @@ def write_problem(folder: Path, demands: Sequence[IkProblem], config: Controller
     last (v, 12, over q), and the posture (12). Limits are over q (12), whose joints are in `names`.
     """
     robot, dt = RobotModel(), 1.0 / config.rate_hz
-    actuation, box = Actuation(robot.drive), VelocityBounds(robot, config, dt)
+    actuation, box = Actuation(robot.drive), VelocityBounds(robot, config.whole_body, dt)
     # Velocities of actuators are no problem for a solver of tool poses.
     demands = [demand for demand in demands if isinstance(demand.tool, ToolTask)]
     targets = []
@@ -36,9 +36,9 @@ def write_problem(folder: Path, demands: Sequence[IkProblem], config: Controller
         )
     wheels = np.abs(actuation.wheels) @ box.speed[:2]
     velocity = np.concatenate([[box.speed[0]] * 2, [box.speed[1]], wheels, box.speed[2:]])
-    base = [config.base_acceleration] * 2
-    arm = robot.limits.acceleration[2:] * config.arm_acceleration_scale
-    acceleration = np.concatenate([base, [config.base_yaw_acceleration], robot.limits.acceleration[:2], arm])
+    base = [config.whole_body.base_acceleration] * 2
+    arm = robot.limits.acceleration[2:] * config.whole_body.arm_acceleration_scale
+    acceleration = np.concatenate([base, [config.whole_body.base_yaw_acceleration], robot.limits.acceleration[:2], arm])
     np.savez(
         folder / "problem.npz",
         names=np.array([str(name) for name in robot.model.names][1:]),

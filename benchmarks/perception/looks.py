@@ -90,7 +90,7 @@ def look_again(points: Sequence[m.PruningPoint], row: Row, eye: CloseCamera, opi
     for point in points:
         place, along = np.array(point.position), np.array(point.tangent)
         try:
-            poses = cut_poses(place, along, _LEFT, config.stand_off, config.clearance)
+            poses = cut_poses(place, along, _LEFT, config.work.stand_off, config.work.clearance)
         except InputError:
             continue
         T_odom_camera: Array = poses.clear.homogeneous @ on_tool
@@ -98,7 +98,7 @@ def look_again(points: Sequence[m.PruningPoint], row: Row, eye: CloseCamera, opi
         seen = eye.look(row, T_odom_camera, point)
         if seen.finding != "seen":
             seen = eye.look(row, T_odom_camera, point)
-        why = not_as_accepted(seen, ticket, config.moved_tolerance)
+        why = not_as_accepted(seen, ticket, config.work.moved_tolerance)
         if why or seen.position is None or seen.tangent is None:
             (into.right_voided if surveyed.right else into.wrong_voided).append(why)
             continue

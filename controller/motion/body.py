@@ -38,13 +38,13 @@ class Body:
         self._config, self.dt = config, 1.0 / config.rate_hz
         base_dt = self.dt * config.base_every
         self.robot = RobotModel(robot_config)
-        self.saturation = Saturation(self.robot, config, self.dt, base_dt)
+        self.saturation = Saturation(self.robot, config.whole_body, self.dt, base_dt)
         self.setpoints = Setpoints(self.saturation)
         self.surroundings = Surroundings(CollisionModel(self.robot))
-        arm = method or make_method(self.robot, config, self.dt, self.surroundings.model)
-        base = method or make_method(self.robot, config, base_dt, self.surroundings.model)
+        arm = method or make_method(self.robot, config.whole_body, self.dt, self.surroundings.model)
+        base = method or make_method(self.robot, config.whole_body, base_dt, self.surroundings.model)
         self._method = TwoRates(arm, base, config.base_every)
-        self.follower = Follower(config, self._method, self.dt)
+        self.follower = Follower(config.motion, self._method, self.dt)
         self._base = BaseEstimate(self.robot.drive)
         self.tracking_error = TrackingErrorMonitor()
         self.measured: Measured | None = None
@@ -58,9 +58,9 @@ class Body:
             sent = self.setpoints.sent
             q = self._base.configuration(joints.message, odometry.message)
             # The arm executes this command after its lag. It has to match the base's velocity at that time.
-            ahead = self._config.arm_lag_s + 0.5 * self.dt
+            ahead = self._config.motion.arm_lag_s + 0.5 * self.dt
             measured = np.array(joints.message.velocity[:2])
-            wheels = wheels_ahead(measured, sent[:2], ahead, self._config.base_lag_s)
+            wheels = wheels_ahead(measured, sent[:2], ahead, self._config.motion.base_lag_s)
             self.measured = Measured(q, self.robot.kinematics(q), sent)
             self._method.start_period(sent, self.setpoints.before, wheels)
         self.surroundings.update(inbox.newest(Obstacles))

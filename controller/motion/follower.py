@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 from msgspec import Struct
 
-from controller.config import ControllerConfig
+from controller.config import MotionConfig, TeleoperationConfig
 from controller.motion.tool_motion import ToolMotion
 from controller.motion.trajectory import Rates, ToolState, quintic
 from controller.whole_body.compiled import MATRIX, NOTHING, NUMBER, VECTOR, compiled
@@ -59,9 +59,9 @@ class Tracking(Struct, frozen=True):
 class Follower:
     """Turns motions into velocities by the whole-body method."""
 
-    def __init__(self, config: ControllerConfig, method: Method, dt: float) -> None:
+    def __init__(self, config: MotionConfig, method: Method, dt: float) -> None:
         """Bind the parts for a control period of `dt` (s)."""
-        self._config, self._method, self._dt = config, method, dt
+        self._method, self._dt = method, dt
         self._J_before: Array | None = None
         self._gains = np.repeat([config.gain_position, config.gain_rotation], 3)
         self._lag = config.arm_lag_s + 0.5 * dt if config.arm_lag_s else 0.0
@@ -115,7 +115,15 @@ class Follower:
         problem = IkProblem(robot.q, robot.kinematics, robot.sent, ActuatorTask(xi), Posture(robot.q), "free")
         return _tracking(self._method.solve(problem), None, np.zeros(6), False)
 
-    def carry(self, goal: Any, linear: float, angular: float, robot: Measured, speed_scale: float = 1.0) -> Tracking:
+    def carry(
+        self,
+        goal: Any,
+        linear: float,
+        angular: float,
+        robot: Measured,
+        limits: TeleoperationConfig,
+        speed_scale: float = 1.0,
+    ) -> Tracking:
         """One period with the tool at a fixed pose while the base moves, as far as the arm allows.
 
         Args:
@@ -123,15 +131,16 @@ class Follower:
             linear: Forward velocity of the base (m/s).
             angular: Yaw rate of the base (rad/s).
             robot: Measured robot.
+            limits: Of tool and base.
             speed_scale: Share of the tool's speed to use.
         """
         rate = np.zeros(len(robot.q))
         heading = float(robot.q[2])
         rate[:3] = linear * math.cos(heading), linear * math.sin(heading), angular
-        return self._towards(goal, Posture(robot.q, rate), robot, "row", speed_scale)
+        return self._towards(goal, Posture(robot.q, rate), robot, "row", limits, speed_scale)
 
     def seek(
-        self, goal: Any, q_goal: Array, robot: Measured, base: BaseMode = "free", speed_scale: float = 1.0
+        self, goal: Any, q_goal: Array, robot: Measured, limits: TeleoperationConfig, speed_scale: float = 1.0
     ) -> Tracking:
         """One period towards a pose that may move (teleoperation): proportional, with bounded linear and angular speed.
 
@@ -139,17 +148,25 @@ class Follower:
             goal: T_odom_tool wanted (pin.SE3).
             q_goal: Configuration (12) with the desired heading and arm posture.
             robot: Measured robot.
-            base: Role of the base.
+            limits: Of tool and base, and the base's role.
             speed_scale: Share of the tool's speed to use.
         """
         posture = q_goal.copy()
         posture[:2] = robot.q[:2]
-        return self._towards(goal, Posture(posture), robot, base, speed_scale)
+        return self._towards(goal, Posture(posture), robot, limits.base, limits, speed_scale)
 
-    def _towards(self, goal: Any, posture: Posture, robot: Measured, base: BaseMode, speed_scale: float) -> Tracking:
+    def _towards(
+        self,
+        goal: Any,
+        posture: Posture,
+        robot: Measured,
+        base: BaseMode,
+        limits: TeleoperationConfig,
+        speed_scale: float,
+    ) -> Tracking:
         error = tool_error(robot.kinematics.T_odom_tool, goal)
         twist = self._gains * error
-        bounds = speed_scale * self._config.teleop_speed, speed_scale * self._config.teleop_turn
+        bounds = speed_scale * limits.speed, speed_scale * limits.turn
         for part, bound in zip((slice(0, 3), slice(3, 6)), bounds, strict=True):
             size = _length(twist[part])
             if size > bound:
@@ -162,7 +179,7 @@ class Follower:
             posture,
             base,
             bounds[0],
-            wheel_cap=self._config.teleop_base_speed,
+            wheel_cap=limits.base_speed,
         )
         return _tracking(self._method.solve(problem), goal, error, False)
 
@@ -176,7 +193,7 @@ def _tracking(out: Solution, desired: Any, error: Array, done: bool) -> Tracking
 class ArmMotion:
     """A motion of the arm's joints with the base still: quintic in every joint."""
 
-    def __init__(self, config: ControllerConfig, start: Array, goal: Array) -> None:
+    def __init__(self, config: MotionConfig, start: Array, goal: Array) -> None:
         """Plan from one posture (7) to another (7)."""
         self._start, self._span = start, goal - start
         self._gain = config.gain_position

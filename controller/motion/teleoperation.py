@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from controller.config import ControllerConfig
+from controller.config import TeleoperationConfig, WorkConfig
 from controller.identity import Client
 from controller.motion.follower import Follower, Measured, Tracking
 from rolling_panda.errors import ModelError
@@ -20,10 +20,12 @@ _PROMPT_S, _LATE_S, _SLOWEST = 0.25, 0.5, 0.25
 class Teleoperation:
     """Checks the hold and follows its target. After any other end than its release a hold has to be pressed again."""
 
-    def __init__(self, config: ControllerConfig, follower: Follower, drive: DifferentialDrive) -> None:
-        """Bind the parts."""
+    def __init__(
+        self, config: TeleoperationConfig, work: WorkConfig, follower: Follower, drive: DifferentialDrive
+    ) -> None:
+        """Bind the parts; `work` has the row's direction and the posture that the arm tends to."""
         self._config, self._follower, self._drive = config, follower, drive
-        self._posture: Array = np.concatenate([[0.0, 0.0, config.row_heading, 0.0, 0.0], config.reach])
+        self._posture: Array = np.concatenate([[0.0, 0.0, work.row_heading, 0.0, 0.0], work.reach])
         self._newest: Received[TeleopTarget] | None = None
         self._message: TeleopTarget | None = None
         self._goal: Any = None
@@ -78,13 +80,15 @@ class Teleoperation:
             xi[:2] = self._drive.wheels(*self._driven(message.base, speed_scale))
             return self._follower.jog(xi, robot)
         if message.base is None:
-            return self._follower.seek(self._goal, self._posture, robot, self._config.teleop_base, speed_scale)
-        return self._follower.carry(self._goal, *self._driven(message.base, speed_scale), robot, speed_scale)
+            return self._follower.seek(self._goal, self._posture, robot, self._config, speed_scale)
+        return self._follower.carry(
+            self._goal, *self._driven(message.base, speed_scale), robot, self._config, speed_scale
+        )
 
     def _driven(self, base: BaseVelocity, speed_scale: float) -> tuple[float, float]:
         """Forward velocity (m/s) and yaw rate (rad/s), slowed alike until no wheel is too fast to brake in time."""
         fastest = abs(base.linear) + abs(base.angular) * self._drive.half_track
-        scale = speed_scale * min(1.0, self._config.teleop_base_speed / fastest) if fastest > 0.0 else 0.0
+        scale = speed_scale * min(1.0, self._config.base_speed / fastest) if fastest > 0.0 else 0.0
         return scale * base.linear, scale * base.angular
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from controller.config import ControllerConfig
+from controller.config import MotionConfig, WholeBodyConfig
 from controller.motion.trajectory import Correction, PoseTrajectory, Rates, ToolState, quintic, quintic_time
 from controller.whole_body.compiled import NOTHING, NUMBER, VECTOR, compiled
 from controller.whole_body.task import BaseMode, Posture
@@ -75,7 +75,8 @@ class ToolMotion:
 
     def __init__(
         self,
-        config: ControllerConfig,
+        config: MotionConfig,
+        limits: WholeBodyConfig,
         start: Any,
         q_start: Array,
         legs: Sequence[Leg],
@@ -87,7 +88,8 @@ class ToolMotion:
         """Plan.
 
         Args:
-            config: Of the controller.
+            config: Speeds and accelerations of the tool.
+            limits: Of the base.
             start: T_odom_tool at the beginning (pin.SE3).
             q_start: Configuration (12) at the beginning.
             legs: At least one.
@@ -98,7 +100,7 @@ class ToolMotion:
         """
         self._config, self._slow_end, self.free_axis = config, slow_end, free_axis
         self._flows, self._waits_until = flows, math.inf if waits and flows else 0.0
-        self._start, self._q_start, self._legs = start, q_start, _timed(config, start, q_start, legs, flows)
+        self._start, self._q_start, self._legs = start, q_start, _timed(config, limits, start, q_start, legs, flows)
         self.goal, self.q_goal, self.speed = legs[-1].goal, legs[-1].q_goal, max(leg.speed for leg in legs)
         self._goal_place = self.goal.translation.tolist()
         self._free = _free(self._legs)
@@ -216,12 +218,12 @@ def _go_along(span: Array, s: float, rate: float, q: Array, q_rate: Array) -> No
 
 
 def _timed(
-    config: ControllerConfig, start: Any, q_start: Array, legs: Sequence[Leg], flows: bool
+    config: MotionConfig, limits: WholeBodyConfig, start: Any, q_start: Array, legs: Sequence[Leg], flows: bool
 ) -> tuple[_Timed, ...]:
     """The legs in their places, with time enough for the base between them."""
     travel = float(np.hypot(*(legs[-1].q_goal[:2] - q_start[:2])))
     # With margin for feedback.
-    base_s = Rates(0.8 * config.base_speed, 0.75 * config.base_acceleration, 10.0).duration(travel)
+    base_s = Rates(0.8 * limits.base_speed, 0.75 * limits.base_acceleration, 10.0).duration(travel)
     # The segment that waits for the base: there the line of the tool matters least.
     waits = next((i for i, leg in enumerate(legs) if leg.frozen_until == leg.frozen_within == 0.0), None)
     extra = 0.0
@@ -235,7 +237,7 @@ def _timed(
 
 
 def _placed(
-    config: ControllerConfig,
+    config: MotionConfig,
     start: Any,
     q_start: Array,
     legs: Sequence[Leg],

@@ -36,9 +36,11 @@ class CutPlanner:
         """Build the models (about half a second)."""
         self._config, self._robot_config = config, robot_config
         self._robot = RobotModel(robot_config)
-        self._flows = make_method(self._robot, config, 1.0 / config.rate_hz).flows
-        self._clearance = CutClearance(RobotModel(robot_config), config)
-        self._search = PostureSearch(RobotModel(robot_config), config, self._clearance.too_near)
+        self._flows = make_method(self._robot, config.whole_body, 1.0 / config.rate_hz).flows
+        self._clearance = CutClearance(RobotModel(robot_config), config.whole_body.hierarchy)
+        self._search = PostureSearch(
+            RobotModel(robot_config), config.work, config.whole_body.joint_margin, self._clearance.too_near
+        )
         self._rollout = Rollout(config, robot_config)
 
     def plan(self, request: PlanRequest) -> WorkPlan:

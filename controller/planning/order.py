@@ -26,11 +26,16 @@ def travel_times(config: ControllerConfig, flows: bool, start: tuple[Any, Array]
         start: T_odom_tool (pin.SE3) and configuration (12) at the start.
         cuts: The cuts.
     """
-    segments = ApproachSegments(config, flows)
+    segments = ApproachSegments(config.work, flows)
     places = [start, *((cut.poses.clear, cut.q_clear) for cut in cuts)]
     return np.array(
         [
-            [ToolMotion(config, pose, q, segments.there(cut, pose, q), flows=flows).duration for cut in cuts]
+            [
+                ToolMotion(
+                    config.motion, config.whole_body, pose, q, segments.there(cut, pose, q), flows=flows
+                ).duration
+                for cut in cuts
+            ]
             for pose, q in places
         ]
     )

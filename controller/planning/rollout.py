@@ -68,7 +68,7 @@ class _Run:
     def __init__(self, config: ControllerConfig, robot_config: RobotConfig, request: PreviewRequest) -> None:
         self._configs, self._request, self._dt = (config, robot_config), request, 1.0 / config.rate_hz
         self._journal = Journal()
-        self._queue = PointQueue(config, self._journal)
+        self._queue = PointQueue(config.work, self._journal)
         self._queue.update(m.PruningPoints(header=m.Header(), segmenter="", frames=0, points=request.points))
         for point in request.points:
             self._queue.accept(point.point_id, point.revision, "preview")
@@ -77,7 +77,9 @@ class _Run:
         self._queue.arrange(tuple(point.point_id for point in request.points))
         self._movement = Movement(config, robot_config, self._queue, EventLogger(self._journal), "preview", self._known)
         robot = self._movement.body.robot
-        self._actuators = ActuatorLag(robot.drive, request.q, config.base_lag_s, config.arm_lag_s, self._dt)
+        self._actuators = ActuatorLag(
+            robot.drive, request.q, config.motion.base_lag_s, config.motion.arm_lag_s, self._dt
+        )
         self._log = CutLog(robot, self._movement.body.surroundings.model, self._queue)
         self._inbox = Inbox()
         self._inbox.put(Obstacles(header=m.Header(0.0, "odom"), capsules=request.obstacles), 0.0)

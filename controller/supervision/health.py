@@ -6,7 +6,7 @@ from typing import Literal
 
 from msgspec import Struct
 
-from controller.config import ControllerConfig
+from controller.config import SupervisionConfig
 from rolling_panda import topics
 from rolling_panda.messages.perception import Obstacles
 from rolling_panda.messages.robot import BridgeState, JointState, Odometry
@@ -106,7 +106,7 @@ FINE = Verdict("none")
 OVERRULED = "another controller commands this robot"
 
 
-def check(mode: Mode, moving: bool, health: Health, config: ControllerConfig) -> Verdict:
+def check(mode: Mode, moving: bool, health: Health, config: SupervisionConfig) -> Verdict:
     """The most severe thing that the inputs demand in a mode.
 
     Args:
@@ -132,12 +132,12 @@ def check(mode: Mode, moving: bool, health: Health, config: ControllerConfig) ->
     return Verdict("pause", why) if why else FINE
 
 
-def cause(health: Health, config: ControllerConfig) -> str:
+def cause(health: Health, config: SupervisionConfig) -> str:
     """Cause that still blocks the end of a PROTECTIVE_STOP or FAULT; empty if it is gone."""
     return health.ledger or sensors(health, config) or ("watchdog" if health.watchdog else "")
 
 
-def sensors(health: Health, config: ControllerConfig) -> str:
+def sensors(health: Health, config: SupervisionConfig) -> str:
     """Reason why the robot's own data forbid motion; empty if they allow it."""
     if health.overruled:
         return OVERRULED
@@ -152,7 +152,7 @@ def sensors(health: Health, config: ControllerConfig) -> str:
     return ""
 
 
-def supervision(health: Health, config: ControllerConfig, teleoperated: bool) -> str:
+def supervision(health: Health, config: SupervisionConfig, teleoperated: bool) -> str:
     """Reason why the server's state forbids motion; empty if it allows it.
 
     Args:
@@ -165,7 +165,7 @@ def supervision(health: Health, config: ControllerConfig, teleoperated: bool) ->
     return _process("server", health.server, allowed, health.present)
 
 
-def perception(health: Health, config: ControllerConfig) -> str:
+def perception(health: Health, config: SupervisionConfig) -> str:
     """Reason why perception's state forbids automatic work; empty if it allows it."""
     if health.obstacles > config.obstacles_max_age_s:
         return (

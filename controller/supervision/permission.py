@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from controller.config import ControllerConfig
+from controller.config import SupervisionConfig
 from controller.supervision import health as safety
 from controller.supervision import modes
 from controller.supervision.modes import Event
@@ -18,7 +18,7 @@ class Situation:
     """State that a permission depends on.
 
     Attributes:
-        config: Section `[controller]`.
+        config: Section `[controller.supervision]`.
         state: State of the supervision state machine.
         health: Health of the inputs.
         homing: True during homing.
@@ -30,7 +30,7 @@ class Situation:
         unwatched: Reason why automatic work lacks an attentive operator; empty when it has one.
     """
 
-    config: ControllerConfig
+    config: SupervisionConfig
     state: modes.State
     health: safety.Health
     homing: bool

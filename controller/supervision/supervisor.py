@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Final
 
-from controller.config import ControllerConfig
+from controller.config import SupervisionConfig
 from controller.identity import Client
 from controller.ledger.journal import EventLogger
 from controller.supervision import health as safety
@@ -33,7 +33,7 @@ class Supervisor:
 
     def __init__(
         self,
-        config: ControllerConfig,
+        config: SupervisionConfig,
         movement: Movement,
         event_log: EventLogger,
         draw: Callable[[], str] = draw_nonce,
@@ -41,7 +41,7 @@ class Supervisor:
         """Start in IDLE.
 
         Args:
-            config: Section `[controller]`.
+            config: Section `[controller.supervision]`.
             movement: What is ended when a mode ends.
             event_log: Records events for people.
             draw: Draws the random parts of tokens and stops.

@@ -10,7 +10,7 @@ import math
 import numpy as np
 from msgspec.structs import replace
 
-from controller.config import ControllerConfig
+from controller.config import WholeBodyConfig
 from controller.whole_body.actuation import Actuation
 from controller.whole_body.nullspace import Nullspace
 from controller.whole_body.saturation import Saturation
@@ -33,7 +33,7 @@ class Decoupled:
     name = "decoupled"
     flows = False
 
-    def __init__(self, robot: RobotModel, config: ControllerConfig, dt: float) -> None:
+    def __init__(self, robot: RobotModel, config: WholeBodyConfig, dt: float) -> None:
         """Bind the parts for a control period of `dt` (s)."""
         self._config = config
         self._arm = Nullspace(robot, config, dt)

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from msgspec import Struct
 
-from controller.config import ControllerConfig
+from controller.config import WholeBodyConfig
 from controller.whole_body.actuation import Actuation
 from controller.whole_body.cascade import Answer, Cascade, Problem, given_up
 from controller.whole_body.compiled import COUNT, MATRIX, NOTHING, NUMBER, PACKED, VECTOR, compiled
@@ -53,12 +53,12 @@ class Hierarchy:
     name = "hierarchy"
     flows = True
 
-    def __init__(self, robot: RobotModel, config: ControllerConfig, dt: float, guards: Sequence[Guard] = ()) -> None:
+    def __init__(self, robot: RobotModel, config: WholeBodyConfig, dt: float, guards: Sequence[Guard] = ()) -> None:
         """Bind the parts.
 
         Args:
             robot: Its model.
-            config: Of the controller.
+            config: Section `[controller.whole_body]`.
             dt: Control period (s).
             guards: Inequalities beside the axle's, for instance of collisions.
         """
@@ -76,7 +76,7 @@ class Hierarchy:
         self._weight = np.repeat([1.0 / _SPEED, 1.0 / _TURN], 3)
         self._stack(self.secondary_tasks(robot, config))
 
-    def secondary_tasks(self, robot: RobotModel, config: ControllerConfig) -> Sequence[SecondaryTask]:
+    def secondary_tasks(self, robot: RobotModel, config: WholeBodyConfig) -> Sequence[SecondaryTask]:
         """The tasks of the null space; their weights are in `[controller.hierarchy]`."""
         weights, speed = config.hierarchy, self._box.speed
         return (

@@ -14,7 +14,7 @@ import math
 import numpy as np
 from scipy.linalg.lapack import dposv
 
-from controller.config import ControllerConfig
+from controller.config import WholeBodyConfig
 from controller.whole_body.actuation import Actuation
 from controller.whole_body.joint_limits import LimitRepulsion
 from controller.whole_body.manipulability import ArmManipulability
@@ -30,7 +30,7 @@ class Nullspace:
     name = "nullspace"
     flows = True
 
-    def __init__(self, robot: RobotModel, config: ControllerConfig, dt: float) -> None:
+    def __init__(self, robot: RobotModel, config: WholeBodyConfig, dt: float) -> None:
         """Precompute the weights and the limits for a control period of `dt` (s)."""
         self._config = config
         self._saturation = Saturation(robot, config, dt)

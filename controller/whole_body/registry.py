@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 
-from controller.config import ControllerConfig
+from controller.config import WholeBodyConfig
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.decoupled import Decoupled
 from controller.whole_body.guards.collision import CollisionGuard
@@ -16,17 +16,17 @@ from controller.whole_body.tipping import Tipping
 from rolling_panda.errors import ConfigError
 from rolling_panda.model.robot import RobotModel
 
-Maker = Callable[[RobotModel, ControllerConfig, float, CollisionModel | None], Method]
+Maker = Callable[[RobotModel, WholeBodyConfig, float, CollisionModel | None], Method]
 
 
 def make_method(
-    robot: RobotModel, config: ControllerConfig, dt: float, collision: CollisionModel | None = None
+    robot: RobotModel, config: WholeBodyConfig, dt: float, collision: CollisionModel | None = None
 ) -> Method:
     """The configured method.
 
     Args:
         robot: Robot model.
-        config: Section `[controller]`.
+        config: Section `[controller.whole_body]`.
         dt: Control period (s).
         collision: Collision model with the obstacles, on the same `robot`. With None `hierarchy` avoids itself and
             the ground, and the other methods avoid nothing.
@@ -41,7 +41,7 @@ def make_method(
     return make(robot, config, dt, collision)
 
 
-def guards(robot: RobotModel, config: ControllerConfig, dt: float, collision: CollisionModel | None) -> Sequence[Guard]:
+def guards(robot: RobotModel, config: WholeBodyConfig, dt: float, collision: CollisionModel | None) -> Sequence[Guard]:
     """The inequalities that the configuration asks for."""
     settings, out = config.hierarchy, list[Guard]()
     if settings.collisions:
@@ -51,14 +51,14 @@ def guards(robot: RobotModel, config: ControllerConfig, dt: float, collision: Co
     return out
 
 
-def _hierarchy(robot: RobotModel, config: ControllerConfig, dt: float, collision: CollisionModel | None) -> Method:
+def _hierarchy(robot: RobotModel, config: WholeBodyConfig, dt: float, collision: CollisionModel | None) -> Method:
     return Hierarchy(robot, config, dt, guards(robot, config, dt, collision))
 
 
-def _with_speed_scaling(make: Callable[[RobotModel, ControllerConfig, float], Method]) -> Maker:
+def _with_speed_scaling(make: Callable[[RobotModel, WholeBodyConfig, float], Method]) -> Maker:
     """Methods that know no inequalities beyond the limits are braked where obstacles are known."""
 
-    def maker(robot: RobotModel, config: ControllerConfig, dt: float, collision: CollisionModel | None) -> Method:
+    def maker(robot: RobotModel, config: WholeBodyConfig, dt: float, collision: CollisionModel | None) -> Method:
         method = make(robot, config, dt)
         if collision is None or not config.hierarchy.collisions:
             return method

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller.config import ControllerConfig
+from controller.config import WholeBodyConfig
 from controller.whole_body.actuation import Actuation
 from controller.whole_body.compiled import FLAG, NOTHING, VECTOR, compiled
 from rolling_panda.model.differential_drive import NXI, Array
@@ -31,12 +31,12 @@ class Saturated:
 class Saturation:
     """Makes a wanted velocity sendable by scaling it in time, never by bending it joint by joint."""
 
-    def __init__(self, robot: RobotModel, config: ControllerConfig, dt: float, base_dt: float | None = None) -> None:
+    def __init__(self, robot: RobotModel, config: WholeBodyConfig, dt: float, base_dt: float | None = None) -> None:
         """Precompute the limits for a control period of `dt` (s).
 
         Args:
             robot: Whose limits they are.
-            config: Of the controller.
+            config: Section `[controller.whole_body]`.
             dt: Control period (s).
             base_dt: Period of the base (s), in which its speed may change by as much at once; None for `dt`.
         """

@@ -19,7 +19,7 @@ from typing import Any, cast
 import numpy as np
 from msgspec import Struct
 
-from controller.config import ControllerConfig
+from controller.config import WholeBodyConfig
 from controller.whole_body.actuation import Actuation
 from controller.whole_body.compiled import NOTHING, NUMBER, PAIR, VECTOR, compiled, records
 from rolling_panda.model.differential_drive import NXI, Array
@@ -63,7 +63,7 @@ class Bounds(Struct, frozen=True):
 class VelocityBounds:
     """Computes the bounds from the configuration and the last command."""
 
-    def __init__(self, robot: RobotModel, config: ControllerConfig, dt: float) -> None:
+    def __init__(self, robot: RobotModel, config: WholeBodyConfig, dt: float) -> None:
         """Precompute for a control period of `dt` (s)."""
         limits, mu, R = robot.limits, robot.drive.half_track, robot.drive.wheel_radius
         #: Largest ν (9).

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from controller.config import ControllerConfig
+from controller.config import WorkConfig
 from controller.motion.tool_motion import Leg
 from controller.work.posture_search import CutPlan
 from rolling_panda.model.differential_drive import Array
@@ -16,7 +16,7 @@ from rolling_panda.model.robot import ARM_Q
 class ApproachSegments:
     """Segments for a method that blends them, or for one that stops between them."""
 
-    def __init__(self, config: ControllerConfig, flows: bool) -> None:
+    def __init__(self, config: WorkConfig, flows: bool) -> None:
         """Bind the configuration."""
         self._config, self._flows = config, flows
 

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from controller.config import ControllerConfig
+from controller.config import WorkConfig
 from controller.work.point_queue import PointQueue
 from rolling_panda import messages as m
 
@@ -34,11 +34,11 @@ class _Cut:
 class Blades:
     """Orders cuts, one at a time, and passes the outcome of each to the queue."""
 
-    def __init__(self, config: ControllerConfig, queue: PointQueue, run_id: str, ended: Ended | None = None) -> None:
+    def __init__(self, config: WorkConfig, queue: PointQueue, run_id: str, ended: Ended | None = None) -> None:
         """Bind the parts.
 
         Args:
-            config: Section `[controller]`.
+            config: Section `[controller.work]`.
             queue: The queue, which gets the outcomes.
             run_id: Prefix that makes the cut ids of this start unique.
             ended: Called with the cutter's report in place of the queue: point, outcome, text, time.

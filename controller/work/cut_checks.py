@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller.config import ControllerConfig
+from controller.config import WorkConfig
 from controller.motion.follower import Measured
 from controller.motion.tool_motion import ToolMotion
 from controller.work.close_up import CloseUpClient
@@ -128,7 +128,7 @@ def not_as_accepted(close_up: CloseUpResult, ticket: Ticket | None, tolerance: f
     return ""
 
 
-def camera_ready(robot: Measured, motion: ToolMotion, config: ControllerConfig) -> bool:
+def camera_ready(robot: Measured, motion: ToolMotion, config: WorkConfig) -> bool:
     """Whether the camera has the point in view from near, and hardly moves.
 
     Args:

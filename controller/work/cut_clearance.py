@@ -1,6 +1,6 @@
 """Clearance check of a cut plan."""
 
-from controller.config import ControllerConfig
+from controller.config import HierarchyConfig
 from controller.motion.surroundings import Surroundings
 from controller.whole_body.collision import CollisionModel
 from controller.work.posture_search import CutPlan
@@ -17,9 +17,9 @@ _ROOM = 0.003
 class CutClearance:
     """Checks cut plans before their execution. It has its own robot model, like the posture search."""
 
-    def __init__(self, robot: RobotModel, config: ControllerConfig) -> None:
+    def __init__(self, robot: RobotModel, settings: HierarchyConfig) -> None:
         """Nothing is known to stand around yet."""
-        self._settings = config.hierarchy
+        self._settings = settings
         self._surroundings = Surroundings(CollisionModel(robot))
 
     def update(self, obstacles: Received[Obstacles] | None) -> None:

@@ -46,17 +46,17 @@ class CutSequence:
         `run_id` makes the cut ids of this start unique. `known` gives the planned cut of a point, and
         `permit` the reason why the robot may not approach it.
         """
-        close_ups = CloseUpClient(config.close_up_timeout_s, _PICTURES)
-        check = PostCutCheck(queue, close_ups, config.post_cut_check)
+        close_ups = CloseUpClient(config.work.close_up_timeout_s, _PICTURES)
+        check = PostCutCheck(queue, close_ups, config.work.post_cut_check)
         self._parts = Parts(
             config,
             follower,
             saturation,
             queue,
-            ApproachSegments(config, follower.flows),
+            ApproachSegments(config.work, follower.flows),
             close_ups,
             check,
-            Blades(config, queue, run_id, check.start),
+            Blades(config.work, queue, run_id, check.start),
             NextCut(search, queue, config.search_steps_each, known, permit),
         )
         self._stage: Stage = Rest(self._parts)

@@ -26,8 +26,8 @@ class Homing:
     def __init__(self, config: ControllerConfig, follower: Follower, dt: float) -> None:
         """Bind the parts for a control period of `dt` (s)."""
         self._config, self._follower, self._dt = config, follower, dt
-        self._goal = np.array(config.home)
-        heading = config.row_heading
+        self._goal = np.array(config.work.home)
+        heading = config.work.row_heading
         self._left = np.array([-np.sin(heading), np.cos(heading), 0.0])
         self._out: ToolMotion | None = None
         self._in: ArmMotion | None = None
@@ -40,18 +40,18 @@ class Homing:
         """One period: ξ̇ to send (9)."""
         if self._in is None:
             depth = float(robot.kinematics.T_odom_tool.translation @ self._left)
-            depth -= self._config.row_distance - self._config.clearance - 0.03
+            depth -= self._config.work.row_distance - self._config.work.clearance - 0.03
             if self._out is None and depth > 0.0:
                 pose = robot.kinematics.T_odom_tool
                 goal = escape_pose(pose, self._left, depth)
-                out = Leg(goal, robot.q, self._config.advance_speed, math.inf)
-                self._out = ToolMotion(self._config, pose, robot.q, [out])
+                out = Leg(goal, robot.q, self._config.work.advance_speed, math.inf)
+                self._out = ToolMotion(self._config.motion, self._config.whole_body, pose, robot.q, [out])
             if self._out is not None:
                 tracking = self._follower.follow(self._out, robot)
                 if not tracking.done or tracking.position_error > _CLEAR:
                     self._wait(tracking.done or tracking.scale < _HELD, tracking)
                     return tracking.xi
-            self._in = ArmMotion(self._config, robot.q[ARM_Q].copy(), self._goal)
+            self._in = ArmMotion(self._config.motion, robot.q[ARM_Q].copy(), self._goal)
         tracking = self._in.step(robot, self._follower, self._dt)
         self._wait(tracking.scale < _HELD, tracking)
         self.done = self._in.done and float(np.abs(robot.q[ARM_Q] - self._goal).max()) < _NEAR
@@ -75,8 +75,8 @@ class Withdrawal:
         """Plan from q (12) to the arm posture of `q_clear` (12), clear of the canes."""
         self._follower, self._dt = follower, 1.0 / config.rate_hz
         self._goal = q_clear[ARM_Q].copy()
-        self._motion = ArmMotion(config, q[ARM_Q].copy(), self._goal)
-        self._timeout = MotionTimeout(config.reach_timeout_s, self._dt)
+        self._motion = ArmMotion(config.motion, q[ARM_Q].copy(), self._goal)
+        self._timeout = MotionTimeout(config.work.reach_timeout_s, self._dt)
         self._timeout.start(self._motion.duration)
         #: Whether the arm has arrived, and whether the motion has failed.
         self.done = self.late = False

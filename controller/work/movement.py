@@ -74,10 +74,12 @@ class Movement:
         self._config, self._event_log = config, event_log
         self.body = body = Body(config, robot_config, method)
         self._saturation, self._setpoints = body.saturation, body.setpoints
-        self._clearance = CutClearance(RobotModel(robot_config), config)
-        search = PostureSearch(RobotModel(robot_config), config, self._clearance.too_near)
+        self._clearance = CutClearance(RobotModel(robot_config), config.whole_body.hierarchy)
+        search = PostureSearch(
+            RobotModel(robot_config), config.work, config.whole_body.joint_margin, self._clearance.too_near
+        )
         self.sequence = CutSequence(config, search, body.follower, body.saturation, queue, run_id, known, permit)
-        self.teleoperation = Teleoperation(config, body.follower, body.robot.drive)
+        self.teleoperation = Teleoperation(config.teleoperation, config.work, body.follower, body.robot.drive)
         self._homing: Homing | None = None
         #: Tracking of the last step's motion; None without one.
         self.tracking: Tracking | None = None

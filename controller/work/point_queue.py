@@ -7,7 +7,7 @@ from typing import Literal
 import msgspec
 import numpy as np
 
-from controller.config import ControllerConfig
+from controller.config import WorkConfig
 from controller.ledger.journal import Journal, TicketRow
 from controller.work.order import Approaches, WorkOrder
 from controller.work.rule_history import RuleHistory
@@ -59,7 +59,7 @@ class Ticket:
 class PointQueue:
     """All points by id. Every change of state has a reason and is recorded."""
 
-    def __init__(self, config: ControllerConfig, journal: Journal | None = None) -> None:
+    def __init__(self, config: WorkConfig, journal: Journal | None = None) -> None:
         """Start empty; changes are recorded in `journal`."""
         self._config = config
         self._journal = journal or Journal()

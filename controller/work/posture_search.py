@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from controller.config import ControllerConfig
+from controller.config import WorkConfig
 from controller.work.cut_pose import CutPoses, cut_poses
 from rolling_panda.errors import InputError
 from rolling_panda.model.differential_drive import Array
@@ -85,14 +85,16 @@ class PostureSearch:
     def __init__(
         self,
         robot: RobotModel,
-        config: ControllerConfig,
+        config: WorkConfig,
+        joint_margin: float,
         too_near: Callable[[CutPlan], tuple[float, str]] = lambda _: (0.0, ""),
     ) -> None:
         """Remember the model and the row's direction.
 
         Args:
             robot: Model of its own.
-            config: Of the controller.
+            config: The row and the usual postures.
+            joint_margin: Distance from every joint limit (rad).
             too_near: How much of a required distance a plan lacks (m), with the parts as text; empty if it lacks none.
                 Another plan is not returned.
         """
@@ -105,7 +107,7 @@ class PostureSearch:
         flange, tool = robot.pose(neutral, robot.flange_id), robot.pose(neutral, robot.tool_id)
         self._shoulder = mount.translation + np.array([0.0, 0.0, _SHOULDER_HEIGHT])
         self._tool_length = float(flange.actInv(tool).translation[2])
-        margin = config.joint_margin + 0.02
+        margin = joint_margin + 0.02
         self._lower = robot.limits.lower[ARM_Q] + margin
         self._upper = robot.limits.upper[ARM_Q] - margin
 

@@ -71,7 +71,7 @@ class Parts:
 
         During the retreat, without a stop: one picture is enough to see that the wood is gone.
         """
-        if math.dist(robot.kinematics.T_odom_tool.translation, self.cut_at) > self.config.close_up_from:
+        if math.dist(robot.kinematics.T_odom_tool.translation, self.cut_at) > self.config.work.close_up_from:
             self.post_cut_check.request_close_up(self.cut_point, now)
 
     def refine(self, point_id: str, motion: ToolMotion, known: m.Vector3 | None = None) -> None:
@@ -100,15 +100,16 @@ class FollowedMotion:
         """
         config, self._follower = parts.config, parts.follower
         self.motion = ToolMotion(
-            config,
+            config.motion,
+            config.whole_body,
             robot.kinematics.T_odom_tool,
             robot.q,
             legs,
-            slow_end=to_cut and not config.pre_cut_check,
+            slow_end=to_cut and not config.work.pre_cut_check,
             flows=parts.follower.flows,
-            waits=to_cut and config.pre_cut_check,
+            waits=to_cut and config.work.pre_cut_check,
         )
-        self.timeout = MotionTimeout(config.reach_timeout_s, 1.0 / config.rate_hz)
+        self.timeout = MotionTimeout(config.work.reach_timeout_s, 1.0 / config.rate_hz)
         self.timeout.start(self.motion.duration)
 
     def track(self, robot: Measured) -> Tracking:
@@ -217,11 +218,11 @@ class Escape(Stage):
     def step(self, robot: Measured, now: float) -> Step:
         """One period."""
         config, pose = self._parts.config, robot.kinematics.T_odom_tool
-        towards_row = np.array([-np.sin(config.row_heading), np.cos(config.row_heading), 0.0])
-        depth = float(pose.translation @ towards_row) - (config.row_distance - config.clearance) - 0.03
+        towards_row = np.array([-np.sin(config.work.row_heading), np.cos(config.work.row_heading), 0.0])
+        depth = float(pose.translation @ towards_row) - (config.work.row_distance - config.work.clearance) - 0.03
         if depth <= 0.0:
             return Rest(self._parts).step(robot, now)
-        leg = Leg(escape_pose(pose, towards_row, depth), robot.q, config.advance_speed, math.inf)
+        leg = Leg(escape_pose(pose, towards_row, depth), robot.q, config.work.advance_speed, math.inf)
         return Escaping(self._parts, FollowedMotion(self._parts, robot, leg)).step(robot, now)
 
 
@@ -329,19 +330,19 @@ class Travel(MovingStage):
             return self._escape(robot, now, text)
         if parts.ending:
             return self, parts.brake(robot, parts.ending)
-        if not config.pre_cut_check:
+        if not config.work.pre_cut_check:
             parts.refine(self.point_id, motion)
         parts.look_back(robot, now)
         tracking = self._way.track(robot)
         result = StepResult(tracking.xi, tracking)
         last = motion.leg == motion.legs - 1
-        if last and not config.pre_cut_check:
+        if last and not config.work.pre_cut_check:
             return Advance(parts, self._task, self._way), result
-        if last and camera_ready(robot, motion, config):
+        if last and camera_ready(robot, motion, config.work):
             parts.close_ups.ask(self.point_id, "seen", now)
             timeout.again()
             return CloseUp(parts, self._task, self._way), result
-        if not (config.pre_cut_check and timeout.over(tracking, now, 0.0)) and timeout.late(now):
+        if not (config.work.pre_cut_check and timeout.over(tracking, now, 0.0)) and timeout.late(now):
             return self._fail(robot, self.point_id, missed("the stand-off", tracking))
         return self, result
 
@@ -364,7 +365,7 @@ class CloseUp(MovingStage):
             return self, result
         parts.close_ups.forget(self.point_id)
         ticket = parts.queue.get(self.point_id)
-        if why := not_as_accepted(close_up, ticket, parts.config.moved_tolerance):
+        if why := not_as_accepted(close_up, ticket, parts.config.work.moved_tolerance):
             parts.queue.void(self.point_id, why)
             # The next period leaves it.
             return self, result
@@ -402,10 +403,10 @@ class Advance(MovingStage):
         parts.refine(self.point_id, motion, self._close_up_of)
         tracking = self._way.track(robot)
         result = StepResult(tracking.xi, tracking)
-        there = timeout.over(tracking, now, config.position_tolerance, config.rotation_tolerance)
+        there = timeout.over(tracking, now, config.work.position_tolerance, config.work.rotation_tolerance)
         # At the end of the motion, not during it.
-        rests = there and float(np.linalg.norm(robot.kinematics.J_xi[:3] @ tracking.xi)) < config.settle_speed
-        if rests and np.abs(tracking.xi[ARM_XI]).max() >= config.settle_joints:
+        rests = there and float(np.linalg.norm(robot.kinematics.J_xi[:3] @ tracking.xi)) < config.work.settle_speed
+        if rests and np.abs(tracking.xi[ARM_XI]).max() >= config.work.settle_joints:
             # Remaining corrections beside the tool's path can wait: the blades close at rest.
             motion.settle(robot.q)
             rests = False

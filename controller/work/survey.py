@@ -52,7 +52,7 @@ class Survey:
         """
         self._config, self._follower, self._saturation, self._queue = config, follower, saturation, queue
         self._homing: Homing | None = Homing(config, follower, 1.0 / config.rate_hz)
-        c, s = math.cos(config.row_heading), math.sin(config.row_heading)
+        c, s = math.cos(config.work.row_heading), math.sin(config.work.row_heading)
         self._along, self._left = np.array([c, s]), np.array([-s, c])
         self._distance = asked.distance if isinstance(asked, intents.Survey) else 0.0
         self._place = (
@@ -90,8 +90,8 @@ class Survey:
 
     def _drive(self, robot: Measured, x: float, aside: float, now: float) -> StepResult:
         left = self._goal - x
-        speed = math.copysign(min(self._config.survey_speed, math.sqrt(2.0 * _BRAKING * abs(left))), left)
-        turned = math.remainder(float(robot.q[2]) - self._config.row_heading, math.tau)
+        speed = math.copysign(min(self._config.work.survey_speed, math.sqrt(2.0 * _BRAKING * abs(left))), left)
+        turned = math.remainder(float(robot.q[2]) - self._config.work.row_heading, math.tau)
         turning = -_GAIN_HEADING * turned - _GAIN_ASIDE * speed * aside
         xi = np.zeros(NXI)
         xi[:2] = _wheels(robot, speed, turning)

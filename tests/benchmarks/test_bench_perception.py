@@ -101,7 +101,7 @@ def test_the_summary_has_a_figure_an_interval_and_a_number_for_each_measure():
 
 def test_the_bench_looks_as_often_as_a_survey_does():
     camera = load_section(resource("assets/config/sim.toml"), "bridge", BridgeConfig)
-    assert pytest.approx(ControllerConfig().survey_speed / camera.camera_moving_hz) == STEP
+    assert pytest.approx(ControllerConfig().work.survey_speed / camera.camera_moving_hz) == STEP
 
 
 def test_a_step_that_leads_nowhere_is_refused(capsys):

@@ -13,7 +13,7 @@ ROBOT = RobotModel()
 
 def reaching():
     q = np.zeros(12)
-    q[ARM_Q] = ControllerConfig().reach
+    q[ARM_Q] = ControllerConfig().work.reach
     return q
 
 

@@ -15,7 +15,7 @@ class Beside:
     """What `walk` needs of a loop, with a kinematic robot and a camera that sees 0.5 m to either side."""
 
     def __init__(self, row):
-        self.robot = KinematicRobot(Controller(CONFIG, RobotConfig()), CONFIG.home)
+        self.robot = KinematicRobot(Controller(CONFIG, RobotConfig()), CONFIG.work.home)
         self.controller, self.command = self.robot.controller, self.robot.ask
         self._row, self._seen = row, {}
         self.run(0.1)

@@ -8,8 +8,8 @@ from controller.whole_body.task import IkProblem, Posture, ToolTask
 from rolling_panda.model.robot import ARM_Q, RobotModel
 
 ROBOT, CONFIG, DT = RobotModel(), ControllerConfig(), 0.01
-METHOD = Hierarchy(ROBOT, CONFIG, DT)
-AHEAD = CONFIG.hierarchy.axle_ahead
+METHOD = Hierarchy(ROBOT, CONFIG.whole_body, DT)
+AHEAD = CONFIG.whole_body.hierarchy.axle_ahead
 #: The arm in front of the base, tool downwards.
 FRONT = np.array([0.0, -0.3, 0.0, -2.0, 0.0, 1.9, 0.0])
 

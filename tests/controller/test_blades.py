@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from controller.config import ControllerConfig
+from controller.config import ControllerConfig, WorkConfig
 from controller.work.blades import Blades
 
 
@@ -31,7 +31,7 @@ class Queue:
 
 def test_the_command_is_repeated_with_one_id_until_the_outcome_comes():
     queue = Queue()
-    blades = Blades(ControllerConfig(), queue, "run")
+    blades = Blades(WorkConfig(), queue, "run")
     blades.start("p1", 0.0)
     asked = [blades.command(0.01 * tick) for tick in range(20)]
     told = [command for command in asked if command is not None]
@@ -45,11 +45,11 @@ def test_the_command_is_repeated_with_one_id_until_the_outcome_comes():
 
 def test_without_a_word_the_cut_is_unknown_and_no_other_is_taken_for_it():
     config, queue = ControllerConfig(), Queue()
-    blades = Blades(config, queue, "run")
+    blades = Blades(config.work, queue, "run")
     blades.start("p1", 5.0)
     assert blades.command(5.0)
-    assert blades.watch(Bridge(), 5.0 + config.cut_timeout_s) == ()
-    (text,) = blades.watch(Bridge(), 5.1 + config.cut_timeout_s)
+    assert blades.watch(Bridge(), 5.0 + config.work.cut_timeout_s) == ()
+    (text,) = blades.watch(Bridge(), 5.1 + config.work.cut_timeout_s)
     assert "UNKNOWN" in text and queue.resolved[0][1] == "UNKNOWN"
     blades.start("p2", 20.0)
     # The late outcome of the first is not that of the second.
@@ -59,7 +59,7 @@ def test_without_a_word_the_cut_is_unknown_and_no_other_is_taken_for_it():
 
 def test_no_order_is_given_before_the_intent_is_durable():
     queue = Queue(durable=0)
-    blades = Blades(ControllerConfig(), queue, "run")
+    blades = Blades(WorkConfig(), queue, "run")
     blades.start("p1", 0.0)
     assert all(blades.command(0.01 * tick) is None for tick in range(50))
     queue.durable = 1
@@ -68,8 +68,8 @@ def test_no_order_is_given_before_the_intent_is_durable():
 
 def test_a_cut_that_was_never_ordered_is_no_unknown_one():
     config, queue = ControllerConfig(), Queue(durable=0)
-    blades = Blades(config, queue, "run")
+    blades = Blades(config.work, queue, "run")
     blades.start("p1", 0.0)
     assert blades.command(0.1) is None
-    (text,) = blades.watch(Bridge(), config.cut_timeout_s + 0.1)
+    (text,) = blades.watch(Bridge(), config.work.cut_timeout_s + 0.1)
     assert "no order was given" in text and queue.resolved[0][1] == "FAILED_NOT_CUT"

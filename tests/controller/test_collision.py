@@ -12,7 +12,7 @@ from rolling_panda.model.robot import ARM_Q, RobotModel
 
 ROBOT = RobotModel()
 MODEL = CollisionModel(ROBOT)
-HOME, REACH = np.array(ControllerConfig().home), np.array(ControllerConfig().reach)
+HOME, REACH = np.array(ControllerConfig().work.home), np.array(ControllerConfig().work.reach)
 seeds = st.integers(0, 2**32 - 1)
 
 

@@ -13,6 +13,6 @@ def test_the_simulations_configuration_agrees_with_the_defaults():
 def test_postures_are_inside_the_arms_limits():
     limits = RobotModel(load_section(SIM, "robot", RobotConfig)).limits
     config = ControllerConfig()
-    for posture in (config.home, config.reach):
+    for posture in (config.work.home, config.work.reach):
         assert (limits.lower[ARM_Q] + 0.2 < posture).all()
         assert (limits.upper[ARM_Q] - 0.2 > posture).all()

@@ -20,7 +20,7 @@ from tests.support.sent import newest
 pytestmark = pytest.mark.long
 
 CUT = (0.45, 0.75, 1.10)
-STAND_OFF = ControllerConfig().stand_off
+STAND_OFF = ControllerConfig().work.stand_off
 
 
 def cane(x, y=0.75, top=1.09, spur=1, foot=0.95):

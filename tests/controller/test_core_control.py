@@ -96,7 +96,7 @@ def test_when_nobody_watches_no_further_cut_begins_the_tool_comes_out_and_work_p
     run_until(r, lambda s: s.mode != "AUTO", r.now + 12.0)
     assert r.state.mode == "PAUSED" and "seen the robot" in r.state.reason
     assert len(r.cuts) <= 1
-    clear = CONFIG.row_distance - CONFIG.clearance + 0.08
+    clear = CONFIG.work.row_distance - CONFIG.work.clearance + 0.08
     if phase != "APPROACH":
         assert r.model.kinematics(r.q).T_odom_tool.translation[1] < clear
     r.watching = True

@@ -101,7 +101,7 @@ def test_a_post_in_between_is_not_met_and_the_tool_comes_back() -> None:
     r.obstacles = (Capsule("post", (x + 0.3, y, 0.0), (x + 0.3, y, 2.0), 0.05, 0.05),)
     r.run(0.1)
     beyond = at(start, x + 0.6, y, z)
-    assert lead(r, beyond, 5.0) >= CONFIG.hierarchy.blade_distance - 1e-4
+    assert lead(r, beyond, 5.0) >= CONFIG.whole_body.hierarchy.blade_distance - 1e-4
     assert missing(r, beyond) > 0.1 and np.abs(r.record[-1]).max() < 0.01
     assert recovers(r, start) > 0.0
 
@@ -127,7 +127,7 @@ def test_work_behind_a_post_ends_with_a_reason_and_the_rest_is_done() -> None:
     r.run(0.5)
     assert r.ask(intents.Home(user="ada")).ok
     r.run(12.0)
-    np.testing.assert_allclose(r.q[ARM_Q], CONFIG.home, atol=0.02)
+    np.testing.assert_allclose(r.q[ARM_Q], CONFIG.work.home, atol=0.02)
 
 
 def test_a_start_outside_a_joint_limit_comes_back_inside_and_is_never_sent_further_out() -> None:

@@ -32,7 +32,7 @@ def test_held_on_the_straight_way_back_the_tool_comes_out_by_joints_and_work_goe
     run_until(r, lambda s: s is not None and s.mode == "AUTO", 1.0)
     run_until(r, lambda s: s.active_point_id == "b" and s.phase == "APPROACH", 40.0)
     # Clear of the canes before it goes on to the next.
-    clear = CONFIG.row_distance - CONFIG.clearance + 0.02
+    clear = CONFIG.work.row_distance - CONFIG.work.clearance + 0.02
     assert r.model.kinematics(r.q).T_odom_tool.translation[1] < clear
     assert entry(r, "a").state == "DONE" and any("joint 1" in text and "by joints" in text for text in r.events)
     run_until(r, lambda s: s.mode != "AUTO", 60.0)

@@ -200,7 +200,7 @@ def test_home_brings_the_arm_back_with_the_base_still():
     assert r.ask(intents.Home(user="ada")).ok
     assert "Start" not in (newest(r.step(), m.ControllerState) or r.state).allowed
     r.run(10.0)
-    np.testing.assert_allclose(r.q[ARM_Q], CONFIG.home, atol=0.011)
+    np.testing.assert_allclose(r.q[ARM_Q], CONFIG.work.home, atol=0.011)
     np.testing.assert_allclose(r.q[:5], base, atol=1e-3)
     assert_limits_kept(r)
 

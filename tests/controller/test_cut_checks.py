@@ -16,7 +16,7 @@ class Work:
     """A queue with one accepted point that has been cut."""
 
     def __init__(self) -> None:
-        self.queue, self.client = PointQueue(CONFIG), CloseUpClient(2.0, 1)
+        self.queue, self.client = PointQueue(CONFIG.work), CloseUpClient(2.0, 1)
         self.check = PostCutCheck(self.queue, self.client, True)
         self.queue.update(m.PruningPoints(header=m.Header(), segmenter="", frames=1, points=(point("a", (0, 0, 1)),)))
         assert self.queue.accept("a", 1, "ada") == ""

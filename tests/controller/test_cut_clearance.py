@@ -14,7 +14,7 @@ from rolling_panda.model.robot import ARM_Q, RobotModel
 from rolling_panda.transport.inbox import Received
 
 CONFIG = ControllerConfig()
-SETTINGS = CONFIG.hierarchy
+SETTINGS = CONFIG.whole_body.hierarchy
 POINT = np.array([0.3, 0.785, 1.169])
 
 
@@ -24,12 +24,12 @@ def wire(height, y=0.75):
 
 def find(*capsules):
     """A plan for the point, among these."""
-    clearance = CutClearance(RobotModel(), CONFIG)
+    clearance = CutClearance(RobotModel(), CONFIG.whole_body.hierarchy)
     message = Obstacles(header=m.Header(0.0, "odom"), capsules=capsules)
     clearance.update(Received(message, 0.0))
     q = np.zeros(12)
-    q[ARM_Q] = CONFIG.home
-    search = PostureSearch(RobotModel(), CONFIG, clearance.too_near)
+    q[ARM_Q] = CONFIG.work.home
+    search = PostureSearch(RobotModel(), CONFIG.work, CONFIG.whole_body.joint_margin, clearance.too_near)
     return completed(search.find(POINT, np.array([0.0, 0.1, 1.0]), q))
 
 
@@ -101,7 +101,7 @@ def test_clear_of_the_canes_there_is_room_for_the_motion_to_lead_on():
     free = find()
     x, y, z = free.poses.clear.translation.tolist()
     beside = Capsule("wire", (x + 0.047, y, z - 0.03), (x + 0.047, y, z + 0.03), 0.002, 0.002)
-    clearance = CutClearance(RobotModel(), CONFIG)
+    clearance = CutClearance(RobotModel(), CONFIG.whole_body.hierarchy)
     clearance.update(Received(Obstacles(header=m.Header(0.0, "odom"), capsules=(beside,)), 0.0))
     near, far = free.q_clear.copy(), free.q_clear.copy()
     far[0] += 1.0

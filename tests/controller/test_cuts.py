@@ -15,6 +15,7 @@ from controller.planning.work_plan import PlanRequest
 from rolling_panda.config import RobotConfig
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.model.robot import ARM_Q, RobotModel
+from tests.support.controller_config import controller_config
 from tests.support.points import point as pruning_point
 
 CONFIG, ROBOT = ControllerConfig(), RobotModel()
@@ -28,7 +29,7 @@ def point(point_id, x, z=1.05, **changes):
 
 def request(*points, obstacles=(), number=1):
     q = np.zeros(12)
-    q[ARM_Q] = CONFIG.home
+    q[ARM_Q] = CONFIG.work.home
     return PlanRequest(number, q, points, obstacles)
 
 
@@ -121,7 +122,7 @@ def test_the_hash_changes_when_anything_does(what) -> None:
     elif what == "points":
         asked = replace(asked, points=(*asked.points, point("b", 1.2)))
     else:
-        planner = CutPlanner(msgspec.structs.replace(CONFIG, base_speed=0.25), RobotConfig())
+        planner = CutPlanner(controller_config(CONFIG, whole_body__base_speed=0.25), RobotConfig())
     assert planner.plan(asked).digest != before
 
 

@@ -1,23 +1,23 @@
 import numpy as np
 
-from controller.config import ControllerConfig
 from controller.motion.follower import Follower, Measured
 from controller.motion.tool_motion import Leg, ToolMotion
 from controller.whole_body.decoupled import Decoupled
 from controller.whole_body.saturation import Saturation
 from rolling_panda.model.robot import ARM_Q, RobotModel
+from tests.support.controller_config import controller_config
 
-ROBOT, CONFIG, DT = RobotModel(), ControllerConfig(method="decoupled"), 0.01
-GATE = Saturation(ROBOT, CONFIG, DT)
+ROBOT, CONFIG, DT = RobotModel(), controller_config(whole_body__method="decoupled"), 0.01
+GATE = Saturation(ROBOT, CONFIG.whole_body, DT)
 
 
 def run(q_goal, seconds):
     """Follow one motion from home; configurations and velocities on the way, and the last tracking."""
     q = np.zeros(12)
-    q[ARM_Q] = CONFIG.home
-    follower = Follower(CONFIG, Decoupled(ROBOT, CONFIG, DT), DT)
-    leg = Leg(ROBOT.pose(q_goal, ROBOT.tool_id), q_goal, CONFIG.tool_speed)
-    motion = ToolMotion(CONFIG, ROBOT.pose(q, ROBOT.tool_id), q, [leg])
+    q[ARM_Q] = CONFIG.work.home
+    follower = Follower(CONFIG.motion, Decoupled(ROBOT, CONFIG.whole_body, DT), DT)
+    leg = Leg(ROBOT.pose(q_goal, ROBOT.tool_id), q_goal, CONFIG.work.tool_speed)
+    motion = ToolMotion(CONFIG.motion, CONFIG.whole_body, ROBOT.pose(q, ROBOT.tool_id), q, [leg])
     sent, record = np.zeros(9), []
     for _ in range(round(seconds / DT)):
         tracking = follower.follow(motion, Measured(q, ROBOT.kinematics(q), sent))
@@ -33,7 +33,7 @@ def run(q_goal, seconds):
 def goal(x, y, phi):
     q = np.zeros(12)
     q[:3] = x, y, phi
-    q[ARM_Q] = np.array(CONFIG.home) + [0.2, 0.1, 0.0, 0.2, 0.0, 0.1, 0.0]
+    q[ARM_Q] = np.array(CONFIG.work.home) + [0.2, 0.1, 0.0, 0.2, 0.0, 0.1, 0.0]
     return q
 
 

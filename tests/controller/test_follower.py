@@ -1,4 +1,3 @@
-import msgspec
 import numpy as np
 import pinocchio as pin
 
@@ -8,15 +7,16 @@ from controller.motion.tool_motion import Leg, ToolMotion
 from controller.whole_body.registry import make_method
 from controller.whole_body.saturation import Saturation
 from rolling_panda.model.robot import ARM_Q, RobotModel
+from tests.support.controller_config import controller_config
 
 ROBOT, CONFIG, DT = RobotModel(), ControllerConfig(), 0.01
-SATURATION = Saturation(ROBOT, CONFIG, DT)
-FOLLOWER = Follower(CONFIG, make_method(ROBOT, CONFIG, DT), DT)
+SATURATION = Saturation(ROBOT, CONFIG.whole_body, DT)
+FOLLOWER = Follower(CONFIG.motion, make_method(ROBOT, CONFIG.whole_body, DT), DT)
 
 
 def start():
     q = np.zeros(12)
-    q[ARM_Q] = CONFIG.home
+    q[ARM_Q] = CONFIG.work.home
     return q
 
 
@@ -44,10 +44,12 @@ def test_path_is_kept_when_the_limits_slow_the_motion():
     q, sent = start(), np.zeros(9)
     T = ROBOT.pose(q, ROBOT.tool_id)
     goal = pin.SE3(T.rotation, T.translation + np.array([0.2, 0.15, 0.1]))
-    hasty = ControllerConfig(tool_acceleration=50.0, tool_jerk=500.0, arm_velocity_scale=0.15)
-    saturation = Saturation(ROBOT, hasty, DT)
-    follower = Follower(hasty, make_method(ROBOT, hasty, DT), DT)
-    motion = ToolMotion(hasty, T, q, [Leg(goal, q, 3.0)])
+    hasty = controller_config(
+        motion__tool_acceleration=50.0, motion__tool_jerk=500.0, whole_body__arm_velocity_scale=0.15
+    )
+    saturation = Saturation(ROBOT, hasty.whole_body, DT)
+    follower = Follower(hasty.motion, make_method(ROBOT, hasty.whole_body, DT), DT)
+    motion = ToolMotion(hasty.motion, hasty.whole_body, T, q, [Leg(goal, q, 3.0)])
     way = (goal.translation - T.translation) / np.linalg.norm(goal.translation - T.translation)
     steps, off = 0, 0.0
     while steps < 1500:
@@ -66,8 +68,8 @@ def test_path_is_kept_when_the_limits_slow_the_motion():
 
 def test_arm_motion_ends_at_its_goal_with_the_base_still():
     q, sent = start(), np.zeros(9)
-    goal = np.array(CONFIG.reach)
-    motion = ArmMotion(CONFIG, q[ARM_Q].copy(), goal)
+    goal = np.array(CONFIG.work.reach)
+    motion = ArmMotion(CONFIG.motion, q[ARM_Q].copy(), goal)
     for _ in range(1000):
         sent = motion.step(measured(q, sent), FOLLOWER, DT).xi
         q = integrate(q, sent)
@@ -78,12 +80,12 @@ def test_arm_motion_ends_at_its_goal_with_the_base_still():
 
 def peak_error_with_a_lag(lag: float, reckoned: float) -> float:
     """Of the tool on 0.3 m (m), every joint following with a first-order lag (s)."""
-    config = msgspec.structs.replace(CONFIG, arm_lag_s=reckoned)
-    follower = Follower(config, make_method(ROBOT, config, DT), DT)
+    config = controller_config(CONFIG, motion__arm_lag_s=reckoned)
+    follower = Follower(config.motion, make_method(ROBOT, config.whole_body, DT), DT)
     q, sent, xi, peak = start(), np.zeros(9), np.zeros(9), 0.0
     T = ROBOT.pose(q, ROBOT.tool_id)
     goal = pin.SE3(T.rotation, T.translation + np.array([0.1, -0.2, 0.2]))
-    motion = ToolMotion(config, T, q, [Leg(goal, q, 0.4)])
+    motion = ToolMotion(config.motion, config.whole_body, T, q, [Leg(goal, q, 0.4)])
     while not motion.done:
         kinematics = ROBOT.kinematics(q)
         tracking = follower.follow(motion, Measured(q, kinematics, sent))

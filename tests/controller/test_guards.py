@@ -15,25 +15,31 @@ from controller.whole_body.saturation import Saturation
 from controller.whole_body.task import IkProblem, Posture, ToolTask
 from controller.whole_body.tipping import Tipping
 from rolling_panda.model.robot import ARM_Q, RobotModel
+from tests.support.controller_config import controller_config
 
 ROBOT, CONFIG, DT = RobotModel(), ControllerConfig(), 0.01
-SETTINGS = CONFIG.hierarchy
+SETTINGS = CONFIG.whole_body.hierarchy
 COLLISION = CollisionModel(ROBOT)
-GUARDED = Hierarchy(ROBOT, CONFIG, DT, (CollisionGuard(COLLISION, SETTINGS, DT),))
-BLIND = Hierarchy(ROBOT, CONFIG, DT)
-GATE = Saturation(ROBOT, CONFIG, DT)
+GUARDED = Hierarchy(ROBOT, CONFIG.whole_body, DT, (CollisionGuard(COLLISION, SETTINGS, DT),))
+BLIND = Hierarchy(ROBOT, CONFIG.whole_body, DT)
+GATE = Saturation(ROBOT, CONFIG.whole_body, DT)
 #: Full rated base, as the vendor allows it, and the arm stretched forward: what tips.
-FAST = ControllerConfig(base_speed=1.5, base_acceleration=2.4, base_braking=2.4, base_yaw_rate=1.0)
+FAST = controller_config(
+    whole_body__base_speed=1.5,
+    whole_body__base_acceleration=2.4,
+    whole_body__base_braking=2.4,
+    whole_body__base_yaw_rate=1.0,
+)
 STRETCHED = (0.0, 0.9, 0.0, -0.5, 0.0, 1.6, 0.0)
 
 
-def lead(method, twist, seconds, base="row", keep_path=True, arm=CONFIG.home):
+def lead(method, twist, seconds, base="row", keep_path=True, arm=CONFIG.work.home):
     """Ask for one twist all the time; configurations and answers on the way."""
     q, sent, scale, way = np.zeros(12), np.zeros(9), 1.0, []
     q[ARM_Q] = arm
     for _ in range(round(seconds / DT)):
         posture = q.copy()
-        posture[ARM_Q] = CONFIG.home
+        posture[ARM_Q] = CONFIG.work.home
         out = method.solve(
             IkProblem(
                 q,
@@ -94,7 +100,7 @@ def test_a_tool_led_into_its_own_base_stops_before_it():
 def test_a_robot_that_something_was_put_upon_moves_out_of_it():
     """An obstacle appears inside the distance that is kept: the pair parts, without any problem."""
     q = np.zeros(12)
-    q[ARM_Q] = CONFIG.home
+    q[ARM_Q] = CONFIG.work.home
     tool = ROBOT.pose(q, ROBOT.tool_id).translation
     perch = tuple(tool + [0.005, 0, 0])
     COLLISION.set_obstacles([Obstacle("bird", "cane", perch, perch, 0.01)])
@@ -117,7 +123,7 @@ def test_wherever_a_hand_leads_the_tool_nothing_is_touched(seed):
     )
     try:
         q, sent = np.zeros(12), np.zeros(9)
-        q[ARM_Q] = CONFIG.home
+        q[ARM_Q] = CONFIG.work.home
         for i in range(300):
             if i % 75 == 0:
                 twist = np.concatenate([rng.normal(0, 0.25, 3), rng.normal(0, 0.6, 3)])
@@ -154,8 +160,8 @@ def stop(method, tipping):
 
 def test_stopping_with_the_arm_stretched_forward_keeps_the_caster_on_the_ground():
     tipping = Tipping(ROBOT)
-    tipped, _, _ = stop(Hierarchy(ROBOT, FAST, DT), tipping)
-    kept, q, sent = stop(Hierarchy(ROBOT, FAST, DT, (TippingGuard(tipping, DT),)), tipping)
+    tipped, _, _ = stop(Hierarchy(ROBOT, FAST.whole_body, DT), tipping)
+    kept, q, sent = stop(Hierarchy(ROBOT, FAST.whole_body, DT, (TippingGuard(tipping, DT),)), tipping)
     assert tipped < 0.0 < kept
     # It does stop, only later.
     assert np.abs(sent[:2]).max() < 0.05 and q[0] < 2.0

@@ -1,7 +1,7 @@
 import msgspec
 import pytest
 
-from controller.config import ControllerConfig
+from controller.config import SupervisionConfig
 from controller.supervision.health import FINE, Health, cause, check, health
 from rolling_panda import messages as m
 from rolling_panda import topics
@@ -10,7 +10,7 @@ from rolling_panda.messages.robot import RejectionCount
 from rolling_panda.transport.inbox import Inbox
 from tests.support.fake_wire import bridge_state, joints
 
-CONFIG = ControllerConfig()
+CONFIG = SupervisionConfig()
 ALL = frozenset({"bridge", "controller", "perception", "server"})
 HEALTHY = Health(0.01, 0.02, 0.05, 0.05, 0.05, ALL, watchdog=False, overruled=False)
 

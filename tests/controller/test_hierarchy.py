@@ -10,11 +10,12 @@ from controller.whole_body.saturation import Saturation
 from controller.whole_body.task import ActuatorTask, IkProblem, Inequalities, Posture, ToolTask
 from rolling_panda.model.robot import ARM_Q, ARM_XI, RobotModel
 from tests.controller.test_follower import integrate
+from tests.support.controller_config import controller_config
 
 ROBOT, CONFIG, DT = RobotModel(), ControllerConfig(), 0.01
 LIMITS = ROBOT.limits
-BARE = ControllerConfig(
-    hierarchy=HierarchyConfig(
+BARE = controller_config(
+    whole_body__hierarchy=HierarchyConfig(
         base_heading=0.0,
         base_place=0.0,
         arm_posture=0.0,
@@ -24,9 +25,9 @@ BARE = ControllerConfig(
         damping=0.0,
     )
 )
-UNDAMPED = ControllerConfig(hierarchy=HierarchyConfig(damping=0.0))
-METHOD = Hierarchy(ROBOT, CONFIG, DT)
-GATE = Saturation(ROBOT, CONFIG, DT)
+UNDAMPED = controller_config(whole_body__hierarchy=HierarchyConfig(damping=0.0))
+METHOD = Hierarchy(ROBOT, CONFIG.whole_body, DT)
+GATE = Saturation(ROBOT, CONFIG.whole_body, DT)
 TWIST = np.array([0.05, 0.02, -0.03, 0.05, -0.1, 0.02])
 MODES = ("row", "free", "transit", "frozen")
 seeds = st.integers(0, 2**32 - 1)
@@ -35,7 +36,7 @@ seeds = st.integers(0, 2**32 - 1)
 def home():
     q = np.zeros(12)
     q[2] = 0.3
-    q[ARM_Q] = CONFIG.home
+    q[ARM_Q] = CONFIG.work.home
     return q
 
 
@@ -63,7 +64,7 @@ def settled(method, make, ticks=80):
 def test_the_tool_moves_exactly_as_asked_whatever_the_posture_wants(base):
     q = home()
     J = ROBOT.kinematics(q).J_xi
-    for arm in (CONFIG.home, CONFIG.reach):
+    for arm in (CONFIG.work.home, CONFIG.work.reach):
         out = settled(METHOD, lambda sent, arm=arm: ik_problem(q, sent=sent, arm=arm, base=base))
         np.testing.assert_allclose(J @ out.xi, TWIST * out.scale, atol=1e-6)
         assert out.scale > 0.99 and out.feasible
@@ -72,7 +73,7 @@ def test_the_tool_moves_exactly_as_asked_whatever_the_posture_wants(base):
 def test_a_posture_moves_the_robot():
     q = home()
     still = settled(METHOD, lambda sent: ik_problem(q, 0 * TWIST, sent))
-    moved = settled(METHOD, lambda sent: ik_problem(q, 0 * TWIST, sent, arm=CONFIG.reach))
+    moved = settled(METHOD, lambda sent: ik_problem(q, 0 * TWIST, sent, arm=CONFIG.work.reach))
     assert np.abs(still.xi).max() < 1e-2 < 0.1 < np.abs(moved.xi).max()
 
 
@@ -80,9 +81,9 @@ def test_with_one_velocity_for_every_twist_the_answer_is_the_closed_form():
     """Arm alone and bare of other tasks: the least velocity in shares of the limits, (J W⁻¹)⁺ in closed form."""
     q = home()
     J = ROBOT.kinematics(q).J_xi[:, ARM_XI]
-    speed = LIMITS.velocity[ARM_XI] * CONFIG.arm_velocity_scale
+    speed = LIMITS.velocity[ARM_XI] * CONFIG.whole_body.arm_velocity_scale
     closed = speed * (np.linalg.pinv(J * speed) @ TWIST)
-    method = Hierarchy(ROBOT, BARE, DT)
+    method = Hierarchy(ROBOT, BARE.whole_body, DT)
     out = settled(method, lambda sent: ik_problem(q, sent=sent, base="frozen"))
     np.testing.assert_allclose(out.xi[ARM_XI], closed, atol=1e-6)
 
@@ -102,7 +103,7 @@ def relaxed(seed):
 def test_no_lower_task_ever_reaches_the_tool(seed):
     """‖J ξ̇(with) − J ξ̇(without)‖ < 1e-8 wherever no limit slows the tool itself."""
     problem = relaxed(seed)
-    outs = [Hierarchy(ROBOT, config, DT).solve(problem) for config in (UNDAMPED, BARE)]
+    outs = [Hierarchy(ROBOT, config.whole_body, DT).solve(problem) for config in (UNDAMPED, BARE)]
     answers = [out.xi for out in outs]
     J = problem.kinematics.J_xi
     if problem.tool.free_axis:
@@ -115,7 +116,7 @@ def test_no_lower_task_ever_reaches_the_tool(seed):
 
 def test_the_tool_is_rarely_slowed_there():
     """So that the property above is not true of nothing."""
-    scales = [Hierarchy(ROBOT, UNDAMPED, DT).solve(relaxed(seed)).scale for seed in range(60)]
+    scales = [Hierarchy(ROBOT, UNDAMPED.whole_body, DT).solve(relaxed(seed)).scale for seed in range(60)]
     assert np.mean(np.array(scales) > 1.0 - 1e-9) > 0.8
 
 
@@ -125,7 +126,7 @@ def test_the_tool_is_rarely_slowed_there():
 def test_whatever_is_asked_from_wherever_no_limit_is_broken(seed):
     """Random problems, modes, options and postures for two seconds from a random state, integrated."""
     rng = np.random.default_rng(seed)
-    method = Hierarchy(ROBOT, CONFIG, DT, guards=(_Random(rng),))
+    method = Hierarchy(ROBOT, CONFIG.whole_body, DT, guards=(_Random(rng),))
     q, sent = home(), np.zeros(9)
     q[ARM_Q] = rng.uniform(LIMITS.lower[ARM_Q] + 0.04, LIMITS.upper[ARM_Q] - 0.04)
     scale, make = 1.0, {}
@@ -144,8 +145,8 @@ def test_whatever_is_asked_from_wherever_no_limit_is_broken(seed):
         assert GATE.admits(out.xi, sent)
         assert (np.abs(out.xi - sent) <= LIMITS.acceleration * DT + 1e-9).all()
         v, omega = ROBOT.drive.twist(out.xi[0], out.xi[1])
-        assert abs(v) <= CONFIG.base_speed + 1e-9 and abs(omega) <= CONFIG.base_yaw_rate + 1e-9
-        assert not make["keep_path"] or out.scale <= scale + CONFIG.hierarchy.clock_rise * DT + 1e-9
+        assert abs(v) <= CONFIG.whole_body.base_speed + 1e-9 and abs(omega) <= CONFIG.whole_body.base_yaw_rate + 1e-9
+        assert not make["keep_path"] or out.scale <= scale + CONFIG.whole_body.hierarchy.clock_rise * DT + 1e-9
         sent, scale = out.xi, out.scale
         q = integrate(q, sent)
         assert (q[ARM_Q] >= LIMITS.lower[ARM_Q]).all() and (q[ARM_Q] <= LIMITS.upper[ARM_Q]).all()
@@ -219,7 +220,7 @@ def test_too_much_is_answered_with_less_of_the_same():
 
 def test_a_clock_that_stood_starts_again_gently():
     out = METHOD.solve(ik_problem(home(), 0.01 * TWIST, scale=0.0))
-    assert out.scale == pytest.approx(CONFIG.hierarchy.clock_rise * DT, rel=1e-3)
+    assert out.scale == pytest.approx(CONFIG.whole_body.hierarchy.clock_rise * DT, rel=1e-3)
 
 
 def test_the_speed_cap_holds_the_tool_back_and_the_clock_with_it():
@@ -234,7 +235,7 @@ def test_a_free_axis_leaves_the_turn_about_the_cane_to_the_posture():
     q = home()
     k = ROBOT.kinematics(q)
     R = k.T_odom_tool.rotation
-    arm = np.array(CONFIG.home)
+    arm = np.array(CONFIG.work.home)
     arm[6] += 0.5
     turns = []
     for free in (False, True):
@@ -264,7 +265,7 @@ class _Wall:
 def test_a_guard_comes_before_the_tool():
     q = home()
     J = ROBOT.kinematics(q).J_xi
-    method = Hierarchy(ROBOT, CONFIG, DT, guards=(_Wall(0.01),))
+    method = Hierarchy(ROBOT, CONFIG.whole_body, DT, guards=(_Wall(0.01),))
     out = settled(method, lambda sent: ik_problem(q, sent=sent))
     assert (J @ out.xi)[0] <= 0.01 + 1e-8
     assert 0.1 < out.scale < 0.3
@@ -273,7 +274,7 @@ def test_a_guard_comes_before_the_tool():
 
 def test_a_guard_that_cannot_be_kept_is_named_and_given_way_to_as_little_as_possible():
     """The wall comes at the robot at 5 m/s: everything flees within its limits, and says why."""
-    method = Hierarchy(ROBOT, CONFIG, DT, guards=(_Wall(-5.0),))
+    method = Hierarchy(ROBOT, CONFIG.whole_body, DT, guards=(_Wall(-5.0),))
     q = home()
     sent = np.zeros(9)
     for _ in range(50):
@@ -281,7 +282,9 @@ def test_a_guard_that_cannot_be_kept_is_named_and_given_way_to_as_little_as_poss
         assert GATE.admits(out.xi, sent)
         assert not out.feasible and "blades and post 3" in out.reason
         sent = out.xi
-    best = -np.abs(ROBOT.kinematics(q).J_xi[0, ARM_XI]) @ (LIMITS.velocity[ARM_XI] * CONFIG.arm_velocity_scale)
+    best = -np.abs(ROBOT.kinematics(q).J_xi[0, ARM_XI]) @ (
+        LIMITS.velocity[ARM_XI] * CONFIG.whole_body.arm_velocity_scale
+    )
     assert (ROBOT.kinematics(q).J_xi @ out.xi)[0] < 0.9 * best
 
 
@@ -289,7 +292,7 @@ def test_before_a_wall_a_path_is_kept_and_says_what_holds_it_while_a_hand_slides
     q = home()
     J = ROBOT.kinematics(q).J_xi
     twist = np.array([0.05, 0.05, 0.0, 0.0, 0.0, 0.0])
-    method = Hierarchy(ROBOT, CONFIG, DT, guards=(_Wall(0.0),))
+    method = Hierarchy(ROBOT, CONFIG.whole_body, DT, guards=(_Wall(0.0),))
     kept = settled(method, lambda sent: ik_problem(q, twist, sent))
     assert np.abs(J @ kept.xi).max() < 5e-4 and kept.scale < 1e-2
     assert not kept.feasible and kept.reason == "blades and post 3 holds the tool back"

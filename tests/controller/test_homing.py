@@ -31,7 +31,7 @@ def homing(*obstacles: Capsule) -> KinematicRobot:
 def test_it_gets_home_when_nothing_is_in_the_way() -> None:
     robot = homing()
     robot.run(12.0)
-    np.testing.assert_allclose(robot.q[ARM_Q], CONFIG.home, atol=0.012)
+    np.testing.assert_allclose(robot.q[ARM_Q], CONFIG.work.home, atol=0.012)
     assert any("the arm is home" in event for event in robot.events)
 
 

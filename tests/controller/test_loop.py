@@ -69,7 +69,7 @@ class Rest:
         joints, odometry, bridge = self._senders
         for request in self.asked.drain():
             self.fence.claim(request.message.token, request.at, True)
-        joints.put(m.JointState(header=header, sequence=n, position=(0.0, 0.0, *CONFIG.home), velocity=(0.0,) * 9))
+        joints.put(m.JointState(header=header, sequence=n, position=(0.0, 0.0, *CONFIG.work.home), velocity=(0.0,) * 9))
         odometry.put(m.Odometry(header=header, sequence=n, pose=m.PlanarPose(), linear=0.0, angular=0.0))
         bridge.put(
             m.BridgeState(

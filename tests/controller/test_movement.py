@@ -15,7 +15,7 @@ from tests.support.controller_at_work import CONFIG, robot
 @pytest.fixture(scope="module")
 def movement():
     config, lines = ControllerConfig(), EventLogger(Journal())
-    return Movement(config, RobotConfig(), PointQueue(config), lines, "run", lambda _: None)
+    return Movement(config, RobotConfig(), PointQueue(config.work), lines, "run", lambda _: None)
 
 
 def test_an_unmeasured_robot_is_not_moved(movement):
@@ -45,7 +45,7 @@ def test_under_a_latched_stop_braking_is_sent_and_rest_is_not(movement):
 
 def test_nobody_in_control_means_rest_whatever_the_mode(movement):
     r = robot()
-    r.q[ARM_Q] = CONFIG.reach
+    r.q[ARM_Q] = CONFIG.work.reach
     movement.update(r.inputs())
     movement.go_home()
     for _ in range(20):

@@ -23,7 +23,7 @@ class Searches:
 
 
 def queue():
-    q = PointQueue(CONFIG)
+    q = PointQueue(CONFIG.work)
     shown = (point("a", (0.2, 0.75, 1.0)), point("b", (0.6, 0.75, 1.0)))
     q.update(m.PruningPoints(header=m.Header(), segmenter="none", frames=1, points=shown))
     for each in shown:

@@ -1,20 +1,20 @@
 import numpy as np
 
-from controller.config import ControllerConfig
 from controller.whole_body.nullspace import Nullspace
 from controller.whole_body.registry import METHODS, make_method
 from controller.whole_body.task import IkProblem, Posture, ToolTask
 from rolling_panda.model.robot import ARM_Q, RobotModel
+from tests.support.controller_config import controller_config
 
-ROBOT, CONFIG, DT = RobotModel(), ControllerConfig(method="nullspace"), 0.01
-METHOD = make_method(ROBOT, CONFIG, DT)
+ROBOT, CONFIG, DT = RobotModel(), controller_config(whole_body__method="nullspace"), 0.01
+METHOD = make_method(ROBOT, CONFIG.whole_body, DT)
 TWIST = np.array([0.05, 0.02, -0.03, 0.05, -0.1, 0.02])
 
 
-def problem(twist=TWIST, frozen=False, arm=CONFIG.home, sent=None):
+def problem(twist=TWIST, frozen=False, arm=CONFIG.work.home, sent=None):
     q = np.zeros(12)
     q[2] = 0.3
-    q[ARM_Q] = CONFIG.home
+    q[ARM_Q] = CONFIG.work.home
     reference = q.copy()
     reference[ARM_Q] = arm
     sent = np.zeros(9) if sent is None else sent
@@ -36,13 +36,13 @@ def test_tool_moves_as_asked():
 
 
 def test_a_posture_moves_the_robot_but_not_the_tool():
-    still, moved = settled(), settled(arm=np.array(CONFIG.home) + [0.5, -0.3, 0.2, 0.5, 0.3, 0.0, -0.3])
+    still, moved = settled(), settled(arm=np.array(CONFIG.work.home) + [0.5, -0.3, 0.2, 0.5, 0.3, 0.0, -0.3])
     assert np.linalg.norm(moved.xi - still.xi) > 0.1
     np.testing.assert_allclose(problem().kinematics.J_xi @ (moved.xi - still.xi), 0, atol=1e-3)
 
 
 def test_with_the_base_frozen_only_the_arm_moves():
-    out = settled(frozen=True, arm=CONFIG.reach)
+    out = settled(frozen=True, arm=CONFIG.work.reach)
     assert not out.xi[:2].any()
     np.testing.assert_allclose(problem().kinematics.J_xi @ out.xi, TWIST, atol=1e-3)
 

@@ -143,7 +143,7 @@ def test_a_cut_is_approached_from_where_somebody_wants_it(degrees):
 
 def test_the_plan_says_at_once_what_a_turn_means():
     q = np.zeros(12)
-    q[ARM_Q] = CONFIG.home
+    q[ARM_Q] = CONFIG.work.home
     planner = CutPlanner(CONFIG, RobotConfig())
     straight = planner.plan(PlanRequest(1, q, (POINT,)))
     turned = planner.plan(PlanRequest(1, q, (POINT,), turned=(("a", 0.5),)))

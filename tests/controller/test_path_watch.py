@@ -21,7 +21,7 @@ from tests.support.points import point
 
 A, B = point("a", (0.45, 0.75, 1.05)), point("b", (0.75, 0.75, 1.1))
 START = np.zeros(12)
-START[ARM_Q] = CONFIG.home
+START[ARM_Q] = CONFIG.work.home
 KNOWN = Capsule("wire", (-2.0, 0.75, 1.7), (2.0, 0.75, 1.7), 0.004, 0.004)
 MADE = Rollout(CONFIG, RobotConfig()).roll(PreviewRequest(1, START, (A, B), (KNOWN,)))
 MODEL = CollisionModel(RobotModel())
@@ -33,7 +33,7 @@ CONFIGURATIONS = [
 
 
 def watch(made=MADE):
-    return PathWatch(made, made.swept, CONFIG.hierarchy)
+    return PathWatch(made, made.swept, CONFIG.whole_body.hierarchy)
 
 
 def upright(x, y, kind="post", radius=0.03, **changes):
@@ -57,7 +57,7 @@ def nearest(capsule):
 def test_it_speaks_of_what_is_too_near_and_of_nothing_else(x, y, kind):
     thing = upright(x, y, kind)
     least, said = nearest(thing), watch().changed([KNOWN, thing])
-    kept = {part: CONFIG.hierarchy.kept((part, f"{kind} ")) for part in least}
+    kept = {part: CONFIG.whole_body.hierarchy.kept((part, f"{kind} ")) for part in least}
     if any(distance < kept[part] for part, distance in least.items()):
         assert f"a {kind} is seen" in said
     shown = max(cut.clearance for cut in MADE.cuts)
@@ -71,7 +71,7 @@ def test_what_was_known_may_be_seen_a_little_elsewhere_and_no_more():
         each for each in (upright(x, y + 0.001 * step) for step in range(0, 400)) if not watch().changed([KNOWN, each])
     )
     least = nearest(close)
-    assert 0.001 < min(least[part] - CONFIG.hierarchy.kept((part, "post ")) for part in least) < 0.015
+    assert 0.001 < min(least[part] - CONFIG.whole_body.hierarchy.kept((part, "post ")) for part in least) < 0.015
     made = replace(MADE, request=replace(MADE.request, obstacles=(KNOWN, close)))
     nearer = 0.9 * SAME, 3.0 * SAME
     said = [watch(made).changed([KNOWN, upright(x, close.start[1] - by)]) for by in nearer]

@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import msgspec
 
-from controller.config import ControllerConfig
+from controller.config import SupervisionConfig
 from controller.supervision import health as safety
 from controller.supervision import modes
 from controller.supervision.permission import Situation, allowed, refusal
@@ -29,7 +29,7 @@ def well(**changes: object) -> safety.Health:
 
 def situation(mode: str = "READY", **changes: object) -> Situation:
     state = replace(modes.boot(), mode=mode)
-    usual = Situation(ControllerConfig(), state, WELL, homing=False, busy="", waits="", rights=modes.OPERATOR)
+    usual = Situation(SupervisionConfig(), state, WELL, homing=False, busy="", waits="", rights=modes.OPERATOR)
     return replace(usual, **changes)
 
 

@@ -2,7 +2,7 @@ import msgspec
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controller.config import ControllerConfig
+from controller.config import WorkConfig
 from controller.work.point_queue import PointQueue
 from rolling_panda import messages as m
 from tests.support.points import point as pruning_point
@@ -19,7 +19,7 @@ def shown(*points):
 
 
 def queue(*points):
-    q = PointQueue(ControllerConfig())
+    q = PointQueue(WorkConfig())
     q.update(shown(*points))
     return q
 
@@ -158,7 +158,7 @@ def test_accepted_points_follow_an_order_asked_for_and_the_others_keep_their_pla
 
 
 def test_another_content_than_was_seen_is_refused():
-    queue = PointQueue(ControllerConfig())
+    queue = PointQueue(WorkConfig())
     point = msgspec.structs.replace(POINT, digest="ab" * 16)
     queue.update(m.PruningPoints(header=m.Header(), segmenter="s", frames=1, points=(point,)))
     assert "not what was seen" in queue.accept(point.point_id, point.revision, "Ada", "cd" * 16)
@@ -168,7 +168,7 @@ def test_another_content_than_was_seen_is_refused():
 
 
 def test_a_decision_is_taken_back_until_the_cut_begins():
-    queue = PointQueue(ControllerConfig())
+    queue = PointQueue(WorkConfig())
     queue.update(m.PruningPoints(header=m.Header(), segmenter="s", frames=1, points=(POINT,)))
     assert "nothing to take back" in queue.reconsider("a", "Ada")
     assert queue.accept("a", POINT.revision, "Ada") == "" and queue.reconsider("a", "Ada") == ""

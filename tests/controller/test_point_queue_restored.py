@@ -2,7 +2,7 @@
 
 import msgspec
 
-from controller.config import ControllerConfig
+from controller.config import WorkConfig
 from controller.ledger.journal import Journal, LedgerState, TicketRow
 from controller.work.point_queue import PointQueue
 from tests.controller.test_point_queue import POINT, point, shown
@@ -13,7 +13,7 @@ class Life:
 
     def __init__(self, rows=()):
         self.journal = Journal()
-        self.queue = PointQueue(ControllerConfig(), self.journal)
+        self.queue = PointQueue(WorkConfig(), self.journal)
         self.before = dict(rows)
         self.queue.restore(msgspec.json.decode(body, type=TicketRow) for body in self.before.values())
 

@@ -6,14 +6,14 @@ from controller.work.posture_search import CutPlan, PostureSearch, Unreachable
 from rolling_panda.model.robot import ARM_Q, RobotModel
 
 ROBOT, CONFIG = RobotModel(), ControllerConfig()
-SEARCH = PostureSearch(RobotModel(), CONFIG)
+SEARCH = PostureSearch(RobotModel(), CONFIG.work, CONFIG.whole_body.joint_margin)
 UP = np.array([0.0, 0.0, 1.0])
 
 
 def find(position, tangent=UP, lateral=0.0):
     q = np.zeros(12)
     q[1] = lateral
-    q[ARM_Q] = CONFIG.home
+    q[ARM_Q] = CONFIG.work.home
     search, steps = SEARCH.find(np.array(position), tangent, q), 0
     while True:
         try:

@@ -9,7 +9,7 @@ from tests.support.controller_at_work import CONFIG
 
 MODEL = CollisionModel(RobotModel())
 START = np.zeros(12)
-START[ARM_Q] = CONFIG.home
+START[ARM_Q] = CONFIG.work.home
 
 
 def test_its_places_are_close_to_each_other_and_from_the_first_to_the_last():

@@ -24,7 +24,7 @@ pytestmark = pytest.mark.long
 POINTS = (point("a", (0.45, 0.75, 1.05)), point("b", (0.75, 0.75, 1.1), (0.1, 0.0, 0.995)))
 DRIVE = RobotModel(RobotConfig()).drive
 START = np.zeros(12)
-START[ARM_Q] = CONFIG.home
+START[ARM_Q] = CONFIG.work.home
 
 
 @pytest.fixture(autouse=True)
@@ -34,7 +34,7 @@ def no_planner(monkeypatch):
 
 def test_what_is_done_is_what_was_shown():
     """On a robot that is half as late again as the preview reckons with."""
-    p = Previewed(POINTS, lag=1.5 * CONFIG.arm_lag_s)
+    p = Previewed(POINTS, lag=1.5 * CONFIG.motion.arm_lag_s)
     shown = p.previewed()
     rows = np.array([row.tool for row in p.motion.rows])
     assert p.ask(intents.ApprovePreview, preview_hash=shown.preview_hash) == ""
@@ -109,7 +109,7 @@ def test_where_the_tool_cannot_leave_the_canes_nothing_is_cut_and_no_point_is_to
 
 
 def test_what_asks_for_more_torque_than_a_joint_has_is_not_cut_and_says_so():
-    robot, queue = RobotModel(), PointQueue(CONFIG)
+    robot, queue = RobotModel(), PointQueue(CONFIG.work)
     log = CutLog(robot, CollisionModel(robot), queue)
     log.sample(Measured(START, robot.kinematics(START), np.zeros(NXI)), "a", 0.0)
     log.closed("a", 0.5)

@@ -4,7 +4,7 @@ import msgspec
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controller.config import ControllerConfig
+from controller.config import WorkConfig
 from controller.ledger.journal import Journal
 from controller.ledger.start import restored
 from controller.ledger.store import Ledger
@@ -32,7 +32,7 @@ D = revised("d", 2.5, 1)
 
 
 def accepted(*names):
-    q = PointQueue(ControllerConfig())
+    q = PointQueue(WorkConfig())
     q.update(shown(A, B, C))
     for name in names:
         assert q.accept(name, 3, "ada") == ""
@@ -101,7 +101,7 @@ def test_perception_that_starts_anew_is_no_change_of_the_rule():
 
 
 def test_the_ledger_has_the_acceptance_again_as_it_was(tmp_path):
-    q = PointQueue(ControllerConfig(), journal := Journal())
+    q = PointQueue(WorkConfig(), journal := Journal())
     q.update(shown(A, B, C))
     q.accept("a", 3, "ada")
     q.update(shown(A_SHORT, B, C, rule=SHORT))
@@ -111,7 +111,7 @@ def test_the_ledger_has_the_acceptance_again_as_it_was(tmp_path):
         ledger.append(_entry("2026-11-22T08:00:00+00:00", record) for record in journal.drain())
     rows = {row.point.point_id: row for row in restored(tmp_path).tickets}
     assert (rows["a"].state, rows["a"].user, rows["a"].accepted) == ("ACCEPTED", "ada", A)
-    anew = PointQueue(ControllerConfig())
+    anew = PointQueue(WorkConfig())
     anew.restore(rows.values())
     anew.update(shown(A, B, C))
     assert anew.next().accepted == A
@@ -123,7 +123,7 @@ POINTS = {"a": (A, A_SHORT), "b": (B, revised("b", 2.03, 5)), "c": (C, C), "e": 
 @given(st.sets(st.sampled_from("abce")), st.lists(st.sampled_from([SHORT, LONG]), max_size=4), st.booleans())
 def test_whatever_is_accepted_taking_rules_back_leaves_it_as_before(names, rules, early):
     """Under each rule each point is as in the first column of POINTS, or as in the second."""
-    q = PointQueue(ControllerConfig())
+    q = PointQueue(WorkConfig())
     views = {USUAL: 0, SHORT: 1, LONG: 1}
 
     def see(rule):

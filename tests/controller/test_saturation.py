@@ -2,13 +2,13 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from controller.config import ControllerConfig
+from controller.config import WholeBodyConfig
 from controller.whole_body.saturation import Saturation
 from rolling_panda.model.robot import ARM_Q, RobotModel
 
 ROBOT = RobotModel()
 DT = 0.01
-SATURATION = Saturation(ROBOT, ControllerConfig(), DT)
+SATURATION = Saturation(ROBOT, WholeBodyConfig(), DT)
 LOWER, UPPER = ROBOT.limits.lower[ARM_Q], ROBOT.limits.upper[ARM_Q]
 seeds = st.integers(0, 2**32 - 1)
 
@@ -94,7 +94,7 @@ def test_what_is_not_finite_is_not_admitted():
 
 def test_what_is_sent_keeps_the_rated_jerk():
     """At 1 kHz from speeding up to braking the change of acceleration takes its periods; what is in reach is sent."""
-    saturation = Saturation(ROBOT, ControllerConfig(), 0.001)
+    saturation = Saturation(ROBOT, WholeBodyConfig(), 0.001)
     step, jerk = saturation.acceleration * 0.001, ROBOT.limits.jerk * 1e-6
     before, sent = np.zeros(9), step
     out = saturation.smooth(np.zeros(9), sent, before)

@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from controller.config import ControllerConfig
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.guards.collision import CollisionGuard
 from controller.whole_body.nullspace import Nullspace
@@ -16,10 +15,11 @@ from controller.whole_body.saturation import Saturation
 from controller.whole_body.speed_scaling import SpeedScaling, allowed_speed_scale
 from controller.whole_body.task import IkProblem, Inequalities, Posture, ToolTask
 from rolling_panda.model.robot import ARM_Q, RobotModel
+from tests.support.controller_config import controller_config
 
-ROBOT, CONFIG, DT = RobotModel(), ControllerConfig(method="nullspace"), 0.01
+ROBOT, CONFIG, DT = RobotModel(), controller_config(whole_body__method="nullspace"), 0.01
 COLLISION = CollisionModel(ROBOT)
-GATE = Saturation(ROBOT, CONFIG, DT)
+GATE = Saturation(ROBOT, CONFIG.whole_body, DT)
 NUMBERS = st.floats(-2.0, 2.0)
 
 
@@ -44,7 +44,7 @@ def lead(method, twist, seconds, q=None, sent=None):
     """Ask for one twist all the time; where that leads, and the answers."""
     if q is None:
         q = np.zeros(12)
-        q[ARM_Q] = CONFIG.home
+        q[ARM_Q] = CONFIG.work.home
     sent, answers = np.zeros(9) if sent is None else sent, []
     for _ in range(round(seconds / DT)):
         problem = IkProblem(q, ROBOT.kinematics(q), sent, ToolTask(np.array(twist)), Posture(q.copy()), "free")
@@ -60,7 +60,7 @@ def lead(method, twist, seconds, q=None, sent=None):
 @pytest.fixture
 def post():
     q = np.zeros(12)
-    q[ARM_Q] = CONFIG.home
+    q[ARM_Q] = CONFIG.work.home
     x, y, _ = ROBOT.pose(q, ROBOT.tool_id).translation.tolist()
     COLLISION.set_obstacles([Obstacle("post 1", "post", (x, y + 0.25, 0.0), (x, y + 0.25, 2.0), 0.04)])
     yield
@@ -69,9 +69,9 @@ def post():
 
 def test_it_stops_before_what_is_in_the_way_says_so_and_gets_away_again(post):
     towards = (0.0, 0.2, 0.0, 0.0, 0.0, 0.0)
-    blind, _, _ = lead(make_method(ROBOT, CONFIG, DT), towards, 2.0)
+    blind, _, _ = lead(make_method(ROBOT, CONFIG.whole_body, DT), towards, 2.0)
     assert COLLISION.least(blind).distance < 0.0
-    braked = make_method(ROBOT, CONFIG, DT, COLLISION)
+    braked = make_method(ROBOT, CONFIG.whole_body, DT, COLLISION)
     assert isinstance(braked, SpeedScaling) and braked.name == "nullspace" and braked.flows
     q, sent, answers = lead(braked, towards, 3.0)
     assert 0.0 < COLLISION.least(q).distance < 0.05
@@ -84,14 +84,16 @@ def test_it_stops_before_what_is_in_the_way_says_so_and_gets_away_again(post):
 
 
 def test_where_nothing_is_near_the_answer_is_the_methods_own():
-    own = Nullspace(ROBOT, CONFIG, DT)
+    own = Nullspace(ROBOT, CONFIG.whole_body, DT)
     _, _, free = lead(own, (0.1, 0.0, 0.05, 0.0, 0.0, 0.0), 0.3)
-    _, _, guarded = lead(make_method(ROBOT, CONFIG, DT, COLLISION), (0.1, 0.0, 0.05, 0.0, 0.0, 0.0), 0.3)
+    _, _, guarded = lead(make_method(ROBOT, CONFIG.whole_body, DT, COLLISION), (0.1, 0.0, 0.05, 0.0, 0.0, 0.0), 0.3)
     assert all(np.array_equal(a.xi, b.xi) for a, b in zip(free, guarded, strict=True))
 
 
 def test_numbers_that_are_not_finite_brake(post):
-    braked = SpeedScaling(Nullspace(ROBOT, CONFIG, DT), CollisionGuard(COLLISION, CONFIG.hierarchy, DT), GATE)
+    braked = SpeedScaling(
+        Nullspace(ROBOT, CONFIG.whole_body, DT), CollisionGuard(COLLISION, CONFIG.whole_body.hierarchy, DT), GATE
+    )
     q = np.zeros(12)
     problem = IkProblem(q, ROBOT.kinematics(q), np.full(9, 0.1), ToolTask(np.full(6, np.nan)), Posture(q), "free")
     out = braked.solve(problem)

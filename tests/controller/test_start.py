@@ -7,7 +7,7 @@ import sqlite3
 import msgspec
 import pytest
 
-from controller.config import ControllerConfig
+from controller.config import WorkConfig
 from controller.ledger.check import verify
 from controller.ledger.journal import ApproachRow, Journal, OrderRow, PreviewRequiredRow, TicketRow
 from controller.ledger.start import Restored, restored, start_record
@@ -59,7 +59,7 @@ def test_a_cut_under_way_in_a_ledger_of_schema_1_is_restored(tmp_path):
     database.execute("PRAGMA user_version = 1")
     database.close()
     assert restored(tmp_path).tickets == (row,)
-    queue = PointQueue(ControllerConfig(), Journal())
+    queue = PointQueue(WorkConfig(), Journal())
     queue.restore(restored(tmp_path).tickets)
     assert queue.entries()[0].state == "UNKNOWN", "somebody has to look how it ended"
     assert verify(tmp_path).problem == "", "the row itself is as it was written"

@@ -16,7 +16,7 @@ from tests.support.sent import every, newest
 
 def ready():
     r = robot()
-    r.q[ARM_Q] = CONFIG.reach
+    r.q[ARM_Q] = CONFIG.work.reach
     r.step()
     assert r.ask(intents.Arm(user="ada")).ok
     run_until(r, lambda s: s is not None and s.mode == "READY", 1.0)

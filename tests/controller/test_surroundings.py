@@ -14,10 +14,11 @@ from rolling_panda.messages.perception import Capsule, Obstacles
 from rolling_panda.messages.supervision import TeleopTarget
 from rolling_panda.model.robot import RobotModel, pose_message
 from rolling_panda.transport.inbox import Received
+from tests.support.controller_config import controller_config
 from tests.support.worlds.kinematic_robot import KinematicRobot
 
 CONFIG = ControllerConfig()
-HOME = np.concatenate([np.zeros(5), CONFIG.home])
+HOME = np.concatenate([np.zeros(5), CONFIG.work.home])
 
 
 def told(*capsules: Capsule) -> Received[Obstacles]:
@@ -93,7 +94,9 @@ def test_a_cut_far_from_every_cane_exempts_none() -> None:
 @pytest.mark.parametrize("method", ["hierarchy", "nullspace", "decoupled"])
 def test_a_post_in_the_way_of_the_held_tool_is_not_met(method: str) -> None:
     """The tool is led straight through a post; it stops before it, and the reason names it."""
-    robot = KinematicRobot(Controller(msgspec.structs.replace(CONFIG, method=method), RobotConfig()), CONFIG.home)
+    robot = KinematicRobot(
+        Controller(controller_config(CONFIG, whole_body__method=method), RobotConfig()), CONFIG.work.home
+    )
     tool = robot.model.kinematics(robot.q).T_odom_tool
     ahead = tool.translation + 0.25 * tool.rotation[:, 2]
     robot.obstacles = told(post(float(ahead[0]), float(ahead[1]))).message.capsules

@@ -34,20 +34,20 @@ def tell(r, *undecided_sites):
 
 def test_it_drives_the_whole_way_with_the_arm_in_its_looking_posture_and_tells_what_was_found():
     r = surveying(1.0, ASKING)
-    r.q[ARM_Q] = np.array(CONFIG.home) + 0.2
+    r.q[ARM_Q] = np.array(CONFIG.work.home) + 0.2
     places = []
     run_until(r, lambda s: s is not None and s.mode == "AUTO", 1.0)
     while r.state.mode == "AUTO":
         assert r.state.phase == "SURVEY" and r.now < 40.0
         places.append(r.q[:3].copy())
         if r.q[0] > 0.05:
-            assert np.abs(r.q[ARM_Q] - CONFIG.home).max() < 0.02
+            assert np.abs(r.q[ARM_Q] - CONFIG.work.home).max() < 0.02
         r.step()
     assert r.state.mode == "READY"
     assert r.state.reason == "surveyed: 1 vine, 2 spurs, 1 point; 0 places still unclear, 1 place for you to decide"
     assert max(place[0] for place in places) == max(r.q[0], 0.0) or abs(r.q[0] - 1.0) < 0.02
     speed = np.abs(np.diff([place[0] for place in places])) / r.dt
-    assert 0.1 < speed.max() < CONFIG.survey_speed * 1.05
+    assert 0.1 < speed.max() < CONFIG.work.survey_speed * 1.05
     assert max(abs(place[1]) for place in places) < 0.01 and not r.cuts
 
 

@@ -17,7 +17,7 @@ ROBOT, CONFIG = RobotModel(), ControllerConfig()
 SPEED = np.array([0.3, 0.2, *[2.0] * 7])
 
 
-def demand(arm=CONFIG.home, sent=None, posture=None):
+def demand(arm=CONFIG.work.home, sent=None, posture=None):
     q = np.zeros(12)
     q[ARM_Q] = arm
     sent = np.zeros(9) if sent is None else sent
@@ -55,7 +55,7 @@ def test_smoothness_asks_for_the_last_velocity_in_terms_of_v_and_omega():
 
 def test_a_joint_is_sent_back_only_near_its_limit_and_the_more_the_nearer():
     task = JointCentre(10.0, 2.0, 0.25, ROBOT.limits, SPEED)
-    arm = np.array(CONFIG.home)
+    arm = np.array(CONFIG.work.home)
     assert not written(task, demand(arm))[0].any()
     pushes = []
     for distance in (0.2, 0.1, 0.0):

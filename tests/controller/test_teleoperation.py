@@ -12,14 +12,15 @@ from rolling_panda.messages.perception import Capsule
 from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
 from rolling_panda.model.robot import pose_message
 from rolling_panda.transport.inbox import Received
+from tests.support.controller_config import controller_config
 from tests.support.worlds.kinematic_robot import KinematicRobot
 
 CONFIG = ControllerConfig()
 
 
-def robot(armed=True, method=CONFIG.method):
-    config = msgspec.structs.replace(CONFIG, method=method)
-    r = KinematicRobot(Controller(config, RobotConfig()), CONFIG.home)
+def robot(armed=True, method=CONFIG.whole_body.method):
+    config = controller_config(CONFIG, whole_body__method=method)
+    r = KinematicRobot(Controller(config, RobotConfig()), CONFIG.work.home)
     r.run(0.05)
     if armed:
         assert r.ask(intents.Arm(user="ada")).ok
@@ -52,7 +53,7 @@ def test_tool_follows_the_gizmo_within_its_speed():
     assert np.linalg.norm(tool(r).translation - target.translation) < 0.002
     assert np.linalg.norm(pin.log3(tool(r).rotation.T @ target.rotation)) < 0.01
     # This base lags by less than the controller reckons with, so that the arm makes good too much for a moment.
-    assert 0.1 < fastest <= 1.08 * CONFIG.teleop_speed
+    assert 0.1 < fastest <= 1.08 * CONFIG.teleoperation.speed
 
 
 @pytest.mark.parametrize("about", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)])
@@ -74,7 +75,11 @@ def test_the_tool_keeps_to_the_speed_scale(speed_scale):
     before = tool(r).translation
     r.run(1.5)
     way = float(np.linalg.norm(tool(r).translation - before))
-    assert 0.6 * speed_scale * 1.5 * CONFIG.teleop_speed < way <= 1.08 * speed_scale * 1.5 * CONFIG.teleop_speed
+    assert (
+        0.6 * speed_scale * 1.5 * CONFIG.teleoperation.speed
+        < way
+        <= 1.08 * speed_scale * 1.5 * CONFIG.teleoperation.speed
+    )
 
 
 def test_a_hand_is_told_how_near_it_is_to_what_and_what_holds_it():
@@ -137,7 +142,10 @@ def test_silence_ends_the_hold():
 
 
 def test_a_demand_that_comes_late_or_twice_counts_for_nothing():
-    teleoperation, age = Teleoperation(CONFIG, None, None), CONFIG.hold_max_age_s
+    teleoperation, age = (
+        Teleoperation(CONFIG.teleoperation, CONFIG.work, None, None),
+        CONFIG.teleoperation.hold_max_age_s,
+    )
 
     def holding(sequence, at, hold=True, now=None):
         message = TeleopTarget(sequence=sequence, hold=hold, user="ada", base=BaseVelocity(0.1, 0.0))
@@ -271,7 +279,7 @@ def test_the_base_is_driven_no_faster_than_it_comes_to_rest_from_in_time():
         held(r, base=base)
         r.run(1.5)
         wheels = np.abs(r.xi[:2]) * r.model.drive.wheel_radius
-        assert wheels.max() == pytest.approx(CONFIG.teleop_base_speed, rel=0.02)
+        assert wheels.max() == pytest.approx(CONFIG.teleoperation.base_speed, rel=0.02)
         v, omega = r.model.drive.twist(*r.xi[:2])
         assert v * base.angular == pytest.approx(omega * base.linear, abs=1e-3), "slowed alike"
 
@@ -283,5 +291,5 @@ def test_a_tool_that_is_led_along_the_row_takes_the_base_no_faster_than_that():
     for _ in range(400):
         r.step()
         fastest = max(fastest, np.abs(r.xi[:2]).max() * r.model.drive.wheel_radius)
-    assert fastest == pytest.approx(CONFIG.teleop_base_speed, rel=0.02)
+    assert fastest == pytest.approx(CONFIG.teleoperation.base_speed, rel=0.02)
     assert r.q[0] > 0.3, "and it does take it along"

@@ -24,8 +24,8 @@ def motion(corners, frozen=False, **changes):
     for number, corner in enumerate(corners[1:]):
         q = np.zeros(12)
         q[5] = number + 1.0
-        legs.append(Leg(corner, q, CONFIG.tool_speed, math.inf if frozen and number == 0 else 0.0))
-    return ToolMotion(CONFIG, corners[0], np.zeros(12), legs, **changes)
+        legs.append(Leg(corner, q, CONFIG.work.tool_speed, math.inf if frozen and number == 0 else 0.0))
+    return ToolMotion(CONFIG.motion, CONFIG.whole_body, corners[0], np.zeros(12), legs, **changes)
 
 
 def at(path, time):
@@ -97,11 +97,11 @@ def out_over_and_in(along, base, arm_only=0.05):
     out = pose((0.0, -0.22, 0.0), (0.0, 0.0, 0.0))
     over, cut = pose((along, -0.22, 0.0), (0.0, 0.0, 0.0)), pose((along, 0.0, 0.0), (0.0, 0.0, 0.0))
     legs = [
-        Leg(out, q_out, CONFIG.tool_speed, frozen_until=arm_only),
-        Leg(over, q_goal, CONFIG.tool_speed),
-        Leg(cut, q_goal, CONFIG.tool_speed, frozen_within=arm_only),
+        Leg(out, q_out, CONFIG.work.tool_speed, frozen_until=arm_only),
+        Leg(over, q_goal, CONFIG.work.tool_speed),
+        Leg(cut, q_goal, CONFIG.work.tool_speed, frozen_within=arm_only),
     ]
-    return ToolMotion(CONFIG, pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), np.zeros(12), legs)
+    return ToolMotion(CONFIG.motion, CONFIG.whole_body, pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), np.zeros(12), legs)
 
 
 @given(st.floats(-1.5, 1.5))
@@ -117,8 +117,8 @@ def test_between_cuts_the_base_is_on_its_way_whenever_the_tool_is_not_at_a_cut(a
         places.append(posture.q[0])
         base_speed.append(abs(posture.rate[0]))
     assert places[0] == 0.0 and places[-1] == pytest.approx(along)
-    assert max(base_speed) <= CONFIG.base_speed
-    assert np.abs(np.diff(base_speed)).max() / dt <= 1.1 * CONFIG.base_acceleration
+    assert max(base_speed) <= CONFIG.whole_body.base_speed
+    assert np.abs(np.diff(base_speed)).max() / dt <= 1.1 * CONFIG.whole_body.base_acceleration
 
 
 def test_a_short_way_of_the_base_costs_no_time():
@@ -131,8 +131,8 @@ def test_a_short_way_of_the_base_costs_no_time():
 def test_the_last_stretch_to_a_cut_is_slow():
     goal = pose((0.0, 0.15, 0.0), (0.0, 0.0, 0.0))
     path = motion([pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), goal], slow_end=True)
-    inside = pose((0.0, 0.15 - 0.9 * CONFIG.slow_zone, 0.0), (0.0, 0.0, 0.0))
-    assert path.cap(inside) == pytest.approx(CONFIG.cut_speed)
+    inside = pose((0.0, 0.15 - 0.9 * CONFIG.motion.slow_zone, 0.0), (0.0, 0.0, 0.0))
+    assert path.cap(inside) == pytest.approx(CONFIG.motion.cut_speed)
     assert path.cap(pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))) > 0.2
 
 
@@ -150,8 +150,8 @@ def test_a_goal_that_moves_under_way_makes_no_jump_and_is_reached(share, later, 
                 path.shift(part)
             around.append(at(path, time + step * dt))
         twist = np.array([state.twist[:3] for state in around])
-        assert np.abs(np.diff(twist, axis=0)).max() < 1.2 * CONFIG.tool_acceleration * dt
-        assert np.abs(np.diff(twist, 2, axis=0)).max() < 3.0 * CONFIG.tool_jerk * dt**2
+        assert np.abs(np.diff(twist, axis=0)).max() < 1.2 * CONFIG.motion.tool_acceleration * dt
+        assert np.abs(np.diff(twist, 2, axis=0)).max() < 3.0 * CONFIG.motion.tool_jerk * dt**2
         position = np.array([state.T_odom_tool.translation for state in around])
         np.testing.assert_allclose(np.diff(position, axis=0), dt * (twist[1:] + twist[:-1]) / 2, atol=1e-9)
     end = at(path, path.duration)
@@ -168,7 +168,7 @@ def test_a_motion_that_is_extended_on_its_way_or_at_its_end_goes_on_without_a_ju
     before = at(path, time)
     q = np.zeros(12)
     q[5] = 2.0
-    path.extend(Leg(corners[2], q, CONFIG.tool_speed, 0.05))
+    path.extend(Leg(corners[2], q, CONFIG.work.tool_speed, 0.05))
     after = at(path, time)
     np.testing.assert_allclose(after.T_odom_tool.homogeneous, before.T_odom_tool.homogeneous, atol=1e-12)
     np.testing.assert_allclose(after.twist, before.twist, atol=1e-12)
@@ -183,7 +183,7 @@ def test_the_base_may_move_while_a_motion_waits_and_not_once_it_is_in_the_canes(
     path = motion([pose((0, 0, 0), (0, 0, 0)), there], waits=True)
     path.time = path.duration + 3.0
     assert path.base == "row"
-    path.extend(Leg(cut, np.zeros(12), CONFIG.tool_speed, CONFIG.arm_only))
+    path.extend(Leg(cut, np.zeros(12), CONFIG.work.tool_speed, CONFIG.work.arm_only))
     assert path.base == "row"
     path.time = path.duration - 0.01
     assert path.base == "frozen"

@@ -9,7 +9,7 @@ from rolling_panda.errors import InputError
 from rolling_panda.model.robot import ARM_XI, RobotModel
 
 ROBOT = RobotModel()
-HOME = np.array(ControllerConfig().home)
+HOME = np.array(ControllerConfig().work.home)
 STRETCHED = np.array([0.0, 1.57, 0.0, -0.07, 0.0, 1.6, 0.0])
 
 

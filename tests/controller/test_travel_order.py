@@ -2,7 +2,6 @@
 
 import itertools
 
-import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -15,12 +14,13 @@ from controller.planning.order import length, shortest, travel_times
 from controller.work.approach_segments import ApproachSegments
 from controller.work.posture_search import PostureSearch, completed
 from rolling_panda.model.robot import ARM_Q, RobotModel
+from tests.support.controller_config import controller_config
 
 ROBOT, CONFIG, UP = RobotModel(), ControllerConfig(), np.array([0.0, 0.0, 1.0])
 START = np.zeros(12)
-START[ARM_Q] = CONFIG.home
+START[ARM_Q] = CONFIG.work.home
 TOOL = ROBOT.pose(START, ROBOT.tool_id).copy()
-SEARCH = PostureSearch(RobotModel(), CONFIG)
+SEARCH = PostureSearch(RobotModel(), CONFIG.work, CONFIG.whole_body.joint_margin)
 CUTS = [completed(SEARCH.find(np.array([x, 0.75, 1.05]), UP, START)) for x in (0.4, 1.4, 2.4)]
 
 
@@ -29,16 +29,16 @@ def test_a_motion_takes_as_long_as_the_slowest_of_base_arm_and_tool() -> None:
     assert times.shape == (4, 3)
     np.testing.assert_allclose(np.diag(times[1:]), 0.0, atol=0.05)
     # A metre of the base, by the quintic that it follows.
-    assert times[1, 1] > 1.0 / CONFIG.base_speed
-    assert times[1, 2] - times[1, 1] == pytest.approx(PEAK_VELOCITY / (0.8 * CONFIG.base_speed), rel=0.01)
-    slow = msgspec.structs.replace(CONFIG, base_speed=0.5 * CONFIG.base_speed)
+    assert times[1, 1] > 1.0 / CONFIG.whole_body.base_speed
+    assert times[1, 2] - times[1, 1] == pytest.approx(PEAK_VELOCITY / (0.8 * CONFIG.whole_body.base_speed), rel=0.01)
+    slow = controller_config(CONFIG, whole_body__base_speed=0.5 * CONFIG.whole_body.base_speed)
     assert travel_times(slow, True, (TOOL, START), CUTS)[1, 1] > 1.5 * times[1, 1]
 
 
 def test_a_method_that_rests_between_segments_takes_the_sum_of_their_times() -> None:
-    drive, reach = ApproachSegments(CONFIG, False).there(CUTS[1], TOOL, START)
-    first = ToolMotion(CONFIG, TOOL, START, [drive], flows=False).duration
-    second = ToolMotion(CONFIG, drive.goal, drive.q_goal, [reach], flows=False).duration
+    drive, reach = ApproachSegments(CONFIG.work, False).there(CUTS[1], TOOL, START)
+    first = ToolMotion(CONFIG.motion, CONFIG.whole_body, TOOL, START, [drive], flows=False).duration
+    second = ToolMotion(CONFIG.motion, CONFIG.whole_body, drive.goal, drive.q_goal, [reach], flows=False).duration
     assert travel_times(CONFIG, False, (TOOL, START), CUTS)[0, 1] == pytest.approx(first + second)
 
 

@@ -44,7 +44,7 @@ def jogged(xi, seconds):
 def test_the_base_speeds_up_as_fast_as_it_may_over_periods_of_its_own():
     drive = jogged(np.array([2.0, 2.0, *[0.0] * 7]), 0.2)
     speed = [ROBOT.drive.twist(*xi[:2])[0] for xi in drive.record]
-    np.testing.assert_allclose(np.diff(speed[::20]), drive.config.base_acceleration * 0.02, rtol=0.01)
+    np.testing.assert_allclose(np.diff(speed[::20]), drive.config.whole_body.base_acceleration * 0.02, rtol=0.01)
 
 
 def test_the_tool_keeps_to_its_path(fast):

@@ -7,9 +7,10 @@ from controller.config import ControllerConfig
 from controller.whole_body.actuation import Actuation
 from controller.whole_body.velocity_bounds import VelocityBounds
 from rolling_panda.model.robot import ARM_Q, ARM_XI, RobotModel
+from tests.support.controller_config import controller_config
 
 ROBOT, CONFIG, DT = RobotModel(), ControllerConfig(), 0.01
-BOX, ACTUATION = VelocityBounds(ROBOT, CONFIG, DT), Actuation(ROBOT.drive)
+BOX, ACTUATION = VelocityBounds(ROBOT, CONFIG.whole_body, DT), Actuation(ROBOT.drive)
 LOWER, UPPER = ROBOT.limits.lower[ARM_Q], ROBOT.limits.upper[ARM_Q]
 MIDDLE = (LOWER + UPPER) / 2
 seeds = st.integers(0, 2**32 - 1)
@@ -44,7 +45,7 @@ def test_something_is_possible_from_any_state(seed):
     brake = BOX.brake(xi, before)
     slowest = np.concatenate([brake[:2], np.clip(brake, *_reachable(bounds))[2:]])
     assert inside(bounds, slowest)
-    reach = ROBOT.limits.acceleration[ARM_XI] * CONFIG.arm_acceleration_scale * DT + 1e-12
+    reach = ROBOT.limits.acceleration[ARM_XI] * CONFIG.whole_body.arm_acceleration_scale * DT + 1e-12
     assert (np.abs(bounds.upper - ACTUATION.nu(xi))[ARM_XI] <= reach).all()
     assert (np.abs(bounds.lower - ACTUATION.nu(xi))[ARM_XI] <= reach).all()
 
@@ -53,8 +54,11 @@ def _reachable(bounds):
     return ACTUATION.xi(bounds.lower), ACTUATION.xi(bounds.upper)
 
 
-SHARES = {"as configured": CONFIG, "hasty": ControllerConfig(arm_velocity_scale=1.0, arm_acceleration_scale=1.0)}
-SHARES["gentle"] = ControllerConfig(arm_jerk_scale=0.05)
+SHARES = {
+    "as configured": CONFIG,
+    "hasty": controller_config(whole_body__arm_velocity_scale=1.0, whole_body__arm_acceleration_scale=1.0),
+}
+SHARES["gentle"] = controller_config(whole_body__arm_jerk_scale=0.05)
 
 
 @pytest.mark.long
@@ -65,11 +69,11 @@ SHARES["gentle"] = ControllerConfig(arm_jerk_scale=0.05)
 def test_whatever_is_chosen_inside_the_bounds_no_limit_is_ever_broken(rate_hz, shares, seed):
     """For seconds an end of every joint's interval, the worst that can be chosen, or anything between, for any time."""
     config, dt, rng = SHARES[shares], 1.0 / rate_hz, np.random.default_rng(seed)
-    box, limits = VelocityBounds(ROBOT, config, dt), ROBOT.limits
-    most = limits.velocity[ARM_XI] * config.arm_velocity_scale + 1e-9
-    acceleration = limits.acceleration[ARM_XI] * config.arm_acceleration_scale + 1e-6
-    jerk = limits.jerk[ARM_XI] * config.arm_jerk_scale * (1 + 1e-6)
-    margin = config.joint_margin - 1e-9
+    box, limits = VelocityBounds(ROBOT, config.whole_body, dt), ROBOT.limits
+    most = limits.velocity[ARM_XI] * config.whole_body.arm_velocity_scale + 1e-9
+    acceleration = limits.acceleration[ARM_XI] * config.whole_body.arm_acceleration_scale + 1e-6
+    jerk = limits.jerk[ARM_XI] * config.whole_body.arm_jerk_scale * (1 + 1e-6)
+    margin = config.whole_body.joint_margin - 1e-9
     q, sent, before = at(rng.uniform(LOWER + margin, UPPER - margin)), np.zeros(9), np.zeros(9)
     for i in range(round(3.0 * rate_hz)):
         if rng.random() < rng.choice([2.0, 20.0]) * dt or i == 0:
@@ -89,7 +93,7 @@ def test_whatever_is_chosen_inside_the_bounds_no_limit_is_ever_broken(rate_hz, s
 
 def test_a_joint_still_comes_to_its_limit_and_its_full_speed():
     """The bounds cost nothing but time: at 1 kHz a joint that is pushed uses what it has."""
-    box, dt = VelocityBounds(ROBOT, CONFIG, 0.001), 0.001
+    box, dt = VelocityBounds(ROBOT, CONFIG.whole_body, 0.001), 0.001
     q, sent, before, fastest = at(MIDDLE), np.zeros(9), np.zeros(9), np.zeros(7)
     for _ in range(3000):
         nu = box.at(q, sent, before).upper
@@ -97,8 +101,8 @@ def test_a_joint_still_comes_to_its_limit_and_its_full_speed():
         q[ARM_Q] += nu[ARM_XI] * dt
         before, sent = sent, nu
         fastest = np.maximum(fastest, nu[ARM_XI])
-    assert (UPPER - CONFIG.joint_margin - q[ARM_Q] < 1e-3).all()
-    np.testing.assert_allclose(fastest, ROBOT.limits.velocity[ARM_XI] * CONFIG.arm_velocity_scale, rtol=0.02)
+    assert (UPPER - CONFIG.whole_body.joint_margin - q[ARM_Q] < 1e-3).all()
+    np.testing.assert_allclose(fastest, ROBOT.limits.velocity[ARM_XI] * CONFIG.whole_body.arm_velocity_scale, rtol=0.02)
 
 
 @pytest.mark.parametrize("rate_hz", [100, 1000])
@@ -106,8 +110,8 @@ def test_a_joint_still_comes_to_its_limit_and_its_full_speed():
 @given(seeds)
 def test_braking_for_a_reason_keeps_the_rated_jerk_and_comes_to_rest(rate_hz, seed):
     dt, rng = 1.0 / rate_hz, np.random.default_rng(seed)
-    box, sent = VelocityBounds(ROBOT, CONFIG, dt), rng.normal(0, 1, 9)
-    before = sent - rng.uniform(-1, 1, 9) * ROBOT.limits.acceleration * CONFIG.arm_acceleration_scale * dt
+    box, sent = VelocityBounds(ROBOT, CONFIG.whole_body, dt), rng.normal(0, 1, 9)
+    before = sent - rng.uniform(-1, 1, 9) * ROBOT.limits.acceleration * CONFIG.whole_body.arm_acceleration_scale * dt
     for _ in range(round(2.0 * rate_hz)):
         new = box.brake(sent, before)
         jerk = np.abs(new - 2 * sent + before)[ARM_XI] / dt**2
@@ -136,11 +140,11 @@ def test_speeding_up_is_slower_than_braking_and_both_end_at_rest():
     q = at(MIDDLE)
     fast = ACTUATION.xi(np.array([0.2, 0.0, *[0.0] * 7]))
     bounds = BOX.at(q, fast, fast)
-    assert bounds.upper[0] - 0.2 == pytest.approx(CONFIG.base_acceleration * DT)
-    assert 0.2 - bounds.lower[0] == pytest.approx(CONFIG.base_braking * DT)
+    assert bounds.upper[0] - 0.2 == pytest.approx(CONFIG.whole_body.base_acceleration * DT)
+    assert 0.2 - bounds.lower[0] == pytest.approx(CONFIG.whole_body.base_braking * DT)
     crawling = ACTUATION.xi(np.array([0.001, 0.0, *[0.0] * 7]))
     slow = BOX.at(q, crawling, crawling)
-    assert slow.lower[0] == pytest.approx(0.001 - CONFIG.base_acceleration * DT)
+    assert slow.lower[0] == pytest.approx(0.001 - CONFIG.whole_body.base_acceleration * DT)
 
 
 def test_braking_comes_to_rest_along_the_arc():

@@ -23,6 +23,7 @@ from rolling_panda.model.robot import ARM_Q, RobotModel
 from rolling_panda.resources import resource
 from rolling_panda.transport.inbox import Inbox
 from server.config import ServerConfig
+from tests.support.controller_config import controller_config
 from tests.support.sent import every
 
 SIM = resource("assets/config/sim.toml")
@@ -35,10 +36,10 @@ PROMISED = {
     ("real", "arm.deadline_s"): 0.2,
     ("robot", "wheel_velocity"): 11.2,
     ("robot", "wheel_acceleration"): 17.9,
-    ("controller", "base_speed"): 0.3,
-    ("controller", "supervision_s"): 2.0,
-    ("controller", "hold_max_age_s"): 0.15,
-    ("controller", "teleop_speed"): 0.25,
+    ("controller", "whole_body.base_speed"): 0.3,
+    ("controller", "supervision.supervision_s"): 2.0,
+    ("controller", "teleoperation.hold_max_age_s"): 0.15,
+    ("controller", "teleoperation.speed"): 0.25,
     ("server", "hold_timeout_s"): 0.15,
     ("server", "view_timeout_s"): 0.5,
 }
@@ -49,10 +50,13 @@ HARMLESS = {
     "odometry.linear_noise odometry.angular_noise",
     "real": "arm.load_mass arm.load_inertia camera.enabled camera.width camera.height camera.rate_hz",
     "robot": "rho",
-    "controller": "row_heading blend base_lag_s arm_lag_s gain_position gain_rotation gain_posture gain_heading "
-    "gain_manipulability gain_limits damping search_steps hierarchy.base_heading hierarchy.base_place "
-    "hierarchy.arm_posture hierarchy.manipulability hierarchy.joint_centre hierarchy.smoothness "
-    "hierarchy.good_manipulability hierarchy.damping hierarchy.damping_from hierarchy.clock_rise hierarchy.axle_rate",
+    "controller": "work.row_heading work.search_steps motion.blend motion.base_lag_s motion.arm_lag_s "
+    "motion.gain_position motion.gain_rotation whole_body.gain_posture whole_body.gain_heading "
+    "whole_body.gain_manipulability whole_body.gain_limits whole_body.damping whole_body.hierarchy.base_heading "
+    "whole_body.hierarchy.base_place whole_body.hierarchy.arm_posture whole_body.hierarchy.manipulability "
+    "whole_body.hierarchy.joint_centre whole_body.hierarchy.smoothness whole_body.hierarchy.good_manipulability "
+    "whole_body.hierarchy.damping whole_body.hierarchy.damping_from whole_body.hierarchy.clock_rise "
+    "whole_body.hierarchy.axle_rate",
     "server": "scene_rate_hz log_lines",
 }
 
@@ -137,14 +141,16 @@ def test_what_is_promised_cannot_be_configured_away(tmp_path: Path, name: str, k
 
 @pytest.mark.parametrize("key", ["collisions", "tipping"])
 def test_what_keeps_the_robot_from_harm_cannot_be_turned_off(tmp_path: Path, key: str) -> None:
-    with pytest.raises(ConfigError, match=rf"\[controller.hierarchy\] {key} is false; allowed is true"):
-        load_section(write(tmp_path, "controller", {f"hierarchy.{key}": False}), "controller", ControllerConfig)
+    with pytest.raises(ConfigError, match=rf"\[controller.whole_body.hierarchy\] {key} is false; allowed is true"):
+        load_section(
+            write(tmp_path, "controller", {f"whole_body.hierarchy.{key}": False}), "controller", ControllerConfig
+        )
 
 
 @pytest.mark.parametrize(
     ("name", "key", "values"),
     [
-        ("controller", "home", [0.0, 2.0, 0.0, -2.0, 0.0, 1.0, 0.0]),
+        ("controller", "work.home", [0.0, 2.0, 0.0, -2.0, 0.0, 1.0, 0.0]),
         ("bridge", "start_arm", [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]),
         ("robot", "arm_jerk", [7500.0, 3750.0, 5000.0, 6250.0, 7500.0, 10000.0, 10001.0]),
         ("real", "arm.load_center", [0.0, 0.0, 3.0]),
@@ -169,7 +175,7 @@ def test_the_defaults_are_within_their_own_bounds() -> None:
 def test_postures_are_bounded_by_the_arms_own_limits() -> None:
     limits = RobotModel(RobotConfig()).limits
     for config in (BridgeConfig(), ControllerConfig()):
-        posture = [each for each in numbers(config) if each.name.startswith(("home", "start_arm"))]
+        posture = [each for each in numbers(config) if each.name.startswith(("work.home", "start_arm"))]
         assert [each.bound.low for each in posture] == limits.lower[ARM_Q].tolist()
         assert [each.bound.high for each in posture] == limits.upper[ARM_Q].tolist()
 
@@ -188,9 +194,9 @@ def test_what_is_stricter_is_taken_without_a_word_and_what_is_wider_is_said(tmp_
         "[bridge] deadline_s = 0.195, usually 0.19 (allowed: more than 0, at most 0.2)",
         "[bridge] joint_margin = 0.006, usually 0.01 (allowed: from 0.005 to 0.2)",
     )
-    path = write(tmp_path, "controller", {"post_cut_check": False})
+    path = write(tmp_path, "controller", {"work.post_cut_check": False})
     assert wider("controller", load_section(path, "controller", ControllerConfig)) == (
-        "[controller] post_cut_check = false, usually true (allowed: true or false)",
+        "[controller] work.post_cut_check = false, usually true (allowed: true or false)",
     )
     assert wider("server", ServerConfig(invite_s=3600.0)) == (
         "[server] invite_s = 3600, usually 600 (allowed: more than 0, at most 3600)",
@@ -210,8 +216,8 @@ def test_the_bridge_and_the_controller_say_what_is_wider_at_the_start_and_in_eve
     assert f"less strict than usual: {line}" in [event.text for each in outputs for event in each.events]
     assert {each.state.relaxed_limits for each in outputs if each.state is not None} == {(line,)}
 
-    told = Controller(ControllerConfig(arm_velocity_scale=0.9), RobotConfig())
+    told = Controller(controller_config(whole_body__arm_velocity_scale=0.9), RobotConfig())
     out = told.step(Inbox(), 1.0)
-    words = "[controller] arm_velocity_scale = 0.9, usually 0.6 (allowed: more than 0, at most 1)"
+    words = "[controller] whole_body.arm_velocity_scale = 0.9, usually 0.6 (allowed: more than 0, at most 1)"
     assert f"less strict than usual: {words}" in [event.text for event in every(out, m.LogEvent)]
     assert [state.relaxed_limits for state in every(out, m.ControllerState)] == [(words,)]

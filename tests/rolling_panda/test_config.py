@@ -36,6 +36,7 @@ def test_what_is_given_is_taken_and_the_rest_has_defaults(tmp_path: Path) -> Non
     ("text", "parts"),
     [
         ("[controller]\nrate = 50\n", ["[controller]", "'rate'", "did you mean 'rate_hz'"]),
+        ("[controller]\nopening = 50\n", ["'opening'", "it stands in [controller.gripper]"]),
         ("[controller]\nzzz = 50\n", ["'zzz'", "known are rate_hz, gripper"]),
         ("[controler]\nrate_hz = 50\n", ["[controler]", "did you mean 'controller'"]),
         ("[controller.gripper]\nopenning = 1\n", ["[controller.gripper]", "did you mean 'opening'"]),

@@ -10,7 +10,7 @@ CONFIG = ControllerConfig()
 
 
 def robot(config=CONFIG, **changes):
-    r = KinematicRobot(Controller(config, RobotConfig()), config.home, dt=1.0 / config.rate_hz, **changes)
+    r = KinematicRobot(Controller(config, RobotConfig()), config.work.home, dt=1.0 / config.rate_hz, **changes)
     r.every = config.base_every
     return r
 

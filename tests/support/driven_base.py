@@ -31,11 +31,11 @@ class DrivenBase:
     def __init__(self, rate_hz, base_rate_hz, lag=0.1, knows="predicted"):
         self.config = ControllerConfig(rate_hz=rate_hz, base_rate_hz=base_rate_hz)
         self.dt, self.every, self.lag, self.knows = 1.0 / rate_hz, self.config.base_every, lag, knows
-        arm, base = (make_method(ROBOT, self.config, dt) for dt in (self.dt, self.dt * self.every))
+        arm, base = (make_method(ROBOT, self.config.whole_body, dt) for dt in (self.dt, self.dt * self.every))
         self.method = TwoRates(arm, base, self.every)
-        self.follower = Follower(self.config, self.method, self.dt)
+        self.follower = Follower(self.config.motion, self.method, self.dt)
         self.q, self.wheels, self.arm = np.zeros(12), np.zeros(2), np.zeros(7)
-        self.q[ARM_Q] = self.config.home
+        self.q[ARM_Q] = self.config.work.home
         self.sent = self.before = np.zeros(9)
         self.record, self.errors = [], []
         self.odometer, self.odometry, self.ticks = Odometer(ROBOT.drive, LATE, self.dt), None, 0
@@ -68,7 +68,7 @@ class DrivenBase:
         joints = m.JointState(
             header=m.Header(now), sequence=1, position=tuple(q[3:]), velocity=(*self.wheels, *self.arm)
         )
-        ahead = self.config.arm_lag_s + 0.5 * self.dt
+        ahead = self.config.motion.arm_lag_s + 0.5 * self.dt
         wheels = wheels_ahead(self.wheels, self.sent[:2], ahead, self.lag)
         return self.estimate.configuration(joints, self.odometry), wheels
 
@@ -79,7 +79,7 @@ class DrivenBase:
         for _ in range(inner):
             dt, q = self.dt / inner, self.q.copy()
             self.wheels = self.wheels + (xi[:2] - self.wheels) * (1.0 - np.exp(-dt / self.lag))
-            self.arm = self.arm + (xi[2:] - self.arm) * (1.0 - np.exp(-dt / self.config.arm_lag_s))
+            self.arm = self.arm + (xi[2:] - self.arm) * (1.0 - np.exp(-dt / self.config.motion.arm_lag_s))
             q[:3] = ROBOT.drive.integrate(q[:3], *(self.wheels * dt))
             q[3:] += np.concatenate([self.wheels, self.arm]) * dt
             self.q = q
@@ -89,7 +89,7 @@ class DrivenBase:
         T, q_goal = ROBOT.pose(self.q, ROBOT.tool_id), self.q.copy()
         q_goal[0] += 0.8
         goal = pin.SE3(T.rotation, T.translation + np.array([0.8, 0.1, 0.0]))
-        motion = ToolMotion(self.config, T, self.q, [Leg(goal, q_goal, 0.3)])
+        motion = ToolMotion(self.config.motion, self.config.whole_body, T, self.q, [Leg(goal, q_goal, 0.3)])
         while not motion.done:
             robot = self.observed()
             wanted = motion.desired().T_odom_tool.translation

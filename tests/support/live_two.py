@@ -32,7 +32,7 @@ class LiveTwo:
 
     def __init__(self, endpoint, folder):
         self.endpoint, self.folder = endpoint, folder
-        self.robot = LaggedRobot(CONFIG.home)
+        self.robot = LaggedRobot(CONFIG.work.home)
         self._running = []
 
     def transport(self, process):

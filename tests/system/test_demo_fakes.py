@@ -41,7 +41,8 @@ def test_an_accepted_point_is_cut_where_it_was_accepted_by_libfranka_ros_and_lib
     # Two cores that other tests use too may take seconds for a picture, which is nothing against the drivers. These are
     # the longest that may be configured, and what is paused for longer is taken up again.
     patient = (
-        "[controller]\nobstacles_max_age_s = 10.0\nlook_timeout_s = 20.0\nperception_max_age_s = 2.0\n\n"
+        "[controller.supervision]\nobstacles_max_age_s = 10.0\nperception_max_age_s = 2.0\n\n"
+        "[controller.work]\nclose_up_timeout_s = 20.0\n\n"
         "[perception]\nframe_timeout_s = 20.0"
     )
     small = "[vineyard]\nvines = 1\nrows_behind = 0\n\n"

@@ -26,7 +26,7 @@ pytestmark = pytest.mark.paced
 CHILD = """
 import sys, threading
 from pathlib import Path
-from controller.config import ControllerConfig
+from controller.config import WorkConfig, ControllerConfig
 from controller.ledger.journal import EventLogger, Journal, LedgerState, Records, RequestRow
 from controller.ledger.store import Ledger
 from controller.ledger.start import restored
@@ -44,7 +44,7 @@ class Desk:
 
     def __init__(self, rows):
         self.journal = Journal()
-        self.queue = PointQueue(ControllerConfig(), self.journal)
+        self.queue = PointQueue(WorkConfig(), self.journal)
         self.queue.restore(rows)
         self.handlers = QueueRequests(self.queue, EventLogger(self.journal)).handlers()
         self.cuts = 0

@@ -20,7 +20,7 @@ from hypothesis.stateful import (
     run_state_machine_as_test,
 )
 
-from controller.config import ControllerConfig
+from controller.config import WorkConfig
 from controller.ledger.check import reading, verify
 from controller.ledger.journal import EventLogger, Journal, LedgerState, RequestRow, TicketRow
 from controller.ledger.store import Entry, Ledger, read
@@ -55,7 +55,7 @@ class Robot:
     def begin(self):
         rows = [msgspec.json.decode(body, type=TicketRow) for _, body in self.ledger.newest("ticket")]
         self.journal = Journal()
-        self.queue = PointQueue(ControllerConfig(), self.journal)
+        self.queue = PointQueue(WorkConfig(), self.journal)
         self.queue.restore(rows)
         self.handlers = QueueRequests(self.queue, EventLogger(self.journal)).handlers()
         self.see()

@@ -4,8 +4,6 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-import msgspec
-
 from bridge.sim.build import simulated_bridge
 from bridge.sim.robot.robot import SimulatedRobot
 from controller.config import ControllerConfig
@@ -27,6 +25,7 @@ from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.resources import resource
 from rolling_panda.transport.inbox import Inbox, Received
+from tests.support.controller_config import controller_config
 from tests.support.worlds.world import RobotWorld
 
 # A frame takes perception about this long, so its points come later by as much.
@@ -98,9 +97,9 @@ class ClosedLoop(RobotWorld, Closing):
         robot = load_section(path, "robot", RobotConfig)
         config = load_section(path, "controller", ControllerConfig)
         if method is not None:
-            config = msgspec.structs.replace(config, method=method)
+            config = controller_config(config, whole_body__method=method)
         if not looks:
-            config = msgspec.structs.replace(config, pre_cut_check=False, post_cut_check=False)
+            config = controller_config(config, work__pre_cut_check=False, work__post_cut_check=False)
         plan = CutPlanner(config, robot).plan if plans else None
         super().__init__(simulated_bridge(path, seed, trace), Controller(config, robot), config.rate_hz, plan, seed)
         self._drive = RobotModel(robot).drive

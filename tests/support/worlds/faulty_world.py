@@ -8,8 +8,6 @@ import random
 from collections.abc import Callable
 from typing import cast
 
-import msgspec
-
 from bridge.config import BridgeConfig, OdometryConfig
 from bridge.core.bridge import TICK_S, BridgeCore
 from bridge.core.odometer import Odometer
@@ -28,6 +26,7 @@ from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.transport.memory import Link
 from server.auth.sessions import Session
 from server.robots.presence import PresenceTracker
+from tests.support.controller_config import controller_config
 from tests.support.points import point
 from tests.support.worlds.world import RobotWorld
 
@@ -44,8 +43,8 @@ class FaultyWorld(RobotWorld):
         """Everything is well; nothing moves yet. `hand_speed` (m/s) is in place of the configured one."""
         self.config = ControllerConfig()
         if hand_speed is not None:
-            self.config = msgspec.structs.replace(self.config, teleop_base_speed=hand_speed)
-        self.robot = LaggedRobot(self.config.home)
+            self.config = controller_config(self.config, teleoperation__base_speed=hand_speed)
+        self.robot = LaggedRobot(self.config.work.home)
         self.memory = KeptValue(Remembered())
         chance = random.Random(seed)
         self._draw = lambda: f"{chance.getrandbits(64):016x}"
@@ -119,8 +118,8 @@ class FaultyWorld(RobotWorld):
     def drive(self) -> None:
         """An operator drives the base by hand at its greatest speed."""
         self.arm()
-        self.held = BaseVelocity(self.config.base_speed, 0.0)
-        wheel = self.config.teleop_base_speed / MODEL.drive.wheel_radius
+        self.held = BaseVelocity(self.config.whole_body.base_speed, 0.0)
+        wheel = self.config.teleoperation.base_speed / MODEL.drive.wheel_radius
         self.until_it_moves(0.95 * wheel)
 
     def lead(self) -> None:

@@ -40,7 +40,7 @@ class Sequence:
 
     def __init__(self, config, queue, run_id, chance, permit):
         self._queue, self._chance, self._permit, self.close_up_s = queue, chance, permit, 0.0
-        self.blades = Blades(config, queue, run_id)
+        self.blades = Blades(config.work, queue, run_id)
         self.phase, self.places, self.ending = "", (), ""
         self.abort()
 
@@ -109,7 +109,7 @@ class Movement:
         self.body = SimpleNamespace(robot=MODEL, measured=None, tracking_error=nothing, surroundings=nothing)
         self.sequence = Sequence(config, queue, run_id, self.chance, permit)
         follower = SimpleNamespace(jog=lambda xi, robot: SimpleNamespace(xi=np.clip(xi, -0.03, 0.03)))
-        self.teleoperation = Teleoperation(config, follower, MODEL.drive)
+        self.teleoperation = Teleoperation(config.teleoperation, config.work, follower, MODEL.drive)
         self.tracking, self._home = None, 0
 
     @property
