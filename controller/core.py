@@ -46,7 +46,7 @@ from rolling_panda.config import RobotConfig
 from rolling_panda.errors import ControlError
 from rolling_panda.messages.perception import CloseUpRequest, CloseUpResult, Obstacles
 from rolling_panda.messages.supervision import StopRecord
-from rolling_panda.reasons import text_of
+from rolling_panda.reasons import said, text_of
 from rolling_panda.transport.inbox import Answered, Inbox, Rejected, Reply, Request
 
 _STATE_S = 0.05
@@ -217,11 +217,11 @@ class Controller:
         if command is None:
             return m.Answer(ok=False, reason=f"{type(intent).__name__} is not something this controller does")
         refused = refusal(command, now, self._situation(now, intent)) or self._handlers[command.message](intent, now)
-        reason = refused if isinstance(refused, m.Reason) else None
-        told = text_of(reason) if reason is not None else str(refused or "")[:500]
-        row = RequestRow(asked=intent, ok=not refused, reason=told, mode=self.mode)
+        reason = said(refused) if isinstance(refused, str) and refused else (refused or None)
+        told = "" if reason is None else text_of(reason)
+        row = RequestRow(asked=intent, ok=reason is None, reason=told, mode=self.mode)
         self._journal.add("request", intent.user, row)
-        if refused:
+        if reason is not None:
             self._event_log.say("warning", f"{intent.user}: {command.name} refused: {told}")
             return m.Answer(ok=False, reason=told, refused=reason)
         if text := command.text(intent):

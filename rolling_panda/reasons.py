@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from inspect import signature
 from string import Formatter
-from typing import Final, Literal, ParamSpec
+from typing import Any, Final, Literal, ParamSpec
 
 from rolling_panda.errors import MessageError
 from rolling_panda.messages.types import Reason
@@ -39,14 +39,15 @@ CATALOGUE: Final[dict[str, Entry]] = {}
 
 def text_of(reason: Reason) -> str:
     """English text of a reason, with what to do. A code that this version does not know is shown with its values."""
-    entry, values = CATALOGUE.get(reason.code), dict(reason.values)
+    entry = CATALOGUE.get(reason.code)
+    values = {name: text_of(value) if isinstance(value, Reason) else value for name, value in reason.values}
     try:
         told = "" if entry is None else entry.text.format(**values)
-    except (KeyError, ValueError):
+    except (LookupError, TypeError, ValueError):
         entry = None
     if entry is None:
         return f"{reason.code} {values or ''}".strip()[:500]
-    return f"{told}: {entry.act}"[:500]
+    return (f"{told}: {entry.act}" if entry.act else told)[:500]
 
 
 def entry_of(severity: Severity, act: str, made: Callable[P, None]) -> tuple[Entry, Callable[P, Reason]]:
@@ -56,17 +57,25 @@ def entry_of(severity: Severity, act: str, made: Callable[P, None]) -> tuple[Ent
         MessageError: The text does not name exactly the parameters.
     """
     code, text = made.__name__, (made.__doc__ or "").strip().removesuffix(".")
-    parameters = signature(made)
+    parameters = tuple(signature(made).parameters)
     named = {name for _, name, _, _ in Formatter().parse(text) if name is not None}
-    if not text or named != set(parameters.parameters):
-        raise MessageError(
-            f"reason {code}: its text names {sorted(named)}, its parameters are {[*parameters.parameters]}"
-        )
+    if not text or named != set(parameters):
+        raise MessageError(f"reason {code}: its text names {sorted(named)}, its parameters are {[*parameters]}")
 
     def make(*args: P.args, **kwargs: P.kwargs) -> Reason:
-        return Reason(code=code, values=tuple(parameters.bind(*args, **kwargs).arguments.items()))
+        # It fails where the arguments are not the parameters.
+        made(*args, **kwargs)
+        values: dict[str, Any] = dict(zip(parameters, args, strict=False)) | kwargs
+        return Reason(code=code, values=tuple((name, _bounded(values[name])) for name in parameters))
 
     return Entry(code, severity, text, act), make
+
+
+def _bounded(value: str | float | Reason) -> str | float | Reason:
+    """The value within the bounds of the wire, which refuses a whole message for one value out of them."""
+    if isinstance(value, Reason):
+        return value
+    return value[:500] if isinstance(value, str) else max(-1e9, min(1e9, value))
 
 
 def _reason(severity: Severity, act: str) -> Callable[[Callable[P, None]], Callable[P, Reason]]:
@@ -76,6 +85,14 @@ def _reason(severity: Severity, act: str) -> Callable[[Callable[P, None]], Calla
         return make
 
     return enter
+
+
+@_reason("info", "")
+def said(text: str) -> None:
+    """{text}."""
+
+
+# Control and roles
 
 
 @_reason("warning", "sign in as an operator or a supervisor")

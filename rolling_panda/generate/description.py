@@ -56,10 +56,13 @@ def describe(struct: type[msgspec.Struct]) -> StructDescription:
 def reachable(roots: Iterable[type[msgspec.Struct]]) -> tuple[type[msgspec.Struct], ...]:
     """The roots and every struct they contain, parts before the wholes, each once."""
     found: dict[type[msgspec.Struct], None] = {}
+    begun: set[type[msgspec.Struct]] = set()
 
     def visit(hint: Any) -> None:
         if isinstance(hint, type) and issubclass(hint, msgspec.Struct):
-            if hint not in found:
+            # A struct may contain others of its type.
+            if hint not in begun:
+                begun.add(hint)
                 for field in msgspec.structs.fields(hint):
                     visit(field.type)
                 found[hint] = None

@@ -90,12 +90,16 @@ def _spelled_out(hint: Any) -> str:
         return "|".join(f'"{value}"' for value in arguments)
     if is_union(hint):
         return "|".join(js_type(argument) for argument in arguments)
+    if origin is dict:
+        return f"Record<{', '.join(js_type(argument) for argument in arguments)}>"
     if origin is tuple and arguments[-1] is Ellipsis:
         inner = js_type(arguments[0])
         return f"({inner})[]" if "|" in inner else f"{inner}[]"
     if origin is tuple:
         return "[" + ", ".join(js_type(argument) for argument in arguments) + "]"
-    raise MessageError(f"the page's messages cannot hold {hint}: use numbers, strings, booleans, tuples and structs")
+    raise MessageError(
+        f"the page's messages cannot hold {hint}: use numbers, strings, booleans, tuples, dicts and structs"
+    )
 
 
 def _is_worth_a_name(hint: Any) -> bool:

@@ -150,6 +150,8 @@ def spelled_out(hint: Any) -> str:
         return " \\| ".join(f'`"{value}"`' for value in arguments)
     if is_union(hint):
         return " or ".join(_named(argument) for argument in arguments)
+    if origin is dict:
+        return f"map of {_named(arguments[0])} to {_named(arguments[1])}"
     if origin is tuple and arguments[-1] is Ellipsis:
         return f"array of {_named(arguments[0])}"
     if origin is tuple:

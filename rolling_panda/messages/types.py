@@ -140,11 +140,11 @@ class Reason(Struct, frozen=True, kw_only=True):
 
     Attributes:
         code: The code.
-        values: Name and value of each value in the text.
+        values: Name and value of each value in the text. A value that is a reason is the cause of this one.
     """
 
     code: Name
-    values: tuple[tuple[Name, Text | float], ...] = ()
+    values: "tuple[tuple[Name, Text | Finite | Reason], ...]" = ()
 
 
 class Answer(Message, frozen=True, kw_only=True):

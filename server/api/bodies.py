@@ -242,10 +242,13 @@ class Outcome(BaseModel):
 
 
 class Refusal(Outcome):
-    """Why a command was refused: as text, and as a code of the catalogue with its values where it has one."""
+    """Why a command was refused: as text, and as a code of the catalogue with its values where it has one.
+
+    A value that is an object is the cause, with its own code and values.
+    """
 
     code: str = ""
-    values: dict[str, str | float] = {}
+    values: dict[str, str | float | dict[str, Any]] = {}
 
 
 class Invited(Outcome):

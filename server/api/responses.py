@@ -6,6 +6,7 @@ import msgspec
 from fastapi import Response
 from fastapi.responses import JSONResponse
 
+from rolling_panda.messages import Reason
 from server.api import bodies as body
 from server.robots.commands import Result
 
@@ -51,8 +52,13 @@ def answer(result: Result) -> JSONResponse:
     """A result as `{ok, reason}`, with `code` and `values` of a refusal that is in the catalogue."""
     content: dict[str, Any] = {"ok": result.ok, "reason": result.reason}
     if result.refused is not None:
-        content |= {"code": result.refused.code, "values": dict(result.refused.values)}
+        content |= _as_data(result.refused)
     return JSONResponse(content, result.status)
+
+
+def _as_data(reason: Reason) -> dict[str, Any]:
+    values = {name: _as_data(value) if isinstance(value, Reason) else value for name, value in reason.values}
+    return {"code": reason.code, "values": values}
 
 
 def message(content: msgspec.Struct) -> Response:

@@ -4,6 +4,7 @@ import copy
 import math
 import re
 from collections.abc import Iterator
+from functools import cache
 from typing import Any, get_args
 
 import msgspec
@@ -27,6 +28,13 @@ OPTIONAL = {
     if type(None) in get_args(field.type)
 }
 MODEST = settings(max_examples=150, deadline=None)
+
+
+@cache
+def a_struct(cls: type[msgspec.Struct]) -> st.SearchStrategy[Any]:
+    """Structs of a type, which may contain others of it."""
+    fields = msgspec.inspect.type_info(cls).fields
+    return st.deferred(lambda: st.builds(cls, **{field.name: values(field.type) for field in fields}))
 
 
 def values(info: Any) -> st.SearchStrategy[Any]:
@@ -56,8 +64,10 @@ def values(info: Any) -> st.SearchStrategy[Any]:
             return st.lists(values(info.item_type), max_size=3).map(tuple)
         case msgspec.inspect.UnionType():
             return st.one_of(*(values(item) for item in info.types))
+        case msgspec.inspect.DictType():
+            return st.dictionaries(values(info.key_type), values(info.value_type), max_size=3)
         case msgspec.inspect.StructType():
-            return st.builds(info.cls, **{field.name: values(field.type) for field in info.fields})
+            return a_struct(info.cls)
         case msgspec.inspect.Metadata():
             return values(info.type)
     raise AssertionError(f"a message holds {info}: say here how to make one")

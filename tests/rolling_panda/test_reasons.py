@@ -1,4 +1,5 @@
 import ast
+import math
 from pathlib import Path
 
 import msgspec
@@ -17,6 +18,7 @@ def test_every_code_is_used_by_the_product():
         for path in (ROOT / package).rglob("*.py"):
             tree = ast.parse(path.read_text(encoding="utf-8"))
             used |= {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
+            used |= {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
     assert reasons.CATALOGUE and set(reasons.CATALOGUE) <= used
 
 
@@ -38,6 +40,18 @@ def test_a_reason_survives_the_wire_and_has_its_values_in_the_text():
     assert msgspec.json.decode(msgspec.json.encode(reason), type=Reason) == reason
     text = reasons.text_of(reason)
     assert all(str(value) in text for _, value in reason.values)
+
+
+def test_a_cause_is_data_too_and_its_text_stands_in_the_place_of_the_value():
+    reason = reasons.said(reasons.control_held("ada"))
+    assert msgspec.msgpack.decode(msgspec.msgpack.encode(reason), type=Reason) == reason
+    assert reasons.text_of(reason) == reasons.text_of(reasons.control_held("ada"))
+
+
+def test_values_are_kept_within_the_bounds_of_the_wire():
+    for value in ("x" * 999, math.inf, -math.inf, math.nan):
+        reason = reasons.said(value)
+        assert msgspec.json.decode(msgspec.json.encode(reason), type=Reason) == reason
 
 
 @pytest.mark.parametrize("reason", [Reason(code="of-tomorrow", values=(("n", 3.0),)), Reason(code="control_held")])
