@@ -1,6 +1,6 @@
 """A robot without mass or contact: velocities follow commands with a first-order lag. For control tests and timing."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, is_dataclass
 from typing import Any
 
 import msgspec
@@ -152,6 +152,8 @@ class KinematicRobot:
                     self.ledger = LedgerState(message.rows[-1].number)
                 case m.LogEvent():
                     self.events.append(message.text)
+                case _ if not isinstance(message, msgspec.Struct) and not is_dataclass(message):
+                    raise TypeError(f"the runner cannot send {message!r}")
         self.record.append(command)
         self.integrate(command)
         self.now += self.dt
