@@ -158,3 +158,451 @@ def control_not_yours() -> None:
 @_reason("warning", "wait until somebody asks")
 def control_not_requested() -> None:
     """Nobody asks for control."""
+
+
+# Server
+
+
+@_reason("info", "")
+def done() -> None:
+    """Done."""
+
+
+@_reason("warning", "")
+def hold_refused(user: str, cause: Reason) -> None:
+    """Hold by {user} refused: {cause}."""
+
+
+@_reason("warning", "")
+def gizmo_refused(user: str, cause: Reason) -> None:
+    """No gizmo for {user}: {cause}."""
+
+
+@_reason("info", "")
+def request_done(command: str, user: str, result: Reason) -> None:
+    """{command} by {user}: {result}."""
+
+
+@_reason("warning", "")
+def request_refused(command: str, user: str, cause: Reason) -> None:
+    """{command} by {user} refused: {cause}."""
+
+
+@_reason("warning", "wait until they let go")
+def held_by_other(user: str) -> None:
+    """{user} is holding the robot."""
+
+
+@_reason("warning", "let go of it first")
+def other_robot_held(robot: str) -> None:
+    """You hold {robot}."""
+
+
+@_reason("warning", "let go, then hold again")
+def hold_overdue(resume_s: float) -> None:
+    """Your hold ended, as nothing was heard of it for more than {resume_s:.1f} s."""
+
+
+@_reason("warning", "wait until the page shows the robot as it is now")
+def hold_view_stale(limit_s: float) -> None:
+    """The view of the robot is not current: teleoperation needs one younger than {limit_s:.1f} s."""
+
+
+@_reason("warning", "show the gizmo first")
+def hold_without_target() -> None:
+    """There is no target yet."""
+
+
+@_reason("info", "")
+def hold_began(user: str) -> None:
+    """{user} holds the robot."""
+
+
+@_reason("info", "")
+def hold_released(user: str) -> None:
+    """{user} let go of the robot."""
+
+
+@_reason("info", "")
+def hold_lapsed() -> None:
+    """The hold ended: it was not renewed, or the page no longer sees the robot."""
+
+
+@_reason("info", "press again to continue")
+def hold_interrupted() -> None:
+    """The hold ended: the page or its link was too slow."""
+
+
+@_reason("info", "press again to continue")
+def hold_ended_elsewhere() -> None:
+    """The hold was ended from elsewhere."""
+
+
+@_reason("warning", "")
+def hold_stopped() -> None:
+    """The robot was stopped."""
+
+
+@_reason("warning", "wait until the robot reports its posture")
+def tool_unknown() -> None:
+    """The gizmo cannot be shown, as the pose of the tool is unknown."""
+
+
+@_reason("warning", "ask less often")
+def motion_rate_exceeded(limit_hz: float) -> None:
+    """At most {limit_hz:.0f} requests for motion are accepted per second."""
+
+
+@_reason("warning", "normalize it")
+def quaternion_not_unit(length: float) -> None:
+    """A quaternion has length 1, this one has {length:.3f}."""
+
+
+@_reason("warning", "")
+def software_stop(user: str, text: str) -> None:
+    """Software stop by {user}: {text}."""
+
+
+@_reason("error", "use the robot's emergency stop")
+def stop_unconfirmed() -> None:
+    """The stop was sent, but the bridge has not confirmed it."""
+
+
+@_reason("warning", "")
+def stop_half_confirmed() -> None:
+    """Stopped: the bridge has latched the stop, the controller has not confirmed it."""
+
+
+@_reason("info", "")
+def stop_confirmed() -> None:
+    """Stopped: bridge and controller have latched the stop."""
+
+
+@_reason("error", "use the emergency stop of each robot that has not stopped")
+def stop_of_all_unconfirmed(robots: str) -> None:
+    """The stop was sent to all robots, but the bridge of {robots} has not confirmed it."""
+
+
+@_reason("warning", "")
+def stop_of_all_half_confirmed(robots: str) -> None:
+    """All robots stopped; the controller of {robots} has not confirmed it."""
+
+
+@_reason("info", "")
+def stop_of_all_confirmed(robots: str) -> None:
+    """Stopped: bridge and controller of {robots} have latched the stop."""
+
+
+@_reason("error", "check that it runs")
+def service_silent(process: str, detail: str) -> None:
+    """The {process} does not answer: {detail}."""
+
+
+@_reason("warning", "ask again")
+def not_reported(process: str) -> None:
+    """The {process} has not reported yet."""
+
+
+@_reason("warning", "")
+def no_recording() -> None:
+    """This is a robot, not a recording."""
+
+
+@_reason("warning", "")
+def no_camera_image() -> None:
+    """No camera image has come yet."""
+
+
+@_reason("warning", "ask for a newer one")
+def camera_frame_gone(frame: float, newest: float) -> None:
+    """Frame {frame:.0f} is not among the newest ones; {newest:.0f} is."""
+
+
+@_reason("warning", "")
+def point_unknown(point: str) -> None:
+    """There is no point {point!r}."""
+
+
+@_reason("warning", "look at them in GET /api/robots")
+def robot_unknown(robot: str, robots: str) -> None:
+    """There is no robot {robot!r} here; there are: {robots}."""
+
+
+@_reason("warning", "accept the points again")
+def acceptances_not_restored(cause: Reason) -> None:
+    """The rule is restored, its acceptances are not: {cause}."""
+
+
+@_reason("warning", "ask for another one")
+def preview_expired(cause: Reason) -> None:
+    """The preview has expired: {cause}."""
+
+
+@_reason("warning", "ask for one")
+def preview_missing() -> None:
+    """There is no preview to approve."""
+
+
+@_reason("warning", "look again")
+def preview_replaced(newest: str, approved: str) -> None:
+    """The preview is another one now: {newest}, not {approved}."""
+
+
+@_reason("warning", "wait until the robot reports its posture")
+def posture_unknown() -> None:
+    """The position of the robot is unknown."""
+
+
+@_reason("warning", "ask for another one")
+def preview_base_moved(distance_m: float) -> None:
+    """The preview has expired: the base moved {distance_m:.2f} m."""
+
+
+@_reason("warning", "ask for another one")
+def preview_base_turned(angle_deg: float) -> None:
+    """The preview has expired: the base turned by {angle_deg:.0f}°."""
+
+
+@_reason("warning", "ask for another one")
+def preview_arm_moved(angle_rad: float) -> None:
+    """The preview has expired: a joint of the arm moved by {angle_rad:.2f} rad."""
+
+
+@_reason("warning", "open the sign-in link of this server, or its page")
+def not_signed_in() -> None:
+    """You are not signed in."""
+
+
+@_reason("warning", "sign in as a supervisor")
+def supervisor_needed() -> None:
+    """Only a supervisor may do this."""
+
+
+@_reason("warning", "open the page of this server")
+def origin_foreign() -> None:
+    """This request does not come from the page of this server (Origin)."""
+
+
+@_reason("warning", "")
+def origin_refused(path: str, origin: str) -> None:
+    """Refused {path!r} from origin {origin!r}."""
+
+
+@_reason("warning", "try later")
+def visitor_rate_exceeded() -> None:
+    """Too many requests without a session come from this address."""
+
+
+@_reason("warning", "send less")
+def body_too_long(limit: float) -> None:
+    """A request body has at most {limit:.0f} bytes."""
+
+
+@_reason("warning", "")
+def request_invalid(detail: str) -> None:
+    """The request is wrong: {detail}."""
+
+
+@_reason("warning", "")
+def sign_in_wrong() -> None:
+    """Name or password is wrong."""
+
+
+@_reason("warning", "ask a supervisor for another one")
+def sign_in_link_void() -> None:
+    """This sign-in link has been used, has expired or is not from this server."""
+
+
+@_reason("warning", "wait, then try again")
+def sign_in_throttled(wait_s: float) -> None:
+    """Too many failed sign-ins; try again in {wait_s:.0f} s."""
+
+
+@_reason("warning", "try again in 1 s")
+def sign_ins_crowded() -> None:
+    """Too many sign-ins at once."""
+
+
+@_reason("warning", "sign in with the link that it printed")
+def sign_in_without_passwords() -> None:
+    """This server has no users file."""
+
+
+@_reason("warning", "rolling-panda user add NAME")
+def invitation_impossible() -> None:
+    """People sign in here with a password."""
+
+
+@_reason("warning", "")
+def sign_in_refused(user: str, address: str, cause: Reason) -> None:
+    """Sign-in as {user!r} from {address} refused: {cause}."""
+
+
+@_reason("warning", "")
+def link_refused(address: str, cause: Reason) -> None:
+    """Sign-in by link from {address} refused: {cause}."""
+
+
+@_reason("warning", "")
+def page_closed(user: str, cause: Reason) -> None:
+    """A page of {user} was closed: {cause}."""
+
+
+@_reason("warning", "")
+def view_closed(user: str, cause: Reason) -> None:
+    """A view of {user} was closed: {cause}."""
+
+
+@_reason("info", "")
+def signed_in(user: str, role: str) -> None:
+    """{user} signed in ({role})."""
+
+
+@_reason("info", "")
+def signed_out(user: str) -> None:
+    """{user} signed out."""
+
+
+@_reason("info", "")
+def invited(user: str, guest: str, role: str) -> None:
+    """{user} made a sign-in link for {guest} ({role})."""
+
+
+@_reason("warning", "")
+def account_changed(user: str) -> None:
+    """The account of {user} was removed or changed."""
+
+
+@_reason("error", "repair it; nobody new can sign in")
+def users_unreadable(detail: str) -> None:
+    """The users file cannot be read: {detail}."""
+
+
+@_reason("warning", "")
+def view_message_dropped(user: str, kind: str) -> None:
+    """A view of {user} sent {kind!r} to the 3-D view; dropped."""
+
+
+@_reason("warning", "")
+def view_from_outside() -> None:
+    """Refused a connection to the 3-D view from outside the page."""
+
+
+@_reason("warning", "")
+def page_message_invalid(user: str, detail: str) -> None:
+    """A page of {user} was closed: {detail}."""
+
+
+@_reason("warning", "")
+def message_rejected(topic: str, detail: str) -> None:
+    """Refused a message on {topic}: {detail}."""
+
+
+@_reason("warning", "")
+def limit_relaxed(detail: str) -> None:
+    """Less strict than usual: {detail}."""
+
+
+@_reason("error", "")
+def robot_unseen() -> None:
+    """Not seen yet."""
+
+
+@_reason("error", "release it, then reset")
+def emergency_stop_pressed() -> None:
+    """Emergency stop on the robot is pressed."""
+
+
+@_reason("error", "")
+def bridge_silent() -> None:
+    """The bridge is silent."""
+
+
+@_reason("error", "")
+def controller_silent() -> None:
+    """The controller is silent."""
+
+
+@_reason("warning", "")
+def perception_silent() -> None:
+    """Perception is silent."""
+
+
+@_reason("error", "")
+def robot_stopped(cause: Reason) -> None:
+    """Stopped: {cause}."""
+
+
+@_reason("error", "")
+def robot_protective_stop(cause: Reason) -> None:
+    """Protective stop: {cause}."""
+
+
+@_reason("error", "")
+def robot_fault(cause: Reason) -> None:
+    """Fault: {cause}."""
+
+
+@_reason("error", "")
+def robot_cutter_jammed() -> None:
+    """The cutter is jammed."""
+
+
+@_reason("warning", "")
+def cut_unknown() -> None:
+    """A cut ended unknown."""
+
+
+@_reason("warning", "send less")
+def socket_bytes_exceeded(limit_hz: float) -> None:
+    """It sent more than {limit_hz:.0f} bytes a second."""
+
+
+@_reason("warning", "send less")
+def socket_messages_exceeded(limit_hz: float) -> None:
+    """It sent more than {limit_hz:.0f} messages a second."""
+
+
+@_reason("warning", "send less")
+def session_messages_exceeded(limit_hz: float) -> None:
+    """Its session sent more than {limit_hz:.0f} messages a second through all of its connections."""
+
+
+@_reason("warning", "close some, then try again")
+def too_many_sockets() -> None:
+    """Too many pages and views are open."""
+
+
+@_reason("warning", "")
+def socket_unread() -> None:
+    """It did not read what it was sent."""
+
+
+@_reason("warning", "close other pages, then try again")
+def too_many_connections() -> None:
+    """Too many connections are open."""
+
+
+@_reason("warning", "")
+def connection_refused(address: str, whose: str) -> None:
+    """Refused a connection from {address}: too many of {whose} are in use."""
+
+
+@_reason("warning", "")
+def connection_replaced(whose: str) -> None:
+    """Too many connections of {whose}: the longest idle one was ended."""
+
+
+@_reason("warning", "")
+def request_ended(address: str, part: str) -> None:
+    """Ended a request from {address}: its {part} did not come in time."""
+
+
+@_reason("warning", "send it again")
+def request_late(part: str) -> None:
+    """The request's {part} did not come in time."""
+
+
+@_reason("error", "leave out --plain-wire to close it")
+def plain_wire() -> None:
+    """The wire is plain: every program on this machine can move the robot."""

@@ -11,10 +11,10 @@ from starlette.exceptions import HTTPException
 from starlette.routing import Match, Mount
 from starlette.types import ASGIApp, Scope
 
-from rolling_panda import __version__
+from rolling_panda import __version__, reasons
 from rolling_panda.messages.page import PageEvents, PagePoints, PageState
 from rolling_panda.messages.supervision import SessionPlan, SessionReport
-from rolling_panda.messages.types import Severity
+from rolling_panda.messages.types import Reason
 from rolling_panda.resources import resource
 from server.api.commands import commands_router
 from server.api.control import Control, control_router
@@ -23,7 +23,7 @@ from server.api.page_files import PageFiles
 from server.api.page_socket import page_socket_router
 from server.api.plant import plant_router
 from server.api.preview import Previewed, preview_router
-from server.api.responses import answer
+from server.api.responses import RefusedError, answer
 from server.api.robots import RobotRouter, path_of, robots_router
 from server.api.sign_in import page_router, sign_in_router
 from server.api.state import camera_router, state_router
@@ -85,10 +85,10 @@ def robot_app(app_state: AppState, robot: RobotContext, origins: frozenset[str],
     """The application of one robot, at this path."""
 
     def log_dropped(session: Session, kind: str) -> None:
-        robot.log.note("warning", f"a view of {session.user} sent {kind!r} to the 3-D view; dropped", session.client)
+        robot.log.note(reasons.view_message_dropped(session.user, kind), session.client)
 
-    def log_closed(session: Session, reason: str) -> None:
-        robot.log.note("warning", f"a view of {session.user} was closed: {reason}", session.client)
+    def log_closed(session: Session, reason: Reason) -> None:
+        robot.log.note(reasons.view_closed(session.user, reason), session.client)
 
     files = PageFiles(web := resource("web"))
     routers = (
@@ -119,7 +119,7 @@ def _application(
     files: PageFiles,
     app_state: AppState,
     origins: frozenset[str],
-    note: Callable[[Severity, str, str], None],
+    note: Callable[[Reason, str], None],
     path: str = "/",
 ) -> ASGIApp:
     app = _Application(
@@ -144,7 +144,7 @@ def _application(
         origins,
         app_state.cookie,
         app_state.max_body_bytes,
-        on_refusal=lambda text: note("warning", text, "a foreign page"),
+        on_refusal=lambda reason: note(reason, "a foreign page"),
     )
 
 
@@ -152,16 +152,17 @@ async def _validation_error(_: Request, error: Exception) -> JSONResponse:
     """Validation errors as text: each field with its error."""
     problems = error.errors() if isinstance(error, RequestValidationError) else []
     errors = [f"{'.'.join(str(part) for part in problem['loc'])}: {problem['msg']}" for problem in problems[:5]]
-    return answer(Result(422, False, "; ".join(errors)[:500] or "the request is wrong"))
+    return answer(Result(422, reasons.request_invalid("; ".join(errors)[:400])))
 
 
 async def _http_error(request: Request, error: Exception) -> JSONResponse:
     if not isinstance(error, HTTPException):
-        return answer(Result(500, False, ""))
+        return answer(Result(500))
     if error.status_code == 400:
         # FastAPI's response to bytes that are not UTF-8.
-        return answer(Result(422, False, "the body is not JSON in UTF-8"))
-    response = answer(Result(error.status_code, False, str(error.detail)[:500]))
+        return answer(Result(422, reasons.request_invalid("the body is not JSON in UTF-8")))
+    told = error.reason if isinstance(error, RefusedError) else reasons.said(str(error.detail)[:400])
+    response = answer(Result(error.status_code, told))
     response.headers.update(error.headers or {})
     if error.status_code == 405:
         # Starlette lists the methods of one route alone, and two may share a path.

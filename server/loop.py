@@ -9,6 +9,7 @@ import time
 from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
+from rolling_panda import reasons
 from rolling_panda.topics import HEARTBEAT, PRESENCE
 from server.robots.app_state import AppState
 from server.robots.context import RobotContext
@@ -77,7 +78,7 @@ class Loop:
             topic, reason = robot.link.refused.popleft()
             if (topic, reason) not in self._warned and len(self._warned) < _MAX_WARNINGS:
                 self._warned.add((topic, reason))
-                robot.log.note("warning", f"refused a message on {topic}: {reason}")
+                robot.log.note(reasons.message_rejected(topic, reason))
         if robot.log.lines.number != before:
             robot.pages.wake()
 

@@ -14,13 +14,13 @@ from pathlib import Path
 import uvicorn
 from starlette.types import ASGIApp
 
+from rolling_panda import reasons
 from rolling_panda.bounds import wider
 from rolling_panda.config import load_section
 from rolling_panda.errors import InputError
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.runtime.process import ProcessContext, wire_config
 from rolling_panda.runtime.scheduling import freeze_heap
-from rolling_panda.transport.settings import PLAIN_WARNING
 from rolling_panda.transport.zenoh import Transport
 from server.app import create_app
 from server.auth.access import Access, Tls, access
@@ -153,7 +153,7 @@ async def serve(
     on_ready()
     work = [watch_accounts(app_state), *(job for robot in app_state.robots.values() for job in Loop(robot).jobs())]
     jobs = [asyncio.create_task(job) for job in work]
-    connections = Connections(config, lambda text, by: app_state.note("warning", text, f"connections of {by}"))
+    connections = Connections(config, lambda reason, by: app_state.note(reason, f"connections of {by}"))
     listener.count(connections, access_options.tls is not None)
     site = asyncio.create_task(_site(app, connections, listener, stopping, access_options.tls))
     try:
@@ -192,7 +192,7 @@ def _robot_context(
         # Called only once a page is served, when `robot` is bound.
         on_select=lambda owner, point_id: robot.pages.on_point_clicked(owner, point_id),
         on_ray=lambda owner, origin, direction: robot.pages.on_click(owner, origin, direction),
-        on_refusal=lambda: robot.log.note("warning", "refused a connection to the 3-D view from outside the page"),
+        on_refusal=lambda: robot.log.note(reasons.view_from_outside()),
     )
     link, widened = RobotLink(wire), wider("server", config)
     robot = RobotContext(
@@ -203,9 +203,9 @@ def _robot_context(
         held_elsewhere=lambda session: app_state.held_elsewhere(session, robot),
     )
     for line in widened:
-        robot.log.note("warning", f"less strict than usual: {line}")
+        robot.log.note(reasons.limit_relaxed(line))
     if wire.plain:
-        robot.log.note("error", PLAIN_WARNING)
+        robot.log.note(reasons.plain_wire())
     return robot
 
 

@@ -13,9 +13,10 @@ import msgspec
 from fastapi import Path
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model, field_validator, model_validator
 
+from rolling_panda import reasons
 from rolling_panda.commands import Intent, PlantRequest
 from rolling_panda.generate.description import describe
-from rolling_panda.messages.types import Role
+from rolling_panda.messages.types import Reason, Role
 
 #: As `rolling_panda.messages.Name`.
 POINT_ID: Any = Path(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9_.:\-]+$")
@@ -170,10 +171,10 @@ class Target(_JsonTuples):
     quat_xyzw: tuple[_Unit, _Unit, _Unit, _Unit]
 
     @property
-    def refused(self) -> str:
-        """Why the quaternion is invalid; empty where it is valid. JSON Schema cannot express this."""
+    def refused(self) -> Reason | None:
+        """Why the quaternion is invalid; None where it is valid. JSON Schema cannot express this."""
         length = sum(part * part for part in self.quat_xyzw) ** 0.5
-        return "" if abs(length - 1.0) <= 1e-2 else f"a quaternion has length 1, this one has {length:.3f}"
+        return None if abs(length - 1.0) <= 1e-2 else reasons.quaternion_not_unit(length)
 
 
 class BaseVelocity(_Body):

@@ -14,7 +14,7 @@ from fastapi import APIRouter, Depends, Request, Response
 
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
-from rolling_panda import topics
+from rolling_panda import reasons, topics
 from rolling_panda.commands import COMMANDS, Command, PlantRequest, SeekReplay
 from rolling_panda.errors import ServiceError
 from rolling_panda.generate.description import describe
@@ -25,12 +25,14 @@ from server.api.dependencies import Caller, Operator, activity, operator, superv
 from server.api.preview import outdated_preview
 from server.api.responses import COMMAND, STOP_BODY, TOO_MANY, answer
 from server.auth.sessions import Session
-from server.robots.commands import Result
+from server.robots.commands import Result, result_of
 from server.robots.context import RobotContext
 from server.robots.teleop import MOTION_RATE_HZ, TeleopCommand
 
-#: What the server itself refuses of a command, since it has newer data than the controller: the reason, or empty.
-_CHECKS: dict[type[msgspec.Struct], Callable[[RobotContext, Any], str]] = {intents.ApprovePreview: outdated_preview}
+#: What the server itself refuses of a command, since it has newer data than the controller: the reason, or None.
+_CHECKS: dict[type[msgspec.Struct], Callable[[RobotContext, Any], m.Reason | None]] = {
+    intents.ApprovePreview: outdated_preview
+}
 
 
 def commands_router(robot: RobotContext) -> APIRouter:
@@ -58,13 +60,12 @@ def commands_router(robot: RobotContext) -> APIRouter:
         """
         if not request.hold:
             robot.teleop.release(session)
-            return answer(Result(200, True, "released"))
-        if request.target is not None and request.target.refused:
-            return answer(Result(409, False, request.target.refused))
+            return answer(Result(200))
+        if request.target is not None and request.target.refused is not None:
+            return answer(Result(409, request.target.refused))
         now = time.monotonic()
         if not robot.teleop.within_rate(session, now):
-            limit = f"at most {MOTION_RATE_HZ:.0f} requests for motion a second; ask less often"
-            return answer(Result(429, False, limit))
+            return answer(Result(429, reasons.motion_rate_exceeded(MOTION_RATE_HZ)))
         command = TeleopCommand(
             None if request.target is None else m.Pose(request.target.position, request.target.quat_xyzw),
             None if request.base is None else BaseVelocity(request.base.linear, request.base.angular),
@@ -72,18 +73,18 @@ def commands_router(robot: RobotContext) -> APIRouter:
         )
         given = None if command == TeleopCommand() else command
         refused = robot.teleop.hold(session, now, given, speed_scale=request.speed_scale)
-        return answer(Result(409, False, refused) if refused else Result(200, True, "holding"))
+        return answer(Result(200) if refused is None else Result(409, refused))
 
     @router.post("/replay", tags=["replay"], responses=COMMAND)
     async def seek(session: Caller, wanted: Annotated[dict[str, Any], Depends(fields_of(SeekReplay))]) -> Response:
         """Seek, pause or play the recording; 409 while none is played."""
         if robot.link.replay.peek() is None:
-            return answer(Result(409, False, "this is a robot, not a recording"))
+            return answer(Result(409, reasons.no_recording()))
         try:
             result = await robot.link.call(topics.SEEK, SeekReplay(**wanted))
         except ServiceError as error:
-            return answer(Result(503, False, str(error)))
-        return answer(Result(200, result.ok, result.reason, refused=result.refused))
+            return answer(Result(503, reasons.service_silent("recorder", str(error))))
+        return answer(result_of(result))
 
     return router
 
@@ -99,10 +100,10 @@ def _add(router: APIRouter, robot: RobotContext, command: Command) -> None:
         session: Annotated[Session, Depends(role)], fields: Annotated[dict[str, Any], Depends(read)]
     ) -> Response:
         asked = command.message(user=session.user, **fields)
-        refused = "" if check is None else check(robot, asked)
-        if refused:
-            robot.log.note("warning", f"{session.user}: {command.name} refused: {refused}")
-            return answer(Result(409, False, refused))
+        refused = None if check is None else check(robot, asked)
+        if refused is not None:
+            robot.log.note(reasons.request_refused(command.name, session.user, refused))
+            return answer(Result(409, refused))
         if isinstance(asked, PlantRequest):
             return answer(await robot.commands.ask_perception(session, asked))
         return answer(await robot.commands.ask(session, asked))

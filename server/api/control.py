@@ -3,6 +3,7 @@
 import msgspec
 from fastapi import APIRouter, Depends, Response
 
+from rolling_panda import reasons
 from rolling_panda.messages.supervision import ClientKey, ControlState
 from server.api.dependencies import Caller, Operator, activity
 from server.api.responses import COMMAND, UNAVAILABLE, answer, message, query
@@ -25,12 +26,12 @@ def control_router(robot: RobotContext) -> APIRouter:
         """Who holds control, who requests it, and the remaining time of the lease; `client` is the caller's key."""
         received = robot.link.control.peek()
         if received is None:
-            return answer(Result(503, False, "The controller has not reported the holder of control yet; ask again."))
+            return answer(Result(503, reasons.not_reported("controller")))
         return message(Control(**msgspec.structs.asdict(received.message), client=session.client))
 
     @router.post("/here", responses=COMMAND)
     async def here(session: Operator) -> Response:
         """Report presence, which renews the lease: a page does so while the 3-D view keeps it busy."""
-        return answer(Result(200, True, ""))
+        return answer(Result(200))
 
     return router

@@ -7,9 +7,11 @@ import time
 from collections.abc import Awaitable, Callable
 from typing import Annotated
 
-from fastapi import Depends, HTTPException, Request
+from fastapi import Depends, Request
 
+from rolling_panda import reasons
 from server.api import bodies as body
+from server.api.responses import RefusedError
 from server.auth.sessions import Session
 from server.robots.context import RobotContext
 
@@ -27,7 +29,7 @@ Visitor = Annotated[Session | None, Depends(_session)]
 
 def _caller(session: Visitor) -> Session:
     if session is None:
-        raise HTTPException(401, "sign in first")
+        raise RefusedError(401, reasons.not_signed_in())
     return session
 
 
@@ -38,7 +40,7 @@ Caller = Annotated[Session, Depends(_caller)]
 def operator(session: Caller) -> Session:
     """The session of a caller who may operate."""
     if not session.may_operate:
-        raise HTTPException(403, f"a {session.role} may look and stop, not operate")
+        raise RefusedError(403, reasons.viewer_only())
     return session
 
 
@@ -49,7 +51,7 @@ Operator = Annotated[Session, Depends(operator)]
 def supervisor(session: Caller) -> Session:
     """The session of a supervisor."""
     if session.role != "supervisor":
-        raise HTTPException(403, f"only a supervisor may do this, not a {session.role}")
+        raise RefusedError(403, reasons.supervisor_needed())
     return session
 
 

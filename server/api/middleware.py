@@ -13,7 +13,10 @@ from starlette.datastructures import MutableHeaders
 from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from rolling_panda import reasons
+from rolling_panda.messages.types import Reason
 from rolling_panda.runtime.token_bucket import TokenBuckets
+from server.api.responses import outcome
 from server.auth.sessions import Session, Sessions
 
 _PUBLIC_PATHS = frozenset({"/api/sign-in", "/api/health", "/api/openapi.json"})
@@ -49,9 +52,9 @@ class SecurityMiddleware:
         origins: frozenset[str],
         cookie: str,
         max_body: int,
-        on_refusal: Callable[[str], None],
+        on_refusal: Callable[[Reason], None],
     ) -> None:
-        """Wrap `app`; `on_refusal(text)` is called with refused origins."""
+        """Wrap `app`; `on_refusal(reason)` is called with refused origins."""
         self._app = app
         self._sessions = sessions
         self._origins = origins
@@ -79,13 +82,13 @@ class SecurityMiddleware:
 
         session = self.session(scope)
         if session is None and not await self._within_rate_limit(scope):
-            await _refuse(with_headers, 429, "too many requests without a session come from this address; try later")
+            await _refuse(with_headers, 429, reasons.visitor_rate_exceeded())
             return
         if scope["method"] not in _SAFE_METHODS and not self._origin_allowed(scope):
-            await _refuse(with_headers, 403, "this request does not come from the page of this server (Origin)")
+            await _refuse(with_headers, 403, reasons.origin_foreign())
             return
         if session is None and not is_public(path):
-            await _refuse(with_headers, 401, "sign in first: open the sign-in link of this server")
+            await _refuse(with_headers, 401, reasons.not_signed_in())
             return
         try:
             async with asyncio.timeout(_OPTIONAL_BODY_S if path in _OPTIONAL_BODY else None):
@@ -97,7 +100,7 @@ class SecurityMiddleware:
         if body is None and path in _OPTIONAL_BODY:
             body = b""
         if body is None:
-            await _refuse(with_headers, 413, f"a request body has at most {self._max_body} bytes")
+            await _refuse(with_headers, 413, reasons.body_too_long(float(self._max_body)))
             return
         scope.setdefault("state", {})["session"] = session
         await self._app(scope, _BufferedBody(body, receive), with_headers)
@@ -138,7 +141,7 @@ class SecurityMiddleware:
         origins = [value.decode("latin-1") for name, value in scope["headers"] if name == b"origin"]
         if len(origins) == 1 and origins[0] in self._origins:
             return True
-        self._on_refusal(f"refused {scope['path'][:80]!r} from origin {', '.join(origins)[:80] or 'none'!r}")
+        self._on_refusal(reasons.origin_refused(scope["path"][:80], ", ".join(origins)[:80] or "none"))
         return False
 
 
@@ -180,8 +183,8 @@ async def _read_body(receive: Receive, limit: int) -> bytes | None:
             return body
 
 
-async def _refuse(send: Send, status: int, reason: str) -> None:
-    body = msgspec.json.encode({"ok": False, "reason": reason})
+async def _refuse(send: Send, status: int, reason: Reason) -> None:
+    body = msgspec.json.encode(outcome(False, reason))
     headers = [(b"content-type", b"application/json"), (b"content-length", str(len(body)).encode())]
     await send({"type": "http.response.start", "status": status, "headers": headers})
     await send({"type": "http.response.body", "body": body})

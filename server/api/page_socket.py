@@ -8,6 +8,7 @@ import msgspec
 from fastapi import APIRouter
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from rolling_panda import reasons
 from rolling_panda.messages.page import (
     FromPage,
     Hold,
@@ -31,6 +32,7 @@ from rolling_panda.messages.page import (
     ShowPreview,
 )
 from rolling_panda.messages.supervision import PreviewState
+from rolling_panda.messages.types import Reason
 from server.auth.sessions import Session
 from server.connections.websocket_protocol import why_ended
 from server.robots.context import RobotContext
@@ -90,7 +92,7 @@ class PageSocket:
         if self.session.ended.is_set():
             await self._close("signed out")
         elif reason := why_ended(self._websocket.scope):
-            self._log_closed(reason)
+            self._robot.log.note(reasons.page_closed(self.session.user, reason), self.session.client)
 
     def send_selected(self, point_id: str) -> None:
         """A point was clicked in the 3-D view of this session."""
@@ -107,7 +109,7 @@ class PageSocket:
         self._measured = measured
         self.wake()
 
-    def send_hold_ended(self, reason: str) -> None:
+    def send_hold_ended(self, reason: Reason) -> None:
         """This session's hold has ended; the page that held needs a new press of the button."""
         if self._holding:
             self._end_hold(reason)
@@ -167,16 +169,14 @@ class PageSocket:
                 try:
                     message = _DECODER.decode(text)
                 except (msgspec.MsgspecError, UnicodeEncodeError, RecursionError) as error:
-                    self._log_closed(str(error)[:200])
+                    invalid = reasons.page_message_invalid(self.session.user, str(error)[:200])
+                    self._robot.log.note(invalid, self.session.client)
                     await self._close("this message is not one that a page may send")
                     return
                 self._handle(message)
         except (WebSocketDisconnect, KeyError, RuntimeError):
             # KeyError: a binary frame, which no page sends.
             return
-
-    def _log_closed(self, reason: str) -> None:
-        self._robot.log.note("warning", f"a page of {self.session.user} was closed: {reason}", self.session.client)
 
     def _handle(self, message: FromPage) -> None:
         match message:
@@ -219,19 +219,19 @@ class PageSocket:
             return
         # A short pause of a slow browser is resumed; a longer one needs a new press.
         if teleop.must_release(self.session, now) and self._holding:
-            self._end_hold("The hold ended: the page or its link was too slow. Press again to continue.")
+            self._end_hold(reasons.hold_interrupted())
             return
         drives = message.base is not None or message.joints is not None
         command = TeleopCommand(None, message.base, message.joints) if drives else None
         refused = teleop.hold(self.session, now, command, self.view, message.speed_scale)
-        if not refused:
+        if refused is None:
             self._holding = True
         elif not self._holding:
             self._end_hold(refused)
 
-    def _end_hold(self, reason: str) -> None:
+    def _end_hold(self, reason: Reason) -> None:
         self._holding, self._needs_release = False, True
-        self._hold_ended = HoldEnded(reason=reason)
+        self._hold_ended = HoldEnded(reason=reasons.text_of(reason))
         self.wake()
 
     async def _close(self, reason: str) -> None:

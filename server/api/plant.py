@@ -1,12 +1,12 @@
 """REST for requests to perception about the pruning rule, and for crops of points."""
 
-from dataclasses import replace
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query, Response
 from fastapi.responses import JSONResponse
 
 from rolling_panda import commands as ask
+from rolling_panda import reasons
 from rolling_panda.messages.page import PagePoints
 from rolling_panda.messages.perception import PruningRule
 from rolling_panda.messages.types import RuleEffect
@@ -57,7 +57,8 @@ def plant_router(robot: RobotContext) -> APIRouter:
             return answer(done)
         restored = await robot.commands.ask(session, ask.RestoreAccepted(user=session.user, rule=rule))
         if not restored.ok:
-            return answer(replace(restored, reason=f"the rule is restored, its acceptances are not: {restored.reason}"))
+            cause = restored.reason or reasons.said("")
+            return answer(Result(restored.status, reasons.acceptances_not_restored(cause)))
         return answer(done)
 
     @router.get(
@@ -78,7 +79,7 @@ def plant_router(robot: RobotContext) -> APIRouter:
             if any(row.point.point_id == point_id for row in known):
                 # Not an error, which a browser's console would show.
                 return Response(status_code=204)
-            return answer(Result(404, False, f"there is no point {point_id!r}"))
+            return answer(Result(404, reasons.point_unknown(point_id)))
         return Response(found.jpeg, media_type="image/jpeg")
 
     return router

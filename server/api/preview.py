@@ -7,6 +7,7 @@ from fastapi import APIRouter, Response
 
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.messages.supervision import PreviewMotion, PreviewState
 from server.api.dependencies import Caller
 from server.api.responses import message, query
@@ -37,16 +38,16 @@ def preview_router(robot: RobotContext) -> APIRouter:
     return router
 
 
-def outdated_preview(robot: RobotContext, approval: intents.ApprovePreview) -> str:
-    """Why an approval is refused, since the robot or the preview has changed; empty where it is passed on."""
+def outdated_preview(robot: RobotContext, approval: intents.ApprovePreview) -> m.Reason | None:
+    """Why an approval is refused, since the robot or the preview has changed; None where it is passed on."""
     state = robot.link.preview.peek()
     if state is None:
-        return ""
+        return None
     return outdated(state.message, approval.preview_hash, robot.link.posture(state.at))
 
 
-def outdated(state: PreviewState, preview_hash: str, posture: Posture | None) -> str:
-    """Why an approval is refused; empty where it is passed on.
+def outdated(state: PreviewState, preview_hash: str, posture: Posture | None) -> m.Reason | None:
+    """Why an approval is refused; None where it is passed on.
 
     Args:
         state: Newest state of the preview.
@@ -54,25 +55,25 @@ def outdated(state: PreviewState, preview_hash: str, posture: Posture | None) ->
         posture: Measured; None where it is unknown.
     """
     if state.phase == "expired":
-        return f"the preview has expired: {state.reason}; ask for another one"
+        return reasons.preview_expired(reasons.said(state.reason))
     if state.phase not in ("ready", "approved"):
-        return "there is no preview to approve; ask for one"
+        return reasons.preview_missing()
     if preview_hash != state.preview_hash:
-        return f"the preview is another one now: {state.preview_hash[:8]}, not {preview_hash[:8]}; look again"
+        return reasons.preview_replaced(state.preview_hash[:8], preview_hash[:8])
     if posture is None or state.start is None or state.position is None:
-        return "the position of the robot is unknown"
+        return reasons.posture_unknown()
     return _deviation(state.start, state.position, posture)
 
 
-def _deviation(start: m.PlanarPose, position: m.Actuated, posture: Posture) -> str:
+def _deviation(start: m.PlanarPose, position: m.Actuated, posture: Posture) -> m.Reason | None:
     base = posture.base
     moved = math.hypot(base.x - start.x, base.y - start.y)
     if moved > _BASE_TOLERANCE:
-        return f"the preview has expired: the base moved {moved:.2f} m; ask for another one"
+        return reasons.preview_base_moved(moved)
     turned = abs(math.remainder(base.phi - start.phi, math.tau))
     if turned > _HEADING_TOLERANCE:
-        return f"the preview has expired: the base turned by {math.degrees(turned):.0f}°; ask for another one"
+        return reasons.preview_base_turned(math.degrees(turned))
     joint_change = max(abs(now - then) for now, then in zip(posture.position[2:], position[2:], strict=True))
     if joint_change > _JOINT_TOLERANCE:
-        return f"the preview has expired: a joint of the arm moved by {joint_change:.2f} rad; ask for another one"
-    return ""
+        return reasons.preview_arm_moved(joint_change)
+    return None

@@ -3,10 +3,11 @@
 from typing import Any
 
 import msgspec
-from fastapi import Response
+from fastapi import HTTPException, Response
 from fastapi.responses import JSONResponse
 
-from rolling_panda.messages import Reason
+from rolling_panda.messages.types import Reason
+from rolling_panda.reasons import text_of
 from server.api import bodies as body
 from server.robots.commands import Result
 
@@ -49,11 +50,25 @@ def query(content: type[msgspec.Struct] | str, *others: Responses) -> Responses:
 
 
 def answer(result: Result) -> JSONResponse:
-    """A result as `{ok, reason}`, with `code` and `values` of a refusal that is in the catalogue."""
-    content: dict[str, Any] = {"ok": result.ok, "reason": result.reason}
-    if result.refused is not None:
-        content |= _as_data(result.refused)
-    return JSONResponse(content, result.status)
+    """A result as `{ok, reason}`, with `code` and `values` of a refusal."""
+    return JSONResponse(outcome(result.ok, result.reason), result.status)
+
+
+def outcome(ok: bool, reason: Reason | None = None) -> dict[str, Any]:
+    """The body of an answer: `reason` is English text; a refusal has its code and values too."""
+    content: dict[str, Any] = {"ok": ok, "reason": "" if reason is None else text_of(reason)}
+    if reason is not None and not ok:
+        content |= _as_data(reason)
+    return content
+
+
+class RefusedError(HTTPException):
+    """A refusal outside of a route's own answer."""
+
+    def __init__(self, status: int, reason: Reason) -> None:
+        """Answer with this HTTP status and reason."""
+        super().__init__(status, text_of(reason))
+        self.reason = reason
 
 
 def _as_data(reason: Reason) -> dict[str, Any]:

@@ -3,13 +3,14 @@
 import asyncio
 from collections.abc import Mapping
 
-from fastapi import APIRouter, HTTPException, Request, Response
+from fastapi import APIRouter, Request, Response
 from fastapi.responses import RedirectResponse
 from starlette.types import ASGIApp, Receive, Scope, Send
 
+from rolling_panda import reasons
 from server.api import bodies as body
 from server.api.dependencies import Caller
-from server.api.responses import COMMAND, SIGNED_IN, STOP_BODY, answer
+from server.api.responses import COMMAND, SIGNED_IN, STOP_BODY, RefusedError, answer
 from server.auth.sessions import Session
 from server.robots.app_state import AppState
 from server.robots.commands import Result
@@ -60,16 +61,23 @@ def robots_router(app_state: AppState) -> APIRouter:
 
 
 async def stop_all(robots: dict[str, RobotContext], session: Session, reason: str) -> Result:
-    """Stop every robot at once; the status is the worst, the reason has that of each."""
+    """Stop every robot at once; the status is the worst, the reason names the robots that have not confirmed."""
     results = await asyncio.gather(*(robot.commands.stop(session, reason) for robot in robots.values()))
-    reasons = "; ".join(f"{name}: {result.reason}" for name, result in zip(robots, results, strict=True))
-    return Result(max(result.status for result in results), all(result.ok for result in results), reasons)
+    by_code: dict[str, list[str]] = {}
+    for name, result in zip(robots, results, strict=True):
+        by_code.setdefault("" if result.reason is None else result.reason.code, []).append(name)
+    for code, status, told in (
+        ("stop_unconfirmed", 503, reasons.stop_of_all_unconfirmed),
+        ("stop_half_confirmed", 200, reasons.stop_of_all_half_confirmed),
+    ):
+        if code in by_code:
+            return Result(status, told(", ".join(by_code[code])))
+    return Result(200, reasons.stop_of_all_confirmed(", ".join(robots)))
 
 
-def unknown(name: str, app_state: AppState) -> HTTPException:
+def unknown(name: str, app_state: AppState) -> RefusedError:
     """The error for a name that no robot has."""
-    there = ", ".join(app_state.robots)
-    return HTTPException(404, f"there is no robot {name[:64]!r} here; there are: {there} (GET /api/robots)")
+    return RefusedError(404, reasons.robot_unknown(name[:64], ", ".join(app_state.robots)))
 
 
 class RobotRouter:

@@ -8,11 +8,12 @@ import msgspec
 from fastapi import APIRouter, Depends, Header, Request, Response
 from fastapi.responses import FileResponse, JSONResponse, RedirectResponse
 
+from rolling_panda import reasons
 from rolling_panda.cli.about import about
 from server.api import bodies as body
 from server.api.dependencies import Caller, Supervisor, Visitor
 from server.api.page_files import PageFiles
-from server.api.responses import COMMAND, SIGN_IN, SIGN_OUT, SIGNED_IN, answer
+from server.api.responses import COMMAND, SIGN_IN, SIGN_OUT, SIGNED_IN, answer, outcome
 from server.auth.sessions import Session, SignInError
 from server.robots.app_state import AppState
 from server.robots.commands import Result
@@ -55,7 +56,7 @@ def sign_in_router(app_state: AppState) -> APIRouter:
         if request.token is not None:
             return app_state.sessions.sign_in(request.token, time.monotonic(), address)
         if app_state.passwords is None:
-            raise SignInError("this server has no users file: sign in with the link that it printed")
+            raise SignInError(reasons.sign_in_without_passwords())
         user = await app_state.passwords.check(request.user or "", request.password or "", address)
         return app_state.sessions.open(user.name, user.role, time.monotonic(), user.fingerprint)
 
@@ -65,17 +66,21 @@ def sign_in_router(app_state: AppState) -> APIRouter:
         try:
             session = await _session_of(request, address)
         except SignInError as error:
-            name = f" as {request.user!r}" if request.user is not None else ""
-            app_state.note("warning", f"sign-in{name} from {address} refused: {error}", f"sign-in {address}")
+            refusal = (
+                reasons.link_refused(address, error.reason)
+                if request.user is None
+                else reasons.sign_in_refused(request.user, address, error.reason)
+            )
+            app_state.note(refusal, f"sign-in {address}")
             if error.wait_s > 0:
-                refused = answer(Result(429, False, str(error)))
+                refused = answer(Result(429, error.reason))
                 refused.headers["Retry-After"] = str(max(1, round(error.wait_s)))
                 return refused
-            return answer(Result(401, False, str(error)))
+            return answer(Result(401, error.reason))
         if visitor is not None:
             app_state.sign_out(visitor)
-        app_state.note("info", f"{session.user} signed in ({session.role})")
-        signed_in = JSONResponse({"ok": True, "reason": ""})
+        app_state.note(reasons.signed_in(session.user, session.role))
+        signed_in = JSONResponse(outcome(True))
         signed_in.set_cookie(
             app_state.cookie,
             session.session_id,
@@ -97,7 +102,7 @@ def sign_in_router(app_state: AppState) -> APIRouter:
         """End this session; its pages close at once."""
         if visitor is not None:
             app_state.sign_out(visitor)
-        signed_out = JSONResponse({"ok": True, "reason": ""})
+        signed_out = JSONResponse(outcome(True))
         signed_out.delete_cookie(app_state.cookie, path="/", httponly=True, samesite="strict")
         return signed_out
 
@@ -122,6 +127,6 @@ def sign_in_router(app_state: AppState) -> APIRouter:
     async def invite(session: Supervisor, request: body.Invite) -> Response:
         """A single-use sign-in link for another user or a script. Supervisors only."""
         made = app_state.invite(session, request.user, request.role)
-        return JSONResponse({"ok": True, "reason": "", "link": made.reason}) if made.ok else answer(made)
+        return JSONResponse(outcome(True) | {"link": made}) if isinstance(made, str) else answer(Result(403, made))
 
     return router

@@ -10,6 +10,7 @@ import msgspec
 from fastapi import APIRouter, Depends, Query, Response
 from pydantic import BaseModel, Field
 
+from rolling_panda import reasons
 from rolling_panda.messages.page import PageEvents, PagePoints, PageState
 from rolling_panda.messages.supervision import CutReport, SessionPlan, SessionReport
 from server.api.dependencies import Caller, activity
@@ -35,7 +36,7 @@ def state_router(robot: RobotContext) -> APIRouter:
     async def state(session: Caller) -> Response:
         """The newest state of the robot: what the page gets 10 times a second."""
         if robot.pages.state is None:
-            return answer(Result(503, False, "The server is starting; ask again."))
+            return answer(Result(503, reasons.not_reported("server")))
         robot.pages.on_state_fetched(session, time.monotonic())
         return message(addressed(robot.pages.state, session))
 
@@ -49,7 +50,7 @@ def state_router(robot: RobotContext) -> APIRouter:
         """The plan: order and approach of each accepted point that can be cut, and why the others cannot."""
         received = robot.link.plan.peek()
         if received is None:
-            return answer(Result(503, False, "The controller has not sent its plan yet; ask again."))
+            return answer(Result(503, reasons.not_reported("controller")))
         return message(received.message)
 
     @router.get("/events", tags=["state"], responses=query(PageEvents, INVALID))
@@ -96,12 +97,12 @@ def camera_router(robot: RobotContext) -> APIRouter:
         """The newest image of the eye-in-hand camera, JPEG; with `n` that of frame `n`, one of the newest few."""
         frame = robot.link.camera.peek()
         if frame is None:
-            return answer(Result(404, False, "no camera image has come yet"))
+            return answer(Result(404, reasons.no_camera_image()))
         # `images` is filled on another thread, and may lack the newest frame for a moment.
         images = {**robot.link.images, frame.message.sequence: frame.message.color_jpeg}
         image = images.get(frame.message.sequence if n is None else n)
         if image is None:
-            return answer(Result(404, False, f"frame {n} is not among the newest ones; {frame.message.sequence} is"))
+            return answer(Result(404, reasons.camera_frame_gone(float(n or 0), float(frame.message.sequence))))
         return Response(image, media_type="image/jpeg")
 
     return router
@@ -127,4 +128,4 @@ def _escape_formula(value: object) -> object:
 
 
 def _no_report() -> Response:
-    return answer(Result(503, False, "The controller has not reported yet; ask again."))
+    return answer(Result(503, reasons.not_reported("controller")))

@@ -4,6 +4,7 @@ import asyncio
 import time
 from collections.abc import Callable
 
+from rolling_panda import reasons
 from server.auth.sessions import SignInError
 from server.auth.throttle import LoginThrottle
 from server.auth.users import User, UserFile
@@ -36,7 +37,7 @@ class Passwords:
             InputError: The users file cannot be read.
         """
         if self._waiting >= _MAX_WAITING:
-            raise SignInError("too many sign-ins at once; try again in 1 s", 1.0)
+            raise SignInError(reasons.sign_ins_crowded(), 1.0)
         keys = (f"name {name}", f"address {address}")
         self._waiting += 1
         try:
@@ -44,11 +45,11 @@ class Passwords:
             async with self._lock:
                 wait = self._throttle.wait(keys, self._clock())
                 if wait > 0.0:
-                    raise SignInError(f"too many failed sign-ins; try again in {max(1.0, wait):.0f} s", wait)
+                    raise SignInError(reasons.sign_in_throttled(max(1.0, wait)), wait)
                 user = await asyncio.to_thread(self.users.check, name, password)
                 if user is None:
                     self._throttle.failed(keys, self._clock())
-                    raise SignInError("name or password is wrong")
+                    raise SignInError(reasons.sign_in_wrong())
                 self._throttle.succeeded(keys)
                 return user
         finally:

@@ -6,20 +6,21 @@ import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from rolling_panda import reasons
 from rolling_panda.errors import InputError
-from rolling_panda.messages.types import Role
+from rolling_panda.messages.types import Reason, Role
 from server.auth.throttle import LoginThrottle
 
 _TOKEN_BYTES = 32
 
 
 class SignInError(InputError):
-    """A sign-in was refused; further attempts are refused for `wait_s`."""
+    """A sign-in was refused for a reason; further attempts are refused for `wait_s`."""
 
-    def __init__(self, reason: str, wait_s: float = 0.0) -> None:
+    def __init__(self, reason: Reason, wait_s: float = 0.0) -> None:
         """Store reason and delay."""
-        super().__init__(reason)
-        self.wait_s = wait_s
+        super().__init__(reasons.text_of(reason))
+        self.reason, self.wait_s = reason, wait_s
 
 
 @dataclass(eq=False)
@@ -91,11 +92,11 @@ class Sessions:
         """
         wait = self._attempts.wait((address,), now)
         if wait > 0.0:
-            raise SignInError(f"too many failed sign-ins; try again in {wait:.0f} s", wait)
+            raise SignInError(reasons.sign_in_throttled(max(1.0, wait)), wait)
         invitation = self._invitations.pop(_digest(token), None)
         if invitation is None or now > invitation.expires_at:
             self._attempts.failed((address,), now)
-            raise SignInError("this sign-in link has been used, has expired or is not from this server")
+            raise SignInError(reasons.sign_in_link_void())
         self._attempts.succeeded((address,))
         return self.open(invitation.user, invitation.role, now)
 

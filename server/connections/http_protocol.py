@@ -10,6 +10,7 @@ from starlette.types import ASGIApp
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.server import ServerState
 
+from rolling_panda import reasons
 from server.connections.listener import Connection, Connections, refusal
 
 #: Time for which a refused connection stays open (s): a reset would discard the reason before the client reads it.
@@ -135,10 +136,10 @@ class TimedHttp(H11Protocol):
         if self._awaited == "request":
             self.transport.abort()
             return
-        late, address = f"{self._awaited} did not come in time", self._connection.address
-        self.config.connections.note(f"ended a request from {address}: its {late}", address)
+        address = self._connection.address
+        self.config.connections.note(reasons.request_ended(address, self._awaited), address)
         if self.conn.our_state in (h11.IDLE, h11.SEND_RESPONSE):
-            self.transport.write(refusal(408, f"the request's {late}; send it again"))
+            self.transport.write(refusal(408, reasons.request_late(self._awaited)))
         self._linger()
 
     def _linger(self) -> None:

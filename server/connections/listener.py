@@ -15,6 +15,8 @@ from weakref import WeakKeyDictionary
 
 import msgspec
 
+from rolling_panda import reasons
+from rolling_panda.messages.types import Reason
 from rolling_panda.runtime.token_bucket import TokenBucket
 from server.config import ServerConfig
 
@@ -65,8 +67,8 @@ class Connection:
 class Connections:
     """All open connections, the one served longest ago first. Belongs to the server's event loop."""
 
-    def __init__(self, limits: ServerConfig, note: Callable[[str, str], object] = lambda text, by: None) -> None:
-        """Start without connections. `note(text, by)` reports refused and ended connections with their client."""
+    def __init__(self, limits: ServerConfig, note: Callable[[Reason, str], object] = lambda reason, by: None) -> None:
+        """Start without connections. `note(reason, by)` reports refused and ended connections with their client."""
         self.limits, self.note = limits, note
         self._open: OrderedDict[tuple[Any, ...], Connection] = OrderedDict()
         self._of_address: Counter[str] = Counter()
@@ -86,9 +88,9 @@ class Connections:
             idle = self._first_idle(address, served=False) or self._first_idle(address, served=True)
             whose = new.address if crowded else "all addresses together"
             if idle is None:
-                self.note(f"refused a connection from {new.address}: too many of {whose} are in use", new.address)
+                self.note(reasons.connection_refused(new.address, whose), new.address)
                 return False
-            self.note(f"too many connections of {whose}: the longest idle one was ended", new.address)
+            self.note(reasons.connection_replaced(whose), new.address)
             self.gone(idle)
             idle.end()
         if new.peer in self._open:
@@ -173,7 +175,7 @@ class Listener(socket.socket):
                 return accepted, peer
             if not self._speaks_tls:
                 with suppress(OSError):
-                    accepted.send(refusal(503, "too many connections are open; close other pages, then try again"))
+                    accepted.send(refusal(503, reasons.too_many_connections()))
             accepted.close()
 
 
@@ -204,10 +206,10 @@ class _Counted(socket.socket):
         super().close()
 
 
-def refusal(status: int, reason: str) -> bytes:
+def refusal(status: int, reason: Reason) -> bytes:
     """A whole answer of HTTP/1.1 where no request was read; the connection ends after it."""
     words = {408: "Request Timeout", 503: "Service Unavailable"}[status]
-    body = msgspec.json.encode({"ok": False, "reason": reason})
+    body = msgspec.json.encode({"ok": False, "reason": reasons.text_of(reason), "code": reason.code})
     head = (
         f"HTTP/1.1 {status} {words}\r\ncontent-type: application/json\r\ncontent-length: {len(body)}\r\n"
         f"retry-after: 1\r\nconnection: close\r\n\r\n"

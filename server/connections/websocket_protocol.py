@@ -12,6 +12,8 @@ from uvicorn._types import ASGIReceiveEvent, ASGISendEvent
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from uvicorn.server import ServerState
 
+from rolling_panda import reasons
+from rolling_panda.messages.types import Reason
 from rolling_panda.runtime.token_bucket import TokenBucket
 from server.connections.http_protocol import LINGER_S, SiteConfig
 
@@ -65,7 +67,7 @@ class LimitedSocket(WebSocketsSansIOProtocol):
             if self._cut_off or self.transport.is_closing():
                 return
             if not self._bytes.take(time.monotonic(), len(piece)):
-                self._cut(_POLICY, f"it sent more than {self.config.limits.socket_bytes_hz:.0f} bytes a second")
+                self._cut(_POLICY, reasons.socket_bytes_exceeded(self.config.limits.socket_bytes_hz))
                 return
             super().data_received(piece)
 
@@ -73,10 +75,9 @@ class LimitedSocket(WebSocketsSansIOProtocol):
         """Count messages, pings and all, before they are handed on."""
         now, count = time.monotonic(), len(self.conn.events)
         if not self._messages.take(now, count):
-            self._cut(_POLICY, f"it said more than {self.config.limits.socket_messages_hz:.0f} things a second")
+            self._cut(_POLICY, reasons.socket_messages_exceeded(self.config.limits.socket_messages_hz))
         elif self.handshake_complete and not self.close_sent and not self._bucket().take(now, count):
-            most = self.config.limits.session_messages_hz
-            self._cut(_POLICY, f"its session said more than {most:.0f} things a second through all of its connections")
+            self._cut(_POLICY, reasons.session_messages_exceeded(self.config.limits.session_messages_hz))
         else:
             super().handle_events()
 
@@ -93,7 +94,7 @@ class LimitedSocket(WebSocketsSansIOProtocol):
             await asyncio.sleep(_TURN_S)
         await super().send(message)
         if not self.config.connections.upgrade(self._connection):
-            self._cut(_TRY_AGAIN, "too many pages and views are open; close some, then try again")
+            self._cut(_TRY_AGAIN, reasons.too_many_sockets())
 
     async def receive(self) -> ASGIReceiveEvent:
         """The next message; whoever else waits for the loop has a turn before it."""
@@ -103,7 +104,7 @@ class LimitedSocket(WebSocketsSansIOProtocol):
     def keepalive_timeout(self) -> None:
         """A ping was not answered in time."""
         super().keepalive_timeout()
-        self._state()[_ENDED] = "it did not read what it was sent"
+        self._state()[_ENDED] = reasons.socket_unread()
         self.transport.abort()
 
     def _state(self) -> dict[str, Any]:
@@ -112,12 +113,14 @@ class LimitedSocket(WebSocketsSansIOProtocol):
     def _bucket(self) -> TokenBucket:
         return self.config.connections.said_by(self._state()["session"])
 
-    def _cut(self, code: int, reason: str) -> None:
+    def _cut(self, code: int, cause: Reason) -> None:
         self._cut_off = True
         if not self.handshake_complete:
             self.transport.abort()
             return
-        self._state()[_ENDED] = reason
+        self._state()[_ENDED] = cause
+        # A close frame has room for 123 bytes.
+        reason = reasons.text_of(cause).encode()[:123].decode(errors="ignore")
         self.stop_keepalive()
         if not self.close_sent:
             self.close_sent = True
@@ -130,6 +133,7 @@ class LimitedSocket(WebSocketsSansIOProtocol):
         self.close_timer = self.loop.call_later(LINGER_S, self.transport.abort)
 
 
-def why_ended(scope: Mapping[str, Any]) -> str:
-    """Reason why the server closed this connection, as text; empty if it did not."""
-    return str(scope.get("state", {}).get(_ENDED, ""))
+def why_ended(scope: Mapping[str, Any]) -> Reason | None:
+    """Reason why the server closed this connection; None if it did not."""
+    reason: Reason | None = scope.get("state", {}).get(_ENDED)
+    return reason

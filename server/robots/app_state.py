@@ -4,10 +4,10 @@ import time
 from dataclasses import dataclass, field
 
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.errors import InputError
 from server.auth.passwords import Passwords
 from server.auth.sessions import Session, Sessions
-from server.robots.commands import Result
 from server.robots.context import RobotContext
 
 
@@ -34,25 +34,25 @@ class AppState:
     robots: dict[str, RobotContext] = field(default_factory=dict)
     _users_error: str = ""
 
-    def note(self, severity: m.Severity, text: str, by: str = "") -> None:
+    def note(self, reason: m.Reason, by: str = "") -> None:
         """Write a line into the log of every robot; see `RobotLog.note`."""
         for robot in self.robots.values():
-            robot.log.note(severity, text, by)
+            robot.log.note(reason, by)
 
     def sign_out(self, session: Session) -> None:
         """End a session; its holds of all robots are released."""
         for robot in self.robots.values():
             robot.end_session(session)
         self.sessions.end(session)
-        self.note("info", f"{session.user} signed out")
+        self.note(reasons.signed_out(session.user))
 
-    def invite(self, session: Session, user: str, role: m.Role) -> Result:
-        """A link that signs `user` in once; the result's reason is the link."""
+    def invite(self, session: Session, user: str, role: m.Role) -> str | m.Reason:
+        """A link that signs `user` in once, or why there is none."""
         if self.passwords is not None:
-            return Result(403, False, "here people sign in with a password: rolling-panda user add NAME")
+            return reasons.invitation_impossible()
         token = self.sessions.invite(user, role, time.monotonic() + self.invite_s)
-        self.note("info", f"{session.user} made a sign-in link for {user} ({role})")
-        return Result(200, True, f"{self.address}/sign-in?token={token}")
+        self.note(reasons.invited(session.user, user, role))
+        return f"{self.address}/sign-in?token={token}"
 
     def end_void_sessions(self) -> None:
         """Sign out the sessions of removed and changed accounts."""
@@ -64,11 +64,11 @@ class AppState:
             # Sessions stay signed in while the file cannot be read; nobody new can sign in.
             if str(error) != self._users_error:
                 self._users_error = str(error)
-                self.note("error", self._users_error)
+                self.note(reasons.users_unreadable(self._users_error))
             return
         self._users_error = ""
         for session in self.sessions.void(accounts):
-            self.note("warning", f"the account of {session.user} was removed or changed")
+            self.note(reasons.account_changed(session.user))
             self.sign_out(session)
 
     def held_elsewhere(self, session: Session, here: RobotContext) -> str:

@@ -10,7 +10,7 @@ import msgspec
 
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
-from rolling_panda import topics
+from rolling_panda import reasons, topics
 from rolling_panda.commands import EvaluateRule, PlantRequest
 from rolling_panda.errors import ServiceError
 from server.auth.sessions import Session
@@ -22,13 +22,22 @@ _CONFIRM_POLL_S = 0.01
 
 @dataclass(frozen=True)
 class Result:
-    """The result of a request: HTTP status, success, and a message."""
+    """The result of a request.
+
+    Attributes:
+        status: HTTP status; below 400 it was done.
+        reason: Why it was refused, or what was done; None where there is nothing to say.
+        effect: Of a pruning rule.
+    """
 
     status: int
-    ok: bool
-    reason: str
+    reason: m.Reason | None = None
     effect: m.RuleEffect | None = None
-    refused: m.Reason | None = None
+
+    @property
+    def ok(self) -> bool:
+        """Whether the request was done."""
+        return self.status < 400
 
 
 class RobotCommands:
@@ -63,7 +72,7 @@ class RobotCommands:
             # The age of the view goes with the intent, since the presence message may arrive later.
             view_age_s=self._view_age_s(session),
         )
-        return await self._call(session, "the controller", topics.INTENT, complete)
+        return await self._call(session, "controller", topics.INTENT, complete)
 
     async def ask_perception(self, session: Session, request: PlantRequest) -> Result:
         """Send a request to perception, and log the answer."""
@@ -71,11 +80,9 @@ class RobotCommands:
         result = await self._call(session, "perception", topics.PLANT, request)
         # Dragging a slider tries many rules, and changes nothing.
         if result.status in (200, 409) and not isinstance(request, EvaluateRule):
-            self._log.note(
-                "info",
-                f"{name} by {session.user}: {result.reason if result.ok else 'refused, ' + result.reason}",
-                session.client,
-            )
+            told, by = result.reason or reasons.done(), session.user
+            line = reasons.request_done(name, by, told) if result.ok else reasons.request_refused(name, by, told)
+            self._log.note(line, session.client)
         return result
 
     async def _call(
@@ -84,22 +91,26 @@ class RobotCommands:
         try:
             answer = await self._link.call(service, request)
         except ServiceError as error:
-            name = type(request).__name__
-            self._log.note("error", f"{name} by {session.user}: no answer from {process}", session.client)
-            return Result(503, False, f"{process[0].upper()}{process[1:]} does not answer: {error}")
-        return Result(200 if answer.ok else 409, answer.ok, answer.reason, answer.effect, answer.refused)
+            silent = reasons.service_silent(process, str(error))
+            refused = reasons.request_refused(type(request).__name__, session.user, silent)
+            self._log.note(refused, session.client)
+            return Result(503, silent)
+        return result_of(answer)
 
     async def stop(self, session: Session, reason: str) -> Result:
         """Send the software stop at once, and wait until bridge and controller report it latched."""
         sent_at = time.monotonic()
         stop_id = self._link.send_stop(session.user, reason)
         self._on_stop()
-        self._log.note("warning", f"software stop by {session.user}: {reason}", f"stop {session.client}")
+        self._log.note(reasons.software_stop(session.user, reason), f"stop {session.client}")
         while (missing := self._link.not_latched(stop_id)) and time.monotonic() - sent_at < self._stop_confirm_s:
             await asyncio.sleep(_CONFIRM_POLL_S)
         if "bridge" in missing:
-            reason = "The stop was sent, but the bridge has not confirmed it: use the robot's emergency stop."
-            return Result(503, False, reason)
-        if missing:
-            return Result(200, True, "stopped: the bridge has latched the stop; the controller has not confirmed it")
-        return Result(200, True, "stopped: bridge and controller have latched the stop")
+            return Result(503, reasons.stop_unconfirmed())
+        return Result(200, reasons.stop_half_confirmed() if missing else reasons.stop_confirmed())
+
+
+def result_of(answer: m.Answer) -> Result:
+    """The result of a request that a process has answered."""
+    reason = answer.refused or (reasons.said(answer.reason) if answer.reason else None)
+    return Result(200 if answer.ok else 409, reason, answer.effect)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from rolling_panda import messages as m
 from rolling_panda.messages.page import PageEvent
+from rolling_panda.reasons import CATALOGUE, text_of
 from rolling_panda.runtime.token_bucket import TokenBucket
 
 #: Lines of one source: at once, and per second after that.
@@ -76,10 +77,11 @@ class RobotLog:
         self._send = send
         self._limiter = LogRateLimiter()
 
-    def note(self, severity: m.Severity, text: str, by: str = "") -> None:
+    def note(self, reason: m.Reason, by: str = "") -> None:
         """Write a line of the server; `by` is the source whose rate is limited, empty for none."""
         now = time.monotonic()
-        text = self._limiter.line(by, text, now) if by else text
+        text = self._limiter.line(by, text_of(reason), now) if by else text_of(reason)
         if text:
+            severity = CATALOGUE[reason.code].severity if reason.code in CATALOGUE else "warning"
             self.lines.add("server", severity, text[:500], time.time())
             self._send(severity, text, now)

@@ -34,7 +34,7 @@ class Page(Protocol):
     def send_selected(self, point_id: str) -> None:
         """A point was clicked in the 3-D view of this page's session."""
 
-    def send_hold_ended(self, reason: str) -> None:
+    def send_hold_ended(self, reason: m.Reason) -> None:
         """The hold of this page's session has ended."""
 
 
@@ -107,7 +107,7 @@ class RobotPages:
         """Age of the newest state that this session has rendered or fetched (s)."""
         return self._presence.view_age_s(session, time.monotonic())
 
-    def end_hold(self, owner: str, reason: str) -> None:
+    def end_hold(self, owner: str, reason: m.Reason) -> None:
         """Tell the pages of a session that hold that its hold has ended."""
         for page in self._of(owner):
             page.send_hold_ended(reason)

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from rolling_panda import messages as m
-from rolling_panda.errors import InputError
+from rolling_panda import reasons
 from rolling_panda.messages.page import GizmoAxes
 from rolling_panda.messages.supervision import ArmVelocities, BaseVelocity, TeleopTarget
 from rolling_panda.runtime.token_bucket import TokenBuckets
@@ -103,7 +103,7 @@ class TeleopHold:
 
     def hold(
         self, holder: str, user: str, now: float, view: str = "", client: str = "", speed_scale: float = 1.0
-    ) -> None:
+    ) -> m.Reason | None:
         """Start or renew a hold.
 
         Args:
@@ -114,28 +114,26 @@ class TeleopHold:
             client: The session's key at the controller.
             speed_scale: Speed scale, 0…1.
 
-        Raises:
-            InputError: Somebody else holds, the view is stale, there is no target, or the last hold has lapsed and was
-                not released since.
+        Returns:
+            Why it is refused: somebody else holds, the view is stale, there is no target, or the last hold has lapsed
+            and was not released since.
         """
         self.expire(now)
         if self._hold is not None and self._hold.holder != holder:
-            raise InputError(f"{self._hold.user} is holding the robot; wait until they let go")
+            return reasons.held_by_other(self._hold.user)
         if self.must_release(holder, now):
-            raise InputError(
-                f"your hold ended, as nothing was heard of it in time, and more than {self._config.hold_resume_s} s "
-                "have passed: let go, then hold again"
-            )
+            return reasons.hold_overdue(self._config.hold_resume_s)
         view = view or holder
         age = now - self._rendered_at.get(view, float("-inf"))
         if age > self._config.view_timeout_s:
-            raise InputError("the view of the robot is not current; teleoperation needs one younger than 0.5 s")
+            return reasons.hold_view_stale(self._config.view_timeout_s)
         if holder not in self._commands:
-            raise InputError("there is no target yet; show the gizmo first")
+            return reasons.hold_without_target()
         if self._hold is None:
             self._hold = _Hold(holder, user, view, client, now, self._commands[holder])
         self._hold.renewed_at, self._hold.view, self._hold.speed_scale = now, view, speed_scale
         self._lapsed.pop(holder, None)
+        return None
 
     def must_release(self, holder: str, now: float) -> bool:
         """Whether this holder's hold lapsed so long ago that it has to be released before the next one."""
@@ -214,7 +212,7 @@ class Teleoperation:
         view: PageView,
         log: RobotLog,
         held_elsewhere: Callable[[Session], str],
-        on_end: Callable[[str, str], None],
+        on_end: Callable[[str, m.Reason], None],
     ) -> None:
         """No session holds.
 
@@ -231,7 +229,7 @@ class Teleoperation:
         self._held_elsewhere, self._on_end = held_elsewhere, on_end
         self._hold = TeleopHold(config)
         self._limiter = TokenBuckets(MOTION_RATE_HZ, _MOTION_BURST)
-        self._refused: dict[str, str] = {}
+        self._refused: dict[str, m.Reason] = {}
         self._sent_at = float("-inf")
 
     @property
@@ -269,7 +267,7 @@ class Teleoperation:
         command: TeleopCommand | None = None,
         view: str = "",
         speed_scale: float = 1.0,
-    ) -> str:
+    ) -> m.Reason | None:
         """Start or renew this session's hold on the robot.
 
         Args:
@@ -280,7 +278,7 @@ class Teleoperation:
             speed_scale: Fraction of the usual speed.
 
         Returns:
-            Why it is refused; empty where it holds.
+            Why it is refused; None where it holds.
         """
         key = session.session_id
         if command is None and view and (pose := self._scene.gizmos.pose(key)) is not None:
@@ -288,33 +286,31 @@ class Teleoperation:
         if command is not None:
             self._hold.set_command(key, command)
         refused = self._refusal(session)
-        if not refused:
+        if refused is None:
             self._expire(now)
             was_holding = self._hold.holder == key
-            try:
-                self._hold.hold(key, session.user, now, view or key, session.client, speed_scale)
-            except InputError as error:
-                refused = str(error)
-        if refused:
+            refused = self._hold.hold(key, session.user, now, view or key, session.client, speed_scale)
+        if refused is not None:
             # Held buttons repeat at 20 Hz; each new reason is logged once.
             if self._refused.get(key) != refused:
                 self._refused[key] = refused
-                self._log.note("warning", f"hold by {session.user} refused: {refused}", session.client)
+                self._log.note(reasons.hold_refused(session.user, refused), session.client)
             return refused
         self._refused.pop(key, None)
         if not was_holding:
-            self._log.note("info", f"{session.user} holds the robot", session.client)
-        return ""
+            self._log.note(reasons.hold_began(session.user), session.client)
+        return None
 
-    def _refusal(self, session: Session) -> str:
+    def _refusal(self, session: Session) -> m.Reason | None:
         if not session.may_operate:
-            return f"a {session.role} may look and stop, not operate"
-        if not self.may_move(session):
+            return reasons.viewer_only()
+        control = self._link.control.peek()
+        if control is not None and not self.may_move(session):
             # Otherwise the hold would block the session that has control.
-            return "somebody else holds control of the robot; ask for it, or take it"
+            return reasons.control_held(control.message.user)
         other = self._held_elsewhere(session)
         # One key or gamepad must not move two robots in two windows.
-        return f"you hold {other}: let go of it first" if other else ""
+        return reasons.other_robot_held(other) if other else None
 
     def drag(self, session: Session, gizmo: GizmoUpdate | GizmoDragEnd) -> None:
         """A gizmo was dragged or released. While its owner holds, the target is sent at once.
@@ -341,8 +337,8 @@ class Teleoperation:
         """Show this session's gizmo at the tool, along these axes; its hold ends."""
         tool = self._view.tool(time.monotonic())
         if not session.may_operate or tool is None:
-            why = "the tool's place is not known, or the role is viewer"
-            self._log.note("warning", f"no gizmo for {session.user}: {why}", session.client)
+            refused = reasons.tool_unknown() if session.may_operate else reasons.viewer_only()
+            self._log.note(reasons.gizmo_refused(session.user, refused), session.client)
             return
         self.release(session)
         self._scene.show_gizmo(session.session_id, tool, axes)
@@ -372,15 +368,15 @@ class Teleoperation:
         self._refused.pop(session.session_id, None)
         if self._hold.release(session.session_id):
             self._send(time.monotonic())
-            self._reset_gizmo(session.session_id, "The hold was ended from elsewhere. Press again to go on.")
-            self._log.note("info", f"{session.user} let go of the robot", session.client)
+            self._reset_gizmo(session.session_id, reasons.hold_ended_elsewhere())
+            self._log.note(reasons.hold_released(session.user), session.client)
 
     def stopped(self) -> None:
         """The robot is being stopped: end the hold."""
         holder = self._hold.holder
         if holder is not None:
             self._hold.release(holder)
-            self._reset_gizmo(holder, "The robot was stopped.")
+            self._reset_gizmo(holder, reasons.hold_stopped())
 
     def forget(self, session: Session) -> None:
         """The session has ended: release its hold and forget it."""
@@ -396,12 +392,12 @@ class Teleoperation:
         """End a hold that was not renewed in time, or whose page has no current view."""
         ended = self._hold.expire(now)
         if ended is not None:
-            self._log.note("info", "the hold ended: it was not renewed, or the page no longer sees the robot")
+            self._log.note(reasons.hold_lapsed())
             self._reset_gizmo(ended)
 
-    def _reset_gizmo(self, owner: str, reason: str = "") -> None:
+    def _reset_gizmo(self, owner: str, reason: m.Reason | None = None) -> None:
         """After a hold: the gizmo and its target return to the tool; pages that hold are sent a reason."""
-        if reason:
+        if reason is not None:
             self._on_end(owner, reason)
         tool = self._view.tool(time.monotonic())
         self._scene.gizmos.reset(owner, tool)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from websockets.exceptions import ConnectionClosed
 
 from rolling_panda import messages as m
-from rolling_panda import topics
+from rolling_panda import reasons, topics
 from rolling_panda.messages.page import PageState, ProcessPresence
 from rolling_panda.messages.supervision import StopState
 from server.api.page_socket import StateThrottle
@@ -120,7 +120,7 @@ def test_a_page_that_may_only_look_on_holds_nothing_and_is_told_for_its_role(ser
     with server.client(user="vi", role="viewer") as client, Page(server, client) as page:
         page.hear("PageState")
         page.hold(True)
-        assert "a viewer may look and stop, not operate" in page.hear("HoldEnded")["reason"]
+        assert page.hear("HoldEnded")["reason"] == reasons.text_of(reasons.viewer_only())
 
 
 def test_a_ping_is_answered_with_its_number(page):
@@ -236,7 +236,7 @@ def test_a_hold_that_paused_for_long_is_over_until_it_is_pressed_anew(late_page)
     time.sleep(2.2)
     late_page.look()
     late_page.hold(True)
-    assert "Press again" in late_page.hear("HoldEnded")["reason"]
+    assert late_page.hear("HoldEnded")["reason"] == reasons.text_of(reasons.hold_interrupted())
     for _ in range(3):
         late_page.look()
         late_page.hold(True)
@@ -257,7 +257,7 @@ def test_a_page_that_draws_a_robot_that_has_fallen_silent_may_not_hold():
         for _ in range(3):
             page.look()
         page.hold(True)
-        assert "not current" in page.hear("HoldEnded")["reason"]
+        assert page.hear("HoldEnded")["reason"] == reasons.text_of(reasons.hold_view_stale(0.5))
 
 
 def test_letting_go_is_said_at_once(server, page):
@@ -279,8 +279,8 @@ def test_a_page_that_has_not_drawn_the_robot_may_not_hold(server, page):
     page.hear("PageState")
     page.say("ShowGizmo", visible=True)
     page.say("Hold", sequence=1, hold=True)
-    assert "not current" in page.hear("HoldEnded")["reason"]
-    page.hear_event("the view of the robot is not current")
+    assert page.hear("HoldEnded")["reason"] == reasons.text_of(reasons.hold_view_stale(0.5))
+    page.hear_event("The view of the robot is not current")
     page.sequence = 1
     page.look()
     page.hold(True)
@@ -291,7 +291,7 @@ def test_a_page_that_has_not_drawn_the_robot_may_not_hold(server, page):
 def test_a_stop_ends_the_hold_of_the_page_that_held():
     with holding_page(hold_timeout_s=20.0) as page, page.server.client(user="bob") as other:
         other.post("/api/stop")
-        assert page.hear("HoldEnded")["reason"] == "The robot was stopped."
+        assert page.hear("HoldEnded")["reason"] == reasons.text_of(reasons.hold_stopped())
 
 
 def test_an_old_hold_that_arrives_late_is_ignored(server, page):
@@ -398,7 +398,7 @@ def test_a_page_that_does_not_read_is_dropped_and_one_that_reads_stays():
             eventually(lambda: client.get("/api/state").json()["viewers"] == 1)
             said = [line["text"] for line in client.get("/api/events").json()["events"]]
             assert [text for text in said if "did not read" in text] == [
-                "a page of ann was closed: it did not read what it was sent"
+                reasons.text_of(reasons.page_closed("ann", reasons.socket_unread()))
             ]
             assert reader.is_alive()
         reader.join()

@@ -154,13 +154,14 @@ def test_a_rule_is_taken_back_by_perception_first_and_then_its_acceptances_by_th
         assert [type(each) for each in server.wire.asked] == [UndoRule]
         server.wire.answer = lambda request: m.Answer(ok=isinstance(request, UndoRule), reason="it began since")
         answer = client.post("/api/rule/undo", json={"nodes_kept": 3})
-        assert answer.json()["reason"] == "the rule is restored, its acceptances are not: it began since"
+        assert answer.json()["code"] == "acceptances_not_restored"
+        assert answer.json()["values"]["cause"]["values"] == {"text": "it began since"}
 
 
 def test_the_picture_of_a_point_is_given_for_its_revision(server):
     with server.client(role="viewer", user="bob") as client:
         unknown = client.get("/api/points/p1/crop")
-        assert (unknown.status_code, unknown.json()["reason"]) == (404, "there is no point 'p1'")
+        assert (unknown.status_code, unknown.json()["code"]) == (404, "point_unknown")
         server.wire.deliver(topics.POINTS, pruning_points(pruning_point("p1")))
         eventually(lambda: client.get("/api/points/p1/crop").status_code == 204)
         server.wire.deliver(topics.CROPS, PointCrop(point_id="p1", revision=3, sequence=7, jpeg=b"picture"))

@@ -1,9 +1,12 @@
 """What the server checks of an approval before it passes it on."""
 
+import math
+
 import msgspec
 import pytest
 
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.messages.supervision import PreviewState
 from server.api.preview import outdated
 from server.robots.link import Posture
@@ -25,25 +28,27 @@ def posture(x=1.0, phi=0.0, wheels=3.0, first=0.0):
 
 
 def test_what_is_as_it_was_passes_however_far_the_wheels_have_turned():
-    assert outdated(STATE, STATE.preview_hash, posture(x=1.04, phi=0.04, wheels=30.0, first=0.09)) == ""
+    assert outdated(STATE, STATE.preview_hash, posture(x=1.04, phi=0.04, wheels=30.0, first=0.09)) is None
 
 
 @pytest.mark.parametrize(
-    ("where", "words"),
+    ("where", "code", "values"),
     [
-        (posture(x=1.31), "the base moved 0.31 m"),
-        (posture(phi=0.2), "the base turned by 11°"),
-        (posture(first=0.3), "a joint of the arm moved by 0.30 rad"),
-        (None, "the position of the robot is unknown"),
+        (posture(x=1.31), "preview_base_moved", [0.31]),
+        (posture(phi=0.2), "preview_base_turned", [math.degrees(0.2)]),
+        (posture(first=0.3), "preview_arm_moved", [0.3]),
+        (None, "posture_unknown", []),
     ],
 )
-def test_a_robot_that_stands_elsewhere_is_told_how(where, words):
-    assert words in outdated(STATE, STATE.preview_hash, where)
+def test_a_robot_that_stands_elsewhere_is_told_how(where, code, values):
+    refused = outdated(STATE, STATE.preview_hash, where)
+    assert refused.code == code
+    assert [value for _, value in refused.values] == pytest.approx(values)
 
 
 def test_another_hash_an_expired_one_and_none_are_refused():
-    assert "another one now: abababab, not cdcdcdcd" in outdated(STATE, "cd" * 32, posture())
+    assert outdated(STATE, "cd" * 32, posture()) == reasons.preview_replaced("abababab", "cdcdcdcd")
     gone = msgspec.structs.replace(STATE, phase="expired", reason="a was revised")
-    assert "expired: a was revised" in outdated(gone, STATE.preview_hash, posture())
+    assert outdated(gone, STATE.preview_hash, posture()) == reasons.preview_expired(reasons.said("a was revised"))
     none = msgspec.structs.replace(STATE, phase="rolling")
-    assert "no preview to approve" in outdated(none, STATE.preview_hash, posture())
+    assert outdated(none, STATE.preview_hash, posture()) == reasons.preview_missing()

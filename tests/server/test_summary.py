@@ -41,36 +41,36 @@ def test_a_calm_robot_has_no_alarm() -> None:
 
 def test_before_its_first_state_that_itself_is_the_alarm() -> None:
     assert summarize("panda-1", "/robots/panda-1/", None, None, "me").severity == "error"
-    assert seen(controller=None, processes=gone("controller")).alarm == "controller is silent"
+    assert seen(controller=None, processes=gone("controller")).code == "controller_silent"
 
 
 @pytest.mark.parametrize(
-    ("changes", "severity", "alarm"),
+    ("changes", "severity", "code"),
     [
-        ({"controller": controller_state(mode="ESTOP_LATCHED")}, "error", "Stopped"),
-        ({"controller": controller_state(mode="PROTECTIVE_STOP")}, "error", "Protective stop"),
-        ({"controller": controller_state(mode="FAULT")}, "error", "Fault"),
+        ({"controller": controller_state(mode="ESTOP_LATCHED")}, "error", "robot_stopped"),
+        ({"controller": controller_state(mode="PROTECTIVE_STOP")}, "error", "robot_protective_stop"),
+        ({"controller": controller_state(mode="FAULT")}, "error", "robot_fault"),
         ({"controller": controller_state(mode="PAUSED")}, "", ""),
-        ({"processes": gone("bridge")}, "error", "bridge is silent"),
-        ({"processes": gone("controller", 1.5, True)}, "error", "controller is silent"),
-        ({"processes": gone("perception", None, True)}, "warning", "perception is silent"),
-        ({"bridge": msgspec.structs.replace(bridge_state(), cutter="jammed")}, "error", "The cutter is jammed"),
+        ({"processes": gone("bridge")}, "error", "bridge_silent"),
+        ({"processes": gone("controller", 1.5, True)}, "error", "controller_silent"),
+        ({"processes": gone("perception", None, True)}, "warning", "perception_silent"),
+        ({"bridge": msgspec.structs.replace(bridge_state(), cutter="jammed")}, "error", "robot_cutter_jammed"),
         (
             {"stops": (StopState(process="bridge", stops=(), hardware=True),), "processes": gone("controller")},
             "error",
-            "Emergency stop on the robot is pressed",
+            "emergency_stop_pressed",
         ),
     ],
 )
-def test_the_worst_is_told(changes: dict[str, object], severity: str, alarm: str) -> None:
+def test_the_worst_is_told(changes: dict[str, object], severity: str, code: str) -> None:
     told = seen(**changes)
-    assert (told.severity, told.alarm) == (severity, alarm)
+    assert (told.severity, told.code) == (severity, code)
 
 
 def test_a_cut_that_nobody_knows_the_end_of_waits_for_somebody() -> None:
     row = p.PagePoint(pruning_point(), m.QueueEntry("p1", "UNKNOWN"))
     points = p.PagePoints(points=(row,), undecided_sites=(), segmenter="", frames=1, image_size=(1, 1))
-    assert (seen(points).severity, seen(points).alarm) == ("warning", "A cut ended unknown")
+    assert (seen(points).severity, seen(points).code) == ("warning", "cut_unknown")
 
 
 def test_who_holds_control_is_told_by_name_and_to_themselves() -> None:

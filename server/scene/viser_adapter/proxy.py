@@ -12,6 +12,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
+from rolling_panda.messages.types import Reason
 from server.auth.sessions import Session
 from server.connections.websocket_protocol import why_ended
 from server.scene.viser_adapter.client_messages import GizmoDragEnd, GizmoUpdate, admit, message_type
@@ -31,7 +32,7 @@ def viser_router(
     may_move: Callable[[Session], bool],
     on_gizmo: Callable[[Session, GizmoUpdate | GizmoDragEnd], object],
     on_drop: Callable[[Session, str], None],
-    on_end: Callable[[Session, str], None],
+    on_end: Callable[[Session, Reason], None],
 ) -> APIRouter:
     """Routes `/viser/` and the WebSocket `/viser`.
 
