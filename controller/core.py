@@ -40,13 +40,14 @@ from controller.work.queue_requests import QueueRequests
 from controller.work.survey import open_place
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.bounds import wider
 from rolling_panda.commands import COMMAND_OF, Handlers
 from rolling_panda.config import RobotConfig
 from rolling_panda.errors import ControlError
 from rolling_panda.messages.perception import CloseUpRequest, CloseUpResult, Obstacles
 from rolling_panda.messages.supervision import StopRecord
-from rolling_panda.reasons import said, text_of
+from rolling_panda.reasons import said, said_or_none, text_of
 from rolling_panda.transport.inbox import Answered, Inbox, Rejected, Reply, Request
 
 _STATE_S = 0.05
@@ -215,7 +216,8 @@ class Controller:
         self._supervisor.authority.saw(intent, now)
         command = COMMAND_OF.get(type(intent))
         if command is None:
-            return m.Answer(ok=False, reason=f"{type(intent).__name__} is not something this controller does")
+            unknown = reasons.command_unknown(type(intent).__name__)
+            return m.Answer(ok=False, reason=text_of(unknown), refused=unknown)
         refused = refusal(command, now, self._situation(now, intent)) or self._handlers[command.message](intent, now)
         reason = said(refused) if isinstance(refused, str) and refused else (refused or None)
         told = "" if reason is None else text_of(reason)
@@ -280,13 +282,13 @@ class Controller:
         try:
             moved = self._movement.step(self.mode, supervisor.authority.held, now)
         except ControlError as error:
-            supervisor.event(Event.FAULT, now, str(error))
+            supervisor.event(Event.FAULT, now, reasons.motion_failed(str(error)))
             return self._movement.ramp()
         if moved.event is not None:
             event, why = moved.event
-            supervisor.event(event, now, why)
+            supervisor.event(event, now, said(why))
         if moved.remark:
-            supervisor.remark(moved.remark)
+            supervisor.remark(said(moved.remark))
         return moved
 
     def _cut(self, cut_id: str, point_id: str) -> m.CutCommand | None:
@@ -305,49 +307,49 @@ class Controller:
         return CloseUpRequest(epoch=token.epoch, number=due[0], point_id=due[1])
 
     def _situation(self, now: float, intent: intents.Intent | None = None) -> Situation:
-        refused = self._previews.start_refused()
-        return self._supervisor.situation(self._queue.waits, refused, now, intent)
+        waits, approval = said_or_none(self._queue.waits), said_or_none(self._previews.start_refused())
+        return self._supervisor.situation(waits, approval, now, intent)
 
-    def _change_mode(self, asked: intents.Intent, now: float) -> str:
+    def _change_mode(self, asked: intents.Intent, now: float) -> m.Reason | None:
         """Process the command's event. A client that moves a robot without a holder gets control."""
         command, authority = COMMAND_OF[type(asked)], self._supervisor.authority
         client = client_of(asked)
         if command.control:
             authority.claim(client, now)
         if command.event is None:
-            return ""
-        reason = f"{command.words} by {asked.user}"
+            return None
+        reason = reasons.command_by(command.words, asked.user)
         return self._supervisor.event(command.event, now, reason, authority.rights(client, asked.role))
 
-    def _start(self, asked: intents.Start, now: float) -> str:
+    def _start(self, asked: intents.Start, now: float) -> m.Reason | None:
         refused = self._change_mode(asked, now)
-        if not refused:
+        if refused is None:
             self._previews.start()
             survey = asked if isinstance(asked, intents.Survey | intents.LookAgain) else None
             self._movement.sequence.start(survey)
         return refused
 
-    def _look_again(self, asked: intents.LookAgain, now: float) -> str:
+    def _look_again(self, asked: intents.LookAgain, now: float) -> m.Reason | None:
         if open_place(self._queue.perceived, asked.vine, asked.spur) is None:
-            return f"there is no undecided site at vine {asked.vine}, spur {asked.spur}"
+            return reasons.site_unknown(asked.vine, asked.spur)
         return self._start(asked, now)
 
-    def _pause(self, asked: intents.Pause, now: float) -> str:
+    def _pause(self, asked: intents.Pause, now: float) -> m.Reason | None:
         if not self._movement.homing:
             return self._change_mode(asked, now)
         self._movement.stay()
-        self._supervisor.remark(f"homing was stopped by {asked.user}")
-        self._event_log.say("info", self._supervisor.state.reason)
-        return ""
+        stopped = reasons.homing_stopped_by(asked.user)
+        self._supervisor.remark(stopped)
+        self._event_log.log(stopped)
+        return None
 
-    def _home(self, asked: intents.Home, now: float) -> str:
+    def _home(self, asked: intents.Home, now: float) -> None:
         self._change_mode(asked, now)
         self._movement.go_home()
-        self._supervisor.remark("homing the arm")
-        return ""
+        self._supervisor.remark(reasons.homing_arm())
 
-    def _being_worked_on(self, point_id: str) -> str:
-        return f"{point_id} is being worked on: pause first" if point_id == self._movement.sequence.active else ""
+    def _being_worked_on(self, point_id: str) -> m.Reason | None:
+        return reasons.point_worked_on(point_id) if point_id == self._movement.sequence.active else None
 
     def _review(self, now: float) -> PlanRequest | None:
         """Update the session's plan; returns the next request to the planner."""

@@ -8,6 +8,7 @@ from controller.whole_body.joint_limits import margin
 from controller.whole_body.manipulability import arm_omega
 from rolling_panda import messages as m
 from rolling_panda.model.robot import RobotModel, pose_message
+from rolling_panda.reasons import text_of
 from rolling_panda.transport.inbox import Inbox
 
 
@@ -20,7 +21,7 @@ def controller_state(
     active: str,
     measured: Measured | None,
     tracking: Tracking | None,
-    allowed: tuple[str, ...],
+    allowed: dict[str, m.Reason | None],
     inbox: Inbox,
     queue: tuple[m.QueueEntry, ...],
     nearest: Clearance | None,
@@ -39,7 +40,7 @@ def controller_state(
         active: Current point of the work.
         measured: Measured state of the robot; None before the first joint state.
         tracking: Tracking of the current motion.
-        allowed: Commands that are allowed.
+        allowed: Reason why each command would be refused; None if it would be taken.
         inbox: What has arrived, with the pace of the loop.
         queue: Points in the order of work.
         nearest: Smallest distance in the last step.
@@ -60,7 +61,7 @@ def controller_state(
         header=m.Header(now, "odom"),
         mode=state.mode,
         phase=phase if state.mode == "AUTO" else "",
-        reason=(held or state.reason)[:500],
+        reason=held[:500] or text_of(state.reason),
         allowed=allowed,
         active_point_id=active if state.mode == "AUTO" else "",
         method=config.whole_body.method,

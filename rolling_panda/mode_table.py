@@ -87,15 +87,3 @@ ROWS: Final[tuple[Row, ...]] = (
     *(Row(mode, Event.FAULT, "FAULT", "system", "an invariant is violated") for mode in SEVERITY[:-2]),
     *(Row(mode, Event.STOP, "ESTOP_LATCHED", "anyone") for mode in SEVERITY[:-1]),
 )
-
-#: For a command that a mode does not allow: the step that has to come first.
-FIRST: Final[dict[Mode, str]] = {
-    "IDLE": "arm the robot first",
-    "READY": "",
-    "TELEOP": "release the hold first",
-    "AUTO": "pause first",
-    "PAUSED": "resume first",
-    "PROTECTIVE_STOP": "acknowledge first",
-    "FAULT": "acknowledge first",
-    "ESTOP_LATCHED": "reset the stop first",
-}

@@ -50,6 +50,17 @@ def text_of(reason: Reason) -> str:
     return (f"{told}: {entry.act}" if entry.act else told)[:500]
 
 
+def severity_of(reason: Reason) -> Severity:
+    """Severity of a reason; a warning where this version does not know its code."""
+    entry = CATALOGUE.get(reason.code)
+    return "warning" if entry is None else entry.severity
+
+
+def said_or_none(text: str) -> Reason | None:
+    """Words as a reason; None for none."""
+    return said(text) if text else None
+
+
 def entry_of(severity: Severity, act: str, made: Callable[P, None]) -> tuple[Entry, Callable[P, Reason]]:
     """The entry that a function describes, and the function that makes its reasons.
 
@@ -112,7 +123,7 @@ def wrong_mode(command: str, modes: str, mode: str) -> None:
 
 @_reason("warning", "wait until it accepts commands")
 def watchdog_holds() -> None:
-    """The bridge's watchdog holds the robot."""
+    """The bridge's watchdog holds the robot: no valid command reached it in time."""
 
 
 @_reason("warning", "ask for it, or take it")
@@ -158,6 +169,284 @@ def control_not_yours() -> None:
 @_reason("warning", "wait until somebody asks")
 def control_not_requested() -> None:
     """Nobody asks for control."""
+
+
+# Controller: supervision
+
+
+@_reason("error", "end one of the two controllers")
+def other_controller() -> None:
+    """Another controller commands this robot."""
+
+
+@_reason("warning", "wait until the other has ended or is silent")
+def controller_waits() -> None:
+    """Another controller commands this robot, so that this one waits."""
+
+
+@_reason("info", "")
+def controller_commands(epoch: float) -> None:
+    """This controller commands the robot: epoch {epoch:.0f}."""
+
+
+@_reason("warning", "")
+def commands_refused(seconds: float) -> None:
+    """The bridge has refused every command for {seconds:.0f} s: another token is asked for."""
+
+
+@_reason("error", "")
+def foreign_motion() -> None:
+    """The robot moves by commands of another sender."""
+
+
+@_reason("error", "")
+def ledger_failed(detail: str) -> None:
+    """{detail}."""
+
+
+@_reason("error", "see whether its disk is full or hangs")
+def ledger_silent(seconds: float) -> None:
+    """The ledger has written nothing for {seconds:.1f} s."""
+
+
+@_reason("error", "wait, or start its sender")
+def nothing_received(topic: str) -> None:
+    """Nothing has arrived on {topic} yet."""
+
+
+@_reason("error", "")
+def joints_stale(age_s: float, limit_s: float) -> None:
+    """Joint states are {age_s:.2f} s old; the limit is {limit_s} s."""
+
+
+@_reason("error", "")
+def odometry_stale(age_s: float, limit_s: float) -> None:
+    """Odometry is {age_s:.2f} s old; the limit is {limit_s} s."""
+
+
+@_reason("error", "")
+def bridge_stale(age_s: float, limit_s: float) -> None:
+    """The bridge's state is {age_s:.2f} s old; the limit is {limit_s} s."""
+
+
+@_reason("warning", "")
+def obstacles_stale(age_s: float, limit_s: float) -> None:
+    """The newest camera frame with the obstacles is {age_s:.2f} s old; the limit is {limit_s} s."""
+
+
+@_reason("warning", "start it again")
+def process_gone(process: str) -> None:
+    """The {process} process is gone."""
+
+
+@_reason("warning", "")
+def process_unheard(process: str) -> None:
+    """The {process} process has not been heard yet."""
+
+
+@_reason("warning", "")
+def process_silent(process: str, age_s: float, limit_s: float) -> None:
+    """The {process} process is silent for {age_s:.2f} s; the limit is {limit_s} s."""
+
+
+@_reason("warning", "look at the robot")
+def never_watched(limit_s: float) -> None:
+    """No operator has seen the robot yet; the limit is {limit_s} s."""
+
+
+@_reason("warning", "look at the robot")
+def unwatched(age_s: float, limit_s: float) -> None:
+    """No operator has seen the robot for {age_s:.1f} s; the limit is {limit_s} s."""
+
+
+@_reason("info", "arm the robot to move it")
+def controller_started() -> None:
+    """Started; nothing moves."""
+
+
+@_reason("warning", "")
+def right_missing(event: str, mode: str, right: str) -> None:
+    """{event} in {mode} is for the {right}."""
+
+
+@_reason("warning", "")
+def cause_remains(cause: Reason) -> None:
+    """The cause is still there: {cause}."""
+
+
+@_reason("warning", "wait")
+def cause_recent(seconds: float) -> None:
+    """The cause must be gone for {seconds:.0f} s first."""
+
+
+@_reason("warning", "")
+def fault_without_effect(mode: str) -> None:
+    """A fault changes nothing: the robot is in {mode}."""
+
+
+@_reason("warning", "arm the robot first")
+def impossible_in_idle(event: str) -> None:
+    """{event} is not possible in IDLE."""
+
+
+@_reason("warning", "")
+def impossible_in_ready(event: str) -> None:
+    """{event} is not possible in READY."""
+
+
+@_reason("warning", "release the hold first")
+def impossible_in_teleop(event: str) -> None:
+    """{event} is not possible in TELEOP."""
+
+
+@_reason("warning", "pause first")
+def impossible_in_auto(event: str) -> None:
+    """{event} is not possible in AUTO."""
+
+
+@_reason("warning", "resume first")
+def impossible_in_paused(event: str) -> None:
+    """{event} is not possible in PAUSED."""
+
+
+@_reason("warning", "acknowledge first")
+def impossible_in_protective_stop(event: str) -> None:
+    """{event} is not possible in PROTECTIVE_STOP."""
+
+
+@_reason("warning", "acknowledge first")
+def impossible_in_fault(event: str) -> None:
+    """{event} is not possible in FAULT."""
+
+
+@_reason("warning", "reset the stop first")
+def impossible_in_estop(event: str) -> None:
+    """{event} is not possible in ESTOP_LATCHED."""
+
+
+@_reason("info", "")
+def control_given(user: str) -> None:
+    """{user} holds control."""
+
+
+@_reason("info", "")
+def control_given_over(user: str, before: str) -> None:
+    """{user} holds control, before {before}."""
+
+
+@_reason("info", "")
+def control_asked(user: str, holder: str) -> None:
+    """{user} asks {holder} for control."""
+
+
+@_reason("warning", "")
+def control_returned(user: str) -> None:
+    """{user} gave control back."""
+
+
+@_reason("warning", "")
+def control_taken(user: str) -> None:
+    """{user} takes control."""
+
+
+@_reason("warning", "")
+def control_lapsed(user: str, seconds: float) -> None:
+    """Control by {user} has ended: nothing was heard from them for {seconds:.0f} s."""
+
+
+@_reason("info", "")
+def mode_changed(before: str, after: str, cause: Reason) -> None:
+    """{before} → {after}: {cause}."""
+
+
+@_reason("warning", "")
+def robot_halted(before: str, after: str, cause: Reason) -> None:
+    """{before} → {after}: {cause}."""
+
+
+@_reason("info", "")
+def command_by(command: str, user: str) -> None:
+    """{command} by {user}."""
+
+
+@_reason("info", "")
+def homing_arm() -> None:
+    """Homing the arm."""
+
+
+@_reason("warning", "")
+def homing_stopped(cause: Reason) -> None:
+    """Homing was stopped: {cause}."""
+
+
+@_reason("info", "")
+def homing_stopped_by(user: str) -> None:
+    """Homing was stopped by {user}."""
+
+
+@_reason("info", "")
+def hold_ended() -> None:
+    """The hold has ended."""
+
+
+@_reason("info", "")
+def moved_by_hand(user: str) -> None:
+    """{user} moves the robot."""
+
+
+@_reason("warning", "")
+def teleoperation_refused(cause: Reason) -> None:
+    """Teleoperation refused: {cause}."""
+
+
+@_reason("warning", "")
+def emergency_stop(text: str) -> None:
+    """Emergency stop: {text}."""
+
+
+@_reason("warning", "")
+def software_stop_unnamed(text: str) -> None:
+    """Software stop: {text}."""
+
+
+@_reason("info", "")
+def stop_reset(user: str, words: str) -> None:
+    """Reset by {user}: {words}."""
+
+
+@_reason("warning", "reset again in a moment")
+def stop_unknown() -> None:
+    """The bridge has not reported its stop yet."""
+
+
+@_reason("warning", "read who pressed it and why, then reset again")
+def stop_newer() -> None:
+    """There is a newer stop."""
+
+
+@_reason("warning", "wait")
+def reset_under_way() -> None:
+    """The reset is under way."""
+
+
+@_reason("error", "")
+def motion_failed(detail: str) -> None:
+    """The motion cannot be computed: {detail}."""
+
+
+@_reason("warning", "")
+def command_unknown(command: str) -> None:
+    """{command} is not a command of this controller."""
+
+
+@_reason("warning", "")
+def site_unknown(vine: float, spur: float) -> None:
+    """There is no undecided site at vine {vine:.0f}, spur {spur:.0f}."""
+
+
+@_reason("warning", "pause first")
+def point_worked_on(point: str) -> None:
+    """{point} is being worked on."""
 
 
 # Server

@@ -9,6 +9,8 @@ import msgspec
 
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
+from rolling_panda import reasons
+from rolling_panda.reasons import severity_of, text_of
 
 #: Kind of a row: state of a point, order of work, approach, requirement of previews, command of an operator with its
 #: answer, stop, log line,
@@ -135,14 +137,13 @@ class Journal:
         """Is the record of this number durable?"""
         return number <= self._state.durable
 
-    def trouble(self, now: float, patience_s: float) -> str:
-        """Reason why the ledger is not reliable; empty if it is."""
+    def trouble(self, now: float, patience_s: float) -> m.Reason | None:
+        """Reason why the ledger is not reliable; None if it is."""
         if self._state.failure:
-            return self._state.failure
+            return reasons.ledger_failed(self._state.failure)
         if self._unwritten_since is not None and now - self._unwritten_since > patience_s:
-            waited = now - self._unwritten_since
-            return f"the ledger has written nothing for {waited:.1f} s: is its disk full or hanging?"
-        return ""
+            return reasons.ledger_silent(now - self._unwritten_since)
+        return None
 
 
 class EventLogger:
@@ -153,6 +154,10 @@ class EventLogger:
         self._journal = journal
         self._events: list[m.LogEvent] = []
         self.now = 0.0
+
+    def log(self, reason: m.Reason) -> None:
+        """One line, with the severity of its reason."""
+        self.say(severity_of(reason), text_of(reason))
 
     def say(self, severity: m.Severity, text: str) -> None:
         """One line, of 500 characters at most."""

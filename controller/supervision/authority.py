@@ -10,6 +10,7 @@ from rolling_panda import reasons
 from rolling_panda.commands import Handlers
 from rolling_panda.messages.supervision import NEVER_SEEN_S, ControlState, Presence
 from rolling_panda.messages.types import Reason, Role
+from rolling_panda.reasons import text_of
 from rolling_panda.transport.inbox import Received
 
 
@@ -32,8 +33,8 @@ class Authority:
         """Whether a person has control and no transfer is pending."""
         return self._lease.holder is not None and self._lease.next_holder is None
 
-    def review(self, presence: Received[Presence] | None, at_rest: bool, now: float) -> str:
-        """Update the lease. Returns the reason why the robot must stop; empty without one.
+    def review(self, presence: Received[Presence] | None, at_rest: bool, now: float) -> Reason | None:
+        """Update the lease. Returns the reason why the robot must stop; None without one.
 
         Args:
             presence: Newest presence message.
@@ -52,20 +53,21 @@ class Authority:
                     self._watch(person.role, person.view_age_s, presence.at)
         lost = self._lease.review(at_rest, now)
         if self._lease.next_holder is not None:
-            lost = lost or f"{self._lease.next_holder.user} takes control"
+            lost = lost or reasons.control_taken(self._lease.next_holder.user)
         return lost
 
     def saw(self, intent: intents.Intent, now: float) -> None:
         """Count the view age of an intent; the next presence message may arrive after the intent."""
         self._watch(intent.role, intent.view_age_s, now)
 
-    def unwatched(self, now: float) -> str:
-        """Why automatic work must pause; empty while an operator has seen the robot recently."""
+    def unwatched(self, now: float) -> Reason | None:
+        """Why automatic work must pause; None while an operator has seen the robot recently."""
         age = now - self._seen
         if age <= self._supervision_s:
-            return ""
-        since = "yet" if age == math.inf else f"for {age:.1f} s"
-        return f"no operator has seen the robot {since}; the limit is {self._supervision_s} s"
+            return None
+        if age == math.inf:
+            return reasons.never_watched(self._supervision_s)
+        return reasons.unwatched(age, self._supervision_s)
 
     def rights(self, client: Client, role: Role) -> Rights:
         """Rights of a client in the mode table. Without a holder every operator counts as the holder."""
@@ -106,7 +108,7 @@ class Authority:
             requested_by="" if requested is None else requested.user,
             requested_key="" if requested is None else requested.key,
             next_user="" if following is None else following.user,
-            notice=lease.notice[:500],
+            notice="" if lease.notice is None else text_of(lease.notice),
             notice_number=lease.notice_number,
             supervised=not self.unwatched(now),
         )

@@ -7,6 +7,7 @@ from typing import Final
 
 from controller.identity import Token
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.topics import TOKEN
 
 #: Without a bridge state for this long after the start (s), the controller publishes its state all the same.
@@ -40,8 +41,8 @@ class FencingToken:
         #: This controller is silent: another one commands, or no bridge state has arrived yet.
         self.waits = True
 
-    def update(self, bridge: m.BridgeState | None, now: float) -> str:
-        """Update the holder of the token. Returns a description of the change; empty without one.
+    def update(self, bridge: m.BridgeState | None, now: float) -> m.Reason | None:
+        """Update the holder of the token. Returns the change; None without one.
 
         Args:
             bridge: Newest bridge state.
@@ -55,10 +56,10 @@ class FencingToken:
             self.overruled = bridge.holder not in ("", self._mine, self._former)
         self.waits = self.overruled or (bridge is None and now - self._began < _UNHEARD_S)
         if self.overruled and not was_overruled:
-            return "another controller commands this robot; this one waits until the other has ended or is silent"
+            return reasons.controller_waits()
         if self.token is not None and self.token != had:
-            return f"this controller commands the robot: epoch {self.token.epoch}"
-        return ""
+            return reasons.controller_commands(self.token.epoch)
+        return None
 
     def request(self, echo: int, mode: m.Mode, now: float) -> m.TokenRequest | None:
         """The request that is due; None when none is.

@@ -1,19 +1,18 @@
 """Freshness limits of the inputs and the reaction to stale data."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
 from msgspec import Struct
 
 from controller.config import SupervisionConfig
-from rolling_panda import topics
+from rolling_panda import reasons, topics
 from rolling_panda.messages.perception import Obstacles
 from rolling_panda.messages.robot import BridgeState, JointState, Odometry
-from rolling_panda.messages.types import Mode
+from rolling_panda.messages.types import Mode, Reason
 from rolling_panda.transport.inbox import Inbox, Received
-
-Action = Literal["none", "pause", "protect", "fault"]
 
 
 class Health(Struct, frozen=True):
@@ -29,8 +28,8 @@ class Health(Struct, frozen=True):
         watchdog: Whether the bridge's watchdog holds the robot.
         overruled: Whether another controller has the bridge's token.
         refused: Number of motion commands that the bridge has refused since its start.
-        ledger: Reason why the ledger cannot record; empty if it can.
-        tracking_error: Description of a tracking error above its limit; empty without one.
+        ledger: Reason why the ledger cannot record; None if it can.
+        tracking_error: Tracking error above its limit; None without one.
         obstacles: Age of the camera frame behind the obstacles.
     """
 
@@ -43,12 +42,14 @@ class Health(Struct, frozen=True):
     watchdog: bool
     overruled: bool
     refused: int = 0
-    ledger: str = ""
-    tracking_error: str = ""
+    ledger: Reason | None = None
+    tracking_error: Reason | None = None
     obstacles: float = 0.0
 
 
-def health(inbox: Inbox, overruled: bool, now: float, ledger: str = "", tracking_error: str = "") -> Health:
+def health(
+    inbox: Inbox, overruled: bool, now: float, ledger: Reason | None = None, tracking_error: Reason | None = None
+) -> Health:
     """Compute the health of the inputs.
 
     Args:
@@ -56,7 +57,7 @@ def health(inbox: Inbox, overruled: bool, now: float, ledger: str = "", tracking
         overruled: Whether another controller has the bridge's token.
         now: Monotonic time (s).
         ledger: Reason why the ledger cannot record.
-        tracking_error: Description of a tracking error above its limit.
+        tracking_error: Tracking error above its limit.
     """
 
     def age(at: float | None) -> float:
@@ -96,18 +97,14 @@ def _picture_age(obstacles: Received[Obstacles] | None, joints: Received[JointSt
 
 @dataclass(frozen=True)
 class Verdict:
-    """Reaction to the health, with its reason. `none` with an empty reason if all is well."""
+    """Reaction to the health, with its reason."""
 
-    action: Action
-    reason: str = ""
-
-
-FINE = Verdict("none")
-OVERRULED = "another controller commands this robot"
+    action: Literal["pause", "protect", "fault"]
+    reason: Reason
 
 
-def check(mode: Mode, moving: bool, health: Health, config: SupervisionConfig) -> Verdict:
-    """The most severe thing that the inputs demand in a mode.
+def check(mode: Mode, moving: bool, health: Health, config: SupervisionConfig) -> Verdict | None:
+    """The most severe reaction that the inputs demand in a mode; None if all is well.
 
     Args:
         mode: Of the machine.
@@ -116,44 +113,44 @@ def check(mode: Mode, moving: bool, health: Health, config: SupervisionConfig) -
         config: Age limits.
     """
     if health.overruled and mode != "IDLE":
-        return Verdict("fault", OVERRULED)
-    if health.ledger:
+        return Verdict("fault", reasons.other_controller())
+    if health.ledger is not None:
         return Verdict("fault", health.ledger)
     if not moving and mode not in ("AUTO", "TELEOP"):
-        return FINE
+        return None
     why = sensors(health, config)
-    if why:
+    if why is None and health.watchdog:
+        why = reasons.watchdog_holds()
+    if why is not None:
         return Verdict("protect", why)
-    if health.watchdog:
-        return Verdict("protect", "the bridge's watchdog holds the robot: no valid command reached it in time")
     why = supervision(health, config, teleoperated=mode == "TELEOP")
-    if not why and mode == "AUTO":
+    if why is None and mode == "AUTO":
         why = perception(health, config)
-    return Verdict("pause", why) if why else FINE
+    return None if why is None else Verdict("pause", why)
 
 
-def cause(health: Health, config: SupervisionConfig) -> str:
-    """Cause that still blocks the end of a PROTECTIVE_STOP or FAULT; empty if it is gone."""
-    return health.ledger or sensors(health, config) or ("watchdog" if health.watchdog else "")
+def cause(health: Health, config: SupervisionConfig) -> Reason | None:
+    """Cause that still blocks the end of a PROTECTIVE_STOP or FAULT; None if it is gone."""
+    return health.ledger or sensors(health, config) or (reasons.watchdog_holds() if health.watchdog else None)
 
 
-def sensors(health: Health, config: SupervisionConfig) -> str:
-    """Reason why the robot's own data forbid motion; empty if they allow it."""
+def sensors(health: Health, config: SupervisionConfig) -> Reason | None:
+    """Reason why the robot's own data forbid motion; None if they allow it."""
     if health.overruled:
-        return OVERRULED
-    if health.tracking_error:
+        return reasons.other_controller()
+    if health.tracking_error is not None:
         return health.tracking_error
     if health.joints > config.joints_max_age_s:
-        return f"joint states are {_age(health.joints)} old; the limit is {config.joints_max_age_s} s"
+        return _stale(reasons.joints_stale, health.joints, config.joints_max_age_s, topics.JOINTS.name)
     if health.odometry > config.odometry_max_age_s:
-        return f"odometry is {_age(health.odometry)} old; the limit is {config.odometry_max_age_s} s"
+        return _stale(reasons.odometry_stale, health.odometry, config.odometry_max_age_s, topics.ODOMETRY.name)
     if health.bridge > config.bridge_max_age_s:
-        return f"the bridge's state is {_age(health.bridge)} old; the limit is {config.bridge_max_age_s} s"
-    return ""
+        return _stale(reasons.bridge_stale, health.bridge, config.bridge_max_age_s, topics.BRIDGE.name)
+    return None
 
 
-def supervision(health: Health, config: SupervisionConfig, teleoperated: bool) -> str:
-    """Reason why the server's state forbids motion; empty if it allows it.
+def supervision(health: Health, config: SupervisionConfig, teleoperated: bool) -> Reason | None:
+    """Reason why the server's state forbids motion; None if it allows it.
 
     Args:
         health: Health of the inputs.
@@ -165,23 +162,20 @@ def supervision(health: Health, config: SupervisionConfig, teleoperated: bool) -
     return _process("server", health.server, allowed, health.present)
 
 
-def perception(health: Health, config: SupervisionConfig) -> str:
-    """Reason why perception's state forbids automatic work; empty if it allows it."""
+def perception(health: Health, config: SupervisionConfig) -> Reason | None:
+    """Reason why perception's state forbids automatic work; None if it allows it."""
     if health.obstacles > config.obstacles_max_age_s:
-        return (
-            f"the newest camera frame with the obstacles is {_age(health.obstacles)} old; "
-            f"the limit is {config.obstacles_max_age_s} s"
-        )
+        return _stale(reasons.obstacles_stale, health.obstacles, config.obstacles_max_age_s, topics.OBSTACLES.name)
     return _process("perception", health.perception, config.perception_max_age_s, health.present)
 
 
-def _process(name: str, age: float, allowed: float, present: frozenset[str]) -> str:
+def _stale(too_old: Callable[[float, float], Reason], age: float, limit: float, topic: str) -> Reason:
+    return reasons.nothing_received(topic) if age == math.inf else too_old(age, limit)
+
+
+def _process(name: str, age: float, limit: float, present: frozenset[str]) -> Reason | None:
     if name not in present:
-        return f"the {name} process is gone"
-    if age > allowed:
-        return f"the {name} process is silent for {_age(age)}; the limit is {allowed} s"
-    return ""
-
-
-def _age(age: float) -> str:
-    return "endlessly" if age == float("inf") else f"{age:.2f} s"
+        return reasons.process_gone(name)
+    if age == math.inf:
+        return reasons.process_unheard(name)
+    return reasons.process_silent(name, age, limit) if age > limit else None

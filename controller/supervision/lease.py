@@ -23,7 +23,8 @@ class Lease:
         self.holder: Client | None = None
         self.next_holder: Client | None = None
         self.requested: Client | None = None
-        self.notice = self._lost = ""
+        self.notice: Reason | None = None
+        self._lost: Reason | None = None
         self.notice_number = 0
 
     def held_by(self, client: Client) -> bool:
@@ -41,7 +42,7 @@ class Lease:
     def claim(self, client: Client, now: float) -> None:
         """Give control to a client that `refusal` lets through; the robot is at rest."""
         if self.holder is None:
-            self._give(client, now, f"{client.user} holds control")
+            self._give(client, now, reasons.control_given(client.user))
 
     def take(self, client: Client, confirmed: bool) -> Reason | None:
         """Take control; from a holder only if confirmed. Returns the reason of a refusal; None if granted."""
@@ -63,7 +64,7 @@ class Lease:
         if self.requested is not None and self.requested.key != client.key:
             return reasons.control_requested(self.requested.user)
         self.requested, self._asked = client, now
-        self._notify(f"{client.user} asks {self.holder.user} for control")
+        self._notify(reasons.control_asked(client.user, self.holder.user))
         return None
 
     def grant(self, client: Client) -> Reason | None:
@@ -79,7 +80,7 @@ class Lease:
         """Give up control. Returns the reason of a refusal; None if done."""
         if self.holder is None or self.holder.key != client.key:
             return reasons.control_not_yours()
-        self._lost = f"{client.user} gave control back"
+        self._lost = reasons.control_returned(client.user)
         self._drop(self._lost)
         return None
 
@@ -88,8 +89,8 @@ class Lease:
         if self.holder is not None:
             self._renewed = max(self._renewed, heard.get(self.holder.key, -math.inf))
 
-    def review(self, at_rest: bool, now: float) -> str:
-        """Update at a time. Returns the reason why the holder lost control; empty without one.
+    def review(self, at_rest: bool, now: float) -> Reason | None:
+        """Update at a time. Returns the reason why the holder lost control; None without one.
 
         Args:
             at_rest: Whether the robot is at rest, so that control may change hands.
@@ -97,28 +98,29 @@ class Lease:
         """
         if self.requested is not None and now - self._asked > _REQUEST_S:
             self.requested = None
-        lost, self._lost = self._lost, ""
+        lost, self._lost = self._lost, None
         if self.holder is not None and self.left(now) <= 0.0:
-            lost = f"control by {self.holder.user} has ended: nothing was heard from them for {LIFE_S:.0f} s"
+            lost = reasons.control_lapsed(self.holder.user, LIFE_S)
             self._drop(lost)
         if self.next_holder is not None and at_rest:
             before, client = self.holder, self.next_holder
-            self._give(client, now, f"{client.user} holds control{f', before {before.user}' if before else ''}")
+            given, over = reasons.control_given, reasons.control_given_over
+            self._give(client, now, given(client.user) if before is None else over(client.user, before.user))
         return lost
 
     def left(self, now: float) -> float:
         """Time to the end of the lease without a message of its holder (s); 0 without a holder."""
         return 0.0 if self.holder is None else max(0.0, self._renewed + LIFE_S - now)
 
-    def _give(self, client: Client, now: float, told: str) -> None:
+    def _give(self, client: Client, now: float, told: Reason) -> None:
         self.holder, self.next_holder, self._renewed = client, None, now
         if self.requested is not None and self.requested.key == client.key:
             self.requested = None
         self._notify(told)
 
-    def _drop(self, told: str) -> None:
+    def _drop(self, told: Reason) -> None:
         self.holder = self.requested = None
         self._notify(told)
 
-    def _notify(self, told: str) -> None:
+    def _notify(self, told: Reason) -> None:
         self.notice, self.notice_number = told, self.notice_number + 1

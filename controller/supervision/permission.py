@@ -22,28 +22,28 @@ class Situation:
         state: State of the supervision state machine.
         health: Health of the inputs.
         homing: True during homing.
-        busy: Action that blocks a new motion; empty when none.
-        waits: Reason why no accepted point is workable; empty when one is.
+        busy: Action that blocks a new motion; None when none.
+        waits: Reason why no accepted point is workable; None when one is.
         rights: Rights of the client.
         not_theirs: Reason why the client may not move the robot; None when it may.
-        approval: Reason why a start needs an approved preview first; empty when it does not.
-        unwatched: Reason why automatic work lacks an attentive operator; empty when it has one.
+        approval: Reason why a start needs an approved preview first; None when it does not.
+        unwatched: Reason why automatic work lacks an attentive operator; None when it has one.
     """
 
     config: SupervisionConfig
     state: modes.State
     health: safety.Health
     homing: bool
-    busy: str
-    waits: str
+    busy: Reason | None
+    waits: Reason | None
     rights: modes.Rights = modes.ANYBODY
     not_theirs: Reason | None = None
-    unwatched: str = ""
-    approval: str = ""
+    unwatched: Reason | None = None
+    approval: Reason | None = None
 
 
-#: Check of each condition: the reason why it does not hold, None or empty if it does.
-_CHECKS: Final[dict[Condition, Callable[[Situation], Reason | str | None]]] = {
+#: Check of each condition: the reason why it does not hold, None if it does.
+_CHECKS: Final[dict[Condition, Callable[[Situation], Reason | None]]] = {
     "fresh sensors": lambda now: safety.sensors(now.health, now.config),
     "bridge obeys": lambda now: reasons.watchdog_holds() if now.health.watchdog else None,
     "server": lambda now: safety.supervision(now.health, now.config, False),
@@ -55,7 +55,7 @@ _CHECKS: Final[dict[Condition, Callable[[Situation], Reason | str | None]]] = {
 }
 
 
-def refusal(command: Command, now: float, situation: Situation) -> Reason | str | None:
+def refusal(command: Command, now: float, situation: Situation) -> Reason | None:
     """Reason why a command is refused now, apart from its content; None if it is allowed.
 
     Args:
@@ -67,21 +67,21 @@ def refusal(command: Command, now: float, situation: Situation) -> Reason | str 
     if "operator" not in situation.rights:
         return situation.not_theirs or reasons.operator_needed()
     # Acknowledging a fault moves nothing.
-    if command.control and mode != "FAULT" and situation.not_theirs:
+    if command.control and mode != "FAULT" and situation.not_theirs is not None:
         return situation.not_theirs
     if event is not None and not (event is Event.PAUSE and situation.homing):
-        refused = modes.step(situation.state, event, now, by=situation.rights).refused
-        if refused:
+        refused = modes.refusal(situation.state, event, now, situation.rights)
+        if refused is not None:
             return refused
     if command.modes and mode not in command.modes:
         return reasons.wrong_mode(command.name, " and ".join(command.modes), mode)
-    return next((why for condition in command.conditions if (why := _CHECKS[condition](situation))), None)
+    return next((why for each in command.conditions if (why := _CHECKS[each](situation)) is not None), None)
 
 
-def allowed(now: float, situation: Situation) -> tuple[str, ...]:
-    """Names of the commands that would be taken now, apart from those about control itself."""
-    return tuple(
-        command.name
+def allowed(now: float, situation: Situation) -> dict[str, Reason | None]:
+    """Reason why each command would be refused now; None if it would be taken. Those about control are left out."""
+    return {
+        command.name: refusal(command, now, situation)
         for command in COMMANDS
-        if command.process == "controller" and command.tag != "control" and not refusal(command, now, situation)
-    )
+        if command.process == "controller" and command.tag != "control"
+    }

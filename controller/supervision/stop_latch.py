@@ -2,6 +2,7 @@
 
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.messages.supervision import StopRecord, StopState
 
 #: Time limit for the bridge to show a release before it is requested again (s).
@@ -27,14 +28,14 @@ class StopLatch:
         self._told: tuple[str, ...] | None = None
 
     @property
-    def reset_reason(self) -> str:
-        """Reason of the last reset, as text."""
-        return f"reset by {self._asked.user}: {self._asked.reason}" if self._asked is not None else "reset"
+    def reset_reason(self) -> m.Reason:
+        """Reason of the last reset."""
+        return reasons.stop_reset(*(("", "") if self._asked is None else (self._asked.user, self._asked.reason)))
 
     @property
-    def latched(self) -> str:
-        """Reason of the latched stop; empty without one."""
-        return _words(next(reversed(self._pending.values()))) if self._pending else ""
+    def latched(self) -> m.Reason | None:
+        """Reason of the latched stop; None without one."""
+        return _reason(next(reversed(self._pending.values()))) if self._pending else None
 
     @property
     def changed(self) -> bool:
@@ -47,37 +48,42 @@ class StopLatch:
         stops = tuple(reversed(self._pending.values()))[:_MOST]
         return StopState(process="controller", stops=stops, released_by=self._released_by)
 
-    def update(self, stops: tuple[m.StopRequest, ...], bridge: m.BridgeState | None, wall_time: float = 0.0) -> str:
-        """Latch new stops. Returns the reason of a new stop; empty without one.
+    def update(
+        self, stops: tuple[m.StopRequest, ...], bridge: m.BridgeState | None, wall_time: float = 0.0
+    ) -> m.Reason | None:
+        """Latch new stops. Returns the reason of a new stop; None without one.
 
         A request is sent several times with one id. After its release later copies do not latch. What the bridge has
         latched always counts.
         """
-        latched = ""
+        latched = None
         for stop in stops:
             if stop.stop_id not in self._pending and stop.stop_id not in self._over:
                 record = StopRecord(stop.stop_id, stop.source, stop.user, stop.reason, max(0.0, wall_time))
                 self._latch(record)
-                latched = _words(record)
+                latched = _reason(record)
         if bridge is not None and bridge.stop_id and bridge.stop_id not in self._pending:
             record = StopRecord(bridge.stop_id, "bridge", "", bridge.stopped_by, max(0.0, wall_time))
             self._latch(record)
-            latched = latched or _words(record)
+            latched = latched or _reason(record)
         return latched
 
-    def ask_release(self, intent: intents.Reset, bridge: m.BridgeState | None, now: float) -> str:
-        """A supervisor resets; returns why not. The release goes to the bridge, and only its state ends the latch."""
+    def ask_release(self, intent: intents.Reset, bridge: m.BridgeState | None, now: float) -> m.Reason | None:
+        """A supervisor resets; returns why not.
+
+        The release goes to the bridge, and only its state ends the latch.
+        """
         if bridge is None:
-            return "the bridge has not reported its stop yet: reset again in a moment"
+            return reasons.stop_unknown()
         newest = bridge.stop_id or next(reversed(self._pending), "")
         if intent.stop_id and intent.stop_id != newest:
-            return "there is a newer stop: read who pressed it and why, then reset again"
+            return reasons.stop_newer()
         if self._asked is not None and now - self._asked_at < _RELEASE_S:
-            return "the reset is under way"
+            return reasons.reset_under_way()
         self._asked, self._asked_at = intent, now
         if bridge.stop_id:
             self._due = m.ReleaseStop(stop_id=bridge.stop_id, user=intent.user, reason=intent.reason)
-        return ""
+        return None
 
     def release_due(self) -> m.ReleaseStop | None:
         """The release to send now, once."""
@@ -100,8 +106,8 @@ class StopLatch:
         self._asked = self._due = None
 
 
-def _words(stop: StopRecord) -> str:
+def _reason(stop: StopRecord) -> m.Reason:
     if stop.source == "hardware":
-        return f"emergency stop: {stop.reason}"
+        return reasons.emergency_stop(stop.reason)
     who = stop.user or ("" if stop.source == "bridge" else stop.source)
-    return f"software stop by {who}: {stop.reason}" if who else f"software stop: {stop.reason}"
+    return reasons.software_stop(who, stop.reason) if who else reasons.software_stop_unnamed(stop.reason)

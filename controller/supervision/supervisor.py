@@ -17,8 +17,9 @@ from controller.supervision.stop_latch import StopLatch
 from controller.work.movement import Movement
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.messages.supervision import Presence, StopRecord, TeleopTarget
-from rolling_panda.reasons import text_of
+from rolling_panda.reasons import said_or_none, text_of
 from rolling_panda.transport.inbox import Inbox
 
 #: A new token is requested when the bridge's watchdog has held the robot for this long (s).
@@ -79,18 +80,18 @@ class Supervisor:
         self.stops = StopLatch(tuple(stops))
         self.state = modes.boot(self.stops.latched)
 
-    def update(self, inbox: Inbox, trouble: str, now: float) -> None:
+    def update(self, inbox: Inbox, trouble: m.Reason | None, now: float) -> None:
         """Take in how fresh everything is.
 
         Args:
             inbox: What has arrived.
-            trouble: Why the ledger cannot be relied on; empty when it can.
+            trouble: Why the ledger cannot be relied on; None when it can.
             now: Monotonic time (s).
         """
         self._inbox = inbox
-        if changed := self.fencing.update(self.bridge, now):
-            self._event_log.say("warning" if self.fencing.overruled else "info", changed)
-        tracking_error = self._movement.body.tracking_error.reason
+        if (changed := self.fencing.update(self.bridge, now)) is not None:
+            self._event_log.log(changed)
+        tracking_error = said_or_none(self._movement.body.tracking_error.reason)
         self.health = safety.health(inbox, self.fencing.overruled, now, trouble, tracking_error)
 
     def review(self, stops: tuple[m.StopRequest, ...], now: float) -> None:
@@ -98,33 +99,37 @@ class Supervisor:
         self._review_token(now)
         bridge = self.bridge
         latched = self.stops.update((*stops, *self._review_motion()), bridge, self._inbox.wall_time)
-        if latched:
+        if latched is not None:
             self.event(Event.STOP, now, latched)
         elif self.stops.released(bridge):
             self.event(Event.RESET, now, self.stops.reset_reason, modes.OPERATOR)
-        if lost := self.authority.review(self._inbox.newest(Presence), self._movement.at_rest, now):
+        lost = self.authority.review(self._inbox.newest(Presence), self._movement.at_rest, now)
+        if lost is not None:
             self._pause(lost, now)
         verdict = safety.check(self.mode, self._movement.homing, self.health, self._config)
-        if verdict.action == "fault":
-            self.event(Event.FAULT, now, verdict.reason)
-        elif verdict.action == "protect":
-            self.event(Event.PROTECT, now, verdict.reason)
-        elif verdict.action == "pause":
-            self._pause(verdict.reason, now)
-        self._movement.sequence.finish_cut_and_pause(self.authority.unwatched(now))
+        match verdict:
+            case safety.Verdict("fault", reason):
+                self.event(Event.FAULT, now, reason)
+            case safety.Verdict("protect", reason):
+                self.event(Event.PROTECT, now, reason)
+            case safety.Verdict("pause", reason):
+                self._pause(reason, now)
+        unwatched = self.authority.unwatched(now)
+        self._movement.sequence.finish_cut_and_pause("" if unwatched is None else text_of(unwatched))
         self.state = modes.observe(self.state, safety.cause(self.health, self._config), now)
         self._review_hold(now)
 
-    def event(self, event: Event, now: float, reason: str, by: modes.Rights = modes.SYSTEM) -> str:
-        """Process an event; a change of mode is logged. Returns the reason of a refusal."""
+    def event(self, event: Event, now: float, reason: m.Reason, by: modes.Rights = modes.SYSTEM) -> m.Reason | None:
+        """Process an event; a change of mode is logged. Returns the reason of a refusal; None without one."""
         before = self.state
         transition = modes.step(before, event, now, reason, by)
         self.state = transition.state
         if self.mode != before.mode:
             self._note_interruption(before.mode)
             self._movement.leave(before.mode)
-            worse = modes.severity(self.mode) >= modes.severity("PAUSED")
-            self._event_log.say("warning" if worse else "info", f"{before.mode} → {self.mode}: {self.state.reason}")
+            halted = modes.severity(self.mode) >= modes.severity("PAUSED")
+            told = reasons.robot_halted if halted else reasons.mode_changed
+            self._event_log.log(told(before.mode, self.mode, self.state.reason))
         return transition.refused
 
     def _note_interruption(self, before: m.Mode) -> None:
@@ -134,20 +139,22 @@ class Supervisor:
         elif before in modes.MOVING or self.mode not in ("READY", "PAUSED", "PROTECTIVE_STOP"):
             self.interrupted = ""
 
-    def remark(self, reason: str) -> None:
+    def remark(self, reason: m.Reason) -> None:
         """Why the robot is in its mode is another reason from now on."""
         self.state = replace(self.state, reason=reason)
 
-    def busy(self) -> str:
-        """Action that has to end before a motion may begin; empty without one."""
-        return self._movement.busy(self.bridge)
+    def busy(self) -> m.Reason | None:
+        """Action that has to end before a motion may begin; None without one."""
+        return said_or_none(self._movement.busy(self.bridge))
 
-    def situation(self, waits: str, approval: str, now: float, intent: intents.Intent | None = None) -> Situation:
+    def situation(
+        self, waits: m.Reason | None, approval: m.Reason | None, now: float, intent: intents.Intent | None = None
+    ) -> Situation:
         """State that a permission depends on.
 
         Args:
-            waits: Reason why no accepted point is workable; empty if one is.
-            approval: Reason why the start needs an approved preview; empty if it does not.
+            waits: Reason why no accepted point is workable; None if one is.
+            approval: Reason why the start needs an approved preview; None if it does not.
             now: Monotonic time (s).
             intent: The command; None for any operator.
         """
@@ -173,9 +180,7 @@ class Supervisor:
                 return
             if health.refused > self._refused:
                 self.fencing.release_token()
-                self._event_log.say(
-                    "warning", f"the bridge refused every command for {_ANEW_S:.0f} s: another token is asked for"
-                )
+                self._event_log.log(reasons.commands_refused(_ANEW_S))
         self._obeyed, self._refused = now, health.refused
 
     def _review_motion(self) -> tuple[m.StopRequest, ...]:
@@ -188,36 +193,36 @@ class Supervisor:
             return ()
         if bridge.header.stamp - self._explained <= _BRAKING_S:
             return ()
-        reason = "the robot moves by commands of another sender"
+        reason = text_of(reasons.foreign_motion())
         stop = m.StopRequest(stop_id=f"motion-{self._draw()}", source="controller", user="", reason=reason)
         self.stop_due = stop
         # The other sender knows this token.
         self.fencing.release_token()
         return (stop,)
 
-    def _pause(self, reason: str, now: float) -> None:
+    def _pause(self, reason: m.Reason, now: float) -> None:
         """Bring all motion to rest. Nothing resumes by itself."""
         if self.mode in modes.MOVING:
             self.event(Event.LOST, now, reason)
         elif self._movement.homing:
             self._movement.stay()
-            self._event_log.say("warning", f"homing was stopped: {reason}")
+            self._event_log.log(reasons.homing_stopped(reason))
 
     def _review_hold(self, now: float) -> None:
         hand = self._movement.teleoperation
         holding = hand.holding(self._inbox.newest(TeleopTarget), now)
         client = hand.client
         not_theirs = self.authority.refusal(client, "operator") if holding else None
-        holding = holding and not (not_theirs and self.mode == "TELEOP")
+        holding = holding and (not_theirs is None or self.mode != "TELEOP")
         if self.mode == "TELEOP" and not holding:
-            self.event(Event.RELEASE, now, "the hold was released")
+            self.event(Event.RELEASE, now, reasons.hold_ended())
         elif self.mode == "READY" and holding and hand.pressed:
-            why = (not_theirs and text_of(not_theirs)) or self.busy() or safety.sensors(self.health, self._config)
+            why = not_theirs or self.busy() or safety.sensors(self.health, self._config)
             why = why or safety.supervision(self.health, self._config, True)
-            if why:
+            if why is not None:
                 hand.refuse()
-                self._event_log.say("warning", f"teleoperation refused: {why}")
+                self._event_log.log(reasons.teleoperation_refused(why))
             else:
                 self.authority.claim(client, now)
                 rights = self.authority.rights(client, "operator")
-                self.event(Event.HOLD, now, f"{client.user} moves the robot", rights)
+                self.event(Event.HOLD, now, reasons.moved_by_hand(client.user), rights)

@@ -24,6 +24,7 @@ from rolling_panda.messages.types import (
     PointState,
     Pose,
     Process,
+    Reason,
     Role,
     Text,
     Vector3,
@@ -109,7 +110,8 @@ class ControllerState(Message, frozen=True, kw_only=True):
         mode: State of the supervision state machine.
         phase: Step of the cut sequence in AUTO; empty otherwise.
         reason: Reason for the mode, as text.
-        allowed: Intent types that are allowed now. Every other one is refused with a reason.
+        allowed: Reason why each command would be refused now; None if it would be taken. What only the holder of
+            control may do is told for the holder. The commands about control are not among them.
         active_point_id: Current point of the work; empty without one.
         method: Name of the whole-body method.
         T_odom_tool: Measured tool pose.
@@ -134,7 +136,7 @@ class ControllerState(Message, frozen=True, kw_only=True):
     mode: Mode
     phase: Phase
     reason: Text
-    allowed: tuple[str, ...]
+    allowed: dict[Name, Reason | None]
     active_point_id: Annotated[str, Meta(max_length=64)]
     method: Name
     T_odom_tool: Pose | None

@@ -7,6 +7,7 @@ from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.messages.supervision import BaseVelocity, ControlState, StopRecord, TeleopTarget
+from rolling_panda.reasons import text_of
 from tests.support.controller_at_work import CONFIG, robot, run_until, working
 from tests.support.points import point
 from tests.support.sent import every, newest
@@ -23,7 +24,7 @@ def test_without_being_heard_the_robot_stops_pauses_and_stays_so():
     r = far_at_work()
     r.people.clear()
     r.run(1.5)
-    assert r.state.mode == "PAUSED" and "control by ada has ended" in r.state.reason
+    assert r.state.mode == "PAUSED" and r.state.reason == text_of(reasons.control_lapsed("ada", 1.0))
     assert np.abs(r.xi).max() < 2e-3
     r.people.add("ada")
     r.run(2.0)
@@ -117,20 +118,20 @@ def ready_and_unwatched():
 
 def test_work_does_not_begin_unwatched():
     r = ready_and_unwatched()
-    assert "seen the robot" in r.ask(intents.Start(user="ada")).reason
+    assert r.ask(intents.Start(user="ada")).refused.code == "never_watched"
 
 
 @pytest.mark.parametrize(("age_s", "begins"), [(1.9, True), (2.1, False)])
 def test_what_who_asks_has_seen_comes_with_what_they_ask(age_s, begins):
     r = ready_and_unwatched()
     answer = r.ask(intents.Start(user="ada", view_age_s=age_s))
-    assert answer.ok == begins and ("seen the robot" in answer.reason) != begins
+    assert answer.refused == (None if begins else reasons.unwatched(2.1, 2.0))
 
 
 def test_what_a_viewer_has_seen_lets_nothing_begin():
     r = ready_and_unwatched()
     assert not r.ask(intents.Arm(user="eve", role="viewer", view_age_s=0.1)).ok
-    assert "seen the robot" in r.ask(intents.Start(user="ada")).reason
+    assert r.ask(intents.Start(user="ada")).refused.code == "never_watched"
 
 
 def test_a_controller_that_starts_while_a_stop_is_latched_is_stopped():

@@ -4,6 +4,8 @@ import numpy as np
 
 from controller.ledger.journal import LedgerState, Records
 from rolling_panda import commands as intents
+from rolling_panda import reasons
+from rolling_panda.reasons import text_of
 from tests.support.controller_at_work import entry, finish, run_until, working
 from tests.support.points import point
 from tests.support.sent import every
@@ -30,8 +32,8 @@ def test_a_failure_is_a_fault_and_the_robot_rests_within_a_second():
     r.step()
     run_until(r, lambda s: s.mode == "FAULT", r.now + 0.1)
     at_rest(r, 1.0)
-    assert "disk is full" in r.state.reason and r.cuts == []
-    assert "cause is still there" in r.ask(intents.Acknowledge(user="ada", role="supervisor")).reason
+    assert r.state.reason == text_of(reasons.ledger_failed(r.ledger.failure)) and r.cuts == []
+    assert r.ask(intents.Acknowledge(user="ada", role="supervisor")).refused.code == "cause_remains"
     r.stop()
     run_until(r, lambda s: s.mode == "ESTOP_LATCHED", r.now + 0.2)
 

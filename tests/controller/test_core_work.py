@@ -6,6 +6,7 @@ import pytest
 from controller.config import ControllerConfig
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.model.robot import ARM_Q, ARM_XI, RobotModel
 from tests.support.controller_at_work import CONFIG, entry, finish, robot, run_until, working
 from tests.support.points import point
@@ -167,7 +168,7 @@ def test_stale_sensors_stop_and_need_an_acknowledgement_after_the_cause_is_gone(
     r.run(3.0)
     r.frozen_sensors = True
     r.run(0.5)
-    assert r.state.mode == "PROTECTIVE_STOP" and "joint states" in r.state.reason
+    assert r.state.mode == "PROTECTIVE_STOP" and "Joint states" in r.state.reason
     assert np.abs(r.record[-1]).max() == 0.0
     assert "still there" in r.ask(intents.Acknowledge(user="ada")).reason
     r.frozen_sensors = False
@@ -198,7 +199,7 @@ def test_home_brings_the_arm_back_with_the_base_still():
     finish(r, 30.0)
     base = r.q[:5].copy()
     assert r.ask(intents.Home(user="ada")).ok
-    assert "Start" not in (newest(r.step(), m.ControllerState) or r.state).allowed
+    assert (newest(r.step(), m.ControllerState) or r.state).allowed["Start"] is not None
     r.run(10.0)
     np.testing.assert_allclose(r.q[ARM_Q], CONFIG.work.home, atol=0.011)
     np.testing.assert_allclose(r.q[:5], base, atol=1e-3)
@@ -208,14 +209,26 @@ def test_home_brings_the_arm_back_with_the_base_still():
 def test_refusals_say_why_and_allowed_agrees_with_them():
     r = robot()
     r.run(0.1)
-    assert "arm the robot first" in r.ask(intents.Start(user="ada")).reason
+    idle = reasons.impossible_in_idle("start")
+    assert r.ask(intents.Start(user="ada")).refused == r.state.allowed["Start"] == idle
     decisions = {"AcceptPoint", "RejectPoint", "ReconsiderPoint", "ResolvePoint", "AcceptAll", "SetApproach"}
     orders = {"MoveInQueue", "ResetOrder", "RestoreAccepted"}
     previews = {"RequestPreview", "ApprovePreview", "RequirePreview"}
-    assert set(r.state.allowed) == {"Arm"} | decisions | orders | previews
+    possible = {name for name, reason in r.state.allowed.items() if reason is None}
+    assert possible == {"Arm"} | decisions | orders | previews
+    assert set(r.state.allowed) - possible == {
+        "Start",
+        "Survey",
+        "LookAgain",
+        "Pause",
+        "Resume",
+        "Home",
+        "Acknowledge",
+        "Reset",
+    }
     assert r.ask(intents.Arm(user="ada")).ok
     assert r.ask(intents.Start(user="ada")).reason == "no point is accepted"
-    assert r.ask(intents.Resume(user="ada")).reason == "resume is not possible in READY"
+    assert r.ask(intents.Resume(user="ada")).refused == reasons.impossible_in_ready("resume")
 
 
 @pytest.mark.parametrize("phase", ["APPROACH", "ADVANCE"])

@@ -4,6 +4,7 @@ import itertools
 
 from controller.supervision.fencing import FencingToken
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from tests.support.fake_wire import as_received
 
 
@@ -29,14 +30,14 @@ def test_it_is_asked_for_five_times_a_second_and_at_once_in_another_mode():
 
 def test_it_is_held_when_the_bridge_says_so_and_lost_when_that_names_another_one():
     it = drawn()
-    assert it.update(bridge(), 0.0) == "" and it.token is None and not it.waits
-    assert it.update(bridge("t0", 4), 0.1) == "this controller commands the robot: epoch 4"
+    assert it.update(bridge(), 0.0) is None and it.token is None and not it.waits
+    assert it.update(bridge("t0", 4), 0.1) == reasons.controller_commands(4)
     assert (it.token.epoch, it.token.nonce) == (4, "t0")
-    assert it.update(bridge("t0", 4), 0.2) == ""
-    assert "this one waits" in it.update(bridge("other", 5), 0.3)
+    assert it.update(bridge("t0", 4), 0.2) is None
+    assert it.update(bridge("other", 5), 0.3) == reasons.controller_waits()
     assert it.token is None and it.overruled and it.waits
-    assert it.update(bridge("other", 5), 0.4) == ""
-    assert "epoch 6" in it.update(bridge("t0", 6), 0.5) and not it.waits
+    assert it.update(bridge("other", 5), 0.4) is None
+    assert it.update(bridge("t0", 6), 0.5) == reasons.controller_commands(6) and not it.waits
 
 
 def test_before_the_bridge_has_said_who_commands_a_controller_keeps_silent_for_a_second():

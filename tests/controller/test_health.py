@@ -1,16 +1,19 @@
+import math
+
 import msgspec
 import pytest
 
 from controller.config import SupervisionConfig
-from controller.supervision.health import FINE, Health, cause, check, health
+from controller.supervision.health import Health, Verdict, cause, check, health
 from rolling_panda import messages as m
-from rolling_panda import topics
+from rolling_panda import reasons, topics
 from rolling_panda.messages.perception import Obstacles
 from rolling_panda.messages.robot import RejectionCount
 from rolling_panda.transport.inbox import Inbox
 from tests.support.fake_wire import bridge_state, joints
 
 CONFIG = SupervisionConfig()
+FULL, ASTRAY = reasons.ledger_failed("the disk is full"), reasons.said("joint 3 does not follow")
 ALL = frozenset({"bridge", "controller", "perception", "server"})
 HEALTHY = Health(0.01, 0.02, 0.05, 0.05, 0.05, ALL, watchdog=False, overruled=False)
 
@@ -21,92 +24,100 @@ def verdict(mode, moving=False, **changes):
 
 @pytest.mark.parametrize("mode", ["IDLE", "READY", "TELEOP", "AUTO", "PAUSED"])
 def test_all_is_well(mode):
-    assert verdict(mode) == FINE
+    assert verdict(mode) is None
 
 
 @pytest.mark.parametrize("mode", ["AUTO", "TELEOP"])
 @pytest.mark.parametrize(
-    ("changes", "words"),
+    ("changes", "reason"),
     [
-        ({"joints": 0.21}, "joint states are 0.21 s old"),
-        ({"odometry": 0.26}, "odometry is 0.26 s old"),
-        ({"bridge": 0.6}, "the bridge's state is 0.60 s old"),
-        ({"joints": float("inf")}, "are endlessly old"),
-        ({"watchdog": True}, "watchdog"),
+        ({"joints": 0.21}, reasons.joints_stale(0.21, CONFIG.joints_max_age_s)),
+        ({"odometry": 0.26}, reasons.odometry_stale(0.26, CONFIG.odometry_max_age_s)),
+        ({"bridge": 0.6}, reasons.bridge_stale(0.6, CONFIG.bridge_max_age_s)),
+        ({"joints": math.inf}, reasons.nothing_received(topics.JOINTS.name)),
+        ({"odometry": math.inf}, reasons.nothing_received(topics.ODOMETRY.name)),
+        ({"bridge": math.inf}, reasons.nothing_received(topics.BRIDGE.name)),
+        ({"watchdog": True}, reasons.watchdog_holds()),
     ],
 )
-def test_without_the_robots_own_data_motion_stops_protectively(mode, changes, words):
-    found = verdict(mode, **changes)
-    assert found.action == "protect"
-    assert words in found.reason
+def test_without_the_robots_own_data_motion_stops_protectively(mode, changes, reason):
+    assert verdict(mode, **changes) == Verdict("protect", reason)
 
 
 @pytest.mark.parametrize(
-    ("mode", "changes"),
+    ("mode", "changes", "reason"),
     [
-        ("TELEOP", {"server": 0.31}),
-        ("AUTO", {"server": 2.01}),
-        ("TELEOP", {"present": ALL - {"server"}}),
-        ("AUTO", {"present": ALL - {"server"}}),
+        ("TELEOP", {"server": 0.31}, reasons.process_silent("server", 0.31, CONFIG.hold_link_max_age_s)),
+        ("AUTO", {"server": 2.01}, reasons.process_silent("server", 2.01, CONFIG.server_max_age_s)),
+        ("AUTO", {"server": math.inf}, reasons.process_unheard("server")),
+        ("TELEOP", {"present": ALL - {"server"}}, reasons.process_gone("server")),
+        ("AUTO", {"present": ALL - {"server"}}, reasons.process_gone("server")),
     ],
 )
-def test_without_the_server_motion_pauses(mode, changes):
-    assert verdict(mode, **changes).action == "pause"
-    assert "server" in verdict(mode, **changes).reason
+def test_without_the_server_motion_pauses(mode, changes, reason):
+    assert verdict(mode, **changes) == Verdict("pause", reason)
 
 
-@pytest.mark.parametrize("changes", [{"perception": 1.01}, {"present": ALL - {"perception"}}])
-def test_without_perception_only_automatic_work_pauses(changes):
-    assert verdict("AUTO", **changes).action == "pause"
-    assert verdict("TELEOP", **changes) == FINE
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"perception": 1.01}, reasons.process_silent("perception", 1.01, CONFIG.perception_max_age_s)),
+        ({"present": ALL - {"perception"}}, reasons.process_gone("perception")),
+    ],
+)
+def test_without_perception_only_automatic_work_pauses(changes, reason):
+    assert verdict("AUTO", **changes) == Verdict("pause", reason)
+    assert verdict("TELEOP", **changes) is None
 
 
 def test_work_goes_on_where_the_server_is_too_slow_for_a_hand():
-    assert verdict("TELEOP", server=0.5).reason == "the server process is silent for 0.50 s; the limit is 0.3 s"
-    assert verdict("AUTO", server=1.9) == FINE
+    assert verdict("TELEOP", server=0.5).reason == reasons.process_silent("server", 0.5, CONFIG.hold_link_max_age_s)
+    assert verdict("AUTO", server=1.9) is None
 
 
 def test_a_jitter_of_a_tenth_of_a_second_stops_nothing():
     jitter = {"joints": 0.11, "odometry": 0.12, "bridge": 0.15, "server": 0.15, "perception": 0.6}
-    assert verdict("AUTO", **jitter) == FINE
+    assert verdict("AUTO", **jitter) is None
 
 
 def test_nothing_is_demanded_of_a_robot_that_does_not_move():
     gone = {"joints": 9.0, "server": 9.0, "present": frozenset()}
-    assert verdict("READY", **gone) == FINE
+    assert verdict("READY", **gone) is None
     assert verdict("READY", moving=True, **gone).action == "protect"
 
 
 def test_the_most_severe_of_several_counts():
     found = verdict("AUTO", present=frozenset(), joints=1.0, overruled=True)
-    assert (found.action, found.reason) == ("fault", "another controller commands this robot")
-    assert verdict("IDLE", overruled=True) == FINE
+    assert (found.action, found.reason) == ("fault", reasons.other_controller())
+    assert verdict("IDLE", overruled=True) is None
     assert verdict("AUTO", present=frozenset(), joints=1.0).action == "protect"
 
 
 @pytest.mark.parametrize(
-    "changes",
+    ("changes", "reason"),
     [
-        {"ledger": "the disk is full"},
-        {"overruled": True},
-        {"tracking_error": "joint 3 does not follow"},
-        {"joints": 1.0},
-        {"odometry": 1.0},
-        {"bridge": 1.0},
-        {"watchdog": True},
+        ({"ledger": FULL}, FULL),
+        ({"overruled": True}, reasons.other_controller()),
+        ({"tracking_error": ASTRAY}, ASTRAY),
+        ({"joints": 1.0}, reasons.joints_stale(1.0, CONFIG.joints_max_age_s)),
+        ({"odometry": 1.0}, reasons.odometry_stale(1.0, CONFIG.odometry_max_age_s)),
+        ({"bridge": 1.0}, reasons.bridge_stale(1.0, CONFIG.bridge_max_age_s)),
+        ({"watchdog": True}, reasons.watchdog_holds()),
     ],
 )
-def test_a_stop_or_fault_cannot_be_left_while_its_cause_is_there(changes):
-    assert cause(msgspec.structs.replace(HEALTHY, **changes), CONFIG)
-    assert cause(HEALTHY, CONFIG) == ""
+def test_a_stop_or_fault_cannot_be_left_while_its_cause_is_there(changes, reason):
+    assert cause(msgspec.structs.replace(HEALTHY, **changes), CONFIG) == reason
+    assert cause(HEALTHY, CONFIG) is None
     # These end motion, and are no cause of a stop.
-    assert cause(msgspec.structs.replace(HEALTHY, server=9.0, perception=9.0, obstacles=9.0), CONFIG) == ""
+    assert cause(msgspec.structs.replace(HEALTHY, server=9.0, perception=9.0, obstacles=9.0), CONFIG) is None
 
 
 def test_old_pictures_of_what_stands_around_stop_automatic_work_alone():
     old = verdict("AUTO", obstacles=6.5)
-    assert old.action == "pause" and "with the obstacles is 6.50 s old" in old.reason
-    assert verdict("TELEOP", obstacles=6.5) == FINE
+    assert old == Verdict("pause", reasons.obstacles_stale(6.5, CONFIG.obstacles_max_age_s))
+    never = verdict("AUTO", obstacles=math.inf)
+    assert never == Verdict("pause", reasons.nothing_received(topics.OBSTACLES.name))
+    assert verdict("TELEOP", obstacles=6.5) is None
 
 
 def test_the_age_of_a_picture_is_told_by_its_stamp_however_often_it_is_repeated():
@@ -127,13 +138,13 @@ def test_the_age_of_a_picture_is_told_by_its_stamp_however_often_it_is_repeated(
 
 @pytest.mark.parametrize("mode", ["IDLE", "READY", "AUTO"])
 def test_without_a_ledger_there_is_a_fault_in_every_mode(mode):
-    found = verdict(mode, ledger="the disk is full")
-    assert (found.action, found.reason) == ("fault", "the disk is full")
+    found = verdict(mode, ledger=FULL)
+    assert found == Verdict("fault", FULL)
 
 
 def test_a_robot_that_does_not_follow_is_stopped_protectively():
-    found = verdict("AUTO", tracking_error="joint 3 does not follow")
-    assert found.action == "protect" and "joint 3" in found.reason
+    found = verdict("AUTO", tracking_error=ASTRAY)
+    assert found == Verdict("protect", ASTRAY)
 
 
 def test_the_age_of_each_input_is_counted_from_its_arrival_and_what_never_came_is_endless():
@@ -151,13 +162,13 @@ def test_the_age_of_each_input_is_counted_from_its_arrival_and_what_never_came_i
         inbox.put(message, at)
     inbox.put(m.Heartbeat(process="server", sequence=1), 8.5)
     inbox.put(m.Heartbeat(process="perception", sequence=1), 8.0)
-    found = health(inbox, True, 10.0, "the disk is full", "joint 3 does not follow")
+    found = health(inbox, True, 10.0, FULL, ASTRAY)
     ages = (found.joints, found.odometry, found.bridge, found.server, found.perception)
     assert ages == (0.5, 0.75, 1.0, 1.5, 2.0)
     assert (found.present, found.watchdog, found.overruled, found.refused) == (ALL, True, True, 5)
-    assert (found.ledger, found.tracking_error) == ("the disk is full", "joint 3 does not follow")
+    assert (found.ledger, found.tracking_error) == (FULL, ASTRAY)
     nothing = health(Inbox(), False, 10.0)
     ages = (nothing.joints, nothing.odometry, nothing.bridge, nothing.server, nothing.perception)
     assert ages == (float("inf"),) * 5
     assert (nothing.present, nothing.watchdog, nothing.overruled, nothing.refused) == (frozenset(), False, False, 0)
-    assert (nothing.ledger, nothing.tracking_error) == ("", "")
+    assert (nothing.ledger, nothing.tracking_error) == (None, None)

@@ -2,6 +2,7 @@
 
 from controller.ledger.journal import EventLogger, Journal, LedgerState
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from tests.support.fake_wire import as_received
 
 BODY = m.Header()
@@ -24,15 +25,15 @@ def test_a_record_is_held_when_the_ledger_says_so():
 
 def test_a_ledger_that_takes_nothing_is_trouble_after_its_time_and_no_sooner():
     journal = Journal()
-    assert journal.trouble(100.0, 0.6) == ""
+    assert journal.trouble(100.0, 0.6) is None
     journal.add("event", "x", BODY)
     journal.observe(LedgerState(0), 10.0)
-    assert journal.trouble(10.5, 0.6) == ""
+    assert journal.trouble(10.5, 0.6) is None
     for now in (10.2, 10.4, 10.6):
         journal.observe(LedgerState(0), now)
-    assert "written nothing for 0.7 s" in journal.trouble(10.7, 0.6)
+    assert journal.trouble(10.75, 0.6) == reasons.ledger_silent(0.75)
     journal.observe(LedgerState(1), 10.8)
-    assert journal.trouble(20.0, 0.6) == ""
+    assert journal.trouble(20.0, 0.6) is None
 
 
 def test_a_slow_ledger_that_goes_on_is_no_trouble():
@@ -43,15 +44,15 @@ def test_a_slow_ledger_that_goes_on_is_no_trouble():
         durable += 1
         now += 0.3
         journal.observe(LedgerState(durable), now)
-        assert journal.trouble(now, 0.6) == ""
+        assert journal.trouble(now, 0.6) is None
 
 
 def test_a_failure_is_trouble_at_once_until_it_is_over():
     journal = Journal()
     journal.observe(LedgerState(0, "disk full"), 0.0)
-    assert journal.trouble(0.0, 0.6) == "disk full"
+    assert journal.trouble(0.0, 0.6) == reasons.ledger_failed("disk full")
     journal.observe(LedgerState(0), 1.0)
-    assert journal.trouble(1.0, 0.6) == ""
+    assert journal.trouble(1.0, 0.6) is None
 
 
 def test_a_stop_that_is_sent_several_times_is_one_record():

@@ -159,7 +159,7 @@ def test_operator_is_answered_a_stop_latches_and_a_reset_releases_it(rest):
     assert all(command.xi == (0.0,) * 9 for command in commands)
 
     assert "arm the robot first" in rest.server.call(INTENT, intents.Start(user="ada")).reason
-    rest.until(lambda: "Arm" in rest.state.peek().message.allowed)
+    rest.until(lambda: rest.state.peek().message.allowed["Arm"] is None)
     assert rest.server.call(INTENT, intents.Arm(user="ada")).ok
     rest.until(lambda: rest.mode() == "READY")
 
@@ -189,11 +189,11 @@ def test_operator_is_answered_a_stop_latches_and_a_reset_releases_it(rest):
 
 
 def test_a_heartbeat_that_stands_still_is_no_sign_of_life(rest):
-    rest.until(lambda: rest.mode() == "IDLE" and "Arm" in rest.state.peek().message.allowed)
+    rest.until(lambda: rest.mode() == "IDLE" and rest.state.peek().message.allowed["Arm"] is None)
     assert rest.server.call(INTENT, intents.Arm(user="ada")).ok
-    rest.until(lambda: rest.mode() == "READY" and "Home" in rest.state.peek().message.allowed)
+    rest.until(lambda: rest.mode() == "READY" and rest.state.peek().message.allowed["Home"] is None)
     rest.beats = False
-    rest.until(lambda: "Home" not in rest.state.peek().message.allowed)
+    rest.until(lambda: rest.state.peek().message.allowed["Home"] is not None)
     assert "silent" in rest.server.call(INTENT, intents.Home(user="ada")).reason
 
 

@@ -6,10 +6,11 @@ from hypothesis import strategies as st
 
 from controller.supervision import modes
 from controller.supervision.modes import ANYBODY, MOVING, OPERATOR, SEVERITY, SYSTEM, Event
-from rolling_panda.mode_table import FIRST
+from rolling_panda import reasons
 
 ALL = SYSTEM | OPERATOR
 EVENTS = tuple(Event)
+CAUSE, OTHER = reasons.said("joint states are old"), reasons.said("the link")
 RIGHTS = (ANYBODY, SYSTEM, OPERATOR, frozenset({"anyone", "operator"}), frozenset({"anyone", "operator", "holder"}))
 
 #: Written out by hand beside the table itself: one slip in one of them is seen.
@@ -31,6 +32,10 @@ EXPECTED = {
     ("FAULT", Event.ACKNOWLEDGE): ("IDLE", "supervisor"),
     ("ESTOP_LATCHED", Event.RESET): ("IDLE", "supervisor"),
 }
+
+
+def step(state, event, now, by=SYSTEM):
+    return modes.step(state, event, now, CAUSE, by)
 
 
 def expected(mode, event):
@@ -55,15 +60,15 @@ def reach(mode):
     }
     state = modes.boot()
     for event in ways[mode]:
-        state = modes.step(state, event, 0.0, by=ALL).state
+        state = step(state, event, 0.0, ALL).state
     assert state.mode == mode
-    return modes.observe(state, "", -9.0)
+    return modes.observe(state, None, -9.0)
 
 
 def test_boot_is_idle_or_still_stopped():
     assert modes.boot().mode == "IDLE"
-    stopped = modes.boot("ada stopped it")
-    assert (stopped.mode, stopped.reason) == ("ESTOP_LATCHED", "ada stopped it")
+    stopped = modes.boot(CAUSE)
+    assert (stopped.mode, stopped.reason) == ("ESTOP_LATCHED", CAUSE)
 
 
 @pytest.mark.parametrize("mode", SEVERITY)
@@ -71,7 +76,7 @@ def test_boot_is_idle_or_still_stopped():
 @pytest.mark.parametrize("by", RIGHTS)
 def test_exactly_the_listed_transitions_are_taken_by_exactly_those_who_may(mode, event, by):
     after, who = expected(mode, event)
-    taken = modes.step(reach(mode), event, 0.0, by=by)
+    taken = step(reach(mode), event, 0.0, by)
     if who in by:
         assert taken.state.mode == after
     else:
@@ -81,43 +86,45 @@ def test_exactly_the_listed_transitions_are_taken_by_exactly_those_who_may(mode,
 
 
 def test_a_refusal_says_what_to_do_or_whose_it_is():
-    refused = modes.step(reach("IDLE"), Event.START, 0.0, by=OPERATOR).refused
-    assert refused == "start is not possible in IDLE: arm the robot first"
-    assert "reset the stop first" in modes.step(reach("ESTOP_LATCHED"), Event.ARM, 0.0, by=OPERATOR).refused
-    assert modes.step(reach("READY"), Event.START, 0.0, by=ANYBODY).refused == "start in READY is for who holds control"
-    assert "for a supervisor" in modes.step(reach("FAULT"), Event.ACKNOWLEDGE, 0.0, by=ANYBODY).refused
+    def refused(mode, event, by):
+        return step(reach(mode), event, 0.0, by).refused
+
+    assert refused("IDLE", Event.START, OPERATOR) == reasons.impossible_in_idle("start")
+    assert refused("ESTOP_LATCHED", Event.ARM, OPERATOR) == reasons.impossible_in_estop("arm")
+    assert refused("READY", Event.START, ANYBODY) == reasons.right_missing("start", "READY", "holder")
+    assert refused("FAULT", Event.ACKNOWLEDGE, ANYBODY) == reasons.right_missing("acknowledge", "FAULT", "supervisor")
 
 
 def test_acknowledging_needs_the_cause_gone_for_a_second():
     def acknowledge(state, now):
-        return modes.step(state, Event.ACKNOWLEDGE, now, by=OPERATOR)
+        return step(state, Event.ACKNOWLEDGE, now, OPERATOR)
 
-    state = modes.observe(reach("PROTECTIVE_STOP"), "joint states are old", 5.0)
-    assert "still there" in acknowledge(state, 9.0).refused
-    state = modes.observe(state, "", 10.0)
-    assert acknowledge(state, 10.9).refused
-    flicker = modes.observe(modes.observe(state, "again", 10.95), "", 11.0)
+    state = modes.observe(reach("PROTECTIVE_STOP"), CAUSE, 5.0)
+    assert acknowledge(state, 9.0).refused == reasons.cause_remains(state.reason)
+    state = modes.observe(state, None, 10.0)
+    assert acknowledge(state, 10.9).refused == reasons.cause_recent(1.0)
+    flicker = modes.observe(modes.observe(state, CAUSE, 10.95), None, 11.0)
     assert acknowledge(flicker, 11.5).refused
     assert acknowledge(state, 11.0).state.mode == "PAUSED"
 
 
 def test_a_protective_stop_for_another_cause_begins_its_second_anew():
-    state = modes.observe(reach("PROTECTIVE_STOP"), "", 0.0)
-    again = modes.step(state, Event.PROTECT, 5.0, "the link").state
-    assert (again.mode, again.reason, again.clear_since) == ("PROTECTIVE_STOP", "the link", None)
+    state = modes.observe(reach("PROTECTIVE_STOP"), None, 0.0)
+    again = modes.step(state, Event.PROTECT, 5.0, OTHER).state
+    assert (again.mode, again.reason, again.clear_since) == ("PROTECTIVE_STOP", OTHER, None)
 
 
 def test_a_fault_is_left_to_idle_by_a_supervisor():
-    state = modes.observe(reach("FAULT"), "", 0.0)
-    assert modes.step(state, Event.ACKNOWLEDGE, 2.0, by=frozenset({"anyone", "operator", "holder"})).refused
-    assert modes.step(state, Event.ACKNOWLEDGE, 2.0, by=OPERATOR).state.mode == "IDLE"
+    state = modes.observe(reach("FAULT"), None, 0.0)
+    assert step(state, Event.ACKNOWLEDGE, 2.0, frozenset({"anyone", "operator", "holder"})).refused
+    assert step(state, Event.ACKNOWLEDGE, 2.0, OPERATOR).state.mode == "IDLE"
 
 
 @given(st.permutations([Event.STOP, Event.FAULT, Event.PROTECT, Event.PAUSE, Event.LOST]))
 def test_of_concurrent_faults_the_most_severe_wins_in_any_order(order):
     state = reach("AUTO")
     for event in order:
-        state = modes.step(state, event, 0.0, by=ALL).state
+        state = step(state, event, 0.0, ALL).state
     assert state.mode == "ESTOP_LATCHED"
 
 
@@ -126,7 +133,7 @@ def test_of_concurrent_faults_the_most_severe_wins_in_any_order(order):
 def test_what_happens_by_itself_never_makes_it_less_severe(mode, events):
     state = reach(mode)
     for event in events:
-        before, state = state, modes.step(state, event, 0.0).state
+        before, state = state, step(state, event, 0.0).state
         assert modes.severity(state.mode) >= modes.severity(before.mode)
 
 
@@ -139,8 +146,8 @@ def random_steps(count, seed):
         now += draw.random()
         event, by = draw.choice(EVENTS), draw.choice(RIGHTS)
         if draw.random() < 0.3:
-            state = modes.observe(state, draw.choice(("", "", "joint states are old")), now)
-        before, taken = state, modes.step(state, event, now, by=by)
+            state = modes.observe(state, draw.choice((None, None, CAUSE)), now)
+        before, taken = state, step(state, event, now, by)
         state = taken.state
         visited.add(state.mode)
         assert state.reason
@@ -181,26 +188,30 @@ def test_severity_grows_from_idle_to_the_stop():
 def test_a_repeated_stop_or_fault_is_no_refusal_and_a_fault_under_a_stop_says_why_it_changes_nothing():
     for mode, event in (("ESTOP_LATCHED", Event.STOP), ("FAULT", Event.FAULT)):
         state = reach(mode)
-        assert modes.step(state, event, 0.0, "again") == modes.Transition(state)
-    told = modes.step(reach("ESTOP_LATCHED"), Event.FAULT, 0.0, "the ledger")
-    assert told.refused == "a fault changes nothing: the robot is in ESTOP_LATCHED"
+        assert modes.step(state, event, 0.0, CAUSE) == modes.Transition(state)
+    told = step(reach("ESTOP_LATCHED"), Event.FAULT, 0.0)
+    assert told.refused == reasons.fault_without_effect("ESTOP_LATCHED")
 
 
-def test_a_transition_without_a_reason_has_its_event_for_one():
-    assert modes.step(reach("IDLE"), Event.ARM, 0.0, by=ALL).state.reason == Event.ARM.value
+def test_a_transition_has_its_reason_and_a_refusal_keeps_the_one_before():
+    idle = reach("IDLE")
+    assert modes.step(idle, Event.ARM, 0.0, OTHER, ALL).state.reason == OTHER
+    assert modes.step(idle, Event.START, 0.0, OTHER, ALL).state is idle
+    assert modes.step(idle, Event.ARM, 0.0, OTHER, ANYBODY).state is idle
 
 
 def test_the_second_counts_from_when_the_cause_went_away_and_in_stops_and_faults_alone():
-    state = modes.observe(modes.observe(reach("PROTECTIVE_STOP"), "again", 9.0), "", 10.0)
-    assert modes.observe(state, "", 10.9).clear_since == 10.0
+    state = modes.observe(modes.observe(reach("PROTECTIVE_STOP"), CAUSE, 9.0), None, 10.0)
+    assert modes.observe(state, None, 10.9).clear_since == 10.0
     for mode in ("IDLE", "READY", "AUTO", "PAUSED", "ESTOP_LATCHED"):
-        state = modes.State(mode, "")
-        assert modes.observe(state, "", 5.0) == state
+        state = modes.State(mode, CAUSE)
+        assert modes.observe(state, None, 5.0) == state
 
 
-def test_where_there_is_nothing_to_advise_a_refusal_ends():
-    quiet = [mode for mode in SEVERITY if not FIRST[mode]]
-    assert quiet
-    for mode in quiet:
-        refused = modes.step(reach(mode), Event.RESET, 0.0, by=ALL).refused
-        assert refused == f"{Event.RESET.value} is not possible in {mode}"
+@pytest.mark.parametrize("mode", SEVERITY)
+def test_each_mode_has_its_own_refusal_with_the_step_that_comes_first(mode):
+    event = Event.FINISHED if mode != "AUTO" else Event.ARM
+    refused = step(reach(mode), event, 0.0, ALL).refused
+    assert refused == modes.IMPOSSIBLE[mode](event.value)
+    assert refused.code == f"impossible_in_{'estop' if mode == 'ESTOP_LATCHED' else mode.lower()}"
+    assert mode in reasons.text_of(refused)

@@ -29,29 +29,34 @@ def well(**changes: object) -> safety.Health:
 
 def situation(mode: str = "READY", **changes: object) -> Situation:
     state = replace(modes.boot(), mode=mode)
-    usual = Situation(SupervisionConfig(), state, WELL, homing=False, busy="", waits="", rights=modes.OPERATOR)
+    usual = Situation(SupervisionConfig(), state, WELL, homing=False, busy=None, waits=None, rights=modes.OPERATOR)
     return replace(usual, **changes)
 
 
 def test_a_ready_robot_with_work_may_start_and_go_home() -> None:
-    assert {"Start", "Home"} <= set(allowed(0.0, situation()))
+    found = allowed(0.0, situation())
+    assert found["Start"] is None and found["Home"] is None
+    assert found["Arm"] == reasons.impossible_in_ready("arm")
     assert "TakeControl" not in allowed(0.0, situation()), "who may have control is told with it"
 
 
 def test_each_thing_that_is_missing_is_said() -> None:
     start, home = COMMAND_OF[intents.Start], COMMAND_OF[intents.Home]
-    assert refusal(start, 0.0, situation(waits="no point is accepted")) == "no point is accepted"
-    assert refusal(home, 0.0, situation(waits="no point is accepted")) is None
-    assert refusal(start, 0.0, situation(busy="the blades are closing")) == "the blades are closing"
-    assert "perception" in refusal(start, 0.0, situation(health=well(perception=9.0)))
+    missing = reasons.said("no point is accepted")
+    assert refusal(start, 0.0, situation(waits=missing)) == missing
+    assert refusal(home, 0.0, situation(waits=missing)) is None
+    assert refusal(start, 0.0, situation(busy=missing)) == missing
+    limit = SupervisionConfig().perception_max_age_s
+    silent = reasons.process_silent("perception", 9.0, limit)
+    assert refusal(start, 0.0, situation(health=well(perception=9.0))) == silent
     assert refusal(home, 0.0, situation(health=well(perception=9.0))) is None
     assert refusal(start, 0.0, situation(health=well(watchdog=True))) == reasons.watchdog_holds()
     assert refusal(home, 0.0, situation("PAUSED")) == reasons.wrong_mode("Home", "READY", "PAUSED")
 
 
 def test_a_pause_ends_the_way_home_in_ready() -> None:
-    assert "Pause" not in allowed(0.0, situation())
-    assert "Pause" in allowed(0.0, situation(homing=True))
+    assert allowed(0.0, situation())["Pause"] == reasons.impossible_in_ready("pause")
+    assert allowed(0.0, situation(homing=True))["Pause"] is None
 
 
 def test_who_may_not_operate_is_refused_everything() -> None:
@@ -66,14 +71,15 @@ def test_what_another_holds_is_not_moved_and_a_fault_is_left_by_any_supervisor()
     assert refusal(COMMAND_OF[intents.Home], 0.0, situation(**others)) == others["not_theirs"]
     assert refusal(COMMAND_OF[intents.AcceptAll], 0.0, situation(**others)) is None
     fault = situation("FAULT", **others)
-    fault = replace(fault, state=modes.observe(fault.state, "", 0.0))
+    fault = replace(fault, state=modes.observe(fault.state, None, 0.0))
     assert refusal(COMMAND_OF[intents.Acknowledge], 2.0, fault) is None
 
 
 def test_a_stop_is_acknowledged_a_second_after_its_cause_is_gone() -> None:
     stopped = situation("PROTECTIVE_STOP")
-    stopped = replace(stopped, state=modes.observe(stopped.state, "", 5.0))
-    assert "Acknowledge" not in allowed(5.5, stopped) and "Acknowledge" in allowed(6.5, stopped)
+    stopped = replace(stopped, state=modes.observe(stopped.state, None, 5.0))
+    assert allowed(5.5, stopped)["Acknowledge"] == reasons.cause_recent(1.0)
+    assert allowed(6.5, stopped)["Acknowledge"] is None
 
 
 def test_without_measurements_nothing_begins_to_move_and_all_else_goes_on() -> None:
@@ -83,18 +89,22 @@ def test_without_measurements_nothing_begins_to_move_and_all_else_goes_on() -> N
             assert refusal(command, 0.0, blind)
         assert refusal(COMMAND_OF[intents.Arm], 0.0, replace(blind, state=modes.boot()))
         assert refusal(COMMAND_OF[intents.AcceptAll], 0.0, blind) is None
-        assert refusal(COMMAND_OF[intents.Pause], 0.0, replace(blind, state=modes.State("AUTO", ""))) is None
+        assert (
+            refusal(COMMAND_OF[intents.Pause], 0.0, replace(blind, state=modes.State("AUTO", reasons.said("work"))))
+            is None
+        )
 
 
 def test_a_link_that_is_too_slow_for_a_hand_lets_work_begin_and_without_a_server_the_robot_can_be_armed() -> None:
     assert refusal(COMMAND_OF[intents.Start], 0.0, situation(health=well(server=1.0))) is None
     gone = situation(health=well(server=9.0))
-    assert "server" in refusal(COMMAND_OF[intents.Start], 0.0, gone)
+    limit = SupervisionConfig().server_max_age_s
+    assert refusal(COMMAND_OF[intents.Start], 0.0, gone) == reasons.process_silent("server", 9.0, limit)
     assert refusal(COMMAND_OF[intents.Arm], 0.0, replace(gone, state=modes.boot())) is None
 
 
 def test_a_survey_needs_neither_accepted_points_nor_an_approved_preview() -> None:
-    for missing in ({"waits": "no point is accepted"}, {"approval": "approve the preview"}):
+    for missing in ({"waits": reasons.said("nothing")}, {"approval": reasons.said("approve it")}):
         (why,) = missing.values()
         assert refusal(COMMAND_OF[intents.Start], 0.0, situation(**missing)) == why
         assert refusal(COMMAND_OF[intents.Survey], 0.0, situation(**missing)) is None

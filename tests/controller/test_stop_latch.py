@@ -3,6 +3,7 @@ import msgspec
 from controller.supervision.stop_latch import StopLatch
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.messages.supervision import StopRecord
 from tests.support.fake_wire import as_received, bridge_state
 
@@ -20,14 +21,14 @@ def bridge(stop_id):
 
 def test_a_stop_latches_once_and_says_who_and_why():
     latch = StopLatch()
-    assert latch.update((stop("a"),), BRIDGE) == "software stop by eve: dog in the row"
-    assert latch.update((stop("a"),), bridge("a")) == ""
+    assert latch.update((stop("a"),), BRIDGE) == reasons.software_stop("eve", "dog in the row")
+    assert latch.update((stop("a"),), bridge("a")) is None
 
 
 def test_a_stop_that_only_the_bridge_has_seen_latches_too():
     latch = StopLatch()
-    assert latch.update((), bridge("a"), 7.0) == "software stop: eve: dog in the row"
-    assert latch.update((), bridge("a"), 8.0) == ""
+    assert latch.update((), bridge("a"), 7.0) == reasons.software_stop_unnamed("eve: dog in the row")
+    assert latch.update((), bridge("a"), 8.0) is None
     (record,) = latch.message().stops
     assert record == StopRecord("a", "bridge", "", "eve: dog in the row", 7.0)
 
@@ -45,17 +46,17 @@ def test_what_was_latched_before_a_start_is_not_released_by_itself():
     before = StopLatch()
     before.update((stop("a"),), BRIDGE)
     latch = StopLatch(before.message().stops)
-    assert not latch.released(BRIDGE) and latch.latched
+    assert not latch.released(BRIDGE) and latch.latched == reasons.software_stop("eve", "dog in the row")
     assert latch.message().released_by == ""
 
 
 def test_an_emergency_stop_is_told_from_a_software_stop_and_a_process_stands_for_a_person():
     for source, user, told in (
-        ("hardware", "", "emergency stop: the button"),
-        ("hardware", "eve", "emergency stop: the button"),
-        ("server", "", "software stop by server: the button"),
-        ("server", "eve", "software stop by eve: the button"),
-        ("bridge", "", "software stop: the button"),
+        ("hardware", "", reasons.emergency_stop("the button")),
+        ("hardware", "eve", reasons.emergency_stop("the button")),
+        ("server", "", reasons.software_stop("server", "the button")),
+        ("server", "eve", reasons.software_stop("eve", "the button")),
+        ("bridge", "", reasons.software_stop_unnamed("the button")),
     ):
         pressed = m.StopRequest(stop_id="a", source=source, user=user, reason="the button")
         assert StopLatch().update((pressed,), BRIDGE) == told
@@ -65,7 +66,7 @@ def test_reset_ends_only_when_the_bridge_shows_the_release():
     latch = StopLatch()
     latch.update((stop("a"),), bridge("a"))
     assert not latch.released(bridge("a"))
-    assert latch.ask_release(RESET, bridge("a"), 1.0) == ""
+    assert latch.ask_release(RESET, bridge("a"), 1.0) is None
     assert latch.release_due() == m.ReleaseStop(stop_id="a", user="ada", reason="looked at it")
     assert latch.release_due() is None
     assert not latch.released(bridge("a"))
@@ -75,8 +76,8 @@ def test_reset_ends_only_when_the_bridge_shows_the_release():
 
 def test_a_reset_where_nothing_is_latched_releases_nothing():
     latch = StopLatch()
-    assert "newer stop" in latch.ask_release(msgspec.structs.replace(RESET, stop_id="a"), BRIDGE, 1.0)
-    assert latch.ask_release(RESET, BRIDGE, 1.0) == ""
+    assert latch.ask_release(msgspec.structs.replace(RESET, stop_id="a"), BRIDGE, 1.0) == reasons.stop_newer()
+    assert latch.ask_release(RESET, BRIDGE, 1.0) is None
     assert latch.release_due() is None and not latch.released(BRIDGE)
 
 
@@ -86,12 +87,12 @@ def test_echoes_of_a_released_stop_latch_nothing_but_the_bridges_latch_always_co
     latch.ask_release(RESET, bridge("a"), 1.0)
     latch.release_due()
     assert latch.released(BRIDGE)
-    assert latch.update((stop("a"),), BRIDGE) == ""
+    assert latch.update((stop("a"),), BRIDGE) is None
     latch.update((stop("b"),), bridge("b"))
     latch.ask_release(RESET, bridge("b"), 3.0)
     latch.release_due()
     assert latch.released(BRIDGE)
-    assert latch.update((stop("a"), stop("b")), BRIDGE) == ""
+    assert latch.update((stop("a"), stop("b")), BRIDGE) is None
     assert latch.update((), bridge("a")) != ""
 
 
@@ -108,9 +109,9 @@ def test_every_stop_is_kept_with_who_pressed_it_and_when_and_survives_a_restart(
     ]
     assert not latch.changed and told.process == "controller"
     again = StopLatch(told.stops)
-    assert "dog in the row" in again.latched
+    assert again.latched == reasons.software_stop("eve", "dog in the row")
     assert again.message().stops == told.stops
-    assert again.update((stop("b"),), BRIDGE) == ""
+    assert again.update((stop("b"),), BRIDGE) is None
 
 
 def test_a_reset_of_a_stop_that_is_not_the_newest_any_more_is_refused():
@@ -118,10 +119,10 @@ def test_a_reset_of_a_stop_that_is_not_the_newest_any_more_is_refused():
     latch.update((stop("a"),), bridge("a"))
     latch.update((stop("b"),), bridge("b"))
     looked_at_a = intents.Reset(user="ada", role="supervisor", reason="looked at it", stop_id="a")
-    assert "newer stop" in latch.ask_release(looked_at_a, bridge("b"), 1.0)
+    assert latch.ask_release(looked_at_a, bridge("b"), 1.0) == reasons.stop_newer()
     assert latch.release_due() is None
     looked_at_b = intents.Reset(user="ada", role="supervisor", reason="looked at it", stop_id="b")
-    assert latch.ask_release(looked_at_b, bridge("b"), 1.0) == ""
+    assert latch.ask_release(looked_at_b, bridge("b"), 1.0) is None
     assert latch.release_due().stop_id == "b"
     assert latch.released(BRIDGE)
     assert latch.message().released_by == "ada: looked at it"
@@ -139,9 +140,9 @@ def test_a_long_reason_of_a_reset_is_cut_to_what_the_wire_carries():
 def test_before_the_bridge_has_said_what_it_holds_a_reset_is_refused_and_later_it_is_not_lost():
     latch = StopLatch()
     latch.update((stop("a"),), None)
-    assert "the bridge has not reported" in latch.ask_release(RESET, None, 1.0)
+    assert latch.ask_release(RESET, None, 1.0) == reasons.stop_unknown()
     assert not latch.released(None) and not latch.released(BRIDGE)
-    assert latch.ask_release(RESET, bridge("a"), 1.1) == ""
+    assert latch.ask_release(RESET, bridge("a"), 1.1) is None
     assert latch.release_due().stop_id == "a"
 
 
@@ -150,7 +151,7 @@ def test_of_two_stops_the_one_that_the_bridge_holds_is_released():
     latch.update((stop("a"),), bridge("a"))
     latch.update((stop("b"),), bridge("a"))
     looked_at_a = msgspec.structs.replace(RESET, stop_id="a")
-    assert latch.ask_release(looked_at_a, bridge("a"), 1.0) == ""
+    assert latch.ask_release(looked_at_a, bridge("a"), 1.0) is None
     assert latch.release_due().stop_id == "a"
     assert latch.released(BRIDGE)
 
@@ -159,8 +160,8 @@ def test_a_stop_that_the_bridge_does_not_hold_is_reset_by_its_own_id():
     latch = StopLatch()
     latch.update((stop("a"), stop("b")), BRIDGE)
     looked_at_a = msgspec.structs.replace(RESET, stop_id="a")
-    assert "newer stop" in latch.ask_release(looked_at_a, BRIDGE, 1.0)
-    assert latch.ask_release(msgspec.structs.replace(RESET, stop_id="b"), BRIDGE, 1.0) == ""
+    assert latch.ask_release(looked_at_a, BRIDGE, 1.0) == reasons.stop_newer()
+    assert latch.ask_release(msgspec.structs.replace(RESET, stop_id="b"), BRIDGE, 1.0) is None
     assert latch.released(BRIDGE)
 
 
@@ -177,5 +178,5 @@ def test_asking_again_is_possible_when_the_bridge_did_not_answer():
     latch = StopLatch()
     latch.update((stop("a"),), bridge("a"))
     latch.ask_release(RESET, bridge("a"), 1.0)
-    assert latch.ask_release(RESET, bridge("a"), 1.5) == "the reset is under way"
-    assert latch.ask_release(RESET, bridge("a"), 2.1) == ""
+    assert latch.ask_release(RESET, bridge("a"), 1.5) == reasons.reset_under_way()
+    assert latch.ask_release(RESET, bridge("a"), 2.1) is None

@@ -4,10 +4,11 @@ import pytest
 from controller.ledger.journal import LedgerState
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
-from rolling_panda import topics
+from rolling_panda import reasons, topics
 from rolling_panda.messages.robot import RejectionCount
 from rolling_panda.messages.supervision import BaseVelocity, ControlState, StopState, TeleopTarget
 from rolling_panda.model.robot import ARM_Q
+from rolling_panda.reasons import severity_of, text_of
 from rolling_panda.transport.inbox import Inbox
 from tests.support.controller_at_work import CONFIG, robot, run_until
 from tests.support.fake_wire import as_received
@@ -39,7 +40,7 @@ def stays(r):
 
 def test_what_ends_a_mode_ends_what_moved_in_it():
     r = on_the_way_home()
-    assert r.state.reason == "homing the arm"
+    assert r.state.reason == text_of(reasons.homing_arm())
     r.stop()
     r.run(0.2)
     assert r.state.mode == "ESTOP_LATCHED"
@@ -53,7 +54,8 @@ def test_a_lost_server_ends_the_way_home_without_a_change_of_mode():
     r = on_the_way_home()
     r.server = False
     r.run(3.0)
-    assert sum("homing was stopped" in text for text in r.events) == 1, r.events
+    stopped = reasons.homing_stopped(reasons.process_gone("server"))
+    assert r.events.count(text_of(stopped)) == 1, r.events
     r.server = True
     stays(r)
 
@@ -61,17 +63,15 @@ def test_a_lost_server_ends_the_way_home_without_a_change_of_mode():
 def test_who_is_heard_no_more_ends_the_way_home_with_a_warning_and_is_not_told_so_where_nothing_moves():
     r = on_the_way_home()
     r.people.clear()
-    said = told(outputs(r, 1.5))
-    assert [severity for severity, text in said if "homing was stopped: control by ada has ended" in text] == [
-        "warning"
-    ]
+    stopped = line(reasons.homing_stopped(reasons.control_lapsed("ada", 1.0)))
+    assert told(outputs(r, 1.5)).count(stopped) == 1 and stopped[0] == "warning"
     assert r.controller.mode == "READY"
     r.people.add("ada")
     r.run(0.1)
     assert r.ask(intents.TakeControl(user="ada")).ok
     r.run(0.1)
     r.people.clear()
-    assert not [text for _, text in told(outputs(r, 1.5)) if "homing" in text]
+    assert stopped not in told(outputs(r, 1.5))
 
 
 def test_an_operator_stops_the_way_home_and_is_named():
@@ -79,7 +79,7 @@ def test_an_operator_stops_the_way_home_and_is_named():
     assert r.ask(intents.Pause(user="ada")).ok
     r.run(0.1)
     assert r.state.mode == "READY"
-    assert "stopped by ada" in r.state.reason
+    assert r.state.reason == text_of(reasons.homing_stopped_by("ada"))
 
 
 def bridge_says(r, **changes):
@@ -101,23 +101,28 @@ def told(outs):
     return [(event.severity, event.text) for out in outs for event in every(out, m.LogEvent)]
 
 
+def line(reason):
+    return severity_of(reason), text_of(reason)
+
+
 def test_a_change_of_mode_is_a_warning_from_a_pause_on():
     r = ready()
     r.teleop = TeleopTarget(sequence=1, hold=True, user="ada", base=BaseVelocity(0.1, 0.0))
     said = told(outputs(r, 0.1))
-    assert ("info", "READY → TELEOP: ada moves the robot") in said
+    assert line(reasons.mode_changed("READY", "TELEOP", reasons.moved_by_hand("ada"))) in said
     assert r.ask(intents.Pause(user="ada")).ok
-    assert ("warning", "TELEOP → PAUSED: pause by ada") in told(outputs(r, 0.1))
+    paused = line(reasons.robot_halted("TELEOP", "PAUSED", reasons.command_by("pause", "ada")))
+    assert paused in told(outputs(r, 0.1)) and paused[0] == "warning"
 
 
 def test_who_commands_the_robot_is_told_and_that_another_controller_does_is_a_warning_and_a_fault():
     r = robot()
-    assert ("info", "this controller commands the robot: epoch 1") in told(outputs(r, 0.1))
+    assert line(reasons.controller_commands(1)) in told(outputs(r, 0.1))
     assert r.ask(intents.Arm(user="ada")).ok
     bridge_says(r, holder=m.fingerprint("cafe"))
     outs = outputs(r, 0.1)
-    [severity] = [severity for severity, text in told(outs) if "another controller commands this robot; " in text]
-    assert severity == "warning"
+    assert told(outs).count(line(reasons.controller_waits())) == 1
+    assert line(reasons.controller_waits())[0] == "warning"
     assert r.controller.mode == "FAULT" and newest(outs[-1], m.MotionCommand) is None
 
 
@@ -163,7 +168,7 @@ def test_a_hold_of_somebody_else_ends_the_motion_of_who_has_control():
     assert r.controller.mode == "TELEOP"
     r.teleop = TeleopTarget(sequence=1, hold=True, user="bob", base=BaseVelocity(0.1, 0.0))
     said = told(outputs(r, 0.05))
-    assert ("info", "TELEOP → READY: the hold was released") in said
+    assert line(reasons.mode_changed("TELEOP", "READY", reasons.hold_ended())) in said
     r.run(1.0)
     assert r.controller.mode == "READY" and np.abs(r.xi).max() < 1e-3
 
@@ -178,8 +183,8 @@ def test_a_hold_gives_control_that_nobody_has_and_is_refused_once_where_the_robo
     r = ready()
     bridge_says(r, cutter="closing")
     r.teleop = TeleopTarget(sequence=1, hold=True, user="ada", base=BaseVelocity(0.1, 0.0))
-    refused = [(severity, text) for severity, text in told(outputs(r, 0.3)) if "teleoperation refused" in text]
-    assert refused == [("warning", "teleoperation refused: the blades are closing; wait until the cut has ended")]
+    [refused] = [each for each in told(outputs(r, 0.3)) if "Teleoperation refused" in each[1]]
+    assert refused[0] == "warning" and "blades are closing" in refused[1]
     # What was held all the time moves nothing when the cut has ended: it must be released first.
     r.bridge_changes = {}
     r.run(0.3)
@@ -197,8 +202,8 @@ def test_a_hold_without_a_link_or_measurements_is_refused(missing):
     r.deaf.add({"server": m.Heartbeat, "odometry": m.Odometry}[missing])
     r.teleop = TeleopTarget(sequence=1, hold=True, user="ada", base=BaseVelocity(0.1, 0.0))
     r.now += 1.0
-    said = [text for severity, text in told(outputs(r, 0.1)) if "teleoperation refused" in text]
-    assert len(said) == 1 and missing in said[0] and r.controller.mode == "READY"
+    said = [text for severity, text in told(outputs(r, 0.1)) if "Teleoperation refused" in text]
+    assert len(said) == 1 and missing in said[0].lower() and r.controller.mode == "READY"
 
 
 def refusing(r, count):
@@ -218,8 +223,7 @@ def test_a_bridge_that_refuses_every_command_is_asked_for_another_token_after_tw
     assert tokens(outputs(r, 1.9)) == {first}
     outs = outputs(r, 0.3)
     assert [token.token for token in said(outs, m.TokenRequest) if token.releases] == [first]
-    [severity] = [severity for severity, text in told(outs) if "another token is asked for" in text]
-    assert severity == "warning"
+    assert told(outs).count(line(reasons.commands_refused(2.0))) == 1
     (second,) = tokens(outputs(r, 1.0))
     assert second != first
     # It obeys again, and keeps the token.
@@ -237,7 +241,7 @@ def test_a_watchdog_that_holds_the_robot_without_refusing_commands_changes_no_to
 def test_before_anything_was_measured_all_motion_is_refused():
     r = robot()
     answer = r.controller.answer(intents.Arm(user="ada", role="operator"), 0.0)
-    assert not answer.ok and "joint states are endlessly old" in answer.reason
+    assert not answer.ok and answer.refused == reasons.nothing_received(topics.JOINTS.name)
 
 
 def test_at_the_start_nothing_was_interrupted():
@@ -265,13 +269,13 @@ def test_a_protective_stop_says_why_and_what_it_interrupted_and_is_left_a_second
     r.frozen_sensors = True
     r.run(0.5)
     assert (r.state.mode, r.state.interrupted) == ("PROTECTIVE_STOP", "teleoperation")
-    assert r.state.reason.startswith("joint states are")
+    assert r.state.reason.startswith("Joint states are")
     r.teleop = None
     r.run(2.0)
-    assert "the cause is still there" in r.ask(intents.Acknowledge(user="ada")).reason
+    assert r.ask(intents.Acknowledge(user="ada")).refused.code == "cause_remains"
     r.frozen_sensors = False
     r.run(0.5)
-    assert "must be gone for 1 s" in r.ask(intents.Acknowledge(user="ada")).reason
+    assert r.ask(intents.Acknowledge(user="ada")).refused == reasons.cause_recent(1.0)
     r.run(0.7)
     assert r.ask(intents.Acknowledge(user="ada")).ok
     r.run(0.1)
@@ -292,7 +296,7 @@ def test_without_a_server_a_hand_moves_nothing_and_the_reason_is_told():
     driven(r)
     r.server = False
     r.run(0.2)
-    assert (r.state.mode, r.state.reason) == ("PAUSED", "the server process is gone")
+    assert (r.state.mode, r.state.reason) == ("PAUSED", text_of(reasons.process_gone("server")))
 
 
 def test_the_way_home_needs_measurements():
@@ -306,7 +310,7 @@ def test_a_ledger_that_takes_nothing_is_a_fault():
     r = ready()
     r.ledger = LedgerState(failure="the disk is full")
     r.run(0.1)
-    assert (r.state.mode, r.state.reason) == ("FAULT", "the disk is full")
+    assert (r.state.mode, r.state.reason) == ("FAULT", text_of(reasons.ledger_failed("the disk is full")))
 
 
 def test_a_stop_that_only_the_bridge_knows_is_kept_with_its_time_and_reset_through_the_bridge():
@@ -315,9 +319,10 @@ def test_a_stop_that_only_the_bridge_knows_is_kept_with_its_time_and_reset_throu
     r.stop_id = "pressed-there"
     kept = said(outputs(r, 0.1), StopState)[-1].stops
     assert [(stop.stop_id, stop.source, stop.wall_time) for stop in kept] == [("pressed-there", "bridge", 1e9)]
-    assert (r.state.mode, r.state.reason) == ("ESTOP_LATCHED", "software stop: ada")
+    assert (r.state.mode, r.state.reason) == ("ESTOP_LATCHED", text_of(reasons.software_stop_unnamed("ada")))
     assert r.ask(intents.Reset(user="ada", role="supervisor", reason="looked")).ok
-    assert ("info", "ESTOP_LATCHED → IDLE: reset by ada: looked") in told(outputs(r, 0.2))
+    reset = reasons.mode_changed("ESTOP_LATCHED", "IDLE", reasons.stop_reset("ada", "looked"))
+    assert line(reset) in told(outputs(r, 0.2))
     assert r.state.mode == "IDLE"
 
 

@@ -102,7 +102,7 @@ def bridge_state(stop_id=""):
 
 def controller_state(queue=(), mode="READY"):
     return m.ControllerState(
-        header=HEADER, mode=mode, phase="", reason="", allowed=("Start",), active_point_id="", method="nullspace",
+        header=HEADER, mode=mode, phase="", reason="", allowed={"Start": None}, active_point_id="", method="nullspace",
         T_odom_tool=None, T_odom_tool_desired=None, position_error=0.0, rotation_error=0.0, manipulability=0.1,
         joint_margin=0.3, tick_s=1e-4, ticks=100, late_ticks=0, queue=queue,
     )  # fmt: skip

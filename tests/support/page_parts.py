@@ -17,7 +17,7 @@ PLANNING = ("RequestPreview", "ApprovePreview", "RequirePreview", "SetApproach",
 def ready(**changes: Any) -> m.ControllerState:
     """A robot that is armed and takes everything that goes with accepted points."""
     state = controller("READY", **changes)
-    return msgspec.structs.replace(state, allowed=(*state.allowed, *PLANNING))
+    return msgspec.structs.replace(state, allowed=state.allowed | dict.fromkeys(PLANNING))
 
 
 def planned(row: p.PagePoint, order: int, reason: str = "") -> p.PagePoint:

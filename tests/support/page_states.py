@@ -244,7 +244,7 @@ def _stopped(page: Page, server: PlayedServer) -> None:
 def _fault(page: Page, server: PlayedServer) -> None:
     working(page, server)
     state = controller("FAULT", reason="the ledger cannot be written: no space left on the disk")
-    show_mode(page, server, msgspec.structs.replace(state, allowed=("Acknowledge",)))
+    show_mode(page, server, msgspec.structs.replace(state, allowed={"Acknowledge": None}))
 
 
 def _alarms(page: Page, server: PlayedServer) -> None:

@@ -76,7 +76,7 @@ class Desk:
             self.cuts += 1
             name = ticket.point.point_id
             self.intent = name, self.queue.begin_cut(name, f"{sys.argv[3]}-{self.cuts}")
-        state = m.ControllerState(header=m.Header(), mode="READY", phase="", reason="", allowed=(), active_point_id="",
+        state = m.ControllerState(header=m.Header(), mode="READY", phase="", reason="", allowed={}, active_point_id="",
             method="test", T_odom_tool=None, T_odom_tool_desired=None, position_error=0.0, rotation_error=0.0,
             manipulability=0.0, joint_margin=0.0, tick_s=0.0, ticks=0, late_ticks=0, queue=self.queue.entries())
         return [*out, state, Records(self.journal.drain())]

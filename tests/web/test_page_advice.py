@@ -29,7 +29,7 @@ def needed(phase: str) -> PreviewState:
 def mode(name: m.Mode, interrupted: str = "", **changes: Any) -> m.ControllerState:
     state = controller(name, interrupted=interrupted, **changes)
     if name == "READY":
-        return msgspec.structs.replace(state, allowed=(*state.allowed, "Survey"))
+        return msgspec.structs.replace(state, allowed=state.allowed | {"Survey": None})
     return state
 
 
@@ -85,13 +85,15 @@ CASES = {
         mode("PROTECTIVE_STOP", "work"), f"{UNMENDED} press Acknowledge, then Resume."
     ),
     "protective stop, cause gone": Case(
-        mode("PROTECTIVE_STOP", "work", allowed=("Acknowledge",)),
+        mode("PROTECTIVE_STOP", "work", allowed={"Acknowledge": None}),
         f"{MENDED} press Acknowledge, then Resume.",
         "#acknowledge",
     ),
-    "fault": Case(mode("FAULT", allowed=("Acknowledge",)), f"{MENDED} press Acknowledge, then Arm.", "#acknowledge"),
+    "fault": Case(
+        mode("FAULT", allowed={"Acknowledge": None}), f"{MENDED} press Acknowledge, then Arm.", "#acknowledge"
+    ),
     "fault, an operator's page": Case(
-        mode("FAULT", allowed=("Acknowledge",)),
+        mode("FAULT", allowed={"Acknowledge": None}),
         f"{MENDED} a supervisor presses Acknowledge, then Arm.",
         role="operator",
     ),

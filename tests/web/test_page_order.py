@@ -15,7 +15,7 @@ ALLOWED = ("MoveInQueue", "ResetOrder", "SetApproach")
 @pytest.fixture
 def server() -> PlayedServer:
     state = controller(order=m.QueueOrder(7, ""))
-    state = msgspec.structs.replace(state, allowed=(*state.allowed, *ALLOWED))
+    state = msgspec.structs.replace(state, allowed=state.allowed | dict.fromkeys(ALLOWED))
     rows = tuple(point(number, "ACCEPTED", spur=number) for number in range(1, 6))
     return PlayedServer(controller=state, points=rows)
 

@@ -58,7 +58,7 @@ def test_what_the_plan_refuses_neither_looks_accepted_nor_is_counted_so(page: Pa
     page.keyboard.press("Enter")
     until(page, lambda: bool(server.posted))
     assert server.posted[-1] == ("/api/points/p2/reject", {"reason": ""})
-    server.controller = controller("READY", allowed=())
+    server.controller = controller("READY", allowed={})
     server.points = server.points[1:2]
     server.tell(server.page_points())
     expect(page.locator("rp-queue .summary")).to_have_text("1 found · 0 accepted · 1 cannot be reached · 0 done")

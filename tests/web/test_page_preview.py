@@ -34,7 +34,7 @@ STATE = PreviewState(
 @pytest.fixture
 def server() -> PlayedServer:
     state = controller()
-    state = msgspec.structs.replace(state, allowed=(*state.allowed, *ALLOWED))
+    state = msgspec.structs.replace(state, allowed=state.allowed | dict.fromkeys(ALLOWED))
     return PlayedServer(controller=state, points=(point(1, "ACCEPTED"), point(2, "ACCEPTED"), point(3, "PROPOSED")))
 
 
@@ -101,7 +101,7 @@ def test_where_it_is_required_start_says_what_is_missing(page: Page, server: Pla
     until(page, lambda: ("/api/preview/required", {"required": True}) in server.posted)
     expect(box).not_to_be_checked()
     assert server.controller is not None
-    kept = tuple(name for name in server.controller.allowed if name != "Start")
+    kept = {name: why for name, why in server.controller.allowed.items() if name != "Start"}
     server.controller = msgspec.structs.replace(server.controller, allowed=kept)
     told(server, required=True)
     expect(box).to_be_checked()

@@ -11,7 +11,7 @@ pytestmark = pytest.mark.browser
 
 
 def test_a_survey_goes_as_far_as_was_chosen(page: Page, server: PlayedServer) -> None:
-    server.controller = controller("READY", allowed=("Survey",))
+    server.controller = controller("READY", allowed={"Survey": None})
     expect(page.locator("#survey")).to_be_enabled()
     page.locator("#survey").click()
     until(page, lambda: bool(server.posted))
@@ -24,7 +24,7 @@ def test_a_survey_goes_as_far_as_was_chosen(page: Page, server: PlayedServer) ->
 def test_a_place_that_needs_another_look_has_a_button_for_it_and_one_for_a_person_has_none(
     page: Page, server: PlayedServer
 ) -> None:
-    server.controller = controller("READY", allowed=("Survey",))
+    server.controller = controller("READY", allowed={"Survey": None})
     unclear, deciding = server.undecided_sites
     server.undecided_sites = (msgspec.structs.replace(unclear, position=(1.0, 0.8, 0.9)), deciding)
     server.tell(server.page_points())
@@ -36,5 +36,5 @@ def test_a_place_that_needs_another_look_has_a_button_for_it_and_one_for_a_perso
     button.click()
     until(page, lambda: bool(server.posted))
     assert server.posted == [("/api/look-again", {"vine": 1, "spur": 3})]
-    server.controller = controller("AUTO", allowed=("Pause",))
+    server.controller = controller("AUTO", allowed={"Pause": None})
     expect(button).to_be_disabled()

@@ -60,7 +60,7 @@ export function whyNot(intent) {
   if (controller === null || whyNoController()) return whyNoController();
   // Acknowledging a fault moves nothing and needs no control.
   const ofHolder = OF_HOLDER.includes(intent) && controller.mode !== "FAULT";
-  if (controller.allowed.includes(intent)) return ofHolder ? whyNotHolder() : "";
+  if (controller.allowed[intent] === null) return ofHolder ? whyNotHolder() : "";
   if (intent === "Start" && controller.mode === "READY" && countOf("ACCEPTED") === 0) {
     return countOf("UNREACHABLE") > 0 ? "No accepted point can be reached" : "Accept a point first";
   }

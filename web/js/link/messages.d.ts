@@ -76,6 +76,14 @@ export interface Header {
   frame_id: string;
 }
 
+/** A reason as data; `rolling_panda/reasons.py` has the text of each code. */
+export interface Reason {
+  /** The code. */
+  code: string;
+  /** Name and value of each value in the text. A value that is a reason is the cause of this one. */
+  values: ([string, string|number|Reason])[];
+}
+
 /** Pose of a frame in another frame; the field that contains it names both. */
 export interface Pose {
   /** Origin (m). */
@@ -177,8 +185,8 @@ export interface ControllerState {
   phase: Phase;
   /** Reason for the mode, as text. */
   reason: string;
-  /** Intent types that are allowed now. Every other one is refused with a reason. */
-  allowed: string[];
+  /** Reason why each command would be refused now; None if it would be taken. What only the holder of control may do is told for the holder. The commands about control are not among them. */
+  allowed: Record<string, Reason|null>;
   /** Current point of the work; empty without one. */
   active_point_id: string;
   /** Name of the whole-body method. */

@@ -216,13 +216,13 @@ function afterPause({ interrupted }) {
 
 /** @param {ControllerState} controller In PROTECTIVE_STOP. */
 function afterProtectiveStop({ allowed }) {
-  const mended = allowed.includes("Acknowledge");
+  const mended = allowed.Acknowledge === null;
   return `${control()}${mended ? "The cause has gone:" : `${NOT_MENDED},`} ${press("Acknowledge")}, then Resume.`;
 }
 
 /** @param {ControllerState} controller In FAULT. */
 function afterFault({ allowed }) {
-  const mended = allowed.includes("Acknowledge");
+  const mended = allowed.Acknowledge === null;
   return `${mended ? "The cause has gone:" : `${NOT_MENDED},`} ${ofSupervisor("Acknowledge")}, then Arm.`;
 }
 
