@@ -92,6 +92,8 @@ def _bounded(value: str | float | Reason) -> str | float | Reason:
 def _reason(severity: Severity, act: str) -> Callable[[Callable[P, None]], Callable[P, Reason]]:
     def enter(made: Callable[P, None]) -> Callable[P, Reason]:
         entry, make = entry_of(severity, act, made)
+        if entry.code in CATALOGUE:
+            raise MessageError(f"two reasons have the code {entry.code}; each needs its own")
         CATALOGUE[entry.code] = entry
         return make
 
@@ -216,22 +218,22 @@ def nothing_received(topic: str) -> None:
 
 @_reason("error", "")
 def joints_stale(age_s: float, limit_s: float) -> None:
-    """Joint states are {age_s:.2f} s old; the limit is {limit_s} s."""
+    """Joint states are {age_s:.2f} s old; the limit is {limit_s:g} s."""
 
 
 @_reason("error", "")
 def odometry_stale(age_s: float, limit_s: float) -> None:
-    """Odometry is {age_s:.2f} s old; the limit is {limit_s} s."""
+    """Odometry is {age_s:.2f} s old; the limit is {limit_s:g} s."""
 
 
 @_reason("error", "")
 def bridge_stale(age_s: float, limit_s: float) -> None:
-    """The bridge's state is {age_s:.2f} s old; the limit is {limit_s} s."""
+    """The bridge's state is {age_s:.2f} s old; the limit is {limit_s:g} s."""
 
 
 @_reason("warning", "")
 def obstacles_stale(age_s: float, limit_s: float) -> None:
-    """The newest camera frame with the obstacles is {age_s:.2f} s old; the limit is {limit_s} s."""
+    """The newest camera frame with the obstacles is {age_s:.2f} s old; the limit is {limit_s:g} s."""
 
 
 @_reason("warning", "start it again")
@@ -246,17 +248,17 @@ def process_unheard(process: str) -> None:
 
 @_reason("warning", "")
 def process_silent(process: str, age_s: float, limit_s: float) -> None:
-    """The {process} process is silent for {age_s:.2f} s; the limit is {limit_s} s."""
+    """The {process} process is silent for {age_s:.2f} s; the limit is {limit_s:g} s."""
 
 
 @_reason("warning", "look at the robot")
 def never_watched(limit_s: float) -> None:
-    """No operator has seen the robot yet; the limit is {limit_s} s."""
+    """No operator has seen the robot yet; the limit is {limit_s:g} s."""
 
 
 @_reason("warning", "look at the robot")
 def unwatched(age_s: float, limit_s: float) -> None:
-    """No operator has seen the robot for {age_s:.1f} s; the limit is {limit_s} s."""
+    """No operator has seen the robot for {age_s:.1f} s; the limit is {limit_s:g} s."""
 
 
 @_reason("info", "arm the robot to move it")
@@ -609,12 +611,12 @@ def camera_frame_gone(frame: float, newest: float) -> None:
 
 @_reason("warning", "")
 def point_unknown(point: str) -> None:
-    """There is no point {point!r}."""
+    """There is no point {point}."""
 
 
 @_reason("warning", "look at them in GET /api/robots")
 def robot_unknown(robot: str, robots: str) -> None:
-    """There is no robot {robot!r} here; there are: {robots}."""
+    """There is no robot {robot} here; there are: {robots}."""
 
 
 @_reason("warning", "accept the points again")
@@ -674,7 +676,7 @@ def origin_foreign() -> None:
 
 @_reason("warning", "")
 def origin_refused(path: str, origin: str) -> None:
-    """Refused {path!r} from origin {origin!r}."""
+    """Refused {path} from origin {origin}."""
 
 
 @_reason("warning", "try later")
@@ -724,7 +726,7 @@ def invitation_impossible() -> None:
 
 @_reason("warning", "")
 def sign_in_refused(user: str, address: str, cause: Reason) -> None:
-    """Sign-in as {user!r} from {address} refused: {cause}."""
+    """Sign-in as {user} from {address} refused: {cause}."""
 
 
 @_reason("warning", "")
@@ -769,7 +771,7 @@ def users_unreadable(detail: str) -> None:
 
 @_reason("warning", "")
 def view_message_dropped(user: str, kind: str) -> None:
-    """A view of {user} sent {kind!r} to the 3-D view; dropped."""
+    """A view of {user} sent {kind} to the 3-D view; dropped."""
 
 
 @_reason("warning", "")

@@ -1,4 +1,4 @@
-"""`python -m rolling_panda.generate --check | --write`: files that are generated from messages, topics and modes."""
+"""`python -m rolling_panda.generate --check | --write`: files generated from messages, topics, reasons and modes."""
 
 import argparse
 import json
@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rolling_panda.errors import RollingPandaError
 from rolling_panda.generate import safety
-from rolling_panda.generate.javascript import messages_module, messages_types
+from rolling_panda.generate.javascript import messages_module, messages_types, reasons_module
 from rolling_panda.generate.markdown import fill
 from rolling_panda.transport.access import access_control
 
@@ -26,6 +26,7 @@ def generated(root: Path = ROOT) -> dict[Path, str]:
     return {
         root / "web" / "js" / "link" / "messages.js": messages_module(),
         root / "web" / "js" / "link" / "messages.d.ts": messages_types(),
+        root / "web" / "js" / "link" / "reasons.js": reasons_module(),
         root / "assets" / "config" / "router.json5": router_config(),
         wire: fill(wire.read_text(encoding="utf-8")),
         safety_page: fill(safety_page.read_text(encoding="utf-8"), safety.BLOCKS, "docs/safety.md"),

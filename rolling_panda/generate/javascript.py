@@ -1,8 +1,9 @@
-"""`web/js/link/messages.js` and `.d.ts`: constants and types of the page's messages.
+"""`web/js/link/messages.js` and `.d.ts`: constants and types of the page's messages; `reasons.js`: the catalogue.
 
 Types are in a separate file, which browsers do not fetch.
 """
 
+import json
 from typing import Annotated, Any, Literal, get_args, get_origin
 
 import msgspec
@@ -21,6 +22,7 @@ from rolling_panda.generate.description import (
 )
 from rolling_panda.messages import page as page_messages
 from rolling_panda.messages.supervision import SessionReport
+from rolling_panda.reasons import CATALOGUE
 
 #: Named literals whose values the page lists, and the name of the list.
 CONSTANTS = {"Process": "PROCESSES"}
@@ -64,6 +66,19 @@ def messages_types() -> str:
     for name, union in (("FromServer", page_messages.FromServer), ("FromPage", page_messages.FromPage)):
         parts.append(_type(name, "|".join(struct.__name__ for struct in union_members(union))))
     return "\n".join(parts)
+
+
+def reasons_module() -> str:
+    """Text of `web/js/link/reasons.js`: text and advice of each reason."""
+    header = _HEADER.replace("rolling_panda/messages/", "rolling_panda/reasons.py")
+    rows = (
+        f"  {entry.code}: {json.dumps([entry.text, entry.act], ensure_ascii=False)},\n" for entry in CATALOGUE.values()
+    )
+    return (
+        f"{header}\n/**\n * English text of each reason with its values in braces, and what to do.\n *\n"
+        " * @type {Readonly<Record<string, readonly [string, string]>>}\n */\n"
+        f"export const REASONS = Object.freeze({{\n{''.join(rows)}}});\n"
+    )
 
 
 def js_type(hint: Any) -> str:

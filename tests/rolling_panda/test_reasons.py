@@ -1,6 +1,8 @@
 import ast
 import math
+import re
 from pathlib import Path
+from string import Formatter
 
 import msgspec
 import pytest
@@ -57,3 +59,16 @@ def test_values_are_kept_within_the_bounds_of_the_wire():
 @pytest.mark.parametrize("reason", [Reason(code="of-tomorrow", values=(("n", 3.0),)), Reason(code="control_held")])
 def test_a_reason_of_another_version_is_shown_as_it_is(reason):
     assert reason.code in reasons.text_of(reason)
+
+
+def test_a_number_has_a_format_and_nothing_else_has_one():
+    tree = ast.parse(Path(reasons.__file__).read_text(encoding="utf-8"))
+    made = [each for each in tree.body if isinstance(each, ast.FunctionDef) and each.name in reasons.CATALOGUE]
+    assert len(made) == len(reasons.CATALOGUE)
+    for function in made:
+        formats = {name: form for _, name, form, _ in Formatter().parse(reasons.CATALOGUE[function.name].text) if name}
+        for argument in function.args.args:
+            is_number = ast.unparse(argument.annotation) == "float"
+            assert bool(re.fullmatch(r"\.\df|g", formats[argument.arg])) == is_number, (function.name, argument.arg)
+            assert is_number or not formats[argument.arg], (function.name, argument.arg)
+        assert not any(conversion for _, _, _, conversion in Formatter().parse(reasons.CATALOGUE[function.name].text))

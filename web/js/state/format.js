@@ -49,6 +49,15 @@ export function inWords(text) {
 }
 
 /**
+ * The label of a mode or state; other names as they are.
+ *
+ * @param {string} name
+ */
+export function labelOf(name) {
+  return RAW_WORDS[name] ?? name;
+}
+
+/**
  * The nearest obstacle; empty if nothing is near.
  *
  * @param {import("../link/messages.js").ControllerState|null} controller

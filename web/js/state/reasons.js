@@ -1,0 +1,35 @@
+// Reasons as text for people.
+
+import { REASONS } from "../link/reasons.js";
+import { labelOf } from "./format.js";
+
+/** @typedef {{code: string, values: readonly (readonly [string, string|number|Reason])[]}} Reason */
+
+/**
+ * English text of a reason, with what to do; empty without one. A code that this page does not know is shown with its
+ * values.
+ *
+ * @param {Reason|null|undefined} reason
+ * @returns {string}
+ */
+export function reasonText(reason) {
+  if (!reason) return "";
+  const entry = REASONS[reason.code];
+  const values = new Map(reason.values);
+  if (!entry) return [reason.code, ...[...values].map(([name, value]) => `${name} ${shown(value, "")}`)].join(", ");
+  const text = entry[0].replace(/\{(\w+)(?::([^}]*))?\}/g, (_, name, format) => shown(values.get(name), format ?? ""));
+  return entry[1] ? `${text}: ${entry[1]}` : text;
+}
+
+/**
+ * @param {string|number|Reason|undefined} value
+ * @param {string} format As in Python: `.1f`, `g` or empty.
+ * @returns {string}
+ */
+function shown(value, format) {
+  if (value === undefined) return "?";
+  if (typeof value === "string") return labelOf(value);
+  if (typeof value === "object") return reasonText(value);
+  const digits = /^\.(\d)f$/.exec(format);
+  return digits ? value.toFixed(Number(digits[1])) : String(Number(value.toPrecision(format === "g" ? 6 : 12)));
+}
