@@ -1,4 +1,4 @@
-"""The generated blocks of `docs/safety.md`: hard bounds, and diagram and tables of the mode state machine."""
+"""The generated blocks of `docs/safety.md`: bounds, time limits, diagram and tables of the modes."""
 
 import importlib
 from collections.abc import Callable, Iterator
@@ -9,6 +9,7 @@ from rolling_panda.bounds import Bound, Number, numbers
 from rolling_panda.generate.description import describe
 from rolling_panda.generate.markdown import table
 from rolling_panda.mode_table import ROWS, SEVERITY, Event
+from rolling_panda.timeouts import LIMITS, RELATIONS
 
 #: Types of the configuration sections with safety limits. They are imported by name, since this package may not import
 #: the processes' packages statically.
@@ -102,7 +103,23 @@ def severity_order() -> str:
     return " > ".join(f"`{mode}`" for mode in reversed(SEVERITY)) + "\n"
 
 
+def limits_table() -> str:
+    """One row for each related time limit."""
+    rows = []
+    for limit in LIMITS.values():
+        where = "configuration" if limit.configurable else f"`{limit.source.partition(':')[0]}`"
+        rows.append((limit.label, f"{limit.seconds(limit.usual):.4g} s", where))
+    return table(("time limit or period", "usual", "where"), rows)
+
+
+def relations_table() -> str:
+    """One row for each relation between time limits."""
+    return table(("relation", "why"), [(str(relation), relation.why) for relation in RELATIONS])
+
+
 BLOCKS: dict[str, Callable[[], str]] = {
+    "time-limits": limits_table,
+    "relations": relations_table,
     "bounds": bounds_table,
     "modes": mode_diagram,
     "transitions": transitions_table,

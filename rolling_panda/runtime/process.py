@@ -12,7 +12,7 @@ from pathlib import Path
 
 import msgspec
 
-from rolling_panda import __version__
+from rolling_panda import __version__, timeouts
 from rolling_panda import messages as m
 from rolling_panda.config import TransportConfig, load_section
 from rolling_panda.errors import ConfigError, RollingPandaError
@@ -103,6 +103,7 @@ def run_process(
     try:
         wire = wire_config(arguments)
         check(arguments)
+        timeouts.check(arguments.config)
         set_priority(_PRIORITY[process])
         freeze_heap()
         with Transport(wire, process, arguments.robot_id) as transport:
