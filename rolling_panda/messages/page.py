@@ -27,6 +27,7 @@ from rolling_panda.messages.types import (
     NonNegative,
     PlanarPose,
     Process,
+    Reason,
     Role,
     Severity,
     Text,
@@ -240,10 +241,10 @@ class HoldEnded(PageMessage, frozen=True, kw_only=True):
     """The server has ended or refused the hold of this page. The page has to release before it can hold again.
 
     Attributes:
-        reason: Reason, as text.
+        reason: Why.
     """
 
-    reason: Text
+    reason: Reason
 
 
 class Pong(PageMessage, frozen=True, kw_only=True):

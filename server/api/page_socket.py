@@ -231,7 +231,7 @@ class PageSocket:
 
     def _end_hold(self, reason: Reason) -> None:
         self._holding, self._needs_release = False, True
-        self._hold_ended = HoldEnded(reason=reasons.text_of(reason))
+        self._hold_ended = HoldEnded(reason=reason)
         self.wake()
 
     async def _close(self, reason: str) -> None:

@@ -6,6 +6,7 @@ import msgspec
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
+from rolling_panda import reasons
 from rolling_panda.messages import page as p
 from tests.support.page_host import STAND_STILL
 from tests.support.played_page import box_of, until
@@ -245,8 +246,8 @@ def test_a_hold_that_the_server_ended_goes_on_only_when_pressed_again(page: Page
     page.locator("h1").click()
     page.keyboard.down("h")
     until(page, lambda: server.holds()[-1:] == [True])
-    server.tell(p.HoldEnded(reason="The hold ended: too slow. Press again to continue."))
-    expect(page.locator(".toast")).to_contain_text("Press again")
+    server.tell(p.HoldEnded(reason=reasons.hold_interrupted()))
+    expect(page.locator(".toast")).to_contain_text(reasons.text_of(reasons.hold_interrupted()))
     until(page, lambda: not server.holds()[-1])
     count = len(server.holds())
     page.keyboard.down("h")

@@ -4,6 +4,7 @@ import msgspec
 import pytest
 from playwright.sync_api import Page, expect
 
+from rolling_panda import reasons
 from rolling_panda.messages import page as p
 from rolling_panda.messages.supervision import StopRecord, StopState
 from tests.support.played_page import box_of, until
@@ -62,7 +63,7 @@ def test_no_notice_lies_over_the_field_for_the_reason(page: Page, server: Played
     page.locator("#teleop").click()
     page.keyboard.down("h")
     until(page, lambda: server.holds()[-1:] == [True])
-    server.tell(p.HoldEnded(reason="The robot was stopped."))
+    server.tell(p.HoldEnded(reason=reasons.hold_stopped()))
     server.bridge = bridge(stop_id="s1", stopped_by="Ada: stop button")
     server.controller = controller("ESTOP_LATCHED", reason="stopped by Ada")
     field = box_of(page.locator("rp-stop-banner input"))

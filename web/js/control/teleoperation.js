@@ -2,6 +2,7 @@
 
 import { socket } from "../link/socket.js";
 import { pageState, showToast } from "../state/page-state.js";
+import { reasonText } from "../state/reasons.js";
 import { signal } from "../state/signals.js";
 import { whyNoTeleoperation } from "./allowed.js";
 import { isTyping } from "./stop.js";
@@ -138,7 +139,7 @@ export function initTeleoperation() {
   socket.onholdended = (reason) => {
     if (!hold.holding.get()) return;
     hold.releaseAll();
-    showToast("warning", reason);
+    showToast("warning", reasonText(reason));
   };
   // After a mode without teleoperation the switch has to be pressed again.
   pageState.subscribe(() => {

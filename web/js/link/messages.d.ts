@@ -605,8 +605,8 @@ export interface Measured {
 /** The server has ended or refused the hold of this page. The page has to release before it can hold again. */
 export interface HoldEnded {
   type: "HoldEnded";
-  /** Reason, as text. */
-  reason: string;
+  /** Why. */
+  reason: Reason;
 }
 
 /** Immediate answer to a `Ping`, to measure the round trip. */

@@ -23,7 +23,7 @@ class PageSocket {
     this.socket = null;
     /** The link is lost; holds have to end. */
     this.onclose = () => {};
-    /** The server has ended or refused a hold. @type {(reason: string) => void} */
+    /** The server has ended or refused a hold. @type {(reason: import("./messages.js").Reason) => void} */
     this.onholdended = () => {};
     /** A click in the 3-D view, to place a point. @type {(line: PickRay) => void} */
     this.onpickray = () => {};
