@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from bridge.sim.robot.trace import read
+from rolling_panda import reasons
 from rolling_panda.transport.certificates import make
 from tests.support.processes.live_robot import LiveRobot
 
@@ -35,7 +36,7 @@ def test_a_point_is_cut_over_a_wire_with_certificates(tmp_path: Path) -> None:
 
         cut = robot.wait(done, 120, "a cut to be made")
         stop = robot.client.post("/api/stop", json={"reason": "end of the test"})
-        assert stop.json()["reason"] == "stopped: bridge and controller have latched the stop"
+        assert stop.json()["reason"] == reasons.text_of(reasons.stop_confirmed())
         refused = [row["reason"] for row in robot.state()["bridge"]["rejections"]]
     cuts = [event for event in read(robot.trace).events if event["event"] == "cut"]
     assert any(made["point_id"] == cut[0] and made["severed"] for made in cuts), (cuts, refused)

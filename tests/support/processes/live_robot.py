@@ -120,7 +120,7 @@ class LiveRobot(Processes):
     def refused(self) -> list[str]:
         """What a process said of messages that it did not take: none where all speak the same language."""
         told = self.client.get("/api/events").json()["events"]
-        return [line["text"] for line in told if line["text"].startswith(("refused a message", "refused on"))]
+        return [line["text"] for line in told if line["text"].lower().startswith(("refused a message", "refused on"))]
 
     def driving(self) -> bool:
         """Whether the base moves at a good part of its speed, in automatic work."""
