@@ -47,7 +47,7 @@ from rolling_panda.config import RobotConfig
 from rolling_panda.errors import ControlError
 from rolling_panda.messages.perception import CloseUpRequest, CloseUpResult, Obstacles
 from rolling_panda.messages.supervision import StopRecord
-from rolling_panda.reasons import said, said_or_none, text_of
+from rolling_panda.reasons import said, said_or_none, text_of, warned
 from rolling_panda.transport.inbox import Answered, Inbox, Rejected, Reply, Request
 
 _STATE_S = 0.05
@@ -99,7 +99,7 @@ class Controller:
         self._state_due = -math.inf
         self._relaxed_limits = (*wider("controller", config), *wider("robot", robot_config))
         for line in self._relaxed_limits:
-            self._event_log.say("warning", f"less strict than usual: {line}")
+            self._event_log.log(reasons.limit_relaxed(line))
 
     @property
     def mode(self) -> m.Mode:
@@ -198,12 +198,11 @@ class Controller:
     def _refused(self, inbox: Inbox, now: float) -> list[m.LogEvent]:
         """Log lines of refused messages and requests. They are not recorded: a flood must not fill the disk."""
         rejected = (each.message for each in inbox.drain(Rejected)[:_REPORTED])
-        lines = [f"refused on {each.topic}: {each.reason}" for each in rejected]
+        told = [reasons.message_rejected(each.topic, each.reason) for each in rejected]
         for answered in inbox.drain(Answered):
             if not answered.message.answer.ok:
-                lines.append(f"the stop is not released: {answered.message.answer.reason}")
-        header = m.Header(now)
-        return [m.LogEvent(header=header, process="controller", severity="warning", text=text[:500]) for text in lines]
+                told.append(reasons.release_refused(said(answered.message.answer.reason)))
+        return [m.LogEvent(header=m.Header(now), process="controller", reason=reason) for reason in told]
 
     def answer(self, intent: intents.Intent, now: float) -> m.Answer:
         """Handle an intent. The answer has the reason of a refusal.
@@ -224,10 +223,10 @@ class Controller:
         row = RequestRow(asked=intent, ok=reason is None, reason=told, mode=self.mode)
         self._journal.add("request", intent.user, row)
         if reason is not None:
-            self._event_log.say("warning", f"{intent.user}: {command.name} refused: {told}")
+            self._event_log.log(reasons.command_refused(intent.user, command.words, reason))
             return m.Answer(ok=False, reason=told, refused=reason)
-        if text := command.text(intent):
-            self._event_log.say("info", f"{intent.user}: {text}")
+        if command.log is not None:
+            self._event_log.log(command.log(intent))
         return m.Answer(ok=True)
 
     def _all_handlers(self) -> Handlers:
@@ -267,13 +266,13 @@ class Controller:
         if bridge is not None:
             close_up = inbox.newest(CloseUpResult)
             for text in sequence.watch(bridge, None if close_up is None else close_up.message, now):
-                self._event_log.say("info", text)
+                self._event_log.log(said(text))
         if points is not None and points is not self._points_seen:
             self._points_seen = points
             for text in self._queue.update(points.message, sequence.in_canes):
-                self._event_log.say("warning", text)
+                self._event_log.log(warned(text))
         if back := self._queue.restored():
-            self._event_log.say("info", f"accepted again after the rule was undone: {back}"[:500])
+            self._event_log.log(reasons.points_accepted_again(back))
         return stops
 
     def _move(self, now: float) -> MotionResult:

@@ -13,6 +13,7 @@ from controller.planning.work_plan import PlanRequest
 from controller.stop_file import Stops
 from rolling_panda import messages as m
 from rolling_panda.messages.supervision import ControlState, PreviewMotion, PreviewState, StopState
+from rolling_panda.reasons import text_of
 from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.topics import REPORT
 from rolling_panda.transport.inbox import Inbox, Reply
@@ -103,7 +104,7 @@ class ControllerProcess:
         if waits:
             for message in out:
                 if isinstance(message, m.LogEvent):
-                    print(f"rolling-panda controller: {message.text}", file=sys.stderr, flush=True)
+                    print(f"rolling-panda controller: {text_of(message.reason)}", file=sys.stderr, flush=True)
         if waits is not self._waited:
             self._waited = waits
             out.insert(0, Standby(waits))

@@ -13,6 +13,7 @@ from rolling_panda import topics
 from rolling_panda.errors import RollingPandaError
 from rolling_panda.messages.perception import CloseUpResult, Obstacles, PointCrop
 from rolling_panda.messages.robot import CameraFrame
+from rolling_panda.reasons import noted
 from rolling_panda.transport.inbox import Inbox, Received, Reply, Request
 from rolling_panda.transport.runner import Runner, Wire
 
@@ -207,7 +208,7 @@ class PerceptionProcess:
         )
 
     def _log(self, severity: m.Severity, text: str, now: float) -> None:
-        self._out.append(m.LogEvent(header=m.Header(now), process="perception", severity=severity, text=text[:500]))
+        self._out.append(m.LogEvent(header=m.Header(now), process="perception", reason=noted(severity, text)))
 
 
 def perception_runner(wire: Wire, config: PerceptionConfig, perception: Perception) -> Runner:

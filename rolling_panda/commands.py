@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Union
 
 from msgspec import Meta, Struct
 
+from rolling_panda import reasons
 from rolling_panda.messages.perception import PruningRule
 from rolling_panda.messages.supervision import NEVER_SEEN_S
 from rolling_panda.messages.types import (
@@ -382,8 +383,7 @@ class Command:
         message: Type of the request. Its docstring and its own fields describe the route and its body.
         tag: Section of the REST interface.
         path: Path below `/api`, with fields in braces. Empty if another route sends it.
-        log: Log text on success, as a template of the message's fields or a function of the message.
-            Empty if the handler or a change of mode logs.
+        log: Line of the log on success, made from the message; None if the handler or a change of mode logs.
         role: Lowest role that may use it.
         process: Process that answers.
         control: Whether it needs control, because it can lead to motion.
@@ -395,7 +395,7 @@ class Command:
     message: type[Intent] | type[PlantRequest]
     tag: Tag
     path: str = ""
-    log: str | Callable[[Any], str] = ""
+    log: Callable[[Any], Reason] | None = None
     role: Role = "operator"
     process: Process = "controller"
     control: bool = False
@@ -413,20 +413,38 @@ class Command:
         """The name as words, for reasons: "look again"."""
         return re.sub(r"(?<!^)(?=[A-Z])", " ", self.name).lower()
 
-    def text(self, intent: Struct) -> str:
-        """The text for the log."""
-        if callable(self.log):
-            return self.log(intent)
-        return self.log.format_map({name: getattr(intent, name) for name in intent.__struct_fields__})
+
+def _rejected(asked: RejectPoint) -> Reason:
+    if asked.reason:
+        return reasons.point_rejected_because(asked.user, asked.point_id, asked.reason)
+    return reasons.point_rejected(asked.user, asked.point_id)
 
 
-def _approach_text(intent: SetApproach) -> str:
-    turn = "as the search finds it" if intent.azimuth is None else f"turned by {degrees(intent.azimuth):.0f}°"
-    return f"set the approach of {intent.point_id}: {turn}"
+def _resolved(asked: ResolvePoint) -> Reason:
+    inspected = reasons.point_inspected_cut if asked.outcome == "DONE" else reasons.point_inspected_not_cut
+    return inspected(asked.user, asked.point_id, asked.reason)
 
 
-def _resolved_text(intent: ResolvePoint) -> str:
-    return f"inspected {intent.point_id}: {'cut' if intent.outcome == 'DONE' else 'not cut'}: {intent.reason}"
+def _moved(asked: MoveInQueue) -> Reason:
+    if asked.before:
+        return reasons.point_moved_before(asked.user, asked.point_id, asked.before)
+    return reasons.point_moved_last(asked.user, asked.point_id)
+
+
+def _approach(asked: SetApproach) -> Reason:
+    if asked.azimuth is None:
+        return reasons.approach_freed(asked.user, asked.point_id)
+    return reasons.approach_set(asked.user, asked.point_id, degrees(asked.azimuth))
+
+
+def _previewed(asked: RequestPreview) -> Reason:
+    if asked.point_id:
+        return reasons.point_preview_requested(asked.user, asked.point_id)
+    return reasons.preview_requested(asked.user)
+
+
+def _required(asked: RequirePreview) -> Reason:
+    return (reasons.preview_required if asked.required else reasons.preview_optional)(asked.user)
 
 
 _MOTION: Final[tuple[Condition, ...]] = ("fresh sensors", "bridge obeys", "server", "at rest")
@@ -446,43 +464,66 @@ COMMANDS: Final[tuple[Command, ...]] = (
     Command(LookAgain, "mode", "/look-again", control=True, event=Event.START, conditions=_WATCHED_MOTION),
     Command(Pause, "mode", "/pause", event=Event.PAUSE),
     Command(Resume, "mode", "/resume", control=True, event=Event.RESUME),
-    Command(Home, "mode", "/home", "home", control=True, modes=("READY",), conditions=_MOTION),
+    Command(
+        Home,
+        "mode",
+        "/home",
+        lambda asked: reasons.home_requested(asked.user),
+        control=True,
+        modes=("READY",),
+        conditions=_MOTION,
+    ),
     Command(Acknowledge, "mode", "/acknowledge", control=True, event=Event.ACKNOWLEDGE),
     Command(Reset, "mode", "/reset", role="supervisor", event=Event.RESET),
     Command(AcceptAll, "points", "/points/accept-all"),
-    Command(AcceptPoint, "points", "/points/{point_id}/accept", "accepted {point_id}, revision {revision}"),
+    Command(
+        AcceptPoint,
+        "points",
+        "/points/{point_id}/accept",
+        lambda asked: reasons.point_accepted(asked.user, asked.point_id, asked.revision),
+    ),
     Command(
         RejectPoint,
         "points",
         "/points/{point_id}/reject",
-        lambda asked: f"rejected {asked.point_id}{f': {asked.reason}' if asked.reason else ''}",
+        _rejected,
     ),
-    Command(ReconsiderPoint, "points", "/points/{point_id}/reconsider", "undid the decision about {point_id}"),
-    Command(ResolvePoint, "points", "/points/{point_id}/resolve", _resolved_text),
-    Command(RestoreAccepted, "points", log="undid the rule, with the acceptances that it had made void"),
+    Command(
+        ReconsiderPoint,
+        "points",
+        "/points/{point_id}/reconsider",
+        lambda asked: reasons.decision_undone(asked.user, asked.point_id),
+    ),
+    Command(ResolvePoint, "points", "/points/{point_id}/resolve", _resolved),
+    Command(RestoreAccepted, "points", log=lambda asked: reasons.rule_undone(asked.user)),
     Command(
         MoveInQueue,
         "points",
         "/points/{point_id}/work-before",
-        lambda asked: f"moved {asked.point_id} {f'before {asked.before}' if asked.before else 'to the end'}",
+        _moved,
     ),
     Command(AddPoint, "points", "/points/by-hand", process="perception"),
     Command(AddPointInImage, "points", "/points/by-hand-in-image", process="perception"),
     Command(MovePoint, "points", "/points/{point_id}/move", process="perception"),
-    Command(SetApproach, "points", "/points/{point_id}/approach", _approach_text),
-    Command(ResetOrder, "points", "/order/planners", "restored the order of the plan"),
+    Command(SetApproach, "points", "/points/{point_id}/approach", _approach),
+    Command(ResetOrder, "points", "/order/planners", lambda asked: reasons.order_restored(asked.user)),
     Command(
         RequestPreview,
         "preview",
         "/preview",
-        lambda asked: f"requested a preview of {asked.point_id or 'the work'}",
+        _previewed,
     ),
-    Command(ApprovePreview, "preview", "/preview/approve", "approved the preview {preview_hash:.8}"),
+    Command(
+        ApprovePreview,
+        "preview",
+        "/preview/approve",
+        lambda asked: reasons.preview_approved(asked.user, asked.preview_hash[:8]),
+    ),
     Command(
         RequirePreview,
         "preview",
         "/preview/required",
-        lambda asked: "requires a preview before each cut" if asked.required else "requires no previews any more",
+        _required,
     ),
     Command(TakeControl, "control", "/control/take"),
     Command(RequestControl, "control", "/control/request"),

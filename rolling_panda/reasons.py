@@ -56,6 +56,11 @@ def severity_of(reason: Reason) -> Severity:
     return "warning" if entry is None else entry.severity
 
 
+def noted(severity: Severity, text: str) -> Reason:
+    """Words for the log as a reason of a severity."""
+    return {"info": said, "warning": warned, "error": failed}[severity](text)
+
+
 def said_or_none(text: str) -> Reason | None:
     """Words as a reason; None for none."""
     return said(text) if text else None
@@ -102,6 +107,16 @@ def _reason(severity: Severity, act: str) -> Callable[[Callable[P, None]], Calla
 
 @_reason("info", "")
 def said(text: str) -> None:
+    """{text}."""
+
+
+@_reason("warning", "")
+def warned(text: str) -> None:
+    """{text}."""
+
+
+@_reason("error", "")
+def failed(text: str) -> None:
     """{text}."""
 
 
@@ -204,6 +219,11 @@ def foreign_motion() -> None:
 @_reason("error", "")
 def ledger_failed(detail: str) -> None:
     """{detail}."""
+
+
+@_reason("warning", "")
+def lines_unrecorded(lines: float) -> None:
+    """{lines:.0f} log lines of other processes exceeded the rate limit and were not recorded."""
 
 
 @_reason("error", "see whether its disk is full or hangs")
@@ -429,6 +449,117 @@ def stop_newer() -> None:
 @_reason("warning", "wait")
 def reset_under_way() -> None:
     """The reset is under way."""
+
+
+@_reason("warning", "")
+def command_refused(user: str, command: str, cause: Reason) -> None:
+    """{user}: {command} refused: {cause}."""
+
+
+@_reason("warning", "")
+def release_refused(cause: Reason) -> None:
+    """The stop is not released: {cause}."""
+
+
+@_reason("info", "")
+def points_accepted_again(points: str) -> None:
+    """Accepted again after the rule was undone: {points}."""
+
+
+# Commands
+
+
+@_reason("info", "")
+def home_requested(user: str) -> None:
+    """{user} sends the arm home."""
+
+
+@_reason("info", "")
+def point_accepted(user: str, point: str, revision: float) -> None:
+    """{user} accepted {point}, revision {revision:.0f}."""
+
+
+@_reason("info", "")
+def point_rejected(user: str, point: str) -> None:
+    """{user} rejected {point}."""
+
+
+@_reason("info", "")
+def point_rejected_because(user: str, point: str, text: str) -> None:
+    """{user} rejected {point}: {text}."""
+
+
+@_reason("info", "")
+def decision_undone(user: str, point: str) -> None:
+    """{user} undid the decision about {point}."""
+
+
+@_reason("info", "")
+def point_inspected_cut(user: str, point: str, text: str) -> None:
+    """{user} inspected {point}: cut: {text}."""
+
+
+@_reason("info", "")
+def point_inspected_not_cut(user: str, point: str, text: str) -> None:
+    """{user} inspected {point}: not cut: {text}."""
+
+
+@_reason("info", "")
+def rule_undone(user: str) -> None:
+    """{user} undid the rule, with the acceptances that it had made void."""
+
+
+@_reason("info", "")
+def point_moved_before(user: str, point: str, before: str) -> None:
+    """{user} moved {point} before {before}."""
+
+
+@_reason("info", "")
+def point_moved_last(user: str, point: str) -> None:
+    """{user} moved {point} to the end."""
+
+
+@_reason("info", "")
+def approach_set(user: str, point: str, angle_deg: float) -> None:
+    """{user} set the approach of {point}: turned by {angle_deg:.0f}°."""
+
+
+@_reason("info", "")
+def approach_freed(user: str, point: str) -> None:
+    """{user} set the approach of {point}: as the search finds it."""
+
+
+@_reason("info", "")
+def order_restored(user: str) -> None:
+    """{user} restored the order of the plan."""
+
+
+@_reason("info", "")
+def preview_requested(user: str) -> None:
+    """{user} requested a preview of the work."""
+
+
+@_reason("info", "")
+def point_preview_requested(user: str, point: str) -> None:
+    """{user} requested a preview of {point}."""
+
+
+@_reason("info", "")
+def preview_approved(user: str, preview: str) -> None:
+    """{user} approved the preview {preview}."""
+
+
+@_reason("info", "")
+def preview_required(user: str) -> None:
+    """{user} requires a preview before each cut."""
+
+
+@_reason("info", "")
+def preview_optional(user: str) -> None:
+    """{user} requires no previews any more."""
+
+
+# Controller: motion
 
 
 @_reason("error", "")
@@ -897,3 +1028,8 @@ def request_late(part: str) -> None:
 @_reason("error", "leave out --plain-wire to close it")
 def plain_wire() -> None:
     """The wire is plain: every program on this machine can move the robot."""
+
+
+@_reason("warning", "")
+def lines_left_out(cause: Reason, lines: float) -> None:
+    """{cause} (and {lines:.0f} lines like it before)."""

@@ -73,7 +73,7 @@ class Loop:
         for received in robot.link.events.drain():
             event = received.message
             if event.process != "server":
-                robot.log.lines.add(event.process, event.severity, event.text, time.time() - (now - received.at))
+                robot.log.lines.add(event.process, event.reason, time.time() - (now - received.at))
         while robot.link.refused:
             topic, reason = robot.link.refused.popleft()
             if (topic, reason) not in self._warned and len(self._warned) < _MAX_WARNINGS:

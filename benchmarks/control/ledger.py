@@ -18,6 +18,7 @@ from controller.ledger.store import Entry, Ledger
 from controller.ledger.writer import LedgerWriter
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
+from rolling_panda.reasons import said
 from rolling_panda.runtime.scheduling import set_priority
 from tests.support.sent import every
 
@@ -25,7 +26,7 @@ _PERIOD_S = 0.01
 _SLOW_S = 0.2
 #: An operator's decision every so many periods, and a line of another process's log: more than any work gives.
 _DECISION, _LINE = 20, 5
-_LINE_OF_OTHERS = m.LogEvent(header=m.Header(), process="server", severity="info", text="bench")
+_LINE_OF_OTHERS = m.LogEvent(header=m.Header(), process="server", reason=said("bench"))
 
 
 class SlowDisk(Ledger):

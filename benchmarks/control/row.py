@@ -32,6 +32,7 @@ from perception.segmentation.segmenter import SEGMENTERS
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.config import load_section
+from rolling_panda.reasons import text_of
 from rolling_panda.resources import resource
 from tests.support.worlds.closed_loop import ClosedLoop
 
@@ -98,7 +99,7 @@ def cut_row(
                 durations = _work(loop, [entry.point_id for entry in accepted])
                 work_s = sum(durations.values()) if durations else loop.now - begin
             ends = {entry.point_id: entry for entry in loop.queue()}
-            stops = sum("PROTECTIVE_STOP" in event.text for event in loop.events)
+            stops = sum("PROTECTIVE_STOP" in text_of(event.reason) for event in loop.events)
         record = trace.read(path)
     events = {event["point_id"]: event for event in record.events if event["event"] == "cut"}
     severed: dict[str, list[dict[str, Any]]] = {}

@@ -31,6 +31,7 @@ from rolling_panda.messages.supervision import StopState
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import Limits
 from rolling_panda.model.wire_values import actuated
+from rolling_panda.reasons import noted
 from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.topics import BRIDGE, CLOSE_UP_REQUEST, CUT, MOTION, ODOMETRY, TOKEN
 from rolling_panda.transport.rejections import Rejections
@@ -354,7 +355,7 @@ class BridgeCore:
             frame,
             scenery,
             tuple(
-                m.LogEvent(header=m.Header(now), process="bridge", severity=severity, text=text[:500])
+                m.LogEvent(header=m.Header(now), process="bridge", reason=noted(severity, text))
                 for severity, text in events
             ),
             stops,

@@ -10,7 +10,6 @@ import msgspec
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda import reasons
-from rolling_panda.reasons import severity_of, text_of
 
 #: Kind of a row: state of a point, order of work, approach, requirement of previews, command of an operator with its
 #: answer, stop, log line,
@@ -156,14 +155,14 @@ class EventLogger:
         self.now = 0.0
 
     def log(self, reason: m.Reason) -> None:
-        """One line, with the severity of its reason."""
-        self.say(severity_of(reason), text_of(reason))
-
-    def say(self, severity: m.Severity, text: str) -> None:
-        """One line, of 500 characters at most."""
-        event = m.LogEvent(header=m.Header(self.now), process="controller", severity=severity, text=text[:500])
+        """Add a line."""
+        event = m.LogEvent(header=m.Header(self.now), process="controller", reason=reason)
         self._events.append(event)
         self._journal.add("event", "controller", event)
+
+    def say(self, severity: m.Severity, text: str) -> None:
+        """Add words as a line."""
+        self.log(reasons.noted(severity, text))
 
     def drain(self) -> tuple[m.LogEvent, ...]:
         """Return and remove the lines since the last call."""

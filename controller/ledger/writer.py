@@ -13,6 +13,7 @@ from controller.ledger.journal import LedgerState, Record
 from controller.ledger.session_report import SessionReportBuilder
 from controller.ledger.store import Entry
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.errors import LedgerError
 from rolling_panda.runtime.scheduling import set_priority
 from rolling_panda.runtime.token_bucket import TokenBucket
@@ -37,13 +38,6 @@ class Store(Protocol):
 
     def close(self) -> None:
         """Let go of it."""
-
-
-class LeftOut(msgspec.Struct, frozen=True):
-    """Number of log lines of other processes that exceeded the rate limit and were not recorded."""
-
-    text: str
-    lines: int
 
 
 class LedgerWriter:
@@ -82,8 +76,9 @@ class LedgerWriter:
             self._left_out += 1
             return
         if self._left_out:
-            text = f"{self._left_out} log lines of other processes exceeded the rate limit and were not recorded"
-            self.write([Record(0, "event", "controller", LeftOut(text, self._left_out))])
+            left_out = reasons.lines_unrecorded(self._left_out)
+            event = m.LogEvent(header=line.header, process="controller", reason=left_out)
+            self.write([Record(0, "event", "controller", event)])
             self._left_out = 0
         self.write([Record(0, "event", line.process, line)])
 

@@ -4,7 +4,7 @@ from typing import Annotated, Final, Literal, get_args
 
 from msgspec import Meta, Struct
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 Finite = Annotated[float, Meta(ge=-1e9, le=1e9)]
 Metre = Annotated[float, Meta(ge=-1e4, le=1e4)]
 Unit = Annotated[float, Meta(ge=-1.001, le=1.001)]
@@ -111,14 +111,12 @@ class LogEvent(Message, frozen=True, kw_only=True):
     Attributes:
         header: Time of the event.
         process: The sender.
-        severity: Severity.
-        text: The line.
+        reason: What has happened; the catalogue has its severity and its text.
     """
 
     header: Header
     process: Process
-    severity: Severity
-    text: Text
+    reason: "Reason"
 
 
 class RuleEffect(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -6,8 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.messages.page import PageEvent
-from rolling_panda.reasons import CATALOGUE, text_of
+from rolling_panda.reasons import severity_of, text_of
 from rolling_panda.runtime.token_bucket import TokenBucket
 
 #: Lines of one source: at once, and per second after that.
@@ -24,10 +25,10 @@ class EventLog:
         self._events: deque[PageEvent] = deque(maxlen=lines)
         self.number = 0
 
-    def add(self, process: str, severity: m.Severity, text: str, wall_time: float) -> None:
+    def add(self, process: str, reason: m.Reason, wall_time: float) -> None:
         """Append a line; `wall_time` is Unix time (s)."""
         self.number += 1
-        self._events.append(PageEvent(self.number, wall_time, process, severity, text))
+        self._events.append(PageEvent(self.number, wall_time, process, severity_of(reason), text_of(reason)))
 
     def after(self, number: int, at_most: int) -> tuple[PageEvent, ...]:
         """The newest `at_most` lines after line `number`, oldest first."""
@@ -51,17 +52,17 @@ class LogRateLimiter:
         """No source is known."""
         self._sources: OrderedDict[str, _Source] = OrderedDict()
 
-    def line(self, source: str, text: str, now: float) -> str:
-        """The line to write; empty while the source is over its limit."""
+    def line(self, source: str, reason: m.Reason, now: float) -> m.Reason | None:
+        """The line to write; None while the source is over its limit."""
         known = self._sources.setdefault(source, _Source())
         self._sources.move_to_end(source)
         if len(self._sources) > _MAX_SOURCES:
             self._sources.popitem(last=False)
         if not known.lines.take(now):
             known.left_out += 1
-            return ""
+            return None
         left_out, known.left_out = known.left_out, 0
-        return f"{text} (and {left_out} lines like it before)" if left_out else text
+        return reasons.lines_left_out(reason, left_out) if left_out else reason
 
 
 class RobotLog:
@@ -71,8 +72,8 @@ class RobotLog:
         lines: The last lines.
     """
 
-    def __init__(self, lines: int, send: Callable[[m.Severity, str, float], object]) -> None:
-        """Keep up to `lines` lines; `send(severity, text, now)` publishes a line of the server."""
+    def __init__(self, lines: int, send: Callable[[m.Reason, float], object]) -> None:
+        """Keep up to `lines` lines; `send(reason, now)` publishes a line of the server."""
         self.lines = EventLog(lines)
         self._send = send
         self._limiter = LogRateLimiter()
@@ -80,8 +81,7 @@ class RobotLog:
     def note(self, reason: m.Reason, by: str = "") -> None:
         """Write a line of the server; `by` is the source whose rate is limited, empty for none."""
         now = time.monotonic()
-        text = self._limiter.line(by, text_of(reason), now) if by else text_of(reason)
-        if text:
-            severity = CATALOGUE[reason.code].severity if reason.code in CATALOGUE else "warning"
-            self.lines.add("server", severity, text[:500], time.time())
-            self._send(severity, text, now)
+        line = self._limiter.line(by, reason, now) if by else reason
+        if line is not None:
+            self.lines.add("server", line, time.time())
+            self._send(line, now)

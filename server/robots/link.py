@@ -125,9 +125,9 @@ class RobotLink:
         """Publish the heartbeat of the server's loop."""
         self._beat.put(m.Heartbeat(process="server", sequence=sequence))
 
-    def send_event(self, severity: m.Severity, text: str, now: float) -> None:
+    def send_event(self, reason: m.Reason, now: float) -> None:
         """Publish a line of the log, on its own thread, since this topic blocks too."""
-        event = m.LogEvent(header=m.Header(stamp=now), process="server", severity=severity, text=text[:500])
+        event = m.LogEvent(header=m.Header(stamp=now), process="server", reason=reason)
         self._writer.submit(self._event.put, event)
 
     def posture(self, now: float) -> Posture | None:

@@ -14,6 +14,7 @@ from benchmarks.faults.run import deal, main, run_trial, start
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.messages.supervision import BaseVelocity
+from rolling_panda.reasons import text_of
 from tests.support.worlds.faulty_world import FaultyWorld
 from tests.support.worlds.world import RecordedController
 
@@ -152,7 +153,7 @@ def test_commands_by_somebody_else_under_the_robots_own_token_are_seen_stopped_a
         world.drive()
         world.held = None
     world.intruder, said, step = partial(thief, world.commanded), [], world.bridge.step
-    world.bridge.step = lambda *now: (out := step(*now), said.extend(event.text for event in out.events))[0]
+    world.bridge.step = lambda *now: (out := step(*now), said.extend(text_of(event.reason) for event in out.events))[0]
     before = world.robot.now.position
     world.run(1.0)
     assert world.controller.mode == "ESTOP_LATCHED" and abs(world.robot.now.velocity).max() < 1e-3

@@ -15,6 +15,7 @@ from bridge.core.state_memory import Remembered
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import CloseUpRequest
 from rolling_panda.messages.supervision import StopState
+from rolling_panda.reasons import severity_of, text_of
 from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.topics import TOKEN
 from rolling_panda.transport.codec import StrictDecoder, encode
@@ -85,7 +86,7 @@ class Bench(Commander):
 
     @property
     def log(self) -> list[str]:
-        return [event.text for out in self.outputs for event in out.events]
+        return [text_of(event.reason) for out in self.outputs for event in out.events]
 
     def moved_within(self, seconds: float) -> float:
         """Time since which nothing has been sent any more, counted from `seconds` ago."""
@@ -256,8 +257,10 @@ def test_a_cut_is_made_once_and_its_end_is_told(bench: Bench) -> None:
     bench.robot.end_cut("DONE")
     bench.run(0.01, REST)
     assert (bench.state.cut_id, bench.state.outcome) == ("c1", "DONE")
-    told = [event for out in bench.outputs for event in out.events if "c1: DONE, said the robot" in event.text]
-    assert [event.severity for event in told] == ["info"]
+    told = [
+        event for out in bench.outputs for event in out.events if "c1: DONE, said the robot" in text_of(event.reason)
+    ]
+    assert [severity_of(event.reason) for event in told] == ["info"]
     bench.core.on_cut(cut(bench, "c1"), bench.now)
     assert bench.robot.cuts == ["c1"]
 
@@ -355,8 +358,12 @@ def test_the_bridge_says_it_when_it_moves_though_its_controllers_mode_moves_noth
     bench.mode = mode
     bench.run(1.5, FORWARD)
     events = [event for out in bench.outputs for event in out.events]
-    (said,) = [event for event in events if f"commanded to move, though the controller's mode is {mode}" in event.text]
-    assert said.severity == "error"
+    (said,) = [
+        event
+        for event in events
+        if f"commanded to move, though the controller's mode is {mode}" in text_of(event.reason)
+    ]
+    assert severity_of(said.reason) == "error"
     bench.mode = "AUTO"
     bench.run(1.0, REST)
     bench.run(0.5, FORWARD)

@@ -19,6 +19,7 @@ from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.config import TransportConfig
 from rolling_panda.model.robot import RobotModel
+from rolling_panda.reasons import text_of
 from rolling_panda.resources import resource
 from rolling_panda.transport.zenoh import Feed, ForeignWire, Publisher, Slot, Transport
 from tests.support.processes.local_router import local_router
@@ -194,7 +195,7 @@ def test_rubbish_on_the_command_topic_is_counted_and_said(live: Live) -> None:
         # Commands may be dropped on a full wire, so rubbish may be as well.
         for data in (b"", b"rubbish", b"\x81\xa4type\xadMotionCommand"):
             live.send(data)
-        texts.extend(received.message.text for received in live.events.drain())
+        texts.extend(text_of(received.message.reason) for received in live.events.drain())
         new = [row for row in live.newest().rejections if row not in before and row.topic == "command/motion"]
         return len(new) >= 3 and any("refused on command/motion" in text for text in texts)
 

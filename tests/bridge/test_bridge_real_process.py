@@ -15,6 +15,7 @@ from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.config import TransportConfig
 from rolling_panda.model.robot import RobotModel
+from rolling_panda.reasons import text_of
 from rolling_panda.resources import resource
 from rolling_panda.runtime.launch import child_environment
 from rolling_panda.transport.zenoh import Transport
@@ -102,7 +103,7 @@ def test_it_follows_the_wire_or_only_tells_the_robots_state(site: Site, readonly
         if readonly:
             assert moved(site) == before
             assert newest.message.watchdog
-            assert any("--readonly" in event.message.text for event in events.drain())
+            assert any("--readonly" in text_of(event.message.reason) for event in events.drain())
         else:
             np.testing.assert_allclose(wheels, FORWARD[:2], atol=0.1)
             np.testing.assert_allclose(site.arm.tell()["dq"], FORWARD[2:], atol=0.02)

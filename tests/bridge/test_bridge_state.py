@@ -17,6 +17,7 @@ from bridge.core.validator import OLD_SEQUENCE
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.model.differential_drive import Array
+from rolling_panda.reasons import severity_of, text_of
 from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.topics import CUT, MOTION, ODOMETRY, TOKEN, Topic
 from tests.bridge.test_bridge_core import FORWARD, Bench, IdealRobot, cut, odometer, release, stop
@@ -37,7 +38,7 @@ def tick(bench: Bench) -> BridgeOutputs:
 
 
 def lines(out: BridgeOutputs) -> list[tuple[str, str]]:
-    return [(event.severity, event.text) for event in out.events]
+    return [(severity_of(event.reason), text_of(event.reason)) for event in out.events]
 
 
 def refused(bench: Bench, topic: Topic[Any]) -> dict[str, int]:
@@ -319,7 +320,11 @@ def test_a_fault_is_told_once_as_a_warning_and_its_end_as_information(bench: Ben
     bench.robot.now = replace(bench.robot.now, fault="")
     bench.run(0.1, FORWARD)
     events = [event for out in bench.outputs for event in out.events][told:]
-    own = [(event.severity, event.text) for event in events if "no wheel speeds" in event.text or "ready" in event.text]
+    own = [
+        (severity_of(event.reason), text_of(event.reason))
+        for event in events
+        if "no wheel speeds" in text_of(event.reason) or "ready" in text_of(event.reason)
+    ]
     assert [severity for severity, _ in own] == ["warning", "info"]
     assert "base: no wheel speeds" in own[0][1]
     assert all((event.process, event.header.stamp > 0.0) == ("bridge", True) for event in events)
@@ -373,7 +378,7 @@ def test_what_must_survive_a_restart_is_kept(bench: Bench) -> None:
 def test_a_long_reason_is_cut_to_what_the_wire_carries(bench: Bench) -> None:
     bench.core.on_stop(m.StopRequest(stop_id="s1", source="page", user="ada", reason="x" * 500), bench.now)
     (event,) = tick(bench).events
-    assert len(as_received(event).text) == 500
+    assert len(text_of(as_received(event).reason)) == 500
 
 
 def test_after_a_cut_the_camera_looks_more_often_again(bench: Bench) -> None:

@@ -10,6 +10,7 @@ from bridge.core.bridge import TICK_S
 from bridge.core.robot_time import RealTime
 from bridge.real import mp500
 from rolling_panda import messages as m
+from rolling_panda.reasons import text_of
 from tests.support.bridge_rig import FORWARD, REST, Parts, Rig
 from tests.support.extras import need
 from tests.support.real_rig import RealPlant
@@ -37,7 +38,7 @@ def rig(plant: RealPlant) -> Iterator[Rig]:
 
 
 def log(rig: Rig) -> str:
-    return "\n".join(event.text for out in rig.outputs for event in out.events)
+    return "\n".join(text_of(event.reason) for out in rig.outputs for event in out.events)
 
 
 def release(rig: Rig) -> m.Answer:

@@ -8,6 +8,7 @@ from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.model.robot import ARM_Q, ARM_XI, RobotModel
+from rolling_panda.reasons import text_of
 from tests.support.controller_at_work import CONFIG, entry, finish, robot, run_until, working
 from tests.support.points import point
 from tests.support.sent import newest
@@ -278,5 +279,5 @@ def test_a_rule_that_is_taken_back_brings_its_acceptances_and_the_log_says_so():
     r.show((high,), usual)
     r.run(0.1)
     assert (entry(r, "a").state, entry(r, "a").user) == ("ACCEPTED", "ada")
-    assert any("accepted again after the rule was undone: a" in text for text in r.events)
-    assert any("eve: undid the rule" in text for text in r.events)
+    assert text_of(reasons.points_accepted_again("a")) in r.events
+    assert text_of(reasons.rule_undone("eve")) in r.events

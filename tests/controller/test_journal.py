@@ -70,9 +70,9 @@ def test_what_is_said_is_told_once_and_recorded():
     journal = Journal()
     lines = EventLogger(journal)
     lines.now = 3.0
-    lines.say("warning", "x" * 600)
+    lines.log(reasons.warned("x" * 600))
     (told,) = lines.drain()
-    assert (told.header.stamp, told.severity, len(told.text)) == (3.0, "warning", 500)
+    assert (told.header.stamp, told.process, told.reason) == (3.0, "controller", reasons.warned("x" * 500))
     assert lines.drain() == ()
     assert [record.body for record in journal.drain()] == [told]
 
@@ -80,8 +80,9 @@ def test_what_is_said_is_told_once_and_recorded():
 def test_a_line_before_the_first_step_is_one_that_the_wire_carries():
     journal = Journal()
     lines = EventLogger(journal)
-    lines.say("info", "started")
+    lines.log(reasons.controller_started())
     (event,) = lines.drain()
-    assert as_received(event) == m.LogEvent(header=m.Header(0.0), process="controller", severity="info", text="started")
+    assert as_received(event) == event
+    assert event.reason == reasons.controller_started()
     (record,) = journal.drain()
     assert (record.kind, record.name, record.body) == ("event", "controller", event)

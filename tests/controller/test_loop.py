@@ -16,6 +16,7 @@ from controller.loop import controller_runner
 from controller.stop_file import open_stop_file
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.config import RobotConfig, TransportConfig
 from rolling_panda.topics import (
     BRIDGE,
@@ -158,7 +159,8 @@ def test_operator_is_answered_a_stop_latches_and_a_reset_releases_it(rest):
     assert numbers == sorted(set(numbers))
     assert all(command.xi == (0.0,) * 9 for command in commands)
 
-    assert "arm the robot first" in rest.server.call(INTENT, intents.Start(user="ada")).reason
+    refused = rest.server.call(INTENT, intents.Start(user="ada")).refused
+    assert refused == reasons.impossible_in_idle("start")
     rest.until(lambda: rest.state.peek().message.allowed["Arm"] is None)
     assert rest.server.call(INTENT, intents.Arm(user="ada")).ok
     rest.until(lambda: rest.mode() == "READY")
@@ -174,13 +176,14 @@ def test_operator_is_answered_a_stop_latches_and_a_reset_releases_it(rest):
     assert rest.server.call(INTENT, intents.Reset(user="ada", role="supervisor", reason="dog gone")).ok
     rest.until(lambda: rest.mode() == "IDLE")
     assert [release.stop_id for release in rest.releases] == ["s1"]
-    said = " ".join(received.message.text for received in rest.events.drain())
-    assert "dog gone" in said and "Start refused" in said
+    told = [received.message.reason for received in rest.events.drain()]
+    assert reasons.command_refused("ada", "start", reasons.impossible_in_idle("start")) in told
+    assert reasons.mode_changed("ESTOP_LATCHED", "IDLE", reasons.stop_reset("ada", "dog gone")) in told
 
     rest.server.publisher(EVENT).put(
-        m.LogEvent(header=m.Header(), process="server", severity="info", text="ada signed in (supervisor)")
+        m.LogEvent(header=m.Header(), process="server", reason=reasons.signed_in("ada", "supervisor"))
     )
-    rest.until(lambda: any("ada signed in" in row.entry.body for row in rest.rows()))
+    rest.until(lambda: any("signed_in" in row.entry.body for row in rest.rows()))
     kinds = {row.entry.kind for row in rest.rows()}
     assert kinds == {"request", "stop", "event"}
     refused = [row for row in rest.rows() if row.entry.kind == "request" and '"ok":false' in row.entry.body]
@@ -203,5 +206,9 @@ def test_what_is_no_intent_is_refused_and_logged(rest, endpoint):
     wire = ForeignWire(TransportConfig(connect=(endpoint,), plain_wire=True))
     assert msgspec.msgpack.decode(wire.ask(key("rp1", INTENT.name), bad, 2.0))["ok"] is False
     wire.close()
-    rest.until(lambda: any("refused on service/intent" in received.message.text for received in rest.events.drain()))
+
+    def refused(reason):
+        return reason.code == "message_rejected" and dict(reason.values)["topic"] == INTENT.name
+
+    rest.until(lambda: any(refused(received.message.reason) for received in rest.events.drain()))
     assert rest.mode() == "IDLE"

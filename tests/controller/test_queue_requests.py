@@ -11,15 +11,15 @@ def test_each_request_is_one_line_of_the_log():
     r.step()
     before = len(r.events)
     for intent, words in [
-        (intents.Start(user="ada"), "Start refused"),
+        (intents.Start(user="ada"), "start refused"),
         (intents.Arm(user="ada"), "IDLE → READY: arm by ada"),
         (intents.AcceptAll(user="ada"), "ada: accepted 1 point of confidence 0.80 and more"),
-        (intents.RejectPoint(user="ada", point_id="p1", reason="rotten"), "ada: rejected p1: rotten"),
-        (intents.AcceptPoint(user="ada", point_id="p1", revision=1), "ada: accepted p1, revision 1"),
+        (intents.RejectPoint(user="ada", point_id="p1", reason="rotten"), "ada rejected p1: rotten"),
+        (intents.AcceptPoint(user="ada", point_id="p1", revision=1), "ada accepted p1, revision 1"),
         (intents.Start(user="ada"), "READY → AUTO: start by ada"),
         (intents.Pause(user="ada"), "AUTO → PAUSED: pause by ada"),
         (intents.Resume(user="ada"), "PAUSED → READY: resume by ada"),
-        (intents.Home(user="ada"), "ada: home"),
+        (intents.Home(user="ada"), "ada sends the arm home"),
     ]:
         r.ask(intent)
         r.step()

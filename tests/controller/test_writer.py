@@ -12,6 +12,7 @@ from controller.ledger.journal import Record, TicketRow
 from controller.ledger.store import Ledger, read
 from controller.ledger.writer import LedgerWriter
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.errors import LedgerError
 from tests.support.fake_wire import pruning_point
 from tests.support.waiting import until
@@ -22,7 +23,7 @@ def record(number, text="x"):
 
 
 def line(text, process="server"):
-    return m.LogEvent(header=m.Header(), process=process, severity="info", text=text)
+    return m.LogEvent(header=m.Header(), process=process, reason=reasons.said(text))
 
 
 @pytest.fixture
@@ -142,7 +143,10 @@ def test_a_flood_of_lines_is_counted_instead_of_recorded(writers):
     assert (disk.rows[200].kind, disk.rows[200].name) == ("event", "controller")
     left_out = json.loads(disk.rows[200].body)
     assert writer.state.durable == 0
-    assert left_out["lines"] == 800 and left_out["text"].startswith("800 log lines") and "after" in disk.rows[201].body
+    assert (
+        left_out["reason"] == {"code": "lines_unrecorded", "values": [["lines", 800]]}
+        and "after" in disk.rows[201].body
+    )
 
 
 def test_a_line_of_another_process_is_recorded_under_its_name_and_makes_no_record_durable(writers):
@@ -185,7 +189,9 @@ def test_each_flood_is_counted_for_itself(writers):
         now[0] += 100.0
         writer.note(line("after"))
         until(lambda: any("after" in row.body for row in disk.rows))
-        assert [json.loads(row.body)["lines"] for row in disk.rows if row.name == "controller"] == [800]
+        assert [json.loads(row.body)["reason"]["values"] for row in disk.rows if row.name == "controller"] == [
+            [["lines", 800]]
+        ]
         now[0] += 100.0
 
 

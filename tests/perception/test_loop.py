@@ -11,6 +11,7 @@ from rolling_panda.commands import SetRule
 from rolling_panda.errors import MessageError
 from rolling_panda.messages.perception import Capsule, CloseUpResult, PointCrop
 from rolling_panda.messages.robot import CameraFrame, Intrinsics
+from rolling_panda.reasons import severity_of, text_of
 from rolling_panda.topics import CAMERA, CLOSE_UP, CROPS, EVENT, HEARTBEAT, OBSTACLES, PLANT, POINTS
 from rolling_panda.transport.runner import Runner
 from tests.support.fake_wire import FakeWire
@@ -127,7 +128,7 @@ def test_what_was_left_out_is_told_when_it_changes_and_at_most_once_a_minute(par
         step_until(
             loop, lambda: sent and perception.newest is not before and sent[-1] == perception.newest, float(second)
         )
-        return [event.text for event in wire.sent[EVENT.name] if "left out" in event.text]
+        return [text_of(event.reason) for event in wire.sent[EVENT.name] if "left out" in text_of(event.reason)]
 
     assert "1 trunk leaning" in told("1 trunk leaning", 0)[0]
     for second in range(2, 130, 2):
@@ -146,7 +147,7 @@ def test_the_heartbeat_counts_turns_and_stops_counting_when_a_frame_hangs(parts)
     counted = [beat.sequence for beat in beats]
     assert counted[:21] == list(range(1, 22))
     assert counted[-1] == counted[22] and beats[-1].status
-    assert any("1 s" in event.text for event in wire.sent[EVENT.name])
+    assert any("1 s" in text_of(event.reason) for event in wire.sent[EVENT.name])
     perception.release.set()
     step_until(loop, lambda: beats[-1].sequence > counted[-1], now=3.1)
 
@@ -160,7 +161,7 @@ def test_a_corrupt_frame_is_told_once_and_sends_no_points(parts):
     for _ in range(20):
         loop.step(0.2)
         time.sleep(0.001)
-    assert [event.severity for event in events] == ["info", "error"]
+    assert [severity_of(event.reason) for event in events] == ["info", "error"]
     assert not wire.sent[POINTS.name]
 
 
@@ -172,8 +173,11 @@ def test_new_points_and_points_that_were_cut_are_no_warnings(parts):
     perception.withdrawn = ("p2 withdrawn: it has been cut",)
     loop.see("frame", 0.0)
     step_until(loop, lambda: len(events) == 3)
-    assert [event.text for event in events[1:]] == ["1 new pruning point, 1 in all", "p2 withdrawn: it has been cut"]
-    assert {event.severity for event in events} == {"info"}
+    assert [text_of(event.reason) for event in events[1:]] == [
+        "1 new pruning point, 1 in all",
+        "p2 withdrawn: it has been cut",
+    ]
+    assert {severity_of(event.reason) for event in events} == {"info"}
 
 
 def test_a_worker_hands_a_bug_to_its_owner():

@@ -12,6 +12,7 @@ from recorder.recording import RecordedMessage, Recording
 from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.commands import SeekReplay
+from rolling_panda.reasons import said, text_of
 from rolling_panda.topics import Topic
 
 BEGAN = 1.8e9
@@ -32,7 +33,7 @@ def heartbeat(at: float, process: m.Process) -> RecordedMessage:
 
 
 def event(at: float, text: str) -> RecordedMessage:
-    return recorded(topics.EVENT, at, m.LogEvent(header=m.Header(), process="bridge", severity="info", text=text))
+    return recorded(topics.EVENT, at, m.LogEvent(header=m.Header(), process="bridge", reason=said(text)))
 
 
 def stop(at: float) -> RecordedMessage:
@@ -70,7 +71,7 @@ def test_a_jump_tells_the_newest_of_each_kind_and_each_process_and_no_old_events
     player.seek(SeekReplay(playing=True))
     due = player.step(3.1)
     assert sequences(due) == list(range(51, 81))
-    assert [each.message().text for each in due if each.topic is topics.EVENT] == ["later"]  # type: ignore[attr-defined]
+    assert [text_of(each.message().reason) for each in due if each.topic is topics.EVENT] == ["later"]  # type: ignore[attr-defined]
 
 
 def test_standing_still_it_keeps_fresh_what_is_told_often_and_stays_where_it_is() -> None:

@@ -11,6 +11,7 @@ from recorder.recording import read_recording
 from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.config import TransportConfig
+from rolling_panda.reasons import said, text_of
 from rolling_panda.runtime.launch import child_environment, python_command
 from rolling_panda.transport.zenoh import Transport
 
@@ -25,7 +26,7 @@ def publish(transport: Transport, seconds: float, recorder: subprocess.Popen[str
     """
     publisher, sent = transport.publisher(topics.EVENT), 0.0
     for k in range(round(100 * seconds)):
-        publisher.put(m.LogEvent(header=m.Header(k * 0.01), severity="info", process="bridge", text=str(k)))
+        publisher.put(m.LogEvent(header=m.Header(k * 0.01), process="bridge", reason=said(str(k))))
         sent = time.time()
         time.sleep(0.01)
     if recorder is not None:
@@ -51,7 +52,7 @@ def test_a_killed_recorder_loses_less_than_a_second_and_one_that_is_ended_nothin
     code = recorder.wait(20)
     recorder.stdout.close()
     recording = read_recording(path)
-    numbers = [int(each.message().text) for each in recording.messages if each.topic is topics.EVENT]  # type: ignore[attr-defined]
+    numbers = [int(text_of(each.message().reason)) for each in recording.messages if each.topic is topics.EVENT]  # type: ignore[attr-defined]
     assert numbers == list(range(numbers[0], numbers[0] + len(numbers))), "none is missing in between"
     if killed:
         assert code == -signal.SIGKILL and not recording.complete

@@ -141,5 +141,5 @@ def test_a_recording_of_another_version_of_the_wire_is_refused_in_words(tmp_path
         channel = version_1.register_channel("/state/odometry", "json", schema, {"robot_id": "rp1", "about": "base"})
         version_1.add_message(channel, BEGAN, msgspec.json.encode(odometry(1)), BEGAN)
         version_1.finish()
-    with pytest.raises(InputError, match="version 1 of the wire.*replays version 2 only.*Replay it with the version"):
+    with pytest.raises(InputError, match="version 1 of the wire.*replays version 3 only.*Replay it with the version"):
         read_recording(old)

@@ -11,6 +11,7 @@ from rolling_panda import commands as intents
 from rolling_panda import topics
 from rolling_panda.commands import SeekReplay
 from rolling_panda.config import TransportConfig
+from rolling_panda.reasons import text_of
 from rolling_panda.transport.zenoh import Transport
 from tests.recorder.test_player import event, joints, recording
 from tests.support.waiting import until
@@ -41,7 +42,7 @@ def test_a_server_sees_the_robot_of_the_recording_and_moves_in_it(server: tuple[
     assert {"bridge", "controller", "perception"} <= wire.present()
     newest = slot.peek()
     assert newest is not None and 5 <= newest.message.sequence <= 15
-    assert [received.message.text for received in events.drain()] == ["it begins"]
+    assert [text_of(received.message.reason) for received in events.drain()] == ["it begins"]
     assert wire.call(topics.SEEK, SeekReplay(position_s=7.0, playing=False)).ok
     replay.step(time.monotonic())
     time.sleep(0.3)

@@ -15,11 +15,13 @@ from bridge.sim.build import simulated_bridge
 from controller.config import ControllerConfig
 from controller.core import Controller
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.bounds import bound_of, numbers, wider
 from rolling_panda.config import RobotConfig, load_section
 from rolling_panda.errors import ConfigError
 from rolling_panda.generate.safety import SECTIONS, section
 from rolling_panda.model.robot import ARM_Q, RobotModel
+from rolling_panda.reasons import text_of
 from rolling_panda.resources import resource
 from rolling_panda.transport.inbox import Inbox
 from server.config import ServerConfig
@@ -213,11 +215,11 @@ def test_the_bridge_and_the_controller_say_what_is_wider_at_the_start_and_in_eve
         outputs = [core.step(0.001 * n) for n in range(1, 60)]
     finally:
         core.robot.close()
-    assert f"less strict than usual: {line}" in [event.text for each in outputs for event in each.events]
+    assert f"less strict than usual: {line}" in [text_of(event.reason) for each in outputs for event in each.events]
     assert {each.state.relaxed_limits for each in outputs if each.state is not None} == {(line,)}
 
     told = Controller(controller_config(whole_body__arm_velocity_scale=0.9), RobotConfig())
     out = told.step(Inbox(), 1.0)
     words = "[controller] whole_body.arm_velocity_scale = 0.9, usually 0.6 (allowed: more than 0, at most 1)"
-    assert f"less strict than usual: {words}" in [event.text for event in every(out, m.LogEvent)]
+    assert reasons.limit_relaxed(words) in [event.reason for event in every(out, m.LogEvent)]
     assert [state.relaxed_limits for state in every(out, m.ControllerState)] == [(words,)]

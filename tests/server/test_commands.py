@@ -419,7 +419,7 @@ def test_who_reads_the_state_and_starts_at_once_is_not_told_that_nobody_has_seen
     assert client.post("/api/arm").status_code == 200
     assert client.post("/api/points/accept-all", json={}).status_code == 200
     refused = client.post("/api/start")
-    assert refused.status_code == 409 and "no operator has seen the robot" in refused.json()["reason"]
+    assert refused.status_code == 409 and refused.json()["code"] == "never_watched"
     eventually(lambda: client.get("/api/state").json()["joints"] is not None)
     started = client.post("/api/start")
     assert started.status_code == 200, started.text

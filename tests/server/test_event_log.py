@@ -3,13 +3,16 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rolling_panda import reasons
 from server.robots.event_log import BURST, RATE_HZ, EventLog, LogRateLimiter
+
+HELD, REFUSED = reasons.said("held"), reasons.warned("refused")
 
 
 def filled(lines, count):
     log = EventLog(lines)
     for number in range(1, count + 1):
-        log.add("bridge", "info", f"line {number}", 0.0)
+        log.add("bridge", reasons.said(f"line {number}"), 0.0)
     return log
 
 
@@ -34,26 +37,26 @@ def test_a_reader_from_before_a_restart_gets_nothing():
 
 def test_what_is_said_now_and_then_is_written_as_it_is():
     limiter = LogRateLimiter()
-    assert [limiter.line("ann", "held", 2.0 * turn) for turn in range(50)] == ["held"] * 50
+    assert [limiter.line("ann", HELD, 2.0 * turn) for turn in range(50)] == [HELD] * 50
 
 
 def test_a_flood_is_cut_and_its_number_told_with_the_next_line():
     limiter = LogRateLimiter()
-    lines = [limiter.line("eve", "refused", 0.0) for _ in range(10_000)]
-    assert lines[:20] == ["refused"] * 20 and not any(lines[20:])
-    assert limiter.line("ann", "held", 0.0) == "held"
-    assert limiter.line("eve", "refused", 1.5) == "refused (and 9980 lines like it before)"
-    assert limiter.line("eve", "refused", 4.0) == "refused"
+    lines = [limiter.line("eve", REFUSED, 0.0) for _ in range(10_000)]
+    assert lines[:20] == [REFUSED] * 20 and lines[20:] == [None] * 9980
+    assert limiter.line("ann", HELD, 0.0) == HELD
+    assert limiter.line("eve", REFUSED, 1.5) == reasons.lines_left_out(REFUSED, 9980)
+    assert limiter.line("eve", REFUSED, 4.0) == REFUSED
 
 
 def test_many_names_do_not_fill_the_memory():
     limiter = LogRateLimiter()
     for _ in range(30):
-        limiter.line("visitor 0", "x", 0.0)
-    assert not limiter.line("visitor 0", "x", 0.0)
+        limiter.line("visitor 0", HELD, 0.0)
+    assert limiter.line("visitor 0", HELD, 0.0) is None
     for number in range(1, 1001):
-        limiter.line(f"visitor {number}", "x", 0.0)
-    assert limiter.line("visitor 0", "x", 0.0), "the oldest is forgotten, with what it wrote"
+        limiter.line(f"visitor {number}", HELD, 0.0)
+    assert limiter.line("visitor 0", HELD, 0.0) == HELD, "the oldest is forgotten, with what it wrote"
 
 
 @given(st.lists(st.floats(0.0, 0.2), max_size=300))
@@ -61,5 +64,5 @@ def test_of_any_source_there_are_never_more_than_its_share(gaps):
     limiter, now, written = LogRateLimiter(), 0.0, 0
     for gap in gaps:
         now += gap
-        written += bool(limiter.line("eve", "x", now))
+        written += limiter.line("eve", HELD, now) is not None
     assert written <= BURST + RATE_HZ * now + 1e-6

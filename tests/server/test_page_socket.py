@@ -145,7 +145,7 @@ def test_points_come_when_they_change_and_not_again(server, page):
 
 def test_what_the_other_processes_log_reaches_the_page(server, page):
     page.hear("PageEvents")
-    event = m.LogEvent(header=HEADER, process="bridge", severity="warning", text="watchdog")
+    event = m.LogEvent(header=HEADER, process="bridge", reason=reasons.warned("watchdog"))
     server.wire.deliver(topics.EVENT, event)
     (line,) = page.hear("PageEvents")["events"]
     assert (line["process"], line["severity"], line["text"]) == ("bridge", "warning", "watchdog")

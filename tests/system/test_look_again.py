@@ -4,6 +4,7 @@ import pytest
 
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
+from rolling_panda.reasons import text_of
 from tests.support.worlds.closed_loop import ClosedLoop
 
 #: Far enough from the end of the row for the base to come before it (m, odom).
@@ -37,4 +38,6 @@ def test_what_was_unclear_is_settled_by_looking_again(seed: int) -> None:
         shown = [point for point in told.points if (point.vine, point.spur) == (place.vine, place.spur)]
         left = [each for each in told.undecided_sites if (each.vine, each.spur) == (place.vine, place.spur)]
         assert shown or all(each.needs == "operator" and each.reason for each in left)
-        assert any(f"looked again at vine {place.vine}, spur {place.spur}" in event.text for event in loop.events)
+        assert any(
+            f"looked again at vine {place.vine}, spur {place.spur}" in text_of(event.reason) for event in loop.events
+        )

@@ -16,6 +16,7 @@ from rolling_panda.messages.supervision import Person, Presence, TeleopTarget
 from rolling_panda.model.differential_drive import NXI, Array
 from rolling_panda.model.robot import ARM_Q, RobotModel
 from rolling_panda.model.wire_values import actuated, planar_pose
+from rolling_panda.reasons import text_of
 from rolling_panda.transport.inbox import Inbox
 
 _ALL = frozenset({"bridge", "controller", "perception", "server"})
@@ -151,7 +152,7 @@ class KinematicRobot:
                 case Records() if not self.ledger.failure:
                     self.ledger = LedgerState(message.rows[-1].number)
                 case m.LogEvent():
-                    self.events.append(message.text)
+                    self.events.append(text_of(message.reason))
                 case _ if not isinstance(message, msgspec.Struct) and not is_dataclass(message):
                     raise TypeError(f"the runner cannot send {message!r}")
         self.record.append(command)
