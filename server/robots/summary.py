@@ -1,8 +1,9 @@
 """A summary of a robot for the pages of the other robots: mode, holder of control, and the most urgent alarm."""
 
 from collections.abc import Callable
-from typing import Literal
+from typing import Any, Literal
 
+import msgspec
 from pydantic import BaseModel
 
 from rolling_panda import reasons
@@ -31,8 +32,7 @@ class RobotSummary(BaseModel):
         path: Of its page; its REST interface is below, as `PATHapi/state`.
         mode: Of its controller; None before its first message.
         severity: Of `alarm`.
-        alarm: The most urgent alarm, as text; empty without one.
-        code: Of the alarm in the catalogue of reasons.
+        alarm: The most urgent alarm as a reason with `code` and `values`; null without one.
         holder: User who holds control; empty when nobody does.
         yours: Whether the caller holds control.
         pages: Open pages of this robot.
@@ -42,8 +42,7 @@ class RobotSummary(BaseModel):
     path: str
     mode: Mode | None
     severity: Literal["", "info", "warning", "error"]
-    alarm: str
-    code: str
+    alarm: dict[str, Any] | None
     holder: str
     yours: bool
     pages: int
@@ -80,8 +79,7 @@ def _summary(
         path=path,
         mode=mode,
         severity="" if entry is None else entry.severity,
-        alarm="" if alarm is None else reasons.text_of(alarm),
-        code="" if entry is None else entry.code,
+        alarm=None if alarm is None else msgspec.to_builtins(alarm),
         holder=holder,
         yours=yours,
         pages=pages,

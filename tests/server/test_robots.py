@@ -211,4 +211,4 @@ def test_signing_out_of_one_signs_out_of_all_and_lets_everything_go(robots, clie
         assert client.get(f"/robots/{name}/api/state").status_code == 401
     for robot in robots:
         said = robot.wire.sent[topics.EVENT.name]
-        eventually(lambda said=said: "ann signed out" in [event.text for event in said])
+        eventually(lambda said=said: reasons.signed_out("ann") in [event.reason for event in said])

@@ -3,10 +3,13 @@
 from collections.abc import Iterator
 from typing import Any
 
+import msgspec
 import pytest
 from playwright.sync_api import Page, expect
 from starlette.responses import JSONResponse, Response
 
+from rolling_panda import reasons
+from rolling_panda.messages import Reason
 from server.robots.summary import RobotSummary
 from tests.support.axe import axe, grave
 from tests.support.page_host import PlayedRequest, PlayedSocket, page_host
@@ -25,7 +28,7 @@ class PlayedHall:
             name: PlayedServer(base=f"/robots/{name}", points=(point(number, "PROPOSED"),))
             for number, name in enumerate(("panda-1", "panda-2"), 1)
         }
-        self.alarms: dict[str, tuple[str, str]] = {}
+        self.alarms: dict[str, Reason] = {}
         self.stops: list[Any] = []
         self.online = True
 
@@ -56,15 +59,15 @@ class PlayedHall:
         robot.hear(socket, text)
 
     def summarize(self, name: str, robot: PlayedServer) -> RobotSummary:
-        severity, alarm = self.alarms.get(name, ("", ""))
+        alarm = self.alarms.get(name)
         mode = None if robot.controller is None else robot.controller.mode
         return RobotSummary.model_validate(
             {
                 "name": name,
                 "path": f"{robot.base}/",
                 "mode": mode,
-                "severity": severity,
-                "alarm": alarm,
+                "severity": "" if alarm is None else reasons.CATALOGUE[alarm.code].severity,
+                "alarm": None if alarm is None else msgspec.to_builtins(alarm),
                 "holder": "Ada" if name == "panda-1" else "Bob",
                 "yours": name == "panda-1",
                 "pages": 1,
@@ -100,7 +103,7 @@ def test_the_other_robot_is_seen_and_chosen_and_nothing_reaches_the_wrong_one(pa
     expect(second).to_contain_text("Bob holds control")
     expect(page).to_have_title("panda-1 · Rolling Panda")
     two.controller = controller("ESTOP_LATCHED")
-    hall.alarms["panda-2"] = ("error", "Stopped: by Bob")
+    hall.alarms["panda-2"] = reasons.robot_stopped(reasons.said("by Bob"))
     expect(second).to_contain_text("Stopped: by Bob")
     expect(second.locator(".robot-mode")).to_have_text("")
     expect(page.locator("rp-toasts")).to_contain_text("panda-2: Stopped: by Bob")
@@ -141,8 +144,10 @@ def test_the_other_robot_is_seen_and_chosen_and_nothing_reaches_the_wrong_one(pa
 
 def test_the_picker_is_for_fingers_keys_and_those_who_do_not_see_it(pages: Page, hall: PlayedHall, axe: str) -> None:
     page, names = pages, list(hall.robots)
-    hall.alarms["panda-2"] = ("warning", "A cut ended unknown, and this goes on for longer than there is room for it")
-    expect(page.locator('[data-robot="panda-2"]')).to_contain_text("A cut ended unknown")
+    hall.alarms["panda-2"] = reasons.robot_stopped(
+        reasons.said("for a cause that goes on for longer than there is room for it")
+    )
+    expect(page.locator('[data-robot="panda-2"]')).to_contain_text("Stopped: for a cause")
     for scheme in ("light", "dark"):
         page.emulate_media(color_scheme=scheme)
         assert grave(page, axe) == []

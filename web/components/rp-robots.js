@@ -3,8 +3,9 @@
 
 import { hold } from "../js/control/teleoperation.js";
 import { fetchJson } from "../js/link/api.js";
-import { MODE_WORDS, inWords } from "../js/state/format.js";
+import { MODE_WORDS } from "../js/state/format.js";
 import { showToast } from "../js/state/page-state.js";
+import { reasonText } from "../js/state/reasons.js";
 import { element, setText } from "../js/views/dom.js";
 import { SPAN_MS, history } from "../js/views/history.js";
 import { setIcon } from "../js/views/icons.js";
@@ -66,13 +67,15 @@ function restoreHistory() {
  * @property {string} path
  * @property {import("../js/link/messages.js").Mode|null} mode
  * @property {""|"warning"|"error"} severity
- * @property {string} alarm
+ * @property {import("../js/state/reasons.js").Reason|null} alarm
  * @property {string} holder
  * @property {boolean} yours
  * @property {number} pages
  */
 
 const PERIOD_MS = 1000;
+/** Alarms that name the mode. */
+const MODE_ALARMS = new Set(["robot_stopped", "robot_protective_stop", "robot_fault"]);
 
 class RpRobots extends HTMLElement {
   list = element("ul");
@@ -128,9 +131,9 @@ class RpRobots extends HTMLElement {
       link.dataset.severity = robot.severity;
       setIcon(shape, robot.severity || robot.mode || "UNKNOWN");
       const word = robot.mode === null ? "No state yet" : MODE_WORDS[robot.mode];
-      // No mode where the alarm already begins with it.
-      setText(mode, inWords(robot.alarm).startsWith(word) ? "" : word);
-      setText(alarm, inWords(robot.alarm));
+      // No mode where the alarm names it.
+      setText(mode, MODE_ALARMS.has(robot.alarm?.code ?? "") ? "" : word);
+      setText(alarm, reasonText(robot.alarm));
       setText(holder, robot.yours ? "You hold control" : robot.holder ? `${robot.holder} holds control` : "");
       const working = robot.mode === "AUTO" || robot.mode === "TELEOP";
       const leaving = here && working ? ". Work pauses when nobody looks at this robot" : "";
@@ -146,9 +149,10 @@ class RpRobots extends HTMLElement {
    * @param {Glance} robot
    */
   tell({ name, path, severity, alarm }) {
-    if (path === location.pathname || this.told.get(name) === alarm) return;
-    this.told.set(name, alarm);
-    if (severity) showToast(severity, `${name}: ${inWords(alarm)}`);
+    const text = reasonText(alarm);
+    if (path === location.pathname || this.told.get(name) === text) return;
+    this.told.set(name, text);
+    if (severity) showToast(severity, `${name}: ${text}`);
   }
 }
 customElements.define("rp-robots", RpRobots);
