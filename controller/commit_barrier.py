@@ -4,6 +4,8 @@ from collections import deque
 
 from controller.ledger.journal import LedgerState
 from rolling_panda import messages as m
+from rolling_panda import reasons
+from rolling_panda.reasons import text_of
 from rolling_panda.transport.inbox import Reply
 
 #: Time limit of a record; after it the answer is "not recorded" (s).
@@ -26,19 +28,20 @@ class CommitBarrier:
         out = []
         while self._waiting:
             number, since, message = self._waiting[0]
-            why = ""
+            why = None
             if number > ledger.durable:
-                why = ledger.failure
-                if not why and now - since > _PATIENCE_S:
-                    why = f"the ledger has not written it within {_PATIENCE_S} s"
-                if not why:
+                if ledger.failure:
+                    why = reasons.ledger_failed(ledger.failure)
+                elif now - since > _PATIENCE_S:
+                    why = reasons.ledger_silent(now - since)
+                else:
                     break
             self._waiting.popleft()
-            out.append(_unrecorded(message, why) if why else message)
+            out.append(message if why is None else _unrecorded(message, reasons.decision_unrecorded(why)))
         return out
 
 
-def _unrecorded(message: object, why: str) -> object:
+def _unrecorded(message: object, why: m.Reason) -> object:
     if not isinstance(message, Reply) or message.answer is None or not message.answer.ok:
         return message
-    return Reply(message.request, m.Answer(ok=False, reason=f"it was decided, but is not recorded: {why}"[:500]))
+    return Reply(message.request, m.Answer(ok=False, reason=text_of(why), refused=why))

@@ -220,7 +220,7 @@ class Controller:
         refused = refusal(command, now, self._situation(now, intent)) or self._handlers[command.message](intent, now)
         reason = said(refused) if isinstance(refused, str) and refused else (refused or None)
         told = "" if reason is None else text_of(reason)
-        row = RequestRow(asked=intent, ok=reason is None, reason=told, mode=self.mode)
+        row = RequestRow(asked=intent, reason=reason, mode=self.mode)
         self._journal.add("request", intent.user, row)
         if reason is not None:
             self._event_log.log(reasons.command_refused(intent.user, command.words, reason))

@@ -221,6 +221,11 @@ def ledger_failed(detail: str) -> None:
     """{detail}."""
 
 
+@_reason("error", "")
+def decision_unrecorded(cause: Reason) -> None:
+    """It was decided, but is not recorded: {cause}."""
+
+
 @_reason("warning", "")
 def lines_unrecorded(lines: float) -> None:
     """{lines:.0f} log lines of other processes exceeded the rate limit and were not recorded."""

@@ -80,7 +80,9 @@ def _lost(left: Records) -> Iterator[Finding]:
             yield Finding("lost row", f"cut {cut_id} has no intent")
     granted = Counter(left.told.granted)
     recorded = Counter(
-        (body["asked"]["type"], body["asked"].get("point_id", "")) for _, _, body in left.requests if body["ok"]
+        (body["asked"]["type"], body["asked"].get("point_id", ""))
+        for _, _, body in left.requests
+        if body["reason"] is None
     )
     for (kind, point), count in sorted(granted.items()):
         if recorded[kind, point] < count:

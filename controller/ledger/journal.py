@@ -77,11 +77,10 @@ class PreviewRequiredRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unkno
 
 
 class RequestRow(msgspec.Struct, frozen=True, kw_only=True):
-    """A command of an operator and its answer, also a refusal."""
+    """A command of an operator, and the reason of its refusal; None if it was done."""
 
     asked: intents.AnyIntent
-    ok: bool
-    reason: str
+    reason: m.Reason | None
     mode: m.Mode
 
 

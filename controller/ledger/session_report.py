@@ -9,16 +9,14 @@ from msgspec.structs import replace
 
 from controller.ledger.journal import RequestRow, TicketRow
 from rolling_panda import commands as intents
+from rolling_panda import messages as m
 from rolling_panda.messages.supervision import ControlReport, CutReport, RefusalReport, SessionReport, VineReport
 
 #: Largest number of each in the message; the ledger has all.
 _MOST_CUTS, _MOST_REFUSALS, _MOST_CHANGES = 500, 100, 100
 _ENDED = ("DONE", "FAILED_NOT_CUT", "UNKNOWN")
-_CONTROL: dict[type[intents.Intent], str] = {
-    intents.TakeControl: "took control",
-    intents.GrantControl: "gave control to the person who had asked",
-    intents.ReturnControl: "returned control",
-}
+#: Commands that change who has control.
+_CONTROL = (intents.TakeControl, intents.GrantControl, intents.ReturnControl)
 
 
 class SessionReportBuilder:
@@ -47,15 +45,15 @@ class SessionReportBuilder:
         match body:
             case TicketRow():
                 return self._ticket(body, when) or first
-            case RequestRow() if not body.ok:
+            case RequestRow(reason=m.Reason() as reason):
                 self._refused += 1
                 asked = type(body.asked).__name__
-                self._refusals.append(RefusalReport(at=when, user=body.asked.user, asked=asked, reason=body.reason))
+                self._refusals.append(RefusalReport(at=when, user=body.asked.user, asked=asked, reason=reason))
             case RequestRow() if isinstance(body.asked, intents.Start):
                 self._ready_since = when
             case RequestRow() if type(body.asked) in _CONTROL:
-                what = _CONTROL[type(body.asked)]
-                self._control.append(ControlReport(at=when, user=body.asked.user, what=what))
+                asked = type(body.asked).__name__
+                self._control.append(ControlReport(at=when, user=body.asked.user, asked=asked))
             case _:
                 return first
         return True

@@ -10,7 +10,6 @@ from rolling_panda import reasons
 from rolling_panda.commands import Handlers
 from rolling_panda.messages.supervision import NEVER_SEEN_S, ControlState, Presence
 from rolling_panda.messages.types import Reason, Role
-from rolling_panda.reasons import text_of
 from rolling_panda.transport.inbox import Received
 
 
@@ -108,7 +107,7 @@ class Authority:
             requested_by="" if requested is None else requested.user,
             requested_key="" if requested is None else requested.key,
             next_user="" if following is None else following.user,
-            notice="" if lease.notice is None else text_of(lease.notice),
+            notice=lease.notice,
             notice_number=lease.notice_number,
             supervised=not self.unwatched(now),
         )

@@ -202,7 +202,7 @@ class ControlState(Message, frozen=True, kw_only=True):
         requested_by: Name of the person who asks for control; empty without one.
         requested_key: Key of that person.
         next_user: Name of the person who gets control when the robot is at rest; empty without one.
-        notice: Last change of control, as text.
+        notice: Last change of control; None before the first.
         notice_number: Increases with each change, so that a page shows each notice once.
         supervised: Whether a person who may operate the robot sees it now.
     """
@@ -213,7 +213,7 @@ class ControlState(Message, frozen=True, kw_only=True):
     requested_by: Text
     requested_key: ClientKey
     next_user: Text
-    notice: Text
+    notice: Reason | None
     notice_number: Count
     supervised: bool
 
@@ -460,14 +460,14 @@ class RefusalReport(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     Attributes:
         at: Time (s since 1970).
         user: Who asked.
-        asked: The request, as text.
-        reason: Reason for the refusal, as text.
+        asked: Name of the command.
+        reason: Reason for the refusal.
     """
 
     at: WallTime
     user: Text
-    asked: Text
-    reason: Text
+    asked: Name
+    reason: Reason
 
 
 class ControlReport(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -476,12 +476,12 @@ class ControlReport(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     Attributes:
         at: Time (s since 1970).
         user: Who acted.
-        what: The change, as text.
+        asked: Name of the command.
     """
 
     at: WallTime
     user: Text
-    what: Text
+    asked: Name
 
 
 class SessionReport(Message, frozen=True, kw_only=True):

@@ -133,7 +133,7 @@ class RuleEffect(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     added: Count = 0
 
 
-class Reason(Struct, frozen=True, kw_only=True):
+class Reason(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A reason as data; `rolling_panda/reasons.py` has the text of each code.
 
     Attributes:

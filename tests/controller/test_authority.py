@@ -138,7 +138,7 @@ def test_the_old_holder_is_told_before_and_after_control_goes_over():
     it.review(None, True, 0.2)
     after = it.message(0.2)
     assert (after.holder, after.user, after.next_user) == ("b", "Bob", "")
-    assert after.notice_number > before.notice_number and "Bob" in after.notice
+    assert after.notice_number > before.notice_number and after.notice == reasons.control_given_over("Bob", "Ada")
 
 
 def test_a_request_for_control_is_told_granted_and_forgotten_in_time():

@@ -3,6 +3,7 @@
 from controller.commit_barrier import CommitBarrier
 from controller.ledger.journal import LedgerState
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.transport.inbox import Reply, Request
 
 
@@ -31,9 +32,10 @@ def test_a_failure_and_a_silence_turn_a_consent_into_a_refusal():
     waiting.hold(1, 0.0, refused := reply(ok=False))
     waiting.hold(1, 0.0, "state")
     failed, *others = waiting.settle(LedgerState(0, "disk full"), 0.0)
-    assert not failed.answer.ok and "disk full" in failed.answer.reason
+    assert failed.answer.refused == reasons.decision_unrecorded(reasons.ledger_failed("disk full"))
+    assert not failed.answer.ok
     assert others == [refused, "state"]
     waiting.hold(2, 10.0, reply())
     assert waiting.settle(LedgerState(0), 10.5) == []
-    (late,) = waiting.settle(LedgerState(0), 10.7)
-    assert not late.answer.ok and "0.6 s" in late.answer.reason
+    (late,) = waiting.settle(LedgerState(0), 10.75)
+    assert late.answer.refused == reasons.decision_unrecorded(reasons.ledger_silent(0.75))

@@ -186,8 +186,8 @@ def test_operator_is_answered_a_stop_latches_and_a_reset_releases_it(rest):
     rest.until(lambda: any("signed_in" in row.entry.body for row in rest.rows()))
     kinds = {row.entry.kind for row in rest.rows()}
     assert kinds == {"request", "stop", "event"}
-    refused = [row for row in rest.rows() if row.entry.kind == "request" and '"ok":false' in row.entry.body]
-    assert [row.entry.name for row in refused] == ["ada"] and "arm the robot first" in refused[0].entry.body
+    refused = [row for row in rest.rows() if row.entry.kind == "request" and '"reason":{' in row.entry.body]
+    assert [row.entry.name for row in refused] == ["ada"] and "impossible_in_idle" in refused[0].entry.body
     assert verify(rest.folder).problem == ""
 
 

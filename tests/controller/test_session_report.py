@@ -7,6 +7,7 @@ from msgspec.structs import replace
 from controller.ledger.journal import RequestRow, TicketRow
 from controller.ledger.session_report import SessionReportBuilder
 from rolling_panda import commands as intents
+from rolling_panda import reasons
 from rolling_panda.messages.supervision import SessionReport
 from rolling_panda.messages.types import Answer
 from rolling_panda.transport.codec import StrictDecoder, encode
@@ -23,8 +24,8 @@ def ticket(name, state, vine=1, **changes):
     return TicketRow(point=replace(pruning_point(name), vine=vine), state=state, cut_id=f"c-{name}", **changes)
 
 
-def asked(intent, reason=""):
-    return RequestRow(asked=intent, ok=not reason, reason=reason, mode="READY")
+def asked(intent, reason=None):
+    return RequestRow(asked=intent, reason=reason, mode="READY")
 
 
 def report(*rows):
@@ -112,11 +113,11 @@ def test_who_says_later_how_a_cut_ended_takes_the_robot_no_time():
 
 def test_refusals_and_changes_of_control_are_told_and_the_newest_go_over_the_wire():
     rows = [(1.0, asked(intents.TakeControl(user="bob", confirm=True)))]
-    rows += [(2.0 + n, asked(intents.Start(user="bob"), f"no point is accepted {n}")) for n in range(150)]
+    rows += [(2.0 + n, asked(intents.Start(user="bob"), reasons.control_held(f"user {n}"))) for n in range(150)]
     told = report(*rows)
-    assert [(change.user, change.what) for change in told.control] == [("bob", "took control")]
+    assert [(change.user, change.asked) for change in told.control] == [("bob", "TakeControl")]
     assert told.refusal_count == 150 and len(told.refusals) == 100
-    assert (told.refusals[-1].asked, told.refusals[-1].reason) == ("Start", "no point is accepted 149")
+    assert (told.refusals[-1].asked, told.refusals[-1].reason) == ("Start", reasons.control_held("user 149"))
 
 
 def test_points_without_a_cut_and_lines_of_the_log_are_not_in_it():
@@ -148,7 +149,7 @@ def test_only_the_newest_changes_of_control_go_over_the_wire():
 def test_a_refusal_and_a_change_of_control_change_the_report():
     account = SessionReportBuilder()
     account.add(at(0.0), Answer(ok=True))
-    assert account.add(at(1.0), asked(intents.Start(user="bob"), "no point is accepted"))
+    assert account.add(at(1.0), asked(intents.Start(user="bob"), reasons.control_held("ada")))
     assert account.add(at(2.0), asked(intents.TakeControl(user="bob")))
 
 

@@ -22,7 +22,7 @@ def server():
 
 def control(holder):
     return ControlState(
-        holder=holder, user="", expires_s=1.0, requested_by="", requested_key="", next_user="", notice="",
+        holder=holder, user="", expires_s=1.0, requested_by="", requested_key="", next_user="", notice=None,
         notice_number=0, supervised=True,
     )  # fmt: skip
 

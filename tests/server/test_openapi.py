@@ -75,7 +75,7 @@ class Answering(FakeWire):
                      start=PlanarPose(0.0, 0.0, 0.0), position=joints().position))  # fmt: skip
         self.deliver(topics.PREVIEW_MOTION, PreviewMotion(header=HEADER, preview_hash="0f"))
         self.deliver(topics.CONTROL, ControlState(holder="", user="", expires_s=0.0, requested_by="",
-                     requested_key="", next_user="", notice="", notice_number=0, supervised=True))  # fmt: skip
+                     requested_key="", next_user="", notice=None, notice_number=0, supervised=True))  # fmt: skip
 
 
 def wrong(server, path, examples):

@@ -85,7 +85,7 @@ def leave(page: Page, server: PlayedServer) -> None:
 
 
 FREE = ControlState(
-    holder="", user="", expires_s=0.0, requested_by="", requested_key="", next_user="", notice="", notice_number=0,
+    holder="", user="", expires_s=0.0, requested_by="", requested_key="", next_user="", notice=None, notice_number=0,
     supervised=True,
 )  # fmt: skip
 

@@ -7,6 +7,7 @@ import msgspec
 from playwright.sync_api import Page, expect
 
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.messages import page as p
 from rolling_panda.messages.supervision import (
     ControlReport,
@@ -331,9 +332,9 @@ def _report(page: Page, server: PlayedServer) -> None:
         cuts=cuts,
         cut_count=len(cuts),
         vines=(VineReport(vine=1, done=2, not_cut=1, seconds=11.4), VineReport(vine=2, done=1, unknown=1, seconds=9.1)),
-        refusals=(RefusalReport(at=MORNING + 70.0, user="Bob", asked="Start", reason="Ada holds control"),),
+        refusals=(RefusalReport(at=MORNING + 70.0, user="Bob", asked="Start", reason=reasons.control_held("Ada")),),
         refusal_count=1,
-        control=(ControlReport(at=MORNING + 5.0, user="Ada", what="took control, which nobody held"),),
+        control=(ControlReport(at=MORNING + 5.0, user="Ada", asked="TakeControl"),),
     )
     page.locator('[data-opens="report"]').click()
     expect(page.locator("rp-report tbody tr").first).to_be_visible()

@@ -35,6 +35,7 @@ from controller.loop import controller_runner
 from controller.work.queue_requests import QueueRequests
 from controller.work.point_queue import PointQueue
 from rolling_panda import messages as m
+from rolling_panda.reasons import said_or_none
 from rolling_panda.config import TransportConfig
 from rolling_panda.transport.inbox import Reply
 from rolling_panda.transport.zenoh import Transport
@@ -56,7 +57,7 @@ class Desk:
 
     def answer(self, intent, now):
         refused = self.handlers[type(intent)](intent, 0.0)
-        self.journal.add("request", intent.user, RequestRow(asked=intent, ok=not refused, reason=refused, mode="READY"))
+        self.journal.add("request", intent.user, RequestRow(asked=intent, reason=said_or_none(refused), mode="READY"))
         return m.Answer(ok=not refused, reason=refused)
 
     def step(self, inbox, now):

@@ -27,6 +27,7 @@ from controller.ledger.store import Entry, Ledger, read
 from controller.work.point_queue import PointQueue
 from controller.work.queue_requests import QueueRequests
 from rolling_panda import messages as m
+from rolling_panda.reasons import said_or_none
 from tests.support.fake_wire import FakeWire
 from tests.support.points import point as pruning_point
 from tests.support.running_server import running_server
@@ -73,7 +74,7 @@ class Robot:
 
     def answer(self, intent):
         refused = self.handlers[type(intent)](intent, 0.0)
-        self.journal.add("request", intent.user, RequestRow(asked=intent, ok=not refused, reason=refused, mode="READY"))
+        self.journal.add("request", intent.user, RequestRow(asked=intent, reason=said_or_none(refused), mode="READY"))
         self.record()
         return m.Answer(ok=not refused, reason=refused)
 
@@ -189,7 +190,7 @@ class Operators(RuleBasedStateMachine):
             requests = [json.loads(row.entry.body) for row in read(database) if row.entry.kind == "request"]
         # Each question and each refusal is on record, once.
         assert len(requests) == self.asked
-        assert sum(not request["ok"] for request in requests) == self.refused
+        assert sum(request["reason"] is not None for request in requests) == self.refused
         self.folder.cleanup()
 
 

@@ -5,6 +5,7 @@ import time
 import pytest
 from playwright.sync_api import Page, expect
 
+from rolling_panda import reasons
 from rolling_panda.messages.page import Ping
 from tests.support.page_host import STAND_STILL
 from tests.support.page_parts import held
@@ -42,7 +43,7 @@ def test_a_request_is_shown_and_granted_and_who_gave_is_told(page: Page, server:
     expect(page.locator("rp-lease")).to_contain_text("Bob asks for control")
     page.locator("#grant-control").click()
     until(page, lambda: any(path == "/api/control/grant" for path, _ in server.posted))
-    server.control = held("other", "Bob", notice="Bob holds control, before Ada", notice_number=3)
+    server.control = held("other", "Bob", notice=reasons.control_given_over("Bob", "Ada"), notice_number=3)
     expect(page.locator("rp-toasts")).to_contain_text("You no longer hold control")
     expect(page.locator("#request-control")).to_be_visible()
 

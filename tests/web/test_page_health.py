@@ -4,6 +4,7 @@ import msgspec
 import pytest
 from playwright.sync_api import Page, expect
 
+from rolling_panda import reasons
 from rolling_panda.messages.supervision import CutReport, RefusalReport, SessionReport, StopState, VineReport
 from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer, bridge, controller, point
@@ -143,7 +144,7 @@ def test_the_report_tells_cuts_by_outcome_and_vine_and_what_was_refused(page: Pa
         cuts=tuple(cuts),
         cut_count=2,
         vines=(VineReport(vine=1, done=1, unknown=1, seconds=8.0),),
-        refusals=(RefusalReport(at=2e9, user="Bob", asked="Start", reason="Ada holds control"),),
+        refusals=(RefusalReport(at=2e9, user="Bob", asked="Start", reason=reasons.control_held("Ada")),),
         refusal_count=1,
     )
     page.keyboard.press("Escape")

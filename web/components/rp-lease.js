@@ -3,6 +3,7 @@
 import { holder } from "../js/control/lease.js";
 import { ask } from "../js/link/api.js";
 import { pageState, showToast } from "../js/state/page-state.js";
+import { reasonText } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
 
@@ -51,7 +52,7 @@ class RpLease extends HTMLElement {
     const sure = performance.now() < this.armed;
     setText(this.take, !held ? "Take control" : sure ? "Really take it?" : "Take");
     this.take.title = held ? `Takes control from ${user}: the robot stops first, and they are told` : "";
-    this.announceLoss(mine, control?.notice_number ?? 0, control?.notice ?? "");
+    this.announceLoss(mine, control?.notice_number ?? 0, reasonText(control?.notice));
   }
 
   /** Taking control from another person needs a second press. */

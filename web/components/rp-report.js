@@ -1,10 +1,17 @@
 // The session report: cuts by outcome and vine, durations, refusals, and who held control.
 
 import { POINT_WORDS, clockWords, inWords } from "../js/state/format.js";
+import { reasonText } from "../js/state/reasons.js";
 import { element, setText } from "../js/views/dom.js";
 
 /** @typedef {import("../js/link/messages.js").SessionReport} SessionReport */
 
+/** @type {Readonly<Record<string, string>>} */
+const CONTROL_WORDS = Object.freeze({
+  TakeControl: "took control",
+  GrantControl: "gave control to the person who had asked",
+  ReturnControl: "returned control",
+});
 /** Refresh period while open (ms); the controller publishes it every 5 s. */
 const AGAIN_MS = 5000;
 
@@ -93,11 +100,11 @@ export class RpReport extends HTMLElement {
       "Nothing has been cut yet.",
     );
     this.refusals.show(
-      [...report.refusals].reverse().map((each) => [clockWords(each.at), each.user, each.asked, inWords(each.reason)]),
+      [...report.refusals].reverse().map((each) => [clockWords(each.at), each.user, each.asked, reasonText(each.reason)]),
       "Nothing was refused.",
     );
     this.control.show(
-      [...report.control].reverse().map((each) => [clockWords(each.at), each.user, each.what]),
+      [...report.control].reverse().map((each) => [clockWords(each.at), each.user, CONTROL_WORDS[each.asked]]),
       "Control has not changed hands.",
     );
   }

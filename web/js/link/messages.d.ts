@@ -312,8 +312,8 @@ export interface ControlState {
   requested_key: string;
   /** Name of the person who gets control when the robot is at rest; empty without one. */
   next_user: string;
-  /** Last change of control, as text. */
-  notice: string;
+  /** Last change of control; None before the first. */
+  notice: Reason|null;
   /** Increases with each change, so that a page shows each notice once. */
   notice_number: number;
   /** Whether a person who may operate the robot sees it now. */
@@ -745,10 +745,10 @@ export interface RefusalReport {
   at: number;
   /** Who asked. */
   user: string;
-  /** The request, as text. */
+  /** Name of the command. */
   asked: string;
-  /** Reason for the refusal, as text. */
-  reason: string;
+  /** Reason for the refusal. */
+  reason: Reason;
 }
 
 /** A change of control: taken, granted or returned. */
@@ -757,8 +757,8 @@ export interface ControlReport {
   at: number;
   /** Who acted. */
   user: string;
-  /** The change, as text. */
-  what: string;
+  /** Name of the command. */
+  asked: string;
 }
 
 /** Controller → all: cuts, refusals and changes of control since the controller started, as recorded on disk. */

@@ -29,6 +29,7 @@ export const REASONS = Object.freeze({
   commands_refused: ["The bridge has refused every command for {seconds:.0f} s: another token is asked for", ""],
   foreign_motion: ["The robot moves by commands of another sender", ""],
   ledger_failed: ["{detail}", ""],
+  decision_unrecorded: ["It was decided, but is not recorded: {cause}", ""],
   lines_unrecorded: ["{lines:.0f} log lines of other processes exceeded the rate limit and were not recorded", ""],
   ledger_silent: ["The ledger has written nothing for {seconds:.1f} s", "see whether its disk is full or hangs"],
   nothing_received: ["Nothing has arrived on {topic} yet", "wait, or start its sender"],
