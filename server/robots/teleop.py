@@ -213,6 +213,7 @@ class Teleoperation:
         log: RobotLog,
         held_elsewhere: Callable[[Session], str],
         on_end: Callable[[str, m.Reason], None],
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         """No session holds.
 
@@ -224,9 +225,10 @@ class Teleoperation:
             log: For holds, releases and refusals.
             held_elsewhere: Name of another robot that a session holds now; empty where it holds none.
             on_end: Called with a session's id and the reason when its hold was ended from elsewhere.
+            clock: Monotonic time (s).
         """
         self._link, self._scene, self._view, self._log = link, scene, view, log
-        self._held_elsewhere, self._on_end = held_elsewhere, on_end
+        self._held_elsewhere, self._on_end, self._clock = held_elsewhere, on_end, clock
         self._hold = TeleopHold(config)
         self._limiter = TokenBuckets(MOTION_RATE_HZ, _MOTION_BURST)
         self._refused: dict[str, m.Reason] = {}
@@ -327,7 +329,7 @@ class Teleoperation:
         if target is None:
             return
         self._hold.set_target(owner, target)
-        now = time.monotonic()
+        now = self._clock()
         self._expire(now)
         if self._hold.holder == owner and self._hold.follows_gizmo and now - self._sent_at >= _MIN_TARGET_PERIOD_S:
             self._sent_at = now
@@ -335,7 +337,7 @@ class Teleoperation:
 
     def show_gizmo(self, session: Session, axes: GizmoAxes = "tool") -> None:
         """Show this session's gizmo at the tool, along these axes; its hold ends."""
-        tool = self._view.tool(time.monotonic())
+        tool = self._view.tool(self._clock())
         if not session.may_operate or tool is None:
             refused = reasons.tool_unknown() if session.may_operate else reasons.viewer_only()
             self._log.note(reasons.gizmo_refused(session.user, refused), session.client)
@@ -367,7 +369,7 @@ class Teleoperation:
         """End this session's hold at once; its gizmo returns to the tool."""
         self._refused.pop(session.session_id, None)
         if self._hold.release(session.session_id):
-            self._send(time.monotonic())
+            self._send(self._clock())
             self._reset_gizmo(session.session_id, reasons.hold_ended_elsewhere())
             self._log.note(reasons.hold_released(session.user), session.client)
 
@@ -399,7 +401,7 @@ class Teleoperation:
         """After a hold: the gizmo and its target return to the tool; pages that hold are sent a reason."""
         if reason is not None:
             self._on_end(owner, reason)
-        tool = self._view.tool(time.monotonic())
+        tool = self._view.tool(self._clock())
         self._scene.gizmos.reset(owner, tool)
         if tool is not None and self._scene.gizmos.shown(owner):
             self._hold.set_target(owner, tool)
