@@ -85,11 +85,6 @@ class TeleopHold:
         self._rendered_at.pop(view, None)
         self._latency_s.pop(view, None)
 
-    def set_target(self, holder: str, target: m.Pose) -> None:
-        """Set the pose of this holder's gizmo; without effect while they hold base or joints."""
-        if self.holder != holder or self.follows_gizmo:
-            self.set_command(holder, TeleopCommand(target))
-
     def set_command(self, holder: str, command: TeleopCommand) -> None:
         """Set this holder's command; the newest wins."""
         self._commands[holder] = command
@@ -201,7 +196,7 @@ class TeleopHold:
 class Teleoperation:
     """The stream of one robot's teleoperation: the only writer of the aim, and the only sender of `TeleopTarget`.
 
-    The aim of a session comes from its gizmo, from the velocities that its page holds, or from its script.
+    The aim of a session is the pose of its gizmo, the velocities that its page holds, or the command of its script.
     """
 
     def __init__(
@@ -275,7 +270,8 @@ class Teleoperation:
         Args:
             session: Of the holder.
             now: Monotonic time (s).
-            command: Where to move; None for the last target, or the gizmo of a page.
+            command: Where to move. None is the pose of the gizmo; where none is shown, and for a script that holds, it
+                is the last command.
             view: The page that holds; empty for a script.
             speed_scale: Fraction of the usual speed.
 
@@ -283,8 +279,9 @@ class Teleoperation:
             Why it is refused; None where it holds.
         """
         key = session.session_id
-        if command is None and view and (pose := self._scene.gizmos.pose(key)) is not None:
-            command = TeleopCommand(pose)
+        if command is None and (view or self._hold.holder != key):
+            pose = self._scene.gizmos.pose(key)
+            command = None if pose is None else TeleopCommand(pose)
         if command is not None:
             self._hold.set_command(key, command)
         refused = self._refusal(session)
@@ -328,10 +325,12 @@ class Teleoperation:
         target = self._scene.gizmos.drag(owner, gizmo.position, gizmo.wxyz)
         if target is None:
             return
-        self._hold.set_target(owner, target)
         now = self._clock()
         self._expire(now)
-        if self._hold.holder == owner and self._hold.follows_gizmo and now - self._sent_at >= _MIN_TARGET_PERIOD_S:
+        if self._hold.holder != owner or not self._hold.follows_gizmo:
+            return
+        self._hold.set_command(owner, TeleopCommand(target))
+        if now - self._sent_at >= _MIN_TARGET_PERIOD_S:
             self._sent_at = now
             self._send(now)
 
@@ -344,7 +343,6 @@ class Teleoperation:
             return
         self.release(session)
         self._scene.show_gizmo(session.session_id, tool, axes)
-        self._hold.set_target(session.session_id, tool)
 
     def hide_gizmo(self, session: Session) -> None:
         """Hide this session's gizmo, and end its hold."""
@@ -356,9 +354,7 @@ class Teleoperation:
         """Move each gizmo that is not dragged to the tool."""
         tool = self._view.tool(now)
         if tool is not None:
-            holder = self._hold.holder if self._hold.follows_gizmo else None
-            for owner in self._scene.gizmos.follow(tool, holder):
-                self._hold.set_target(owner, tool)
+            self._scene.gizmos.follow(tool, self._hold.holder if self._hold.follows_gizmo else None)
 
     def step(self, now: float) -> None:
         """End a hold that has lapsed, and send what is due: the target, or the end of a hold."""
@@ -398,10 +394,7 @@ class Teleoperation:
             self._reset_gizmo(ended)
 
     def _reset_gizmo(self, owner: str, reason: m.Reason | None = None) -> None:
-        """After a hold: the gizmo and its target return to the tool; pages that hold are sent a reason."""
+        """After a hold: the gizmo returns to the tool; pages that hold are sent a reason."""
         if reason is not None:
             self._on_end(owner, reason)
-        tool = self._view.tool(self._clock())
-        self._scene.gizmos.reset(owner, tool)
-        if tool is not None and self._scene.gizmos.shown(owner):
-            self._hold.set_target(owner, tool)
+        self._scene.gizmos.reset(owner, self._view.tool(self._clock()))

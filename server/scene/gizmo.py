@@ -95,14 +95,11 @@ class SceneGizmos:
             for handle in gizmo.handles.values():
                 handle.remove()
 
-    def follow(self, tool: m.Pose, holder: str | None) -> list[str]:
-        """Move every undragged gizmo to the tool, except that of `holder`; returns the owners of those that moved."""
-        moved = []
+    def follow(self, tool: m.Pose, holder: str | None) -> None:
+        """Move every undragged gizmo to the tool, except that of `holder`."""
         for owner, gizmo in self._gizmos.items():
             if owner != holder and not gizmo.dragged and _difference(gizmo.pose, tool) > _DEADBAND:
                 self._place(gizmo, tool)
-                moved.append(owner)
-        return moved
 
     def reset(self, owner: str, tool: m.Pose | None) -> None:
         """Return a gizmo to the tool; where the tool's pose is unknown, it follows once it is known."""

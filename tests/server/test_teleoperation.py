@@ -225,6 +225,15 @@ def test_each_new_refusal_is_noted_once(hands: Hands) -> None:
     hands.teleop.release(BOB)
     hands.hold(BOB, DRIVE)
     assert len(hands.notes) == 4, "let go and pressed anew"
+    hands.teleop.release(ANN)
+    hands.hold(BOB, DRIVE)
+    hands.elsewhere = "panda-2"
+    hands.hold(BOB, DRIVE)
+    hands.elsewhere = ""
+    hands.hold(BOB, DRIVE)
+    hands.elsewhere = "panda-2"
+    hands.hold(BOB, DRIVE)
+    assert hands.notes.count(other) == 3, "each after a hold that was granted"
 
 
 @pytest.mark.parametrize(
@@ -269,6 +278,20 @@ def test_a_hidden_gizmo_ends_the_hold_and_its_pose_is_forgotten(hands: Hands) ->
 
 def test_a_session_that_ends_leaves_no_target(hands: Hands) -> None:
     hands.hold(ANN, DRIVE)
-    hands.teleop.forget(ANN)
-    assert hands.teleop.holder is None
-    assert hands.hold(ANN) == reasons.hold_without_target()
+    hands.hold(BOB, DRIVE)
+    for session in (ANN, BOB):
+        hands.teleop.forget(session)
+        assert hands.teleop.holder is None
+        assert hands.hold(session) == reasons.hold_without_target()
+
+
+def test_a_script_keeps_its_last_command_and_a_page_takes_its_gizmo(hands: Hands) -> None:
+    hands.teleop.show_gizmo(ANN)
+    hands.teleop.view_rendered("ann", hands.now, hands.now)
+    for command, base in ((None, None), (DRIVE, DRIVE.base), (None, DRIVE.base)):
+        assert hands.teleop.hold(ANN, hands.now, command) is None
+        hands.teleop.step(hands.now)
+        assert hands.sent[-1].base == base
+    hands.hold(ANN)
+    hands.teleop.step(hands.now)
+    assert (hands.sent[-1].base, hands.sent[-1].target) == (None, hands.tool)
