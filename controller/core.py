@@ -47,7 +47,7 @@ from rolling_panda.config import RobotConfig
 from rolling_panda.errors import ControlError
 from rolling_panda.messages.perception import CloseUpRequest, CloseUpResult, Obstacles
 from rolling_panda.messages.supervision import StopRecord
-from rolling_panda.reasons import said, said_or_none, text_of, warned
+from rolling_panda.reasons import said, text_of
 from rolling_panda.transport.inbox import Answered, Inbox, Rejected, Reply, Request
 
 _STATE_S = 0.05
@@ -217,8 +217,7 @@ class Controller:
         if command is None:
             unknown = reasons.command_unknown(type(intent).__name__)
             return m.Answer(ok=False, reason=text_of(unknown), refused=unknown)
-        refused = refusal(command, now, self._situation(now, intent)) or self._handlers[command.message](intent, now)
-        reason = said(refused) if isinstance(refused, str) and refused else (refused or None)
+        reason = refusal(command, now, self._situation(now, intent)) or self._handlers[command.message](intent, now)
         told = "" if reason is None else text_of(reason)
         row = RequestRow(asked=intent, reason=reason, mode=self.mode)
         self._journal.add("request", intent.user, row)
@@ -265,14 +264,14 @@ class Controller:
         sequence, bridge, points = self._movement.sequence, self._supervisor.bridge, inbox.newest(m.PruningPoints)
         if bridge is not None:
             close_up = inbox.newest(CloseUpResult)
-            for text in sequence.watch(bridge, None if close_up is None else close_up.message, now):
-                self._event_log.log(said(text))
+            for ended in sequence.watch(bridge, None if close_up is None else close_up.message, now):
+                self._event_log.log(ended)
         if points is not None and points is not self._points_seen:
             self._points_seen = points
-            for text in self._queue.update(points.message, sequence.in_canes):
-                self._event_log.log(warned(text))
-        if back := self._queue.restored():
-            self._event_log.log(reasons.points_accepted_again(back))
+            for voided in self._queue.update(points.message, sequence.in_canes):
+                self._event_log.log(voided)
+        if (back := self._queue.restored()) is not None:
+            self._event_log.log(back)
         return stops
 
     def _move(self, now: float) -> MotionResult:
@@ -285,9 +284,9 @@ class Controller:
             return self._movement.ramp()
         if moved.event is not None:
             event, why = moved.event
-            supervisor.event(event, now, said(why))
-        if moved.remark:
-            supervisor.remark(said(moved.remark))
+            supervisor.event(event, now, why)
+        if moved.remark is not None:
+            supervisor.remark(moved.remark)
         return moved
 
     def _cut(self, cut_id: str, point_id: str) -> m.CutCommand | None:
@@ -306,8 +305,7 @@ class Controller:
         return CloseUpRequest(epoch=token.epoch, number=due[0], point_id=due[1])
 
     def _situation(self, now: float, intent: intents.Intent | None = None) -> Situation:
-        waits, approval = said_or_none(self._queue.waits), said_or_none(self._previews.start_refused())
-        return self._supervisor.situation(waits, approval, now, intent)
+        return self._supervisor.situation(self._queue.waits, self._previews.start_refused(), now, intent)
 
     def _change_mode(self, asked: intents.Intent, now: float) -> m.Reason | None:
         """Process the command's event. A client that moves a robot without a holder gets control."""

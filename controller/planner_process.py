@@ -10,8 +10,10 @@ from multiprocessing.connection import Connection
 from controller.config import ControllerConfig
 from controller.planning.preview_plan import Preview, PreviewRequest
 from controller.planning.work_plan import PlanRequest, WorkPlan
+from rolling_panda import reasons
 from rolling_panda.config import RobotConfig
 from rolling_panda.errors import RollingPandaError
+from rolling_panda.messages.types import Reason
 from rolling_panda.runtime.scheduling import set_priority
 
 #: Time limit for the process to end (s).
@@ -82,7 +84,7 @@ class PlannerProcess:
                 connection.send(request)
                 self._made.append(connection.recv())
             except (EOFError, OSError):
-                self._made.append(_failed(request, "the planning process ended; the next request starts it again"))
+                self._made.append(_failed(request, reasons.planner_ended()))
                 connection.close()
                 connection = None
         if connection is not None:
@@ -134,11 +136,11 @@ def _plan(connection: Connection, config: ControllerConfig, robot_config: RobotC
         try:
             made = rollout.roll(request) if isinstance(request, PreviewRequest) else planner.plan(request)
         except RollingPandaError as error:
-            made = _failed(request, str(error))
+            made = _failed(request, reasons.said(str(error)))
         connection.send(made)
 
 
-def _failed(request: PlanRequest | PreviewRequest, why: str) -> WorkPlan | Preview:
+def _failed(request: PlanRequest | PreviewRequest, why: Reason) -> WorkPlan | Preview:
     if isinstance(request, PreviewRequest):
         return Preview(request, failure=why)
     return WorkPlan(request, failure=why)

@@ -363,8 +363,8 @@ class ReturnControl(Intent, frozen=True, kw_only=True):
     """Give up control. Motion is paused."""
 
 
-#: Handles a command at a monotonic time (s). Returns the reason of a refusal; None or empty if done.
-Handler = Callable[[Any, float], Reason | str | None]
+#: Handles a command at a monotonic time (s). Returns the reason of a refusal; None if done.
+Handler = Callable[[Any, float], Reason | None]
 Handlers = dict[type[Struct], Handler]
 
 #: Condition of a command beside its mode; `controller/supervision/permission.py` checks each.

@@ -72,7 +72,7 @@ def entry_of(severity: Severity, act: str, made: Callable[P, None]) -> tuple[Ent
     Raises:
         MessageError: The text does not name exactly the parameters.
     """
-    code, text = made.__name__, (made.__doc__ or "").strip().removesuffix(".")
+    code, text = made.__name__, " ".join((made.__doc__ or "").split()).removesuffix(".")
     parameters = tuple(signature(made).parameters)
     named = {name for _, name, _, _ in Formatter().parse(text) if name is not None}
     if not text or named != set(parameters):
@@ -464,11 +464,6 @@ def command_refused(user: str, command: str, cause: Reason) -> None:
 @_reason("warning", "")
 def release_refused(cause: Reason) -> None:
     """The stop is not released: {cause}."""
-
-
-@_reason("info", "")
-def points_accepted_again(points: str) -> None:
-    """Accepted again after the rule was undone: {points}."""
 
 
 # Commands
@@ -1038,3 +1033,608 @@ def plain_wire() -> None:
 @_reason("warning", "")
 def lines_left_out(cause: Reason, lines: float) -> None:
     """{cause} (and {lines:.0f} lines like it before)."""
+
+
+# Work: points
+
+
+@_reason("warning", "")
+def point_state(point: str, state: str) -> None:
+    """{point} is {state}."""
+
+
+@_reason("warning", "look, and report the outcome first")
+def outcome_undecided(point: str) -> None:
+    """It is unknown whether {point} is cut."""
+
+
+@_reason("warning", "")
+def point_unreachable(point: str, why: Reason) -> None:
+    """{point} is accepted, and cannot be reached: {why}."""
+
+
+@_reason("warning", "")
+def point_unseen(point: str) -> None:
+    """Perception does not see {point} any more."""
+
+
+@_reason("warning", "look at it again")
+def point_revised(point: str, seen: float, now: float) -> None:
+    """{point} has changed since: revision {seen:.0f} was seen, it is {now:.0f} now."""
+
+
+@_reason("warning", "look at it again")
+def point_replaced(point: str, now: str, seen: str) -> None:
+    """{point} is not what was seen: its hash is {now}, not {seen}."""
+
+
+@_reason("warning", "cut it by hand")
+def cane_too_thick(point: str, diameter_mm: float, limit_mm: float) -> None:
+    """The cane of {point} is {diameter_mm:.0f} mm thick, the limit is {limit_mm:.0f} mm."""
+
+
+@_reason("info", "")
+def rejected() -> None:
+    """Rejected."""
+
+
+@_reason("warning", "")
+def nothing_to_take_back(point: str, state: str) -> None:
+    """{point} is {state}: there is no decision to take back."""
+
+
+@_reason("warning", "")
+def outcome_known(point: str, state: str) -> None:
+    """The outcome of {point} is not in question: it is {state}."""
+
+
+@_reason("info", "")
+def inspected(user: str, finding: str) -> None:
+    """{user} looked: {finding}."""
+
+
+@_reason("info", "")
+def not_queued_yet() -> None:
+    """The controller has not taken it up yet."""
+
+
+@_reason("info", "accept a point")
+def none_accepted() -> None:
+    """No point is accepted."""
+
+
+@_reason("warning", "move the robot, or turn the approach")
+def none_reachable(count: float) -> None:
+    """No accepted point can be reached, of {count:.0f}."""
+
+
+@_reason("warning", "lower the confidence, or accept points one by one")
+def none_so_confident(confidence: float) -> None:
+    """No proposed point has a confidence of {confidence:.2f} or more."""
+
+
+@_reason("warning", "")
+def none_acceptable(count: float, first: Reason) -> None:
+    """None of {count:.0f} points can be accepted; the first: {first}."""
+
+
+@_reason("info", "")
+def points_accepted(user: str, count: float, confidence: float) -> None:
+    """{user}: points accepted: {count:.0f}, of confidence {confidence:.2f} and more."""
+
+
+@_reason("info", "")
+def cutting() -> None:
+    """The blades close."""
+
+
+@_reason("warning", "look, and report the outcome")
+def interrupted() -> None:
+    """The controller ended before it knew whether this was cut."""
+
+
+@_reason("info", "wait until perception reports it again")
+def accepted_before_restart() -> None:
+    """Accepted before a restart."""
+
+
+@_reason("warning", "accept it again")
+def record_damaged() -> None:
+    """Its record does not match its hash."""
+
+
+@_reason("warning", "accept it again if it is right")
+def acceptance_void(why: Reason) -> None:
+    """The acceptance is void: {why}."""
+
+
+@_reason("warning", "")
+def acceptance_lost(point: str, why: Reason) -> None:
+    """{point}: {why}."""
+
+
+@_reason("warning", "")
+def no_longer_reported() -> None:
+    """Perception no longer reports it."""
+
+
+@_reason("warning", "")
+def moved_after_acceptance(distance_mm: float) -> None:
+    """It moved by {distance_mm:.0f} mm after it was accepted."""
+
+
+@_reason("warning", "")
+def turned_after_acceptance(angle_deg: float) -> None:
+    """Its cane turned by {angle_deg:.0f}° after it was accepted."""
+
+
+@_reason("warning", "")
+def rule_cuts_elsewhere(rule: Reason, distance_mm: float) -> None:
+    """The rule is now: {rule}. It cuts {distance_mm:.0f} mm away."""
+
+
+@_reason("warning", "")
+def rule_cuts_otherwise(rule: Reason) -> None:
+    """The rule is now: {rule}. It cuts otherwise here."""
+
+
+@_reason("warning", "")
+def rule_wants_no_cut(rule: Reason) -> None:
+    """The rule is now: {rule}. It asks for no such cut."""
+
+
+@_reason("info", "")
+def spur_rule(nodes: float, diameter_mm: float, past_mm: float) -> None:
+    """Spur, nodes kept: {nodes:.0f}, from {diameter_mm:g} mm, {past_mm:.0f} mm past the last node."""
+
+
+@_reason("info", "")
+def guyot_rule(nodes: float, fruiting: float, diameter_mm: float, past_mm: float) -> None:
+    """Guyot, nodes kept: {nodes:.0f} + {fruiting:.0f}, from {diameter_mm:g} mm, {past_mm:.0f} mm past the last node."""
+
+
+@_reason("warning", "accept again what is to be cut")
+def nothing_to_restore() -> None:
+    """The controller knows of no acceptance that this rule made void."""
+
+
+@_reason("info", "")
+def acceptances_restored(points: str) -> None:
+    """Accepted again after the rule was undone: {points}."""
+
+
+# Work: order and approach
+
+
+@_reason("warning", "look at the order again")
+def order_changed_by(user: str, seen: float, now: float) -> None:
+    """{user} has changed the order since: number {seen:.0f} was seen, it is {now:.0f} now."""
+
+
+@_reason("warning", "look at the order again")
+def order_changed(seen: float, now: float) -> None:
+    """The order has changed since: number {seen:.0f} was seen, it is {now:.0f} now."""
+
+
+@_reason("warning", "accept it first")
+def not_in_order(point: str) -> None:
+    """{point} is not accepted; only accepted points have a place in the order of work."""
+
+
+@_reason("warning", "")
+def unreachable_in_order(point: str, why: Reason) -> None:
+    """{point} cannot be reached, so it has no place in the order of work: {why}."""
+
+
+@_reason("warning", "")
+def before_itself(point: str) -> None:
+    """{point} cannot come before itself."""
+
+
+@_reason("info", "")
+def order_of_plan() -> None:
+    """The order is the plan's already."""
+
+
+@_reason("warning", "choose a smaller angle")
+def approach_too_far(angle_deg: float, limit_deg: float) -> None:
+    """The approach cannot be turned by {angle_deg:.0f}°; at most {limit_deg:.0f}° are possible."""
+
+
+# Work: motions and cuts
+
+
+@_reason("warning", "wait until it is there")
+def homing() -> None:
+    """The arm is being brought home."""
+
+
+@_reason("warning", "wait until the cut has ended")
+def blades_closing() -> None:
+    """The blades are closing."""
+
+
+@_reason("info", "")
+def arm_home() -> None:
+    """The arm is home."""
+
+
+@_reason("warning", "")
+def homing_blocked(cause: str) -> None:
+    """Homing was stopped: the arm is held by {cause}."""
+
+
+@_reason("warning", "")
+def survey_blocked(cause: str) -> None:
+    """The survey was stopped: the robot is held by {cause}."""
+
+
+@_reason("info", "")
+def survey_returns(places: float) -> None:
+    """The survey drives back; places to look at again: {places:.0f}."""
+
+
+@_reason("warning", "")
+def survey_blind() -> None:
+    """The survey has ended; perception has reported nothing."""
+
+
+@_reason("info", "")
+def surveyed(vines: float, spurs: float, points: float, unclear: float, asking: float) -> None:
+    """Vines {vines:.0f}, spurs {spurs:.0f}, points {points:.0f} seen; {unclear:.0f} unclear, {asking:.0f} to decide."""
+
+
+@_reason("info", "")
+def looked_again(vine: float, spur: float, points: str) -> None:
+    """Looked again at vine {vine:.0f}, spur {spur:.0f}: nothing is left open; points: {points}."""
+
+
+@_reason("info", "")
+def looked_again_unclear(vine: float, spur: float, why: Reason) -> None:
+    """Looked again at vine {vine:.0f}, spur {spur:.0f}; still unclear: {why}."""
+
+
+@_reason("info", "decide about it")
+def looked_again_asks(vine: float, spur: float, why: Reason) -> None:
+    """Looked again at vine {vine:.0f}, spur {spur:.0f}; it is for you to decide: {why}."""
+
+
+@_reason("info", "")
+def work_done() -> None:
+    """No accepted point is left."""
+
+
+@_reason("warning", "move the robot, or turn the approach")
+def work_done_but(unreachable: float) -> None:
+    """No accepted point is left that can be reached; cannot be reached: {unreachable:.0f}."""
+
+
+@_reason("warning", "")
+def point_left(point: str, why: Reason) -> None:
+    """{point} was left: {why}."""
+
+
+@_reason("warning", "")
+def point_gone() -> None:
+    """The point has gone."""
+
+
+@_reason("warning", "")
+def accepted_again() -> None:
+    """It was accepted again."""
+
+
+@_reason("warning", "")
+def point_not_cut(point: str, why: Reason) -> None:
+    """{point} was not cut: {why}."""
+
+
+@_reason("info", "")
+def cut_done(point: str, outcome: Reason) -> None:
+    """{point}: {outcome}."""
+
+
+@_reason("warning", "")
+def cut_ended(point: str, outcome: Reason) -> None:
+    """{point}: {outcome}."""
+
+
+@_reason("error", "look, and report the outcome")
+def outcome_unknown(point: str, why: Reason) -> None:
+    """The outcome of {point} is unknown: {why}."""
+
+
+@_reason("warning", "")
+def not_reached(goal: str, position_mm: float, rotation_deg: float) -> None:
+    """In the time allowed {goal} was missed by {position_mm:.1f} mm and {rotation_deg:.1f}°."""
+
+
+@_reason("warning", "")
+def not_reached_for(goal: str, position_mm: float, rotation_deg: float, cause: str) -> None:
+    """{cause} held the robot; {goal} was missed by {position_mm:.1f} mm and {rotation_deg:.1f}°."""
+
+
+@_reason("warning", "")
+def retreat_by_joints(point: str, why: Reason) -> None:
+    """{point}: the straight way back failed, the arm now retreats by its joints: {why}."""
+
+
+@_reason("error", "check the brakes, the drive and what may hold the robot")
+def tracking_error(part: str, error_rad: float, limit_rad: float) -> None:
+    """The robot does not follow: {part} is {error_rad:.2f} rad from its command; the limit is {limit_rad:.2f} rad."""
+
+
+@_reason("warning", "move the point along its cane, or cut this one by hand")
+def no_clear_posture(near: Reason) -> None:
+    """Every posture that reaches it comes too near to an obstacle; in the best one: {near}."""
+
+
+@_reason("warning", "")
+def too_near(place: str, distance_mm: float, part: str, other: str, needed_mm: float) -> None:
+    """{place}, {distance_mm:.0f} mm would be between {part} and {other}, {needed_mm:.0f} mm are needed."""
+
+
+@_reason("warning", "")
+def out_of_reach(distance: float, height: float) -> None:
+    """No posture of the arm reaches it: it is {distance:.2f} m beside the robot's path and {height:.2f} m high."""
+
+
+@_reason("warning", "")
+def no_square_approach() -> None:
+    """The cane points straight at the robot: no approach is square to it."""
+
+
+@_reason("warning", "")
+def not_reachable(why: Reason) -> None:
+    """Not reachable: {why}."""
+
+
+# Work: checks of a cut
+
+
+@_reason("info", "")
+def cutter_cut() -> None:
+    """The cutter reports a cut."""
+
+
+@_reason("warning", "")
+def cutter_missed() -> None:
+    """The cutter reports that nothing was cut."""
+
+
+@_reason("error", "")
+def cutter_unsure() -> None:
+    """The cutter does not know whether it cut."""
+
+
+@_reason("warning", "")
+def no_order_given(limit_s: float) -> None:
+    """No order was given within {limit_s:g} s."""
+
+
+@_reason("error", "look whether it is cut")
+def no_cutter_report(limit_s: float) -> None:
+    """The cutter did not report for {limit_s:g} s."""
+
+
+@_reason("info", "")
+def cut_and_gone() -> None:
+    """Cut, and the wood is off."""
+
+
+@_reason("error", "look")
+def gone_but(report: Reason) -> None:
+    """{report}, but the wood beyond is gone."""
+
+
+@_reason("warning", "")
+def unseen_after(report: Reason, why: Reason) -> None:
+    """{report}; not seen afterwards: {why}."""
+
+
+@_reason("warning", "")
+def robot_left() -> None:
+    """The robot left before the close-up."""
+
+
+@_reason("warning", "")
+def stands_cut_again(report: Reason) -> None:
+    """{report}, but it still stands: it is cut once more."""
+
+
+@_reason("error", "look")
+def stands_unknown(report: Reason) -> None:
+    """Twice: {report}. It still stands."""
+
+
+@_reason("warning", "")
+def stands_not_cut(report: Reason) -> None:
+    """Twice: {report}. It was not cut."""
+
+
+@_reason("warning", "")
+def not_accepted_any_more() -> None:
+    """It is not accepted any more."""
+
+
+@_reason("warning", "")
+def gone_already() -> None:
+    """Its cane is off already, as the close-up shows."""
+
+
+@_reason("warning", "accept it again if it is right")
+def changed_in_close_up(why: Reason) -> None:
+    """In the close-up: {why}."""
+
+
+@_reason("warning", "")
+def unseen_in_close_up(why: Reason) -> None:
+    """The close-up did not show it: {why}."""
+
+
+@_reason("warning", "accept it again")
+def moved_in_close_up(distance_mm: float) -> None:
+    """It moved by {distance_mm:.0f} mm in the close-up."""
+
+
+# Planning
+
+
+@_reason("warning", "look at it and approve it first")
+def preview_not_approved() -> None:
+    """The preview is ready."""
+
+
+@_reason("warning", "ask for one and approve it")
+def preview_needed() -> None:
+    """A preview before each cut is required."""
+
+
+@_reason("warning", "approve it")
+def preview_awaited(point: str) -> None:
+    """The way to {point} waits for its preview."""
+
+
+@_reason("warning", "ask for another preview")
+def not_in_preview(point: str) -> None:
+    """{point} is not in the approved preview as it is accepted now."""
+
+
+@_reason("warning", "ask for another preview")
+def not_cut_in_preview(point: str, why: Reason) -> None:
+    """The approved preview does not cut {point}: {why}."""
+
+
+@_reason("warning", "ask for another preview")
+def skipped_before(point: str, before: str) -> None:
+    """{before} was skipped, so that the motion to {point} is another one than was approved."""
+
+
+@_reason("info", "")
+def previewed_work_ended() -> None:
+    """The work that it was approved for has ended."""
+
+
+@_reason("info", "wait")
+def robot_moves() -> None:
+    """The robot still moves."""
+
+
+@_reason("info", "wait")
+def plan_being_made() -> None:
+    """The plan is being made."""
+
+
+@_reason("warning", "accept it first")
+def point_to_accept(point: str, state: str) -> None:
+    """{point} is {state}."""
+
+
+@_reason("warning", "move the latter to the front")
+def another_comes_first(other: str, point: str) -> None:
+    """In the order of work {other} comes before {point}."""
+
+
+@_reason("error", "ask for another one")
+def preview_failed(why: Reason) -> None:
+    """The preview failed: {why}."""
+
+
+@_reason("warning", "")
+def robot_elsewhere(distance: float) -> None:
+    """The robot stands {distance:.2f} m from its start."""
+
+
+@_reason("warning", "")
+def robot_turned(angle_deg: float) -> None:
+    """The robot is turned by {angle_deg:.0f}° from its start."""
+
+
+@_reason("warning", "")
+def joint_elsewhere(angle_rad: float) -> None:
+    """A joint of the arm is {angle_rad:.2f} rad from its start."""
+
+
+@_reason("warning", "")
+def accepted_later(point: str) -> None:
+    """{point} was accepted after it was made."""
+
+
+@_reason("warning", "")
+def accepted_anew(point: str) -> None:
+    """{point} was accepted again."""
+
+
+@_reason("warning", "")
+def no_longer_accepted(point: str) -> None:
+    """{point} is no longer accepted."""
+
+
+@_reason("warning", "")
+def no_longer_reachable(point: str) -> None:
+    """{point} cannot be reached any more."""
+
+
+@_reason("warning", "")
+def revised(point: str) -> None:
+    """{point} was revised."""
+
+
+@_reason("warning", "")
+def order_changed_after() -> None:
+    """The order of work was changed after it was made."""
+
+
+@_reason("warning", "")
+def approach_turned_after(point: str) -> None:
+    """The approach to {point} was turned after it was made."""
+
+
+@_reason("warning", "")
+def new_obstacle(kind: str, x: float, y: float, z: float) -> None:
+    """A {kind} is seen at ({x:.1f}, {y:.1f}, {z:.1f}) m that was not there when it was made."""
+
+
+@_reason("warning", "")
+def obstacle_near_way(kind: str, distance_mm: float, part: str, point: str, needed_mm: float) -> None:
+    """A {kind} is seen {distance_mm:.0f} mm from the way of {part} to {point}, {needed_mm:.0f} mm are needed."""
+
+
+@_reason("warning", "")
+def obstacle_in_way(kind: str, part: str, point: str, needed_mm: float) -> None:
+    """A {kind} is seen in the way of {part} to {point}, {needed_mm:.0f} mm are needed."""
+
+
+@_reason("warning", "")
+def work_ended_before() -> None:
+    """The work ended before it."""
+
+
+@_reason("warning", "lower arm_velocity_scale or arm_acceleration_scale")
+def torque_lacking(joint: str, needed: float, limit: float) -> None:
+    """On the way {joint} would need {needed:.0f} Nm, it has {limit:.0f} Nm."""
+
+
+@_reason("warning", "")
+def takes_too_long(limit_s: float) -> None:
+    """It takes longer than {limit_s:.0f} s a point."""
+
+
+@_reason("error", "")
+def planning_failed(why: Reason) -> None:
+    """Planning failed: {why}."""
+
+
+@_reason("error", "ask again, which starts it anew")
+def planner_ended() -> None:
+    """The planning process ended."""
+
+
+@_reason("info", "wait")
+def first_plan() -> None:
+    """The first plan is being made."""
+
+
+@_reason("info", "wait")
+def plan_awaited() -> None:
+    """A plan is about to be made."""

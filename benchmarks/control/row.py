@@ -31,6 +31,7 @@ from controller.whole_body.registry import METHODS
 from perception.segmentation.segmenter import SEGMENTERS
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.config import load_section
 from rolling_panda.reasons import text_of
 from rolling_panda.resources import resource
@@ -110,7 +111,7 @@ def cut_row(
         event, where = events.get(entry.point_id), entry.accepted_position
         assert where is not None
         pieces = severed.get(entry.point_id, [])
-        end = ends.get(entry.point_id, replace(entry, state="PROPOSED", reason="perception no longer reports it"))
+        end = ends.get(entry.point_id, replace(entry, state="PROPOSED", reason=reasons.no_longer_reported()))
         truth = true_cut(truths, pieces)
         cuts.append(
             Cut(
@@ -118,7 +119,7 @@ def cut_row(
                 seed=seed,
                 point_id=entry.point_id,
                 state=end.state,
-                reason=end.reason,
+                reason="" if end.reason is None else end.reason.code,
                 distance=min((math.dist(piece["point"], where) for piece in pieces), default=None),
                 tool_error=None if event is None else math.dist(event["blade"], where),
                 duration_s=durations.get(entry.point_id, 0.0),

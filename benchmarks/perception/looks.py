@@ -100,7 +100,7 @@ def look_again(points: Sequence[m.PruningPoint], row: Row, eye: CloseCamera, opi
             seen = eye.look(row, T_odom_camera, point)
         why = not_as_accepted(seen, ticket, config.work.moved_tolerance)
         if why or seen.position is None or seen.tangent is None:
-            (into.right_voided if surveyed.right else into.wrong_voided).append(why)
+            (into.right_voided if surveyed.right else into.wrong_voided).append("" if why is None else why.code)
             continue
         refined = msgspec.structs.replace(point, position=seen.position, tangent=seen.tangent)
         into.before.append(surveyed)

@@ -43,15 +43,25 @@ class LedgerState:
 
 
 class TicketRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """State of a point. `hash` binds the acceptance; WITHDRAWN means that perception has withdrawn the point."""
+    """State of a point. `hash` binds the acceptance; WITHDRAWN means that perception has withdrawn the point.
+
+    Ledgers of earlier versions have the reason as text.
+    """
 
     point: m.PruningPoint
     state: m.PointState | Literal["WITHDRAWN"]
-    reason: str = ""
+    reason: m.Reason | str | None = None
     user: str = ""
     accepted: m.PruningPoint | None = None
     hash: str = ""
     cut_id: str = ""
+
+    @property
+    def why(self) -> m.Reason | None:
+        """The reason; None without one."""
+        if isinstance(self.reason, str):
+            return reasons.said(self.reason) if self.reason else None
+        return self.reason
 
 
 class OrderRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -40,7 +40,7 @@ class Tracking(Struct, frozen=True):
         rotation_error: The same (rad).
         manipulability: ω of the arm.
         feasible: False when what was wanted could not be done within the limits.
-        reason: Why not, in words; empty when it could.
+        reason: Name of what holds the robot back; empty without one.
         done: True when the motion's clock has run out.
         scale: Rate of the motion's clock, 0…1.
     """

@@ -6,6 +6,7 @@ import numpy as np
 
 from controller.whole_body.compiled import COUNT, NOTHING, NUMBER, VECTOR, compiled
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.model.differential_drive import NXI, Array
 
 #: Largest tracking error of wheels and joints (rad). In motion at full speed the servos'
@@ -37,16 +38,13 @@ class TrackingErrorMonitor:
         _integrate(self._behind, sent, np.array(joints.velocity), passed)
 
     @property
-    def reason(self) -> str:
-        """Description of the largest tracking error above its limit; empty without one."""
+    def reason(self) -> m.Reason | None:
+        """The largest tracking error above its limit; None without one."""
         worst = _worst(self._behind, _LIMIT)
         if worst < 0:
-            return ""
+            return None
         name = ("the left wheel", "the right wheel")[worst] if worst < 2 else f"joint {worst - 1}"
-        return (
-            f"the robot does not follow: {name} is {abs(self._behind[worst]):.2f} rad from its command; "
-            f"the limit is {_LIMIT[worst]}"
-        )
+        return reasons.tracking_error(name, float(abs(self._behind[worst])), float(_LIMIT[worst]))
 
 
 @compiled(NOTHING(VECTOR, VECTOR, VECTOR, NUMBER))

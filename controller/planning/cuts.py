@@ -17,7 +17,7 @@ from controller.work.posture_search import CutPlan, PostureSearch, completed
 from rolling_panda.config import RobotConfig
 from rolling_panda.errors import ControlError
 from rolling_panda.messages.perception import Obstacles
-from rolling_panda.messages.types import Header
+from rolling_panda.messages.types import Header, Reason
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.transport.inbox import Received
 
@@ -72,12 +72,12 @@ class CutPlanner:
             request, planned, refused, track, duration, self._digest(request, planned, refused, rolled.digest)
         )
 
-    def _postures(self, request: PlanRequest) -> tuple[dict[str, CutPlan], dict[str, str]]:
+    def _postures(self, request: PlanRequest) -> tuple[dict[str, CutPlan], dict[str, Reason]]:
         """A posture for each cut, and the reason where there is none."""
         self._clearance.update(Received(Obstacles(header=Header(), capsules=request.obstacles), 0.0))
         turned = dict(request.turned)
         cuts: dict[str, CutPlan] = {}
-        refused: dict[str, str] = {}
+        refused: dict[str, Reason] = {}
         for point in request.points:
             name, position, tangent = point.point_id, np.array(point.position), np.array(point.tangent)
             found = completed(self._search.find(position, tangent, request.q, turned.get(name)))
@@ -111,7 +111,7 @@ class CutPlanner:
             )
         )
 
-    def _digest(self, request: PlanRequest, cuts: Sequence[PlannedCut], refused: dict[str, str], rolled: str) -> str:
+    def _digest(self, request: PlanRequest, cuts: Sequence[PlannedCut], refused: dict[str, Reason], rolled: str) -> str:
         encode = msgspec.msgpack.Encoder(order="deterministic").encode
         out = hashlib.sha256()
         for part in (

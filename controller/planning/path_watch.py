@@ -18,9 +18,10 @@ from controller.whole_body.collision_geometry import BLADES
 from controller.whole_body.compiled import NOTHING, NUMBER, PACKED, VECTOR, compiled
 from controller.whole_body.obstacle import Axes
 from controller.work.cut_clearance import CLEARANCE
+from rolling_panda import reasons
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.messages.supervision import PreviewedCut
-from rolling_panda.messages.types import WOOD_CLASSES
+from rolling_panda.messages.types import WOOD_CLASSES, Reason
 from rolling_panda.model.differential_drive import Array
 
 #: Accuracy of the position of a known obstacle that is seen again (m).
@@ -56,8 +57,8 @@ class PathWatch:
         self._low = np.min([way.low.min(axis=0, initial=np.inf) for way in self._ways], axis=0, initial=np.inf)
         self._high = np.max([way.high.max(axis=0, initial=-np.inf) for way in self._ways], axis=0, initial=-np.inf)
 
-    def changed(self, now: Sequence[Capsule], first: str = "") -> str:
-        """Description of an obstacle that is too near; empty without one.
+    def changed(self, now: Sequence[Capsule], first: str = "") -> Reason | None:
+        """An obstacle that is too near; None without one.
 
         Args:
             now: Current obstacles.
@@ -66,13 +67,13 @@ class PathWatch:
         fresh = [capsule for capsule in now if capsule not in self._known]
         spots = self._new_spots(fresh)
         if not len(spots):
-            return ""
+            return None
         canes = tuple(capsule for capsule in now if capsule.kind == "cane")
         axes = Axes(tuple(obstacles_of(canes)))
         points = {point.point_id: np.array(point.position) for point in self._preview.request.points}
         cuts = self._preview.cuts
         begun = not first
-        worst, words = 0.0, ""
+        worst, found = 0.0, None
         for number, cut in enumerate(cuts):
             begun = begun or cut.point_id == first
             if not begun:
@@ -84,8 +85,8 @@ class PathWatch:
             if lacking > worst:
                 worst = lacking
                 kind, name = fresh[int(spots[spot, 4])].kind, self._swept.shapes.parts[part]
-                words = _words(kind, name, cut.point_id, distance, distance + lacking)
-        return words
+                found = _found(kind, name, cut.point_id, distance, distance + lacking)
+        return found
 
     def _new_spots(self, fresh: Sequence[Capsule]) -> Array:
         """Samples of the new obstacles near the motion (m×5): position, radius and index of the capsule."""
@@ -138,9 +139,10 @@ def _spots(capsule: Capsule, number: int) -> Array:
     return np.hstack([start + along * (end - start), np.tile([radius, number], (count, 1))])
 
 
-def _words(kind: str, part: str, point_id: str, distance: float, needed: float) -> str:
-    where = f"{1e3 * distance:.0f} mm from" if distance > 0.0 else "in"
-    return f"a {kind} is seen {where} the way of {part} to {point_id}, {1e3 * needed:.0f} mm are needed"
+def _found(kind: str, part: str, point_id: str, distance: float, needed: float) -> Reason:
+    if distance > 0.0:
+        return reasons.obstacle_near_way(kind, 1e3 * distance, part, point_id, 1e3 * needed)
+    return reasons.obstacle_in_way(kind, part, point_id, 1e3 * needed)
 
 
 @compiled(NUMBER(VECTOR, VECTOR, NUMBER, VECTOR))

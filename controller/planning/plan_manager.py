@@ -8,8 +8,10 @@ from controller.planning.plan_validity import ObstacleWatch, approaches_changed,
 from controller.planning.work_plan import PlannedCut, PlanRequest, WorkPlan, session_plan
 from controller.work.point_queue import PointQueue, Ticket
 from controller.work.posture_search import CutPlan
+from rolling_panda import reasons
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.messages.supervision import PlanState, SessionPlan
+from rolling_panda.messages.types import Reason
 from rolling_panda.model.differential_drive import Array
 
 #: Debounce (s): a plan is requested when nothing has changed for this long, as operators accept points in series.
@@ -31,7 +33,7 @@ class PlanManager:
         self._plan: WorkPlan | None = None
         self._cuts: dict[str, PlannedCut] = {}
         self._state: PlanState = "none"
-        self._reason = "no point is accepted"
+        self._reason: Reason | None = reasons.none_accepted()
         self._asked: PlanRequest | None = None
         self._number = 0
         self._quiet_since = self._asked_at = -np.inf
@@ -39,7 +41,7 @@ class PlanManager:
         self._fresh = True
         self._watch = ObstacleWatch((), np.empty((0, 2)), ())
         self._compared: object = None
-        self._in_the_way = ""
+        self._in_the_way: Reason | None = None
 
     @property
     def valid(self) -> bool:
@@ -80,8 +82,7 @@ class PlanManager:
         why = self._why_void(q, obstacles, at_rest, working)
         self._check(why, bool(accepted))
         if self.valid and self._plan is not None:
-            refused = {point_id: text[:500] for point_id, text in self._plan.refused.items()}
-            self._queue.reach(self._plan.request.points, refused, busy)
+            self._queue.reach(self._plan.request.points, self._plan.refused, busy)
         pause = _AGAIN_S if self._plan is not None and self._plan.failure else _PAUSE_S
         due = self._asked is None and now - self._quiet_since >= _SETTLED_S and now - self._asked_at >= pause
         wanted = not self.valid or (working and self._runs_out())
@@ -129,12 +130,12 @@ class PlanManager:
         left = [cut for name, cut in self._cuts.items() if (at := self._queue.get(name)) and at.state == "ACCEPTED"]
         return any(cut.rollout is None for cut in left[:_NEXT])
 
-    def _why_void(self, q: Array | None, obstacles: Sequence[Capsule], at_rest: bool, working: bool) -> str:
+    def _why_void(self, q: Array | None, obstacles: Sequence[Capsule], at_rest: bool, working: bool) -> Reason | None:
         plan = self._plan
         if plan is None:
-            return ""
-        if plan.failure:
-            return f"planning failed: {plan.failure}"
+            return None
+        if plan.failure is not None:
+            return reasons.planning_failed(plan.failure)
         why = points_changed(plan, self._queue.tickets(), self._queue.order.by_hand)
         why = why or approaches_changed(plan.request.turned, self._queue.approaches.turned)
         if not why:
@@ -146,17 +147,17 @@ class PlanManager:
             why = why or place_changed(plan, q)
         return why
 
-    def _check(self, why: str, work: bool) -> None:
+    def _check(self, why: Reason | None, work: bool) -> None:
         if not work and self._asked is None:
-            self._set_state("none", "no point is accepted")
-        elif self._plan is not None and not why:
-            self._set_state("valid", "")
+            self._set_state("none", reasons.none_accepted())
+        elif self._plan is not None and why is None:
+            self._set_state("valid", None)
         elif self._asked is not None:
-            self._set_state("planning", why or "the first plan is being made")
+            self._set_state("planning", why or reasons.first_plan())
         else:
-            self._set_state("none" if self._plan is None else "void", why or "waiting to plan")
+            self._set_state("none" if self._plan is None else "void", why or reasons.plan_awaited())
 
-    def _set_state(self, state: PlanState, reason: str) -> None:
+    def _set_state(self, state: PlanState, reason: Reason | None) -> None:
         if (state, reason) == (self._state, self._reason):
             return
         self._state, self._reason, self._fresh = state, reason, True

@@ -8,8 +8,9 @@ from controller.motion.surroundings import obstacles_of
 from controller.planning.work_plan import WorkPlan
 from controller.whole_body.obstacle import Axes, Obstacle
 from controller.work.point_queue import BOUND, Ticket
+from rolling_panda import reasons
 from rolling_panda.messages.perception import Capsule
-from rolling_panda.messages.types import PointState
+from rolling_panda.messages.types import PointState, Reason
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_Q
 from rolling_panda.model.wire_values import vector3
@@ -28,8 +29,8 @@ _SHARES = np.linspace(0.0, 1.0, 9)
 _WORKED: frozenset[PointState] = frozenset({"CUTTING", "DONE", "FAILED_NOT_CUT", "UNKNOWN"})
 
 
-def points_changed(plan: WorkPlan, tickets: Iterable[Ticket], order: tuple[str, ...] = ()) -> str:
-    """How the accepted points and their order differ from the planned ones; empty where they do not.
+def points_changed(plan: WorkPlan, tickets: Iterable[Ticket], order: tuple[str, ...] = ()) -> Reason | None:
+    """How the accepted points and their order differ from the planned ones; None where they do not.
 
     Args:
         plan: The plan.
@@ -42,39 +43,39 @@ def points_changed(plan: WorkPlan, tickets: Iterable[Ticket], order: tuple[str, 
         if ticket.state not in BOUND:
             continue
         if point_id not in planned:
-            return f"{point_id} was accepted after it was made"
+            return reasons.accepted_later(point_id)
         if ticket.accepted != planned[point_id]:
-            return f"{point_id} was accepted again"
+            return reasons.accepted_anew(point_id)
     for point_id in planned:
         if point_id not in now or now[point_id].state not in {*BOUND, *_WORKED}:
-            return f"{point_id} is no longer accepted"
-    return "" if plan.request.order == order else "the order of work was changed after it was made"
+            return reasons.no_longer_accepted(point_id)
+    return None if plan.request.order == order else reasons.order_changed_after()
 
 
-def approaches_changed(before: tuple[tuple[str, float], ...], now: tuple[tuple[str, float], ...]) -> str:
-    """To which point somebody wants another approach than before; empty where to none."""
+def approaches_changed(before: tuple[tuple[str, float], ...], now: tuple[tuple[str, float], ...]) -> Reason | None:
+    """To which point somebody wants another approach than before; None where to none."""
     for point_id, _ in sorted(set(before) ^ set(now)):
-        return f"the approach to {point_id} was turned after it was made"
-    return ""
+        return reasons.approach_turned_after(point_id)
+    return None
 
 
-def place_changed(plan: WorkPlan, q: Array) -> str:
-    """Description of the distance of a robot at rest at q (12) from the plan's start; empty within the tolerances."""
+def place_changed(plan: WorkPlan, q: Array) -> Reason | None:
+    """How far a robot at rest at q (12) is from the plan's start; None within the tolerances."""
     return away_from(plan.request.q, q)
 
 
-def away_from(start: Array, q: Array) -> str:
-    """How far a robot at rest at q (12) is from another configuration (12); empty within the tolerances."""
+def away_from(start: Array, q: Array) -> Reason | None:
+    """How far a robot at rest at q (12) is from another configuration (12); None within the tolerances."""
     away = q - start
     moved, turned = float(np.hypot(*away[:2])), abs(float(away[2]))
     arm = float(np.abs(away[ARM_Q]).max())
     if moved > PLACE_TOLERANCE:
-        return f"the robot stands {moved:.2f} m from its start"
+        return reasons.robot_elsewhere(moved)
     if turned > TURN_TOLERANCE:
-        return f"the robot is turned by {np.degrees(turned):.0f}° from its start"
+        return reasons.robot_turned(float(np.degrees(turned)))
     if arm > JOINT_TOLERANCE:
-        return f"a joint of the arm is {arm:.2f} rad from its start"
-    return ""
+        return reasons.joint_elsewhere(arm)
+    return None
 
 
 class ObstacleWatch:
@@ -100,8 +101,8 @@ class ObstacleWatch:
         lines = [(cut.cut.poses.clear.translation, cut.cut.poses.cut.translation) for cut in plan.cuts]
         return cls(plan.request.obstacles, track, lines)
 
-    def changed(self, now: Sequence[Capsule]) -> str:
-        """Description of a new obstacle that affects the plan; empty without one.
+    def changed(self, now: Sequence[Capsule]) -> Reason | None:
+        """A new obstacle that affects the plan; None without one.
 
         Obstacles that disappeared are ignored. So are obstacles out of the robot's reach along the plan, and canes not
         beside the tool's line into a cut.
@@ -110,7 +111,7 @@ class ObstacleWatch:
             now: Current obstacles.
         """
         if now is self._before or now == self._before or not now or not len(self._track):
-            return ""
+            return None
         start, end = np.array([c.start for c in now]), np.array([c.end for c in now])
         radius = np.array([max(c.start_radius, c.end_radius) for c in now])
         places = (start[:, None] + _SHARES[:, None] * (end - start)[:, None]).reshape(-1, 3)
@@ -121,9 +122,8 @@ class ObstacleWatch:
         for index in np.flatnonzero(new):
             kind = now[int(index) // len(_SHARES)].kind
             if self._in_the_way(places[index], kind == "cane"):
-                x, y, z = places[index]
-                return f"a {kind} is seen at ({x:.1f}, {y:.1f}, {z:.1f}) m that was not there when it was made"
-        return ""
+                return reasons.new_obstacle(kind, *vector3(places[index]))
+        return None
 
     def _in_the_way(self, place: Array, cane: bool) -> bool:
         if cane:

@@ -16,9 +16,11 @@ from controller.planning.preview_plan import Preview, PreviewRequest, motion_mes
 from controller.work.point_queue import PointQueue, Ticket
 from controller.work.posture_search import CutPlan
 from rolling_panda import commands as intents
+from rolling_panda import reasons
 from rolling_panda.commands import Handlers
 from rolling_panda.messages.perception import Capsule, PruningPoint
 from rolling_panda.messages.supervision import PreviewMotion, PreviewPhase, PreviewState
+from rolling_panda.messages.types import Reason
 from rolling_panda.model.differential_drive import Array
 
 #: Largest number of points in a preview.
@@ -48,12 +50,13 @@ class PreviewManager:
         self._wanted_at = -np.inf
         self._number = 0
         self._phase: PreviewPhase = "none"
-        self._reason = self._approved_by = ""
+        self._reason: Reason | None = None
+        self._approved_by = ""
         self._begun = False
         self._order: tuple[str, ...] = ()
         self._watch: PathWatch | None = None
         self._compared: object = None
-        self._in_the_way = ""
+        self._in_the_way: Reason | None = None
         self._fresh = self._fresh_motion = True
         self._said_at = self._moved_at = -np.inf
 
@@ -62,48 +65,52 @@ class PreviewManager:
         self.required = row.required
 
     def handlers(self) -> Handlers:
-        """Handlers of the commands about previews; each returns the reason of a refusal, empty if done."""
+        """Handlers of the commands about previews; each returns the reason of a refusal, None if done."""
         return {
             intents.RequirePreview: lambda asked, now: self._require(asked.required, asked.user),
             intents.RequestPreview: lambda asked, now: self._want(asked.point_id, now),
             intents.ApprovePreview: lambda asked, now: self._approve(asked.preview_hash, asked.user),
         }
 
-    def start_refused(self) -> str:
-        """Reason why the start lacks an approval; empty if it does not."""
+    def start_refused(self) -> Reason | None:
+        """Reason why the start lacks an approval; None if it does not."""
         if not self.required or self._phase == "approved":
-            return ""
+            return None
         if self._phase == "ready":
-            return "look at the preview and approve it first"
-        if self._phase == "expired":
-            return f"the preview has expired: {self._reason}; ask for another one"
-        return "a preview before each cut is required: ask for one and approve it"
+            return reasons.preview_not_approved()
+        return self._expired or reasons.preview_needed()
+
+    @property
+    def _expired(self) -> Reason | None:
+        if self._phase != "expired" or self._reason is None:
+            return None
+        return reasons.preview_expired(self._reason)
 
     def start(self) -> None:
         """Work begins."""
         self._begun = self._phase == "approved"
 
-    def permit(self, ticket: Ticket) -> str:
-        """Reason why the motion to a cut lacks an approval; empty if it does not."""
+    def permit(self, ticket: Ticket) -> Reason | None:
+        """Reason why the motion to a cut lacks an approval; None if it does not."""
         if not self.required:
-            return ""
+            return None
         name, preview = ticket.point.point_id, self._preview
         if preview is None or not self._approved_by:
-            return f"the way to {name} waits for its preview to be approved"
-        if self._phase == "expired":
-            return f"the approved preview has expired: {self._reason}"
+            return reasons.preview_awaited(name)
+        if expired := self._expired:
+            return expired
         names = [cut.point_id for cut in preview.cuts]
         points = {point.point_id: point for point in preview.request.points}
         if name not in names or points[name] != ticket.accepted:
-            return f"{name} is not in the approved preview as it is accepted now"
+            return reasons.not_in_preview(name)
         shown = preview.cuts[names.index(name)]
-        if shown.cut_s is None:
-            return f"the approved preview shows {name} as {shown.result}"[:300]
+        if shown.reason is not None:
+            return reasons.not_cut_in_preview(name, shown.reason)
         for before in names[: names.index(name)]:
             earlier = self._queue.get(before)
             if earlier is None or earlier.state not in ("CUTTING", "DONE"):
-                return f"{before} was skipped, so that the motion to {name} is another one than was approved"
-        return ""
+                return reasons.skipped_before(name, before)
+        return None
 
     def known(self, ticket: Ticket) -> CutPlan | None:
         """The posture that the preview has shown for a cut, where work follows an approved one; else None."""
@@ -146,19 +153,19 @@ class PreviewManager:
         if self._begun and not working:
             self._begun = False
             # The robot has moved, and some of the points are cut.
-            self._set_phase("expired", "the work that it was approved for has ended")
+            self._set_phase("expired", reasons.previewed_work_ended())
         if self._wanted is None or working or self._asked is not None:
             return None
         if not at_rest or q is None:
-            self._set_phase("waiting", "the robot still moves")
+            self._set_phase("waiting", reasons.robot_moves())
             return None
         if cuts is None and now - self._wanted_at < _PLAN_S:
-            self._set_phase("waiting", "the plan is being made")
+            self._set_phase("waiting", reasons.plan_being_made())
             return None
         points = self._points(self._wanted)
         self._wanted = None
         if not points:
-            self._set_phase("none", self._queue.waits or "no point is accepted")
+            self._set_phase("none", self._queue.waits or reasons.none_accepted())
             return None
         self._number += 1
         following, names = self._queue.next(), tuple(point.point_id for point in points)
@@ -168,7 +175,7 @@ class PreviewManager:
         self._asked = PreviewRequest(
             self._number, q.copy(), points, tuple(obstacles), dict(cuts or {}), close_up_s, turned
         )
-        self._set_phase("rolling", "")
+        self._set_phase("rolling")
         return self._asked
 
     def message(self, now: float) -> PreviewState | None:
@@ -187,55 +194,56 @@ class PreviewManager:
         self._fresh_motion, self._moved_at = False, now
         return motion_message(self._preview, now)
 
-    def _require(self, required: bool, user: str) -> str:
+    def _require(self, required: bool, user: str) -> None:
         self.required, self._fresh = required, True
         self._journal.add("preview", "preview", PreviewRequiredRow(required=required, user=user))
-        return ""
 
-    def _want(self, point_id: str, now: float) -> str:
+    def _want(self, point_id: str, now: float) -> Reason | None:
         ticket = self._queue.get(point_id) if point_id else self._queue.next()
         if ticket is None:
-            return f"there is no point {point_id!r}" if point_id else self._queue.waits
-        if ticket.state != "ACCEPTED" or not ticket.seen:
-            if ticket.state == "UNREACHABLE":
-                return f"{point_id} cannot be reached: {ticket.reason}"[:500]
-            return f"{point_id} is {ticket.state}; accept it first" if ticket.seen else f"{point_id} is not seen now"
+            return reasons.point_unknown(point_id) if point_id else self._queue.waits
+        if ticket.state == "UNREACHABLE" and ticket.reason is not None:
+            return reasons.point_unreachable(point_id, ticket.reason)
+        if not ticket.seen:
+            return reasons.point_unseen(point_id)
+        if ticket.state != "ACCEPTED":
+            return reasons.point_to_accept(point_id, ticket.state)
         self._wanted, self._wanted_at, self._asked = point_id, now, None
         self._approved_by = ""
-        self._set_phase("waiting", "")
-        return ""
+        self._set_phase("waiting")
+        return None
 
-    def _approve(self, digest: str, user: str) -> str:
+    def _approve(self, digest: str, user: str) -> Reason | None:
         preview = self._preview
         if preview is None or self._phase not in ("ready", "approved", "expired"):
-            return "there is no preview to approve; ask for one"
+            return reasons.preview_missing()
         if digest != preview.digest:
-            return f"the preview is another one now: {preview.digest[:8]}, not {digest[:8]}; look again"
-        if self._phase == "expired":
-            return f"the preview has expired: {self._reason}; ask for another one"
+            return reasons.preview_replaced(preview.digest[:8], digest[:8])
+        if expired := self._expired:
+            return expired
         following, first = self._queue.next(), preview.request.points[0].point_id
         if following is not None and following.point.point_id != first:
-            return f"{following.point.point_id} comes before {first} in the order of work: move {first} to the front"
+            return reasons.another_comes_first(following.point.point_id, first)
         self._approved_by = user
-        self._set_phase("approved", "")
-        return ""
+        self._set_phase("approved")
+        return None
 
     def _accept(self, made: Preview) -> None:
         self._asked, self._approved_by = None, ""
-        if made.failure:
+        if made.failure is not None:
             self._preview = None
-            self._set_phase("none", f"the preview failed: {made.failure}")
+            self._set_phase("none", reasons.preview_failed(made.failure))
             return
         self._preview, self._fresh_motion = made, True
         self._watch = None if made.swept is None else PathWatch(made, made.swept, self._settings)
-        self._compared, self._in_the_way = None, ""
-        self._set_phase("ready", "")
+        self._compared, self._in_the_way = None, None
+        self._set_phase("ready")
 
-    def _changed(self, q: Array, obstacles: Sequence[Capsule], at_rest: bool, working: bool) -> str:
-        """Description of a change that expires the preview; empty without one."""
+    def _changed(self, q: Array, obstacles: Sequence[Capsule], at_rest: bool, working: bool) -> Reason | None:
+        """The change that expires the preview; None without one."""
         preview, watch = self._preview, self._watch
         if preview is None or watch is None:
-            return ""
+            return None
         if not working and at_rest and (why := away_from(preview.request.q, q)):
             return why
         if why := self._points_changed(preview, working):
@@ -255,20 +263,20 @@ class PreviewManager:
                 return cut.point_id
         return preview.cuts[-1].point_id if preview.cuts else ""
 
-    def _points_changed(self, preview: Preview, working: bool) -> str:
+    def _points_changed(self, preview: Preview, working: bool) -> Reason | None:
         for point in preview.request.points:
             ticket = self._queue.get(point.point_id)
             if ticket is not None and ticket.state == "UNREACHABLE":
-                return f"{point.point_id} cannot be reached any more"
+                return reasons.no_longer_reachable(point.point_id)
             if ticket is None or ticket.state not in ("ACCEPTED", "CUTTING", "DONE", "FAILED_NOT_CUT", "UNKNOWN"):
-                return f"{point.point_id} is no longer accepted"
+                return reasons.no_longer_accepted(point.point_id)
             if ticket.state == "ACCEPTED" and ticket.accepted != point:
-                return f"{point.point_id} was revised"
+                return reasons.revised(point.point_id)
         following = self._queue.next()
         first = preview.request.points[0].point_id
         if self._phase == "approved" and not working and following is not None and following.point.point_id != first:
-            return f"the order has changed: {following.point.point_id} comes before {first}"
-        return ""
+            return reasons.another_comes_first(following.point.point_id, first)
+        return None
 
     def _points(self, point_id: str) -> tuple[PruningPoint, ...]:
         """Points of the preview in the order of work: the requested one, which then comes first, or the next few."""
@@ -277,7 +285,7 @@ class PreviewManager:
             tickets = [ticket for ticket in tickets if ticket.point.point_id == point_id]
         return tuple(ticket.accepted for ticket in tickets[:MOST] if ticket.accepted is not None)
 
-    def _set_phase(self, phase: PreviewPhase, reason: str) -> None:
+    def _set_phase(self, phase: PreviewPhase, reason: Reason | None = None) -> None:
         if (phase, reason) == (self._phase, self._reason):
             return
         self._phase, self._reason, self._fresh = phase, reason, True

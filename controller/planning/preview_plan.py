@@ -68,18 +68,18 @@ class Preview:
         rows: The motion, downsampled.
         duration: Duration (s).
         digest: SHA-256 of request, configuration and motion; empty without a motion.
-        failure: Reason for the failure, as text; empty otherwise.
+        failure: Reason for the failure; None otherwise.
         swept: Swept volume of the motion; None without a motion.
     """
 
     request: PreviewRequest
     cuts: tuple[PreviewedCut, ...] = ()
-    refused: dict[str, str] = field(default_factory=dict)
+    refused: dict[str, m.Reason] = field(default_factory=dict)
     plans: dict[str, CutPlan] = field(default_factory=dict)
     rows: tuple[PreviewRow, ...] = ()
     duration: float = 0.0
     digest: str = ""
-    failure: str = ""
+    failure: m.Reason | None = None
     swept: SweptVolume | None = None
 
 
@@ -87,7 +87,7 @@ def state_message(
     preview: Preview | None,
     required: bool,
     phase: PreviewPhase,
-    reason: str,
+    reason: m.Reason | None,
     approved_by: str,
     left: int,
     now: float,
@@ -105,13 +105,13 @@ def state_message(
     """
     header = m.Header(now, "odom")
     if preview is None:
-        return PreviewState(header=header, required=required, phase=phase, reason=reason[:500])
+        return PreviewState(header=header, required=required, phase=phase, reason=reason)
     q = preview.request.q
     return PreviewState(
         header=header,
         required=required,
         phase=phase,
-        reason=reason[:500],
+        reason=reason,
         preview_hash=preview.digest,
         approved_by=approved_by,
         start=planar_pose(q),

@@ -25,6 +25,7 @@ from controller.work.movement import MotionResult, Movement
 from controller.work.point_queue import PointQueue, Ticket
 from controller.work.posture_search import CutPlan, Unreachable
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.config import RobotConfig
 from rolling_panda.errors import ControlError
 from rolling_panda.messages.perception import CloseUpResult, Obstacles
@@ -99,7 +100,7 @@ class _Run:
         every = max(1, round(ROW_S / self._dt))
         longest = math.ceil(_LONGEST_S * len(self._request.points) / self._dt)
         self._movement.sequence.start()
-        why = f"it takes longer than {_LONGEST_S:.0f} s a point"
+        why: m.Reason | None = reasons.takes_too_long(_LONGEST_S)
         now = 0.0
         for number in range(longest):
             now = number * self._dt
@@ -112,13 +113,13 @@ class _Run:
             self._hash.update(np.ascontiguousarray(way[-1], dtype="<f8").tobytes())
             if moved.event is not None:
                 event, why = moved.event
-                why = "" if event is Event.FINISHED else why
+                why = None if event is Event.FINISHED else why
                 break
         samples = Samples(np.array(times), np.array(way), np.array(rates))
         cuts, refused = self._log.cuts(now, why, samples)
         swept = sweep(self._movement.body.surroundings.model, times, way)
         # The robot did not come to any point.
-        failure = why if self._request.points and not cuts else ""
+        failure = why if self._request.points and not cuts else None
         return Preview(self._request, cuts, refused, self._plans, tuple(rows), now, self._digest(), failure, swept)
 
     def _period(self, number: int, now: float) -> MotionResult:
@@ -261,15 +262,17 @@ class CutLog:
             if least.point_id == point_id and least.closed is None:
                 least.closed = now
 
-    def cuts(self, now: float, why: str, samples: "Samples") -> tuple[tuple[PreviewedCut, ...], dict[str, str]]:
+    def cuts(
+        self, now: float, why: m.Reason | None, samples: "Samples"
+    ) -> tuple[tuple[PreviewedCut, ...], dict[str, m.Reason]]:
         """All cuts, and the reason for each that was not made, by id.
 
         Args:
             now: End of the work (s).
-            why: Reason of an early end, as text; empty otherwise.
+            why: Reason of an early end; None otherwise.
             samples: The whole motion.
         """
-        refused: dict[str, str] = {}
+        refused: dict[str, m.Reason] = {}
         out = []
         for number, least in enumerate(self._points):
             ends = now if number + 1 == len(self._points) else self._points[number + 1].begins
@@ -278,13 +281,10 @@ class CutLog:
             if closed is None:
                 open_still = ticket is None or ticket.state in ("ACCEPTED", "CUTTING")
                 reason = why if ticket is None or open_still else ticket.reason
-                refused[least.point_id] = reason or "the work ended before it"
+                refused[least.point_id] = reason or reasons.work_ended_before()
             elif torque.margin < 0.0:
                 closed = None
-                refused[least.point_id] = (
-                    f"{torque.joint} would need {torque.peak:.0f} Nm on the way, it has {torque.limit:.0f} Nm; "
-                    f"lower arm_velocity_scale or arm_acceleration_scale"
-                )
+                refused[least.point_id] = reasons.torque_lacking(torque.joint, torque.peak, torque.limit)
             out.append(
                 PreviewedCut(
                     point_id=least.point_id,
@@ -292,7 +292,7 @@ class CutLog:
                     begins_s=least.begins,
                     cut_s=closed,
                     ends_s=ends,
-                    result="cut" if closed is not None else f"not cut: {refused[least.point_id]}"[:500],
+                    reason=refused.get(least.point_id),
                     clearance=least.clearance,
                     between=least.between,
                     manipulability=least.omega,

@@ -62,19 +62,19 @@ class WorkPlan:
         track: Positions of the base along the rollout (n×2, m).
         duration: Duration of the work (s).
         digest: SHA-256 of request, configuration and result; empty if planning failed.
-        failure: Reason for the failure, as text; empty otherwise.
+        failure: Reason for the failure; None otherwise.
     """
 
     request: PlanRequest
     cuts: tuple[PlannedCut, ...] = ()
-    refused: dict[str, str] = field(default_factory=dict)
+    refused: dict[str, m.Reason] = field(default_factory=dict)
     track: Array = field(default_factory=lambda: np.empty((0, 2)))
     duration: float = 0.0
     digest: str = ""
-    failure: str = ""
+    failure: m.Reason | None = None
 
 
-def session_plan(plan: WorkPlan | None, state: PlanState, reason: str, now: float) -> SessionPlan:
+def session_plan(plan: WorkPlan | None, state: PlanState, reason: m.Reason | None, now: float) -> SessionPlan:
     """The message of a plan, None for when there is none.
 
     Args:
@@ -85,18 +85,20 @@ def session_plan(plan: WorkPlan | None, state: PlanState, reason: str, now: floa
     """
     header = m.Header(now, "odom")
     if plan is None:
-        return SessionPlan(header=header, state=state, reason=reason[:500])
+        return SessionPlan(header=header, state=state, reason=reason)
     return SessionPlan(
         header=header,
         state=state,
-        reason=reason[:500],
+        reason=reason,
         plan_hash=plan.digest,
         duration_s=plan.duration,
         points=_point_plans(plan.request, plan.cuts, plan.refused),
     )
 
 
-def _point_plans(request: PlanRequest, cuts: Sequence[PlannedCut], refused: dict[str, str]) -> tuple[PointPlan, ...]:
+def _point_plans(
+    request: PlanRequest, cuts: Sequence[PlannedCut], refused: dict[str, m.Reason]
+) -> tuple[PointPlan, ...]:
     """Plan of each point of a request: the cuts in their order, then the refused points."""
     points = [
         PointPlan(
@@ -110,7 +112,7 @@ def _point_plans(request: PlanRequest, cuts: Sequence[PlannedCut], refused: dict
     ]
     revisions = {point.point_id: point.revision for point in request.points}
     points += [
-        PointPlan(point_id=point_id, revision=revisions[point_id], order=0, reason=why[:500])
+        PointPlan(point_id=point_id, revision=revisions[point_id], order=0, reason=why)
         for point_id, why in refused.items()
     ]
     return tuple(points)

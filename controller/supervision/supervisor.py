@@ -19,7 +19,7 @@ from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.messages.supervision import Presence, StopRecord, TeleopTarget
-from rolling_panda.reasons import said_or_none, text_of
+from rolling_panda.reasons import text_of
 from rolling_panda.transport.inbox import Inbox
 
 #: A new token is requested when the bridge's watchdog has held the robot for this long (s).
@@ -91,7 +91,7 @@ class Supervisor:
         self._inbox = inbox
         if (changed := self.fencing.update(self.bridge, now)) is not None:
             self._event_log.log(changed)
-        tracking_error = said_or_none(self._movement.body.tracking_error.reason)
+        tracking_error = self._movement.body.tracking_error.reason
         self.health = safety.health(inbox, self.fencing.overruled, now, trouble, tracking_error)
 
     def review(self, stops: tuple[m.StopRequest, ...], now: float) -> None:
@@ -114,8 +114,7 @@ class Supervisor:
                 self.event(Event.PROTECT, now, reason)
             case safety.Verdict("pause", reason):
                 self._pause(reason, now)
-        unwatched = self.authority.unwatched(now)
-        self._movement.sequence.finish_cut_and_pause("" if unwatched is None else text_of(unwatched))
+        self._movement.sequence.finish_cut_and_pause(self.authority.unwatched(now))
         self.state = modes.observe(self.state, safety.cause(self.health, self._config), now)
         self._review_hold(now)
 
@@ -145,7 +144,7 @@ class Supervisor:
 
     def busy(self) -> m.Reason | None:
         """Action that has to end before a motion may begin; None without one."""
-        return said_or_none(self._movement.busy(self.bridge))
+        return self._movement.busy(self.bridge)
 
     def situation(
         self, waits: m.Reason | None, approval: m.Reason | None, now: float, intent: intents.Intent | None = None

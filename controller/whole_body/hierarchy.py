@@ -17,7 +17,7 @@ from controller.whole_body.cascade import Answer, Cascade, Problem, given_up
 from controller.whole_body.compiled import COUNT, MATRIX, NOTHING, NUMBER, PACKED, VECTOR, compiled
 from controller.whole_body.guards.axle import AxleAhead
 from controller.whole_body.manipulability import ArmManipulability, Manipulability
-from controller.whole_body.task import ActuatorTask, Guard, IkProblem, SecondaryTask, Solution
+from controller.whole_body.task import NOT_FINITE, ActuatorTask, Guard, IkProblem, SecondaryTask, Solution
 from controller.whole_body.tasks.arm_posture import ArmPosture
 from controller.whole_body.tasks.base_reference import BaseReference
 from controller.whole_body.tasks.joint_centre import JointCentre
@@ -90,7 +90,7 @@ class Hierarchy:
     def solve(self, problem: IkProblem) -> Solution:
         """The actuator velocities that answer the problem; see `Method.solve`."""
         if not problem.finite:
-            return self._brake(problem, "the problem has a number that is not finite", _NOWHERE)
+            return self._brake(problem, NOT_FINITE, _NOWHERE)
         bounds = self._box.at(problem.q, problem.sent, problem.sent_before, problem.wheel_cap)
         self._climb.now = manipulability = self._manipulability.at(problem.kinematics.J)
         base = bounds.ramp if problem.held is None else self._actuation.twist @ problem.held
@@ -100,7 +100,7 @@ class Hierarchy:
         J, wanted, speed_scale = self._tool(problem)
         answer = self._cascade.solve(self._problem(problem, bounds, rows, J, wanted, speed_scale, base))
         if answer is None:
-            return self._brake(problem, "no velocity satisfies the limits; the robot brakes", manipulability)
+            return self._brake(problem, "limits that contradict each other", manipulability)
         return self._solution(problem, answer, base, bounds, speed_scale, rows.names, manipulability)
 
     # --- parts of the problem ----------------------------------------------------------------------------------------
@@ -194,12 +194,12 @@ class Hierarchy:
         scale = answer.scale * speed_scale
         worst = given_up(answer.slack)
         if worst >= 0:
-            return Solution(xi, scale, manipulability.value, False, _too_near(names, worst))
+            return Solution(xi, scale, manipulability.value, False, names[worst])
         held = problem.tool.keep_path and answer.scale < _HELD
         if held or (answer.missing > _MISSED and answer.holds >= 0):
             what = _holder(answer.holds, free, names)
             # Sliding along a constraint is a valid solution of motion by hand; it is only reported.
-            return Solution(xi, scale, manipulability.value, not held, f"{what} holds the tool back")
+            return Solution(xi, scale, manipulability.value, not held, what)
         return Solution(xi, scale, manipulability.value)
 
     def _brake(self, problem: IkProblem, reason: str, manipulability: Manipulability) -> Solution:
@@ -208,10 +208,6 @@ class Hierarchy:
         if not math.isfinite(float(sent.sum() + before.sum())):
             return Solution(np.zeros(NXI), 0.0, manipulability.value, False, reason)
         return Solution(self._box.brake(sent, before), 0.0, manipulability.value, False, reason)
-
-
-def _too_near(names: tuple[str, ...], worst: int) -> str:
-    return f"{names[worst]} cannot be kept: it is relaxed by the least amount"
 
 
 def _holder(index: int, free: slice, names: tuple[str, ...]) -> str:

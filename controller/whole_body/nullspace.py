@@ -19,7 +19,7 @@ from controller.whole_body.actuation import Actuation
 from controller.whole_body.joint_limits import LimitRepulsion
 from controller.whole_body.manipulability import ArmManipulability
 from controller.whole_body.saturation import Saturation
-from controller.whole_body.task import ActuatorTask, IkProblem, Solution
+from controller.whole_body.task import NOT_FINITE, ActuatorTask, IkProblem, Solution
 from rolling_panda.model.differential_drive import NXI, Array
 from rolling_panda.model.robot import ARM_Q, ARM_XI, RobotModel
 
@@ -49,18 +49,16 @@ class Nullspace:
     def solve(self, problem: IkProblem) -> Solution:
         """The actuator velocities that answer the problem; see `Method.solve`."""
         if not problem.finite:
-            return self._brake(problem, "the problem has a number that is not finite", 0.0)
+            return self._brake(problem, NOT_FINITE, 0.0)
         manipulability = self._manipulability.at(problem.kinematics.J)
         wanted = self._wanted(problem, manipulability.gradient)
         if wanted is None:
-            return self._brake(problem, "the velocity of the tool has no finite answer", manipulability.value)
+            return self._brake(problem, NOT_FINITE, manipulability.value)
         linear = problem.kinematics.J_xi[:3] @ wanted
         speed = math.sqrt(float(linear @ linear))
         speed_scale = max(problem.speed_cap, 0.0) / speed if speed > problem.speed_cap else 1.0
         limited = self._saturation.apply(wanted * speed_scale, problem.q, problem.sent)
-        reason = (
-            "the wanted velocity leaves a limit, for instance of a joint; the robot brakes" if limited.braked else ""
-        )
+        reason = "a limit of a joint or wheel" if limited.braked else ""
         return Solution(limited.xi, limited.scale * speed_scale, manipulability.value, not limited.braked, reason)
 
     def _wanted(self, problem: IkProblem, gradient: Array) -> Array | None:

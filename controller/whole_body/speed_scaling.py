@@ -33,7 +33,7 @@ class SpeedScaling:
         if speed_scale >= 1.0:
             return out
         limited = self._saturation.apply(speed_scale * out.xi, problem.q, problem.sent)
-        reason = f"{what} holds the robot back" if speed_scale < _TOLD else out.reason
+        reason = what if speed_scale < _TOLD else out.reason
         return Solution(
             limited.xi, out.scale * speed_scale, out.manipulability, out.feasible and speed_scale >= _HELD, reason
         )

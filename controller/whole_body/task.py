@@ -124,6 +124,10 @@ def _squares(q: Array, sent: Array, before: Array, wanted: Array, posture: Array
     return total
 
 
+#: What holds the robot back where a number of the problem, or its answer, is not finite.
+NOT_FINITE = "a number that is not finite"
+
+
 class Solution(Struct, frozen=True):
     """Solution of a method.
 
@@ -132,7 +136,7 @@ class Solution(Struct, frozen=True):
         scale: Rate of the motion's clock, 0…1.
         manipulability: ω of the arm.
         feasible: False if the problem is infeasible: the robot brakes, or a constraint is relaxed.
-        reason: The limiting constraint, as text, also if the tool slides along it; empty without one.
+        reason: Name of what holds the robot back, also if the tool slides along it; empty without one.
     """
 
     xi: Array

@@ -7,17 +7,19 @@ from dataclasses import dataclass
 from controller.config import WorkConfig
 from controller.work.point_queue import PointQueue
 from rolling_panda import messages as m
+from rolling_panda import reasons
+from rolling_panda.messages.types import Reason
 
 #: A cut command is repeated this often until the bridge has seen it (s).
 _REPEAT_S = 0.05
-_OUTCOMES: dict[str, str] = {
-    "DONE": "cut",
-    "FAILED_NOT_CUT": "the cutter reports that nothing was cut",
-    "UNKNOWN": "the cutter does not know whether it cut",
+_OUTCOMES: dict[str, Reason] = {
+    "DONE": reasons.cutter_cut(),
+    "FAILED_NOT_CUT": reasons.cutter_missed(),
+    "UNKNOWN": reasons.cutter_unsure(),
 }
 
 
-Ended = Callable[[str, m.Outcome, str, float], None]
+Ended = Callable[[str, m.Outcome, Reason, float], None]
 
 
 @dataclass
@@ -41,7 +43,7 @@ class Blades:
             config: Section `[controller.work]`.
             queue: The queue, which gets the outcomes.
             run_id: Prefix that makes the cut ids of this start unique.
-            ended: Called with the cutter's report in place of the queue: point, outcome, text, time.
+            ended: Called with the cutter's report in place of the queue: point, outcome, reason, time.
         """
         self._ended = ended
         self._timeout_s, self._queue, self._run_id = config.cut_timeout_s, queue, run_id
@@ -67,27 +69,28 @@ class Blades:
         cut.asked_at = now
         return cut.cut_id, cut.point_id
 
-    def watch(self, bridge: m.BridgeState, now: float) -> tuple[str, ...]:
-        """Update the cut from the bridge's state; returns a log text."""
+    def watch(self, bridge: m.BridgeState, now: float) -> tuple[Reason, ...]:
+        """Update the cut from the bridge's state; returns what is logged."""
         cut = self._cut
         if cut is None:
             return ()
         if bridge.cut_id == cut.cut_id and bridge.outcome:
             self._cut = None
-            text = _OUTCOMES[bridge.outcome]
+            why = _OUTCOMES[bridge.outcome]
             if self._ended is not None:
-                self._ended(cut.point_id, bridge.outcome, text, now)
+                self._ended(cut.point_id, bridge.outcome, why, now)
             else:
-                self._queue.resolve(cut.point_id, bridge.outcome, text)
-            return (f"{cut.point_id}: {text}",)
+                self._queue.resolve(cut.point_id, bridge.outcome, why)
+            told = reasons.cut_done if bridge.outcome == "DONE" else reasons.cut_ended
+            return (told(cut.point_id, why),)
         if now > cut.deadline and cut.asked_at == -math.inf:
             self._cut = None
-            text = f"no order was given within {self._timeout_s} s"
-            self._queue.resolve(cut.point_id, "FAILED_NOT_CUT", text)
-            return (f"{cut.point_id}: not cut: {text}",)
+            why = reasons.no_order_given(self._timeout_s)
+            self._queue.resolve(cut.point_id, "FAILED_NOT_CUT", why)
+            return (reasons.point_not_cut(cut.point_id, why),)
         if now > cut.deadline:
             self._cut = None
-            text = f"no report from the cutter for {self._timeout_s} s; look whether it is cut"
-            self._queue.resolve(cut.point_id, "UNKNOWN", text)
-            return (f"{cut.point_id}: UNKNOWN: {text}",)
+            why = reasons.no_cutter_report(self._timeout_s)
+            self._queue.resolve(cut.point_id, "UNKNOWN", why)
+            return (reasons.outcome_unknown(cut.point_id, why),)
         return ()

@@ -14,8 +14,9 @@ from controller.motion.follower import Measured
 from controller.motion.tool_motion import ToolMotion
 from controller.work.close_up import CloseUpClient
 from controller.work.point_queue import PointQueue, Ticket
+from rolling_panda import reasons
 from rolling_panda.messages.perception import CloseUpResult, PruningPoint
-from rolling_panda.messages.types import Outcome, PointState
+from rolling_panda.messages.types import Outcome, PointState, Reason
 
 #: Time limit for the request of a close-up after a cut (s); after it the cutter's report counts.
 _REQUEST_WITHIN_S = 4.0
@@ -26,7 +27,7 @@ class _Ended:
     """A cut that ended: the cutter's report, its time, and whether a close-up was requested."""
 
     outcome: Outcome
-    word: str
+    report: Reason
     since: float
     requested: bool = False
 
@@ -51,12 +52,12 @@ class PostCutCheck:
         """Whether a cut is still to be settled."""
         return bool(self._ended)
 
-    def start(self, point_id: str, outcome: Outcome, word: str, now: float) -> None:
+    def start(self, point_id: str, outcome: Outcome, report: Reason, now: float) -> None:
         """The cutter has said how a cut ended: DONE or FAILED_NOT_CUT; UNKNOWN is settled with that."""
         if not self._check or outcome == "UNKNOWN":
-            self._end(point_id, outcome or "UNKNOWN", word)
+            self._end(point_id, outcome or "UNKNOWN", report)
             return
-        self._ended[point_id] = _Ended(outcome, word, now)
+        self._ended[point_id] = _Ended(outcome, report, now)
 
     def request_close_up(self, point_id: str, now: float) -> None:
         """The camera sees the place now; requests one close-up."""
@@ -65,49 +66,51 @@ class PostCutCheck:
             ended.requested = True
             self._close_ups.ask(point_id, "severed", now)
 
-    def step(self, now: float) -> list[str]:
-        """Decide the cuts that can be decided; returns log texts."""
+    def step(self, now: float) -> list[Reason]:
+        """Decide the cuts that can be decided; returns what is logged."""
         said = []
         for point_id, ended in list(self._ended.items()):
             close_up = self._close_ups.answer(point_id, now) if ended.requested else None
             if close_up is not None:
-                said.append(self._settle(point_id, ended, close_up.finding, close_up.reason))
+                said.append(self._settle(point_id, ended, close_up.finding, _why(close_up)))
             elif not ended.requested and now - ended.since > _REQUEST_WITHIN_S:
-                said.append(self._settle(point_id, ended, "unseen", "the robot left before the close-up"))
+                said.append(self._settle(point_id, ended, "unseen", reasons.robot_left()))
         return said
 
-    def _settle(self, point_id: str, ended: _Ended, finding: str, reason: str) -> str:
+    def _settle(self, point_id: str, ended: _Ended, finding: str, why: Reason) -> Reason:
         del self._ended[point_id]
         self._close_ups.forget(point_id)
         done = ended.outcome == "DONE"
         if finding == "severed":
             if done:
-                return self._end(point_id, "DONE", "cut, and the wood is off")
-            return self._end(point_id, "UNKNOWN", f"{ended.word}, but the wood beyond is gone: look")
+                return self._end(point_id, "DONE", reasons.cut_and_gone())
+            return self._end(point_id, "UNKNOWN", reasons.gone_but(ended.report))
         if finding == "unseen":
-            return self._end(point_id, ended.outcome or "UNKNOWN", f"{ended.word}; not seen afterwards: {reason}")
+            return self._end(point_id, ended.outcome or "UNKNOWN", reasons.unseen_after(ended.report, why))
         ticket = self._queue.get(point_id)
         accepted = None if ticket is None else ticket.accepted
         if self._tried.get(point_id) is None or self._tried[point_id] is not accepted:
             self._tried[point_id] = accepted
-            self._queue.again(point_id, f"{ended.word}, but it still stands: cut once more")
-            return f"{point_id}: {ended.word}, but it still stands: it is cut once more"
+            again = reasons.stands_cut_again(ended.report)
+            self._queue.again(point_id, again)
+            return reasons.cut_ended(point_id, again)
         if done:
-            return self._end(point_id, "UNKNOWN", f"{ended.word} twice, but it still stands: look")
-        return self._end(point_id, "FAILED_NOT_CUT", f"{ended.word} twice, and it still stands")
+            return self._end(point_id, "UNKNOWN", reasons.stands_unknown(ended.report))
+        return self._end(point_id, "FAILED_NOT_CUT", reasons.stands_not_cut(ended.report))
 
-    def _end(self, point_id: str, state: PointState, reason: str) -> str:
+    def _end(self, point_id: str, state: PointState, reason: Reason) -> Reason:
         self._tried.pop(point_id, None)
         self._queue.resolve(point_id, state, reason)
-        return f"{point_id}: {reason}"
+        told = reasons.cut_done if state == "DONE" else reasons.cut_ended
+        return told(point_id, reason)
 
 
 #: From a larger distance the base has to move before the tool enters the canes (m).
 _BASE_NEAR = 0.1
 
 
-def not_as_accepted(close_up: CloseUpResult, ticket: Ticket | None, tolerance: float) -> str:
-    """Reason why a point is not cut after its close-up; empty if it is.
+def not_as_accepted(close_up: CloseUpResult, ticket: Ticket | None, tolerance: float) -> Reason | None:
+    """Reason why a point is not cut after its close-up; None if it is.
 
     Args:
         close_up: Result of the close-up.
@@ -115,17 +118,21 @@ def not_as_accepted(close_up: CloseUpResult, ticket: Ticket | None, tolerance: f
         tolerance: Largest displacement since the acceptance (m).
     """
     if ticket is None or ticket.accepted is None:
-        return "it is not accepted any more"
+        return reasons.not_accepted_any_more()
     if close_up.finding == "severed":
-        return "its cane is off already, as the close-up shows"
+        return reasons.gone_already()
     if close_up.finding == "changed":
-        return f"in the close-up {close_up.reason}: accept it again if it is right"
+        return reasons.changed_in_close_up(_why(close_up))
     if close_up.finding == "unseen" or close_up.position is None:
-        return f"the close-up did not show it: {close_up.reason}"
+        return reasons.unseen_in_close_up(_why(close_up))
     moved = float(np.linalg.norm(np.subtract(close_up.position, ticket.accepted.position)))
     if moved > tolerance:
-        return f"moved {1e3 * moved:.0f} mm in the close-up: accept it again"
-    return ""
+        return reasons.moved_in_close_up(1e3 * moved)
+    return None
+
+
+def _why(close_up: CloseUpResult) -> Reason:
+    return reasons.said(close_up.reason)
 
 
 def camera_ready(robot: Measured, motion: ToolMotion, config: WorkConfig) -> bool:

@@ -4,7 +4,9 @@ from controller.config import HierarchyConfig
 from controller.motion.surroundings import Surroundings
 from controller.whole_body.collision import CollisionModel
 from controller.work.posture_search import CutPlan
+from rolling_panda import reasons
 from rolling_panda.messages.perception import Obstacles
+from rolling_panda.messages.types import Reason
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.transport.inbox import Received
 
@@ -26,17 +28,17 @@ class CutClearance:
         """Take the newest message; one that was taken before costs nothing."""
         self._surroundings.update(obstacles)
 
-    def too_near(self, plan: CutPlan) -> tuple[float, str]:
-        """Largest violation of a required distance (m), with the parts as text; empty without one.
+    def too_near(self, plan: CutPlan) -> tuple[float, Reason | None]:
+        """Largest violation of a required distance (m), with its place and parts; None without one.
 
         Places: at the cut, at the stand-off and clear of the canes. The blades may touch the spur that is cut.
         """
         settings = self._settings
         if not settings.collisions:
-            return 0.0, ""
+            return 0.0, None
         self._surroundings.work_at((plan.poses.cut.translation,))
         within = max(settings.collision_distance + _ROOM, CLEARANCE)
-        worst, words = 0.0, ""
+        worst, found = 0.0, None
         places = (("at the cut", plan.q_cut), ("at the stand-off", plan.q_stand_off), ("clear of it", plan.q_clear))
         for where, q in places:
             near = self._surroundings.model.distances(q, within)
@@ -47,8 +49,5 @@ class CutClearance:
                     needed = max(needed, CLEARANCE)
                 if needed - distance > worst:
                     worst = needed - distance
-                    words = (
-                        f"{where} {1e3 * distance:.0f} mm would be between {pair[0]} and {pair[1]}, "
-                        f"{1e3 * needed:.0f} mm are needed"
-                    )
-        return worst, words
+                    found = reasons.too_near(where, 1e3 * distance, *pair, 1e3 * needed)
+        return worst, found

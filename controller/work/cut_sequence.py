@@ -39,7 +39,7 @@ class CutSequence:
         queue: PointQueue,
         run_id: str,
         known: Known = lambda _: None,
-        permit: Permit = lambda _: "",
+        permit: Permit = lambda _: None,
     ) -> None:
         """Bind the parts.
 
@@ -112,16 +112,16 @@ class CutSequence:
         else:
             self._stage = Surveying(parts, Survey(parts.config, parts.follower, parts.saturation, parts.queue, survey))
 
-    def finish_cut_and_pause(self, why: str) -> None:
-        """With a reason: begin no further cut, leave the canes and pause. Empty continues the work."""
+    def finish_cut_and_pause(self, why: m.Reason | None) -> None:
+        """With a reason: begin no further cut, leave the canes and pause. None continues the work."""
         self._parts.ending = why
 
     def abort(self) -> None:
         """Abort the work. A cut in progress is still monitored, and an accepted point stays accepted."""
         self._stage = Rest(self._parts)
 
-    def watch(self, bridge: m.BridgeState, close_up: CloseUpResult | None, now: float) -> tuple[str, ...]:
-        """Process the end of a cut and the newest close-up, in every mode; returns log texts."""
+    def watch(self, bridge: m.BridgeState, close_up: CloseUpResult | None, now: float) -> tuple[m.Reason, ...]:
+        """Process the end of a cut and the newest close-up, in every mode; returns what is logged."""
         parts = self._parts
         if close_up is not None:
             parts.close_ups.update(close_up, now)

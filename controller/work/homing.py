@@ -33,7 +33,7 @@ class Homing:
         self._in: ArmMotion | None = None
         self._held_s = 0.0
         self.done = False
-        #: Reason why homing failed; empty otherwise.
+        #: What has blocked the arm; empty otherwise.
         self.blocked = ""
 
     def step(self, robot: Measured) -> Array:
@@ -61,7 +61,7 @@ class Homing:
         """Give up when something has held the arm for long enough."""
         self._held_s = self._held_s + self._dt if held else 0.0
         if self._held_s > _PATIENCE_S:
-            self.blocked = tracking.reason or "the arm is blocked"
+            self.blocked = tracking.reason or "an obstacle"
 
 
 class Withdrawal:

@@ -3,6 +3,8 @@
 import numpy as np
 
 from controller.motion.follower import Tracking
+from rolling_panda import reasons
+from rolling_panda.messages.types import Reason
 
 #: A motion that is blocked without a break for this time (s) has timed out.
 _HELD_S = 3.0
@@ -51,10 +53,9 @@ class MotionTimeout:
         return self._started is not None and now - self._started > 2.5 * self._duration + self._timeout_s
 
 
-def missed(what: str, tracking: Tracking) -> str:
-    """Description of the remaining error of a motion to `what`, and its cause."""
-    why = f": {tracking.reason}" if tracking.reason else ""
-    return (
-        f"{what} was not reached in time: {1e3 * tracking.position_error:.1f} mm and "
-        f"{np.degrees(tracking.rotation_error):.1f}° are missing{why}"
-    )
+def missed(goal: str, tracking: Tracking) -> Reason:
+    """The remaining error of a motion to `goal`, and its cause."""
+    left = 1e3 * tracking.position_error, float(np.degrees(tracking.rotation_error))
+    if tracking.reason:
+        return reasons.not_reached_for(goal, *left, tracking.reason)
+    return reasons.not_reached(goal, *left)

@@ -17,6 +17,7 @@ from controller.work.next_cut import Known, Permit
 from controller.work.point_queue import PointQueue
 from controller.work.posture_search import PostureSearch
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.config import RobotConfig
 from rolling_panda.messages.perception import Obstacles
 from rolling_panda.mode_table import Event
@@ -32,13 +33,13 @@ class MotionResult(Struct, frozen=True):
         xi: ξ̇ to send (9).
         cut: Cut to order, as cut id and point id; None without one.
         event: Event for the supervision state machine with its reason; None to stay in the mode.
-        remark: New reason for the mode, as text; empty to keep it.
+        remark: New reason for the mode; None to keep it.
     """
 
     xi: Array
     cut: tuple[str, str] | None = None
-    event: tuple[Event, str] | None = None
-    remark: str = ""
+    event: tuple[Event, m.Reason] | None = None
+    remark: m.Reason | None = None
 
 
 class Movement:
@@ -53,7 +54,7 @@ class Movement:
         run_id: str,
         known: Known,
         method: Method | None = None,
-        permit: Permit = lambda _: "",
+        permit: Permit = lambda _: None,
     ) -> None:
         """Build the robot's model and the motion sources.
 
@@ -65,7 +66,7 @@ class Movement:
             run_id: Prefix that makes the cut ids of this start unique.
             known: Gives the planned cut of a point.
             method: Whole-body method in place of the configured one.
-            permit: Gives the reason why the robot may not approach a point; empty if it may.
+            permit: Gives the reason why the robot may not approach a point; None if it may.
 
         Raises:
             ConfigError: There is no such method.
@@ -119,13 +120,13 @@ class Movement:
             self.sequence.abort()
         self.teleoperation.refuse()
 
-    def busy(self, bridge: m.BridgeState | None) -> str:
-        """Action that has to end before a motion may begin; empty without one."""
+    def busy(self, bridge: m.BridgeState | None) -> m.Reason | None:
+        """Action that has to end before a motion may begin; None without one."""
         if self._homing is not None:
-            return "the arm is being brought home; wait until it is there"
+            return reasons.homing()
         if self.sequence.cutting or (bridge is not None and bridge.cutter == "closing"):
-            return "the blades are closing; wait until the cut has ended"
-        return ""
+            return reasons.blades_closing()
+        return None
 
     def ramp(self) -> MotionResult:
         """Come to rest, or stay there."""
@@ -173,14 +174,14 @@ class Movement:
     def _work(self, robot: Measured, now: float) -> MotionResult:
         work = self.sequence.step(robot, now)
         self.tracking = work.tracking
-        for text in work.events:
-            self._event_log.say("warning", text)
-        event = None
-        if work.pause:
-            event = Event.LOST, work.pause
+        for event in work.events:
+            self._event_log.log(event)
+        change = None
+        if work.pause is not None:
+            change = Event.LOST, work.pause
         elif work.finished:
-            event = Event.FINISHED, work.summary
-        return MotionResult(work.xi, work.cut, event)
+            change = Event.FINISHED, work.summary
+        return MotionResult(work.xi, work.cut, change)
 
     def _bring_home(self, robot: Measured) -> MotionResult:
         homing = self._homing
@@ -188,10 +189,10 @@ class Movement:
             return self.ramp()
         xi = homing.step(robot)
         if homing.blocked:
-            self._event_log.say("warning", f"homing was stopped: {homing.blocked}")
+            self._event_log.log(reasons.homing_blocked(homing.blocked))
             self._homing = None
         elif homing.done:
             self._homing = None
-            self._event_log.say("info", "the arm is home")
-            return MotionResult(xi, remark="the arm is home")
+            self._event_log.log(reasons.arm_home())
+            return MotionResult(xi, remark=reasons.arm_home())
         return MotionResult(xi)

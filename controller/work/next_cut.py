@@ -7,11 +7,12 @@ import numpy as np
 from controller.work.point_queue import PointQueue, Ticket
 from controller.work.posture_search import CutPlan, PostureSearch, Unreachable
 from rolling_panda.messages.perception import PruningPoint
+from rolling_panda.messages.types import Reason
 from rolling_panda.model.differential_drive import Array
 
 Found = CutPlan | Unreachable | None
 Known = Callable[[Ticket], Found]
-Permit = Callable[[Ticket], str]
+Permit = Callable[[Ticket], Reason | None]
 
 
 class NextCut:
@@ -23,7 +24,7 @@ class NextCut:
         queue: PointQueue,
         iterations: int,
         known: Known = lambda _: None,
-        permit: Permit = lambda _: "",
+        permit: Permit = lambda _: None,
     ) -> None:
         """Start without a point.
 
@@ -32,12 +33,12 @@ class NextCut:
             queue: The queue, which chooses the next point.
             iterations: Iterations of the search in one period.
             known: Gives the planned cut of a point, which is then used without a search.
-            permit: Gives the reason why the robot may not approach a point; empty if it may.
+            permit: Gives the reason why the robot may not approach a point; None if it may.
         """
         self._search, self._queue, self._iterations, self._known = search, queue, iterations, known
         self.permit = permit
-        #: Reason why the robot may not approach the next point; empty without one.
-        self.refused = ""
+        #: Reason why the robot may not approach the next point; None without one.
+        self.refused: Reason | None = None
         self.forget()
 
     def forget(self) -> None:
@@ -63,7 +64,7 @@ class NextCut:
             False when no point is accepted, or the next one may not be gone to.
         """
         ticket = self._queue.next()
-        self.refused = "" if ticket is None else self.permit(ticket)
+        self.refused = None if ticket is None else self.permit(ticket)
         if ticket is None or ticket.accepted is None or self.refused:
             self.forget()
             return False

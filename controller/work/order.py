@@ -4,7 +4,9 @@ import math
 from collections.abc import Callable, Sequence
 
 from controller.ledger.journal import ApproachRow, Journal, OrderRow
+from rolling_panda import reasons
 from rolling_panda.messages.supervision import QueueOrder
+from rolling_panda.messages.types import Reason
 
 
 class WorkOrder:
@@ -42,8 +44,8 @@ class WorkOrder:
         self._held = order
         return changed
 
-    def move(self, point_id: str, before: str, revision: int, user: str, accepted: Sequence[str]) -> str:
-        """Move a point before another one, or to the end. Returns the reason of a refusal; empty if done.
+    def move(self, point_id: str, before: str, revision: int, user: str, accepted: Sequence[str]) -> Reason | None:
+        """Move a point before another one, or to the end. Returns the reason of a refusal; None if done.
 
         Args:
             point_id: The point.
@@ -56,22 +58,22 @@ class WorkOrder:
             return why
         for name in (point_id, before):
             if name and name not in accepted:
-                return f"{name} is not accepted; only accepted points have a place in the order of work"
+                return reasons.not_in_order(name)
         if point_id == before:
-            return f"{point_id} cannot come before itself"
+            return reasons.before_itself(point_id)
         order = [name for name in accepted if name != point_id]
         order.insert(order.index(before) if before else len(order), point_id)
         self._change(tuple(order), user)
-        return ""
+        return None
 
-    def give_back(self, revision: int) -> str:
-        """Return to the plan's order. Returns the reason of a refusal; empty if done."""
+    def give_back(self, revision: int) -> Reason | None:
+        """Return to the plan's order. Returns the reason of a refusal; None if done."""
         if why := self._outdated(revision):
             return why
         if not self._by_hand:
-            return "the order is the plan's already"
+            return reasons.order_of_plan()
         self._change((), "")
-        return ""
+        return None
 
     def arranged(self, along: Sequence[str], accepted: Callable[[str], bool]) -> list[str]:
         """All points in their order.
@@ -98,11 +100,13 @@ class WorkOrder:
         following = iter(wanted)
         return [next(following) if name in among else name for name in along]
 
-    def _outdated(self, revision: int) -> str:
-        if revision == self._state.revision:
-            return ""
-        by = f"{self._state.user} has" if self._state.user else "somebody has"
-        return f"{by} changed the order since: number {revision} was seen, it is {self._state.revision} now"
+    def _outdated(self, revision: int) -> Reason | None:
+        state = self._state
+        if revision == state.revision:
+            return None
+        if state.user:
+            return reasons.order_changed_by(state.user, revision, state.revision)
+        return reasons.order_changed(revision, state.revision)
 
     def _change(self, order: tuple[str, ...], user: str) -> None:
         self._by_hand, self._state = order, QueueOrder(self._state.revision + 1, user)
@@ -136,15 +140,13 @@ class Approaches:
         for point_id, row in rows:
             self._put(point_id, row.azimuth)
 
-    def turn(self, point_id: str, azimuth: float | None, user: str) -> str:
-        """Set the approach of a point. Returns the reason of a refusal; empty if done."""
+    def turn(self, point_id: str, azimuth: float | None, user: str) -> Reason | None:
+        """Set the approach of a point. Returns the reason of a refusal; None if done."""
         if azimuth is not None and not abs(azimuth) <= LARGEST:
-            return (
-                f"the approach cannot be turned by {math.degrees(azimuth):.0f}°; at most {math.degrees(LARGEST):.0f}°"
-            )
+            return reasons.approach_too_far(math.degrees(azimuth), math.degrees(LARGEST))
         self._put(point_id, azimuth)
         self._journal.add("approach", point_id, ApproachRow(azimuth=azimuth, user=user))
-        return ""
+        return None
 
     def _put(self, point_id: str, azimuth: float | None) -> None:
         if azimuth is None:

@@ -11,21 +11,18 @@ from controller.config import WorkConfig
 from controller.ledger.journal import Journal, TicketRow
 from controller.work.order import Approaches, WorkOrder
 from controller.work.rule_history import RuleHistory
+from rolling_panda import reasons
 from rolling_panda.messages.perception import PruningPoint, PruningPoints, PruningRule, point_digest
 from rolling_panda.messages.supervision import QueueEntry
-from rolling_panda.messages.types import PointState
+from rolling_panda.messages.types import PointState, Reason
 from rolling_panda.model.differential_drive import Array
 
 #: A cane that turned further than this after acceptance is not the one the operator saw (rad).
 _TURNED_TOLERANCE = 0.35
 #: A point id that returns at a larger distance belongs to another cane (m).
 _ELSEWHERE = 0.03
-_INTERRUPTED = "the controller ended before it knew whether this was cut; look, and report the outcome"
 #: States in which a point is shown from the record if perception does not report it: a person has to decide.
 _ASKED: frozenset[PointState] = frozenset({"ACCEPTED", "UNREACHABLE", "UNKNOWN"})
-_WAITS = "accepted before a restart; waits until perception reports it again"
-_UNSEEN = "perception no longer reports it"
-_UNBOUND = "its record does not match its hash; accept it again"
 #: States with an acceptance and no cut yet. The acceptance is valid while the point is as the operator saw it.
 BOUND: frozenset[PointState] = frozenset({"ACCEPTED", "UNREACHABLE"})
 _ACCEPTABLE: frozenset[PointState] = frozenset({"PROPOSED", "REJECTED", "FAILED_NOT_CUT"})
@@ -38,7 +35,7 @@ class Ticket:
     Attributes:
         point: The point as last perceived.
         state: State of the point.
-        reason: Reason for the state, as text.
+        reason: Reason for the state; None without one.
         user: Who accepted or rejected it.
         accepted: The point that the operator saw and accepted; it is what is cut.
         hash: Hash of the accepted point.
@@ -48,7 +45,7 @@ class Ticket:
 
     point: PruningPoint
     state: PointState = "PROPOSED"
-    reason: str = ""
+    reason: Reason | None = None
     user: str = ""
     accepted: PruningPoint | None = None
     hash: str = ""
@@ -76,17 +73,17 @@ class PointQueue:
         self._rules: RuleHistory[Ticket] = RuleHistory()
         self._restored: list[str] = []
 
-    def update(self, points: PruningPoints, keep: str = "") -> list[str]:
-        """Update from perception's current points; returns texts of the voided acceptances.
+    def update(self, points: PruningPoints, keep: str = "") -> list[Reason]:
+        """Update from perception's current points; returns the voided acceptances.
 
         Args:
             points: Perception's message.
             keep: Point that the blades hide from the camera: its disappearance is ignored. If it is seen
                 elsewhere than accepted, its acceptance is void like any other.
         """
-        voided: list[str] = []
+        voided: list[Reason] = []
         change = self._rule_change(points)
-        rule = "" if change is None else _rule_words(change[1])
+        rule = None if change is None else _described(change[1])
         bound = {} if change is None else {name: each for name, each in self._tickets.items() if each.state in BOUND}
         self.perceived = points
         seen = {point.point_id for point in points.points}
@@ -102,9 +99,9 @@ class PointQueue:
                 self._put(point.point_id, Ticket(point))
                 continue
             if not ticket.seen and ticket.state == "ACCEPTED":
-                ticket = replace(ticket, reason="")
+                ticket = replace(ticket, reason=None)
             known, ticket = ticket, replace(ticket, point=point, seen=True)
-            why = _by_rule(known, point, rule) if rule and known.seen else ""
+            why = _by_rule(known, point, rule) if rule is not None and known.seen else None
             why = why or self._changed(ticket)
             self._put(point.point_id, self._void(ticket, why, voided) if why else ticket)
         for point_id, ticket in list(self._tickets.items()):
@@ -112,7 +109,7 @@ class PointQueue:
                 continue
             gone = replace(ticket, seen=False)
             if ticket.state in BOUND:
-                why = f"the rule is {rule} now, which asks for no such cut" if rule else _UNSEEN
+                why = reasons.no_longer_reported() if rule is None else reasons.rule_wants_no_cut(rule)
                 gone = self._void(gone, why, voided)
             if gone.state == "PROPOSED" and ticket.state == "PROPOSED":
                 self._drop(point_id)
@@ -132,22 +129,22 @@ class PointQueue:
             return None
         return None if points.rule == before.rule else (before.rule, points.rule)
 
-    def undo_rule(self, rule: PruningRule) -> str:
+    def undo_rule(self, rule: PruningRule) -> Reason | None:
         """Restore the acceptances that the change to `rule` made void, now or when perception reports the former rule.
 
         Returns:
-            Why that cannot be; empty when it is done or will be.
+            Why that cannot be; None when it is done or will be.
         """
         back = self._rules.undo(rule, None if self.perceived is None else self.perceived.rule)
-        if isinstance(back, str):
+        if isinstance(back, Reason):
             return back
         self._restore(back)
-        return ""
+        return None
 
-    def restored(self) -> str:
-        """Text of the acceptances that the undo of a rule has restored, once; empty without any."""
-        told, self._restored = ", ".join(self._restored), []
-        return told
+    def restored(self) -> Reason | None:
+        """The acceptances that the undo of a rule has restored, once; None without any."""
+        names, self._restored = self._restored, []
+        return reasons.acceptances_restored(", ".join(names)) if names else None
 
     def _restore(self, acceptances: Mapping[str, Ticket] | None) -> None:
         for name, accepted in (acceptances or {}).items():
@@ -163,8 +160,8 @@ class PointQueue:
         """The ticket of a point, None when there is none."""
         return self._tickets.get(point_id)
 
-    def accept(self, point_id: str, revision: int, user: str, digest: str = "") -> str:
-        """Accept a point as the operator saw it. Returns the reason of a refusal; empty if accepted.
+    def accept(self, point_id: str, revision: int, user: str, digest: str = "") -> Reason | None:
+        """Accept a point as the operator saw it. Returns the reason of a refusal; None if accepted.
 
         Args:
             point_id: Of the point.
@@ -174,54 +171,52 @@ class PointQueue:
         """
         ticket = self._tickets.get(point_id)
         if ticket is None:
-            return f"there is no point {point_id!r}"
+            return reasons.point_unknown(point_id)
         if ticket.state == "UNKNOWN":
-            return f"it is unknown whether {point_id} is cut; look, and report the outcome first"
-        if ticket.state == "UNREACHABLE":
-            return f"{point_id} is accepted, and cannot be reached: {ticket.reason}"[:500]
+            return reasons.outcome_undecided(point_id)
+        if ticket.state == "UNREACHABLE" and ticket.reason is not None:
+            return reasons.point_unreachable(point_id, ticket.reason)
         if ticket.state not in _ACCEPTABLE:
-            return f"{point_id} is {ticket.state}"
+            return reasons.point_state(point_id, ticket.state)
         if not ticket.seen:
-            return f"perception does not see {point_id} any more"
+            return reasons.point_unseen(point_id)
         if ticket.point.revision != revision:
-            return f"{point_id} has changed since: revision {revision} was seen, it is {ticket.point.revision} now"
+            return reasons.point_revised(point_id, revision, ticket.point.revision)
         if digest and digest != ticket.point.digest:
-            return (
-                f"{point_id} is not what was seen: its hash is {ticket.point.digest[:8] or 'unknown'}, not {digest[:8]}"
-            )
+            return reasons.point_replaced(point_id, ticket.point.digest[:8] or "unknown", digest[:8])
         radius = ticket.point.radius
         if radius > self._config.largest_radius:
-            limit = 2e3 * self._config.largest_radius
-            return f"{point_id}: the cane is {2e3 * radius:.0f} mm thick, the limit is {limit:.0f} mm"
+            return reasons.cane_too_thick(point_id, 2e3 * radius, 2e3 * self._config.largest_radius)
         self._put(
             point_id,
             replace(
-                ticket, state="ACCEPTED", reason="", user=user, accepted=ticket.point, hash=point_digest(ticket.point)
+                ticket, state="ACCEPTED", reason=None, user=user, accepted=ticket.point, hash=point_digest(ticket.point)
             ),
         )
-        return ""
+        return None
 
-    def reject(self, point_id: str, user: str, reason: str) -> str:
-        """Reject a point. Returns the reason of a refusal; empty if done."""
+    def reject(self, point_id: str, user: str, reason: str) -> Reason | None:
+        """Reject a point. Returns the reason of a refusal; None if done."""
         ticket = self._tickets.get(point_id)
         if ticket is None:
-            return f"there is no point {point_id!r}"
+            return reasons.point_unknown(point_id)
         if ticket.state in ("CUTTING", "DONE", "UNKNOWN"):
-            return f"{point_id} is {ticket.state}"
-        self._put(point_id, replace(ticket, state="REJECTED", reason=reason or "rejected", user=user, accepted=None))
-        return ""
+            return reasons.point_state(point_id, ticket.state)
+        why = reasons.said(reason) if reason else reasons.rejected()
+        self._put(point_id, replace(ticket, state="REJECTED", reason=why, user=user, accepted=None))
+        return None
 
-    def reconsider(self, point_id: str, user: str) -> str:
-        """ACCEPTED, UNREACHABLE or REJECTED → PROPOSED. Returns the reason of a refusal; empty if done."""
+    def reconsider(self, point_id: str, user: str) -> Reason | None:
+        """ACCEPTED, UNREACHABLE or REJECTED → PROPOSED. Returns the reason of a refusal; None if done."""
         ticket = self._tickets.get(point_id)
         if ticket is None:
-            return f"there is no point {point_id!r}"
+            return reasons.point_unknown(point_id)
         if ticket.state not in {*BOUND, "REJECTED"}:
-            return f"{point_id} is {ticket.state}: there is nothing to take back"
+            return reasons.nothing_to_take_back(point_id, ticket.state)
         if not ticket.seen:
-            return f"perception does not see {point_id} any more"
-        self._put(point_id, replace(ticket, state="PROPOSED", reason="", user=user, accepted=None, hash=""))
-        return ""
+            return reasons.point_unseen(point_id)
+        self._put(point_id, replace(ticket, state="PROPOSED", reason=None, user=user, accepted=None, hash=""))
+        return None
 
     def proposed(self, confidence: float) -> list[PruningPoint]:
         """Points that wait for a decision and are at least this sure."""
@@ -254,18 +249,12 @@ class PointQueue:
         return sum(ticket.state == state and ticket.seen for ticket in self._tickets.values())
 
     @property
-    def waits(self) -> str:
-        """Reason why no accepted point is workable; empty if one is."""
+    def waits(self) -> Reason | None:
+        """Reason why no accepted point is workable; None if one is."""
         if self.next() is not None:
-            return ""
+            return None
         beyond = self.count("UNREACHABLE")
-        if not beyond:
-            return "no point is accepted"
-        return (
-            "the accepted point cannot be reached"
-            if beyond == 1
-            else f"none of {beyond} accepted points can be reached"
-        )
+        return reasons.none_reachable(beyond) if beyond else reasons.none_accepted()
 
     def arrange(self, order: tuple[str, ...]) -> None:
         """Work in this order from now on; points that it does not name stay in their places along the row.
@@ -276,7 +265,7 @@ class PointQueue:
         self.order.plan(order)
         self.sort()
 
-    def reach(self, planned: Iterable[PruningPoint], refused: Mapping[str, str], busy: str = "") -> bool:
+    def reach(self, planned: Iterable[PruningPoint], refused: Mapping[str, Reason], busy: str = "") -> bool:
         """Update which accepted points the current plan can reach: ACCEPTED ↔ UNREACHABLE.
 
         Args:
@@ -292,11 +281,11 @@ class PointQueue:
             ticket = self._tickets.get(point.point_id)
             if ticket is None or ticket.state not in BOUND or ticket.accepted != point or point.point_id == busy:
                 continue
-            why = refused.get(point.point_id, "")
+            why = refused.get(point.point_id)
             if why and (ticket.state, ticket.reason) != ("UNREACHABLE", why):
                 self._put(point.point_id, replace(ticket, state="UNREACHABLE", reason=why))
             elif not why and ticket.state == "UNREACHABLE":
-                self._put(point.point_id, replace(ticket, state="ACCEPTED", reason=""))
+                self._put(point.point_id, replace(ticket, state="ACCEPTED", reason=None))
             else:
                 continue
             changed = True
@@ -311,22 +300,22 @@ class PointQueue:
 
     def begin_cut(self, point_id: str, cut_id: str) -> int:
         """ACCEPTED → CUTTING: the blades are about to move. Returns the number of its record."""
-        self._put(point_id, replace(self._tickets[point_id], state="CUTTING", cut_id=cut_id, reason="cutting"))
+        self._put(point_id, replace(self._tickets[point_id], state="CUTTING", cut_id=cut_id, reason=reasons.cutting()))
         return self._journal.number
 
     def recorded(self, number: int) -> bool:
         """Is the record of this number durable?"""
         return self._journal.holds(number)
 
-    def resolve(self, point_id: str, state: PointState, reason: str) -> None:
+    def resolve(self, point_id: str, state: PointState, reason: Reason) -> None:
         """End of a point's work: DONE, FAILED_NOT_CUT or UNKNOWN."""
         self._put(point_id, replace(self._tickets[point_id], state=state, reason=reason))
 
-    def again(self, point_id: str, reason: str) -> None:
+    def again(self, point_id: str, reason: Reason) -> None:
         """CUTTING → ACCEPTED: it stands after a cut, and is cut once more as it was accepted."""
         self._put(point_id, replace(self._tickets[point_id], state="ACCEPTED", reason=reason))
 
-    def void(self, point_id: str, why: str) -> None:
+    def void(self, point_id: str, why: Reason) -> None:
         """ACCEPTED or UNREACHABLE → PROPOSED: the point differs from the accepted one."""
         self._put(point_id, self._void(self._tickets[point_id], why, []))
 
@@ -337,27 +326,33 @@ class PointQueue:
                 continue
             point_id = row.point.point_id
             self._tickets[point_id] = Ticket(
-                row.point, row.state, row.reason, row.user, row.accepted, row.hash, row.cut_id, seen=False
+                row.point, row.state, row.why, row.user, row.accepted, row.hash, row.cut_id, seen=False
             )
             self._order.append(point_id)
             if row.state == "CUTTING":
-                self.resolve(point_id, "UNKNOWN", _INTERRUPTED)
+                self.resolve(point_id, "UNKNOWN", reasons.interrupted())
             elif row.state in BOUND and (row.accepted is None or point_digest(row.accepted) != row.hash):
-                self._put(point_id, replace(self._tickets[point_id], state="REJECTED", reason=_UNBOUND, accepted=None))
+                self._put(
+                    point_id,
+                    replace(self._tickets[point_id], state="REJECTED", reason=reasons.record_damaged(), accepted=None),
+                )
             elif row.state in BOUND:
                 # A point that was unreachable from the earlier robot pose is for the next plan to decide.
-                self._put(point_id, replace(self._tickets[point_id], state="ACCEPTED", reason=_WAITS))
+                self._put(
+                    point_id,
+                    replace(self._tickets[point_id], state="ACCEPTED", reason=reasons.accepted_before_restart()),
+                )
         self.sort()
 
-    def decide(self, point_id: str, outcome: PointState, user: str, reason: str) -> str:
-        """Set the outcome of an UNKNOWN cut after an inspection. Returns the reason of a refusal; empty if done."""
+    def decide(self, point_id: str, outcome: PointState, user: str, reason: str) -> Reason | None:
+        """Set the outcome of an UNKNOWN cut after an inspection. Returns the reason of a refusal; None if done."""
         ticket = self._tickets.get(point_id)
         if ticket is None:
-            return f"there is no point {point_id!r}"
+            return reasons.point_unknown(point_id)
         if ticket.state != "UNKNOWN":
-            return f"how {point_id} ended is not in question: it is {ticket.state}"
-        self._put(point_id, replace(ticket, state=outcome, reason=f"{user} looked: {reason}"[:500]))
-        return ""
+            return reasons.outcome_known(point_id, ticket.state)
+        self._put(point_id, replace(ticket, state=outcome, reason=reasons.inspected(user, reason)))
+        return None
 
     def entries(self) -> tuple[QueueEntry, ...]:
         """Every point in the order of work, for the wire."""
@@ -365,24 +360,24 @@ class PointQueue:
             self._entries = tuple(_entry(self._tickets[i], self.approaches.of(i)) for i in self._order)
         return self._entries
 
-    def _changed(self, ticket: Ticket) -> str:
+    def _changed(self, ticket: Ticket) -> Reason | None:
         if ticket.state not in BOUND or ticket.accepted is None:
-            return ""
+            return None
         moved = _apart(ticket.point, ticket.accepted)
         if moved > self._config.moved_tolerance:
-            return f"it moved by {1e3 * moved:.0f} mm after it was accepted"
+            return reasons.moved_after_acceptance(1e3 * moved)
         turned = float(np.clip(abs(np.dot(ticket.point.tangent, ticket.accepted.tangent)), 0.0, 1.0))
         if np.arccos(turned) > _TURNED_TOLERANCE:
-            return f"its cane turned by {np.degrees(np.arccos(turned)):.0f}° after it was accepted"
-        return ""
+            return reasons.turned_after_acceptance(float(np.degrees(np.arccos(turned))))
+        return None
 
-    def _void(self, ticket: Ticket, why: str, voided: list[str]) -> Ticket:
-        text = f"acceptance void: {why}"
-        voided.append(f"{ticket.point.point_id}: {text}")
-        return replace(ticket, state="PROPOSED", reason=text, accepted=None, hash="")
+    def _void(self, ticket: Ticket, why: Reason, voided: list[Reason]) -> Ticket:
+        void = reasons.acceptance_void(why)
+        voided.append(reasons.acceptance_lost(ticket.point.point_id, void))
+        return replace(ticket, state="PROPOSED", reason=void, accepted=None, hash="")
 
-    def move(self, point_id: str, before: str, revision: int, user: str) -> str:
-        """Move an accepted point in the order of work. Returns the reason of a refusal; empty if done.
+    def move(self, point_id: str, before: str, revision: int, user: str) -> Reason | None:
+        """Move an accepted point in the order of work. Returns the reason of a refusal; None if done.
 
         Args:
             point_id: What is moved.
@@ -392,32 +387,34 @@ class PointQueue:
         """
         for name in (point_id, before):
             ticket = self._tickets.get(name)
-            if ticket is not None and ticket.state == "UNREACHABLE":
-                return f"{name} cannot be reached, so it has no place in the order of work: {ticket.reason}"[:500]
+            if ticket is not None and ticket.state == "UNREACHABLE" and ticket.reason is not None:
+                return reasons.unreachable_in_order(name, ticket.reason)
         accepted = [name for name in self._order if self._tickets[name].state == "ACCEPTED"]
-        return self.order.move(point_id, before, revision, user, accepted) or self.sort()
+        if why := self.order.move(point_id, before, revision, user, accepted):
+            return why
+        self.sort()
+        return None
 
-    def turn(self, point_id: str, azimuth: float | None, user: str) -> str:
+    def turn(self, point_id: str, azimuth: float | None, user: str) -> Reason | None:
         """Set the turn of the approach (rad); None leaves it to the search. Returns the reason of a refusal."""
         ticket = self._tickets.get(point_id)
         if ticket is None:
-            return f"there is no point {point_id!r}"
+            return reasons.point_unknown(point_id)
         if ticket.state in ("CUTTING", "DONE", "UNKNOWN"):
-            return f"{point_id} is {ticket.state}"
+            return reasons.point_state(point_id, ticket.state)
         self._entries = None
         why = self.approaches.turn(point_id, azimuth, user)
         if not why and ticket.state == "UNREACHABLE":
             # Another approach may reach it; the next plan decides.
-            self._put(point_id, replace(ticket, state="ACCEPTED", reason=""))
+            self._put(point_id, replace(ticket, state="ACCEPTED", reason=None))
         return why
 
-    def sort(self) -> str:
-        """Sort all points into the order of work. It never fails."""
+    def sort(self) -> None:
+        """Sort all points into the order of work."""
         along = sorted(self._order, key=self._place)
         order = self.order.arranged(along, lambda name: self._tickets[name].state == "ACCEPTED")
         if order != self._order:
             self._order, self._entries = order, None
-        return ""
 
     def _place(self, point_id: str) -> tuple[float, str]:
         ticket = self._tickets[point_id]
@@ -457,20 +454,19 @@ def _apart(one: PruningPoint, other: PruningPoint) -> float:
     return float(np.linalg.norm(np.subtract(one.position, other.position)))
 
 
-def _rule_words(rule: PruningRule) -> str:
-    """A rule's numbers for people."""
-    count = f"{rule.nodes_kept} + {rule.fruiting_nodes}" if rule.system == "guyot" else f"{rule.nodes_kept}"
-    nodes = "1 node" if count == "1" else f"{count} nodes"
+def _described(rule: PruningRule) -> Reason:
     thick, past = 1e3 * rule.preferred_diameter, 1e3 * rule.offset
-    return f"{rule.system.capitalize()}, {nodes}, from {thick:g} mm, {past:.0f} mm past"
+    if rule.system == "guyot":
+        return reasons.guyot_rule(rule.nodes_kept, rule.fruiting_nodes, thick, past)
+    return reasons.spur_rule(rule.nodes_kept, thick, past)
 
 
-def _by_rule(known: Ticket, point: PruningPoint, rule: str) -> str:
-    """Why an acceptance is void where another rule has come into force; empty where it asks for the same cut."""
+def _by_rule(known: Ticket, point: PruningPoint, rule: Reason) -> Reason | None:
+    """Why an acceptance is void where another rule has come into force; None where it asks for the same cut."""
     if known.state not in BOUND or (point.revision, point.digest) == (known.point.revision, known.point.digest):
-        return ""
+        return None
     moved = 1e3 * _apart(known.point, point)
-    return f"the rule is {rule} now, which cuts {f'{moved:.0f} mm away' if moved >= 1.0 else 'otherwise here'}"
+    return reasons.rule_cuts_elsewhere(rule, moved) if moved >= 1.0 else reasons.rule_cuts_otherwise(rule)
 
 
 def _recorded(ticket: Ticket) -> tuple[object, ...]:

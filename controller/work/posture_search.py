@@ -12,7 +12,9 @@ import pinocchio as pin
 
 from controller.config import WorkConfig
 from controller.work.cut_pose import CutPoses, cut_poses
+from rolling_panda import reasons
 from rolling_panda.errors import InputError
+from rolling_panda.messages.types import Reason
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_Q, RobotModel
 
@@ -67,9 +69,9 @@ class CutPlan:
 
 @dataclass(frozen=True)
 class Unreachable:
-    """No posture was found; `reason` is the reason as text."""
+    """No posture was found, for a reason."""
 
-    reason: str
+    reason: Reason
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,7 @@ class PostureSearch:
         robot: RobotModel,
         config: WorkConfig,
         joint_margin: float,
-        too_near: Callable[[CutPlan], tuple[float, str]] = lambda _: (0.0, ""),
+        too_near: Callable[[CutPlan], tuple[float, Reason | None]] = lambda _: (0.0, None),
     ) -> None:
         """Remember the model and the row's direction.
 
@@ -95,7 +97,7 @@ class PostureSearch:
             robot: Model of its own.
             config: The row and the usual postures.
             joint_margin: Distance from every joint limit (rad).
-            too_near: How much of a required distance a plan lacks (m), with the parts as text; empty if it lacks none.
+            too_near: How much of a required distance a plan lacks (m), with its place and parts; None if it lacks none.
                 Another plan is not returned.
         """
         self._robot, self._config, self._too_near = robot, config, too_near
@@ -123,7 +125,7 @@ class PostureSearch:
             azimuth: Turn of the approach about the cane (rad) set by a person; None leaves it to the search.
         """
         best: CutPlan | None = None
-        passed_over: list[tuple[float, str]] = []
+        passed_over: list[tuple[float, Reason]] = []
         seeds = (np.array(self._config.reach), np.array(self._config.home))
         base = np.array([q[0], q[1], 0.0])
         lateral = float(base @ self._left)
@@ -132,8 +134,8 @@ class PostureSearch:
         for turn, tilt in approaches:
             try:
                 poses = cut_poses(position, tangent, self._left, config.stand_off, config.clearance, turn, tilt)
-            except InputError as error:
-                return Unreachable(str(error))
+            except InputError:
+                return Unreachable(reasons.no_square_approach())
             for offset in OFFSETS:
                 place = (float(position @ self._along) - offset) * self._along + lateral * self._left
                 start = q.copy()
@@ -144,9 +146,9 @@ class PostureSearch:
                     plan = yield from self._try(poses, start, seed)
                     if plan is None:
                         continue
-                    lacking = self._too_near(plan)
-                    if lacking[1]:
-                        passed_over.append(lacking)
+                    lacking, nearest = self._too_near(plan)
+                    if nearest is not None:
+                        passed_over.append((lacking, nearest))
                         continue
                     if plan.joint_margin >= _GOOD_MARGIN and plan.manipulability >= _GOOD_OMEGA:
                         return plan
@@ -156,16 +158,9 @@ class PostureSearch:
             if best is not None:
                 return best
         if passed_over:
-            _, words = min(passed_over, key=lambda lacking: lacking[0])
-            return Unreachable(
-                f"every posture that reaches it comes too near to an obstacle; in the best one, {words}: "
-                f"move the point along its cane, or cut this one by hand"
-            )
+            return Unreachable(reasons.no_clear_posture(min(passed_over, key=lambda each: each[0])[1]))
         distance = float(position @ self._left) - lateral
-        return Unreachable(
-            f"no posture of the arm reaches it: it is {distance:.2f} m beside the robot's path and "
-            f"{position[2]:.2f} m high"
-        )
+        return Unreachable(reasons.out_of_reach(distance, float(position[2])))
 
     def _too_far(self, goal: Any, q: Array) -> bool:
         """Whether the stretched arm would not get there, which saves most of a vain search."""

@@ -1,9 +1,13 @@
 """Handlers of the operators' decisions about points."""
 
+from typing import Any
+
 from controller.ledger.journal import EventLogger
 from controller.work.point_queue import PointQueue
 from rolling_panda import commands as intents
+from rolling_panda import reasons
 from rolling_panda.commands import Handler, Handlers
+from rolling_panda.messages.types import Reason
 
 
 class QueueRequests:
@@ -14,7 +18,7 @@ class QueueRequests:
         self._queue, self._event_log = queue, event_log
 
     def handlers(self) -> Handlers:
-        """Handler of each decision; it returns the reason of a refusal, empty if done."""
+        """Handler of each decision; it returns the reason of a refusal, None if done."""
         queue = self._queue
         decide: Handlers = {
             intents.AcceptPoint: lambda asked, _: queue.accept(
@@ -34,18 +38,19 @@ class QueueRequests:
         return {message: self._sorted(handler) for message, handler in decide.items()}
 
     def _sorted(self, handler: Handler) -> Handler:
-        return lambda asked, now: handler(asked, now) or self._queue.sort()
+        def handle(asked: Any, now: float) -> Reason | None:
+            refused = handler(asked, now)
+            self._queue.sort()
+            return refused
 
-    def _accept_all(self, asked: intents.AcceptAll) -> str:
+        return handle
+
+    def _accept_all(self, asked: intents.AcceptAll) -> Reason | None:
         points = self._queue.proposed(asked.confidence)
-        refusals = [self._queue.accept(point.point_id, point.revision, asked.user, point.digest) for point in points]
-        accepted = refusals.count("")
-        if accepted:
-            counted = "1 point" if accepted == 1 else f"{accepted} points"
-            self._event_log.say(
-                "info", f"{asked.user}: accepted {counted} of confidence {asked.confidence:.2f} and more"
-            )
-            return ""
-        if not points:
-            return f"no proposed point has a confidence of {asked.confidence:.2f} or more"
-        return "; ".join(refusals)
+        refused = [self._queue.accept(point.point_id, point.revision, asked.user, point.digest) for point in points]
+        why = [each for each in refused if each is not None]
+        if len(why) < len(points):
+            counted = len(points) - len(why)
+            self._event_log.log(reasons.points_accepted(asked.user, counted, asked.confidence))
+            return None
+        return reasons.none_acceptable(len(why), why[0]) if why else reasons.none_so_confident(asked.confidence)

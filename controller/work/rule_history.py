@@ -3,7 +3,9 @@
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
+from rolling_panda import reasons
 from rolling_panda.messages.perception import PruningRule
+from rolling_panda.messages.types import Reason
 
 Acceptance = TypeVar("Acceptance")
 #: Number of changes that can be undone, the last one first.
@@ -39,7 +41,7 @@ class RuleHistory(Generic[Acceptance]):
         self._changes = [*self._changes, Change(former, rule, voided)][-_MOST:]
         return None
 
-    def undo(self, rule: PruningRule, now: PruningRule | None) -> dict[str, Acceptance] | None | str:
+    def undo(self, rule: PruningRule, now: PruningRule | None) -> dict[str, Acceptance] | None | Reason:
         """Undo the change to `rule` while `now` is in force.
 
         Returns:
@@ -55,4 +57,4 @@ class RuleHistory(Generic[Acceptance]):
             voided = changes[-2].voided
             self._changes = changes[:-2]
             return voided
-        return "the controller knows of no acceptance that this rule made void; accept again what is to be cut"
+        return reasons.nothing_to_restore()

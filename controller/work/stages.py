@@ -25,6 +25,7 @@ from controller.work.posture_search import CutPlan, Unreachable
 from controller.work.step_result import StepResult
 from controller.work.survey import Survey
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_XI
 
@@ -48,7 +49,7 @@ class Parts:
         post_cut_check: Check of the last cuts.
         blades: Orders the cuts.
         next_cut: Posture search for the next point.
-        ending: Reason to begin no further cut; empty without one.
+        ending: Reason to begin no further cut; None without one.
         cut_point: Point of the last cut; empty before the first.
         cut_at: Position of the tool at the last cut (3, m, odom).
     """
@@ -62,7 +63,7 @@ class Parts:
     post_cut_check: PostCutCheck
     blades: Blades
     next_cut: NextCut
-    ending: str = ""
+    ending: m.Reason | None = None
     cut_point: str = ""
     cut_at: Array = field(default_factory=lambda: np.zeros(3))
 
@@ -81,7 +82,7 @@ class Parts:
             return
         _shift(motion, np.array(ticket.point.position))
 
-    def brake(self, robot: Measured, pause: str = "") -> StepResult:
+    def brake(self, robot: Measured, pause: m.Reason | None = None) -> StepResult:
         """Come to rest, or stay there; with a reason the work pauses."""
         return StepResult(self.saturation.ramp(robot.sent), pause=pause)
 
@@ -167,27 +168,29 @@ class Stage:
         """
         raise NotImplementedError
 
-    def _left(self, point_id: str, accepted: m.PruningPoint | None) -> str:
-        """Log line if the point may no longer be approached; empty if it may."""
+    def _left(self, point_id: str, accepted: m.PruningPoint | None) -> m.Reason | None:
+        """Why the point may no longer be approached; None if it may."""
         ticket = self._parts.queue.get(point_id)
         if ticket is None:
-            why = "the point has gone"
+            why = reasons.point_gone()
         elif ticket.state != "ACCEPTED":
-            why = ticket.reason
+            why = ticket.reason or reasons.point_state(point_id, ticket.state)
         elif ticket.accepted is not accepted:
-            why = "it was accepted again"
-        elif not (why := self._parts.next_cut.permit(ticket)):
-            return ""
-        return f"{point_id}: left: {why}"
+            why = reasons.accepted_again()
+        elif (refused := self._parts.next_cut.permit(ticket)) is not None:
+            why = refused
+        else:
+            return None
+        return reasons.point_left(point_id, why)
 
-    def _escape(self, robot: Measured, now: float, text: str) -> "Step":
+    def _escape(self, robot: Measured, now: float, why: m.Reason) -> "Step":
         """Leave the point, from outside the canes."""
         stage, result = Escape(self._parts).step(robot, now)
-        return stage, result.with_event(text)
+        return stage, result.with_event(why)
 
-    def _fail(self, robot: Measured, point_id: str, reason: str) -> "Step":
+    def _fail(self, robot: Measured, point_id: str, reason: m.Reason) -> "Step":
         self._parts.queue.resolve(point_id, "FAILED_NOT_CUT", reason)
-        return Escape(self._parts), self._parts.brake(robot).with_event(f"{point_id}: not cut: {reason}")
+        return Escape(self._parts), self._parts.brake(robot).with_event(reasons.point_not_cut(point_id, reason))
 
 
 #: Stage of the next period, and the result of this one.
@@ -205,8 +208,7 @@ class Rest(Stage):
             return Search(parts, following.point_id, following.accepted), StepResult(xi)
         # The last cut may still have to be made once more.
         beyond = parts.queue.count("UNREACHABLE")
-        unreachable = f"; {beyond} cannot be reached" if beyond else ""
-        summary = following.refused or f"{StepResult.summary}{unreachable}"
+        summary = following.refused or (reasons.work_done_but(beyond) if beyond else reasons.work_done())
         return self, StepResult(xi, finished=not parts.post_cut_check.pending, summary=summary)
 
 
@@ -259,15 +261,15 @@ class Search(Stage):
     def step(self, robot: Measured, now: float) -> Step:
         """One period."""
         parts = self._parts
-        if text := self._left(self.point_id, self._accepted):
-            return self._escape(robot, now, text)
+        if left := self._left(self.point_id, self._accepted):
+            return self._escape(robot, now, left)
         if parts.ending:
             return self, parts.brake(robot, parts.ending)
         result = parts.brake(robot)
         parts.next_cut.step()
         found = parts.next_cut.found
         if isinstance(found, Unreachable):
-            return self._fail(robot, self.point_id, f"not reachable: {found.reason}")
+            return self._fail(robot, self.point_id, reasons.not_reachable(found.reason))
         if found is None or np.any(robot.sent):
             return self, result
         legs = parts.segments.to(found, robot.kinematics.T_odom_tool, robot.q)
@@ -326,8 +328,8 @@ class Travel(MovingStage):
     def step(self, robot: Measured, now: float) -> Step:
         """One period."""
         parts, config, timeout, motion = self._parts, self._parts.config, self._way.timeout, self._way.motion
-        if text := self._left(self.point_id, self._task.accepted):
-            return self._escape(robot, now, text)
+        if left := self._left(self.point_id, self._task.accepted):
+            return self._escape(robot, now, left)
         if parts.ending:
             return self, parts.brake(robot, parts.ending)
         if not config.work.pre_cut_check:
@@ -355,8 +357,8 @@ class CloseUp(MovingStage):
     def step(self, robot: Measured, now: float) -> Step:
         """One period."""
         parts, motion = self._parts, self._way.motion
-        if text := self._left(self.point_id, self._task.accepted):
-            return self._escape(robot, now, text)
+        if left := self._left(self.point_id, self._task.accepted):
+            return self._escape(robot, now, left)
         if parts.ending:
             return self, parts.brake(robot, parts.ending)
         tracking, close_up = self._way.track(robot), parts.close_ups.answer(self.point_id, now)
@@ -396,10 +398,10 @@ class Advance(MovingStage):
     def step(self, robot: Measured, now: float) -> Step:
         """One period."""
         parts, config, timeout, motion = self._parts, self._parts.config, self._way.timeout, self._way.motion
-        text = self._left(self.point_id, self._task.accepted)
-        if text or parts.ending:
+        left = self._left(self.point_id, self._task.accepted)
+        if left or parts.ending:
             stage, result = self._retreat(robot).step(robot, now)
-            return stage, result.with_event(text) if text else result
+            return stage, result.with_event(left) if left else result
         parts.refine(self.point_id, motion, self._close_up_of)
         tracking = self._way.track(robot)
         result = StepResult(tracking.xi, tracking)
@@ -416,7 +418,7 @@ class Advance(MovingStage):
         if timeout.late(now):
             reason = missed("the cut", tracking)
             parts.queue.resolve(self.point_id, "FAILED_NOT_CUT", reason)
-            return self._retreat(robot), result.with_event(f"{self.point_id}: not cut: {reason}")
+            return self._retreat(robot), result.with_event(reasons.point_not_cut(self.point_id, reason))
         return self, result
 
 
@@ -452,7 +454,8 @@ class LeavingStage(TaskStage):
         """Clear of the canes, with no next cut under way."""
         ticket = self._parts.queue.get(self.point_id)
         if ticket is not None and ticket.state == "UNKNOWN":
-            return self, StepResult(tracking.xi, tracking, pause=f"{self.point_id} is UNKNOWN: {ticket.reason}")
+            why = ticket.reason or reasons.cutter_unsure()
+            return self, StepResult(tracking.xi, tracking, pause=reasons.outcome_unknown(self.point_id, why))
         return Rest(self._parts).step(robot, now)
 
 
@@ -478,8 +481,8 @@ class Retreat(LeavingStage):
             return self._out(robot, tracking, now)
         if timeout.late(now):
             withdrawal = Withdrawal(parts.config, parts.follower, robot.q, self._task.plan.q_clear)
-            text = f"{self.point_id}: {missed('the way back', tracking)}; now by joints"
-            return Withdraw(parts, self._task, withdrawal), result.with_event(text)
+            event = reasons.retreat_by_joints(self.point_id, missed("the way back", tracking))
+            return Withdraw(parts, self._task, withdrawal), result.with_event(event)
         return self, result
 
 

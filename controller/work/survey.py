@@ -16,6 +16,7 @@ from controller.work.point_queue import PointQueue
 from controller.work.step_result import StepResult
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.model.differential_drive import NXI, Array
 
 #: Deceleration of the base towards the end of the survey (m/s²), and tolerance of the end (m).
@@ -75,7 +76,7 @@ class Survey:
         if self._homing is not None:
             xi = self._homing.step(robot)
             if self._homing.blocked:
-                return StepResult(self._saturation.ramp(robot.sent), pause=f"survey: {self._homing.blocked}")
+                return StepResult(self._saturation.ramp(robot.sent), pause=reasons.survey_blocked(self._homing.blocked))
             if self._homing.done:
                 self._homing = None
             return StepResult(xi)
@@ -99,8 +100,8 @@ class Survey:
         if self._moved is None or abs(x - self._moved[0]) > _LEAST:
             self._moved = x, now
         elif now - self._moved[1] > _PATIENCE_S:
-            why = tracking.reason or "the base is blocked"
-            return StepResult(self._saturation.ramp(robot.sent), pause=f"survey: {why}")
+            why = reasons.survey_blocked(tracking.reason or "an obstacle")
+            return StepResult(self._saturation.ramp(robot.sent), pause=why)
         return StepResult(tracking.xi)
 
     def _wait(self, robot: Measured, now: float) -> StepResult:
@@ -114,8 +115,7 @@ class Survey:
             return StepResult(xi)
         if self._line is not None and not self._again and self._unclear() > 0:
             self._again, self._goal, self._there_at, self._moved = True, self._line[0], None, None
-            text = f"{_counted(self._unclear(), 'place')} to look at again: the survey drives back"
-            return StepResult(xi, events=(text,))
+            return StepResult(xi, events=(reasons.survey_returns(self._unclear()),))
         return StepResult(xi, finished=True, summary=self._summary())
 
     def _waypoints(self, robot: Measured, x: float) -> list[float]:
@@ -132,19 +132,17 @@ class Survey:
         perceived = self._queue.perceived
         return 0 if perceived is None else sum(each.needs == "another look" for each in perceived.undecided_sites)
 
-    def _summary(self) -> str:
+    def _summary(self) -> m.Reason:
         perceived = self._queue.perceived
         if perceived is None:
-            return "the survey has ended; perception has reported nothing"
+            return reasons.survey_blind()
         if self._place is not None:
             return looked_again(perceived, self._place)
         named = [(point.vine, point.spur) for point in perceived.points]
         named += [(each.vine, each.spur) for each in perceived.undecided_sites if each.vine > 0]
         vines, spurs = len({vine for vine, _ in named}), len(set(named))
         asking = sum(each.needs == "operator" for each in perceived.undecided_sites)
-        found = f"{_counted(vines, 'vine')}, {_counted(spurs, 'spur')}, {_counted(len(perceived.points), 'point')}"
-        left = f"{_counted(self._unclear(), 'place')} still unclear, {_counted(asking, 'place')} for you to decide"
-        return f"surveyed: {found}; {left}"
+        return reasons.surveyed(vines, spurs, len(perceived.points), self._unclear(), asking)
 
 
 def open_place(perceived: m.PruningPoints | None, vine: int, spur: int) -> m.UndecidedSite | None:
@@ -154,15 +152,14 @@ def open_place(perceived: m.PruningPoints | None, vine: int, spur: int) -> m.Und
     return next((each for each in found if each.needs == "another look"), found[0] if found else None)
 
 
-def looked_again(perceived: m.PruningPoints, place: m.UndecidedSite) -> str:
-    """Result of a site, as text."""
-    where = f"looked again at vine {place.vine}, spur {place.spur}"
+def looked_again(perceived: m.PruningPoints, place: m.UndecidedSite) -> m.Reason:
+    """Result of a site."""
     left = open_place(perceived, place.vine, place.spur)
     shown = [point.point_id for point in perceived.points if (point.vine, point.spur) == (place.vine, place.spur)]
-    parts = [f"{', '.join(shown)} shown"] if shown else []
-    if left is not None:
-        parts.append(f"{'for you to decide' if left.needs == 'operator' else 'still unclear'}: {left.reason}")
-    return f"{where}: {'; '.join(parts) or 'nothing is left open'}"[:500]
+    if left is None:
+        return reasons.looked_again(place.vine, place.spur, ", ".join(shown) or "none")
+    made = reasons.looked_again_asks if left.needs == "operator" else reasons.looked_again_unclear
+    return made(place.vine, place.spur, reasons.said(left.reason))
 
 
 def _wheels(robot: Measured, speed: float, turning: float) -> Array:
@@ -171,7 +168,3 @@ def _wheels(robot: Measured, speed: float, turning: float) -> Array:
     forward = math.cos(heading) * S[0, :2] + math.sin(heading) * S[1, :2]
     out: Array = np.linalg.solve(np.stack([forward, S[2, :2]]), np.array([speed, turning]))
     return out
-
-
-def _counted(number: int, word: str) -> str:
-    return f"{number} {word}" if number == 1 else f"{number} {word}s"

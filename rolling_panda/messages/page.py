@@ -138,7 +138,7 @@ class PagePlan(Struct, frozen=True, forbid_unknown_fields=True):
     """
 
     state: PlanState
-    reason: Text
+    reason: Reason | None
     plan_hash: Digest
     duration_s: NonNegative
 

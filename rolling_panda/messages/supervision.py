@@ -58,7 +58,7 @@ class QueueEntry(Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         point_id: The point.
         state: State of the point.
-        reason: Reason for the state, as text.
+        reason: Reason for the state; None without one.
         user: The person who last decided about the point.
         cut_id: Its last cut; empty before the first.
         accepted_position: Position at acceptance, in odom (m).
@@ -69,7 +69,7 @@ class QueueEntry(Struct, frozen=True, forbid_unknown_fields=True):
 
     point_id: Name
     state: PointState
-    reason: Text = ""
+    reason: Reason | None = None
     user: Text = ""
     cut_id: Annotated[str, Meta(max_length=64)] = ""
     accepted_position: Vector3 | None = None
@@ -273,7 +273,7 @@ class PreviewedCut(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         begins_s: Start of the motion to it (s from the start).
         cut_s: Time at which the blades close (s from the start); None without a cut.
         ends_s: Start of the motion to the next point, or end of the work (s from the start).
-        result: Outcome as text: cut, or the reason why not.
+        reason: Reason why it is not cut; None if it is.
         clearance: Smallest distance from `begins_s` to `ends_s`, among the robot's parts and to ground and
             obstacles (m).
         between: The two parts with that distance.
@@ -288,7 +288,7 @@ class PreviewedCut(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     begins_s: NonNegative
     cut_s: NonNegative | None
     ends_s: NonNegative
-    result: Text
+    reason: Reason | None
     clearance: Finite
     between: tuple[Text, Text]
     manipulability: NonNegative
@@ -307,7 +307,7 @@ class PointPlan(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
         point_id: The point.
         revision: Accepted revision that the plan is for.
         order: Position in the order of work, from 1; 0 for a refused point.
-        reason: Reason for the refusal, as text; empty otherwise.
+        reason: Reason for the refusal; None otherwise.
         base: Pose of base_link in odom at the cut; None for a refused point.
         rollout: Figures of the motion to it and out again; None for a refused point, and for a later one
             until the work comes near it.
@@ -316,7 +316,7 @@ class PointPlan(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     point_id: Name
     revision: Count
     order: Count
-    reason: Text = ""
+    reason: Reason | None = None
     base: PlanarPose | None = None
     rollout: PreviewedCut | None = None
 
@@ -327,7 +327,7 @@ class SessionPlan(Message, frozen=True, kw_only=True):
     Attributes:
         header: `frame_id` is odom.
         state: `valid` while the work follows the plan; `void` after a change; `planning` until the next plan is ready.
-        reason: Reason why the plan is void or missing, as text.
+        reason: Reason why the plan is void or missing.
         plan_hash: SHA-256 of the inputs and the content of the plan; empty without a plan.
         duration_s: Duration of the work (s). A point that is not rolled out yet counts as the mean of the others.
         points: Points in the order of work, then the refused points.
@@ -335,7 +335,7 @@ class SessionPlan(Message, frozen=True, kw_only=True):
 
     header: Header
     state: PlanState
-    reason: Text = ""
+    reason: Reason | None = None
     plan_hash: Digest = ""
     duration_s: NonNegative = 0.0
     points: tuple[PointPlan, ...] = ()
@@ -352,7 +352,7 @@ class PreviewState(Message, frozen=True, kw_only=True):
         required: True if a cut needs an approved preview.
         phase: `waiting` for the robot to rest and for the plan; `rolling` while it is computed; `ready` for approval;
             `approved`; `expired` after a change.
-        reason: The change that expired it, or the cause of waiting, as text.
+        reason: The change that expired it, or the cause of waiting.
         preview_hash: SHA-256 of the inputs and the content of the preview; empty without a preview.
         approved_by: Name of the person who approved it; empty without an approval.
         start: Pose of base_link in odom at the start.
@@ -365,7 +365,7 @@ class PreviewState(Message, frozen=True, kw_only=True):
     header: Header
     required: bool
     phase: PreviewPhase
-    reason: Text = ""
+    reason: Reason | None = None
     preview_hash: Digest = ""
     approved_by: Text = ""
     start: PlanarPose | None = None
@@ -417,7 +417,7 @@ class CutReport(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
         vine: Number of its vine.
         spur: Number of its spur on that vine.
         outcome: Current outcome; empty during the cut.
-        reason: Reason for the outcome, as text.
+        reason: Reason for the outcome; None without one.
         user: Who accepted the point, or reported the outcome.
         ended_at: Time of its end (s since 1970); 0 during the cut.
         seconds: Time from the end of the previous cut, or from a later start of work, to the end of this cut (s).
@@ -428,7 +428,7 @@ class CutReport(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     vine: _Number
     spur: _Number
     outcome: Outcome = ""
-    reason: Text = ""
+    reason: Reason | None = None
     user: Text = ""
     ended_at: WallTime = 0.0
     seconds: NonNegative = 0.0

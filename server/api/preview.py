@@ -54,8 +54,8 @@ def outdated(state: PreviewState, preview_hash: str, posture: Posture | None) ->
         preview_hash: Of the approval.
         posture: Measured; None where it is unknown.
     """
-    if state.phase == "expired":
-        return reasons.preview_expired(reasons.said(state.reason))
+    if state.phase == "expired" and state.reason is not None:
+        return reasons.preview_expired(state.reason)
     if state.phase not in ("ready", "approved"):
         return reasons.preview_missing()
     if preview_hash != state.preview_hash:

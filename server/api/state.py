@@ -13,6 +13,7 @@ from pydantic import BaseModel, Field
 from rolling_panda import reasons
 from rolling_panda.messages.page import PageEvents, PagePoints, PageState
 from rolling_panda.messages.supervision import CutReport, SessionPlan, SessionReport
+from rolling_panda.reasons import text_of
 from server.api.dependencies import Caller, activity
 from server.api.responses import INVALID, NOT_FOUND, SIGNED_IN, UNAVAILABLE, answer, message, query
 from server.robots.commands import Result
@@ -115,6 +116,7 @@ def cuts_csv(cuts: tuple[CutReport, ...]) -> str:
     writer.writerow(_CUT_COLUMNS)
     for cut in cuts:
         row = msgspec.to_builtins(cut)
+        row["reason"] = "" if cut.reason is None else text_of(cut.reason)
         row["ended_at"] = (
             datetime.fromtimestamp(cut.ended_at, UTC).isoformat(timespec="seconds") if cut.ended_at else ""
         )

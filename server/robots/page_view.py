@@ -6,6 +6,7 @@ import msgspec
 import numpy as np
 
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.messages.page import PagePlan, PagePoint, PagePoints, PageState
 from rolling_panda.messages.robot import CameraFrame, JointState
 from rolling_panda.messages.supervision import SessionPlan
@@ -19,7 +20,6 @@ from server.robots.link import RobotLink
 _FRAME_COUNT_PERIOD_S = 5.0
 #: The cane's direction in an image is computed from a point so far along its tangent (m).
 _TANGENT_STEP = 0.05
-_NOT_QUEUED = "the controller has not taken it up yet"
 
 
 class PageView:
@@ -138,7 +138,7 @@ class PageView:
         self._seen = recorded | {key: point for key, point in self._seen.items() if key in queued} | current
         rows = [(self._seen[entry.point_id], entry) for entry in queue if entry.point_id in self._seen]
         rows += [
-            (point, m.QueueEntry(point.point_id, "PROPOSED", _NOT_QUEUED))
+            (point, m.QueueEntry(point.point_id, "PROPOSED", reasons.not_queued_yet()))
             for point in points
             if point.point_id not in queued
         ]

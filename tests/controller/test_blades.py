@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 from controller.config import ControllerConfig, WorkConfig
 from controller.work.blades import Blades
+from rolling_panda import reasons
 
 
 @dataclass
@@ -38,7 +39,7 @@ def test_the_command_is_repeated_with_one_id_until_the_outcome_comes():
     assert 3 <= len(told) <= 5 and set(told) == {("run-1", "p1")}
     assert queue.begun == [("p1", "run-1")]
     assert blades.watch(Bridge("another", "DONE"), 0.2) == () and blades.busy
-    assert blades.watch(Bridge("run-1", "DONE"), 0.2) == ("p1: cut",)
+    assert blades.watch(Bridge("run-1", "DONE"), 0.2) == (reasons.cut_done("p1", reasons.cutter_cut()),)
     assert not blades.busy and blades.command(0.3) is None
     assert [row[:2] for row in queue.resolved] == [("p1", "DONE")]
 
@@ -49,8 +50,8 @@ def test_without_a_word_the_cut_is_unknown_and_no_other_is_taken_for_it():
     blades.start("p1", 5.0)
     assert blades.command(5.0)
     assert blades.watch(Bridge(), 5.0 + config.work.cut_timeout_s) == ()
-    (text,) = blades.watch(Bridge(), 5.1 + config.work.cut_timeout_s)
-    assert "UNKNOWN" in text and queue.resolved[0][1] == "UNKNOWN"
+    (event,) = blades.watch(Bridge(), 5.1 + config.work.cut_timeout_s)
+    assert event.code == "outcome_unknown" and queue.resolved[0][1] == "UNKNOWN"
     blades.start("p2", 20.0)
     # The late outcome of the first is not that of the second.
     assert blades.watch(Bridge("run-1", "DONE"), 20.1) == () and blades.busy
@@ -71,5 +72,5 @@ def test_a_cut_that_was_never_ordered_is_no_unknown_one():
     blades = Blades(config.work, queue, "run")
     blades.start("p1", 0.0)
     assert blades.command(0.1) is None
-    (text,) = blades.watch(Bridge(), config.work.cut_timeout_s + 0.1)
-    assert "no order was given" in text and queue.resolved[0][1] == "FAILED_NOT_CUT"
+    (event,) = blades.watch(Bridge(), config.work.cut_timeout_s + 0.1)
+    assert event.code == "point_not_cut" and queue.resolved[0][1] == "FAILED_NOT_CUT"

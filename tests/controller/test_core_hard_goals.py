@@ -7,9 +7,11 @@ import pytest
 from controller.motion.surroundings import obstacles_of
 from controller.whole_body.collision import CollisionModel
 from rolling_panda import commands as intents
+from rolling_panda import reasons
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
 from rolling_panda.model.robot import ARM_Q, RobotModel, pose_message
+from rolling_panda.reasons import text_of
 from tests.controller.test_core_work import (
     CONFIG,
     LIMITS,
@@ -115,11 +117,11 @@ def test_work_behind_a_post_ends_with_a_reason_and_the_rest_is_done() -> None:
     assert COLLISION.least(r.q).distance > 0.0
     assert entry(r, "here").state == "DONE"
     beyond = entry(r, "beyond")
-    assert beyond.state == "FAILED_NOT_CUT" and "post 0 holds the tool back" in beyond.reason
+    assert beyond.state == "FAILED_NOT_CUT" and "post 0" in text_of(beyond.reason)
     assert r.state.mode == "READY"
     assert r.ask(intents.Home(user="ada")).ok
     r.run(12.0)
-    assert "homing was stopped: the distance of blades to post 0" in r.events[-1]
+    assert text_of(reasons.homing_blocked("the distance of blades to post 0")) == r.events[-1]
     # With the base driven away from the post by hand, the way home is free.
     r.teleop = TeleopTarget(sequence=1, hold=True, user="ada", base=BaseVelocity(-0.2, 0.0))
     r.run(2.0)

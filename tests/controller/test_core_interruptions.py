@@ -3,8 +3,10 @@
 import numpy as np
 
 from rolling_panda import commands as intents
+from rolling_panda import reasons
 from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
 from rolling_panda.model.robot import ARM_Q
+from rolling_panda.reasons import text_of
 from tests.support.controller_at_work import entry, finish, robot, run_until, working
 from tests.support.points import point
 
@@ -56,7 +58,7 @@ def test_after_a_pause_the_next_cut_is_planned_from_where_the_robot_is_then():
     r.run(0.1)
     assert r.ask(intents.Start(user="ada")).ok
     finish(r, 60.0)
-    assert "not reachable" in entry(r, "p1").reason
+    assert entry(r, "p1").reason.code == "not_reachable"
 
 
 def test_nothing_begins_to_move_while_the_blades_close():
@@ -100,5 +102,5 @@ def test_a_hold_pressed_on_the_way_home_moves_nothing_when_the_arm_is_there():
     r = homing()
     r.teleop = TeleopTarget(sequence=1, hold=True, user="ada", base=BaseVelocity(0.2, 0.0))
     r.run(6.0)
-    assert r.state.mode == "READY" and r.state.reason == "the arm is home"
+    assert r.state.mode == "READY" and r.state.reason == text_of(reasons.arm_home())
     assert abs(r.q[0]) < 1e-3

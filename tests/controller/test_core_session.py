@@ -7,10 +7,12 @@ from controller.planning import cuts, plan_manager
 from controller.planning.cuts import CutPlanner
 from controller.planning.work_plan import PlanRequest
 from rolling_panda import commands as intents
+from rolling_panda import reasons
 from rolling_panda.config import RobotConfig
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.messages.supervision import BaseVelocity, SessionPlan, TeleopTarget
 from rolling_panda.model.robot import ARM_Q
+from rolling_panda.reasons import text_of
 from tests.controller.test_core_work import CONFIG, entry, finish, point, robot
 from tests.support.sent import every
 
@@ -79,11 +81,15 @@ def test_accepted_points_are_planned_and_what_the_plan_says_is_told() -> None:
     plan = p.accepted("a", "high").until_valid()
     assert len(p.requests) == 1 and len(plan.plan_hash) == 64
     done, refused = plan.points
-    assert (done.point_id, done.order, done.reason, done.rollout.result) == ("a", 1, "", "cut")
+    assert (done.point_id, done.order, done.reason, done.rollout.reason) == ("a", 1, None, None)
     assert 0.0 == done.rollout.begins_s < 0.5 < done.rollout.cut_s < done.rollout.ends_s == plan.duration_s
-    assert (refused.point_id, refused.order, refused.rollout) == ("high", 0, None) and "no posture" in refused.reason
+    assert (refused.point_id, refused.order, refused.rollout) == (
+        "high",
+        0,
+        None,
+    ) and refused.reason.code == "out_of_reach"
     p.robot.run(0.1)
-    assert entry(p.robot, "high").state == "UNREACHABLE" and "no posture" in entry(p.robot, "high").reason
+    assert entry(p.robot, "high").state == "UNREACHABLE" and entry(p.robot, "high").reason.code == "out_of_reach"
     assert [e.point_id for e in p.robot.state.queue if e.state == "ACCEPTED"] == ["a"]
     assert entry(p.robot, "high").user == "ada", "who accepted it stays known"
 
@@ -96,7 +102,7 @@ def test_points_accepted_one_after_the_other_are_planned_once_and_a_late_one_aga
     assert [[each.point_id for each in r.points] for r in p.requests] == [["a", "b"]]
     p.accepted("c")
     p.robot.run(0.1)
-    assert p.plans[-1].state == "void" and p.plans[-1].reason == "c was accepted after it was made"
+    assert p.plans[-1].state == "void" and p.plans[-1].reason == reasons.accepted_later("c")
     again = p.until_valid()
     assert len(p.requests) == 2 and order(again) == ["a", "b", "c"]
     assert again.plan_hash != first.plan_hash
@@ -129,7 +135,7 @@ def test_later_cuts_are_rolled_out_during_the_work_and_the_plan_stays_valid(monk
     assert [point_id for point_id, _ in p.robot.cuts] == ["a", "b", "c"]
     assert len(p.requests) == 2 and [each.point_id for each in p.requests[1].points] == ["b", "c"]
     assert {plan.state for plan in p.plans[said:]} <= {"valid", "none"}
-    assert all(each.rollout.result == "cut" for each in p.plans[-1].points)
+    assert all(each.rollout.reason is None for each in p.plans[-1].points)
 
 
 def test_a_point_that_the_plan_refuses_is_not_driven_to_and_the_ticket_says_why() -> None:
@@ -139,8 +145,8 @@ def test_a_point_that_the_plan_refuses_is_not_driven_to_and_the_ticket_says_why(
     finish(p.robot, 60.0)
     assert [point_id for point_id, _ in p.robot.cuts] == ["good"]
     assert entry(p.robot, "in").state == "UNREACHABLE", "nothing was tried, so nothing failed"
-    assert "post 0" in entry(p.robot, "in").reason
-    assert p.robot.state.reason == "no accepted point is left; 1 cannot be reached"
+    assert "post 0" in text_of(entry(p.robot, "in").reason)
+    assert p.robot.state.reason == text_of(reasons.work_done_but(1))
     assert entry(p.robot, "good").state == "DONE"
     assert p.robot.now < 15.0, "no time is spent on the refused one"
 
@@ -151,11 +157,11 @@ def test_where_nothing_accepted_can_be_reached_no_work_begins_and_that_is_said()
     assert p.robot.ask(intents.Arm(user="ada")).ok
     p.robot.run(0.1)
     assert p.robot.state.allowed["Start"] is not None
-    assert p.robot.ask(intents.Start(user="ada")).reason == "the accepted point cannot be reached"
+    assert p.robot.ask(intents.Start(user="ada")).refused == reasons.none_reachable(1)
     assert p.robot.ask(intents.RejectPoint(user="ada", point_id="high", reason="too high")).ok
     p.robot.run(0.1)
     assert entry(p.robot, "high").state == "REJECTED"
-    assert p.robot.ask(intents.Start(user="ada")).reason == "no point is accepted"
+    assert p.robot.ask(intents.Start(user="ada")).refused == reasons.none_accepted()
 
 
 def test_what_could_not_be_reached_is_accepted_again_once_a_plan_can() -> None:
@@ -172,7 +178,7 @@ def test_what_could_not_be_reached_is_accepted_again_once_a_plan_can() -> None:
     p.robot.teleop = None
     p.until_valid_again(first)
     p.robot.run(0.1)
-    assert (entry(p.robot, "in").state, entry(p.robot, "in").reason) == ("ACCEPTED", "")
+    assert (entry(p.robot, "in").state, entry(p.robot, "in").reason) == ("ACCEPTED", None)
     assert p.robot.ask(intents.Start(user="ada")).ok
     finish(p.robot, 90.0)
     assert {e.state for e in p.robot.state.queue} == {"DONE"}
@@ -196,8 +202,8 @@ def test_what_comes_into_view_in_the_way_voids_the_plan_and_the_next_one_knows_i
     p.accepted("a").until_valid()
     p.robot.obstacles = (POST,)
     p.robot.run(0.1)
-    assert p.plans[-1].state in ("void", "planning") and "a post is seen at (0.5, 0.8," in p.plans[-1].reason
-    assert "post 0" in p.until_valid().points[0].reason
+    assert p.plans[-1].state in ("void", "planning") and p.plans[-1].reason.code == "new_obstacle"
+    assert "post 0" in text_of(p.until_valid().points[0].reason)
 
 
 def test_without_a_planner_the_work_goes_on_along_the_row() -> None:

@@ -17,7 +17,7 @@ def at_work_and_held(monkeypatch, jog_too=False):
             tracking = done(*arguments)
             if r.state.phase != "RETREAT" or r.state.active_point_id != "a":
                 return tracking
-            why = "joint 1 holds the tool back"
+            why = "joint 1"
             return msgspec.structs.replace(tracking, xi=np.zeros(9), scale=0.0, done=False, reason=why)
 
         return follow
@@ -34,7 +34,7 @@ def test_held_on_the_straight_way_back_the_tool_comes_out_by_joints_and_work_goe
     # Clear of the canes before it goes on to the next.
     clear = CONFIG.work.row_distance - CONFIG.work.clearance + 0.02
     assert r.model.kinematics(r.q).T_odom_tool.translation[1] < clear
-    assert entry(r, "a").state == "DONE" and any("joint 1" in text and "by joints" in text for text in r.events)
+    assert entry(r, "a").state == "DONE" and any("joint 1" in text and "by its joints" in text for text in r.events)
     run_until(r, lambda s: s.mode != "AUTO", 60.0)
     assert r.state.mode == "READY" and entry(r, "b").state == "DONE" and len(r.cuts) == 2
 

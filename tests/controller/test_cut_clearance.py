@@ -55,7 +55,7 @@ def test_a_wire_over_the_cut_is_passed_from_below():
 def test_a_wire_in_the_way_from_everywhere_is_said_to_be():
     plan = find(wire(POINT[2]))
     assert isinstance(plan, Unreachable)
-    assert "too near to an obstacle; in the best one, at the cut" in plan.reason
+    assert plan.reason.code == "no_clear_posture" and plan.reason.values[0][1].values[0] == ("place", "at the cut")
 
 
 def test_what_is_far_away_changes_nothing():
@@ -105,7 +105,8 @@ def test_clear_of_the_canes_there_is_room_for_the_motion_to_lead_on():
     clearance.update(Received(Obstacles(header=m.Header(0.0, "odom"), capsules=(beside,)), 0.0))
     near, far = free.q_clear.copy(), free.q_clear.copy()
     far[0] += 1.0
-    assert clearance.too_near(replace(free, q_clear=far, q_stand_off=far, q_cut=near)) == (0.0, "")
-    lacking, words = clearance.too_near(replace(free, q_clear=near, q_stand_off=far, q_cut=far))
+    assert clearance.too_near(replace(free, q_clear=far, q_stand_off=far, q_cut=near)) == (0.0, None)
+    lacking, why = clearance.too_near(replace(free, q_clear=near, q_stand_off=far, q_cut=far))
     assert lacking == pytest.approx(0.003, abs=0.001)
-    assert words.startswith("clear of it 17 mm") and "20 mm are needed" in words
+    assert why.code == "too_near" and dict(why.values)["place"] == "clear of it"
+    assert dict(why.values)["distance_mm"] == pytest.approx(17.0, abs=0.5) and dict(why.values)["needed_mm"] == 20.0

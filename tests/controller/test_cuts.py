@@ -15,6 +15,7 @@ from controller.planning.work_plan import PlanRequest
 from rolling_panda.config import RobotConfig
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.model.robot import ARM_Q, RobotModel
+from rolling_panda.reasons import text_of
 from tests.support.controller_config import controller_config
 from tests.support.points import point as pruning_point
 
@@ -68,7 +69,7 @@ def test_what_the_rollout_does_not_cut_is_refused_and_the_others_are_rolled_out_
     bar = Capsule("wire", (1.2, 0.3, 1.0), (1.2, 0.9, 1.0), 0.004, 0.004)
     points = point("good", 0.3), point("behind", 2.4)
     plan = PLANNER.plan(request(*points, obstacles=(bar,)))
-    assert list(plan.refused) == ["behind"] and "wire 0 holds the tool back" in plan.refused["behind"]
+    assert list(plan.refused) == ["behind"] and "wire 0" in text_of(plan.refused["behind"])
     alone = PLANNER.plan(request(points[0], obstacles=(bar,)))
     assert [cut.rollout for cut in plan.cuts] == [cut.rollout for cut in alone.cuts]
     assert plan.duration == alone.duration and plan.digest != alone.digest
@@ -77,7 +78,7 @@ def test_what_the_rollout_does_not_cut_is_refused_and_the_others_are_rolled_out_
 @pytest.mark.parametrize(
     ("bad", "obstacles", "words"),
     [
-        (point("p", 0.4, z=2.4), (), "no posture of the arm reaches it"),
+        (point("p", 0.4, z=2.4), (), "No posture of the arm reaches it"),
         (point("p", 0.4, tangent=(0.0, 1.0, 0.0)), (), "points straight at the robot"),
         (point("p", 0.5), (POST,), "between blades and post 0, 7 mm are needed"),
     ],
@@ -85,7 +86,7 @@ def test_what_the_rollout_does_not_cut_is_refused_and_the_others_are_rolled_out_
 def test_each_refusal_says_why_and_the_others_are_planned(bad, obstacles, words) -> None:
     plan = PLANNER.plan(request(bad, point("good", 1.5), obstacles=obstacles))
     assert [cut.point.point_id for cut in plan.cuts] == ["good"]
-    assert list(plan.refused) == ["p"] and words in plan.refused["p"]
+    assert list(plan.refused) == ["p"] and words in text_of(plan.refused["p"])
 
 
 def test_a_start_outside_a_joint_limit_is_planned_from() -> None:
@@ -93,7 +94,7 @@ def test_a_start_outside_a_joint_limit_is_planned_from() -> None:
     asked.q[8] = float(ROBOT.limits.upper[8]) + 0.05
     plan = PLANNER.plan(asked)
     assert [cut.point.point_id for cut in plan.cuts] == ["p"]
-    assert plan.cuts[0].rollout.result == "cut"
+    assert plan.cuts[0].rollout.reason is None
     assert plan.cuts[0].rollout.joint_margin < 0.0 < plan.cuts[0].cut.joint_margin
 
 

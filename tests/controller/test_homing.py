@@ -8,9 +8,11 @@ from controller.motion.surroundings import Surroundings
 from controller.whole_body.collision import CollisionModel
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.config import RobotConfig
 from rolling_panda.messages.perception import Capsule, Obstacles
 from rolling_panda.model.robot import ARM_Q, RobotModel
+from rolling_panda.reasons import text_of
 from rolling_panda.transport.inbox import Received
 from tests.support.worlds.kinematic_robot import KinematicRobot
 
@@ -32,7 +34,7 @@ def test_it_gets_home_when_nothing_is_in_the_way() -> None:
     robot = homing()
     robot.run(12.0)
     np.testing.assert_allclose(robot.q[ARM_Q], CONFIG.work.home, atol=0.012)
-    assert any("the arm is home" in event for event in robot.events)
+    assert text_of(reasons.arm_home()) in robot.events
 
 
 def test_a_post_in_the_way_stops_it_before_it_is_met_and_is_named() -> None:
@@ -47,6 +49,6 @@ def test_a_post_in_the_way_stops_it_before_it_is_met_and_is_named() -> None:
         robot.step()
         least = min(least, judge.model.least(robot.q).distance)
     assert least > 0.0
-    assert any("homing was stopped" in event and "post" in event for event in robot.events), robot.events
+    assert any("Homing was stopped" in event and "post" in event for event in robot.events), robot.events
     assert np.abs(robot.xi).max() < 1e-3
     assert robot.controller.mode == "READY"

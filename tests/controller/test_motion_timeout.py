@@ -5,7 +5,9 @@ import pytest
 
 from controller.motion.follower import Tracking
 from controller.work.motion_timeout import MotionTimeout, missed
+from rolling_panda import reasons
 from rolling_panda.messages.perception import Capsule
+from rolling_panda.reasons import text_of
 from tests.support.controller_at_work import entry, run_until, working
 from tests.support.points import point
 
@@ -66,9 +68,11 @@ def test_a_clock_that_stands_for_no_reason_or_has_run_out_is_not_held(timeout, h
 
 
 def test_what_is_missing_is_said_with_the_reason():
-    said = missed("the cut", tracking(error=0.0102, turn=0.02, reason="joint 3 holds the tool back"))
-    assert said == "the cut was not reached in time: 10.2 mm and 1.1° are missing: joint 3 holds the tool back"
-    assert missed("the cut", tracking()).endswith("are missing")
+    said = missed("the cut", tracking(error=0.0102, turn=0.02, reason="joint 3"))
+    assert said.code == "not_reached_for"
+    left = {"position_mm": pytest.approx(10.2), "rotation_deg": pytest.approx(1.146, abs=1e-3)}
+    assert dict(said.values) == {"goal": "the cut", "cause": "joint 3"} | left
+    assert missed("the cut", tracking()) == reasons.not_reached("the cut", 0.0, 0.0)
 
 
 def test_a_post_beside_the_way_is_told_as_the_reason_within_seconds():
@@ -82,5 +86,5 @@ def test_a_post_beside_the_way_is_told_as_the_reason_within_seconds():
         if held is None and r.controller.tracking is not None and r.controller.tracking.reason:
             held = r.now
         assert r.now < 20.0
-    assert entry(r, "a").state == "FAILED_NOT_CUT" and "post 0" in entry(r, "a").reason
+    assert entry(r, "a").state == "FAILED_NOT_CUT" and "post 0" in text_of(entry(r, "a").reason)
     assert held is not None and r.now - held < 4.0

@@ -4,7 +4,10 @@ from controller.work.next_cut import NextCut
 from controller.work.point_queue import PointQueue
 from controller.work.posture_search import Unreachable
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from tests.controller.test_core_work import CONFIG, point
+
+SEARCHED = reasons.out_of_reach(2.0, 1.0)
 
 
 class Searches:
@@ -19,7 +22,7 @@ class Searches:
 
     def look(self):
         yield
-        return Unreachable("searched in vain")
+        return Unreachable(SEARCHED)
 
 
 def queue():
@@ -27,12 +30,12 @@ def queue():
     shown = (point("a", (0.2, 0.75, 1.0)), point("b", (0.6, 0.75, 1.0)))
     q.update(m.PruningPoints(header=m.Header(), segmenter="none", frames=1, points=shown))
     for each in shown:
-        assert q.accept(each.point_id, 1, "ada") == ""
+        assert q.accept(each.point_id, 1, "ada") is None
     return q
 
 
 def test_what_a_plan_knows_is_not_searched_for() -> None:
-    search, known = Searches(), Unreachable("the plan says so")
+    search, known = Searches(), Unreachable(reasons.no_square_approach())
     coming = NextCut(search, queue(), 10, lambda ticket: known if ticket.point.point_id == "a" else None)
     assert coming.search(np.zeros(12))
     assert coming.point_id == "a" and coming.found is known and search.begun == 0
@@ -47,7 +50,7 @@ def test_what_it_does_not_know_is_searched_for_and_its_order_is_followed() -> No
     assert coming.search(np.zeros(12))
     assert coming.point_id == "b" and coming.found is None and search.begun == 1
     coming.step()
-    assert coming.found.reason == "searched in vain"
+    assert coming.found.reason == SEARCHED
 
 
 def test_a_new_order_is_looked_at_anew() -> None:

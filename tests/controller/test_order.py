@@ -14,6 +14,7 @@ from controller.planning.cuts import CutPlanner
 from controller.planning.work_plan import PlanRequest
 from controller.work.order import LARGEST, Approaches, WorkOrder
 from rolling_panda import commands as intents
+from rolling_panda import reasons
 from rolling_panda.config import RobotConfig
 from rolling_panda.model.robot import ARM_Q
 from tests.support.controller_at_work import CONFIG, entry, finish, robot
@@ -39,7 +40,7 @@ def test_a_plan_orders_what_it_names_and_leaves_the_rest_in_its_place():
 def test_who_moves_a_point_orders_all_that_is_accepted_and_the_next_one_comes_last():
     order = WorkOrder(Journal())
     order.plan(tuple("cba"))
-    assert order.move("a", "c", 0, "ada", tuple("cba")) == ""
+    assert order.move("a", "c", 0, "ada", tuple("cba")) is None
     assert order.state.user == "ada" and order.state.revision == 1
     assert order.arranged(NAMES, set("abc").__contains__) == list("acbdef")
     assert order.arranged(NAMES, set("abcd").__contains__) == list("acbdef")
@@ -51,26 +52,26 @@ def test_what_is_held_comes_first_until_it_is_let_go_or_a_person_says_otherwise(
     assert order.hold(("d", "b")) and not order.hold(("d", "b"))
     order.plan(tuple("cbd"))
     assert order.arranged(NAMES, set("abcd").__contains__) == list("dbacef")
-    assert order.move("a", "d", 0, "ada", tuple("dbac")) == ""
+    assert order.move("a", "d", 0, "ada", tuple("dbac")) is None
     assert order.arranged(NAMES, set("abcd").__contains__) == list("adbcef")
-    assert order.give_back(1) == "" and order.hold(())
+    assert order.give_back(1) is None and order.hold(())
     assert order.arranged(NAMES, set("abcd").__contains__) == list("acbdef")
 
 
 def test_of_two_people_who_move_at_once_the_second_is_told():
     order = WorkOrder(Journal())
-    assert order.move("a", "", 0, "ada", NAMES) == ""
+    assert order.move("a", "", 0, "ada", NAMES) is None
     why = order.move("b", "", 0, "bob", NAMES)
-    assert "ada" in why and "0 was seen" in why and "1 now" in why
-    assert order.move("b", "", 1, "bob", NAMES) == ""
+    assert why == reasons.order_changed_by("ada", 0, 1)
+    assert order.move("b", "", 1, "bob", NAMES) is None
 
 
 def test_what_cannot_be_moved_is_refused_and_changes_nothing():
     order = WorkOrder(Journal())
-    assert "x is not accepted" in order.move("x", "", 0, "ada", NAMES)
-    assert "x is not accepted" in order.move("a", "x", 0, "ada", NAMES)
-    assert "itself" in order.move("a", "a", 0, "ada", NAMES)
-    assert "plan's already" in order.give_back(0)
+    assert order.move("x", "", 0, "ada", NAMES) == reasons.not_in_order("x")
+    assert order.move("a", "x", 0, "ada", NAMES) == reasons.not_in_order("x")
+    assert order.move("a", "a", 0, "ada", NAMES) == reasons.before_itself("a")
+    assert order.give_back(0) == reasons.order_of_plan()
     assert order.state.revision == 0 and order.by_hand == ()
 
 
@@ -79,7 +80,7 @@ def test_the_plans_order_is_one_press_away():
     order.plan(tuple("fedcba"))
     order.move("a", "f", 0, "ada", tuple("fedcba"))
     assert order.arranged(NAMES, everything)[0] == "a"
-    assert order.give_back(1) == ""
+    assert order.give_back(1) is None
     assert order.arranged(NAMES, everything) == list("fedcba")
 
 
@@ -155,12 +156,12 @@ def test_the_plan_says_at_once_what_a_turn_means():
 def test_what_cannot_be_turned_is_refused():
     r = accepted(robot())
     too_far = r.ask(intents.SetApproach(user="ada", point_id="a", azimuth=LARGEST + 0.1))
-    assert not too_far.ok and "at most 75°" in too_far.reason
-    assert "no point" in r.ask(intents.SetApproach(user="ada", point_id="b", azimuth=0.1)).reason
+    assert not too_far.ok and too_far.refused.code == "approach_too_far"
+    assert r.ask(intents.SetApproach(user="ada", point_id="b", azimuth=0.1)).refused == reasons.point_unknown("b")
     assert r.ask(intents.Start(user="ada")).ok
     r.run(1.5)
     assert r.state.active_point_id == "a"
-    assert "being worked on" in r.ask(intents.SetApproach(user="ada", point_id="a", azimuth=0.1)).reason
+    assert r.ask(intents.SetApproach(user="ada", point_id="a", azimuth=0.1)).refused == reasons.point_worked_on("a")
 
 
 def test_a_restart_keeps_it_and_taking_it_back_leaves_it_to_the_search():

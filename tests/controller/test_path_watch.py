@@ -22,6 +22,7 @@ from tests.support.points import point
 A, B = point("a", (0.45, 0.75, 1.05)), point("b", (0.75, 0.75, 1.1))
 START = np.zeros(12)
 START[ARM_Q] = CONFIG.work.home
+FOUND = ("obstacle_near_way", "obstacle_in_way")
 KNOWN = Capsule("wire", (-2.0, 0.75, 1.7), (2.0, 0.75, 1.7), 0.004, 0.004)
 MADE = Rollout(CONFIG, RobotConfig()).roll(PreviewRequest(1, START, (A, B), (KNOWN,)))
 MODEL = CollisionModel(RobotModel())
@@ -59,10 +60,10 @@ def test_it_speaks_of_what_is_too_near_and_of_nothing_else(x, y, kind):
     least, said = nearest(thing), watch().changed([KNOWN, thing])
     kept = {part: CONFIG.whole_body.hierarchy.kept((part, f"{kind} ")) for part in least}
     if any(distance < kept[part] for part, distance in least.items()):
-        assert f"a {kind} is seen" in said
+        assert said.code in FOUND and said.values[0] == ("kind", kind)
     shown = max(cut.clearance for cut in MADE.cuts)
     if all(distance > max(shown, kept[part] + STEP) + 2.0 * STEP for part, distance in least.items()):
-        assert said == ""
+        assert said is None
 
 
 def test_what_was_known_may_be_seen_a_little_elsewhere_and_no_more():
@@ -75,24 +76,25 @@ def test_what_was_known_may_be_seen_a_little_elsewhere_and_no_more():
     made = replace(MADE, request=replace(MADE.request, obstacles=(KNOWN, close)))
     nearer = 0.9 * SAME, 3.0 * SAME
     said = [watch(made).changed([KNOWN, upright(x, close.start[1] - by)]) for by in nearer]
-    assert said[0] == "" and "a post is seen" in said[1]
+    assert said[0] is None and said[1].code in FOUND
 
 
 def test_the_spur_that_is_cut_may_be_touched_by_the_blades_and_its_neighbour_may_not():
     at = np.array(A.position)
     low, high = at - (0.0, 0.0, 0.05), at - (0.0, 0.0, 0.006)
     stays = Capsule("cane", tuple(low.tolist()), tuple(high.tolist()), 0.004, 0.004, vine=0, spur=0)
-    assert watch().changed([KNOWN, stays]) == ""
+    assert watch().changed([KNOWN, stays]) is None
     post = Capsule("post", stays.start, stays.end, 0.004, 0.004)
-    assert "a post is seen" in watch().changed([KNOWN, post])
+    assert watch().changed([KNOWN, post]).code in FOUND
 
 
 def test_what_stands_where_the_work_has_been_is_no_matter():
     x, y, _ = next(row.tool for row in MADE.rows if row.time >= MADE.cuts[0].cut_s)
     behind = upright(x, y, radius=0.01)
-    assert "to a" in watch().changed([KNOWN, behind])
+    assert ("point", "a") in watch().changed([KNOWN, behind]).values
     thin = Capsule("post", (x, y, 1.045), (x, y, 1.055), 0.002, 0.002)
-    assert "to a" in watch().changed([KNOWN, thin]) and watch().changed([KNOWN, thin], first="b") == ""
+    assert ("point", "a") in watch().changed([KNOWN, thin]).values
+    assert watch().changed([KNOWN, thin], first="b") is None
 
 
 @pytest.mark.alone

@@ -12,8 +12,10 @@ import pytest
 from controller.planner_process import PlannerProcess
 from controller.planning.preview_plan import PreviewRequest
 from controller.planning.rollout import Rollout
+from rolling_panda import reasons
 from rolling_panda.config import RobotConfig
 from rolling_panda.generate.__main__ import ROOT
+from rolling_panda.reasons import text_of
 from tests.controller.test_cuts import CONFIG, PLANNER, POST, point, request
 from tests.support.waiting import until
 
@@ -53,11 +55,11 @@ def test_it_answers_as_the_planner_in_this_process_does_and_at_low_priority(work
 def test_what_cannot_be_planned_from_is_answered_with_a_failure_and_a_dead_process_is_replaced(worker) -> None:
     broken = request(point("a", 0.3), number=2)
     broken.q[0] = np.nan
-    assert "every coordinate must be finite" in answered(worker, broken).failure
+    assert "every coordinate must be finite" in text_of(answered(worker, broken).failure)
     first = worker.pid
     os.kill(first, signal.SIGKILL)
     until(lambda: not psutil.pid_exists(first) or psutil.Process(first).status() == psutil.STATUS_ZOMBIE)
-    assert "process ended" in answered(worker, request(point("a", 0.3), number=3)).failure
+    assert answered(worker, request(point("a", 0.3), number=3)).failure == reasons.planner_ended()
     assert len(answered(worker, request(point("a", 0.3), number=4)).cuts) == 1
     assert worker.pid != first
 

@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 from controller.config import WorkConfig
 from controller.work.point_queue import PointQueue
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from tests.support.points import point as pruning_point
 
 POINT = pruning_point("a", (1.0, 0.85, 1.0), revision=3, confidence=0.8)
@@ -30,7 +31,7 @@ def state(q, point_id="a"):
 
 def test_acceptance_binds_what_the_operator_saw():
     q = queue(point())
-    assert q.accept("a", 3, "ada") == ""
+    assert q.accept("a", 3, "ada") is None
     q.update(shown(point(revision=4, position=(1.0, 0.853, 1.0))))
     assert state(q) == "ACCEPTED"
     assert q.next().accepted.position == (1.0, 0.85, 1.0)
@@ -40,7 +41,7 @@ def test_acceptance_binds_what_the_operator_saw():
 
 def test_accepting_an_old_view_is_refused():
     q = queue(point())
-    assert "revision 2 was seen, it is 3 now" in q.accept("a", 2, "ada")
+    assert q.accept("a", 2, "ada") == reasons.point_revised("a", 2, 3)
     assert state(q) == "PROPOSED"
 
 
@@ -49,19 +50,20 @@ def test_a_point_that_moved_or_turned_is_not_accepted_any_more():
         q = queue(point())
         q.accept("a", 3, "ada")
         voided = q.update(shown(point(revision=4, **changes)))
-        assert len(voided) == 1 and "acceptance void" in voided[0]
+        assert len(voided) == 1 and voided[0] == reasons.acceptance_lost("a", q.get("a").reason)
         assert state(q) == "PROPOSED" and q.next() is None
-        assert "accepted" in q.get("a").reason
+        assert q.get("a").reason.code == "acceptance_void"
 
 
 def test_a_point_that_vanished_is_not_cut_and_a_new_look_is_needed():
     q = queue(point())
     q.accept("a", 3, "ada")
-    assert "no longer reports it" in q.update(shown())[0]
+    void = reasons.acceptance_void(reasons.no_longer_reported())
+    assert q.update(shown()) == [reasons.acceptance_lost("a", void)]
     assert q.next() is None
-    assert "does not see" in q.accept("a", 3, "ada")
+    assert q.accept("a", 3, "ada") == reasons.point_unseen("a")
     q.update(shown(point()))
-    assert q.accept("a", 3, "ada") == ""
+    assert q.accept("a", 3, "ada") is None
 
 
 def test_a_point_behind_the_blades_may_vanish():
@@ -79,7 +81,7 @@ def test_a_proposal_that_vanished_leaves_the_queue():
 
 def test_a_thick_cane_is_refused():
     q = queue(point(radius=0.009))
-    assert "18 mm thick, the limit is 15 mm" in q.accept("a", 3, "ada")
+    assert q.accept("a", 3, "ada") == reasons.cane_too_thick("a", 18.0, 15.0)
 
 
 def test_order_of_work_is_along_the_row():
@@ -96,9 +98,9 @@ def test_life_of_a_cut_point():
     q.accept("a", 3, "ada")
     q.begin_cut("a", "cut-1")
     assert (state(q), q.entries()[0].cut_id) == ("CUTTING", "cut-1")
-    assert "CUTTING" in q.reject("a", "ada", "no")
-    q.resolve("a", "DONE", "cut")
-    assert "is DONE" in q.accept("a", 3, "ada")
+    assert q.reject("a", "ada", "no") == reasons.point_state("a", "CUTTING")
+    q.resolve("a", "DONE", reasons.cutter_cut())
+    assert q.accept("a", 3, "ada") == reasons.point_state("a", "DONE")
     q.update(shown())
     assert state(q) == "DONE"
 
@@ -108,45 +110,45 @@ def test_an_unknown_or_failed_cut_waits_for_a_person():
         q = queue(point())
         q.accept("a", 3, "ada")
         q.begin_cut("a", "cut-1")
-        q.resolve("a", outcome, "why")
+        q.resolve("a", outcome, reasons.cutter_unsure())
         assert q.next() is None
         if outcome == "UNKNOWN":
-            assert "look, and report the outcome first" in q.accept("a", 3, "eve")
-            assert "UNKNOWN" in q.reject("a", "eve", "no")
+            assert q.accept("a", 3, "eve") == reasons.outcome_undecided("a")
+            assert q.reject("a", "eve", "no") == reasons.point_state("a", "UNKNOWN")
             assert q.proposed(0.0) == []
-            assert q.decide("a", "FAILED_NOT_CUT", "eve", "the cane stands") == ""
-            assert q.get("a").reason == "eve looked: the cane stands"
-        assert q.accept("a", 3, "eve") == ""
+            assert q.decide("a", "FAILED_NOT_CUT", "eve", "the cane stands") is None
+            assert q.get("a").reason == reasons.inspected("eve", "the cane stands")
+        assert q.accept("a", 3, "eve") is None
 
 
 def test_what_a_person_saw_ends_an_unknown_cut_and_nothing_else():
     q = queue(point())
-    assert "not in question: it is PROPOSED" in q.decide("a", "DONE", "eve", "cut")
-    assert "there is no point" in q.decide("z", "DONE", "eve", "cut")
+    assert q.decide("a", "DONE", "eve", "cut") == reasons.outcome_known("a", "PROPOSED")
+    assert q.decide("z", "DONE", "eve", "cut") == reasons.point_unknown("z")
     q.accept("a", 3, "ada")
     q.begin_cut("a", "cut-1")
-    assert "it is CUTTING" in q.decide("a", "DONE", "eve", "cut")
-    q.resolve("a", "UNKNOWN", "why")
-    assert q.decide("a", "DONE", "eve", "the cane is off") == ""
+    assert q.decide("a", "DONE", "eve", "cut") == reasons.outcome_known("a", "CUTTING")
+    q.resolve("a", "UNKNOWN", reasons.cutter_unsure())
+    assert q.decide("a", "DONE", "eve", "the cane is off") is None
     assert (state(q), q.get("a").cut_id) == ("DONE", "cut-1")
-    assert "is DONE" in q.accept("a", 3, "eve")
+    assert q.accept("a", 3, "eve") == reasons.point_state("a", "DONE")
 
 
 def test_rejected_points_are_not_proposed_and_unknown_ones_are_named():
     q = queue(point(), point("b", confidence=0.4))
-    assert q.reject("a", "ada", "keep this one") == ""
-    assert (q.entries()[0].state, q.entries()[0].reason) == ("REJECTED", "keep this one")
+    assert q.reject("a", "ada", "keep this one") is None
+    assert (q.entries()[0].state, q.entries()[0].reason) == ("REJECTED", reasons.said("keep this one"))
     assert [p.point_id for p in q.proposed(0.0)] == ["b"]
     assert q.proposed(0.5) == []
-    assert "'zz'" in q.accept("zz", 1, "ada")
-    assert "'zz'" in q.reject("zz", "ada", "")
+    assert q.accept("zz", 1, "ada") == reasons.point_unknown("zz")
+    assert q.reject("zz", "ada", "") == reasons.point_unknown("zz")
 
 
 def test_accepted_points_follow_an_order_asked_for_and_the_others_keep_their_places():
     places = {"a": 0.1, "b": 0.3, "c": 0.5, "d": 0.7}
     q = queue(*(point(i, position=(x, 0.75, 1.0)) for i, x in places.items()))
     for point_id in ("a", "c", "d"):
-        assert q.accept(point_id, q.get(point_id).point.revision, "ada") == ""
+        assert q.accept(point_id, q.get(point_id).point.revision, "ada") is None
     q.arrange(("d", "a", "c"))
     assert [e.point_id for e in q.entries()] == ["d", "b", "a", "c"]
     assert q.next().point.point_id == "d"
@@ -161,26 +163,27 @@ def test_another_content_than_was_seen_is_refused():
     queue = PointQueue(WorkConfig())
     point = msgspec.structs.replace(POINT, digest="ab" * 16)
     queue.update(m.PruningPoints(header=m.Header(), segmenter="s", frames=1, points=(point,)))
-    assert "not what was seen" in queue.accept(point.point_id, point.revision, "Ada", "cd" * 16)
+    refused = queue.accept(point.point_id, point.revision, "Ada", "cd" * 16)
+    assert refused == reasons.point_replaced(point.point_id, "abababab", "cdcdcdcd")
     assert queue.entries()[0].digest == ""
-    assert queue.accept(point.point_id, point.revision, "Ada", point.digest) == ""
+    assert queue.accept(point.point_id, point.revision, "Ada", point.digest) is None
     assert queue.entries()[0].digest == point.digest
 
 
 def test_a_decision_is_taken_back_until_the_cut_begins():
     queue = PointQueue(WorkConfig())
     queue.update(m.PruningPoints(header=m.Header(), segmenter="s", frames=1, points=(POINT,)))
-    assert "nothing to take back" in queue.reconsider("a", "Ada")
-    assert queue.accept("a", POINT.revision, "Ada") == "" and queue.reconsider("a", "Ada") == ""
+    assert queue.reconsider("a", "Ada") == reasons.nothing_to_take_back("a", "PROPOSED")
+    assert queue.accept("a", POINT.revision, "Ada") is None and queue.reconsider("a", "Ada") is None
     assert queue.entries()[0].state == "PROPOSED" and queue.next() is None
-    assert queue.reject("a", "Ada", "wrong cane") == "" and queue.reconsider("a", "Ada") == ""
-    assert queue.entries()[0].state == "PROPOSED" and queue.entries()[0].reason == ""
-    assert queue.accept("a", POINT.revision, "Ada") == ""
+    assert queue.reject("a", "Ada", "wrong cane") is None and queue.reconsider("a", "Ada") is None
+    assert queue.entries()[0].state == "PROPOSED" and queue.entries()[0].reason is None
+    assert queue.accept("a", POINT.revision, "Ada") is None
     queue.begin_cut("a", "c1")
-    assert "nothing to take back" in queue.reconsider("a", "Ada")
+    assert queue.reconsider("a", "Ada") == reasons.nothing_to_take_back("a", "CUTTING")
 
 
-REFUSED = {"a": "no posture reaches it"}
+REFUSED = {"a": reasons.no_square_approach()}
 
 
 def beyond(*others):
@@ -193,23 +196,23 @@ def beyond(*others):
 
 def test_what_the_plan_refuses_is_neither_accepted_nor_worked_on_and_says_why():
     q = beyond(point("b", position=(2.0, 0.85, 1.0)))
-    assert (state(q), q.get("a").reason) == ("UNREACHABLE", "no posture reaches it")
-    assert q.next() is None and q.waits == "the accepted point cannot be reached"
+    assert (state(q), q.get("a").reason) == ("UNREACHABLE", REFUSED["a"])
+    assert q.next() is None and q.waits == reasons.none_reachable(1)
     assert q.accepted() == (point(),), "the next plan is asked about it again"
     assert q.count("ACCEPTED") == 0 and q.count("UNREACHABLE") == 1
     assert not q.reach(q.accepted(), REFUSED), "the same again is nothing new"
-    assert "is accepted, and cannot be reached: no posture" in q.accept("a", 3, "eve")
+    assert q.accept("a", 3, "eve") == reasons.point_unreachable("a", REFUSED["a"])
     q.accept("b", 3, "ada")
-    assert q.next().point.point_id == "b" and q.waits == ""
-    assert "a cannot be reached, so it has no place" in q.move("a", "b", 0, "ada")
+    assert q.next().point.point_id == "b" and q.waits is None
+    assert q.move("a", "b", 0, "ada") == reasons.unreachable_in_order("a", REFUSED["a"])
 
 
 def test_it_is_accepted_again_when_a_plan_reaches_it_or_somebody_turns_its_approach():
     q = beyond()
     q.reach(q.accepted(), {})
-    assert (state(q), q.get("a").reason, q.get("a").user) == ("ACCEPTED", "", "ada")
+    assert (state(q), q.get("a").reason, q.get("a").user) == ("ACCEPTED", None, "ada")
     q = beyond()
-    assert q.turn("a", 0.5, "ada") == "" and state(q) == "ACCEPTED"
+    assert q.turn("a", 0.5, "ada") is None and state(q) == "ACCEPTED"
 
 
 def test_a_plan_says_nothing_of_what_was_accepted_otherwise_or_is_worked_on():
@@ -222,12 +225,13 @@ def test_a_plan_says_nothing_of_what_was_accepted_otherwise_or_is_worked_on():
 
 def test_an_acceptance_out_of_reach_is_void_like_any_other_and_can_be_taken_back():
     q = beyond()
-    assert "acceptance void" in q.update(shown(point(revision=4, position=(1.0, 0.85, 1.006))))[0]
+    (lost,) = q.update(shown(point(revision=4, position=(1.0, 0.85, 1.006))))
+    assert lost.code == "acceptance_lost" and lost.values[1][1].code == "acceptance_void"
     assert state(q) == "PROPOSED"
     q = beyond()
-    assert "no longer reports it" in q.update(shown())[0]
+    assert [lost.code for lost in q.update(shown())] == ["acceptance_lost"]
     q = beyond()
-    assert q.reconsider("a", "ada") == "" and state(q) == "PROPOSED" and q.waits == "no point is accepted"
+    assert q.reconsider("a", "ada") is None and state(q) == "PROPOSED" and q.waits == reasons.none_accepted()
 
 
 STEPS = st.lists(st.sampled_from(["refuse", "reach", "accept", "back", "reject", "move", "gone", "seen"]), max_size=30)

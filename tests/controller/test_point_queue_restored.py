@@ -5,6 +5,8 @@ import msgspec
 from controller.config import WorkConfig
 from controller.ledger.journal import Journal, LedgerState, TicketRow
 from controller.work.point_queue import PointQueue
+from rolling_panda import reasons
+from rolling_panda.reasons import text_of
 from tests.controller.test_point_queue import POINT, point, shown
 
 
@@ -42,15 +44,15 @@ def begun(*points):
 
 def test_an_acceptance_stands_but_is_not_worked_on_before_the_point_is_seen_again():
     life = begun(point(), point("b", position=(2.0, 0.85, 1.0)))
-    assert life.queue.accept("a", 3, "ada") == ""
+    assert life.queue.accept("a", 3, "ada") is None
     life = life.restarted()
     assert life.state() == "ACCEPTED" and life.queue.next() is None and life.queue.accepted() == ()
-    assert "waits until perception reports it" in life.queue.entries()[0].reason
+    assert life.queue.entries()[0].reason == reasons.accepted_before_restart()
     life.queue.update(shown())
     assert life.state() == "ACCEPTED"
     life.queue.update(shown(point(revision=4, position=(1.0, 0.852, 1.0))))
     assert life.queue.next().accepted == POINT and life.queue.next().user == "ada"
-    assert life.queue.entries()[0].reason == ""
+    assert life.queue.entries()[0].reason is None
 
 
 def test_an_acceptance_is_void_when_the_point_is_elsewhere_after_the_restart():
@@ -58,7 +60,7 @@ def test_an_acceptance_is_void_when_the_point_is_elsewhere_after_the_restart():
     life.queue.accept("a", 3, "ada")
     life = life.restarted()
     (voided,) = life.queue.update(shown(point(position=(1.0, 0.85, 1.01))))
-    assert "moved by 10 mm" in voided and life.state() == "PROPOSED"
+    assert "moved by 10 mm" in text_of(voided) and life.state() == "PROPOSED"
 
 
 def test_an_acceptance_that_does_not_fit_its_hash_is_none():
@@ -66,7 +68,7 @@ def test_an_acceptance_that_does_not_fit_its_hash_is_none():
     life.queue.accept("a", 3, "ada")
     (body,) = life.rows().values()
     life = Life({"a": body.replace(b"0.85", b"0.86")})
-    assert life.state() == "REJECTED" and "does not match its hash" in life.queue.get("a").reason
+    assert life.state() == "REJECTED" and life.queue.get("a").reason == reasons.record_damaged()
 
 
 def test_what_a_person_is_asked_about_is_told_with_its_point_until_perception_shows_it():
@@ -90,7 +92,7 @@ def test_what_is_done_or_rejected_stays_so():
         life = life.restarted()
         assert (life.state("a"), life.state("b")) == ("DONE", "REJECTED")
     entry = next(entry for entry in life.queue.entries() if entry.point_id == "b")
-    assert (entry.user, entry.reason) == ("ada", "a wire behind it")
+    assert (entry.user, entry.reason) == ("ada", reasons.said("a wire behind it"))
     assert life.queue.get("a").cut_id == "run-1"
 
 

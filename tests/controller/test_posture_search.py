@@ -3,6 +3,7 @@ import pytest
 
 from controller.config import ControllerConfig
 from controller.work.posture_search import CutPlan, PostureSearch, Unreachable
+from rolling_panda import reasons
 from rolling_panda.model.robot import ARM_Q, RobotModel
 
 ROBOT, CONFIG = RobotModel(), ControllerConfig()
@@ -51,11 +52,11 @@ def test_the_base_keeps_its_distance_to_the_row():
 def test_what_is_too_far_is_refused_in_words():
     plan, steps = find((1.0, 1.6, 1.0))
     assert isinstance(plan, Unreachable)
-    assert "1.60 m beside the robot's path" in plan.reason
+    assert plan.reason.code == "out_of_reach" and dict(plan.reason.values)["distance"] == pytest.approx(1.6, abs=0.005)
     assert steps == 0
 
 
 def test_a_cane_that_points_at_the_robot_is_refused():
     plan, _ = find((1.0, 0.85, 1.0), np.array([0.0, 1.0, 0.0]))
     assert isinstance(plan, Unreachable)
-    assert "straight at the robot" in plan.reason
+    assert plan.reason == reasons.no_square_approach()

@@ -11,13 +11,17 @@ from controller.planning import preview as preview_module
 from controller.planning.cuts import CutPlanner
 from controller.planning.preview_plan import PreviewRequest
 from rolling_panda import commands as intents
+from rolling_panda import reasons
 from rolling_panda.config import RobotConfig
 from rolling_panda.messages.perception import Capsule
+from rolling_panda.reasons import text_of
 from tests.support.controller_at_work import CONFIG, entry
 from tests.support.points import point
 from tests.support.previewed import ROLLOUT, Previewed
 
 POINTS = (point("a", (0.45, 0.75, 1.05)), point("b", (0.75, 0.75, 1.1)))
+
+TOO_NEAR = reasons.obstacle_in_way("wire", "blades", "b", 7.0)
 
 
 @pytest.fixture(autouse=True)
@@ -76,7 +80,7 @@ def test_a_preview_of_one_cut_allows_that_one_alone(p):
     p.worked()
     assert [name for name, _ in p.robot.cuts] == ["a"]
     p.robot.run(0.2)
-    assert p.robot.state.mode == "READY" and "b is not in the approved preview" in p.robot.state.reason
+    assert p.robot.state.mode == "READY" and p.robot.state.reason == text_of(reasons.not_in_preview("b"))
     assert p.state.phase == "expired"
     assert "expired" in p.ask(intents.Start)
     assert [name for name, _ in p.robot.cuts] == ["a"]
@@ -94,8 +98,7 @@ def test_what_the_preview_does_not_cut_is_not_cut_under_its_approval(rolled):
     def not_b(request):
         made = rolled(request)
         cuts = tuple(
-            cut if cut.point_id == "a" else structs.replace(cut, cut_s=None, result="not cut: a wire is too near")
-            for cut in made.cuts
+            cut if cut.point_id == "a" else structs.replace(cut, cut_s=None, reason=TOO_NEAR) for cut in made.cuts
         )
         return replace(made, cuts=cuts)
 
@@ -104,7 +107,7 @@ def test_what_the_preview_does_not_cut_is_not_cut_under_its_approval(rolled):
     assert p.ask(intents.ApprovePreview, preview_hash=shown.preview_hash) == ""
     p.worked()
     assert [name for name, _ in p.robot.cuts] == ["a"]
-    assert "the approved preview shows b as not cut: a wire is too near" in p.robot.state.reason
+    assert p.robot.state.reason == text_of(reasons.not_cut_in_preview("b", TOO_NEAR))
 
 
 def test_a_base_that_was_moved_ends_the_approval_and_is_told(p):
@@ -113,7 +116,7 @@ def test_a_base_that_was_moved_ends_the_approval_and_is_told(p):
     assert p.ask(intents.ApprovePreview, preview_hash=shown.preview_hash) == ""
     p.robot.q[0] += 0.31
     p.robot.run(0.3)
-    assert p.state.phase == "expired" and "0.31 m" in p.state.reason
+    assert p.state.phase == "expired" and p.state.reason.code == "robot_elsewhere"
     assert "0.31 m" in p.ask(intents.Start)
     assert "0.31 m" in p.ask(intents.ApprovePreview, preview_hash=shown.preview_hash)
 
@@ -125,7 +128,7 @@ def test_a_point_accepted_anew_or_not_any_more_ends_it(p):
     p.robot.run(0.2)
     assert p.state.phase == "approved"
     p.ask(intents.ReconsiderPoint, point_id="a")
-    assert p.state.phase == "expired" and "a is no longer accepted" in p.state.reason
+    assert p.state.phase == "expired" and p.state.reason == reasons.no_longer_accepted("a")
     p.ask(intents.AcceptPoint, point_id="a", revision=2)
     assert p.state.phase == "expired"
 
@@ -144,7 +147,7 @@ def test_what_comes_into_the_way_ends_it_and_what_leaves_it_room_does_not(p):
     halfway = p.motion.rows[len(p.motion.rows) // 3].tool
     p.robot.obstacles = (*beside, post_at(*halfway[:2]))
     p.robot.run(0.3)
-    assert p.state.phase == "expired" and "a post is seen" in p.state.reason and "to a" in p.state.reason
+    assert p.state.phase == "expired" and ("point", "a") in p.state.reason.values
 
 
 @pytest.mark.long
@@ -166,7 +169,7 @@ def test_another_order_ends_it(p):
     shown = p.previewed()
     assert p.ask(intents.ApprovePreview, preview_hash=shown.preview_hash) == ""
     assert p.ask(intents.MoveInQueue, point_id="b", before="a", revision=0) == ""
-    assert p.state.phase == "expired" and "b comes before a" in p.state.reason
+    assert p.state.phase == "expired" and p.state.reason == reasons.another_comes_first("b", "a")
 
 
 def test_an_approval_that_expires_under_way_keeps_the_blades_from_closing(p):
@@ -181,11 +184,11 @@ def test_an_approval_that_expires_under_way_keeps_the_blades_from_closing(p):
     p.robot.run(10.0)
     assert p.robot.cuts == []
     assert entry(p.robot, "a").state == "ACCEPTED"
-    assert any("left: the approved preview has expired: a post is seen" in text for text in p.robot.events)
+    assert any("a was left: The preview has expired: A post is seen" in text for text in p.robot.events)
 
 
 def test_there_is_nothing_to_preview_without_an_accepted_point(p):
-    assert "no point is accepted" in p.ask(intents.RequestPreview)
+    assert p.ask(intents.RequestPreview) == text_of(reasons.none_accepted())
     assert "accept it first" in p.ask(intents.RequestPreview, point_id="a")
     assert "no preview to approve" in p.ask(intents.ApprovePreview, preview_hash="")
 
@@ -201,10 +204,10 @@ def test_what_was_required_is_required_after_a_restart(rolled):
 
 def test_a_preview_that_failed_says_why():
     def fail(request: PreviewRequest):
-        return preview_module.Preview(request, failure="the planning process ended")
+        return preview_module.Preview(request, failure=reasons.planner_ended())
 
     p = Previewed(POINTS, roll=fail)
     p.ask(intents.AcceptAll)
     p.ask(intents.RequestPreview)
     p.robot.run(0.3)
-    assert p.state.phase == "none" and "the planning process ended" in p.state.reason
+    assert p.state.phase == "none" and p.state.reason == reasons.preview_failed(reasons.planner_ended())

@@ -1,6 +1,8 @@
 """What the controller's log says of what operators ask."""
 
 from rolling_panda import commands as intents
+from rolling_panda import reasons
+from rolling_panda.reasons import text_of
 from tests.controller.test_core_work import point, robot
 
 
@@ -13,7 +15,7 @@ def test_each_request_is_one_line_of_the_log():
     for intent, words in [
         (intents.Start(user="ada"), "start refused"),
         (intents.Arm(user="ada"), "IDLE → READY: arm by ada"),
-        (intents.AcceptAll(user="ada"), "ada: accepted 1 point of confidence 0.80 and more"),
+        (intents.AcceptAll(user="ada"), text_of(reasons.points_accepted("ada", 1, 0.8))),
         (intents.RejectPoint(user="ada", point_id="p1", reason="rotten"), "ada rejected p1: rotten"),
         (intents.AcceptPoint(user="ada", point_id="p1", revision=1), "ada accepted p1, revision 1"),
         (intents.Start(user="ada"), "READY → AUTO: start by ada"),

@@ -1,6 +1,7 @@
 """Acceptances that another pruning rule makes void: the rows say so, and they come back when it is taken back."""
 
 import msgspec
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -11,6 +12,7 @@ from controller.ledger.store import Ledger
 from controller.ledger.writer import _entry
 from controller.work.point_queue import PointQueue
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.messages.perception import point_digest
 from tests.controller.test_point_queue import point, state
 
@@ -35,7 +37,7 @@ def accepted(*names):
     q = PointQueue(WorkConfig())
     q.update(shown(A, B, C))
     for name in names:
-        assert q.accept(name, 3, "ada") == ""
+        assert q.accept(name, 3, "ada") is None
     return q
 
 
@@ -43,17 +45,20 @@ def test_rows_name_the_rule_as_the_cause():
     q = accepted("a", "b", "c")
     voided = q.update(shown(A_SHORT, C, D, rule=SHORT))
     assert len(voided) == 2
-    reasons = {e.point_id: e.reason for e in q.entries()}
-    rule = "the rule is Spur, 1 node, from 6 mm, 20 mm past now"
-    assert reasons["a"] == f"acceptance void: {rule}, which cuts 40 mm away"
-    assert reasons["b"] == f"acceptance void: {rule}, which asks for no such cut"
+    why, rule = {e.point_id: e.reason for e in q.entries()}, reasons.spur_rule(1, 6.0, 20.0)
+    ((_, cause),) = why["a"].values
+    assert why["a"].code == "acceptance_void" and cause.code == "rule_cuts_elsewhere"
+    assert dict(cause.values) == {"rule": rule, "distance_mm": pytest.approx(40.0)}
+    assert why["b"] == reasons.acceptance_void(reasons.rule_wants_no_cut(rule))
     assert state(q, "c") == "ACCEPTED", "what the rule leaves as it is stays accepted"
 
 
 def test_what_moves_less_than_a_point_may_move_is_void_by_a_rule_all_the_same():
     q = accepted("a")
     q.update(shown(revised("a", 1.004, 4), B, C, rule=m.PruningRule(offset=0.024)))
-    assert state(q) == "PROPOSED" and "which cuts 4 mm away" in q.get("a").reason
+    (why,) = (value for _, value in q.get("a").reason.values)
+    assert state(q) == "PROPOSED" and why.code == "rule_cuts_elsewhere"
+    assert dict(why.values)["distance_mm"] == pytest.approx(4.0)
 
 
 def test_a_rule_is_taken_back_with_its_acceptances_whoever_is_heard_first():
@@ -64,14 +69,14 @@ def test_a_rule_is_taken_back_with_its_acceptances_whoever_is_heard_first():
         if perception_first:
             q.update(shown(A, B, C))
             assert q.count("ACCEPTED") == 0, "nobody has said so yet"
-            assert q.undo_rule(SHORT) == ""
+            assert q.undo_rule(SHORT) is None
         else:
-            assert q.undo_rule(SHORT) == ""
+            assert q.undo_rule(SHORT) is None
             assert q.count("ACCEPTED") == 0, "the points are not back yet"
             q.update(shown(A, B, C))
         assert {ticket.point.point_id: ticket for ticket in q.tickets()} == before
-        assert q.restored() == "a, b" and q.restored() == ""
-        assert "knows of no acceptance" in q.undo_rule(SHORT), "once"
+        assert q.restored() == reasons.acceptances_restored("a, b") and q.restored() is None
+        assert q.undo_rule(SHORT) == reasons.nothing_to_restore(), "once"
 
 
 def test_setting_the_former_numbers_is_not_taking_back():
@@ -84,20 +89,20 @@ def test_setting_the_former_numbers_is_not_taking_back():
 def test_what_somebody_has_decided_since_or_is_elsewhere_stays_as_it_is():
     q = accepted("a", "b", "c")
     q.update(shown(A_SHORT, rule=SHORT))
-    assert q.reject("a", "eve", "wrong cane") == ""
-    assert q.undo_rule(SHORT) == ""
+    assert q.reject("a", "eve", "wrong cane") is None
+    assert q.undo_rule(SHORT) is None
     q.update(shown(A, revised("b", 2.006, 4)))
     assert [state(q, name) for name in "abc"] == ["REJECTED", "PROPOSED", "PROPOSED"]
-    assert q.restored() == ""
+    assert q.restored() is None
 
 
 def test_perception_that_starts_anew_is_no_change_of_the_rule():
     q = accepted("a")
     q.update(shown(A, B, C, frames=9))
     q.update(shown(rule=SHORT, frames=1))
-    assert "perception no longer reports it" in q.get("a").reason
+    assert q.get("a").reason == reasons.acceptance_void(reasons.no_longer_reported())
     q.update(shown(A, rule=SHORT, frames=2))
-    assert "knows of no" in q.undo_rule(SHORT) and state(q) == "PROPOSED"
+    assert q.undo_rule(SHORT) == reasons.nothing_to_restore() and state(q) == "PROPOSED"
 
 
 def test_the_ledger_has_the_acceptance_again_as_it_was(tmp_path):
@@ -143,6 +148,6 @@ def test_whatever_is_accepted_taking_rules_back_leaves_it_as_before(names, rules
         rule = stack.pop()
         if early:
             see(stack[-1])
-        assert q.undo_rule(rule) == ""
+        assert q.undo_rule(rule) is None
         see(stack[-1])
     assert {t.point.point_id: t for t in q.tickets()} == begun

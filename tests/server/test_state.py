@@ -8,7 +8,7 @@ from types import SimpleNamespace
 from fastapi import FastAPI
 from httpx import ASGITransport, AsyncClient
 
-from rolling_panda import topics
+from rolling_panda import reasons, topics
 from rolling_panda.messages.supervision import CutReport, SessionReport, VineReport
 from server.api.state import camera_router
 from tests.support.fake_wire import FakeWire
@@ -17,7 +17,14 @@ from tests.support.running_server import eventually, running_server
 
 def test_everybody_who_is_signed_in_gets_the_report_and_its_cuts_as_a_table():
     cut = CutReport(
-        cut_id="c1", point_id="p1", vine=3, spur=2, outcome="DONE", reason="=1+1", ended_at=1769850000.0, seconds=3.25
+        cut_id="c1",
+        point_id="p1",
+        vine=3,
+        spur=2,
+        outcome="DONE",
+        reason=reasons.said("=1+1"),
+        ended_at=1769850000.0,
+        seconds=3.25,
     )
     told = SessionReport(
         began_at=1769840000.0, written_at=1769850000.0, cuts=(cut,), cut_count=1, vines=(VineReport(vine=3, done=1),)

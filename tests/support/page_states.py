@@ -86,7 +86,7 @@ def _all_states(page: Page, server: PlayedServer) -> None:
 
 def _refused_plan(page: Page, server: PlayedServer) -> None:
     working(page, server)
-    reason = "the blades cannot come there: wire 2 is 4 mm from their way in"
+    reason = reasons.no_clear_posture(reasons.too_near("at the cut", 4.0, "blades", "wire 2", 7.0))
     refused = planned(point(2, "UNREACHABLE", spur=2, user="Ada", reason=reason), 0, reason)
     show(server, queue()[0], refused, *queue()[2:])
     choose(page, "p2")
@@ -212,9 +212,7 @@ def _by_hand_joints(page: Page, server: PlayedServer) -> None:
 def _held_back(page: Page, server: PlayedServer) -> None:
     _by_hand_tool(page, server)
     near = m.Proximity(0.021, "the blades and a wire")
-    server.controller = controller(
-        "TELEOP", limited_by="link 6 is 20 mm from the cordon: it goes no further", proximity=near
-    )
+    server.controller = controller("TELEOP", limited_by="link 6 and cordon 2", proximity=near)
     page.locator("#hold").dispatch_event("pointerdown", {"button": 0, "isPrimary": True, "pointerId": 1})
     expect(page.locator("#hold")).to_contain_text("Moving")
 

@@ -5,6 +5,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer, controller, point
 
@@ -132,7 +133,7 @@ def test_of_many_points_only_those_in_view_are_there_and_only_what_changed_is_dr
     expect(page.locator('.order-row[data-point-id="p298"]')).to_have_attribute("aria-selected", "true")
     # Of the queue the first row takes the Tab key while no row is chosen.
     assert touched(page) <= {"p298", "p299", "p0"}
-    entry = msgspec.structs.replace(server.points[297].entry, reason="a wire is near")
+    entry = msgspec.structs.replace(server.points[297].entry, reason=reasons.said("a wire is near"))
     changed = msgspec.structs.replace(server.points[297], entry=entry)
     server.points = (*server.points[:297], changed, *server.points[298:])
     server.tell(server.page_points())

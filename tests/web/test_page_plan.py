@@ -4,6 +4,7 @@ import msgspec
 import pytest
 from playwright.sync_api import Page, expect
 
+from rolling_panda import reasons
 from rolling_panda.messages.supervision import PointPlan
 from tests.support.played_page import until
 from tests.support.played_server import PlayedServer, controller, point
@@ -16,12 +17,12 @@ WAY = PointPlan(
     order=2,
     rollout=rolled_out("p1", 4, begins_s=5.0, ends_s=8.14, clearance=0.122, manipulability=0.07),
 )
-REFUSAL = PointPlan(point_id="p2", revision=4, order=0, reason="no posture of the arm reaches it")
+REFUSAL = PointPlan(point_id="p2", revision=4, order=0, reason=reasons.out_of_reach(1.2, 0.9))
 
 
 @pytest.fixture
 def server() -> PlayedServer:
-    far = point(2, "UNREACHABLE", reason="no posture of the arm reaches it")
+    far = point(2, "UNREACHABLE", reason=reasons.out_of_reach(1.2, 0.9))
     rows = (
         msgspec.structs.replace(point(1, "ACCEPTED"), plan=WAY),
         msgspec.structs.replace(far, plan=REFUSAL),
@@ -36,7 +37,7 @@ def test_a_row_says_its_number_and_way_or_why_the_plan_refuses_it(page: Page) ->
     assert "the cut takes 3.1 s and leaves 122 mm between link5 and camera, manipulability 0.070" in (
         facts.get_attribute("title") or ""
     )
-    expect(page.locator('[data-point-id="p2"] .reason')).to_contain_text("no posture of the arm reaches it")
+    expect(page.locator('[data-point-id="p2"] .reason')).to_contain_text("No posture of the arm reaches it")
     for other in ("p2", "p3"):
         expect(page.locator(f'[data-point-id="{other}"] .reason')).not_to_contain_text("no. ")
 

@@ -5,6 +5,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from tests.support.played_page import until
 from tests.support.played_server import PlayedServer
 
@@ -88,7 +89,8 @@ def test_an_applied_rule_is_taken_back_with_its_acceptances_by_undo(page: Page, 
     until(page, lambda: of(server, "/api/rule") == [ASKED])
     # What comes of it is on the rows, with the rule as the cause.
     first, second, third = server.points
-    cause = "acceptance void: the rule is Spur, 2 nodes, from 6 mm, 25 mm past now, which cuts 5 mm away"
+    rule = reasons.spur_rule(2.0, 6.0, 25.0)
+    cause = reasons.acceptance_void(reasons.rule_cuts_elsewhere(rule, 5.0))
     server.rule = m.PruningRule(offset=0.025)
     server.points = (
         first,
@@ -96,7 +98,7 @@ def test_an_applied_rule_is_taken_back_with_its_acceptances_by_undo(page: Page, 
         third,
     )
     server.tell(server.page_points())
-    expect(page.locator('[data-point-id="p2"] .reason')).to_contain_text("the rule is Spur, 2 nodes")
+    expect(page.locator('[data-point-id="p2"] .reason')).to_contain_text("The rule is now: Spur, nodes kept: 2")
     expect(page.locator("rp-rule summary")).to_have_text("Spur · 2 nodes · ≥ 6 mm · 25 mm past")
     expect(page.locator("#rule-apply")).to_be_hidden()
     undo = page.locator("#undo")

@@ -5,6 +5,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.messages import page as p
 from rolling_panda.messages.supervision import PreviewedCut, PreviewState
 from tests.support.played_page import until
@@ -90,8 +91,8 @@ def test_it_is_approved_by_its_hash_and_what_changed_is_said_when_it_expires(pag
     until(page, lambda: ("/api/preview/approve", {"preview_hash": "ab" * 32}) in server.posted)
     told(server, phase="approved", approved_by="Ada")
     expect(page.locator(".preview-words")).to_contain_text("Approved by Ada")
-    told(server, phase="expired", reason="the robot stands 0.31 m from its start")
-    expect(page.locator(".preview-words")).to_have_text("Expired: the robot stands 0.31 m from its start")
+    told(server, phase="expired", reason=reasons.robot_elsewhere(0.31))
+    expect(page.locator(".preview-words")).to_have_text("Expired: The robot stands 0.31 m from its start")
     expect(page.locator("#approve-preview")).to_have_attribute("aria-disabled", "true")
 
 

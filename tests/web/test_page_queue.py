@@ -13,7 +13,7 @@ pytestmark = pytest.mark.browser
 SEEN = {"revision": 4, "digest": "00000002" * 4}
 
 
-def become(server: PlayedServer, name: str, state: m.PointState, reason: str = "") -> None:
+def become(server: PlayedServer, name: str, state: m.PointState, reason: m.Reason | None = None) -> None:
     rows = []
     for row in server.points:
         if row.point.point_id == name:

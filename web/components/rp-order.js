@@ -2,10 +2,10 @@
 
 import { cutTime, moveTo, orderWords, resetOrder, whyNoMove, whyNoResetOrder, workOrder } from "../js/control/order.js";
 import { select, selectAndReveal } from "../js/control/selection.js";
-import { inWords } from "../js/state/format.js";
 import { link, now, pageState, points, revealCount, selected } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
 import { element, setAttribute, setEnabled, setText } from "../js/views/dom.js";
+import { reasonText } from "../js/state/reasons.js";
 
 /** @typedef {import("../js/link/messages.js").PagePoint} PagePoint */
 
@@ -132,7 +132,7 @@ class RpOrder extends HTMLElement {
       this.space?.append(row);
     }
     const [, number, name, way] = row.children;
-    const why = inWords(point.entry.reason);
+    const why = reasonText(point.entry.reason);
     if (number) setText(number, `${at + 1}`);
     if (name) setText(name, `${point.point.point_id} · vine ${point.point.vine}, spur ${point.point.spur}`);
     if (way) setText(way, point.plan ? cutTime(point.plan) : "");

@@ -4,9 +4,10 @@ import { accept, isUncertain, isUnknown, reject, whyNotAccept, whyNotReject } fr
 import { cutTime } from "../js/control/order.js";
 import { select, selectAndReveal } from "../js/control/selection.js";
 import { TEXT_MAX_LENGTH } from "../js/link/messages.js";
-import { POINT_WORDS, counted, inWords } from "../js/state/format.js";
+import { POINT_WORDS, counted, } from "../js/state/format.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
 import { icon, setIcon } from "../js/views/icons.js";
+import { reasonText } from "../js/state/reasons.js";
 
 /** @typedef {import("../js/link/messages.js").PagePoint} PagePoint */
 
@@ -167,7 +168,7 @@ export class RpPoint extends HTMLElement {
     );
     const kept = `Keeps ${point.nodes_kept} of ${counted(point.nodes_seen, "node")}`;
     this.facts.title = `${kept}; the cane is ${thick} thick; confidence ${sure}${planWords(row)}`;
-    setText(this.reason, inWords([planned, entry.reason, point.reason].filter(Boolean).join(" · ")));
+    setText(this.reason, [planned, reasonText(entry.reason), point.reason].filter(Boolean).join(" · "));
     this.reason.title = this.reason.textContent ?? "";
     const [yes, no] = isUnknown(row)
       ? ["I have looked: it is cut", "I have looked: it is not cut"]

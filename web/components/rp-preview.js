@@ -16,10 +16,10 @@ import {
   whyNoApproval,
   whyNoPreview,
 } from "../js/control/preview.js";
-import { inWords } from "../js/state/format.js";
 import { link, now, pageState, points, preview, selected } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
+import { reasonText } from "../js/state/reasons.js";
 
 /** @typedef {import("../js/link/messages.js").PreviewState} PreviewState */
 
@@ -104,13 +104,13 @@ class RpPreview extends HTMLElement {
  * @param {number|null} at
  */
 function wordsOf(state, at) {
-  if (state === null || state.phase === "none") return inWords(state?.reason ?? "");
-  if (state.phase === "waiting") return state.reason ? `Waiting: ${state.reason}…` : "Waiting…";
+  if (state === null || state.phase === "none") return reasonText(state?.reason);
+  if (state.phase === "waiting") return state.reason ? `Waiting: ${reasonText(state.reason)}…` : "Waiting…";
   if (state.phase === "rolling") return "Working it out…";
-  if (state.phase === "expired") return `Expired: ${inWords(state.reason)}`;
+  if (state.phase === "expired") return `Expired: ${reasonText(state.reason)}`;
   const cut = at === null ? undefined : cutAt(at);
   const approved = state.phase === "approved" ? `Approved by ${state.approved_by}. ` : "";
-  if (cut) return `${approved}${cut.point_id}: ${inWords(cut.result)} · ${least([cut])}`;
+  if (cut) return `${approved}${cut.point_id}: ${cut.reason ? `not cut: ${reasonText(cut.reason)}` : "cut"} · ${least([cut])}`;
   const left = state.remaining > 0 ? ` of ${state.cuts.length + state.remaining}` : "";
   const done = state.cuts.filter((each) => each.cut_s !== null).length;
   return `${approved}${done}${left} ${done === 1 ? "cut" : "cuts"} in ${state.duration_s.toFixed(1)} s · ${least(state.cuts)}`;

@@ -1,6 +1,6 @@
 // The session report: cuts by outcome and vine, durations, refusals, and who held control.
 
-import { POINT_WORDS, clockWords, inWords } from "../js/state/format.js";
+import { POINT_WORDS, clockWords } from "../js/state/format.js";
 import { reasonText } from "../js/state/reasons.js";
 import { element, setText } from "../js/views/dom.js";
 
@@ -93,7 +93,7 @@ export class RpReport extends HTMLElement {
           cut.ended_at > 0 ? clockWords(cut.ended_at) : "now",
           cut.point_id,
           cut.vine,
-          [cut.outcome ? POINT_WORDS[cut.outcome] : "Cutting", inWords(cut.reason)].filter(Boolean).join(": "),
+          [cut.outcome ? POINT_WORDS[cut.outcome] : "Cutting", reasonText(cut.reason)].filter(Boolean).join(": "),
           cut.ended_at > 0 ? cut.seconds.toFixed(1) : "–",
           cut.user,
         ]),

@@ -216,7 +216,7 @@ class RpTeleoperation extends HTMLElement {
       const held = (holding && controller?.limited_by) || "";
       setText(
         words,
-        held ? `${held[0]?.toUpperCase()}${held.slice(1)}.` : explanation(why, holding, part, nearWords(controller)),
+        held ? `Held back by ${held}.` : explanation(why, holding, part, nearWords(controller)),
       );
       words.classList.toggle("warned", held !== "" || (controller?.proximity?.distance ?? 1) < NEAR);
     });

@@ -5,6 +5,7 @@ import { OF_HOLDER } from "../link/messages.js";
 import { MODE_WORDS } from "../state/format.js";
 import { isLive, link, pageState, points, preview, staleWords } from "../state/page-state.js";
 import { holder } from "./lease.js";
+import { reasonText } from "../state/reasons.js";
 
 /** Reason for an intent that the mode does not allow. */
 const NEEDS = Object.freeze({
@@ -73,7 +74,7 @@ function whyNoStart() {
   const state = preview.get();
   if (!state?.required || state.phase === "approved") return "";
   if (state.phase === "ready") return "Approve the preview first";
-  if (state.phase === "expired") return `The preview has expired: ${state.reason}`;
+  if (state.phase === "expired") return `The preview has expired: ${reasonText(state.reason)}`;
   return "A preview is required before each cut: press Preview";
 }
 

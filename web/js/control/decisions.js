@@ -6,6 +6,7 @@ import { POINT_WORDS, counted } from "../state/format.js";
 import { isLive, points, say } from "../state/page-state.js";
 import { signal } from "../state/signals.js";
 import { whyNot, whyNothing } from "./allowed.js";
+import { saidText } from "../state/reasons.js";
 
 /** @typedef {import("../link/messages.js").PagePoint} PagePoint */
 /** @typedef {import("../link/messages.js").PointState} PointState */
@@ -155,7 +156,7 @@ async function restore(before) {
   if (isAccepted(before)) {
     return send(before, "Accepting", "accept", { revision: before.point.revision, digest: before.point.digest });
   }
-  if (state === "REJECTED") return send(before, "Rejecting", "reject", { reason });
+  if (state === "REJECTED") return send(before, "Rejecting", "reject", { reason: saidText(reason) });
   return send(before, "Taking back", "reconsider", {});
 }
 

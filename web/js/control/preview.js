@@ -5,6 +5,7 @@ import { socket } from "../link/socket.js";
 import { preview } from "../state/page-state.js";
 import { signal } from "../state/signals.js";
 import { whyNot, whyNothing } from "./allowed.js";
+import { reasonText } from "../state/reasons.js";
 
 /** @typedef {import("../link/messages.js").PreviewedCut} PreviewedCut */
 
@@ -31,7 +32,7 @@ export function whyNoApproval() {
   const state = preview.get();
   if (!state || !hasPreview()) return whyNothing() || "There is no preview yet";
   if (state.phase === "approved") return `Approved by ${state.approved_by}`;
-  if (state.phase === "expired") return `It has expired: ${state.reason}`;
+  if (state.phase === "expired") return `It has expired: ${reasonText(state.reason)}`;
   return whyNot("ApprovePreview");
 }
 

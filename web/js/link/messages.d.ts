@@ -142,8 +142,8 @@ export interface QueueEntry {
   point_id: string;
   /** State of the point. */
   state: PointState;
-  /** Reason for the state, as text. */
-  reason: string;
+  /** Reason for the state; None without one. */
+  reason: Reason|null;
   /** The person who last decided about the point. */
   user: string;
   /** Its last cut; empty before the first. */
@@ -417,8 +417,8 @@ export interface PreviewedCut {
   cut_s: number|null;
   /** Start of the motion to the next point, or end of the work (s from the start). */
   ends_s: number;
-  /** Outcome as text: cut, or the reason why not. */
-  result: string;
+  /** Reason why it is not cut; None if it is. */
+  reason: Reason|null;
   /** Smallest distance from `begins_s` to `ends_s`, among the robot's parts and to ground and obstacles (m). */
   clearance: number;
   /** The two parts with that distance. */
@@ -441,8 +441,8 @@ export interface PointPlan {
   revision: number;
   /** Position in the order of work, from 1; 0 for a refused point. */
   order: number;
-  /** Reason for the refusal, as text; empty otherwise. */
-  reason: string;
+  /** Reason for the refusal; None otherwise. */
+  reason: Reason|null;
   /** Pose of base_link in odom at the cut; None for a refused point. */
   base: PlanarPose|null;
   /** Figures of the motion to it and out again; None for a refused point, and for a later one until the work comes near it. */
@@ -482,7 +482,7 @@ export interface PagePlan {
   /** As in `SessionPlan`. */
   state: PlanState;
   /** As in `SessionPlan`. */
-  reason: string;
+  reason: Reason|null;
   /** As in `SessionPlan`. */
   plan_hash: string;
   /** Duration of the work, including the cuts (s). */
@@ -531,8 +531,8 @@ export interface PreviewState {
   required: boolean;
   /** `waiting` for the robot to rest and for the plan; `rolling` while it is computed; `ready` for approval; `approved`; `expired` after a change. */
   phase: PreviewPhase;
-  /** The change that expired it, or the cause of waiting, as text. */
-  reason: string;
+  /** The change that expired it, or the cause of waiting. */
+  reason: Reason|null;
   /** SHA-256 of the inputs and the content of the preview; empty without a preview. */
   preview_hash: string;
   /** Name of the person who approved it; empty without an approval. */
@@ -713,8 +713,8 @@ export interface CutReport {
   spur: number;
   /** Current outcome; empty during the cut. */
   outcome: Outcome;
-  /** Reason for the outcome, as text. */
-  reason: string;
+  /** Reason for the outcome; None without one. */
+  reason: Reason|null;
   /** Who accepted the point, or reported the outcome. */
   user: string;
   /** Time of its end (s since 1970); 0 during the cut. */

@@ -22,6 +22,15 @@ export function reasonText(reason) {
 }
 
 /**
+ * The words of a person; empty where a reason has none.
+ *
+ * @param {Reason|null} reason
+ */
+export function saidText(reason) {
+  return reason?.code === "said" ? reasonText(reason) : "";
+}
+
+/**
  * @param {string|number|Reason|undefined} value
  * @param {string} format As in Python: `.1f`, `g` or empty.
  * @returns {string}
