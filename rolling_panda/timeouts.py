@@ -112,6 +112,10 @@ _ALL: Final = (
     Limit("controller.work.cut_timeout_s", 3.0),
     Limit("controller.work.close_up_timeout_s", 8.0),
     Limit("lost close-up", 1.5, "controller/work/close_up.py:_LOST_S"),
+    Limit("repetition of a close-up request", 0.05, "controller/work/close_up.py:_REPEAT_S"),
+    Limit("planner: settling", 0.3, "controller/planning/plan_manager.py:_SETTLED_S"),
+    Limit("planner: pause", 2.0, "controller/planning/plan_manager.py:_PAUSE_S"),
+    Limit("planner: pause after a failure", 10.0, "controller/planning/plan_manager.py:_AGAIN_S"),
     Limit("lease", 1.0, "controller/supervision/lease.py:LIFE_S"),
     Limit("reply of a command", topics.INTENT.timeout_s, "rolling_panda/topics.py:INTENT"),
     # The server, and its page.
@@ -120,13 +124,17 @@ _ALL: Final = (
     Limit("server.hold_timeout_s", 0.15),
     Limit("server.hold_resume_s", 1.0),
     Limit("server.view_timeout_s", 0.5),
+    Limit("server.stop_confirm_s", 0.5),
+    Limit("repetition of a stop", 0.025, "server/robots/link.py:_STOP_SPACING_S"),
     Limit("absence of a session", 1.0, "server/robots/presence.py:PRESENT_S"),
     Limit("renewal of a hold by the page", 0.05, "web/js/control/teleoperation.js:PERIOD_MS"),
+    Limit("ping of the page", 0.1, "web/js/link/socket.js:PING_MS"),
     Limit("renewal of the lease by the page", 0.3, "web/js/control/lease-worker.js:EVERY_MS"),
     _period(topics.ODOMETRY, "ODOMETRY"),
     _period(topics.BRIDGE, "BRIDGE"),
     _period(topics.HEARTBEAT, "HEARTBEAT"),
     _period(topics.PRESENCE, "PRESENCE"),
+    _period(topics.TOKEN, "TOKEN"),
 )
 #: All limits, by name.
 LIMITS: Final[dict[str, Limit]] = {limit.name: limit for limit in _ALL}
@@ -147,6 +155,12 @@ RELATIONS: Final = (
         "silence that frees the token",
         "the robot is at rest before another controller gets the token",
         strict=True,
+    ),
+    Relation(
+        "period of command/token",
+        "silence that frees the token",
+        "two requests of the token's holder may be lost in a row",
+        times=3,
     ),
     Relation(
         "bridge.deadline_s", "lease", "the robot is at rest before a controller that is gone loses control", strict=True
@@ -212,6 +226,8 @@ RELATIONS: Final = (
         "controller.supervision.supervision_s",
         "motion by hand needs a view at least as fresh as automatic work",
     ),
+    Relation("ping of the page", "server.view_timeout_s", "one report of the page about its view may be lost", times=2),
+    Relation("repetition of a stop", "server.stop_confirm_s", "a stop is confirmed after all its repetitions", times=5),
     Relation("renewal of the lease by the page", "lease", "two renewals of the lease may be lost in a row", times=3),
     Relation("period of operator/presence", "lease", "two reports of presence may be lost in a row", times=3),
     Relation("absence of a session", "lease", "a session that is absent keeps no lease"),
@@ -233,6 +249,15 @@ RELATIONS: Final = (
         "controller.work.cut_timeout_s",
         "the cutter reports its own timeout before the cut is UNKNOWN",
         strict=True,
+    ),
+    Relation(
+        "repetition of a close-up request", "lost close-up", "two requests of a close-up may be lost in a row", times=3
+    ),
+    Relation(
+        "planner: settling", "planner: pause", "a plan is requested when decisions have settled, also during work"
+    ),
+    Relation(
+        "planner: pause", "planner: pause after a failure", "a planner that fails is asked less often", strict=True
     ),
     Relation(
         "lost close-up",
