@@ -6,11 +6,11 @@ import time
 import pytest
 from websockets.exceptions import ConnectionClosed
 
-from rolling_panda import topics
+from rolling_panda import reasons, topics
 from rolling_panda.messages.supervision import ControlState
 from tests.server.test_page_socket import Page
 from tests.support.fake_wire import FakeWire, telling
-from tests.support.running_server import running_server
+from tests.support.running_server import eventually, running_server
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +43,8 @@ def test_who_does_not_hold_control_cannot_keep_the_tool_from_who_does(server):
             other.look()
             other.say("ShowGizmo", visible=True)
             other.hold(True)
-            other.hear_event("hold by eve refused: somebody else holds control")
+            refused = reasons.hold_refused("eve", reasons.control_held(""))
+            eventually(lambda: refused in [event.reason for event in server.wire.sent[topics.EVENT.name]])
             assert not any(message.hold for message in server.wire.sent[topics.TELEOP.name])
             sent = holder.hold_until_sent(server)
             assert {message.user for message in sent if message.hold} == {"ann"}
