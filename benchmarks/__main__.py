@@ -21,6 +21,7 @@ BENCHMARKS = {
     "record": ("benchmarks.control.record", "what a recorder beside the demo costs the control"),
     "live": ("benchmarks.control.live", "the running demo: control periods on time, round trip, tool error"),
     "perception": ("benchmarks.perception.survey", "surveys of unseen rows, every pruning point judged"),
+    "photographs": ("benchmarks.perception.photographs", "classes of photographs, against masks that people drew"),
     "obstacles": ("benchmarks.perception.obstacles", "what stands in the way after ten minutes, against the truth"),
     "real": ("benchmarks.faults.real", "random commands and faults, the real bridge on fakes with monitors"),
     "faults": ("benchmarks.faults.run", "random faults in motion, judged by what the actuators were sent"),
@@ -42,7 +43,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             print(f"rolling-panda bench {words[0]}: {error}", file=sys.stderr)
             return 1
         return code
-    lines = "\n".join(f"  {name:<12}{about}" for name, (_, about) in BENCHMARKS.items())
+    lines = "\n".join(f"  {name:<13}{about}" for name, (_, about) in BENCHMARKS.items())
     parser = argparse.ArgumentParser(
         prog="rolling-panda bench",
         description="Measure the program.",

@@ -17,8 +17,9 @@ from rolling_panda.messages.types import WOOD_CLASSES
 CHANNELS = 4
 #: Depths below this are invalid (m).
 _MIN_DEPTH = 0.15
-#: Images are padded to multiples of this (px).
+#: Images are padded to multiples of this (px), unless the network's metadata says more.
 _MULTIPLE = 16
+_MULTIPLES = ("8", "16", "32", "64")
 #: An image whose brightest value or standard deviation is below these is blank (of 255).
 _MIN_BRIGHTNESS, _MIN_CONTRAST = 12, 2.0
 #: Largest plausible width bias (px).
@@ -54,7 +55,8 @@ def network_input(color: NDArray[np.uint8], depth: NDArray[np.floating] | None) 
 class NetworkSegmenter:
     """Runs an ONNX file: `image` 1×4×H×W (see `network_input`) to `classes` 1×H×W, uint8.
 
-    Its metadata has `classes`, a JSON list equal to `WOOD_CLASSES`, and optionally `widening`, the width bias (px).
+    Its metadata has `classes`, a JSON list equal to `WOOD_CLASSES`, and optionally `widening`, the width bias (px), and
+    `multiple`, which image sides must be a multiple of (px). A second output, `confidence`, is optional.
     """
 
     def __init__(self, path: Path, threads: int = 2) -> None:
@@ -82,6 +84,10 @@ class NetworkSegmenter:
         self._run_options.add_run_config_entry("memory.enable_memory_arena_shrinkage", "cpu:0")
         self.name = f"network {path.name}"
         self.width_bias = _width_bias(self._session, path)
+        self._multiple = _multiple(self._session, path)
+        self._outputs = [
+            output.name for output in self._session.get_outputs() if output.name in ("classes", "confidence")
+        ]
 
     def segment(self, view: View) -> Labels:
         """Classes by colour and depth.
@@ -98,6 +104,16 @@ class NetworkSegmenter:
         Raises:
             InputError: The colour image is blank.
         """
+        return self.classify_surely(color, depth, ["classes"])[0]
+
+    def classify_surely(
+        self, color: NDArray[np.uint8], depth: NDArray[np.float32] | None, outputs: list[str] | None = None
+    ) -> tuple[Labels, NDArray[np.float32] | None]:
+        """Classes as of `classify`, and the probability of each pixel's class (H×W), or None if the network has none.
+
+        Raises:
+            InputError: The colour image is blank.
+        """
         if int(color.max()) < _MIN_BRIGHTNESS or float(color[::4, ::4].std()) < _MIN_CONTRAST:
             raise InputError(
                 f"the colour image is blank (brightest {color.max()} of 255): "
@@ -105,11 +121,18 @@ class NetworkSegmenter:
             )
         height, width = color.shape[:2]
         image = network_input(color, depth)
-        below, right = -height % _MULTIPLE, -width % _MULTIPLE
+        below, right = -height % self._multiple, -width % self._multiple
         if below or right:
             image = np.pad(image, ((0, 0), (0, below), (0, right)), mode="edge")
-        classes: Labels = self._session.run(["classes"], {"image": image[None]}, self._run_options)[0]
-        return np.ascontiguousarray(classes[0, :height, :width])
+        names = outputs or self._outputs
+        told = dict(zip(names, self._session.run(names, {"image": image[None]}, self._run_options), strict=True))
+        classes: Labels = np.ascontiguousarray(told["classes"][0, :height, :width])
+        if "confidence" not in told:
+            return classes, None
+        # One value for each block of pixels.
+        blocks = told["confidence"][0].astype(np.float32) / np.float32(255.0)
+        block = image.shape[1] // blocks.shape[0]
+        return classes, blocks.repeat(block, axis=0).repeat(block, axis=1)[:height, :width]
 
 
 def _width_bias(session: onnxruntime.InferenceSession, path: Path) -> float:
@@ -121,6 +144,13 @@ def _width_bias(session: onnxruntime.InferenceSession, path: Path) -> float:
     if not abs(value) <= _MAX_WIDTH_BIAS:
         raise ConfigError(f"{path}: metadata 'widening' is {text!r}; give a number of pixels up to {_MAX_WIDTH_BIAS:g}")
     return value
+
+
+def _multiple(session: onnxruntime.InferenceSession, path: Path) -> int:
+    text = session.get_modelmeta().custom_metadata_map.get("multiple", str(_MULTIPLE))
+    if text not in _MULTIPLES:
+        raise ConfigError(f"{path}: metadata 'multiple' is {text!r}; give one of {', '.join(_MULTIPLES)} pixels")
+    return int(text)
 
 
 def _check(session: onnxruntime.InferenceSession, path: Path) -> None:

@@ -94,6 +94,7 @@ def test_a_frame_without_a_picture_is_refused(tmp_path):
         (onnx_by_hand.brightest_channel(CLASSES, widening="much"), "'widening' is 'much'"),
         (onnx_by_hand.brightest_channel(CLASSES, widening="nan"), "'widening' is"),
         (onnx_by_hand.brightest_channel(CLASSES, widening="40"), "'widening' is"),
+        (onnx_by_hand.brightest_channel(CLASSES, multiple="12"), "'multiple' is '12'"),
     ],
 )
 def test_a_network_that_does_not_fit_is_refused_in_words(tmp_path, data, says):

@@ -31,6 +31,7 @@ def brightest_channel(
     output: str = "classes",
     kind: str = "uint8",
     widening: str | None = None,
+    multiple: str | None = None,
 ) -> bytes:
     """A model whose class of a pixel is the number of its largest channel.
 
@@ -40,6 +41,7 @@ def brightest_channel(
         output: Name of the output.
         kind: uint8 or int64.
         widening: Written into the metadata.
+        multiple: Written into the metadata.
     """
     argmax = (
         _bytes(1, "image")
@@ -67,4 +69,6 @@ def brightest_channel(
         model += _bytes(14, _bytes(1, "classes") + _bytes(2, json.dumps(classes)))
     if widening is not None:
         model += _bytes(14, _bytes(1, "widening") + _bytes(2, widening))
+    if multiple is not None:
+        model += _bytes(14, _bytes(1, "multiple") + _bytes(2, multiple))
     return model

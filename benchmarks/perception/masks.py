@@ -1,0 +1,106 @@
+"""How well a class image agrees with a mask that a person drew: recall, precision, overlap, boundaries, calibration."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_erosion, distance_transform_edt
+
+Mask = NDArray[np.bool_]
+
+#: Bins of probability for the calibration error.
+_BINS = 10
+
+
+@dataclass
+class Agreement:
+    """Counts of pixels of one class, which add up over pictures.
+
+    Attributes:
+        true: In the mask.
+        told: In the class image.
+        both: In both.
+        found: Of the mask, with a told pixel within the tolerance.
+        right: Told, with a pixel of the mask within the tolerance.
+        true_edge: On the mask's boundary.
+        told_edge: On the told boundary.
+        found_edge: Of the mask's boundary, within the tolerance of the told one.
+        right_edge: Of the told boundary, within the tolerance of the mask's.
+        bins: Of each bin of probability: told pixels, their sum of probabilities, and those in the mask (10×3).
+    """
+
+    true: int = 0
+    told: int = 0
+    both: int = 0
+    found: int = 0
+    right: int = 0
+    true_edge: int = 0
+    told_edge: int = 0
+    found_edge: int = 0
+    right_edge: int = 0
+    bins: NDArray[np.float64] = field(default_factory=lambda: np.zeros((_BINS, 3)))
+
+    def add(self, true: Mask, told: Mask, tolerance: float, likely: NDArray[np.floating] | None = None) -> None:
+        """Count one picture.
+
+        Args:
+            true: The person's mask (H×W).
+            told: The class image's (H×W).
+            tolerance: A pixel matches one that is at most so far away (px).
+            likely: Probability of what was told (H×W, 0…1).
+        """
+        self.true += int(true.sum())
+        self.told += int(told.sum())
+        self.both += int((true & told).sum())
+        self.found += int((true & _near(told, tolerance)).sum())
+        self.right += int((told & _near(true, tolerance)).sum())
+        true_edge, told_edge = edge(true), edge(told)
+        self.true_edge += int(true_edge.sum())
+        self.told_edge += int(told_edge.sum())
+        self.found_edge += int((true_edge & _near(told_edge, tolerance)).sum())
+        self.right_edge += int((told_edge & _near(true_edge, tolerance)).sum())
+        if likely is not None:
+            values, hits = likely[told], true[told]
+            number = np.clip((values * _BINS).astype(int), 0, _BINS - 1)
+            for column, weights in enumerate((None, values, hits.astype(float))):
+                self.bins[:, column] += np.bincount(number, weights, minlength=_BINS)
+
+    def figures(self) -> dict[str, float | None]:
+        """Recall, precision and their F at the tolerance, intersection over union, boundary F, calibration error.
+
+        A figure that has nothing to be of is None.
+        """
+        recall, precision = _share(self.found, self.true), _share(self.right, self.told)
+        edges = _share(self.found_edge, self.true_edge), _share(self.right_edge, self.told_edge)
+        total = float(self.bins[:, 0].sum())
+        return {
+            "recall": recall,
+            "precision": precision,
+            "f": _harmonic(recall, precision),
+            "iou": _share(self.both, self.true + self.told - self.both),
+            "boundary_f": _harmonic(*edges),
+            "ece": float(np.abs(self.bins[:, 1] - self.bins[:, 2]).sum() / total) if total else None,
+        }
+
+
+def edge(mask: Mask) -> Mask:
+    """Pixels of a mask with a neighbour outside; the picture's own border is no edge."""
+    out: Mask = mask & ~binary_erosion(mask, border_value=1)
+    return out
+
+
+def _near(mask: Mask, tolerance: float) -> Mask:
+    if not mask.any():
+        return np.zeros_like(mask)
+    out: Mask = distance_transform_edt(~mask) <= tolerance
+    return out
+
+
+def _share(part: int, whole: int) -> float | None:
+    return part / whole if whole else None
+
+
+def _harmonic(a: float | None, b: float | None) -> float | None:
+    if a is None or b is None:
+        return None
+    return 2.0 * a * b / (a + b) if a + b else 0.0
