@@ -28,7 +28,8 @@ demo: $(VENV)/.project
 
 # First the tests that others may run beside, on every core; then those that keep real time, two at once; then those that
 # anything beside them would disturb. Training has its own target, since nothing else needs PyTorch.
-WITHOUT_TRAINING := --ignore tests/perception/test_training.py
+TRAINING_TESTS := tests/perception/test_training.py tests/perception/test_wide_training.py
+WITHOUT_TRAINING := $(TRAINING_TESTS:%=--ignore %)
 test: check browser systemd drivers
 ifdef ARGS
 	$(BIN)/pytest $(ARGS)
@@ -40,7 +41,7 @@ else
 endif
 
 test-training: training
-	$(BIN)/pytest tests/perception/test_training.py
+	$(BIN)/pytest $(TRAINING_TESTS)
 
 # Fewer random examples than `make test` has.
 FAST = HYPOTHESIS_PROFILE=fast $(BIN)/pytest -n auto -m "not (paced or alone or slow or browser or processes or long)" \

