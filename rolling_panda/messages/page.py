@@ -183,7 +183,8 @@ class PageEvent(Struct, frozen=True, forbid_unknown_fields=True):
         wall_time: Wall clock of the server (s since 1970).
         process: Process that the line is from.
         severity: Severity.
-        text: The line.
+        text: The line in English, for scripts.
+        reason: The line as data, which the page renders; null for a line of the page's own.
     """
 
     number: Count
@@ -191,6 +192,7 @@ class PageEvent(Struct, frozen=True, forbid_unknown_fields=True):
     process: str
     severity: Severity
     text: str
+    reason: Reason | None = None
 
 
 class PageEvents(PageMessage, frozen=True, kw_only=True):

@@ -28,7 +28,7 @@ class EventLog:
     def add(self, process: str, reason: m.Reason, wall_time: float) -> None:
         """Append a line; `wall_time` is Unix time (s)."""
         self.number += 1
-        self._events.append(PageEvent(self.number, wall_time, process, severity_of(reason), text_of(reason)))
+        self._events.append(PageEvent(self.number, wall_time, process, severity_of(reason), text_of(reason), reason))
 
     def after(self, number: int, at_most: int) -> tuple[PageEvent, ...]:
         """The newest `at_most` lines after line `number`, oldest first."""

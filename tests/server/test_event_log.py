@@ -18,7 +18,9 @@ def filled(lines, count):
 
 def test_only_new_lines_come_oldest_first():
     log = filled(1000, 5)
-    assert [event.text for event in log.after(3, 200)] == ["line 4", "line 5"]
+    assert [(event.text, event.reason) for event in log.after(3, 200)] == [
+        (line, reasons.said(line)) for line in ("line 4", "line 5")
+    ]
     assert log.after(5, 200) == ()
 
 

@@ -13,6 +13,7 @@ from playwright.sync_api import Page
 from starlette.responses import JSONResponse, Response
 
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.messages import page as page_messages
 from rolling_panda.messages import types as types_messages
 from rolling_panda.messages.supervision import ControlState, ReplayState, SessionReport, StopState
@@ -230,8 +231,10 @@ class PlayedServer:
             rule=self.rule,
         )
 
-    def event(self, number: int, severity: m.Severity, text: str) -> page_messages.PageEvent:
-        return page_messages.PageEvent(number, self.started + 0.001 * number, "server", severity, text)
+    def event(self, number: int, severity: m.Severity, told: str | m.Reason) -> page_messages.PageEvent:
+        reason = reasons.said(told) if isinstance(told, str) else told
+        at, text = self.started + 0.001 * number, reasons.text_of(reason)
+        return page_messages.PageEvent(number, at, "server", severity, text, reason)
 
     def holds(self) -> list[bool]:
         return [message.hold for message in self.said if isinstance(message, page_messages.Hold)]

@@ -107,8 +107,9 @@ def test_it_says_that_it_is_a_simulation_and_what_tells_wood_from_wire(page: Pag
 
 
 def test_the_log_has_the_words_of_the_page(page: Page, server: PlayedServer) -> None:
-    server.tell(p.PageEvents(events=(server.event(2, "info", "READY → AUTO: start by Ada; p1 is FAILED_NOT_CUT"),)))
-    expect(page.locator("#log li .text").last).to_have_text("Ready → Automatic: start by Ada; p1 is Not cut")
+    changed = reasons.mode_changed("READY", "AUTO", reasons.said("start by Ada"))
+    server.tell(p.PageEvents(events=(server.event(2, "info", changed),)))
+    expect(page.locator("#log li .text").last).to_have_text("Ready → Automatic: start by Ada")
 
 
 def test_what_only_engineers_read_is_behind_a_disclosure_that_tells_its_warnings(

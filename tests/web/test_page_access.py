@@ -3,6 +3,7 @@
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
+from rolling_panda import reasons
 from rolling_panda.messages import page as p
 from tests.support.axe import axe, grave
 from tests.support.page_parts import leave
@@ -123,18 +124,22 @@ def test_a_fingertip_hits_everything_that_can_be_pressed(browser: Browser, serve
 
 
 def test_the_log_is_searched_by_severity_process_and_words(page: Page, server: PlayedServer) -> None:
-    lines = [("bridge", "error", "the cutter is jammed"), ("controller", "info", "READY: armed by Ada")]
-    lines.append(("controller", "warning", "p7 is refused: too near a wire"))
-    events = [p.PageEvent(number, server.started + number, *line) for number, line in enumerate(lines, 2)]
+    armed = reasons.said("READY")
+    lines = [("bridge", "error", reasons.robot_cutter_jammed()), ("controller", "info", armed)]
+    lines.append(("controller", "warning", reasons.said("p7 is refused: too near a wire")))
+    events = [
+        p.PageEvent(number, server.started + number, process, severity, "for scripts", reason)
+        for number, (process, severity, reason) in enumerate(lines, 2)
+    ]
     server.tell(p.PageEvents(events=tuple(events)))
     shown = page.locator("#log li:visible .text")
     expect(shown).to_have_count(4)
     page.locator("#log-process").select_option("controller")
-    expect(shown).to_have_text(["Ready: armed by Ada", "p7 is refused: too near a wire"])
+    expect(shown).to_have_text(["Ready", "p7 is refused: too near a wire"])
     page.locator("#log-filter").select_option("warning")
     expect(shown).to_have_text(["p7 is refused: too near a wire"])
     page.locator("#log-filter").select_option("info")
     page.locator("#log-words").fill("ready")
-    expect(shown).to_have_text(["Ready: armed by Ada"])
+    expect(shown).to_have_text(["Ready"])
     page.locator("#log-words").fill("no such thing")
     expect(page.locator("#log .empty")).to_have_text("Nothing in the log is like that.")

@@ -1,8 +1,9 @@
 // The log, with filters by severity, process and text.
 
 import { PROCESSES } from "../js/link/messages.js";
-import { clockWords, inWords } from "../js/state/format.js";
+import { clockWords } from "../js/state/format.js";
 import { log } from "../js/state/page-state.js";
+import { reasonText } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
 import { dropDown, element, setText } from "../js/views/dom.js";
 import { icon } from "../js/views/icons.js";
@@ -58,7 +59,7 @@ class RpLog extends HTMLElement {
     const isWanted = (line) =>
       (least.value === "info" || line.severity === "error" || line.severity === least.value) &&
       (from.value === "" || line.process === from.value) &&
-      inWords(line.text).toLowerCase().includes(words.value.trim().toLowerCase());
+      wordsOf(line).toLowerCase().includes(words.value.trim().toLowerCase());
 
     /** @type {Map<PageEvent, HTMLElement>} */
     const rows = new Map();
@@ -100,6 +101,11 @@ class RpLog extends HTMLElement {
 }
 
 /** @param {PageEvent} line */
+function wordsOf(line) {
+  return line.reason ? reasonText(line.reason) : line.text;
+}
+
+/** @param {PageEvent} line */
 function lineRow(line) {
   return element(
     "li",
@@ -107,7 +113,7 @@ function lineRow(line) {
     element("time", { text: clockWords(line.wall_time) }),
     element("span", { class: "severity", attributes: { title: line.severity } }, icon(line.severity), line.severity),
     element("span", { class: "process", text: line.process }),
-    element("span", { class: "text", text: inWords(line.text) }),
+    element("span", { class: "text", text: wordsOf(line) }),
   );
 }
 customElements.define("rp-log", RpLog);

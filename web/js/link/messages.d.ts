@@ -566,8 +566,10 @@ export interface PageEvent {
   process: string;
   /** Severity. */
   severity: Severity;
-  /** The line. */
+  /** The line in English, for scripts. */
   text: string;
+  /** The line as data, which the page renders; null for a line of the page's own. */
+  reason: Reason|null;
 }
 
 /** New lines of the log. */

@@ -87,7 +87,7 @@ export function receiveEvents(events, first) {
  * @param {string} text
  */
 export function say(severity, text) {
-  const line = { number: nextLocalLine--, wall_time: Date.now() / 1000, process: "page", severity, text };
+  const line = { number: nextLocalLine--, wall_time: Date.now() / 1000, process: "page", severity, text, reason: null };
   log.set([...log.get(), line].slice(-MAX_LINES));
   showToast(severity, text);
 }
