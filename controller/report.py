@@ -7,8 +7,8 @@ from controller.whole_body.collision import Clearance
 from controller.whole_body.joint_limits import margin
 from controller.whole_body.manipulability import arm_omega
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.model.robot import RobotModel, pose_message
-from rolling_panda.reasons import text_of
 from rolling_panda.transport.inbox import Inbox
 
 
@@ -61,7 +61,7 @@ def controller_state(
         header=m.Header(now, "odom"),
         mode=state.mode,
         phase=phase if state.mode == "AUTO" else "",
-        reason=held[:500] or text_of(state.reason),
+        reason=reasons.held_back(held) if held else state.reason,
         allowed=allowed,
         active_point_id=active if state.mode == "AUTO" else "",
         method=config.whole_body.method,

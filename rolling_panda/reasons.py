@@ -9,6 +9,8 @@ from inspect import signature
 from string import Formatter
 from typing import Any, Final, Literal, ParamSpec
 
+import msgspec
+
 from rolling_panda.errors import MessageError
 from rolling_panda.messages.types import Reason
 
@@ -61,9 +63,11 @@ def noted(severity: Severity, text: str) -> Reason:
     return {"info": said, "warning": warned, "error": failed}[severity](text)
 
 
-def said_or_none(text: str) -> Reason | None:
-    """Words as a reason; None for none."""
-    return said(text) if text else None
+def with_reason(stored: Any) -> Any:
+    """A decoded row or stop with its reason as data; earlier versions stored text."""
+    if isinstance(stored, dict) and isinstance(text := stored.get("reason"), str):
+        return stored | {"reason": msgspec.to_builtins(said(text))}
+    return stored
 
 
 def entry_of(severity: Severity, act: str, made: Callable[P, None]) -> tuple[Entry, Callable[P, Reason]]:
@@ -427,13 +431,23 @@ def teleoperation_refused(cause: Reason) -> None:
 
 
 @_reason("warning", "")
-def emergency_stop(text: str) -> None:
-    """Emergency stop: {text}."""
+def button_pressed() -> None:
+    """The emergency stop button of the robot is pressed."""
+
+
+@_reason("error", "")
+def robot_fault_reported(detail: str) -> None:
+    """{detail}."""
 
 
 @_reason("warning", "")
-def software_stop_unnamed(text: str) -> None:
-    """Software stop: {text}."""
+def emergency_stop(cause: Reason) -> None:
+    """Emergency stop: {cause}."""
+
+
+@_reason("warning", "")
+def software_stop_unnamed(cause: Reason) -> None:
+    """Software stop: {cause}."""
 
 
 @_reason("info", "")
@@ -562,6 +576,16 @@ def preview_optional(user: str) -> None:
 # Controller: motion
 
 
+@_reason("warning", "")
+def held_back(constraint: str) -> None:
+    """{constraint} holds the robot back."""
+
+
+@_reason("error", "")
+def velocity_withheld() -> None:
+    """A velocity outside the limits was not sent; the robot brakes."""
+
+
 @_reason("error", "")
 def motion_failed(detail: str) -> None:
     """The motion cannot be computed: {detail}."""
@@ -681,8 +705,8 @@ def quaternion_not_unit(length: float) -> None:
 
 
 @_reason("warning", "")
-def software_stop(user: str, text: str) -> None:
-    """Software stop by {user}: {text}."""
+def software_stop(user: str, cause: Reason) -> None:
+    """Software stop by {user}: {cause}."""
 
 
 @_reason("error", "use the robot's emergency stop")

@@ -3,6 +3,7 @@
 import math
 
 from rolling_panda import commands as intents
+from rolling_panda import reasons
 from rolling_panda.messages.robot import Odometry
 from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
 from tests.support.worlds.closed_loop import ClosedLoop
@@ -59,8 +60,7 @@ def _go_on(loop: ClosedLoop, distance: float) -> None:
     """Arm home, drive on by hand, look."""
     if loop.command(intents.Home(user=_USER)).ok:
         loop.run(0.1)
-        loop.run_until(lambda: loop.state is not None and "home" in loop.state.reason, _PATIENCE_S)
-        loop.run_until(lambda: loop.state is not None and loop.state.reason != "homing the arm", _PATIENCE_S)
+        loop.run_until(lambda: loop.state is not None and loop.state.reason != reasons.homing_arm(), _PATIENCE_S)
     begin, goal = loop.now, _place(loop) + distance
     while _place(loop) < goal and loop.now - begin < _PATIENCE_S:
         left = goal - _place(loop)

@@ -25,6 +25,7 @@ from rolling_panda.config import TransportConfig
 from rolling_panda.errors import RollingPandaError, ServiceError
 from rolling_panda.messages.perception import CloseUpRequest, CloseUpResult, Obstacles, point_digest
 from rolling_panda.messages.supervision import Person, Presence, StopState
+from rolling_panda.reasons import said, text_of
 from rolling_panda.transport import certificates
 from rolling_panda.transport.access import RECORDER
 from rolling_panda.transport.zenoh import Onlooker, Transport
@@ -143,7 +144,8 @@ class CutRig(Processes):
         if state is None:
             return "no controller was heard"
         rows = ", ".join(f"{each.point_id} {each.state}" for each in state.queue if each.state != "DONE")
-        return f"{state.mode} {state.phase} ({state.reason}), {time.monotonic() - self.controller_at:.1f} s ago: {rows}"
+        age_s = time.monotonic() - self.controller_at
+        return f"{state.mode} {state.phase} ({text_of(state.reason)}), {age_s:.1f} s ago: {rows}"
 
     # --- the wire ----------------------------------------------------------------------------------------------------
 
@@ -230,7 +232,7 @@ class CutRig(Processes):
         """The software stop, as the page sends it; its id."""
         stop_id = f"trial-{time.monotonic_ns()}"
         for _ in range(3):
-            self._stop.put(m.StopRequest(stop_id=stop_id, source="server", user=_USER, reason="trial"))
+            self._stop.put(m.StopRequest(stop_id=stop_id, source="server", user=_USER, reason=said("trial")))
         return stop_id
 
     def ask(self, intent: intents.Intent) -> m.Answer | None:

@@ -6,8 +6,10 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import httpx
+import msgspec
 import numpy as np
 
 from benchmarks.faults.judge import Rows, Trial, braking_after, judge, last_taken
@@ -15,7 +17,9 @@ from benchmarks.faults.live_fault_kinds import LiveFault
 from benchmarks.faults.live_world import FaultyRobot, Hand
 from bridge.sim.robot import trace
 from controller.config import ControllerConfig
+from rolling_panda import messages as m
 from rolling_panda.errors import RollingPandaError
+from rolling_panda.reasons import text_of
 from tests.support.worlds.faulty_world import MODEL
 
 #: A base driven by hand moves at least this fast (rad/s of a wheel) before a fault, and base or arm at work.
@@ -119,7 +123,11 @@ def _mode(robot: FaultyRobot) -> str:
         controller = robot.state()["controller"]
     except httpx.HTTPError:
         return ""
-    return f"{controller['mode']}: {controller['reason']}" if controller else ""
+    return f"{controller['mode']}: {_text(controller['reason'])}" if controller else ""
+
+
+def _text(reason: dict[str, Any]) -> str:
+    return text_of(msgspec.convert(reason, m.Reason))
 
 
 def _why_not(robot: FaultyRobot) -> str:
@@ -131,7 +139,7 @@ def _why_not(robot: FaultyRobot) -> str:
     if not controller:
         return "no controller"
     near = controller["proximity"] and f"near {controller['proximity']}"
-    return ", ".join(filter(None, (controller["mode"], controller["reason"], controller["limited_by"], near)))
+    return ", ".join(filter(None, (controller["mode"], _text(controller["reason"]), controller["limited_by"], near)))
 
 
 def _moves(robot: FaultyRobot, by_hand: bool) -> bool:

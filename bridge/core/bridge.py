@@ -31,7 +31,7 @@ from rolling_panda.messages.supervision import StopState
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import Limits
 from rolling_panda.model.wire_values import actuated
-from rolling_panda.reasons import noted
+from rolling_panda.reasons import button_pressed, noted, text_of
 from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.topics import BRIDGE, CLOSE_UP_REQUEST, CUT, MOTION, ODOMETRY, TOKEN
 from rolling_panda.transport.rejections import Rejections
@@ -223,7 +223,7 @@ class BridgeCore:
         """Latch a stop; repetitions change nothing. `wall_time` (s since 1970) is for people."""
         if self._latch.stop(request, wall_time):
             what = "emergency stop" if request.source == "hardware" else "software stop"
-            self._log("warning", f"{what} by {request.user or request.source}: {request.reason}")
+            self._log("warning", f"{what} by {request.user or request.source}: {text_of(request.reason)}")
             self._stops_changed()
 
     def _stops_changed(self) -> None:
@@ -234,8 +234,10 @@ class BridgeCore:
         pressed = self._measured.emergency
         if pressed and not self._latch.hardware:
             stop_id = f"hardware-{self._draw()}"
-            reason = "the emergency stop button of the robot is pressed"
-            self.on_stop(m.StopRequest(stop_id=stop_id, source="hardware", user="", reason=reason), now, self._wall)
+            pressed_there = button_pressed()
+            self.on_stop(
+                m.StopRequest(stop_id=stop_id, source="hardware", user="", reason=pressed_there), now, self._wall
+            )
         if pressed != self._latch.hardware:
             self._latch.hardware, self._stops_due = pressed, True
 

@@ -2,6 +2,7 @@
 
 from rolling_panda.messages.robot import ReleaseStop, StopRequest
 from rolling_panda.messages.supervision import StopRecord
+from rolling_panda.reasons import text_of
 
 #: Number of latched stops in the message, newest first, and of remembered released ids.
 _MOST, _OVER = 50, 1000
@@ -40,7 +41,7 @@ class StopLatch:
         if not self.stops:
             return ""
         newest = self.stops[0]
-        return f"{newest.user or newest.source}: {newest.reason}"[:500]
+        return f"{newest.user or newest.source}: {text_of(newest.reason)}"[:500]
 
     @property
     def over(self) -> tuple[str, ...]:

@@ -4,6 +4,7 @@ import secrets
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from rolling_panda import reasons
 from rolling_panda.messages.robot import StopRequest
 
 # Time for the robot to recover after a person's release, before it is stopped again (s).
@@ -52,7 +53,9 @@ class RobotFaults:
             return FaultChange("the robot is ready again; it waits for a setpoint at rest", None)
         stop = None
         if severe and not stopped and now >= self._recovering_until:
-            stop = StopRequest(stop_id=f"robot-{self._draw()}", source="robot", user="", reason=fault[:500])
+            stop = StopRequest(
+                stop_id=f"robot-{self._draw()}", source="robot", user="", reason=reasons.robot_fault_reported(fault)
+            )
         return FaultChange(f"the robot does not move: {fault}", stop)
 
     def released(self, now: float) -> None:

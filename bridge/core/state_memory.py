@@ -3,11 +3,13 @@
 import secrets
 import time
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
 from rolling_panda.messages.supervision import StopRecord
 from rolling_panda.messages.types import Epoch
+from rolling_panda.reasons import said, with_reason
 from rolling_panda.runtime.latest_file import KeptValue, LatestFileWriter
 from rolling_panda.runtime.state_folder import read_kept, replace_durably
 
@@ -40,8 +42,14 @@ def open_memory(folder: Path) -> KeptValue[Remembered]:
     """
     path = folder / _NAME
     remedy = f"check that the robot may move, then run: rolling-panda bridge --begin-anew --state {folder}"
-    remembered = read_kept(path, Remembered, Remembered(), "what the bridge remembers", remedy)
+    remembered = read_kept(path, Remembered, Remembered(), "what the bridge remembers", remedy, _upgraded)
     return KeptValue(remembered, LatestFileWriter(path))
+
+
+def _upgraded(content: Any) -> Any:
+    if isinstance(content, dict) and isinstance(stops := content.get("stops"), list):
+        return content | {"stops": [with_reason(stop) for stop in stops]}
+    return content
 
 
 def begin_anew(folder: Path) -> str:
@@ -56,6 +64,6 @@ def begin_anew(folder: Path) -> str:
     if path.exists():
         aside = path.replace(path.with_suffix(".aside"))
         done = f"the stored state of the bridge is set aside in {aside}"
-    stop = StopRecord(f"anew-{secrets.token_hex(8)}", "bridge", "", done[:500], time.time())
+    stop = StopRecord(f"anew-{secrets.token_hex(8)}", "bridge", "", said(done), time.time())
     replace_durably(path, msgspec.json.encode(Remembered(stops=(stop,))))
     return done

@@ -43,25 +43,15 @@ class LedgerState:
 
 
 class TicketRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """State of a point. `hash` binds the acceptance; WITHDRAWN means that perception has withdrawn the point.
-
-    Ledgers of earlier versions have the reason as text.
-    """
+    """State of a point. `hash` binds the acceptance; WITHDRAWN means that perception has withdrawn the point."""
 
     point: m.PruningPoint
     state: m.PointState | Literal["WITHDRAWN"]
-    reason: m.Reason | str | None = None
+    reason: m.Reason | None = None
     user: str = ""
     accepted: m.PruningPoint | None = None
     hash: str = ""
     cut_id: str = ""
-
-    @property
-    def why(self) -> m.Reason | None:
-        """The reason; None without one."""
-        if isinstance(self.reason, str):
-            return reasons.said(self.reason) if self.reason else None
-        return self.reason
 
 
 class OrderRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -168,10 +158,6 @@ class EventLogger:
         event = m.LogEvent(header=m.Header(self.now), process="controller", reason=reason)
         self._events.append(event)
         self._journal.add("event", "controller", event)
-
-    def say(self, severity: m.Severity, text: str) -> None:
-        """Add words as a line."""
-        self.log(reasons.noted(severity, text))
 
     def drain(self) -> tuple[m.LogEvent, ...]:
         """Return and remove the lines since the last call."""

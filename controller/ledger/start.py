@@ -12,6 +12,7 @@ from controller.ledger.store import Ledger
 from rolling_panda import __version__
 from rolling_panda.cli.about import About, about
 from rolling_panda.errors import LedgerError
+from rolling_panda.reasons import with_reason
 
 Row = TypeVar("Row", bound=msgspec.Struct)
 
@@ -89,10 +90,14 @@ def _newest(ledger: Ledger, kind: str, row: type[Row]) -> list[Row]:
 
 
 def _upgraded(kind: str, body: Any) -> Any:
-    """A decoded row with the names of this schema version."""
-    if kind == "ticket" and isinstance(body, dict) and body.get("state") == "INTENT":
+    """A decoded row in the form of this schema version."""
+    if kind != "ticket" or not isinstance(body, dict):
+        return body
+    if body.get("state") == "INTENT":
         body["state"] = "CUTTING"
-    return body
+    if body.get("reason") == "":
+        del body["reason"]
+    return with_reason(body)
 
 
 def _written_by(ledger: Ledger) -> str:

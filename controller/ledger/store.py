@@ -29,8 +29,8 @@ SCHEMA = (
     "CREATE TRIGGER no_delete BEFORE DELETE ON audit BEGIN SELECT RAISE(ABORT, 'rows are never deleted'); END",
 )
 #: Form of tables and rows, as `PRAGMA user_version` of the file; the first files have 0. Up to 1 the state CUTTING of a
-#: point was called INTENT.
-SCHEMA_VERSION = 2
+#: point was called INTENT; up to 2 reasons were text.
+SCHEMA_VERSION = 3
 #: Errors raised by a file that was changed from outside.
 UNREADABLE = (sqlite3.Error, UnicodeDecodeError, TypeError)
 _COLUMNS = "number, at, kind, name, body, hash"

@@ -11,8 +11,6 @@ from rolling_panda.model.wire_values import actuated
 #: Number of zero commands at the start of a token. The bridge requires one, and some may be lost.
 _AT_REST_FIRST = 3
 
-BRAKED = "a velocity outside the limits was not sent; the robot brakes"
-
 
 class Setpoints:
     """Remembers what was sent last: `sent` (9, rad/s), and `before` in the period before that."""

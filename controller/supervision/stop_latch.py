@@ -63,7 +63,7 @@ class StopLatch:
                 self._latch(record)
                 latched = _reason(record)
         if bridge is not None and bridge.stop_id and bridge.stop_id not in self._pending:
-            record = StopRecord(bridge.stop_id, "bridge", "", bridge.stopped_by, max(0.0, wall_time))
+            record = StopRecord(bridge.stop_id, "bridge", "", reasons.said(bridge.stopped_by), max(0.0, wall_time))
             self._latch(record)
             latched = latched or _reason(record)
         return latched

@@ -19,7 +19,6 @@ from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.messages.supervision import Presence, StopRecord, TeleopTarget
-from rolling_panda.reasons import text_of
 from rolling_panda.transport.inbox import Inbox
 
 #: A new token is requested when the bridge's watchdog has held the robot for this long (s).
@@ -192,7 +191,7 @@ class Supervisor:
             return ()
         if bridge.header.stamp - self._explained <= _BRAKING_S:
             return ()
-        reason = text_of(reasons.foreign_motion())
+        reason = reasons.foreign_motion()
         stop = m.StopRequest(stop_id=f"motion-{self._draw()}", source="controller", user="", reason=reason)
         self.stop_due = stop
         # The other sender knows this token.

@@ -7,7 +7,6 @@ from controller.identity import Token
 from controller.ledger.journal import EventLogger
 from controller.motion.body import Body
 from controller.motion.follower import Measured, Tracking
-from controller.motion.setpoints import BRAKED
 from controller.motion.teleoperation import Teleoperation
 from controller.whole_body.task import Method
 from controller.work.cut_clearance import CutClearance
@@ -164,7 +163,7 @@ class Movement:
             latched: Whether a stop is latched. Then nothing is sent once the robot is at rest.
         """
         if not self._setpoints.admits(xi):
-            self._event_log.say("error", BRAKED)
+            self._event_log.log(reasons.velocity_withheld())
         xi = self._setpoints.smooth(xi)
         if token is None or joints is None or (latched and not xi.any()):
             self._setpoints.withhold()

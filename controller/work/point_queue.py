@@ -326,7 +326,7 @@ class PointQueue:
                 continue
             point_id = row.point.point_id
             self._tickets[point_id] = Ticket(
-                row.point, row.state, row.why, row.user, row.accepted, row.hash, row.cut_id, seen=False
+                row.point, row.state, row.reason, row.user, row.accepted, row.hash, row.cut_id, seen=False
             )
             self._order.append(point_id)
             if row.state == "CUTTING":

@@ -20,6 +20,7 @@ from rolling_panda.messages.types import (
     NonNegative,
     Outcome,
     PlanarPose,
+    Reason,
     Speed,
     Text,
 )
@@ -95,13 +96,13 @@ class StopRequest(Message, frozen=True, kw_only=True):
         stop_id: Identifies the stop, also in the reset.
         source: Process or input that it came from.
         user: Who pressed; empty for a stop by a program.
-        reason: Cause, as text.
+        reason: Cause.
     """
 
     stop_id: Name
     source: Name
     user: Text
-    reason: Text
+    reason: Reason
 
 
 class JointState(Message, frozen=True, kw_only=True):

@@ -109,7 +109,7 @@ class ControllerState(Message, frozen=True, kw_only=True):
         header: Time of the state.
         mode: State of the supervision state machine.
         phase: Step of the cut sequence in AUTO; empty otherwise.
-        reason: Reason for the mode, as text.
+        reason: Reason for the mode.
         allowed: Reason why each command would be refused now; None if it would be taken. What only the holder of
             control may do is told for the holder. The commands about control are not among them.
         active_point_id: Current point of the work; empty without one.
@@ -135,7 +135,7 @@ class ControllerState(Message, frozen=True, kw_only=True):
     header: Header
     mode: Mode
     phase: Phase
-    reason: Text
+    reason: Reason
     allowed: dict[Name, Reason | None]
     active_point_id: Annotated[str, Meta(max_length=64)]
     method: Name
@@ -225,14 +225,14 @@ class StopRecord(Struct, frozen=True, forbid_unknown_fields=True):
         stop_id: Id of the stop.
         source: Process or input that it came from.
         user: Who pressed; empty for a stop by a program.
-        reason: Cause, as text.
+        reason: Cause.
         wall_time: Time at which this process latched it (s since 1970).
     """
 
     stop_id: Annotated[str, Meta(min_length=1, max_length=64)]
     source: Annotated[str, Meta(max_length=64)]
     user: Text
-    reason: Text
+    reason: Reason
     wall_time: WallTime
 
 

@@ -2,10 +2,10 @@
 
 import fcntl
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import msgspec
 
@@ -69,6 +69,7 @@ def read_kept(
     nothing: Kept,
     what: str,
     remedy: str = "look whether the robot may move, then remove it",
+    upgrade: Callable[[Any], Any] | None = None,
 ) -> Kept:
     """Read a JSON file that `replace_durably` wrote; `nothing` where it does not exist.
 
@@ -78,12 +79,16 @@ def read_kept(
         nothing: Content before the first write.
         what: Description of the content, for the error.
         remedy: What to do on an error.
+        upgrade: Turns decoded content of an earlier version into that of this one.
 
     Raises:
         InputError: It cannot be read: a process that does not know its latched stops must not start.
     """
     try:
-        return msgspec.json.decode(path.read_bytes(), type=kind) if path.exists() else nothing
+        if not path.exists():
+            return nothing
+        content = msgspec.json.decode(path.read_bytes())
+        return msgspec.convert(content if upgrade is None else upgrade(content), kind)
     except (OSError, msgspec.MsgspecError) as error:
         raise InputError(f"cannot read {what} in {path}: {error}; {remedy}") from error
 

@@ -102,7 +102,7 @@ class RobotCommands:
         sent_at = time.monotonic()
         stop_id = self._link.send_stop(session.user, reason)
         self._on_stop()
-        self._log.note(reasons.software_stop(session.user, reason), f"stop {session.client}")
+        self._log.note(reasons.software_stop(session.user, reasons.said(reason)), f"stop {session.client}")
         while (missing := self._link.not_latched(stop_id)) and time.monotonic() - sent_at < self._stop_confirm_s:
             await asyncio.sleep(_CONFIRM_POLL_S)
         if "bridge" in missing:

@@ -18,6 +18,7 @@ from rolling_panda.messages.page import ProcessPresence
 from rolling_panda.messages.perception import PointCrop
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.messages.supervision import Presence, StopState, TeleopTarget
+from rolling_panda.reasons import said
 from rolling_panda.transport.inbox import Received
 from rolling_panda.transport.zenoh import Transport
 
@@ -94,7 +95,7 @@ class RobotLink:
 
         It is sent on its own thread, since the topic blocks when the wire is congested.
         """
-        request = m.StopRequest(stop_id=f"s-{secrets.token_hex(8)}", source="server", user=user, reason=reason)
+        request = m.StopRequest(stop_id=f"s-{secrets.token_hex(8)}", source="server", user=user, reason=said(reason))
 
         def send() -> None:
             self._stop.put(request)

@@ -95,7 +95,7 @@ def _alarm(state: PageState, points: PagePoints | None) -> Reason | None:
             return _SILENT[process]()
     controller, bridge = state.controller, state.bridge
     if controller is not None and controller.mode in _STOPPED:
-        return _STOPPED[controller.mode](reasons.said(controller.reason or "no cause reported"))
+        return _STOPPED[controller.mode](controller.reason)
     if bridge is not None and bridge.cutter == "jammed":
         return reasons.robot_cutter_jammed()
     if "perception" in silent:

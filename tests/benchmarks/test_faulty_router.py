@@ -9,6 +9,7 @@ from benchmarks.faults.lossy_link import WayFault
 from rolling_panda import messages as m
 from rolling_panda.config import TransportConfig
 from rolling_panda.errors import ServiceError
+from rolling_panda.reasons import said
 from rolling_panda.topics import CONTROLLER, MOTION, RELEASE, STOP
 from rolling_panda.transport.zenoh import Transport
 from tests.support.processes.local_router import free_port
@@ -56,7 +57,7 @@ def test_a_way_is_cut_for_one_topic_and_one_direction(wire):
     time.sleep(0.3)
     cut = '{"from": "controller", "to": "bridge", "topic": "command/motion", "fault": {"loss": 1.0}}'
     assert obey(router, cut) == "set"
-    stop.put(m.StopRequest(stop_id="s", source="server", user="ada", reason="trial"))
+    stop.put(m.StopRequest(stop_id="s", source="server", user="ada", reason=said("trial")))
     heard = []
 
     sent = 0

@@ -15,6 +15,7 @@ from bridge.sim.robot.robot import SimulatedRobot
 from bridge.sim.vineyard.row import Row
 from rolling_panda import messages as m
 from rolling_panda.config import load_section
+from rolling_panda.reasons import said
 from rolling_panda.resources import resource
 from tests.support.bridge_rig import FORWARD, MODEL, REST, NoCamera, Parts, Rig, SimulatedPlant
 from tests.support.extras import need
@@ -49,7 +50,7 @@ def rig(request: pytest.FixtureRequest) -> Iterator[Rig]:
 
 
 def stop(stop_id: str = "s1") -> m.StopRequest:
-    return m.StopRequest(stop_id=stop_id, source="page", user="ada", reason="button")
+    return m.StopRequest(stop_id=stop_id, source="page", user="ada", reason=said("button"))
 
 
 def release(stop_id: str = "s1") -> m.ReleaseStop:

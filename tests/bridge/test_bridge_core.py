@@ -15,7 +15,7 @@ from bridge.core.state_memory import Remembered
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import CloseUpRequest
 from rolling_panda.messages.supervision import StopState
-from rolling_panda.reasons import severity_of, text_of
+from rolling_panda.reasons import said, severity_of, text_of
 from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.topics import TOKEN
 from rolling_panda.transport.codec import StrictDecoder, encode
@@ -101,7 +101,7 @@ def bench() -> Bench:
 
 
 def stop(stop_id: str = "s1") -> m.StopRequest:
-    return m.StopRequest(stop_id=stop_id, source="page", user="ada", reason="button")
+    return m.StopRequest(stop_id=stop_id, source="page", user="ada", reason=said("button"))
 
 
 def release(stop_id: str = "s1") -> m.ReleaseStop:

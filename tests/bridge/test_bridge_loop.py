@@ -6,6 +6,7 @@ from types import SimpleNamespace
 from bridge.core.bridge import BridgeOutputs
 from bridge.loop import bridge_runner
 from rolling_panda import messages as m
+from rolling_panda.reasons import said
 from rolling_panda.topics import MOTION, STOP
 from tests.support.fake_wire import FakeWire
 
@@ -35,7 +36,7 @@ class SleepyCore:
 def test_a_command_is_taken_when_it_comes_and_a_stop_does_not_wait_for_a_step():
     core, wire, stopping = SleepyCore(), FakeWire("bridge"), threading.Event()
     runner = bridge_runner(core, wire)
-    wire.deliver(STOP, m.StopRequest(stop_id="s", source="server", user="eve", reason="dog"))
+    wire.deliver(STOP, m.StopRequest(stop_id="s", source="server", user="eve", reason=said("dog")))
     assert core.heard == ["s"]
     thread = threading.Thread(target=runner.run, args=(stopping,))
     thread.start()

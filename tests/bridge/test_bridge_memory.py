@@ -1,12 +1,18 @@
+import json
+from pathlib import Path
+
 import pytest
 
 from bridge.core.state_memory import Remembered, begin_anew, open_memory
 from rolling_panda.errors import InputError
 from rolling_panda.messages.supervision import StopRecord
+from rolling_panda.reasons import said
 
 
 def test_what_is_kept_is_known_after_a_restart(tmp_path):
-    kept = Remembered(epoch=9, token="ab", stops=(StopRecord("s1", "server", "ada", "dog", 1.0),), released=("s0",))
+    kept = Remembered(
+        epoch=9, token="ab", stops=(StopRecord("s1", "server", "ada", said("dog"), 1.0),), released=("s0",)
+    )
     memory = open_memory(tmp_path)
     assert memory.value == Remembered()
     memory.keep(kept)
@@ -27,4 +33,12 @@ def test_a_bridge_without_a_memory_begins_anew_with_a_stop(tmp_path):
     memory = open_memory(tmp_path)
     (stop,) = memory.value.stops
     assert (stop.source, stop.user) == ("bridge", "") and stop.reason
+    memory.close()
+
+
+def test_the_stops_of_an_earlier_version_whose_reasons_are_text_are_read(tmp_path: Path) -> None:
+    stop = {"stop_id": "s1", "source": "server", "user": "ada", "reason": "dog", "wall_time": 1.0}
+    (tmp_path / "bridge.json").write_text(json.dumps({"epoch": 9, "stops": [stop]}))
+    memory = open_memory(tmp_path)
+    assert memory.value == Remembered(epoch=9, stops=(StopRecord("s1", "server", "ada", said("dog"), 1.0),))
     memory.close()

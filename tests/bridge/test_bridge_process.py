@@ -19,7 +19,7 @@ from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.config import TransportConfig
 from rolling_panda.model.robot import RobotModel
-from rolling_panda.reasons import text_of
+from rolling_panda.reasons import said, text_of
 from rolling_panda.resources import resource
 from rolling_panda.transport.zenoh import Feed, ForeignWire, Publisher, Slot, Transport
 from tests.support.processes.local_router import local_router
@@ -174,7 +174,7 @@ def test_a_stop_by_wire_latches_until_released(live: Live) -> None:
     stop = live.transport.publisher(topics.STOP)
     at = time.monotonic()
     for _ in range(3):
-        stop.put(m.StopRequest(stop_id="s1", source="test", user="ada", reason="button"))
+        stop.put(m.StopRequest(stop_id="s1", source="test", user="ada", reason=said("button")))
     live.drive(0.6, FORWARD)
     assert live.newest().stop_id == "s1"
     release = m.ReleaseStop(stop_id="s1", user="ada", reason="checked")

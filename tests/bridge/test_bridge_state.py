@@ -17,7 +17,7 @@ from bridge.core.validator import OLD_SEQUENCE
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.model.differential_drive import Array
-from rolling_panda.reasons import severity_of, text_of
+from rolling_panda.reasons import button_pressed, robot_fault_reported, said, severity_of, text_of
 from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.topics import CUT, MOTION, ODOMETRY, TOKEN, Topic
 from tests.bridge.test_bridge_core import FORWARD, Bench, IdealRobot, cut, odometer, release, stop
@@ -148,7 +148,7 @@ def test_the_emergency_stop_button_is_told_by_its_name_with_its_time(bench: Benc
     assert out.stops is not None and out.stops.hardware
     (pressed,) = as_received(out.stops).stops
     assert (pressed.source, pressed.user, pressed.wall_time) == ("hardware", "", 9.0)
-    assert "button" in pressed.reason and bench.state.stop_id == pressed.stop_id
+    assert pressed.reason == button_pressed() and bench.state.stop_id == pressed.stop_id
 
 
 def test_who_gets_the_token_and_gives_it_back_is_told_at_once_and_the_robot_comes_to_rest(bench: Bench) -> None:
@@ -341,7 +341,7 @@ def test_a_severe_fault_is_a_stop_once_and_again_where_the_robot_does_not_recove
         bench.now += TICK_S
         bench.hear(bench.core.step(bench.now, wall_time=9.0), REST)
     (first,) = bench.stops.stops
-    assert (first.source, first.reason, first.wall_time) == ("robot", "arm: reflex", 9.0)
+    assert (first.source, first.reason, first.wall_time) == ("robot", robot_fault_reported("arm: reflex"), 9.0)
     assert bench.state.stop_id == first.stop_id
     assert bench.core.on_release(release(first.stop_id), bench.now).ok
     bench.run(2.5, REST)
@@ -376,7 +376,7 @@ def test_what_must_survive_a_restart_is_kept(bench: Bench) -> None:
 
 
 def test_a_long_reason_is_cut_to_what_the_wire_carries(bench: Bench) -> None:
-    bench.core.on_stop(m.StopRequest(stop_id="s1", source="page", user="ada", reason="x" * 500), bench.now)
+    bench.core.on_stop(m.StopRequest(stop_id="s1", source="page", user="ada", reason=said("x" * 500)), bench.now)
     (event,) = tick(bench).events
     assert len(text_of(as_received(event).reason)) == 500
 

@@ -4,10 +4,11 @@ from hypothesis import strategies as st
 from bridge.core.latch import StopLatch
 from rolling_panda.messages.robot import ReleaseStop, StopRequest
 from rolling_panda.messages.supervision import StopRecord
+from rolling_panda.reasons import said
 
 
 def stop(stop_id: str) -> StopRequest:
-    return StopRequest(stop_id=stop_id, source="page", user="ada", reason="button")
+    return StopRequest(stop_id=stop_id, source="page", user="ada", reason=said("button"))
 
 
 def release(stop_id: str) -> ReleaseStop:
@@ -20,7 +21,7 @@ def test_every_stop_is_kept_and_all_hold_until_the_newest_is_released() -> None:
     assert latch.stop(stop("b"), 11.0)
     assert not latch.stop(stop("a"), 12.0)
     assert [(each.stop_id, each.wall_time) for each in latch.stops] == [("b", 11.0), ("a", 10.0)]
-    assert latch.stops[0] == StopRecord("b", "page", "ada", "button", 11.0)
+    assert latch.stops[0] == StopRecord("b", "page", "ada", said("button"), 11.0)
     assert latch.stop_id == "b" and latch.released_by == ""
     assert latch.stopped_by == "ada: button"
     assert "latched stop is b" in latch.release(release("a"))
@@ -32,7 +33,7 @@ def test_every_stop_is_kept_and_all_hold_until_the_newest_is_released() -> None:
 def test_a_clock_before_1970_and_a_long_reason_spoil_no_message() -> None:
     latch = StopLatch()
     for stop_id, wall_time in (("a", -5.0), ("b", 0.5)):
-        latch.stop(StopRequest(stop_id=stop_id, source="page", user="ada", reason="x" * 500), wall_time)
+        latch.stop(StopRequest(stop_id=stop_id, source="page", user="ada", reason=said("x" * 500)), wall_time)
     assert [each.wall_time for each in latch.stops] == [0.5, 0.0]
     assert latch.stopped_by == "ada: " + "x" * 495
     latch.release(ReleaseStop(stop_id="b", user="ada", reason="y" * 500))

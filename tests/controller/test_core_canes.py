@@ -13,6 +13,7 @@ from rolling_panda import commands as intents
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.messages.supervision import TeleopTarget
 from rolling_panda.model.robot import RobotModel, pose_message
+from rolling_panda.reasons import text_of
 from tests.support.controller_at_work import entry, robot, run_until, working
 from tests.support.points import point
 from tests.support.sent import newest
@@ -130,7 +131,7 @@ def test_a_hand_that_leads_the_tool_into_a_cane_is_held_and_told_why():
     for _ in range(400):
         r.step()
         judge.look(r.q)
-        reasons.add(r.state.reason)
+        reasons.add(text_of(r.state.reason))
     assert min(judge.least.values()) > 0.0
     assert any("cane 0 of vine 2, spur 7" in reason for reason in reasons), reasons
 

@@ -7,7 +7,7 @@ from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.messages.supervision import BaseVelocity, ControlState, StopRecord, TeleopTarget
-from rolling_panda.reasons import text_of
+from rolling_panda.reasons import said, text_of
 from tests.support.controller_at_work import CONFIG, robot, run_until, working
 from tests.support.points import point
 from tests.support.sent import every, newest
@@ -24,7 +24,7 @@ def test_without_being_heard_the_robot_stops_pauses_and_stays_so():
     r = far_at_work()
     r.people.clear()
     r.run(1.5)
-    assert r.state.mode == "PAUSED" and r.state.reason == text_of(reasons.control_lapsed("ada", 1.0))
+    assert r.state.mode == "PAUSED" and r.state.reason == reasons.control_lapsed("ada", 1.0)
     assert np.abs(r.xi).max() < 2e-3
     r.people.add("ada")
     r.run(2.0)
@@ -95,7 +95,7 @@ def test_when_nobody_watches_no_further_cut_begins_the_tool_comes_out_and_work_p
     run_until(r, lambda s: s is not None and s.phase == phase, 30.0)
     r.watching = False
     run_until(r, lambda s: s.mode != "AUTO", r.now + 12.0)
-    assert r.state.mode == "PAUSED" and "seen the robot" in r.state.reason
+    assert r.state.mode == "PAUSED" and "seen the robot" in text_of(r.state.reason)
     assert len(r.cuts) <= 1
     clear = CONFIG.work.row_distance - CONFIG.work.clearance + 0.08
     if phase != "APPROACH":
@@ -136,7 +136,7 @@ def test_what_a_viewer_has_seen_lets_nothing_begin():
 
 def test_a_controller_that_starts_while_a_stop_is_latched_is_stopped():
     r = robot()
-    r.controller.restore((), (StopRecord("s9", "server", "eve", "dog in the row", 1.0),))
+    r.controller.restore((), (StopRecord("s9", "server", "eve", said("dog in the row"), 1.0),))
     assert r.controller.mode == "ESTOP_LATCHED"
     r.step()
     refused = r.ask(intents.Arm(user="ada"))

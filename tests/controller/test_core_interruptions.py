@@ -95,12 +95,12 @@ def test_a_pause_stops_the_way_home():
     assert r.ask(intents.Pause(user="ada")).ok
     r.run(0.4)
     assert np.abs(r.xi).max() < 1e-3
-    assert r.state.mode == "READY" and "stopped by ada" in r.state.reason
+    assert r.state.mode == "READY" and "stopped by ada" in text_of(r.state.reason)
 
 
 def test_a_hold_pressed_on_the_way_home_moves_nothing_when_the_arm_is_there():
     r = homing()
     r.teleop = TeleopTarget(sequence=1, hold=True, user="ada", base=BaseVelocity(0.2, 0.0))
     r.run(6.0)
-    assert r.state.mode == "READY" and r.state.reason == text_of(reasons.arm_home())
+    assert r.state.mode == "READY" and r.state.reason == reasons.arm_home()
     assert abs(r.q[0]) < 1e-3

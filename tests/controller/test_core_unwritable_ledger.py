@@ -32,7 +32,7 @@ def test_a_failure_is_a_fault_and_the_robot_rests_within_a_second():
     r.step()
     run_until(r, lambda s: s.mode == "FAULT", r.now + 0.1)
     at_rest(r, 1.0)
-    assert r.state.reason == text_of(reasons.ledger_failed(r.ledger.failure)) and r.cuts == []
+    assert r.state.reason == reasons.ledger_failed(r.ledger.failure) and r.cuts == []
     assert r.ask(intents.Acknowledge(user="ada", role="supervisor")).refused.code == "cause_remains"
     r.stop()
     run_until(r, lambda s: s.mode == "ESTOP_LATCHED", r.now + 0.2)
@@ -48,7 +48,7 @@ def test_a_ledger_that_hangs_is_a_fault_within_a_second():
         r.step()
         r.ledger = held
         assert r.now - began < 1.0
-    assert r.state.mode == "FAULT" and "written nothing" in r.state.reason
+    assert r.state.mode == "FAULT" and "written nothing" in text_of(r.state.reason)
 
 
 def test_the_blades_wait_for_the_record_of_their_intent():

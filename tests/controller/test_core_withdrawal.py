@@ -4,6 +4,7 @@ import msgspec
 import numpy as np
 
 from controller.motion.follower import Follower
+from rolling_panda.reasons import text_of
 from tests.support.controller_at_work import CONFIG, entry, run_until, working
 from tests.support.points import point
 
@@ -43,5 +44,5 @@ def test_held_by_its_joints_too_it_pauses_and_says_why(monkeypatch):
     r = at_work_and_held(monkeypatch, jog_too=True)
     run_until(r, lambda s: s is not None and s.mode == "AUTO", 1.0)
     run_until(r, lambda s: s.mode != "AUTO", 40.0)
-    assert r.state.mode == "PAUSED" and "joint 1" in r.state.reason
+    assert r.state.mode == "PAUSED" and "joint 1" in text_of(r.state.reason)
     assert entry(r, "b").state == "ACCEPTED" and len(r.cuts) == 1

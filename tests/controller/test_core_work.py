@@ -120,7 +120,7 @@ def test_a_point_that_moves_after_acceptance_is_not_cut():
 def test_an_unknown_cut_pauses_after_the_retreat_and_is_not_retried():
     r = working((point("a", (0.4, 0.75, 1.0)), point("b", (0.6, 0.75, 1.0))), outcome="UNKNOWN")
     finish(r, 40.0)
-    assert r.state.mode == "PAUSED" and "unknown" in r.state.reason
+    assert r.state.mode == "PAUSED" and "unknown" in text_of(r.state.reason)
     assert r.model.kinematics(r.q).T_odom_tool.translation[1] < 0.7
     assert len(r.cuts) == 1
     assert entry(r, "b").state == "ACCEPTED"
@@ -141,7 +141,7 @@ def test_losing_a_supervisor_stops_the_robot_and_it_stays_stopped(who):
     setattr(r, who, False)
     r.run(0.4)
     assert np.abs(r.xi).max() < 2e-3
-    assert r.state.mode == "PAUSED" and who in r.state.reason
+    assert r.state.mode == "PAUSED" and who in text_of(r.state.reason)
     setattr(r, who, True)
     r.run(2.0)
     assert r.state.mode == "PAUSED" and np.abs(r.xi).max() < 1e-6
@@ -154,7 +154,7 @@ def test_stop_ends_motion_latches_and_the_reset_moves_nothing():
     r.run(0.5)
     assert np.abs(r.xi).max() < 1e-3
     assert r.state.mode == "ESTOP_LATCHED"
-    assert "ada" in r.state.reason
+    assert "ada" in text_of(r.state.reason)
     assert not r.ask(intents.Arm(user="ada")).ok
     assert r.ask(intents.Reset(user="ada", role="supervisor", reason="looked at it")).ok
     q = r.q.copy()
@@ -169,7 +169,7 @@ def test_stale_sensors_stop_and_need_an_acknowledgement_after_the_cause_is_gone(
     r.run(3.0)
     r.frozen_sensors = True
     r.run(0.5)
-    assert r.state.mode == "PROTECTIVE_STOP" and "Joint states" in r.state.reason
+    assert r.state.mode == "PROTECTIVE_STOP" and "Joint states" in text_of(r.state.reason)
     assert np.abs(r.record[-1]).max() == 0.0
     assert "still there" in r.ask(intents.Acknowledge(user="ada")).reason
     r.frozen_sensors = False

@@ -3,6 +3,7 @@
 from controller.ledger.journal import EventLogger, Journal, LedgerState
 from rolling_panda import messages as m
 from rolling_panda import reasons
+from rolling_panda.reasons import said
 from tests.support.fake_wire import as_received
 
 BODY = m.Header()
@@ -57,7 +58,9 @@ def test_a_failure_is_trouble_at_once_until_it_is_over():
 
 def test_a_stop_that_is_sent_several_times_is_one_record():
     journal = Journal()
-    stops = [m.StopRequest(stop_id=name, source="server", user="eve", reason="r") for name in ("a", "a", "b", "a")]
+    stops = [
+        m.StopRequest(stop_id=name, source="server", user="eve", reason=said("r")) for name in ("a", "a", "b", "a")
+    ]
     for stop in stops:
         journal.stops((stop,))
     assert [(record.kind, record.name, record.body.stop_id) for record in journal.drain()] == [

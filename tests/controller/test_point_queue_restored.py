@@ -86,7 +86,7 @@ def test_what_is_done_or_rejected_stays_so():
     life = begun(point(), point("b", position=(2.0, 0.85, 1.0)))
     life.queue.accept("a", 3, "ada")
     life.queue.begin_cut("a", "run-1")
-    life.queue.resolve("a", "DONE", "cut")
+    life.queue.resolve("a", "DONE", reasons.said("cut"))
     life.queue.reject("b", "ada", "a wire behind it")
     for _ in range(3):
         life = life.restarted()

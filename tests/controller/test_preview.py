@@ -80,7 +80,7 @@ def test_a_preview_of_one_cut_allows_that_one_alone(p):
     p.worked()
     assert [name for name, _ in p.robot.cuts] == ["a"]
     p.robot.run(0.2)
-    assert p.robot.state.mode == "READY" and p.robot.state.reason == text_of(reasons.not_in_preview("b"))
+    assert p.robot.state.mode == "READY" and p.robot.state.reason == reasons.not_in_preview("b")
     assert p.state.phase == "expired"
     assert "expired" in p.ask(intents.Start)
     assert [name for name, _ in p.robot.cuts] == ["a"]
@@ -107,7 +107,7 @@ def test_what_the_preview_does_not_cut_is_not_cut_under_its_approval(rolled):
     assert p.ask(intents.ApprovePreview, preview_hash=shown.preview_hash) == ""
     p.worked()
     assert [name for name, _ in p.robot.cuts] == ["a"]
-    assert p.robot.state.reason == text_of(reasons.not_cut_in_preview("b", TOO_NEAR))
+    assert p.robot.state.reason == reasons.not_cut_in_preview("b", TOO_NEAR)
 
 
 def test_a_base_that_was_moved_ends_the_approval_and_is_told(p):

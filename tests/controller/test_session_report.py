@@ -107,7 +107,7 @@ def test_who_says_later_how_a_cut_ended_takes_the_robot_no_time():
         (0.0, asked(intents.Start(user="ada"))),
         (3.0, ticket("a", "CUTTING", user="ada")),
         (5.0, ticket("a", "UNKNOWN", user="ada")),
-        (500.0, ticket("a", "DONE", user="bob", reason="seen by eye")),
+        (500.0, ticket("a", "DONE", user="bob", reason=reasons.said("seen by eye"))),
     )
     (cut,) = told.cuts
     assert (cut.outcome, cut.user, cut.seconds) == ("DONE", "bob", 5.0)
@@ -185,9 +185,3 @@ def test_a_point_that_stays_out_of_reach_changes_the_report_once():
     builder = SessionReportBuilder()
     beyond = TicketRow(point=pruning_point("a"), state="UNREACHABLE", cut_id="")
     assert [builder.add(at(second), beyond) for second in (0.0, 1.0, 2.0)] == [True, False, False]
-
-
-def test_a_long_reason_of_an_earlier_version_is_cut_to_what_the_wire_carries():
-    given_up = TicketRow(point=pruning_point("a"), state="FAILED_NOT_CUT", cut_id="", reason="x" * 600)
-    ended = (0.0, ticket("b", "CUTTING")), (1.0, ticket("b", "FAILED_NOT_CUT", reason="x" * 600))
-    assert [cut.reason for cut in report((0.0, given_up), *ended).cuts] == [reasons.said("x" * 500)] * 2

@@ -13,6 +13,7 @@ from controller.ledger.journal import ApproachRow, Journal, OrderRow, PreviewReq
 from controller.ledger.start import Restored, restored, start_record
 from controller.ledger.store import FILE, Entry, Ledger
 from controller.work.point_queue import PointQueue
+from rolling_panda import reasons
 from rolling_panda.errors import LedgerError
 from tests.support.fake_wire import pruning_point
 
@@ -31,7 +32,7 @@ def test_a_start_is_recorded_with_its_configuration(tmp_path):
 def test_the_newest_of_each_row_is_restored_and_nothing_of_an_empty_ledger(tmp_path):
     assert restored(tmp_path) == Restored()
     old, new = (TicketRow(point=pruning_point("p1"), state=state) for state in ("PROPOSED", "ACCEPTED"))
-    other = TicketRow(point=pruning_point("p2"), state="REJECTED", reason="too thick")
+    other = TicketRow(point=pruning_point("p2"), state="REJECTED", reason=reasons.said("too thick"))
     orders = [OrderRow(order=(name,), revision=number, user="ada") for number, name in enumerate(("p2", "p1"))]
     rows = [
         *(("ticket", row.point.point_id, row) for row in (old, other, new)),
@@ -63,6 +64,15 @@ def test_a_cut_under_way_in_a_ledger_of_schema_1_is_restored(tmp_path):
     queue.restore(restored(tmp_path).tickets)
     assert queue.entries()[0].state == "UNKNOWN", "somebody has to look how it ended"
     assert verify(tmp_path).problem == "", "the row itself is as it was written"
+
+
+def test_the_reason_of_a_point_in_a_ledger_of_schema_2_is_restored_from_its_text(tmp_path):
+    row = TicketRow(point=pruning_point("p1"), state="REJECTED", reason=reasons.said("x" * 500), user="ada")
+    body = json.loads(msgspec.json.encode(row)) | {"reason": "x" * 600}
+    without = json.loads(msgspec.json.encode(msgspec.structs.replace(row, reason=None))) | {"reason": ""}
+    with Ledger(tmp_path) as ledger:
+        ledger.append([Entry("t", "ticket", "p1", json.dumps(body)), Entry("t", "ticket", "p2", json.dumps(without))])
+    assert restored(tmp_path).tickets == (row, msgspec.structs.replace(row, reason=None))
 
 
 def started(name, version):

@@ -1,12 +1,15 @@
+import json
+
 import pytest
 
 from controller.stop_file import open_stop_file
 from rolling_panda.errors import InputError
 from rolling_panda.messages.supervision import StopRecord
+from rolling_panda.reasons import said
 
 
 def test_latched_stops_are_known_after_a_restart(tmp_path):
-    stops = (StopRecord("b", "server", "eve", "dog", 2.0), StopRecord("a", "server", "ada", "", 1.0))
+    stops = (StopRecord("b", "server", "eve", said("dog"), 2.0), StopRecord("a", "server", "ada", said(""), 1.0))
     file = open_stop_file(tmp_path)
     assert file.value == ()
     file.keep(stops)
@@ -14,6 +17,14 @@ def test_latched_stops_are_known_after_a_restart(tmp_path):
     again = open_stop_file(tmp_path)
     assert again.value == stops
     again.close()
+
+
+def test_the_file_of_an_earlier_version_whose_reasons_are_text_is_read(tmp_path):
+    old = [{"stop_id": "a", "source": "server", "user": "ada", "reason": "dog", "wall_time": 1.0}]
+    (tmp_path / "controller-stops.json").write_text(json.dumps(old))
+    file = open_stop_file(tmp_path)
+    assert file.value == (StopRecord("a", "server", "ada", said("dog"), 1.0),)
+    file.close()
 
 
 def test_a_file_that_cannot_be_read_starts_nothing(tmp_path):

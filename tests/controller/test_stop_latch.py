@@ -5,6 +5,7 @@ from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.messages.supervision import StopRecord
+from rolling_panda.reasons import said
 from tests.support.fake_wire import as_received, bridge_state
 
 BRIDGE = bridge_state()
@@ -12,7 +13,7 @@ RESET = intents.Reset(user="ada", role="supervisor", reason="looked at it")
 
 
 def stop(stop_id):
-    return m.StopRequest(stop_id=stop_id, source="server", user="eve", reason="dog in the row")
+    return m.StopRequest(stop_id=stop_id, source="server", user="eve", reason=said("dog in the row"))
 
 
 def bridge(stop_id):
@@ -21,16 +22,16 @@ def bridge(stop_id):
 
 def test_a_stop_latches_once_and_says_who_and_why():
     latch = StopLatch()
-    assert latch.update((stop("a"),), BRIDGE) == reasons.software_stop("eve", "dog in the row")
+    assert latch.update((stop("a"),), BRIDGE) == reasons.software_stop("eve", said("dog in the row"))
     assert latch.update((stop("a"),), bridge("a")) is None
 
 
 def test_a_stop_that_only_the_bridge_has_seen_latches_too():
     latch = StopLatch()
-    assert latch.update((), bridge("a"), 7.0) == reasons.software_stop_unnamed("eve: dog in the row")
+    assert latch.update((), bridge("a"), 7.0) == reasons.software_stop_unnamed(said("eve: dog in the row"))
     assert latch.update((), bridge("a"), 8.0) is None
     (record,) = latch.message().stops
-    assert record == StopRecord("a", "bridge", "", "eve: dog in the row", 7.0)
+    assert record == StopRecord("a", "bridge", "", said("eve: dog in the row"), 7.0)
 
 
 def test_a_clock_before_1970_spoils_no_record():
@@ -46,19 +47,19 @@ def test_what_was_latched_before_a_start_is_not_released_by_itself():
     before = StopLatch()
     before.update((stop("a"),), BRIDGE)
     latch = StopLatch(before.message().stops)
-    assert not latch.released(BRIDGE) and latch.latched == reasons.software_stop("eve", "dog in the row")
+    assert not latch.released(BRIDGE) and latch.latched == reasons.software_stop("eve", said("dog in the row"))
     assert latch.message().released_by == ""
 
 
 def test_an_emergency_stop_is_told_from_a_software_stop_and_a_process_stands_for_a_person():
     for source, user, told in (
-        ("hardware", "", reasons.emergency_stop("the button")),
-        ("hardware", "eve", reasons.emergency_stop("the button")),
-        ("server", "", reasons.software_stop("server", "the button")),
-        ("server", "eve", reasons.software_stop("eve", "the button")),
-        ("bridge", "", reasons.software_stop_unnamed("the button")),
+        ("hardware", "", reasons.emergency_stop(said("the button"))),
+        ("hardware", "eve", reasons.emergency_stop(said("the button"))),
+        ("server", "", reasons.software_stop("server", said("the button"))),
+        ("server", "eve", reasons.software_stop("eve", said("the button"))),
+        ("bridge", "", reasons.software_stop_unnamed(said("the button"))),
     ):
-        pressed = m.StopRequest(stop_id="a", source=source, user=user, reason="the button")
+        pressed = m.StopRequest(stop_id="a", source=source, user=user, reason=said("the button"))
         assert StopLatch().update((pressed,), BRIDGE) == told
 
 
@@ -109,7 +110,7 @@ def test_every_stop_is_kept_with_who_pressed_it_and_when_and_survives_a_restart(
     ]
     assert not latch.changed and told.process == "controller"
     again = StopLatch(told.stops)
-    assert again.latched == reasons.software_stop("eve", "dog in the row")
+    assert again.latched == reasons.software_stop("eve", said("dog in the row"))
     assert again.message().stops == told.stops
     assert again.update((stop("b"),), BRIDGE) is None
 

@@ -13,6 +13,7 @@ from rolling_panda.config import RobotConfig
 from rolling_panda.messages.perception import Capsule, Obstacles
 from rolling_panda.messages.supervision import TeleopTarget
 from rolling_panda.model.robot import RobotModel, pose_message
+from rolling_panda.reasons import text_of
 from rolling_panda.transport.inbox import Received
 from tests.support.controller_config import controller_config
 from tests.support.worlds.kinematic_robot import KinematicRobot
@@ -111,7 +112,7 @@ def test_a_post_in_the_way_of_the_held_tool_is_not_met(method: str) -> None:
     least, said = 1.0, set()
     for _ in range(500):
         robot.step()
-        said.add(robot.state.reason)
+        said.add(text_of(robot.state.reason))
         least = min(least, judge.model.least(robot.q).distance)
     assert robot.state is not None and robot.state.mode == "TELEOP", robot.events
     moved = robot.model.kinematics(robot.q).T_odom_tool.translation - tool.translation
@@ -122,4 +123,4 @@ def test_a_post_in_the_way_of_the_held_tool_is_not_met(method: str) -> None:
     robot.teleop = TeleopTarget(sequence=2, hold=True, user="ada", target=pose_message(tool))
     for _ in range(100):
         robot.step()
-    assert robot.state.mode == "TELEOP" and "holds" not in robot.state.reason
+    assert robot.state.mode == "TELEOP" and "holds" not in text_of(robot.state.reason)

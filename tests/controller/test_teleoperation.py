@@ -11,6 +11,7 @@ from rolling_panda.config import RobotConfig
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
 from rolling_panda.model.robot import pose_message
+from rolling_panda.reasons import text_of
 from rolling_panda.transport.inbox import Received
 from tests.support.controller_config import controller_config
 from tests.support.worlds.kinematic_robot import KinematicRobot
@@ -177,7 +178,7 @@ def test_without_the_server_there_is_no_teleoperation():
     r.run(1.0)
     r.server = False
     r.run(0.4)
-    assert r.state.mode == "PAUSED" and "server" in r.state.reason
+    assert r.state.mode == "PAUSED" and "server" in text_of(r.state.reason)
     assert np.abs(r.xi).max() < 1e-2
 
 

@@ -4,6 +4,7 @@ import pytest
 from controller.motion.tracking_error import TrackingErrorMonitor
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
+from rolling_panda.reasons import text_of
 from tests.support.controller_at_work import working
 from tests.support.points import point
 
@@ -61,7 +62,7 @@ def test_a_base_that_is_held_back_stops_the_work_with_the_figure():
     r.integrate = held
     r.run(1.0)
     assert r.state.mode == "PROTECTIVE_STOP"
-    assert "does not follow" in r.state.reason and "wheel" in r.state.reason
+    assert "does not follow" in text_of(r.state.reason) and "wheel" in text_of(r.state.reason)
     assert not r.ask(intents.Acknowledge(user="ada")).ok
     r.integrate = integrate
     r.run(4.0)

@@ -37,7 +37,7 @@ def event(at: float, text: str) -> RecordedMessage:
 
 
 def stop(at: float) -> RecordedMessage:
-    return recorded(topics.STOP, at, m.StopRequest(stop_id="s1", source="page", user="ada", reason="a branch"))
+    return recorded(topics.STOP, at, m.StopRequest(stop_id="s1", source="page", user="ada", reason=said("a branch")))
 
 
 def recording(*more: RecordedMessage) -> Recording:

@@ -14,6 +14,7 @@ from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.config import TransportConfig
 from rolling_panda.errors import InputError, ServiceError, TransportError
+from rolling_panda.reasons import said
 from rolling_panda.topics import BRIDGE, INTENT, JOINTS, MOTION, RELEASE, SERVICES, STOP, TOKEN, TOPICS, key
 from rolling_panda.transport.access import BEARERS, CALLERS, access_control
 from rolling_panda.transport.certificates import APART, NAMES, main, make
@@ -181,7 +182,7 @@ def test_without_a_certificate_of_this_authority_nobody_comes_in(
         time.sleep(0.3)
         with pytest.raises(TransportError):
             intruder = Transport(config(endpoint, mixed), "controller", "rp1")
-            stop = m.StopRequest(stop_id="a", source="x", user="eve", reason="r")
+            stop = m.StopRequest(stop_id="a", source="x", user="eve", reason=said("r"))
             intruder.publisher(STOP).put(stop)
         time.sleep(0.3)
         assert got.peek() is None

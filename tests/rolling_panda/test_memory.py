@@ -6,6 +6,7 @@ from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.errors import MessageError
+from rolling_panda.reasons import said
 from rolling_panda.transport.inbox import Answered, Reply
 from rolling_panda.transport.memory import Link, World
 from tests.support.fake_wire import bridge_state, joints
@@ -75,7 +76,7 @@ def test_a_link_loses_and_repeats(share, arrived):
     world = World()
     world.links[topics.STOP.name] = Link(world.rng, **share)
     node = world.add("bridge", Core(), 0.001, at_once={m.StopRequest: "stop"})
-    world.say(m.StopRequest(stop_id="s", source="server", user="eve", reason="dog"))
+    world.say(m.StopRequest(stop_id="s", source="server", user="eve", reason=said("dog")))
     world.run(0.01)
     assert node.core.stopped == ["s"] * arrived
 

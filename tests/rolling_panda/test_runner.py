@@ -9,11 +9,12 @@ import pytest
 from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.messages.supervision import SessionPlan, StopState
+from rolling_panda.reasons import said
 from rolling_panda.transport.inbox import Answered, Inbox, Rejected, Reply
 from rolling_panda.transport.runner import Runner, Standby
 from tests.support.fake_wire import FakeWire, joints
 
-STOP = m.StopRequest(stop_id="s", source="server", user="eve", reason="dog")
+STOP = m.StopRequest(stop_id="s", source="server", user="eve", reason=said("dog"))
 
 
 class Core:
@@ -66,7 +67,7 @@ def test_the_newest_wins_on_a_topic_without_a_queue_and_a_queue_keeps_the_order(
     core, wire, clock, runner = parts
     for number in (1, 2):
         wire.deliver(topics.JOINTS, joints(number), clock.now - 0.02 / number)
-        wire.deliver(topics.STOP, m.StopRequest(stop_id=f"s{number}", source="server", user="eve", reason="dog"))
+        wire.deliver(topics.STOP, m.StopRequest(stop_id=f"s{number}", source="server", user="eve", reason=said("dog")))
     runner.turn(clock.now)
     newest = core.inbox.newest(m.JointState)
     assert (newest.message.sequence, newest.at) == (2, pytest.approx(99.99))
@@ -80,7 +81,7 @@ def test_the_newest_wins_on_a_topic_without_a_queue_and_a_queue_keeps_the_order(
 def test_a_queue_that_is_full_loses_the_oldest():
     inbox = Inbox()
     for number in range(topics.STOP.queue + 3):
-        inbox.put(m.StopRequest(stop_id=f"s{number}", source="server", user="eve", reason="dog"), 0.0)
+        inbox.put(m.StopRequest(stop_id=f"s{number}", source="server", user="eve", reason=said("dog")), 0.0)
     kept = [each.message.stop_id for each in inbox.drain(m.StopRequest)]
     assert (kept[0], len(kept)) == ("s3", topics.STOP.queue)
 

@@ -8,6 +8,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from rolling_panda import reasons, topics
 from rolling_panda.messages.supervision import StopRecord, StopState
+from rolling_panda.reasons import said
 from tests.server.test_misuse import control
 from tests.server.test_page_socket import Page
 from tests.server.test_proxy import drawn
@@ -49,7 +50,7 @@ def latching(*robots):
     def latch():
         while not over.wait(0.005):
             for robot in robots:
-                records = tuple(StopRecord(each, "server", "ann", "", 0.0) for each in stops(robot))
+                records = tuple(StopRecord(each, "server", "ann", said(""), 0.0) for each in stops(robot))
                 for process in ("bridge", "controller"):
                     robot.wire.deliver(topics.STOPS, StopState(process=process, stops=records))
 
@@ -195,7 +196,7 @@ def test_a_stop_of_one_leaves_the_other_alone_and_the_one_at_the_root_stops_all(
     with latching(one):
         answer = client.post("/api/stop")
     assert (answer.status_code, answer.json()["values"]) == (503, {"robots": "rp2"})
-    assert {stop.reason for stop in one.wire.sent[topics.STOP.name]} == {"both", "software stop"}
+    assert {stop.reason for stop in one.wire.sent[topics.STOP.name]} == {said("both"), said("software stop")}
 
 
 def test_signing_out_of_one_signs_out_of_all_and_lets_everything_go(robots, client):

@@ -8,6 +8,7 @@ from functools import cache
 
 from rolling_panda import messages as m
 from rolling_panda import topics
+from rolling_panda.reasons import said
 from rolling_panda.transport.codec import StrictDecoder, encode
 from rolling_panda.transport.zenoh import Feed, Slot
 from tests.support.points import point
@@ -102,9 +103,9 @@ def bridge_state(stop_id=""):
 
 def controller_state(queue=(), mode="READY"):
     return m.ControllerState(
-        header=HEADER, mode=mode, phase="", reason="", allowed={"Start": None}, active_point_id="", method="nullspace",
-        T_odom_tool=None, T_odom_tool_desired=None, position_error=0.0, rotation_error=0.0, manipulability=0.1,
-        joint_margin=0.3, tick_s=1e-4, ticks=100, late_ticks=0, queue=queue,
+        header=HEADER, mode=mode, phase="", reason=said("ready"), allowed={"Start": None}, active_point_id="",
+        method="nullspace", T_odom_tool=None, T_odom_tool_desired=None, position_error=0.0, rotation_error=0.0,
+        manipulability=0.1, joint_margin=0.3, tick_s=1e-4, ticks=100, late_ticks=0, queue=queue,
     )  # fmt: skip
 
 

@@ -230,7 +230,11 @@ def _stopped(page: Page, server: PlayedServer) -> None:
     working(page, server)
     records = tuple(
         StopRecord(
-            stop_id=f"s{number}", source="server", user=user, reason="stop button", wall_time=MORNING - 60 * number
+            stop_id=f"s{number}",
+            source="server",
+            user=user,
+            reason=reasons.said("stop button"),
+            wall_time=MORNING - 60 * number,
         )
         for number, user in ((1, "Ada"), (2, "Bob"))
     )

@@ -17,6 +17,7 @@ from rolling_panda import reasons
 from rolling_panda.messages import page as page_messages
 from rolling_panda.messages import types as types_messages
 from rolling_panda.messages.supervision import ControlState, ReplayState, SessionReport, StopState
+from rolling_panda.reasons import said
 from rolling_panda.resources import resource
 from tests.support.fake_wire import bridge_state
 from tests.support.page_host import ORIGIN, PlayedRequest, PlayedSocket, page_host
@@ -45,13 +46,13 @@ ALLOWED = {
 }
 
 
-def controller(mode: m.Mode = "READY", **changes: Any) -> m.ControllerState:
+def controller(mode: m.Mode = "READY", reason: str = "armed by Ada", **changes: Any) -> m.ControllerState:
     points = ("AcceptPoint", "RejectPoint", "ReconsiderPoint", "ResolvePoint", "AcceptAll")
     state = m.ControllerState(
         header=m.Header(),
         mode=mode,
         phase="",
-        reason="armed by Ada",
+        reason=said(reason),
         allowed=dict.fromkeys((*ALLOWED.get(mode, ()), *points)),
         active_point_id="",
         method="nullspace",

@@ -25,7 +25,7 @@ def test_a_full_disk_stops_the_robot_and_the_stop_still_works(tmp_path: Path) ->
         assert refused.status_code in (409, 503), refused.text
         robot.wait(lambda: robot.mode() == "FAULT", 5, "the fault")
         controller = robot.state()["controller"]
-        assert "cannot write the ledger" in controller["reason"]
+        assert controller["reason"]["code"] == "ledger_failed"
         assert robot.client.post("/api/start", json={}).status_code == 409
         assert robot.client.post("/api/stop", json={"reason": "disk full"}).status_code == 200
         robot.wait(lambda: robot.mode() == "ESTOP_LATCHED", 5, "the stop")

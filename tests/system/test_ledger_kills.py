@@ -35,7 +35,7 @@ from controller.loop import controller_runner
 from controller.work.queue_requests import QueueRequests
 from controller.work.point_queue import PointQueue
 from rolling_panda import messages as m
-from rolling_panda.reasons import said_or_none
+from rolling_panda.reasons import said, text_of
 from rolling_panda.config import TransportConfig
 from rolling_panda.transport.inbox import Reply
 from rolling_panda.transport.zenoh import Transport
@@ -57,8 +57,9 @@ class Desk:
 
     def answer(self, intent, now):
         refused = self.handlers[type(intent)](intent, 0.0)
-        self.journal.add("request", intent.user, RequestRow(asked=intent, reason=said_or_none(refused), mode="READY"))
-        return m.Answer(ok=not refused, reason=refused)
+        self.journal.add("request", intent.user, RequestRow(asked=intent, reason=refused, mode="READY"))
+        told = "" if refused is None else text_of(refused)
+        return m.Answer(ok=refused is None, reason=told, refused=refused)
 
     def step(self, inbox, now):
         out = []
@@ -71,15 +72,16 @@ class Desk:
             self.queue.update(points.message)
         ticket = self.queue.next()
         if self.intent is not None and self.journal.holds(self.intent[1]):
-            self.queue.resolve(self.intent[0], "DONE", "cut")
+            self.queue.resolve(self.intent[0], "DONE", said("cut"))
             self.intent = None
         elif self.intent is None and ticket is not None:
             self.cuts += 1
             name = ticket.point.point_id
             self.intent = name, self.queue.begin_cut(name, f"{sys.argv[3]}-{self.cuts}")
-        state = m.ControllerState(header=m.Header(), mode="READY", phase="", reason="", allowed={}, active_point_id="",
-            method="test", T_odom_tool=None, T_odom_tool_desired=None, position_error=0.0, rotation_error=0.0,
-            manipulability=0.0, joint_margin=0.0, tick_s=0.0, ticks=0, late_ticks=0, queue=self.queue.entries())
+        state = m.ControllerState(header=m.Header(), mode="READY", phase="", reason=said("ready"), allowed={},
+            active_point_id="", method="test", T_odom_tool=None, T_odom_tool_desired=None, position_error=0.0,
+            rotation_error=0.0, manipulability=0.0, joint_margin=0.0, tick_s=0.0,
+            ticks=0, late_ticks=0, queue=self.queue.entries())
         return [*out, state, Records(self.journal.drain())]
 
 folder = Path(sys.argv[1])

@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from rolling_panda import reasons
 from rolling_panda.config import TransportConfig
+from rolling_panda.reasons import text_of
 from rolling_panda.resources import resource
 from rolling_panda.topics import BRIDGE, CONTROLLER
 from rolling_panda.transport.certificates import make
@@ -68,7 +70,7 @@ def test_it_waits_says_so_and_takes_over_after_the_first_has_ended_or_was_killed
     second, same = site.process("controller", "two", "second"), site.process("controller", "one", "same")
     assert same.wait(60) == 1 and f"another controller works with {site.folder / 'one'}" in site.log("same").read_text()
     until(lambda: site.refused() > 5)
-    assert "another controller commands this robot; this one waits" in site.log("second").read_text()
+    assert text_of(reasons.controller_waits()) in site.log("second").read_text()
     assert site.held == (epoch, holder) and site.mode() == "IDLE"
     first.terminate()
     until(lambda: site.held[1] not in ("", holder), 20.0)

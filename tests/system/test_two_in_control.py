@@ -20,14 +20,18 @@ pytestmark = [pytest.mark.alone, pytest.mark.slow]
 PEOPLE = {"ada": "supervisor", "bob": "operator", "vic": "viewer"}
 ANYBODY = st.sampled_from(["ada", "bob", "ada", "bob", "vic"])
 #: Of a busy machine, not of the program: what a person would try again.
-_AGAIN = (
-    "watchdog",
-    "old; the limit is",
-    "silent for",
-    "under way",
-    "wait until the robot is at rest",
-    "has not reported its stop yet",
-)
+_AGAIN = {
+    "watchdog_holds",
+    "joints_stale",
+    "odometry_stale",
+    "bridge_stale",
+    "obstacles_stale",
+    "nothing_received",
+    "process_silent",
+    "reset_under_way",
+    "control_passes",
+    "stop_unknown",
+}
 PATIENCE_S = 15.0
 
 
@@ -56,7 +60,7 @@ class Control(RuleBasedStateMachine):
         end = time.monotonic() + PATIENCE_S
         while True:
             answer = self.post(who, path, **body)
-            again = any(words in answer.json()["reason"] for words in _AGAIN)
+            again = answer.json().get("code") in _AGAIN
             if answer.status_code == status or not again or time.monotonic() > end:
                 break
             time.sleep(0.05)

@@ -27,7 +27,7 @@ from controller.ledger.store import Entry, Ledger, read
 from controller.work.point_queue import PointQueue
 from controller.work.queue_requests import QueueRequests
 from rolling_panda import messages as m
-from rolling_panda.reasons import said_or_none
+from rolling_panda.reasons import said, text_of
 from tests.support.fake_wire import FakeWire
 from tests.support.points import point as pruning_point
 from tests.support.running_server import running_server
@@ -74,9 +74,10 @@ class Robot:
 
     def answer(self, intent):
         refused = self.handlers[type(intent)](intent, 0.0)
-        self.journal.add("request", intent.user, RequestRow(asked=intent, reason=said_or_none(refused), mode="READY"))
+        self.journal.add("request", intent.user, RequestRow(asked=intent, reason=refused, mode="READY"))
         self.record()
-        return m.Answer(ok=not refused, reason=refused)
+        told = "" if refused is None else text_of(refused)
+        return m.Answer(ok=refused is None, reason=told, refused=refused)
 
 
 class Operators(RuleBasedStateMachine):
@@ -149,7 +150,7 @@ class Operators(RuleBasedStateMachine):
         if outcome == "killed":
             self.robot.begin()
         else:
-            self.robot.queue.resolve(name, outcome, "test")
+            self.robot.queue.resolve(name, outcome, said("test"))
             self.robot.record()
         self.states[name] = "UNKNOWN" if outcome == "killed" else outcome
 

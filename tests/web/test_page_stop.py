@@ -7,13 +7,14 @@ from playwright.sync_api import Page, expect
 from rolling_panda import reasons
 from rolling_panda.messages import page as p
 from rolling_panda.messages.supervision import StopRecord, StopState
+from rolling_panda.reasons import said
 from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer, bridge, controller
 
 pytestmark = pytest.mark.browser
 
-ADA = StopRecord("s1", "server", "Ada", "branch", 1_700_000_000.0)
-BOB = StopRecord("s2", "server", "Bob", "space bar", 1_700_000_100.0)
+ADA = StopRecord("s1", "server", "Ada", said("branch"), 1_700_000_000.0)
+BOB = StopRecord("s2", "server", "Bob", said("space bar"), 1_700_000_100.0)
 
 
 def clock(page: Page, record: StopRecord) -> str:

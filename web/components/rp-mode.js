@@ -1,7 +1,8 @@
 // The mode, its phase and its reason.
 
-import { MODE_WORDS, PHASE_WORDS, inWords } from "../js/state/format.js";
+import { MODE_WORDS, PHASE_WORDS } from "../js/state/format.js";
 import { isLive, link, now, pageState } from "../js/state/page-state.js";
+import { reasonText } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
 import { element, setText } from "../js/views/dom.js";
 import { setIcon } from "../js/views/icons.js";
@@ -23,7 +24,7 @@ class RpMode extends HTMLElement {
       setIcon(shape, mode || "UNKNOWN");
       const phase = controller ? PHASE_WORDS[controller.phase] : "";
       setText(word, controller ? MODE_WORDS[controller.mode] + (phase ? ` · ${phase}` : "") : "No state yet");
-      setText(reason, inWords(controller?.reason ?? ""));
+      setText(reason, reasonText(controller?.reason));
       reason.title = reason.textContent ?? "";
     });
   }

@@ -5,6 +5,7 @@ import { earlierWords, hardwareStopPressed, sinceWords, stopProgress } from "../
 import { ask } from "../js/link/api.js";
 import { TEXT_MAX_LENGTH } from "../js/link/messages.js";
 import { isLive, link, now, pageState, staleWords } from "../js/state/page-state.js";
+import { reasonText } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
 import { icon, setIcon } from "../js/views/icons.js";
@@ -55,7 +56,7 @@ class RpStopBanner extends HTMLElement {
       if (!shown) return;
       // Without a link no reset is possible, and two banners leave little of the view.
       form.hidden = hint.hidden = link.get().status !== "open";
-      const told = state?.bridge?.stopped_by || (byController ? state?.controller?.reason : "") || "";
+      const told = state?.bridge?.stopped_by || (byController ? reasonText(state?.controller?.reason) : "");
       setText(who, told ? `Pressed by ${told}` : "Pressed on this page; waiting for the robot to say so");
       const newest = state?.bridge?.stop_id ?? "";
       bridge.show(byBridge, sinceWords(state, "bridge", newest));

@@ -16,7 +16,7 @@ from rolling_panda.messages.supervision import Person, Presence, TeleopTarget
 from rolling_panda.model.differential_drive import NXI, Array
 from rolling_panda.model.robot import ARM_Q, RobotModel
 from rolling_panda.model.wire_values import actuated, planar_pose
-from rolling_panda.reasons import text_of
+from rolling_panda.reasons import said, text_of
 from rolling_panda.transport.inbox import Inbox
 
 _ALL = frozenset({"bridge", "controller", "perception", "server"})
@@ -93,7 +93,7 @@ class KinematicRobot:
 
     def stop(self, stop_id: str = "stop-1") -> None:
         """Press the software stop."""
-        self.hear(m.StopRequest(stop_id=stop_id, source="test", user="ada", reason="test"))
+        self.hear(m.StopRequest(stop_id=stop_id, source="test", user="ada", reason=said("test")))
         self.stop_id = stop_id
 
     def hear(self, message: object) -> None:

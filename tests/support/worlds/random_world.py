@@ -22,6 +22,7 @@ from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
 from rolling_panda.messages.perception import Obstacles
 from rolling_panda.messages.supervision import BaseVelocity, ControlState, Person, Presence, StopState, TeleopTarget
+from rolling_panda.reasons import said
 from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.topics import TOPIC_OF
 from rolling_panda.transport.inbox import Inbox
@@ -294,7 +295,7 @@ class RandomWorld:
         else:
             stop_id = f"s{self.steps}"
             self.stop_ids = [*self.stop_ids[-20:], stop_id]
-        request = m.StopRequest(stop_id=stop_id, source="server", user="vic", reason="test")
+        request = m.StopRequest(stop_id=stop_id, source="server", user="vic", reason=said("test"))
         where = self.chance.choice(("both", "both", "bridge", "controller"))
         if where != "controller":
             self.bridge.on_stop(request, self.now)

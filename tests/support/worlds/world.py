@@ -11,6 +11,7 @@ from controller.planning.preview_plan import PreviewRequest
 from controller.planning.work_plan import PlanRequest, WorkPlan
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
+from rolling_panda.reasons import said
 from rolling_panda.transport.inbox import Inbox
 from rolling_panda.transport.memory import World
 
@@ -94,7 +95,7 @@ class RobotWorld(World):
 
     def stop(self, reason: str = "trial") -> None:
         """Press the software stop."""
-        self.say(m.StopRequest(stop_id=f"stop-{self.ticks}", source="server", user="operator", reason=reason))
+        self.say(m.StopRequest(stop_id=f"stop-{self.ticks}", source="server", user="operator", reason=said(reason)))
 
     def command(self, intent: intents.Intent) -> m.Answer:
         """Ask the controller, and advance until it answers."""

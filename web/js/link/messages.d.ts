@@ -183,8 +183,8 @@ export interface ControllerState {
   mode: Mode;
   /** Step of the cut sequence in AUTO; empty otherwise. */
   phase: Phase;
-  /** Reason for the mode, as text. */
-  reason: string;
+  /** Reason for the mode. */
+  reason: Reason;
   /** Reason why each command would be refused now; None if it would be taken. What only the holder of control may do is told for the holder. The commands about control are not among them. */
   allowed: Record<string, Reason|null>;
   /** Current point of the work; empty without one. */
@@ -328,8 +328,8 @@ export interface StopRecord {
   source: string;
   /** Who pressed; empty for a stop by a program. */
   user: string;
-  /** Cause, as text. */
-  reason: string;
+  /** Cause. */
+  reason: Reason;
   /** Time at which this process latched it (s since 1970). */
   wall_time: number;
 }

@@ -5,6 +5,7 @@ import { holder } from "../control/lease.js";
 import { hardwareStopPressed } from "../control/stop.js";
 import { counted, inWords } from "../state/format.js";
 import { isGone, isLive, isOpening, link, pageState, points, preview, staleWords } from "../state/page-state.js";
+import { reasonText } from "../state/reasons.js";
 import { history } from "./history.js";
 
 /** @typedef {import("../link/messages.js").ControllerState} ControllerState */
@@ -88,7 +89,7 @@ function ofModes({ controller, bridge, stops }) {
       ),
     );
   }
-  const reason = controller?.reason ? `: ${controller.reason}` : "";
+  const reason = controller ? `: ${reasonText(controller.reason)}` : "";
   switch (controller?.mode) {
     case "ESTOP_LATCHED":
       found.push(alarm("stopped", "error", `Stopped${reason}`, afterStop()));
