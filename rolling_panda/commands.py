@@ -23,6 +23,7 @@ from rolling_panda.messages.types import (
     Mode,
     Name,
     NonNegative,
+    PointState,
     Process,
     Reason,
     Role,
@@ -125,6 +126,14 @@ class MovePoint(PlantRequest, frozen=True, kw_only=True):
     along: Annotated[float, Meta(ge=-0.1, le=0.1)]
 
 
+#: States of a point in which a command about it is possible.
+POINT_STATES: Final[dict[str, tuple[PointState, ...]]] = {
+    "AcceptPoint": ("PROPOSED", "REJECTED", "FAILED_NOT_CUT"),
+    "RejectPoint": ("PROPOSED", "ACCEPTED", "UNREACHABLE", "FAILED_NOT_CUT", "REJECTED"),
+    "MovePoint": ("PROPOSED", "REJECTED", "FAILED_NOT_CUT"),
+    "SetApproach": ("PROPOSED", "ACCEPTED", "UNREACHABLE", "FAILED_NOT_CUT", "REJECTED"),
+    "ResolvePoint": ("UNKNOWN",),
+}
 #: Default confidence from which `AcceptAll` accepts points.
 SURE: Final = 0.8
 

@@ -317,42 +317,42 @@ def fault_without_effect(mode: str) -> None:
 
 @_reason("warning", "arm the robot first")
 def impossible_in_idle(event: str) -> None:
-    """{event} is not possible in IDLE."""
+    """{event} is not possible while the robot is idle."""
 
 
 @_reason("warning", "")
 def impossible_in_ready(event: str) -> None:
-    """{event} is not possible in READY."""
+    """{event} is not possible while the robot is ready."""
 
 
 @_reason("warning", "release the hold first")
 def impossible_in_teleop(event: str) -> None:
-    """{event} is not possible in TELEOP."""
+    """{event} is not possible while the robot is moved by hand."""
 
 
 @_reason("warning", "pause first")
 def impossible_in_auto(event: str) -> None:
-    """{event} is not possible in AUTO."""
+    """{event} is not possible while the robot works."""
 
 
 @_reason("warning", "resume first")
 def impossible_in_paused(event: str) -> None:
-    """{event} is not possible in PAUSED."""
+    """{event} is not possible while the robot is paused."""
 
 
 @_reason("warning", "acknowledge first")
 def impossible_in_protective_stop(event: str) -> None:
-    """{event} is not possible in PROTECTIVE_STOP."""
+    """{event} is not possible during a protective stop."""
 
 
 @_reason("warning", "acknowledge first")
 def impossible_in_fault(event: str) -> None:
-    """{event} is not possible in FAULT."""
+    """{event} is not possible in a fault."""
 
 
 @_reason("warning", "reset the stop first")
 def impossible_in_estop(event: str) -> None:
-    """{event} is not possible in ESTOP_LATCHED."""
+    """{event} is not possible while a stop is latched."""
 
 
 @_reason("info", "")
@@ -604,6 +604,84 @@ def site_unknown(vine: float, spur: float) -> None:
 @_reason("warning", "pause first")
 def point_worked_on(point: str) -> None:
     """{point} is being worked on."""
+
+
+# Page
+
+
+@_reason("warning", "wait until the page has found it again")
+def no_link() -> None:
+    """There is no link to the server."""
+
+
+@_reason("info", "wait")
+def no_state_yet() -> None:
+    """No state has arrived yet."""
+
+
+@_reason("info", "switch on Teleoperate")
+def teleoperation_off() -> None:
+    """Teleoperation is switched off."""
+
+
+@_reason("info", "choose Base")
+def base_not_chosen() -> None:
+    """The base is not what moves."""
+
+
+@_reason("warning", "let go, then hold one of them")
+def two_holds() -> None:
+    """Two at once: it stopped."""
+
+
+@_reason("info", "choose one")
+def none_chosen() -> None:
+    """No accepted point is chosen."""
+
+
+@_reason("info", "")
+def ghost_hidden() -> None:
+    """The ghost is not shown."""
+
+
+@_reason("info", "write why it is safe to go on")
+def reset_unexplained() -> None:
+    """The reset needs a reason."""
+
+
+@_reason("info", "")
+def nothing_decided() -> None:
+    """Nothing has been decided on this page."""
+
+
+@_reason("info", "")
+def none_proposed() -> None:
+    """There is no proposed point."""
+
+
+@_reason("info", "")
+def preview_approved_already(user: str) -> None:
+    """{user} has approved it already."""
+
+
+@_reason("info", "")
+def approach_free() -> None:
+    """The search chooses the approach already."""
+
+
+@_reason("info", "wait")
+def rule_effect_unknown() -> None:
+    """It is not known yet what the rule would change."""
+
+
+@_reason("info", "take that back first")
+def acceptance_stands(point: str) -> None:
+    """{point} is accepted, and keeps its content."""
+
+
+@_reason("info", "they can give it to you")
+def control_asked_by_you(user: str) -> None:
+    """You have asked {user} for control."""
 
 
 # Server

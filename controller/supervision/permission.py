@@ -10,7 +10,7 @@ from controller.supervision import modes
 from controller.supervision.modes import Event
 from rolling_panda import reasons
 from rolling_panda.commands import COMMANDS, Command, Condition
-from rolling_panda.messages.types import Reason
+from rolling_panda.messages.types import Mode, Reason
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,10 @@ class Situation:
     approval: Reason | None = None
 
 
+#: Name of motion by hand, which is asked for by a stream of targets rather than by a command.
+HOLD: Final = "Teleoperation"
+_OF_HOLDER: Final = (*(command.name for command in COMMANDS if command.control), HOLD)
+
 #: Check of each condition: the reason why it does not hold, None if it does.
 _CHECKS: Final[dict[Condition, Callable[[Situation], Reason | None]]] = {
     "fresh sensors": lambda now: safety.sensors(now.health, now.config),
@@ -66,8 +70,7 @@ def refusal(command: Command, now: float, situation: Situation) -> Reason | None
     mode, event = situation.state.mode, command.event
     if "operator" not in situation.rights:
         return situation.not_theirs or reasons.operator_needed()
-    # Acknowledging a fault moves nothing.
-    if command.control and mode != "FAULT" and situation.not_theirs is not None:
+    if situation.not_theirs is not None and command.name in of_holder(mode):
         return situation.not_theirs
     if event is not None and not (event is Event.PAUSE and situation.homing):
         refused = modes.refusal(situation.state, event, now, situation.rights)
@@ -78,10 +81,32 @@ def refusal(command: Command, now: float, situation: Situation) -> Reason | None
     return next((why for each in command.conditions if (why := _CHECKS[each](situation)) is not None), None)
 
 
+def hold_refusal(situation: Situation) -> Reason | None:
+    """Reason why a hold would not move the robot by hand; None if it would."""
+    mode = situation.state.mode
+    if situation.not_theirs is not None and HOLD in of_holder(mode):
+        return situation.not_theirs
+    if mode == "TELEOP":
+        return None
+    if mode != "READY":
+        return reasons.wrong_mode(HOLD, "READY", mode)
+    why = situation.busy or safety.sensors(situation.health, situation.config)
+    return why or safety.supervision(situation.health, situation.config, True)
+
+
+def of_holder(mode: Mode) -> tuple[str, ...]:
+    """What only the holder of control may do in a mode. Acknowledging a fault moves nothing."""
+    return () if mode == "FAULT" else _OF_HOLDER
+
+
 def allowed(now: float, situation: Situation) -> dict[str, Reason | None]:
-    """Reason why each command would be refused now; None if it would be taken. Those about control are left out."""
-    return {
+    """Reason why each command, or a hold, would be refused now; None if it would be taken.
+
+    Commands about control are left out.
+    """
+    commands = {
         command.name: refusal(command, now, situation)
         for command in COMMANDS
         if command.process == "controller" and command.tag != "control"
     }
+    return commands | {HOLD: hold_refusal(situation)}

@@ -12,7 +12,7 @@ from controller.supervision import modes
 from controller.supervision.authority import Authority, client_of
 from controller.supervision.fencing import FencingToken, draw_nonce
 from controller.supervision.modes import Event
-from controller.supervision.permission import Situation
+from controller.supervision.permission import Situation, hold_refusal
 from controller.supervision.stop_latch import StopLatch
 from controller.work.movement import Movement
 from rolling_panda import commands as intents
@@ -215,8 +215,7 @@ class Supervisor:
         if self.mode == "TELEOP" and not holding:
             self.event(Event.RELEASE, now, reasons.hold_ended())
         elif self.mode == "READY" and holding and hand.pressed:
-            why = not_theirs or self.busy() or safety.sensors(self.health, self._config)
-            why = why or safety.supervision(self.health, self._config, True)
+            why = hold_refusal(replace(self.situation(None, None, now), not_theirs=not_theirs))
             if why is not None:
                 hand.refuse()
                 self._event_log.log(reasons.teleoperation_refused(why))

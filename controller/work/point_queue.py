@@ -12,6 +12,7 @@ from controller.ledger.journal import Journal, TicketRow
 from controller.work.order import Approaches, WorkOrder
 from controller.work.rule_history import RuleHistory
 from rolling_panda import reasons
+from rolling_panda.commands import POINT_STATES
 from rolling_panda.messages.perception import PruningPoint, PruningPoints, PruningRule, point_digest
 from rolling_panda.messages.supervision import QueueEntry
 from rolling_panda.messages.types import PointState, Reason
@@ -25,7 +26,6 @@ _ELSEWHERE = 0.03
 _ASKED: frozenset[PointState] = frozenset({"ACCEPTED", "UNREACHABLE", "UNKNOWN"})
 #: States with an acceptance and no cut yet. The acceptance is valid while the point is as the operator saw it.
 BOUND: frozenset[PointState] = frozenset({"ACCEPTED", "UNREACHABLE"})
-_ACCEPTABLE: frozenset[PointState] = frozenset({"PROPOSED", "REJECTED", "FAILED_NOT_CUT"})
 
 
 @dataclass(frozen=True)
@@ -176,7 +176,7 @@ class PointQueue:
             return reasons.outcome_undecided(point_id)
         if ticket.state == "UNREACHABLE" and ticket.reason is not None:
             return reasons.point_unreachable(point_id, ticket.reason)
-        if ticket.state not in _ACCEPTABLE:
+        if ticket.state not in POINT_STATES["AcceptPoint"]:
             return reasons.point_state(point_id, ticket.state)
         if not ticket.seen:
             return reasons.point_unseen(point_id)
@@ -200,7 +200,7 @@ class PointQueue:
         ticket = self._tickets.get(point_id)
         if ticket is None:
             return reasons.point_unknown(point_id)
-        if ticket.state in ("CUTTING", "DONE", "UNKNOWN"):
+        if ticket.state not in POINT_STATES["RejectPoint"]:
             return reasons.point_state(point_id, ticket.state)
         why = reasons.said(reason) if reason else reasons.rejected()
         self._put(point_id, replace(ticket, state="REJECTED", reason=why, user=user, accepted=None))
@@ -349,7 +349,7 @@ class PointQueue:
         ticket = self._tickets.get(point_id)
         if ticket is None:
             return reasons.point_unknown(point_id)
-        if ticket.state != "UNKNOWN":
+        if ticket.state not in POINT_STATES["ResolvePoint"]:
             return reasons.outcome_known(point_id, ticket.state)
         self._put(point_id, replace(ticket, state=outcome, reason=reasons.inspected(user, reason)))
         return None
@@ -400,7 +400,7 @@ class PointQueue:
         ticket = self._tickets.get(point_id)
         if ticket is None:
             return reasons.point_unknown(point_id)
-        if ticket.state in ("CUTTING", "DONE", "UNKNOWN"):
+        if ticket.state not in POINT_STATES["SetApproach"]:
             return reasons.point_state(point_id, ticket.state)
         self._entries = None
         why = self.approaches.turn(point_id, azimuth, user)

@@ -39,10 +39,10 @@ def messages_module() -> str:
     for name, list_name in CONSTANTS.items():
         values = ", ".join(f'"{value}"' for value in get_args(aliases()[name]))
         parts.append(f"export const {list_name} = Object.freeze([{values}]);\n")
-    holders = ", ".join(f'"{command.name}"' for command in intents.COMMANDS if command.control)
+    rows = (f"  {command}: {json.dumps(states)},\n" for command, states in intents.POINT_STATES.items())
     parts.append(
-        f"/** Intents that need control, except for acknowledging a fault. */\n"
-        f"export const OF_HOLDER = Object.freeze([{holders}]);\n"
+        "/** States of a point in which a command about it is possible. */\n"
+        f"export const POINT_STATES = Object.freeze({{\n{''.join(rows)}}});\n"
     )
     parts.append(f"export const TEXT_MAX_LENGTH = {_text_length()};\n")
     parts.append(
@@ -58,7 +58,8 @@ def messages_types() -> str:
     )
     parts = [_HEADER]
     parts.extend(f"export const {list_name}: readonly {name}[];\n" for name, list_name in CONSTANTS.items())
-    parts.append("export const OF_HOLDER: readonly string[];\n")
+    rows = (f"  {command}: readonly PointState[];\n" for command in intents.POINT_STATES)
+    parts.append(f"export const POINT_STATES: {{\n{''.join(rows)}}};\n")
     parts.append("export const TEXT_MAX_LENGTH: number;\nexport const SURE: number;\n")
     parts.extend(_type(name, _spelled_out(hint)) for name, hint in aliases().items() if _is_worth_a_name(hint))
     from_page = union_members(page_messages.FromPage)
@@ -69,14 +70,15 @@ def messages_types() -> str:
 
 
 def reasons_module() -> str:
-    """Text of `web/js/link/reasons.js`: text and advice of each reason."""
+    """Text of `web/js/link/reasons.js`: severity, text and advice of each reason."""
     header = _HEADER.replace("rolling_panda/messages/", "rolling_panda/reasons.py")
     rows = (
-        f"  {entry.code}: {json.dumps([entry.text, entry.act], ensure_ascii=False)},\n" for entry in CATALOGUE.values()
+        f"  {entry.code}: {json.dumps([entry.severity, entry.text, entry.act], ensure_ascii=False)},\n"
+        for entry in CATALOGUE.values()
     )
     return (
-        f"{header}\n/**\n * English text of each reason with its values in braces, and what to do.\n *\n"
-        " * @type {Readonly<Record<string, readonly [string, string]>>}\n */\n"
+        f"{header}\n/**\n * Severity of each reason, its English text with its values in braces, and what to do.\n *\n"
+        ' * @type {Readonly<Record<string, readonly [import("./messages.js").Severity, string, string]>>}\n */\n'
         f"export const REASONS = Object.freeze({{\n{''.join(rows)}}});\n"
     )
 

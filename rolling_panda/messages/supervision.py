@@ -110,8 +110,9 @@ class ControllerState(Message, frozen=True, kw_only=True):
         mode: State of the supervision state machine.
         phase: Step of the cut sequence in AUTO; empty otherwise.
         reason: Reason for the mode.
-        allowed: Reason why each command would be refused now; None if it would be taken. What only the holder of
-            control may do is told for the holder. The commands about control are not among them.
+        allowed: Reason why each command, or motion by hand (`Teleoperation`), would be refused now; None if it would
+            be taken. What is among `of_holder` is told for the holder. The commands about control are left out.
+        of_holder: What only the holder of control may do now; without a holder, every operator.
         active_point_id: Current point of the work; empty without one.
         method: Name of the whole-body method.
         T_odom_tool: Measured tool pose.
@@ -137,6 +138,7 @@ class ControllerState(Message, frozen=True, kw_only=True):
     phase: Phase
     reason: Reason
     allowed: dict[Name, Reason | None]
+    of_holder: tuple[Name, ...] = ()
     active_point_id: Annotated[str, Meta(max_length=64)]
     method: Name
     T_odom_tool: Pose | None

@@ -5,7 +5,7 @@ import msgspec
 from controller.config import SupervisionConfig
 from controller.supervision import health as safety
 from controller.supervision import modes
-from controller.supervision.permission import Situation, allowed, refusal
+from controller.supervision.permission import Situation, allowed, of_holder, refusal
 from rolling_panda import commands as intents
 from rolling_panda import reasons
 from rolling_panda.commands import COMMAND_OF
@@ -52,6 +52,27 @@ def test_each_thing_that_is_missing_is_said() -> None:
     assert refusal(home, 0.0, situation(health=well(perception=9.0))) is None
     assert refusal(start, 0.0, situation(health=well(watchdog=True))) == reasons.watchdog_holds()
     assert refusal(home, 0.0, situation("PAUSED")) == reasons.wrong_mode("Home", "READY", "PAUSED")
+
+
+def test_a_hold_is_told_with_the_commands() -> None:
+    missing = reasons.homing()
+    limit = SupervisionConfig().hold_link_max_age_s
+    assert allowed(0.0, situation())["Teleoperation"] is None
+    assert allowed(0.0, situation("TELEOP", busy=missing))["Teleoperation"] is None, "the hold under way goes on"
+    assert allowed(0.0, situation(busy=missing))["Teleoperation"] == missing
+    silent = reasons.process_silent("server", 2 * limit, limit)
+    assert allowed(0.0, situation(health=well(server=2 * limit)))["Teleoperation"] == silent
+    elsewhere = reasons.wrong_mode("Teleoperation", "READY", "PAUSED")
+    assert allowed(0.0, situation("PAUSED"))["Teleoperation"] == elsewhere
+
+
+def test_what_only_the_holder_may_do_is_told_and_refused_to_others() -> None:
+    theirs = reasons.control_held("bob")
+    for mode in ("IDLE", "READY", "PAUSED", "FAULT", "ESTOP_LATCHED"):
+        refused = allowed(0.0, situation(mode, not_theirs=theirs))
+        assert {name for name, why in refused.items() if why == theirs} == set(of_holder(mode)), mode
+    assert "Home" in of_holder("READY") and "Pause" not in of_holder("READY")
+    assert of_holder("FAULT") == (), "acknowledging a fault moves nothing"
 
 
 def test_a_pause_ends_the_way_home_in_ready() -> None:

@@ -1,8 +1,10 @@
 import ast
+import json
 import math
 import re
 from pathlib import Path
 from string import Formatter
+from typing import get_args
 
 import msgspec
 import pytest
@@ -14,14 +16,65 @@ from rolling_panda.messages import Reason
 ROOT = Path(reasons.__file__).resolve().parents[1]
 
 
-def test_every_code_is_used_by_the_product():
-    used = set()
+#: A reason that the page makes: its code, and its values as an object literal.
+MADE_BY_PAGE = re.compile(r'\breason\(\s*"(\w+)"(?:,\s*\{([^}]*)\})?')
+
+
+def made_by_page() -> dict[str, set[str]]:
+    """Names of the values of each reason that the page makes itself."""
+    found = {}
+    for path in (ROOT / "web").rglob("*.js"):
+        for code, values in MADE_BY_PAGE.findall(path.read_text(encoding="utf-8")):
+            found[code] = {each.split(":")[0].strip() for each in values.split(",") if each.strip()}
+    return found
+
+
+def made_by_product() -> set[str]:
+    """Codes that a process makes: `reasons.code`, or a name imported from the catalogue."""
+    found = set()
     for package in ("bridge", "controller", "perception", "recorder", "rolling_panda", "server"):
         for path in (ROOT / package).rglob("*.py"):
-            tree = ast.parse(path.read_text(encoding="utf-8"))
-            used |= {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
-            used |= {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
-    assert reasons.CATALOGUE and set(reasons.CATALOGUE) <= used
+            if path == Path(reasons.__file__):
+                continue
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "reasons":
+                    found.add(node.attr)
+                elif isinstance(node, ast.ImportFrom) and node.module == reasons.__name__:
+                    found |= {each.name for each in node.names}
+    return found
+
+
+def values_of(code: str) -> set[str]:
+    return {name for _, name, _, _ in Formatter().parse(reasons.CATALOGUE[code].text) if name}
+
+
+def test_every_code_is_made_by_the_product():
+    words = {"said", "warned", "failed"}
+    assert set(reasons.CATALOGUE) - made_by_product() - set(made_by_page()) <= words, "reasons that nobody makes"
+
+
+def test_the_page_makes_only_reasons_of_the_catalogue_with_all_of_their_values():
+    made = made_by_page()
+    assert "no_link" in made
+    for code, values in made.items():
+        assert values == values_of(code), code
+
+
+def test_the_page_has_every_reason():
+    module = (ROOT / "web" / "js" / "link" / "reasons.js").read_text(encoding="utf-8")
+    rows = dict(re.findall(r"^  (\w+): (\[.*\]),$", module, re.MULTILINE))
+    entries = reasons.CATALOGUE.values()
+    assert {code: json.loads(row) for code, row in rows.items()} == {
+        e.code: [e.severity, e.text, e.act] for e in entries
+    }
+
+
+@pytest.mark.parametrize("entry", reasons.CATALOGUE.values(), ids=reasons.CATALOGUE)
+def test_a_reason_has_a_severity_a_text_and_advice_or_explicitly_none(entry):
+    assert entry.severity in get_args(reasons.Severity)
+    assert re.fullmatch(r"[a-z][a-z0-9_]*", entry.code)
+    assert re.match(r"[A-Z{]", entry.text) and not entry.text.endswith((".", ":", " "))
+    assert entry.act == entry.act.strip() and not entry.act.endswith(".")
 
 
 def test_a_text_names_exactly_the_values():

@@ -20,6 +20,7 @@ from rolling_panda.messages.supervision import (
     StopState,
     VineReport,
 )
+from rolling_panda.reasons import text_of
 from tests.support.page_parts import accepted, choose, held, planned, queue, ready, show, show_mode, working
 from tests.support.played_server import PlayedServer, bridge, controller, point
 from tests.support.points import rolled_out
@@ -277,7 +278,7 @@ def _viewer(page: Page, server: PlayedServer) -> None:
     working(page, server)
     server.role = "viewer"
     server.control = held("other", "Bob")
-    expect(page.locator("#arm")).to_have_attribute("title", "You are signed in as a viewer")
+    expect(page.locator("#arm")).to_have_attribute("title", text_of(reasons.viewer_only()))
 
 
 def _invite(page: Page, server: PlayedServer) -> None:

@@ -12,8 +12,10 @@ from PIL import Image, ImageDraw
 from playwright.sync_api import Page
 from starlette.responses import JSONResponse, Response
 
+from controller.supervision.permission import HOLD, of_holder
 from rolling_panda import messages as m
 from rolling_panda import reasons
+from rolling_panda.commands import COMMANDS
 from rolling_panda.messages import page as page_messages
 from rolling_panda.messages import types as types_messages
 from rolling_panda.messages.supervision import ControlState, ReplayState, SessionReport, StopState
@@ -36,14 +38,19 @@ STILL = (
     "<style>body{margin:0}img{width:100vw;height:100vh;object-fit:cover}</style>"
     "<img id=root src=/viser/still.jpg>"
 )
+COMMAND_NAMES = tuple(command.name for command in COMMANDS if command.process == "controller")
 ALLOWED = {
     "IDLE": ("Arm",),
-    "READY": ("Start", "Home"),
+    "READY": ("Start", "Home", "Teleoperation"),
     "AUTO": ("Pause",),
-    "TELEOP": ("Pause",),
+    "TELEOP": ("Pause", "Teleoperation"),
     "PAUSED": ("Resume",),
     "ESTOP_LATCHED": ("Reset",),
 }
+
+
+def _refused(mode: m.Mode) -> dict[str, m.Reason]:
+    return {name: reasons.wrong_mode(name, "another mode", mode) for name in (*COMMAND_NAMES, HOLD)}
 
 
 def controller(mode: m.Mode = "READY", reason: str = "armed by Ada", **changes: Any) -> m.ControllerState:
@@ -53,7 +60,8 @@ def controller(mode: m.Mode = "READY", reason: str = "armed by Ada", **changes: 
         mode=mode,
         phase="",
         reason=said(reason),
-        allowed=dict.fromkeys((*ALLOWED.get(mode, ()), *points)),
+        allowed=_refused(mode) | dict.fromkeys((*ALLOWED.get(mode, ()), *points)),
+        of_holder=of_holder(mode),
         active_point_id="",
         method="nullspace",
         T_odom_tool=None,

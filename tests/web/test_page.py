@@ -8,6 +8,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from rolling_panda import reasons
 from rolling_panda.messages import page as p
+from rolling_panda.reasons import text_of
 from tests.support.page_host import STAND_STILL
 from tests.support.played_page import box_of, until
 from tests.support.played_server import ORIGIN, PlayedServer, bridge, controller, point
@@ -59,7 +60,7 @@ def test_all_are_accepted_only_from_a_confidence_on_and_the_button_says_which_an
     server.points = server.points[2:]
     server.tell(server.page_points())
     expect(every).to_be_disabled()
-    expect(every).to_have_attribute("title", "No proposed point is ≥ 80 % sure: decide one by one")
+    expect(every).to_have_attribute("title", text_of(reasons.none_so_confident(0.8)))
 
 
 def sure(number: int, share: float) -> p.PagePoint:
@@ -80,22 +81,29 @@ def test_only_what_the_controller_allows_is_enabled_and_the_rest_says_why(page: 
     expect(page.locator("#start")).to_be_enabled()
     pause = page.locator("#pause")
     expect(pause).to_be_disabled()
-    expect(pause).to_have_attribute("aria-description", "There is nothing to pause; the mode is Ready")
+    refused = reasons.impossible_in_ready("pause")
+    server.controller = controller("READY", allowed=controller().allowed | {"Pause": refused})
+    expect(pause).to_have_attribute("aria-description", text_of(refused))
+    server.controller = controller("READY", allowed=controller().allowed | {"Start": refused})
+    expect(page.locator("#start")).to_be_disabled()
     server.role = "viewer"
-    expect(page.locator("#start")).to_have_attribute("title", "You are signed in as a viewer")
+    expect(page.locator("#start")).to_have_attribute("title", text_of(reasons.viewer_only()))
     expect(page.locator("#stop")).to_be_enabled()
 
 
 def test_a_greyed_button_does_nothing_and_says_why_to_a_finger(page: Page, server: PlayedServer) -> None:
+    refused = reasons.impossible_in_ready("pause")
+    server.controller = controller("READY", allowed=controller().allowed | {"Pause": refused})
     pause = page.locator("#pause")
+    expect(pause).to_have_attribute("title", text_of(refused))
     pause.click(force=True)
-    expect(page.locator(".toast")).to_contain_text("There is nothing to pause; the mode is Ready")
+    expect(page.locator(".toast")).to_contain_text(text_of(refused))
     page.locator('[data-point-id="p3"] button.accept').click(force=True)
-    expect(page.locator(".toast").last).to_contain_text("It is done")
+    expect(page.locator(".toast").last).to_contain_text("p3 is Done")
     server.controller = controller("ESTOP_LATCHED")
     expect(page.locator("#reset")).to_have_attribute("aria-disabled", "true")
     page.locator("#reset-reason").press("Enter")
-    expect(page.locator(".toast").last).to_contain_text("Write a reason first")
+    expect(page.locator(".toast").last).to_contain_text(text_of(reasons.reset_unexplained()))
     assert server.posted == []
 
 

@@ -5,6 +5,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from rolling_panda import reasons
 from rolling_panda.messages import page as p
+from rolling_panda.reasons import text_of
 from tests.support.axe import axe, grave
 from tests.support.page_parts import leave
 from tests.support.page_states import STATES
@@ -75,13 +76,13 @@ def test_a_greyed_control_does_nothing_and_says_why_to_keyboard_and_finger(page:
     page.locator("#system-guyot").focus()
     page.keyboard.press("Tab")
     expect(slider).to_be_focused()
-    expect(why).to_have_text("You are signed in as a viewer")
+    expect(why).to_have_text(text_of(reasons.viewer_only()))
     before = slider.input_value()
     page.keyboard.press("ArrowRight")
     page.keyboard.press("End")
     box = box_of(slider)
     page.mouse.click(box["x"] + 0.9 * box["width"], box["y"] + box["height"] / 2)
-    expect(page.locator(".toast")).to_have_text("You are signed in as a viewer×")
+    expect(page.locator(".toast")).to_have_text(f"{text_of(reasons.viewer_only())}×")
     page.keyboard.press("Tab")
     page.keyboard.press("Shift+Tab")
     expect(why).to_be_visible()

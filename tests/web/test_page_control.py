@@ -7,6 +7,7 @@ from playwright.sync_api import Page, expect
 
 from rolling_panda import reasons
 from rolling_panda.messages.page import Ping
+from rolling_panda.reasons import text_of
 from tests.support.page_host import STAND_STILL
 from tests.support.page_parts import held
 from tests.support.played_page import until
@@ -33,7 +34,7 @@ def test_control_is_taken_from_somebody_only_by_a_second_press(page: Page, serve
     assert not any(path == "/api/control/take" for path, _ in server.posted)
     for name in ("#home", "#teleop"):
         expect(page.locator(name)).to_have_attribute("aria-disabled", "true")
-        expect(page.locator(name)).to_have_attribute("title", "Bob holds control: ask for it, or take it")
+        expect(page.locator(name)).to_have_attribute("title", text_of(reasons.control_held("Bob")))
     page.locator("#take-control").click()
     until(page, lambda: ("/api/control/take", {"confirm": True}) in server.posted)
 

@@ -6,6 +6,7 @@ from playwright.sync_api import Page, expect
 
 from rolling_panda import messages as m
 from rolling_panda import reasons
+from rolling_panda.reasons import text_of
 from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer, controller, point
 
@@ -37,7 +38,7 @@ def test_the_list_is_in_the_order_of_work_and_says_whose_it_is(page: Page, serve
     opened(page)
     assert shown(page) == ["p1", "p2", "p3", "p4", "p5"]
     back = page.locator("#planners-order")
-    expect(back).to_have_attribute("title", "It is the plan's order already")
+    expect(back).to_have_attribute("title", text_of(reasons.order_of_plan()))
     server.controller = msgspec.structs.replace(server.controller, order=m.QueueOrder(8, "Bob"))
     expect(page.locator("rp-order summary")).to_contain_text("by Bob")
     back.click()
@@ -84,7 +85,7 @@ def test_keys_move_the_chosen_point(page: Page, server: PlayedServer) -> None:
 def test_who_may_not_change_it_changes_nothing(page: Page, server: PlayedServer) -> None:
     opened(page)
     server.role = "viewer"
-    expect(page.locator("#planners-order")).to_have_attribute("title", "You are signed in as a viewer")
+    expect(page.locator("#planners-order")).to_have_attribute("title", text_of(reasons.viewer_only()))
     page.locator(".order-list").focus()
     page.keyboard.press("ArrowDown")
     page.keyboard.press("Alt+ArrowDown")

@@ -8,6 +8,7 @@ from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.messages import page as p
 from rolling_panda.messages.supervision import PreviewedCut, PreviewState
+from rolling_panda.reasons import text_of
 from tests.support.played_page import until
 from tests.support.played_server import PlayedServer, controller, point
 from tests.support.points import rolled_out
@@ -50,7 +51,7 @@ def moments(server: PlayedServer) -> list[float | None]:
 def test_a_preview_is_asked_for_of_all_or_of_the_chosen_point(page: Page, server: PlayedServer) -> None:
     page.locator("#preview").click()
     until(page, lambda: ("/api/preview", {"point_id": ""}) in server.posted)
-    expect(page.locator("#preview-one")).to_have_attribute("title", "Choose an accepted point first")
+    expect(page.locator("#preview-one")).to_have_attribute("title", text_of(reasons.none_chosen()))
     page.locator('rp-point[data-point-id="p2"]').click()
     page.locator("#preview-one").click()
     until(page, lambda: ("/api/preview", {"point_id": "p2"}) in server.posted)
@@ -102,18 +103,17 @@ def test_where_it_is_required_start_says_what_is_missing(page: Page, server: Pla
     until(page, lambda: ("/api/preview/required", {"required": True}) in server.posted)
     expect(box).not_to_be_checked()
     assert server.controller is not None
-    kept = {name: why for name, why in server.controller.allowed.items() if name != "Start"}
-    server.controller = msgspec.structs.replace(server.controller, allowed=kept)
     told(server, required=True)
     expect(box).to_be_checked()
-    expect(page.locator("#start")).to_have_attribute("title", "Approve the preview first")
-    told(server, required=True, phase="none", preview_hash="", cuts=())
-    expect(page.locator("#start")).to_have_attribute("title", "A preview is required before each cut: press Preview")
+    for missing in (reasons.preview_not_approved(), reasons.preview_needed()):
+        refused = server.controller.allowed | {"Start": missing}
+        server.controller = msgspec.structs.replace(server.controller, allowed=refused)
+        expect(page.locator("#start")).to_have_attribute("title", text_of(missing))
 
 
 def test_who_may_not_operate_may_not_ask_or_approve(page: Page, server: PlayedServer) -> None:
     server.role = "viewer"
     told(server)
     for name in ("preview", "approve-preview"):
-        expect(page.locator(f"#{name}")).to_have_attribute("title", "You are signed in as a viewer")
+        expect(page.locator(f"#{name}")).to_have_attribute("title", text_of(reasons.viewer_only()))
     expect(page.locator("#require-preview")).to_be_disabled()

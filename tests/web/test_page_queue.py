@@ -5,7 +5,9 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.messages import page as p
+from rolling_panda.reasons import text_of
 from tests.support.played_page import until
 from tests.support.played_server import PlayedServer, point
 
@@ -95,7 +97,7 @@ def test_a_point_is_moved_along_its_cane_by_millimetres_and_back(page: Page, ser
     expect(page.locator(".toast").last).to_contain_text("4 mm from a node")
     expect(page.locator("#undo")).to_be_disabled()
     page.locator('[data-point-id="p2"]').click()
-    expect(page.get_by_role("button", name="+1")).to_have_attribute("title", "It is accepted; take that back first")
+    expect(page.get_by_role("button", name="+1")).to_have_attribute("title", text_of(reasons.acceptance_stands("p2")))
 
 
 def many(count: int) -> tuple[p.PagePoint, ...]:

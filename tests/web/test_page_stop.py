@@ -7,7 +7,7 @@ from playwright.sync_api import Page, expect
 from rolling_panda import reasons
 from rolling_panda.messages import page as p
 from rolling_panda.messages.supervision import StopRecord, StopState
-from rolling_panda.reasons import said
+from rolling_panda.reasons import said, text_of
 from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer, bridge, controller
 
@@ -51,7 +51,7 @@ def test_a_pressed_button_on_the_robot_comes_before_the_reset(page: Page, server
     server.stopped = (StopState(process="bridge", stops=(ADA,), hardware=True),)
     page.locator("#reset-reason").fill("row is clear")
     expect(page.locator("#reset")).to_be_disabled()
-    expect(page.locator("#reset")).to_have_attribute("title", "Release the emergency stop button on the robot first")
+    expect(page.locator("#reset")).to_have_attribute("title", text_of(reasons.emergency_stop_pressed()))
     server.stopped = (StopState(process="bridge", stops=(ADA,)),)
     expect(page.locator("#reset")).to_be_enabled()
     page.locator("#reset").click()

@@ -3,7 +3,9 @@
 import pytest
 from playwright.sync_api import Page, expect
 
+from rolling_panda import reasons
 from rolling_panda.messages import page as p
+from rolling_panda.reasons import text_of
 from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer
 
@@ -71,7 +73,7 @@ def test_points_are_placed_or_places_measured_never_both(page: Page, server: Pla
 def test_a_viewer_looks_around_and_is_told_why_measuring_is_not_for_them(page: Page, server: PlayedServer) -> None:
     server.role = "viewer"
     measure = page.locator("#measure")
-    expect(measure).to_have_attribute("title", "You are signed in as a viewer")
+    expect(measure).to_have_attribute("title", text_of(reasons.viewer_only()))
     expect(page.get_by_role("button", name="Row", exact=True)).to_have_attribute("aria-disabled", "false")
     for button in page.locator("rp-view-tools .tools button").all():
         box = box_of(button)

@@ -7,7 +7,7 @@ import { drawOn } from "../js/state/signals.js";
 import { dropDown, element, setEnabled } from "../js/views/dom.js";
 
 /**
- * @type {readonly (readonly [id: string, intent: import("../js/control/allowed.js").Intent, word: string, hint:
+ * @type {readonly (readonly [id: string, intent: string, word: string, hint:
  * string])[]}
  */
 const BUTTONS = Object.freeze([

@@ -3,7 +3,7 @@
 import { holder } from "../js/control/lease.js";
 import { ask } from "../js/link/api.js";
 import { pageState, showToast } from "../js/state/page-state.js";
-import { reasonText } from "../js/state/reasons.js";
+import { reason, reasonText } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
 
@@ -46,7 +46,8 @@ class RpLease extends HTMLElement {
     this.give.title = `${asked} moves the robot then; it stops first`;
     this.request.hidden = !(operates && held && !mine && !coming);
     setText(this.request, mineAsked ? "Asked" : "Ask");
-    const waits = mineAsked ? `You have asked: ${user} can give it to you` : asked && `${asked} has asked already`;
+    const theirs = asked ? reason("control_requested", { user: asked }) : null;
+    const waits = mineAsked ? reason("control_asked_by_you", { user }) : theirs;
     setEnabled(this.request, waits, `Ask ${user} for control; nothing stops meanwhile`);
     this.take.hidden = !operates || mine || coming !== "";
     const sure = performance.now() < this.armed;

@@ -3,6 +3,7 @@
 import { move, whyNotMove } from "../js/control/decisions.js";
 import { turnApproach, whyNotTurn } from "../js/control/order.js";
 import { newtons, uncertainty } from "../js/state/format.js";
+import { reason } from "../js/state/reasons.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
 
 /** @typedef {import("../js/link/messages.js").PagePoint} PagePoint */
@@ -148,7 +149,7 @@ export class RpPointDetails extends HTMLElement {
     setEnabled(this.turn, why, "From where the blades come, turned about the cane; an accepted cut is planned anew");
     setEnabled(
       this.free,
-      why || (azimuth === null ? "It is chosen by what is found already" : ""),
+      why ?? (azimuth === null ? reason("approach_free") : null),
       "Leave the approach to the search",
     );
     if (this.turning) return;

@@ -4,7 +4,7 @@ import { accept, isUncertain, isUnknown, reject, whyNotAccept, whyNotReject } fr
 import { cutTime } from "../js/control/order.js";
 import { select, selectAndReveal } from "../js/control/selection.js";
 import { TEXT_MAX_LENGTH } from "../js/link/messages.js";
-import { POINT_WORDS, counted, } from "../js/state/format.js";
+import { POINT_WORDS, counted } from "../js/state/format.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
 import { icon, setIcon } from "../js/views/icons.js";
 import { reasonText } from "../js/state/reasons.js";

@@ -19,7 +19,7 @@ import {
 import { link, now, pageState, points, preview, selected } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
-import { reasonText } from "../js/state/reasons.js";
+import { reason, reasonText } from "../js/state/reasons.js";
 
 /** @typedef {import("../js/link/messages.js").PreviewState} PreviewState */
 
@@ -76,12 +76,12 @@ class RpPreview extends HTMLElement {
       setEnabled(all, whyNoPreview(accepted.length), "Show what the robot would do with the accepted points");
       setEnabled(
         one,
-        whyNoPreview(accepted.length) || (chosen ? "" : "Choose an accepted point first"),
+        whyNoPreview(accepted.length) ?? (chosen ? null : reason("none_chosen")),
         "Show the cut of the chosen point alone",
       );
       setEnabled(yes, whyNoApproval(), "This is what shall be done; it begins with Start");
       setText(run, playing.get() ? "Stop" : "Play");
-      setEnabled(close, moment.get() === null ? "The ghost is not shown" : "", "Take the ghost out of the 3-D view");
+      setEnabled(close, moment.get() === null ? reason("ghost_hidden") : null, "Take the ghost out of the 3-D view");
       required.checked = state?.required ?? false;
       setEnabled(required, whyNot("RequirePreview"), "No cut begins before its preview has been approved");
       label.title = required.title;

@@ -16,6 +16,7 @@ import { select } from "../js/control/selection.js";
 import { SURE } from "../js/link/messages.js";
 import { counted } from "../js/state/format.js";
 import { link, now, pageState, points, revealCount, selected, staleWords } from "../js/state/page-state.js";
+import { keyOf, reason } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
 import { element, panelHead, setAttribute, setEnabled, setText } from "../js/views/dom.js";
 import { icon } from "../js/views/icons.js";
@@ -27,8 +28,6 @@ import { RpPoint, RpRejectForm } from "./rp-point.js";
 
 /** Intents that a row's buttons depend on. */
 const MAY = /** @type {const} */ (["AcceptPoint", "RejectPoint", "ResolvePoint"]);
-/** Reasons contain the age of a lost process, which grows all the time. */
-const AGE = /[\d.]+ (s|min|h)\b/g;
 /** Height of a group's sticky heading (px). */
 const HEADING = 20;
 /** Rows of Page up and Page down. */
@@ -90,7 +89,7 @@ class RpQueue extends HTMLElement {
       setText(empty, emptyWords());
       // States arrive ten times a second; rows depend on the points and on what is allowed.
       this.markActive(pageState.get()?.controller?.active_point_id ?? "");
-      const may = MAY.map(whyNot).join("\n").replace(AGE, "");
+      const may = MAY.map((command) => keyOf(whyNot(command))).join("\n");
       if (page === drawnPage && may === drawn) return;
       drawnPage = page;
       drawn = may;
@@ -270,11 +269,11 @@ function acceptEvery() {
     const unsure = countOf("PROPOSED") - sure;
     const words = `≥ ${Math.round(100 * SURE)} % sure`;
     setText(button, `Accept all ${sure} (${words})`);
-    const none = unsure === 0 ? "There is no proposed point" : `No proposed point is ${words}: decide one by one`;
+    const none = unsure === 0 ? reason("none_proposed") : reason("none_so_confident", { confidence: SURE });
     const rest = unsure === 0 ? "" : `; ${unsure} less sure: decide one by one`;
     setEnabled(
       button,
-      whyNot("AcceptAll") || (sure === 0 ? none : ""),
+      whyNot("AcceptAll") ?? (sure === 0 ? none : null),
       `Accept every proposed point that is ${words}${rest}`,
     );
   });

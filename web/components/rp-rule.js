@@ -1,9 +1,10 @@
 // The pruning rule. A slider asks for a what-if; Apply puts the rule in force, and Undo reverts it.
 
-import { whyNothing } from "../js/control/allowed.js";
+import { whyNothingOf } from "../js/control/allowed.js";
 import { pushUndo } from "../js/control/decisions.js";
 import { ask, post } from "../js/link/api.js";
-import { isLive, link, now, pageState, points } from "../js/state/page-state.js";
+import { link, now, pageState, points } from "../js/state/page-state.js";
+import { reason } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
 
@@ -207,7 +208,7 @@ class RpRule extends HTMLElement {
     const rule = this.draft ?? this.applied ?? held;
     this.hidden = rule === null;
     if (rule === null) return;
-    const why = whyNothing() || (isLive("perception") ? "" : "Perception is not there");
+    const why = whyNothingOf("perception");
     setText(this.summary, `${ruleWords(this.applied ?? held ?? rule)}${this.draft ? " · another one is tried" : ""}`);
     for (const input of this.systems) {
       if (input.checked !== (input.value === rule.system)) input.checked = input.value === rule.system;
@@ -225,7 +226,7 @@ class RpRule extends HTMLElement {
     this.apply.hidden = this.discard.hidden = this.draft === null;
     setEnabled(
       this.apply,
-      why || (this.known ? "" : "It is not known yet what it would change"),
+      why ?? (this.known ? null : reason("rule_effect_unknown")),
       "From now on points are by this rule; Undo takes it back",
     );
   }

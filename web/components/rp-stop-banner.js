@@ -5,7 +5,7 @@ import { earlierWords, hardwareStopPressed, sinceWords, stopProgress } from "../
 import { ask } from "../js/link/api.js";
 import { TEXT_MAX_LENGTH } from "../js/link/messages.js";
 import { isLive, link, now, pageState, staleWords } from "../js/state/page-state.js";
-import { reasonText } from "../js/state/reasons.js";
+import { reason, reasonText } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
 import { icon, setIcon } from "../js/views/icons.js";
@@ -17,7 +17,7 @@ class RpStopBanner extends HTMLElement {
     const earlier = element("p", { class: "hint earlier" });
     const bridge = acknowledgement("bridge");
     const controller = acknowledgement("controller");
-    const reason = element("input", {
+    const words = element("input", {
       id: "reset-reason",
       attributes: {
         type: "text",
@@ -28,13 +28,13 @@ class RpStopBanner extends HTMLElement {
       },
     });
     const reset = element("button", { id: "reset", text: "Reset", attributes: { type: "submit" } });
-    const form = element("form", {}, reason, reset);
+    const form = element("form", {}, words, reset);
     const hint = element("p", { class: "hint", text: "The reset moves nothing: arm and start again afterwards." });
     form.addEventListener("submit", async (event) => {
       event.preventDefault();
       // With the id of the stop shown: a newer one must not be reset unseen.
-      const body = { reason: reason.value.trim(), stop_id: pageState.get()?.bridge?.stop_id ?? "" };
-      if (await ask("Reset", "api/reset", body)) reason.value = "";
+      const body = { reason: words.value.trim(), stop_id: pageState.get()?.bridge?.stop_id ?? "" };
+      if (await ask("Reset", "api/reset", body)) words.value = "";
     });
     this.append(
       element("div", { class: "banner-head" }, icon("ESTOP_LATCHED"), element("h2", { text: "Software stop" }), who),
@@ -64,11 +64,11 @@ class RpStopBanner extends HTMLElement {
       const before = earlierWords(state);
       earlier.hidden = before === "";
       setText(earlier, before);
-      const pressed = hardwareStopPressed(state) ? "Release the emergency stop button on the robot first" : "";
-      const why = pressed || whyNot("Reset") || (reason.value.trim() === "" ? "Write a reason first" : "");
+      const pressed = hardwareStopPressed(state) ? reason("emergency_stop_pressed") : null;
+      const why = pressed ?? whyNot("Reset") ?? (words.value.trim() === "" ? reason("reset_unexplained") : null);
       setEnabled(reset, why, "Release the latched stop; nothing moves");
     };
-    reason.addEventListener("input", draw);
+    words.addEventListener("input", draw);
     drawOn([pageState, link, now, stopProgress], draw);
     // The robot's own state takes over from "sent".
     pageState.subscribe((state) => {

@@ -14,6 +14,7 @@ import {
 import { fetchJson } from "../js/link/api.js";
 import { nearWords } from "../js/state/format.js";
 import { link, now, pageState, showToast } from "../js/state/page-state.js";
+import { reasonText } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
 import { holdButton } from "../js/views/hold-button.js";
@@ -111,7 +112,7 @@ class RpDrivePad extends HTMLElement {
       if (event.button !== 0 || finger !== null) return;
       const why = drive("pad", () => way);
       if (why) {
-        showToast("warning", why);
+        showToast("warning", reasonText(why));
         return;
       }
       finger = event.pointerId;
@@ -130,8 +131,8 @@ class RpDrivePad extends HTMLElement {
 
     drawOn([moving, teleoperating, gamepad, pageState, link, now], () => {
       const why = whyNoDriving();
-      pad.title = why || label;
-      pad.classList.toggle("disabled", why !== "");
+      pad.title = why ? reasonText(why) : label;
+      pad.classList.toggle("disabled", why !== null);
       const held = gamepad.get() ? "Gamepad: hold a trigger and steer with the left stick." : "A gamepad works too.";
       setText(words, `Drag in the pad, or hold W A S D or the arrow keys. ${held}`);
     });
@@ -243,13 +244,13 @@ function choice(label, chosen, choose, values) {
 }
 
 /**
- * @param {string} why
+ * @param {import("../js/state/reasons.js").Reason|null} why
  * @param {boolean} holding
  * @param {import("../js/control/teleoperation.js").Part} part
  * @param {string} near
  */
 function explanation(why, holding, part, near) {
-  if (why) return `${why}.`;
+  if (why) return `${reasonText(why)}.`;
   if (holding) return near || (part === "tool" ? "The tool follows the gizmo. Let go to stop." : "Let go to stop.");
   if (part === "base") return "The base moves while you hold, and stops when you let go.";
   if (part === "joints") return "A joint turns while you hold + or −. The bar is its range.";

@@ -1,5 +1,6 @@
 // Over the 3-D view: camera presets, layers, measuring; and the hint while clicks place points.
 
+import { whyNothing } from "../js/control/allowed.js";
 import { placing, setPlacing } from "../js/control/placing.js";
 import {
   LAYERS,
@@ -12,6 +13,7 @@ import {
   showLayer,
 } from "../js/control/view-tools.js";
 import { link, now, pageState } from "../js/state/page-state.js";
+import { reason } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
 
@@ -93,12 +95,12 @@ class RpViewTools extends HTMLElement {
 }
 
 function whyNoLooking() {
-  if (link.get().status !== "open") return "There is no link to the server";
-  return pageState.get()?.base ? "" : "It is not known yet where the robot is";
+  if (link.get().status !== "open") return reason("no_link");
+  return pageState.get()?.base ? null : reason("posture_unknown");
 }
 
 function whyNoMeasuring() {
-  return whyNoLooking() || (pageState.get()?.role === "viewer" ? "You are signed in as a viewer" : "");
+  return whyNoLooking() ?? whyNothing();
 }
 
 function distanceWords() {

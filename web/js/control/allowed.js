@@ -1,96 +1,80 @@
-// Which intents are possible now, and otherwise why not. `whyNot…` functions return an empty string if nothing is in
-// the way.
+// Why something cannot be asked for now. The controller tells why it would refuse each command; here stands only what
+// it cannot know: the link, the session, and who holds control. `whyNot…` functions return null if nothing is in the way.
 
-import { OF_HOLDER } from "../link/messages.js";
-import { MODE_WORDS } from "../state/format.js";
-import { isLive, link, pageState, points, preview, staleWords } from "../state/page-state.js";
+import { POINT_STATES } from "../link/messages.js";
+import { STALE_AFTER_S, isLive, link, pageState, points, processAge } from "../state/page-state.js";
+import { reason } from "../state/reasons.js";
 import { holder } from "./lease.js";
-import { reasonText } from "../state/reasons.js";
 
-/** Reason for an intent that the mode does not allow. */
-const NEEDS = Object.freeze({
-  Arm: "Arming starts from Idle",
-  Start: "Starting needs Ready",
-  Survey: "A survey needs Ready",
-  Pause: "There is nothing to pause",
-  Resume: "Resuming needs Paused",
-  Home: "Going home needs Ready",
-  Acknowledge: "There is nothing to acknowledge",
-  Reset: "There is no stop to reset",
-  AcceptPoint: "Points cannot be accepted",
-  AcceptAll: "Points cannot be accepted",
-  RequestPreview: "There can be no preview",
-  ApprovePreview: "Nothing can be approved",
-  RequirePreview: "It cannot be changed",
-  SetApproach: "The approach cannot be turned",
-  MoveInQueue: "The order cannot be changed",
-  ResetOrder: "The order cannot be changed",
-  RejectPoint: "Points cannot be rejected",
-  ReconsiderPoint: "Decisions cannot be taken back",
-  ResolvePoint: "How a cut ended cannot be said",
-});
+/** @typedef {import("../link/messages.js").Process} Process */
+/** @typedef {import("../state/reasons.js").Reason} Reason */
 
-/** @typedef {keyof typeof NEEDS} Intent */
-
-/** Why nothing can be asked for: no link, no state, or a viewer. */
+/**
+ * Why nothing can be asked for: no link, no state, or a viewer.
+ *
+ * @returns {Reason|null}
+ */
 export function whyNothing() {
   const { status } = link.get();
-  if (status === "signed-out") return "You are not signed in";
-  if (status !== "open") return "There is no link to the server";
+  if (status === "signed-out") return reason("not_signed_in");
+  if (status !== "open") return reason("no_link");
   const state = pageState.get();
-  if (state === null) return "Waiting for the first state";
-  if (state.role === "viewer") return "You are signed in as a viewer";
-  return "";
-}
-
-/** Why nothing can be asked of the controller. */
-function whyNoController() {
-  const nothing = whyNothing();
-  if (nothing) return nothing;
-  const known = pageState.get()?.controller && isLive("controller");
-  return known ? "" : staleWords("controller") || "The controller is not there";
+  if (state === null) return reason("no_state_yet");
+  return state.role === "viewer" ? reason("viewer_only") : null;
 }
 
 /**
- * Why the controller would refuse an intent now.
+ * Why nothing can be asked of a process.
  *
- * @param {Intent} intent Name of the intent, as in `ControllerState.allowed`.
+ * @param {Process} process
+ * @returns {Reason|null}
  */
-export function whyNot(intent) {
-  const controller = pageState.get()?.controller ?? null;
-  if (controller === null || whyNoController()) return whyNoController();
-  // Acknowledging a fault moves nothing and needs no control.
-  const ofHolder = OF_HOLDER.includes(intent) && controller.mode !== "FAULT";
-  if (controller.allowed[intent] === null) return ofHolder ? whyNotHolder() : "";
-  if (intent === "Start" && controller.mode === "READY" && countOf("ACCEPTED") === 0) {
-    return countOf("UNREACHABLE") > 0 ? "No accepted point can be reached" : "Accept a point first";
-  }
-  if (intent === "Start" && controller.mode === "READY" && whyNoStart()) return whyNoStart();
-  return `${NEEDS[intent]}; the mode is ${MODE_WORDS[controller.mode]}`;
+export function whyNothingOf(process) {
+  return whyNothing() ?? whySilent("server") ?? whySilent(process);
 }
 
-/** Why work waits for a preview. */
-function whyNoStart() {
-  const state = preview.get();
-  if (!state?.required || state.phase === "approved") return "";
-  if (state.phase === "ready") return "Approve the preview first";
-  if (state.phase === "expired") return `The preview has expired: ${reasonText(state.reason)}`;
-  return "A preview is required before each cut: press Preview";
+/**
+ * @param {Process} process
+ * @returns {Reason|null}
+ */
+function whySilent(process) {
+  const age_s = processAge(process);
+  if (age_s === null) return reason("process_unheard", { process });
+  return isLive(process) ? null : reason("process_silent", { process, age_s, limit_s: STALE_AFTER_S[process] });
 }
 
-/** Names the person who holds control, unless it is this page or nobody. */
-function whyNotHolder() {
+/**
+ * Why the controller would refuse a command now.
+ *
+ * @param {string} command Name of the command, as in `ControllerState.allowed`.
+ * @returns {Reason|null}
+ */
+export function whyNot(command) {
+  const nothing = whyNothingOf("controller");
+  if (nothing) return nothing;
+  const controller = pageState.get()?.controller;
+  const refusal = controller?.allowed[command];
+  if (!controller || refusal === undefined) return reason("command_unknown", { command });
   const { held, mine, user } = holder();
-  return held && !mine ? `${user} holds control: ask for it, or take it` : "";
+  const theirs = held && !mine && controller.of_holder.includes(command);
+  return refusal ?? (theirs ? reason("control_held", { user }) : null);
 }
 
-/** Why teleoperation is not possible now. */
+/**
+ * Why the state of a point refuses a command.
+ *
+ * @param {keyof typeof POINT_STATES} command
+ * @param {import("../link/messages.js").PagePoint} row
+ * @returns {Reason|null}
+ */
+export function whyNotPoint(command, { point: { point_id: point }, entry: { state, reason: why } }) {
+  if (POINT_STATES[command].includes(state)) return null;
+  return state === "UNREACHABLE" && why ? reason("point_unreachable", { point, why }) : reason("point_state", { point, state });
+}
+
+/** Why the robot cannot be moved by hand now. */
 export function whyNoTeleoperation() {
-  const controller = pageState.get()?.controller ?? null;
-  if (controller === null || whyNoController()) return whyNoController();
-  if (!isLive("bridge")) return staleWords("bridge") || "The bridge is not there";
-  if (controller.mode === "READY" || controller.mode === "TELEOP") return whyNotHolder();
-  return `Teleoperation needs Ready; the mode is ${MODE_WORDS[controller.mode]}`;
+  return whyNot("Teleoperation") ?? whyNothingOf("bridge");
 }
 
 /** @param {import("../link/messages.js").PointState} state */

@@ -2,20 +2,16 @@
 
 import { ask } from "../link/api.js";
 import { SURE } from "../link/messages.js";
-import { POINT_WORDS, counted } from "../state/format.js";
-import { isLive, points, say } from "../state/page-state.js";
+import { counted } from "../state/format.js";
+import { points, say } from "../state/page-state.js";
 import { signal } from "../state/signals.js";
-import { whyNot, whyNothing } from "./allowed.js";
-import { saidText } from "../state/reasons.js";
+import { whyNot, whyNotPoint, whyNothingOf } from "./allowed.js";
+import { reason, saidText } from "../state/reasons.js";
 
 /** @typedef {import("../link/messages.js").PagePoint} PagePoint */
 /** @typedef {import("../link/messages.js").PointState} PointState */
 /** @typedef {{ words: string, undo: () => Promise<boolean> }} Decision */
 
-/** @type {ReadonlySet<PointState>} */
-const CAN_ACCEPT = new Set(/** @type {PointState[]} */ (["PROPOSED", "REJECTED", "FAILED_NOT_CUT"]));
-/** @type {ReadonlySet<PointState>} */
-const CAN_REJECT = new Set(/** @type {PointState[]} */ (["PROPOSED", "ACCEPTED", "UNREACHABLE", "FAILED_NOT_CUT"]));
 /** Depth of the undo stack. */
 const MOST = 100;
 
@@ -43,16 +39,13 @@ export function isAccepted(row) {
 /** @param {PagePoint} row */
 export function whyNotAccept(row) {
   if (isUnknown(row)) return whyNot("ResolvePoint");
-  if (row.entry.state === "UNREACHABLE") return "It is accepted, and cannot be reached";
-  if (!CAN_ACCEPT.has(row.entry.state)) return `It is ${POINT_WORDS[row.entry.state].toLowerCase()}`;
-  return whyNot("AcceptPoint");
+  return whyNotPoint("AcceptPoint", row) ?? whyNot("AcceptPoint");
 }
 
 /** @param {PagePoint} row */
 export function whyNotReject(row) {
   if (isUnknown(row)) return whyNot("ResolvePoint");
-  if (!CAN_REJECT.has(row.entry.state)) return `It is ${POINT_WORDS[row.entry.state].toLowerCase()}`;
-  return whyNot("RejectPoint");
+  return whyNotPoint("RejectPoint", row) ?? whyNot("RejectPoint");
 }
 
 /** @param {PagePoint} row */
@@ -109,9 +102,8 @@ export async function acceptAll() {
  * @param {PagePoint} row
  */
 export function whyNotMove(row) {
-  if (isAccepted(row)) return "It is accepted; take that back first";
-  if (!CAN_ACCEPT.has(row.entry.state)) return `It is ${POINT_WORDS[row.entry.state].toLowerCase()}`;
-  return whyNothing() || (isLive("perception") ? "" : "Perception is not there");
+  if (isAccepted(row)) return reason("acceptance_stands", { point: row.point.point_id });
+  return whyNotPoint("MovePoint", row) ?? whyNothingOf("perception");
 }
 
 /**
@@ -135,7 +127,7 @@ export async function undo() {
 
 /** Why there is nothing to undo. */
 export function whyNoUndo() {
-  return decisions.get().length === 0 ? "Nothing has been decided on this page" : whyNot("ReconsiderPoint");
+  return decisions.get().length === 0 ? reason("nothing_decided") : whyNot("ReconsiderPoint");
 }
 
 /**

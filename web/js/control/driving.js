@@ -1,6 +1,7 @@
 // Driving the base by hand with keys, the pad on the page, or a gamepad.
 
 import { showToast } from "../state/page-state.js";
+import { reason, reasonText } from "../state/reasons.js";
 import { signal } from "../state/signals.js";
 import { isTyping } from "./stop.js";
 import { hold, moving, teleoperating } from "./teleoperation.js";
@@ -30,7 +31,7 @@ export const gamepad = signal("");
 
 /** Why the base cannot be driven now. */
 export function whyNoDriving() {
-  return hold.whyNot() || (moving.get() === "base" ? "" : "Choose Base first");
+  return hold.whyNot() ?? (moving.get() === "base" ? null : reason("base_not_chosen"));
 }
 
 /**
@@ -44,7 +45,7 @@ export function drive(source, way) {
     const { ahead, left } = way();
     return { base: { linear: LINEAR * clamp(ahead), angular: ANGULAR * clamp(left) } };
   };
-  return whyNoDriving() || hold.press(source, wanted);
+  return whyNoDriving() ?? hold.press(source, wanted);
 }
 
 /** @param {number} value */
@@ -73,8 +74,8 @@ export function listenForDriveKeys(target) {
       if (event.repeat) return;
       const first = down.size === 0;
       down.add(event.code);
-      const why = first ? drive("drive", () => sum([...down].map((code) => KEYS[code] ?? [0, 0]))) : "";
-      if (why) showToast("warning", why);
+      const why = first ? drive("drive", () => sum([...down].map((code) => KEYS[code] ?? [0, 0]))) : null;
+      if (why) showToast("warning", reasonText(why));
     },
     { capture: true },
   );
@@ -112,7 +113,7 @@ export function watchGamepad() {
     if (!same || !pulled || !document.hasFocus()) hold.release("gamepad");
     else if (begins) {
       const why = drive("gamepad", () => read(index));
-      if (why) showToast("warning", why);
+      if (why) showToast("warning", reasonText(why));
     }
   };
   window.setInterval(poll, POLL_MS);

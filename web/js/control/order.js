@@ -3,7 +3,8 @@
 import { ask } from "../link/api.js";
 import { counted } from "../state/format.js";
 import { pageState, points } from "../state/page-state.js";
-import { countOf, whyNot } from "./allowed.js";
+import { reason } from "../state/reasons.js";
+import { countOf, whyNot, whyNotPoint } from "./allowed.js";
 
 /** @typedef {import("../link/messages.js").PagePoint} PagePoint */
 /** @typedef {import("../link/messages.js").PointPlan} PointPlan */
@@ -48,7 +49,7 @@ export function whyNoMove() {
 
 /** Why the order cannot be reset to the plan's. */
 export function whyNoResetOrder() {
-  return whyNot("ResetOrder") || (orderedBy() ? "" : "It is the plan's order already");
+  return whyNot("ResetOrder") ?? (orderedBy() ? null : reason("order_of_plan"));
 }
 
 /**
@@ -75,8 +76,7 @@ export async function resetOrder() {
  * @param {PagePoint} row
  */
 export function whyNotTurn(row) {
-  if (["CUTTING", "DONE", "UNKNOWN"].includes(row.entry.state)) return "It is cut, or may be";
-  return whyNot("SetApproach");
+  return whyNotPoint("SetApproach", row) ?? whyNot("SetApproach");
 }
 
 /**

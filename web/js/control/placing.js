@@ -2,9 +2,9 @@
 
 import { post } from "../link/api.js";
 import { socket } from "../link/socket.js";
-import { isLive, link, pageState, say, showToast } from "../state/page-state.js";
+import { link, pageState, say, showToast } from "../state/page-state.js";
 import { signal } from "../state/signals.js";
-import { whyNothing } from "./allowed.js";
+import { whyNothingOf } from "./allowed.js";
 import { select } from "./selection.js";
 
 /** Do clicks place points? */
@@ -12,7 +12,7 @@ export const placing = signal(false);
 
 /** Why no point can be placed now. */
 export function whyNoPlacing() {
-  return whyNothing() || (isLive("perception") ? "" : "Perception is not there");
+  return whyNothingOf("perception");
 }
 
 /** @param {boolean} on */

@@ -5,7 +5,7 @@ import { socket } from "../link/socket.js";
 import { preview } from "../state/page-state.js";
 import { signal } from "../state/signals.js";
 import { whyNot, whyNothing } from "./allowed.js";
-import { reasonText } from "../state/reasons.js";
+import { reason } from "../state/reasons.js";
 
 /** @typedef {import("../link/messages.js").PreviewedCut} PreviewedCut */
 
@@ -24,15 +24,15 @@ export function hasPreview() {
 
 /** Why no preview can be requested. @param {number} accepted Number of accepted points. */
 export function whyNoPreview(accepted) {
-  return whyNot("RequestPreview") || (accepted === 0 ? "Accept a point first" : "");
+  return whyNot("RequestPreview") ?? (accepted === 0 ? reason("none_accepted") : null);
 }
 
 /** Why the preview cannot be approved. */
 export function whyNoApproval() {
   const state = preview.get();
-  if (!state || !hasPreview()) return whyNothing() || "There is no preview yet";
-  if (state.phase === "approved") return `Approved by ${state.approved_by}`;
-  if (state.phase === "expired") return `It has expired: ${reasonText(state.reason)}`;
+  if (!state || !hasPreview()) return whyNothing() ?? reason("preview_missing");
+  if (state.phase === "approved") return reason("preview_approved_already", { user: state.approved_by });
+  if (state.phase === "expired" && state.reason) return reason("preview_expired", { cause: state.reason });
   return whyNot("ApprovePreview");
 }
 

@@ -2,11 +2,12 @@
 
 import { socket } from "../link/socket.js";
 import { pageState, showToast } from "../state/page-state.js";
-import { reasonText } from "../state/reasons.js";
+import { reason, reasonText } from "../state/reasons.js";
 import { signal } from "../state/signals.js";
 import { whyNoTeleoperation } from "./allowed.js";
 import { isTyping } from "./stop.js";
 
+/** @typedef {import("../state/reasons.js").Reason} Reason */
 /** @typedef {"button"|"key"|"gizmo"|"drive"|"pad"|"gamepad"|"joint"} HoldSource */
 /**
  * @typedef {{ base?: import("../link/messages.js").BaseVelocity, joints?: import("../link/messages.js").ArmVelocities
@@ -16,12 +17,11 @@ import { isTyping } from "./stop.js";
 const PERIOD_MS = 50;
 /** Sources that lead the tool to the gizmo and may be held together. Any other source has to be the only one. */
 const TOOL = new Set(["button", "key", "gizmo"]);
-const TWO_AT_ONCE = "Two at once: it stopped. Let go, then hold one of them";
 
 class HoldToMove {
   /**
    * @param {(hold: import("../link/messages.js").Hold) => void} send
-   * @param {() => string} whyNot Why holding is not possible now.
+   * @param {() => Reason|null} whyNot Why holding is not possible now.
    */
   constructor(send, whyNot) {
     this.send = send;
@@ -42,22 +42,22 @@ class HoldToMove {
    *
    * @param {HoldSource} source
    * @param {() => Wanted} [wanted] Velocities of base or joints; by default the tool follows the gizmo.
-   * @returns {string} Why it was refused; empty if accepted.
+   * @returns {Reason|null} Why it was refused; null if accepted.
    */
   press(source, wanted = () => ({})) {
     const why = this.whyNot();
     if (why) return why;
     if (this.sources.size > 0 && [...this.sources, source].some((each) => !TOOL.has(each))) {
       this.releaseAll();
-      return TWO_AT_ONCE;
+      return reason("two_holds");
     }
     this.sources.add(source);
     this.wanted = wanted;
-    if (this.holding.get()) return "";
+    if (this.holding.get()) return null;
     this.holding.set(true);
     this.tell(true);
     this.timer = window.setInterval(() => this.turn(), PERIOD_MS);
-    return "";
+    return null;
   }
 
   /** @param {HoldSource} source */
@@ -99,7 +99,7 @@ export const axes = signal(/** @type {import("../link/messages.js").GizmoAxes} *
 
 export const hold = new HoldToMove(
   (message) => socket.send(message),
-  () => whyNoTeleoperation() || (teleoperating.get() ? "" : "Switch on Teleoperate first"),
+  () => whyNoTeleoperation() ?? (teleoperating.get() ? null : reason("teleoperation_off")),
 );
 
 /** @param {boolean} on */
@@ -167,7 +167,7 @@ export function listenForHoldKey(target) {
     if (event.code !== "KeyH" || event.repeat || event.ctrlKey || event.metaKey || event.altKey) return;
     if (isTyping(event.target) || moving.get() !== "tool") return;
     const why = hold.press("key");
-    if (why && teleoperating.get()) showToast("warning", why);
+    if (why && teleoperating.get()) showToast("warning", reasonText(why));
   });
   target.addEventListener("keyup", (event) => {
     if (event.code === "KeyH") hold.release("key");

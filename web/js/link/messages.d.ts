@@ -3,7 +3,13 @@
 
 export const PROCESSES: readonly Process[];
 
-export const OF_HOLDER: readonly string[];
+export const POINT_STATES: {
+  AcceptPoint: readonly PointState[];
+  RejectPoint: readonly PointState[];
+  MovePoint: readonly PointState[];
+  SetApproach: readonly PointState[];
+  ResolvePoint: readonly PointState[];
+};
 
 export const TEXT_MAX_LENGTH: number;
 export const SURE: number;
@@ -185,8 +191,10 @@ export interface ControllerState {
   phase: Phase;
   /** Reason for the mode. */
   reason: Reason;
-  /** Reason why each command would be refused now; None if it would be taken. What only the holder of control may do is told for the holder. The commands about control are not among them. */
+  /** Reason why each command, or motion by hand (`Teleoperation`), would be refused now; None if it would be taken. What is among `of_holder` is told for the holder. The commands about control are left out. */
   allowed: Record<string, Reason|null>;
+  /** What only the holder of control may do now; without a holder, every operator. */
+  of_holder: string[];
   /** Current point of the work; empty without one. */
   active_point_id: string;
   /** Name of the whole-body method. */

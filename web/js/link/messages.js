@@ -4,8 +4,14 @@
 
 export const PROCESSES = Object.freeze(["bridge", "controller", "perception", "server"]);
 
-/** Intents that need control, except for acknowledging a fault. */
-export const OF_HOLDER = Object.freeze(["Arm", "Start", "Survey", "LookAgain", "Resume", "Home", "Acknowledge"]);
+/** States of a point in which a command about it is possible. */
+export const POINT_STATES = Object.freeze({
+  AcceptPoint: ["PROPOSED", "REJECTED", "FAILED_NOT_CUT"],
+  RejectPoint: ["PROPOSED", "ACCEPTED", "UNREACHABLE", "FAILED_NOT_CUT", "REJECTED"],
+  MovePoint: ["PROPOSED", "REJECTED", "FAILED_NOT_CUT"],
+  SetApproach: ["PROPOSED", "ACCEPTED", "UNREACHABLE", "FAILED_NOT_CUT", "REJECTED"],
+  ResolvePoint: ["UNKNOWN"],
+});
 
 export const TEXT_MAX_LENGTH = 500;
 

@@ -19,7 +19,7 @@ import { signal } from "./signals.js";
 
 const MAX_LINES = 500;
 /** Age from which the state of a process is stale (s). */
-const OLD_AFTER_S = { bridge: 1, controller: 1, perception: 2, server: 1 };
+export const STALE_AFTER_S = { bridge: 1, controller: 1, perception: 2, server: 1 };
 
 export const link = signal(/** @type {Link} */ ({ status: "connecting", attempts: 0 }));
 export const pageState = signal(/** @type {PageState|null} */ (null));
@@ -147,7 +147,7 @@ function toldAge(process) {
  */
 export function isGone(process) {
   const row = pageState.get()?.processes.find((each) => each.process === process);
-  return !row?.present || (toldAge(process) ?? Infinity) >= OLD_AFTER_S[process];
+  return !row?.present || (toldAge(process) ?? Infinity) >= STALE_AFTER_S[process];
 }
 
 /**
@@ -159,8 +159,8 @@ export function isLive(process) {
   const state = pageState.get();
   const age = processAge(process);
   if (state === null || link.get().status !== "open") return false;
-  if (process === "server") return turns < SILENT_TURNS || (age ?? 0) < OLD_AFTER_S.server;
-  return !isGone(process) && age !== null && age < OLD_AFTER_S[process];
+  if (process === "server") return turns < SILENT_TURNS || (age ?? 0) < STALE_AFTER_S.server;
+  return !isGone(process) && age !== null && age < STALE_AFTER_S[process];
 }
 
 /**

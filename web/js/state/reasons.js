@@ -6,6 +6,27 @@ import { labelOf } from "./format.js";
 /** @typedef {{code: string, values: readonly (readonly [string, string|number|Reason])[]}} Reason */
 
 /**
+ * A reason of the page's own.
+ *
+ * @param {string} code
+ * @param {Readonly<Record<string, string|number|Reason>>} [values]
+ * @returns {Reason}
+ */
+export function reason(code, values = {}) {
+  return { code, values: Object.entries(values) };
+}
+
+/**
+ * The same for reasons that differ in numbers alone, such as an age that grows.
+ *
+ * @param {Reason|null} why
+ * @returns {string}
+ */
+export function keyOf(why) {
+  return JSON.stringify(why, (_, value) => (typeof value === "number" ? 0 : value));
+}
+
+/**
  * English text of a reason, with what to do; empty without one. A code that this page does not know is shown with its
  * values.
  *
@@ -17,8 +38,9 @@ export function reasonText(reason) {
   const entry = REASONS[reason.code];
   const values = new Map(reason.values);
   if (!entry) return [reason.code, ...[...values].map(([name, value]) => `${name} ${shown(value, "")}`)].join(", ");
-  const text = entry[0].replace(/\{(\w+)(?::([^}]*))?\}/g, (_, name, format) => shown(values.get(name), format ?? ""));
-  return entry[1] ? `${text}: ${entry[1]}` : text;
+  const [, template, act] = entry;
+  const text = template.replace(/\{(\w+)(?::([^}]*))?\}/g, (_, name, format) => shown(values.get(name), format ?? ""));
+  return act ? `${text}: ${act}` : text;
 }
 
 /**

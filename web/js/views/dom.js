@@ -1,5 +1,7 @@
 // Building DOM elements without markup strings, so that no text can become markup.
 
+import { reasonText } from "../state/reasons.js";
+
 const SVG = "http://www.w3.org/2000/svg";
 
 /**
@@ -74,12 +76,12 @@ export function setText(node, text) {
  * neither press nor focus and could not show its reason (`disabled-reasons.js`).
  *
  * @param {HTMLButtonElement|HTMLInputElement} button
- * @param {string} why Reason; empty to enable.
+ * @param {import("../state/reasons.js").Reason|null} why Reason; null to enable.
  * @param {string} [hint] What it does; shown while enabled.
  */
 export function setEnabled(button, why, hint = "") {
-  const words = why || hint;
-  setAttribute(button, "aria-disabled", String(why !== ""));
+  const words = why ? reasonText(why) : hint;
+  setAttribute(button, "aria-disabled", String(why !== null));
   setAttribute(button, "title", words);
   setAttribute(button, "aria-description", words);
 }

@@ -1,10 +1,11 @@
 // A button that acts while it is held with a finger, the mouse, or Enter.
 
 import { showToast } from "../state/page-state.js";
+import { reasonText } from "../state/reasons.js";
 
 /**
  * @param {HTMLElement} button
- * @param {() => string} press Returns why it was refused.
+ * @param {() => import("../state/reasons.js").Reason|null} press Returns why it was refused.
  * @param {() => void} release
  */
 export function holdButton(button, press, release) {
@@ -12,7 +13,7 @@ export function holdButton(button, press, release) {
   const begin = () => {
     const why = press();
     held = !why;
-    if (why) showToast("warning", why);
+    if (why) showToast("warning", reasonText(why));
   };
   // Only if this button is held: blur arrives after the next one has been pressed.
   const end = () => {
