@@ -121,14 +121,13 @@ def test_classes_depth_and_colour_agree(scenes):
         assert (scene.depth[wood] < 6.0).mean() > 0.99 if wood.any() else True
 
 
-def test_the_pictures_are_as_varied_as_they_are_meant_to_be(scenes, artist):
+def test_the_pictures_are_as_varied_as_they_are_meant_to_be(scenes):
     shares = np.array([[(scene.labels == k).mean() for k in range(FAR)] for scene in scenes])
     assert (shares[:, list(WOOD)].sum(axis=1) > 0.005).mean() > 0.6
     assert all((shares[:, k] > 0.0).any() for k in range(FAR))
-    brightness = [artist.draw(3, number).color.mean() for number in range(40)]
-    assert np.ptp(brightness) > 100.0
-    without = sum(artist.draw(3, number).depth is None for number in range(40))
-    assert 8 <= without <= 30
+    drawings = [scene.photograph(np.random.default_rng(number)) for number, scene in enumerate(scenes)]
+    assert np.ptp([each.color.mean() for each in drawings]) > 100.0
+    assert 8 <= sum(each.depth is None for each in drawings) <= 30
 
 
 def test_wood_differs_from_what_is_around_it(scenes):
@@ -157,7 +156,13 @@ def test_backgrounds_are_read_by_name_and_a_bad_one_is_named(tmp_path):
         load_backgrounds(tmp_path)
     Image.new("RGB", (2000, 1000), (1, 2, 3)).save(tmp_path / "b.png")
     Image.new("CMYK", (90, 80)).save(tmp_path / "a.jpg")
-    assert [each.shape for each in load_backgrounds(tmp_path)] == [(80, 90, 3), (640, 1280, 3)]
+    (tmp_path / "LICENCES.txt").write_text("a.jpg: Anna, CC0\n", encoding="utf-8")
+    with pytest.raises(InputError, match="b.png"):
+        load_backgrounds(tmp_path)
+    (tmp_path / "LICENCES.txt").write_text("a.jpg: Anna, CC0\n\nb.png: Bo: GPL-2+\nc.png: C, CC0\n", encoding="utf-8")
+    found = load_backgrounds(tmp_path)
+    assert [(each.name, each.credit) for each in found] == [("a.jpg", "Anna, CC0"), ("b.png", "Bo: GPL-2+")]
+    assert [each.picture.shape for each in found] == [(80, 90, 3), (640, 1280, 3)]
     (tmp_path / "c.png").write_bytes(b"no picture")
     with pytest.raises(InputError, match="c.png"):
         load_backgrounds(tmp_path)

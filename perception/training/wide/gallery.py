@@ -24,7 +24,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--size", type=int, default=320, help="side of a picture (px)")
     parser.add_argument("--backgrounds", type=Path, metavar="DIR", help="real pictures without vines")
     words = parser.parse_args(argv)
-    artist = Artist(words.size, load_backgrounds(words.backgrounds))
+    artist = Artist(words.size, tuple(each.picture for each in load_backgrounds(words.backgrounds)))
     palette = np.array([*COLORS, (120, 120, 120)], np.uint8)
     drawn = [artist.draw(words.seed, number) for number in range(_ACROSS * _DOWN)]
     words.out.mkdir(parents=True, exist_ok=True)
