@@ -12,6 +12,7 @@ from rolling_panda.errors import MessageError
 from rolling_panda.generate.description import alias_name, aliases, describe, is_union, reachable, union_members
 from rolling_panda.messages import page as page_messages
 from rolling_panda.mode_table import ROWS
+from rolling_panda.reasons import CATALOGUE
 from rolling_panda.topics import SERVICES, TOPICS
 
 _BLOCK = re.compile(r"(<!-- generated: ([a-z-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
@@ -219,6 +220,13 @@ def table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     lines.extend("| " + " | ".join(row) + " |" for row in rows)
     return "\n".join(lines) + "\n"
+
+
+def reasons_table() -> str:
+    """One row for each reason, by code."""
+    entries = sorted(CATALOGUE.values(), key=lambda entry: entry.code)
+    rows = [(f"`{entry.code}`", entry.severity, entry.text, entry.act) for entry in entries]
+    return table(("code", "severity", "text", "what to do"), rows)
 
 
 BLOCKS: dict[str, Callable[[], str]] = {
