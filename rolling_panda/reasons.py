@@ -1740,3 +1740,181 @@ def first_plan() -> None:
 @_reason("info", "wait")
 def plan_awaited() -> None:
     """A plan is about to be made."""
+
+
+# Bridge
+
+
+@_reason("warning", "")
+def message_undecodable(detail: str) -> None:
+    """Not a message of this topic: {detail}."""
+
+
+@_reason("warning", "")
+def command_old() -> None:
+    """The sequence is not newer than the last."""
+
+
+@_reason("warning", "")
+def echo_unsent() -> None:
+    """It echoes a joint state that was never sent."""
+
+
+@_reason("warning", "")
+def command_late() -> None:
+    """It was computed from a joint state that is too old."""
+
+
+@_reason("warning", "")
+def velocity_not_finite() -> None:
+    """The velocity is not a finite number."""
+
+
+@_reason("warning", "")
+def velocity_too_high() -> None:
+    """The velocity is outside the robot's limits."""
+
+
+@_reason("warning", "")
+def must_begin_at_rest() -> None:
+    """The first setpoint after a standstill must be zero."""
+
+
+@_reason("warning", "")
+def epoch_old() -> None:
+    """It is an older controller's command."""
+
+
+@_reason("warning", "")
+def epoch_unknown() -> None:
+    """The bridge has not issued this epoch."""
+
+
+@_reason("warning", "")
+def token_foreign() -> None:
+    """The token does not belong to this epoch."""
+
+
+@_reason("warning", "")
+def token_held() -> None:
+    """Another controller commands the robot; a token is issued once the other has ended or is silent."""
+
+
+@_reason("warning", "")
+def token_at_rest_only() -> None:
+    """The robot still moves; a token is issued at rest."""
+
+
+@_reason("error", "end the bridge and run: rolling-panda bridge --begin-anew")
+def epochs_used_up() -> None:
+    """No epoch is left."""
+
+
+@_reason("warning", "")
+def blades_busy() -> None:
+    """The blades are still at the last cut."""
+
+
+@_reason("error", "free the disk or replace it")
+def cut_not_remembered() -> None:
+    """The cut cannot be remembered: the disk is full or broken."""
+
+
+@_reason("warning", "")
+def cut_in_motion() -> None:
+    """The robot moves; the blades close at rest."""
+
+
+@_reason("warning", "reset the stop first")
+def stop_latched() -> None:
+    """The software stop is latched."""
+
+
+@_reason("warning", "")
+def cutter_inhibited() -> None:
+    """No valid setpoint keeps the cutter enabled."""
+
+
+@_reason("warning", "")
+def not_in_command() -> None:
+    """It is not from the controller that commands the robot."""
+
+
+@_reason("warning", "")
+def other_refusals() -> None:
+    """Refused for other reasons."""
+
+
+@_reason("warning", "")
+def refused_on(topic: str, cause: Reason, times: float) -> None:
+    """Refused on {topic}, {times:.0f} times: {cause}."""
+
+
+@_reason("warning", "")
+def refused_once_on(topic: str, cause: Reason) -> None:
+    """Refused on {topic}: {cause}."""
+
+
+@_reason("info", "")
+def token_given_back(epoch: float) -> None:
+    """The controller that held epoch {epoch:.0f} has given way."""
+
+
+@_reason("info", "")
+def token_issued(epoch: float) -> None:
+    """A controller has the token: epoch {epoch:.0f}."""
+
+
+@_reason("warning", "")
+def setpoints_missing() -> None:
+    """No valid setpoint: the base stands, the arm holds, the cutter is inhibited."""
+
+
+@_reason("info", "")
+def setpoints_arrive() -> None:
+    """Setpoints arrive: the robot follows."""
+
+
+@_reason("warning", "")
+def robot_faulty(detail: str) -> None:
+    """The robot does not move: {detail}."""
+
+
+@_reason("info", "")
+def robot_ready_again() -> None:
+    """The robot is ready again; it waits for a setpoint at rest."""
+
+
+@_reason("info", "")
+def cut_reported(cut: str, detail: str) -> None:
+    """Cut {cut}: {detail}."""
+
+
+@_reason("warning", "")
+def cut_not_done(cut: str, outcome: str, detail: str) -> None:
+    """Cut {cut} is {outcome}: {detail}."""
+
+
+@_reason("error", "stop the robot")
+def moved_in_mode(mode: str) -> None:
+    """The robot is commanded to move, though the controller's mode is {mode}."""
+
+
+@_reason("error", "stop the robot")
+def moved_without_mode() -> None:
+    """The robot is commanded to move, though no controller publishes its mode."""
+
+
+@_reason("warning", "")
+def no_stop_latched() -> None:
+    """No stop is latched."""
+
+
+@_reason("warning", "release it first")
+def emergency_button_pressed() -> None:
+    """The robot's emergency stop button is pressed."""
+
+
+@_reason("warning", "look at the newest stop first")
+def another_stop_latched(latched: str, asked: str) -> None:
+    """The latched stop is {latched}, not {asked}."""

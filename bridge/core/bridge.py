@@ -25,13 +25,14 @@ from bridge.core.state_memory import Remembered
 from bridge.core.validator import CommandValidator
 from bridge.core.watchdog import Watchdog
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.messages.perception import Capsule, CloseUpRequest, Scenery
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.messages.supervision import StopState
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import Limits
 from rolling_panda.model.wire_values import actuated
-from rolling_panda.reasons import button_pressed, noted, text_of
+from rolling_panda.reasons import text_of
 from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.topics import BRIDGE, CLOSE_UP_REQUEST, CUT, MOTION, ODOMETRY, TOKEN
 from rolling_panda.transport.rejections import Rejections
@@ -42,7 +43,7 @@ _STATE_TICKS = round(1 / BRIDGE.rate_hz / TICK_S)
 # Speed limits of wheels and joints for closing the blades (rad/s): 5 mm/s at the axle, and the motion that holding
 # the tool in place needs.
 _CUT_WHEELS, _CUT_JOINTS = 0.04, 0.1
-MOVING_CUT = "the robot is not at rest"
+MOVING_CUT = reasons.cut_in_motion()
 # Time without a step (s) after which the robot's own deadlines have begun to stop it. The setpoint then restarts from
 # the measured motion.
 _STANDSTILL_S = 0.05
@@ -145,9 +146,7 @@ class BridgeCore:
         self._cut_id = ""
         self._outcome: m.Outcome = ""
         self._relaxed_limits = relaxed_limits
-        self._events: list[tuple[m.Severity, str]] = [
-            ("warning", f"less strict than usual: {line}") for line in relaxed_limits
-        ]
+        self._events = [reasons.limit_relaxed(line) for line in relaxed_limits]
         self._state_due = True
 
     @property
@@ -171,7 +170,7 @@ class BridgeCore:
         if request.releases:
             if self._fence.release(request.token):
                 self._halt()
-                self._token_changed(f"the controller that held epoch {epoch} has given way")
+                self._token_changed(reasons.token_given_back(epoch))
             return
         reason = self._validator.claim(request, now, not np.any(self._limiter.sent))
         if reason is not None:
@@ -180,25 +179,25 @@ class BridgeCore:
         self._mode = request.mode, now
         if self._fence.epoch != epoch:
             # The token changes hands at rest only, and the validator asks the new holder for rest first.
-            self._token_changed(f"a controller has the token: epoch {self._fence.epoch}")
+            self._token_changed(reasons.token_issued(self._fence.epoch))
 
-    def _token_changed(self, text: str) -> None:
-        self._log("info", text)
+    def _token_changed(self, told: m.Reason) -> None:
+        self._log(told)
         self._remember()
         self._fence_kept, self._state_due = False, True
 
     def on_cut(self, command: m.CutCommand, now: float) -> None:
         """Close the blades, once for a `cut_id`."""
-        inhibited = ""
+        inhibited = None
         if self._latch.stop_id:
-            inhibited = "the software stop is latched"
+            inhibited = reasons.stop_latched()
         elif self._faults.current:
-            inhibited = self._faults.current
+            inhibited = reasons.robot_faulty(self._faults.current)
         elif self._watchdog.tripped(now) or self._validator.must_rest:
-            inhibited = "no valid setpoint keeps the cutter enabled"
+            inhibited = reasons.cutter_inhibited()
         wrong = self._validator.refuse_cut(command, now) or self._unsteady()
         verdict, reason = self._orders.judge(command, wrong, self._measured.cutter == "open", inhibited)
-        if verdict == "refuse":
+        if reason is not None:
             self.refusals.add(CUT.name, reason)
         if verdict == "cut":
             self.robot.cut(command.cut_id, command.point_id)
@@ -210,11 +209,11 @@ class BridgeCore:
     def on_picture(self, request: CloseUpRequest) -> None:
         """Take a picture as soon as the camera is free; only for the token's holder."""
         if request.epoch != self._fence.epoch:
-            self.refusals.add(CLOSE_UP_REQUEST.name, "not from the controller that commands the robot")
+            self.refusals.add(CLOSE_UP_REQUEST.name, reasons.not_in_command())
             return
         self._camera_trigger.want(request)
 
-    def _unsteady(self) -> str | None:
+    def _unsteady(self) -> m.Reason | None:
         speed = np.abs(self._measured.velocity)
         still = speed[:2].max() <= _CUT_WHEELS and speed[2:].max() <= _CUT_JOINTS
         return None if still else MOVING_CUT
@@ -222,8 +221,11 @@ class BridgeCore:
     def on_stop(self, request: m.StopRequest, now: float, wall_time: float = 0.0) -> None:
         """Latch a stop; repetitions change nothing. `wall_time` (s since 1970) is for people."""
         if self._latch.stop(request, wall_time):
-            what = "emergency stop" if request.source == "hardware" else "software stop"
-            self._log("warning", f"{what} by {request.user or request.source}: {text_of(request.reason)}")
+            who = request.user or request.source
+            by_button = request.source == "hardware"
+            self._log(
+                reasons.emergency_stop(request.reason) if by_button else reasons.software_stop(who, request.reason)
+            )
             self._stops_changed()
 
     def _stops_changed(self) -> None:
@@ -234,7 +236,7 @@ class BridgeCore:
         pressed = self._measured.emergency
         if pressed and not self._latch.hardware:
             stop_id = f"hardware-{self._draw()}"
-            pressed_there = button_pressed()
+            pressed_there = reasons.button_pressed()
             self.on_stop(
                 m.StopRequest(stop_id=stop_id, source="hardware", user="", reason=pressed_there), now, self._wall
             )
@@ -244,12 +246,12 @@ class BridgeCore:
     def on_release(self, request: m.ReleaseStop, now: float) -> m.Answer:
         """Release the latched stop that the request names. Nothing moves before a setpoint at rest has come."""
         reason = self._latch.release(request)
-        if reason:
-            return m.Answer(ok=False, reason=reason)
+        if reason is not None:
+            return m.Answer(ok=False, reason=text_of(reason), refused=reason)
         self._halt()
         self._faults.released(now)
         self._stops_changed()
-        self._log("info", f"software stop released by {request.user}: {request.reason}")
+        self._log(reasons.stop_reset(request.user, request.reason))
         return m.Answer(ok=True)
 
     def step(self, now: float, clock: float | None = None, wall_time: float = 0.0) -> BridgeOutputs:
@@ -278,9 +280,9 @@ class BridgeCore:
         if tripped and not self._was_tripped:
             self._halt()
             if not self._faults.current:
-                self._log("warning", "no valid setpoint: base 0, arm holds, cutter inhibited")
+                self._log(reasons.setpoints_missing())
         elif self._was_tripped and not tripped:
-            self._log("info", "setpoints arrive: the robot follows")
+            self._log(reasons.setpoints_arrive())
         if tripped != self._was_tripped:
             self._state_due = True
         self._was_tripped = tripped
@@ -293,7 +295,7 @@ class BridgeCore:
         change = self._faults.follow(fault, measured.severe, bool(self._latch.stop_id), now)
         if change is not None:
             self._halt()
-            self._log("warning" if self._faults.current else "info", change.text)
+            self._log(change.told)
             if change.stop is not None:
                 self.on_stop(change.stop, now, self._wall)
 
@@ -313,13 +315,17 @@ class BridgeCore:
         measured = self._measured
         if measured.cut_id == self._cut_id and measured.outcome != self._outcome:
             self._outcome = measured.outcome
-            severity: m.Severity = "info" if measured.outcome == "DONE" else "warning"
-            self._log(severity, f"cut {self._cut_id}: {measured.outcome}, {measured.detail}")
+            done = measured.outcome == "DONE"
+            self._log(
+                reasons.cut_reported(self._cut_id, measured.detail)
+                if done
+                else reasons.cut_not_done(self._cut_id, measured.outcome, measured.detail)
+            )
             self._camera_trigger.wake(self._ticks)
             self._state_due = True
 
-    def _log(self, severity: m.Severity, text: str) -> None:
-        self._events.append((severity, text))
+    def _log(self, told: m.Reason) -> None:
+        self._events.append(told)
 
     def _outputs(self, now: float) -> BridgeOutputs:
         joints = odometry = state = frame = None
@@ -337,7 +343,7 @@ class BridgeCore:
             self._fence_kept = self._state_due = True
         if self._state_due or ticks % _STATE_TICKS == 0:
             state = self._state(now)
-            self._events += [("warning", line) for line in self.refusals.lines(now)]
+            self._events += self.refusals.lines(now)
         stops = None
         # A stop is reported as latched when it is on disk. A failure of the disk is reported too.
         if self._stops_due and (self._memory.kept or self._memory.failure):
@@ -356,10 +362,7 @@ class BridgeCore:
             state,
             frame,
             scenery,
-            tuple(
-                m.LogEvent(header=m.Header(now), process="bridge", reason=noted(severity, text))
-                for severity, text in events
-            ),
+            tuple(m.LogEvent(header=m.Header(now), process="bridge", reason=told) for told in events),
             stops,
         )
 
@@ -404,8 +407,8 @@ class BridgeCore:
             self._wanted, self._unwanted_said = now, False
         elif now - self._wanted > _BRAKING_S and not self._unwanted_said:
             self._unwanted_said = True
-            why = f"the controller's mode is {mode}" if mode in _STILL else "no controller publishes its mode"
-            self._log("error", f"the robot is commanded to move, though {why}")
+            told = reasons.moved_without_mode() if mode not in _STILL else reasons.moved_in_mode(str(mode))
+            self._log(told)
 
     def _frame(self, now: float) -> CameraFrame | None:
         measured: Measurement = self._measured

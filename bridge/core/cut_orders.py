@@ -3,10 +3,11 @@
 from typing import Literal
 
 from bridge.core.cut_memory import CutMemory, ForLife
+from rolling_panda import reasons
 from rolling_panda.messages.robot import CutCommand
+from rolling_panda.messages.types import Reason
 
-BUSY = "the blades are still at the last cut"
-FORGETFUL = "the cut cannot be remembered: the disk is full or broken"
+BUSY, FORGETFUL = reasons.blades_busy(), reasons.cut_not_remembered()
 
 Verdict = Literal["cut", "known", "wait", "refuse"]
 
@@ -19,7 +20,9 @@ class CutOrders:
         self._memory = memory or ForLife()
         self._known: set[str] = set(self._memory.known)
 
-    def judge(self, command: CutCommand, wrong: str | None, blades_free: bool, inhibited: str) -> tuple[Verdict, str]:
+    def judge(
+        self, command: CutCommand, wrong: Reason | None, blades_free: bool, inhibited: Reason | None
+    ) -> tuple[Verdict, Reason | None]:
         """Decide whether to close the blades now; returns the reason of a refusal.
 
         An order that arrives while the cutter is inhibited is used up: its repetitions must not cut later, when nobody
@@ -30,19 +33,19 @@ class CutOrders:
             command: The order.
             wrong: Reason why the order is invalid; None if it is valid.
             blades_free: Whether the blades are open and idle.
-            inhibited: Reason why the cutter is inhibited; empty if it is not.
+            inhibited: Reason why the cutter is inhibited; None if it is not.
         """
         if command.cut_id in self._known:
-            return "known", ""
+            return "known", None
         if wrong is not None:
             return "refuse", wrong
         if not blades_free:
             return "refuse", BUSY
         kept = self._memory.keep(command.cut_id)
-        if inhibited:
+        if inhibited is not None:
             self._known.add(command.cut_id)
             return "refuse", inhibited
         if kept == "waiting":
-            return "wait", ""
+            return "wait", None
         self._known.add(command.cut_id)
-        return ("cut", "") if kept == "kept" else ("refuse", FORGETFUL)
+        return ("cut", None) if kept == "kept" else ("refuse", FORGETFUL)

@@ -2,19 +2,16 @@
 
 from typing import Final
 
+from rolling_panda import reasons
 from rolling_panda.messages.robot import fingerprint
-from rolling_panda.messages.types import MOST_EPOCHS
+from rolling_panda.messages.types import MOST_EPOCHS, Reason
 
 #: Time without a valid message after which another controller gets the token (s). Longer than the
 #: watchdog's deadline, so that the robot has come to rest before.
 SILENT_S: Final = 1.0
 
-OLD_EPOCH = "an older controller's command"
-UNKNOWN_EPOCH = "an epoch that the bridge has not issued"
-OTHER_TOKEN = "the token does not belong to this epoch"
-HELD = "another controller commands the robot; a token is issued once the other has ended or is silent"
-MOVING = "the robot still moves; a token is issued at rest"
-USED_UP = "no epoch is left; end the bridge and run: rolling-panda bridge --begin-anew"
+OLD_EPOCH, UNKNOWN_EPOCH, OTHER_TOKEN = reasons.epoch_old(), reasons.epoch_unknown(), reasons.token_foreign()
+HELD, MOVING, USED_UP = reasons.token_held(), reasons.token_at_rest_only(), reasons.epochs_used_up()
 
 
 class Fence:
@@ -35,7 +32,7 @@ class Fence:
         """Fingerprint of the token; empty without a holder."""
         return "" if self.token is None else fingerprint(self.token)
 
-    def refuse(self, epoch: int, token: str) -> str | None:
+    def refuse(self, epoch: int, token: str) -> Reason | None:
         """Why a command under this token is not the holder's; None when it is."""
         if epoch != self.epoch:
             return OLD_EPOCH if epoch < self.epoch else UNKNOWN_EPOCH
@@ -45,8 +42,8 @@ class Fence:
         """The holder has sent something valid."""
         self._heard = now
 
-    def claim(self, token: str, now: float, at_rest: bool) -> str:
-        """Issue the token, or renew it for its holder. Returns the reason of a refusal; empty if granted.
+    def claim(self, token: str, now: float, at_rest: bool) -> Reason | None:
+        """Issue the token, or renew it for its holder. Returns the reason of a refusal; None if granted.
 
         Args:
             token: Random part drawn by the requesting controller.
@@ -65,7 +62,7 @@ class Fence:
                 return USED_UP
             self.epoch, self.token = self.epoch + 1, token
         self._heard = now
-        return ""
+        return None
 
     def release(self, token: str) -> bool:
         """The holder gives the token back; False from anybody else."""

@@ -1,7 +1,9 @@
 """The latched stops. Every stop is kept, and all hold until the newest is released by its id."""
 
+from rolling_panda import reasons
 from rolling_panda.messages.robot import ReleaseStop, StopRequest
 from rolling_panda.messages.supervision import StopRecord
+from rolling_panda.messages.types import Reason
 from rolling_panda.reasons import text_of
 
 #: Number of latched stops in the message, newest first, and of remembered released ids.
@@ -62,18 +64,18 @@ class StopLatch:
         self.stops = (record, *(self.stops if len(self.stops) < _MOST else (*self.stops[: _MOST - 2], self.stops[-1])))
         return True
 
-    def release(self, request: ReleaseStop) -> str:
-        """Release all; the reason why not, or an empty text."""
+    def release(self, request: ReleaseStop) -> Reason | None:
+        """Release all; returns the reason why not, None if done."""
         if not self.stops:
-            return "no stop is latched"
+            return reasons.no_stop_latched()
         if self.hardware:
-            return "the robot's emergency stop button is pressed: release it first"
+            return reasons.emergency_button_pressed()
         if request.stop_id != self.stop_id:
-            return f"the latched stop is {self.stop_id}, not {request.stop_id}"
+            return reasons.another_stop_latched(self.stop_id, request.stop_id)
         for stop in self.stops:
             self._over[stop.stop_id] = None
         while len(self._over) > _OVER:
             self._over.pop(next(iter(self._over)))
         self.stops = ()
         self.released_by = f"{request.user}: {request.reason}"[:500]
-        return ""
+        return None

@@ -3,11 +3,13 @@
 import threading
 from dataclasses import dataclass
 
+from rolling_panda import reasons
 from rolling_panda.messages.robot import RejectionCount
+from rolling_panda.messages.types import Reason
 from rolling_panda.transport.rejections import Rejections
 
 _KINDS = 50
-_OTHER = "refused for other reasons"
+_OTHER = reasons.other_refusals()
 
 
 @dataclass
@@ -23,15 +25,15 @@ class Refusals:
         """Share `rejections` with the transport, so that undecodable messages appear in the same table."""
         self._rejections = rejections if rejections is not None else Rejections()
         self._quiet = quiet_s
-        self._kinds: dict[tuple[str, str], _Kind] = {}
+        self._kinds: dict[tuple[str, Reason], _Kind] = {}
         self._lock = threading.Lock()
 
-    def add(self, topic: str, reason: str) -> None:
+    def add(self, topic: str, reason: Reason) -> None:
         """Count one refusal of the bridge's own and log it."""
         self._rejections.add(topic, reason)
         self.log(topic, reason)
 
-    def log(self, topic: str, reason: str) -> None:
+    def log(self, topic: str, reason: Reason) -> None:
         """Log one refusal that has been counted elsewhere."""
         with self._lock:
             known = (topic, reason) in self._kinds or len(self._kinds) < _KINDS
@@ -42,13 +44,17 @@ class Refusals:
         """All refusals since the start."""
         return tuple(row for row in self._rejections.counts())
 
-    def lines(self, now: float) -> list[str]:
-        """Sentences for the log that are due (s, the bridge's clock)."""
+    def lines(self, now: float) -> list[Reason]:
+        """What is due for the log (s, the bridge's clock)."""
         out = []
         with self._lock:
             for (topic, reason), kind in self._kinds.items():
                 if kind.unsaid and now >= kind.next_line:
-                    times = "" if kind.unsaid == 1 else f" ({kind.unsaid} times)"
-                    out.append(f"refused on {topic}: {reason[:300]}{times}")
+                    once = kind.unsaid == 1
+                    out.append(
+                        reasons.refused_once_on(topic, reason)
+                        if once
+                        else reasons.refused_on(topic, reason, kind.unsaid)
+                    )
                     kind.unsaid, kind.next_line = 0, now + self._quiet
         return out

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from rolling_panda import reasons
 from rolling_panda.messages.robot import StopRequest
+from rolling_panda.messages.types import Reason
 
 # Time for the robot to recover after a person's release, before it is stopped again (s).
 _RECOVERY_S = 3.0
@@ -13,9 +14,9 @@ _RECOVERY_S = 3.0
 
 @dataclass(frozen=True)
 class FaultChange:
-    """Begin or end of a fault: a log line, and the stop to latch if the fault is severe."""
+    """Begin or end of a fault: what is logged, and the stop to latch if the fault is severe."""
 
-    text: str
+    told: Reason
     stop: StopRequest | None
 
 
@@ -50,13 +51,13 @@ class RobotFaults:
             return None
         self.current = fault
         if not fault:
-            return FaultChange("the robot is ready again; it waits for a setpoint at rest", None)
+            return FaultChange(reasons.robot_ready_again(), None)
         stop = None
         if severe and not stopped and now >= self._recovering_until:
             stop = StopRequest(
                 stop_id=f"robot-{self._draw()}", source="robot", user="", reason=reasons.robot_fault_reported(fault)
             )
-        return FaultChange(f"the robot does not move: {fault}", stop)
+        return FaultChange(reasons.robot_faulty(fault), stop)
 
     def released(self, now: float) -> None:
         """A person has released the stop: the robot may recover."""

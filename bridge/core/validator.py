@@ -4,15 +4,14 @@ from collections import OrderedDict
 from math import isfinite
 
 from bridge.core.fence import Fence
+from rolling_panda import reasons
 from rolling_panda.messages.robot import CutCommand, MotionCommand, TokenRequest
+from rolling_panda.messages.types import Reason
 from rolling_panda.model.differential_drive import Array
 
-OLD_SEQUENCE = "sequence not newer than the last"
-UNSENT_ECHO = "echoes a joint state that was never sent"
-TOO_OLD = "computed from a joint state that is too old"
-NOT_FINITE = "velocity is not a finite number"
-TOO_FAST = "velocity outside the robot's limits"
-NOT_AT_REST = "the first setpoint after a standstill must be zero"
+OLD_SEQUENCE, UNSENT_ECHO, TOO_OLD = reasons.command_old(), reasons.echo_unsent(), reasons.command_late()
+NOT_FINITE, TOO_FAST = reasons.velocity_not_finite(), reasons.velocity_too_high()
+NOT_AT_REST = reasons.must_begin_at_rest()
 
 #: Speed below which a setpoint means rest (rad/s).
 _REST = 1e-3
@@ -54,7 +53,7 @@ class CommandValidator:
         """Take nothing but a setpoint at rest from here on, until one has come."""
         self.must_rest = True
 
-    def claim(self, request: TokenRequest, now: float, at_rest: bool) -> str | None:
+    def claim(self, request: TokenRequest, now: float, at_rest: bool) -> Reason | None:
         """Issue the token, or renew it for its holder. Returns None, or the reason of a refusal.
 
         Args:
@@ -66,12 +65,12 @@ class CommandValidator:
         if reason is not None:
             return reason
         epoch = self._fence.epoch
-        reason = self._fence.claim(request.token, now, at_rest) or None
+        reason = self._fence.claim(request.token, now, at_rest)
         if self._fence.epoch != epoch:
             self.sequence, self.must_rest = -1, True
         return reason
 
-    def refuse(self, command: MotionCommand, now: float) -> str | None:
+    def refuse(self, command: MotionCommand, now: float) -> Reason | None:
         """Take the command and return None, or the reason why it is refused.
 
         Args:
@@ -84,11 +83,11 @@ class CommandValidator:
             self._fence.renew(now)
         return reason
 
-    def refuse_cut(self, command: CutCommand, now: float) -> str | None:
+    def refuse_cut(self, command: CutCommand, now: float) -> Reason | None:
         """Why a cut order is not to be acted on by its token and age; None when it may. Changes nothing."""
         return self._fence.refuse(command.epoch, command.token) or self._stale(command.echo, now)
 
-    def _fault(self, command: MotionCommand, now: float) -> str | None:
+    def _fault(self, command: MotionCommand, now: float) -> Reason | None:
         wrong = self._fence.refuse(command.epoch, command.token)
         if wrong is not None:
             return wrong
@@ -105,7 +104,7 @@ class CommandValidator:
             return NOT_AT_REST
         return None
 
-    def _stale(self, echo: int, now: float) -> str | None:
+    def _stale(self, echo: int, now: float) -> Reason | None:
         at = self._sent.get(echo)
         if at is None:
             newest = next(reversed(self._sent), -1)

@@ -144,12 +144,12 @@ class RejectionCount(Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         topic: The topic.
-        reason: Reason for the refusal, as text.
+        reason: Reason for the refusal.
         count: Number of messages since the start of the bridge.
     """
 
     topic: Text
-    reason: Text
+    reason: Reason
     count: Count
 
 

@@ -11,13 +11,13 @@ class Rejections:
 
     def __init__(self) -> None:
         """Start at zero."""
-        self._counts: Counter[tuple[str, str]] = Counter()
+        self._counts: Counter[tuple[str, m.Reason]] = Counter()
         self._lock = threading.Lock()
 
-    def add(self, topic: str, reason: str) -> None:
-        """Count one rejection; the reason is truncated."""
+    def add(self, topic: str, reason: m.Reason) -> None:
+        """Count one rejection."""
         with self._lock:
-            self._counts[topic, reason[:200]] += 1
+            self._counts[topic, reason] += 1
 
     def counts(self) -> tuple[m.RejectionCount, ...]:
         """All counts, most frequent first."""

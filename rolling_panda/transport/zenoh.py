@@ -15,6 +15,7 @@ import zenoh
 from msgspec import Struct
 
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.closing import Closing
 from rolling_panda.config import TransportConfig
 from rolling_panda.errors import MessageError, ServiceError, TransportError
@@ -154,7 +155,7 @@ class Onlooker(Closing):
             self._session.close()
 
     def _reject(self, topic: str, reason: str) -> None:
-        self.rejections.add(topic, reason)
+        self.rejections.add(topic, reasons.message_undecodable(reason[:200]))
         self.on_reject(topic, reason)
 
     def _on_presence(self, sample: zenoh.Sample) -> None:

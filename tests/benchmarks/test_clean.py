@@ -25,9 +25,9 @@ def test_in_jitter_the_blades_are_asked_to_close_when_the_arm_rests():
         world.offer()
         world.run(1.0)
     assert world.controller.mode == "AUTO" and world.cut_ids
-    refused = {each.reason: each.count for each in world.bridge.refusals.counts()}
+    refused = {each.reason.code: each.count for each in world.bridge.refusals.counts()}
     # An order is repeated twenty times a second until the blades close.
-    assert refused.get("the robot is not at rest", 0) <= 5
+    assert refused.get("cut_in_motion", 0) <= 5
 
 
 @pytest.mark.parametrize(

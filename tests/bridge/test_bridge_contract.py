@@ -9,8 +9,10 @@ import pytest
 
 from bridge.config import BridgeConfig
 from bridge.core.bridge import TICK_S, BridgeCore
+from bridge.core.fence import HELD, OLD_EPOCH, UNKNOWN_EPOCH
 from bridge.core.odometer import Odometer
 from bridge.core.robot_time import RealTime, SteppedTime
+from bridge.core.validator import OLD_SEQUENCE, TOO_OLD
 from bridge.sim.robot.robot import SimulatedRobot
 from bridge.sim.vineyard.row import Row
 from rolling_panda import messages as m
@@ -106,7 +108,7 @@ def test_a_command_computed_from_an_old_state_is_not_actuated(rig: Rig) -> None:
         rig.echo = stale
         rig.command(FORWARD)
     assert rig.at_rest()
-    assert "too old" in rig.refusals
+    assert TOO_OLD.code in rig.refusals
 
 
 def test_duplicates_reorders_and_replays_are_not_actuated(rig: Rig) -> None:
@@ -118,18 +120,18 @@ def test_duplicates_reorders_and_replays_are_not_actuated(rig: Rig) -> None:
         for message in rng.sample(old, 5):
             rig.core.on_motion(message, rig.now)
         assert rig.at_rest()
-    assert "sequence not newer" in rig.refusals
+    assert OLD_SEQUENCE.code in rig.refusals
 
 
 def test_an_epoch_that_is_not_the_given_one_actuates_nothing(rig: Rig) -> None:
-    for epoch, reason in ((0, "an older controller"), (2, "has not issued")):
+    for epoch, reason in ((0, OLD_EPOCH), (2, UNKNOWN_EPOCH)):
         rig.epoch = 1
         rig.run(0.2, REST)
         assert rig.state.epoch == rig.epoch == 1
         rig.epoch = epoch
         rig.run(0.5, FORWARD)
         assert rig.at_rest(), epoch
-        assert reason in rig.refusals
+        assert reason.code in rig.refusals
         rig.cut(f"c{epoch}")
         rig.run(0.1, REST)
         assert rig.plant.bites() == 0, epoch
@@ -139,14 +141,14 @@ def test_another_controller_is_given_the_token_once_the_holder_is_silent_or_give
     rig.drive_on()
     rig.ask("b2")
     rig.run(0.1, FORWARD)
-    assert "command/token: another controller commands the robot" in rig.refusals
+    assert f"command/token: {HELD.code}" in rig.refusals
     assert rig.state.holder == m.fingerprint(rig.token) and not rig.at_rest()
     rig.run(1.5, None)
     rig.ask("b2")
     rig.run(0.1, None)
     assert (rig.state.epoch, rig.state.holder) == (2, m.fingerprint("b2"))
     rig.run(0.3, FORWARD)
-    assert rig.at_rest() and "older" in rig.refusals
+    assert rig.at_rest() and OLD_EPOCH.code in rig.refusals
     rig.core.on_token(m.TokenRequest(token="b2", releases=True), rig.now)
     rig.epoch = 3
     rig.run(0.2, REST)

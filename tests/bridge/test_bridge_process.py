@@ -197,7 +197,7 @@ def test_rubbish_on_the_command_topic_is_counted_and_said(live: Live) -> None:
             live.send(data)
         texts.extend(text_of(received.message.reason) for received in live.events.drain())
         new = [row for row in live.newest().rejections if row not in before and row.topic == "command/motion"]
-        return len(new) >= 3 and any("refused on command/motion" in text for text in texts)
+        return len(new) >= 3 and any("Refused on command/motion" in text for text in texts)
 
     until(noticed)
 

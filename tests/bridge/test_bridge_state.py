@@ -15,6 +15,7 @@ from bridge.core.picture import Picture
 from bridge.core.state_memory import Remembered
 from bridge.core.validator import OLD_SEQUENCE
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.reasons import button_pressed, robot_fault_reported, said, severity_of, text_of
@@ -55,7 +56,7 @@ def test_limits_that_are_less_strict_are_reported_at_the_start_and_in_every_stat
         bench.robot, BridgeConfig(), MODEL.limits, odometer(), "fakes", relaxed_limits=("fade_s 0.1",)
     )
     out = tick(bench)
-    assert lines(out)[0] == ("warning", "less strict than usual: fade_s 0.1")
+    assert lines(out)[0] == ("warning", text_of(reasons.limit_relaxed("fade_s 0.1")))
     assert out.state is not None
     assert (out.state.relaxed_limits, out.state.kind) == (("fade_s 0.1",), "fakes")
 
@@ -120,7 +121,7 @@ def test_a_stop_its_release_and_who_did_both_are_told_in_the_next_tick(bench: Be
     bench.run(0.1, REST)
     bench.core.on_stop(stop(), bench.now, 5.0)
     out = tick(bench)
-    assert lines(out) == [("warning", "software stop by ada: button")]
+    assert lines(out) == [("warning", "Software stop by ada: button")]
     assert out.state is not None and out.state.stop_id == "s1"
     assert out.stops is not None and out.stops.process == "bridge" and not out.stops.hardware
     assert [(each.stop_id, each.wall_time) for each in out.stops.stops] == [("s1", 5.0)]
@@ -129,7 +130,7 @@ def test_a_stop_its_release_and_who_did_both_are_told_in_the_next_tick(bench: Be
     assert lines(tick(bench)) == []
     assert bench.core.on_release(release(), bench.now) == m.Answer(ok=True)
     out = tick(bench)
-    assert lines(out) == [("info", "software stop released by ada: checked")]
+    assert lines(out) == [("info", text_of(reasons.stop_reset("ada", "checked")))]
     assert out.state is not None and out.state.stop_id == ""
     assert out.stops is not None and (out.stops.stops, out.stops.released_by) == ((), "ada: checked")
     assert bench.robot.sent[-1].releases == 1
@@ -144,7 +145,7 @@ def test_the_emergency_stop_button_is_told_by_its_name_with_its_time(bench: Benc
     bench.now += 2 * TICK_S
     bench.hear(out := bench.core.step(bench.now, wall_time=9.0), None)
     ((severity, text),) = lines(out)
-    assert severity == "warning" and text.startswith("emergency stop by hardware: ")
+    assert severity == "warning" and text.startswith("Emergency stop: ")
     assert out.stops is not None and out.stops.hardware
     (pressed,) = as_received(out.stops).stops
     assert (pressed.source, pressed.user, pressed.wall_time) == ("hardware", "", 9.0)
@@ -155,7 +156,7 @@ def test_who_gets_the_token_and_gives_it_back_is_told_at_once_and_the_robot_come
     bench.run(0.1, None)
     bench.ask()
     out = tick(bench)
-    assert ("info", "a controller has the token: epoch 1") in lines(out)
+    assert ("info", text_of(reasons.token_issued(1))) in lines(out)
     assert out.state is not None and (out.state.epoch, out.state.holder) == (1, m.fingerprint(bench.token))
     bench.drive_on()
     bench.core.on_token(m.TokenRequest(token="other", releases=True), bench.now)
@@ -197,13 +198,13 @@ def test_why_the_cutter_is_inhibited_is_counted_and_the_order_is_used_up(bench: 
     bench.run(0.1, REST)
     bench.core.on_stop(stop(), bench.now)
     bench.core.on_cut(cut(bench, "c1"), bench.now)
-    assert refused_cuts(bench) == {"the software stop is latched": 1}
+    assert refused_cuts(bench) == {reasons.stop_latched(): 1}
     assert bench.core.on_release(release(), bench.now).ok
     # Nothing at rest has come since.
     bench.core.on_cut(cut(bench, "c2"), bench.now)
     assert refused_cuts(bench) == {
-        "the software stop is latched": 1,
-        "no valid setpoint keeps the cutter enabled": 1,
+        reasons.stop_latched(): 1,
+        reasons.cutter_inhibited(): 1,
     }
     tick(bench)
     assert (bench.state.cut_id, bench.state.outcome, bench.robot.cuts) == ("c2", "FAILED_NOT_CUT", [])
@@ -220,7 +221,7 @@ def test_an_end_of_a_cut_is_told_at_once_and_a_bad_one_is_a_warning(bench: Bench
     bench.robot.end_cut("FAILED_NOT_CUT")
     tick(bench)
     told = [line for out in bench.outputs for line in lines(out) if "c1" in line[1]]
-    assert told == [("warning", "cut c1: FAILED_NOT_CUT, said the robot")]
+    assert told == [("warning", text_of(reasons.cut_not_done("c1", "FAILED_NOT_CUT", "said the robot")))]
     assert (bench.state.cut_id, bench.state.outcome) == ("c1", "FAILED_NOT_CUT")
 
 
@@ -247,7 +248,7 @@ def test_what_is_refused_is_counted_under_its_topic(bench: Bench) -> None:
     bench.core.on_motion(bench.message(REST), bench.now)
     assert refused(bench, MOTION) == {OLD_SEQUENCE: 1}
     bench.run(0.1, REST)
-    told = [line for out in bench.outputs for line in lines(out) if OLD_SEQUENCE in line[1]]
+    told = [line for out in bench.outputs for line in lines(out) if text_of(OLD_SEQUENCE) in line[1]]
     assert [severity for severity, _ in told] == ["warning"]
 
 
@@ -268,7 +269,7 @@ def test_a_robot_that_cannot_move_cuts_nothing_and_the_order_is_used_up(bench: B
     bench.robot.now = replace(bench.robot.now, fault="arm: reflex")
     bench.run(0.02, REST)
     bench.core.on_cut(cut(bench, "c1"), bench.now)
-    assert refused_cuts(bench) == {"arm: reflex": 1}
+    assert refused_cuts(bench) == {reasons.robot_faulty("arm: reflex"): 1}
     assert tick(bench).state is not None
     assert (bench.state.cut_id, bench.state.outcome, bench.robot.cuts) == ("c1", "FAILED_NOT_CUT", [])
     assert not bench.robot.sent[-1].blades
@@ -304,11 +305,11 @@ def test_following_and_its_end_are_told_at_once(bench: Bench) -> None:
     bench.ask()
     bench.core.on_motion(bench.message(REST), bench.now)
     out = tick(bench)
-    assert ("info", "setpoints arrive: the robot follows") in lines(out)
+    assert ("info", text_of(reasons.setpoints_arrive())) in lines(out)
     assert out.state is not None and not out.state.watchdog
     outs = [tick(bench) for _ in range(300)]
     (ended,) = [out for out in outs if lines(out)]
-    assert lines(ended) == [("warning", "no valid setpoint: base 0, arm holds, cutter inhibited")]
+    assert lines(ended) == [("warning", text_of(reasons.setpoints_missing()))]
     assert ended.state is not None and ended.state.watchdog
 
 

@@ -15,7 +15,9 @@ import pytest
 from bridge.core import cut_memory
 from bridge.core.cut_memory import FILE, CutFile
 from bridge.core.cut_orders import FORGETFUL, CutOrders
+from rolling_panda import reasons
 from rolling_panda.errors import InputError
+from rolling_panda.messages import Reason
 from rolling_panda.messages.robot import CutCommand
 from rolling_panda.runtime.launch import child_environment
 
@@ -24,7 +26,7 @@ def order(cut_id: str) -> CutCommand:
     return CutCommand(epoch=3, cut_id=cut_id, point_id="p1")
 
 
-def judged(orders: CutOrders, cut_id: str, inhibited: str = "") -> tuple[str, str]:
+def judged(orders: CutOrders, cut_id: str, inhibited: Reason | None = None) -> tuple[str, Reason | None]:
     """What comes of an order that is repeated until something does."""
     end = time.monotonic() + 20.0
     while True:
@@ -37,13 +39,13 @@ def judged(orders: CutOrders, cut_id: str, inhibited: str = "") -> tuple[str, st
 
 def test_a_cut_waits_until_it_cannot_be_forgotten_and_is_known_after_a_restart(tmp_path: Path) -> None:
     memory = CutFile(tmp_path)
-    assert judged(CutOrders(memory), "run-1") == ("cut", "")
+    assert judged(CutOrders(memory), "run-1") == ("cut", None)
     assert b"run-1\n" in (tmp_path / FILE).read_bytes()
     memory.close()
     again = CutFile(tmp_path)
     orders = CutOrders(again)
-    assert judged(orders, "run-1") == ("known", "")
-    assert judged(orders, "run-2") == ("cut", "")
+    assert judged(orders, "run-1") == ("known", None)
+    assert judged(orders, "run-2") == ("cut", None)
     again.close()
 
 
@@ -52,16 +54,16 @@ def test_an_order_that_was_spent_stays_so_after_a_restart(tmp_path: Path) -> Non
     assert judged(CutOrders(memory), "run-1", "stopped") == ("refuse", "stopped")
     memory.close()
     again = CutFile(tmp_path)
-    assert judged(CutOrders(again), "run-1") == ("known", "")
+    assert judged(CutOrders(again), "run-1") == ("known", None)
     again.close()
 
 
 def test_a_stop_between_two_repetitions_spends_the_order(tmp_path: Path) -> None:
     memory = CutFile(tmp_path)
     orders = CutOrders(memory)
-    assert orders.judge(order("a"), None, True, "")[0] in ("wait", "cut")
-    orders.judge(order("b"), None, True, "stopped")
-    assert judged(orders, "b") == ("known", "")
+    assert orders.judge(order("a"), None, True, None)[0] in ("wait", "cut")
+    orders.judge(order("b"), None, True, reasons.stop_latched())
+    assert judged(orders, "b") == ("known", None)
     memory.close()
 
 
@@ -71,10 +73,10 @@ def test_a_disk_that_hangs_keeps_nobody_waiting_but_the_blades(tmp_path: Path, m
     monkeypatch.setattr(os, "fsync", lambda descriptor: (go.wait(20.0), real(descriptor)))
     orders = CutOrders(memory)
     began = time.monotonic()
-    verdicts = {orders.judge(order("a"), None, True, "")[0] for _ in range(1000)}
+    verdicts = {orders.judge(order("a"), None, True, None)[0] for _ in range(1000)}
     assert verdicts == {"wait"} and time.monotonic() - began < 1.0
     go.set()
-    assert judged(orders, "a") == ("cut", "")
+    assert judged(orders, "a") == ("cut", None)
     memory.close()
 
 
@@ -83,7 +85,7 @@ def test_a_disk_that_hangs_does_not_keep_the_bridge_from_ending(
 ) -> None:
     go, memory = threading.Event(), CutFile(tmp_path)
     monkeypatch.setattr(os, "fsync", lambda descriptor: go.wait(20.0))
-    assert CutOrders(memory).judge(order("a"), None, True, "")[0] == "wait"
+    assert CutOrders(memory).judge(order("a"), None, True, None)[0] == "wait"
     began = time.monotonic()
     memory.close()
     assert time.monotonic() - began < 10.0
@@ -100,8 +102,8 @@ def test_a_full_disk_means_no_cut_now_or_later(tmp_path: Path, monkeypatch: pyte
     with monkeypatch.context() as patch:
         patch.setattr(os, "fsync", full)
         assert judged(orders, "a") == ("refuse", FORGETFUL)
-    assert judged(orders, "a") == ("known", "")
-    assert judged(orders, "b") == ("cut", "")
+    assert judged(orders, "a") == ("known", None)
+    assert judged(orders, "b") == ("cut", None)
     memory.close()
 
 
@@ -111,7 +113,7 @@ def test_a_disk_that_takes_half_a_line_means_no_cut(tmp_path: Path, monkeypatch:
     with monkeypatch.context() as patch:
         patch.setattr(os, "write", lambda descriptor, line: real(descriptor, line[: len(line) // 2]))
         assert judged(orders, "run-1") == ("refuse", FORGETFUL)
-    assert judged(orders, "run-2") == ("cut", "")
+    assert judged(orders, "run-2") == ("cut", None)
     memory.close()
     again = CutFile(tmp_path)
     assert "run-2" in again.known and "run-1" not in again.known
@@ -121,7 +123,7 @@ def test_a_disk_that_takes_half_a_line_means_no_cut(tmp_path: Path, monkeypatch:
 def test_a_half_written_line_spoils_no_other(tmp_path: Path) -> None:
     (tmp_path / FILE).write_bytes(b"\nrun-1\n\nrun-")
     memory = CutFile(tmp_path)
-    assert judged(CutOrders(memory), "run-2") == ("cut", "")
+    assert judged(CutOrders(memory), "run-2") == ("cut", None)
     memory.close()
     again = CutFile(tmp_path)
     assert {"run-1", "run-2"} <= again.known
@@ -151,7 +153,7 @@ def test_the_memory_of_cuts_survives_a_power_failure_and_keeps_no_file_open(
     assert synced == [tmp_path], "the name of a new file is in its folder, which has to be on the disk too"
     before = len(os.listdir("/proc/self/fd"))
     for number in range(20):
-        assert judged(CutOrders(memory), f"run-{number}") == ("cut", "")
+        assert judged(CutOrders(memory), f"run-{number}") == ("cut", None)
     assert len(os.listdir("/proc/self/fd")) <= before
     memory.close()
 
@@ -166,7 +168,7 @@ def test_the_disk_waits_for_the_control_loop_and_keeps_no_process_alive(
     before = set(threading.enumerate())
     memory = CutFile(tmp_path)
     (writer,) = set(threading.enumerate()) - before
-    assert judged(CutOrders(memory), "a") == ("cut", "")
+    assert judged(CutOrders(memory), "a") == ("cut", None)
     assert writer.daemon and given == [("interface", writer.name)]
     memory.close()
 
@@ -205,7 +207,7 @@ print("up", flush=True)
 # The controller repeats the orders that it has had no word of, and then gives new ones.
 for number in range(max(0, first - 3), 10**9):
     while True:
-        verdict, _ = orders.judge(CutCommand(epoch=3, cut_id=f"run-{number}", point_id="p"), None, True, "")
+        verdict, _ = orders.judge(CutCommand(epoch=3, cut_id=f"run-{number}", point_id="p"), None, True, None)
         if verdict == "cut":
             os.write(blades, f"{number}\\n".encode())
         if verdict != "wait":

@@ -20,6 +20,7 @@ from bridge.core.state_memory import Remembered, begin_anew, open_memory
 from rolling_panda import messages as m
 from rolling_panda.errors import InputError, MessageError
 from rolling_panda.messages.types import MOST_EPOCHS
+from rolling_panda.reasons import text_of
 from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.transport.codec import StrictDecoder, encode
 from tests.bridge.test_bridge_core import IdealRobot
@@ -198,15 +199,15 @@ def test_an_absurd_epoch_on_disk_is_told_with_its_cause_and_one_command_ends_it(
 
 def test_the_last_epoch_is_given_out_once_and_then_the_way_out_is_told() -> None:
     fence = Fence(MOST_EPOCHS - 1)
-    assert fence.claim("aa", 0.0, at_rest=True) == ""
-    assert fence.claim("bb", SILENT_S, at_rest=True) == f.USED_UP and "--begin-anew" in f.USED_UP
+    assert fence.claim("aa", 0.0, at_rest=True) is None
+    assert fence.claim("bb", SILENT_S, at_rest=True) == f.USED_UP and "--begin-anew" in text_of(f.USED_UP)
 
 
 def test_the_token_changes_hands_at_rest_alone() -> None:
     fence = Fence()
     assert fence.claim("aa", 0.0, at_rest=False) == f.MOVING
-    assert fence.claim("aa", 0.0, at_rest=True) == ""
-    assert fence.claim("aa", 0.1, at_rest=False) == ""
+    assert fence.claim("aa", 0.0, at_rest=True) is None
+    assert fence.claim("aa", 0.1, at_rest=False) is None
     assert not fence.release("bb") and fence.release("aa")
     assert fence.claim("bb", 0.2, at_rest=False) == f.MOVING
     assert (fence.epoch, fence.token) == (1, None)
@@ -220,7 +221,7 @@ def test_an_older_epoch_is_told_from_one_that_was_never_issued() -> None:
 
 def test_the_token_is_free_a_second_after_the_holders_last_valid_command() -> None:
     fence = Fence()
-    assert fence.claim("aa", 0.0, at_rest=True) == ""
+    assert fence.claim("aa", 0.0, at_rest=True) is None
     fence.renew(5.0)
     assert fence.claim("bb", 5.5, at_rest=True) == f.HELD
-    assert fence.claim("bb", 6.1, at_rest=True) == ""
+    assert fence.claim("bb", 6.1, at_rest=True) is None

@@ -2,6 +2,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.core.latch import StopLatch
+from rolling_panda import reasons
 from rolling_panda.messages.robot import ReleaseStop, StopRequest
 from rolling_panda.messages.supervision import StopRecord
 from rolling_panda.reasons import said
@@ -24,9 +25,9 @@ def test_every_stop_is_kept_and_all_hold_until_the_newest_is_released() -> None:
     assert latch.stops[0] == StopRecord("b", "page", "ada", said("button"), 11.0)
     assert latch.stop_id == "b" and latch.released_by == ""
     assert latch.stopped_by == "ada: button"
-    assert "latched stop is b" in latch.release(release("a"))
+    assert latch.release(release("a")) == reasons.another_stop_latched("b", "a")
     assert latch.stop_id == "b"
-    assert latch.release(release("b")) == ""
+    assert latch.release(release("b")) is None
     assert latch.stop_id == "" and latch.stops == () and latch.released_by == "ada: checked"
 
 
@@ -72,7 +73,7 @@ def test_of_very_many_released_stops_the_last_thousand_are_remembered() -> None:
     latch = StopLatch()
     for number in range(1005):
         latch.stop(stop(f"s{number}"))
-        assert latch.release(release(f"s{number}")) == ""
+        assert latch.release(release(f"s{number}")) is None
     assert latch.over == tuple(f"s{number}" for number in range(5, 1005))
     assert not latch.stop(stop("s5")) and latch.stop(stop("s4"))
 
@@ -81,13 +82,13 @@ def test_while_the_button_is_pressed_nothing_is_released() -> None:
     latch = StopLatch()
     latch.stop(stop("a"))
     latch.hardware = True
-    assert "button is pressed" in latch.release(release("a"))
+    assert latch.release(release("a")) == reasons.emergency_button_pressed()
     latch.hardware = False
-    assert latch.release(release("a")) == ""
+    assert latch.release(release("a")) is None
 
 
 def test_there_is_nothing_to_release_without_a_stop() -> None:
-    assert StopLatch().release(release("a")) == "no stop is latched"
+    assert StopLatch().release(release("a")) == reasons.no_stop_latched()
 
 
 @given(st.lists(st.tuples(st.booleans(), st.integers(0, 80)), max_size=200))
@@ -101,7 +102,7 @@ def test_it_is_open_only_after_a_release_of_the_newest(script: list[tuple[bool, 
             if latch.stop(stop(name)):
                 assert name not in over and name not in known
                 newest = name
-        elif latch.release(release(name)) == "":
+        elif latch.release(release(name)) is None:
             assert name == newest
             over |= {name}
             newest = ""

@@ -29,7 +29,7 @@ def upright_rod(kind: WoodClass, x: float, y: float, radius: float) -> Rod:
 def survey() -> tuple[Row, Array, RgbdImage]:
     path = resource("assets/config/sim.toml")
     q = np.zeros(12)
-    q[ARM_Q] = tomllib.loads(path.read_text(encoding="utf-8"))["controller"]["home"]
+    q[ARM_Q] = tomllib.loads(path.read_text(encoding="utf-8"))["controller"]["work"]["home"]
     model = RobotModel()
     T = model.pose(q, model.camera_id).homogeneous
     row = grow(load_section(path, "vineyard", VineyardConfig), 0)

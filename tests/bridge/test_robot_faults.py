@@ -1,6 +1,8 @@
 import pytest
 
 from bridge.core.robot_faults import RobotFaults
+from rolling_panda import reasons
+from rolling_panda.reasons import text_of
 from tests.support.fake_wire import as_received
 
 STALE, REFLEX = "base: no wheel speeds", "arm: reflex"
@@ -15,10 +17,10 @@ def test_a_fault_is_told_once_when_it_begins_and_once_when_it_ends(faults: Robot
     assert faults.follow("", False, False, 0.0) is None
     began = faults.follow(STALE, False, False, 1.0)
     assert began is not None
-    assert STALE in began.text and began.stop is None
+    assert STALE in text_of(began.told) and began.stop is None
     assert faults.follow(STALE, False, False, 2.0) is None
     ended = faults.follow("", False, False, 3.0)
-    assert ended is not None and "ready again" in ended.text
+    assert ended is not None and ended.told == reasons.robot_ready_again()
 
 
 def test_a_severe_fault_latches_a_stop_that_says_why(faults: RobotFaults) -> None:

@@ -150,9 +150,9 @@ def test_a_robot_that_does_not_follow_is_stopped_protectively():
 def test_the_age_of_each_input_is_counted_from_its_arrival_and_what_never_came_is_endless():
     header = m.Header(3.0)
     refused = (
-        RejectionCount(topic=topics.MOTION.name, reason="old sequence", count=4),
-        RejectionCount(topic=topics.MOTION.name, reason="another token", count=1),
-        RejectionCount(topic=topics.CUT.name, reason="another token", count=7),
+        RejectionCount(topic=topics.MOTION.name, reason=reasons.command_old(), count=4),
+        RejectionCount(topic=topics.MOTION.name, reason=reasons.token_foreign(), count=1),
+        RejectionCount(topic=topics.CUT.name, reason=reasons.token_foreign(), count=7),
     )
     bridge = msgspec.structs.replace(bridge_state(), header=header, watchdog=True, rejections=refused)
     odometry = m.Odometry(header=header, sequence=1, pose=m.PlanarPose(0.0), linear=0.0, angular=0.0)

@@ -204,7 +204,7 @@ def test_a_hold_without_a_link_or_measurements_is_refused(missing, code):
 
 def refusing(r, count):
     """The watchdog holds the robot, and so many commands have been refused."""
-    refused = (RejectionCount(topic=topics.MOTION.name, reason="old sequence", count=count),)
+    refused = (RejectionCount(topic=topics.MOTION.name, reason=reasons.command_old(), count=count),)
     bridge_says(r, watchdog=True, rejections=refused)
 
 

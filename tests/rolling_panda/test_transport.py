@@ -13,9 +13,11 @@ import pytest
 
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.config import TransportConfig
 from rolling_panda.errors import ServiceError, TransportError
 from rolling_panda.messages.robot import CameraFrame, Intrinsics
+from rolling_panda.reasons import text_of
 from rolling_panda.topics import CAMERA, HEARTBEAT, INTENT, MOTION, Service, Topic, key
 from rolling_panda.transport.codec import StrictDecoder
 from rolling_panda.transport.rejections import Rejections
@@ -70,13 +72,16 @@ def test_a_feed_keeps_order_and_counts_what_it_drops() -> None:
     assert feed.drain() == []
 
 
+OLD, NAN = reasons.command_old(), reasons.velocity_not_finite()
+
+
 def test_rejections_are_counted_by_topic_and_reason() -> None:
     rejections = Rejections()
-    for reason in ("old", "old", "NaN"):
+    for reason in (OLD, OLD, NAN):
         rejections.add("command/motion", reason)
     assert rejections.counts() == (
-        m.RejectionCount("command/motion", "old", 2),
-        m.RejectionCount("command/motion", "NaN", 1),
+        m.RejectionCount("command/motion", OLD, 2),
+        m.RejectionCount("command/motion", NAN, 1),
     )
 
 
@@ -126,7 +131,7 @@ def test_a_message_without_end_is_refused(controller: Transport, bridge: Transpo
     slot = bridge.slot(CAMERA)
     publisher = controller.publisher(CAMERA)
     until(lambda: (publisher.put(frame(bytes(9 << 20))), bridge.rejections.counts())[1] != (), 10.0)
-    assert "at most" in bridge.rejections.counts()[0].reason
+    assert "at most" in text_of(bridge.rejections.counts()[0].reason)
     assert slot.peek() is None
 
 

@@ -146,7 +146,7 @@ class Rig(Commander):
 
     @property
     def refusals(self) -> str:
-        return "\n".join(f"{row.topic}: {row.reason} ×{row.count}" for row in self.state.rejections)
+        return "\n".join(f"{row.topic}: {row.reason.code} ×{row.count}" for row in self.state.rejections)
 
     def close(self) -> None:
         self.core.robot.close()

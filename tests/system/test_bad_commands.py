@@ -11,6 +11,8 @@ import pytest
 import zenoh
 
 from bridge.sim.robot import trace
+from rolling_panda.messages import Reason
+from rolling_panda.reasons import text_of
 from rolling_panda.runtime.process import ROBOT_ID
 from rolling_panda.topics import MOTION, key
 from tests.support.processes.live_robot import LiveRobot
@@ -84,7 +86,8 @@ def test_bad_commands_move_nothing_and_are_told(tmp_path: Path) -> None:
         assert all(row["topic"] == MOTION.name for row in rejections)
         lines = [event["text"] for event in robot.client.get("/api/events").json()["events"]]
         for row in rejections:
-            assert any(f"{MOTION.name}: {row['reason'][:60]}" in line for line in lines), (row, lines)
+            cause = text_of(msgspec.convert(row["reason"], Reason))
+            assert any(MOTION.name in line and cause[:60] in line for line in lines), (row, lines)
     rows = trace.read(robot.trace).rows
     assert np.abs(rows["setpoint"]).max() == 0.0
     assert np.ptp(rows["position"][:, :2], axis=0).max() < 1e-3

@@ -235,8 +235,8 @@ export interface ControllerState {
 export interface RejectionCount {
   /** The topic. */
   topic: string;
-  /** Reason for the refusal, as text. */
-  reason: string;
+  /** Reason for the refusal. */
+  reason: Reason;
   /** Number of messages since the start of the bridge. */
   count: number;
 }
