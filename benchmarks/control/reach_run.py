@@ -8,7 +8,6 @@ import time
 from dataclasses import dataclass
 from typing import Any, Literal
 
-import msgspec
 import numpy as np
 
 from benchmarks.control.goal_planner import GOOD_OMEGA, GoalPlanner
@@ -16,7 +15,7 @@ from benchmarks.control.path import Refused
 from benchmarks.control.plan_follower import PlanFollower
 from benchmarks.control.plan_limits import plan_limits
 from benchmarks.control.reach_judge import POSITION, ROTATION, BaseBounds, Trajectory, goal_error
-from controller.config import ControllerConfig, HierarchyConfig
+from controller.config import ControllerConfig, HierarchyConfig, MotionConfig, WholeBodyConfig, WorkConfig
 from controller.motion.follower import tool_error
 from controller.motion.trajectory import PoseTrajectory, Rates
 from controller.whole_body.collision import CollisionModel
@@ -177,22 +176,23 @@ class _Loop:
 
 def bench_config(method: MethodName) -> ControllerConfig:
     """The controller with the arm's full rates and the base's as its vendor's planner has them."""
-    return msgspec.structs.replace(
-        ControllerConfig(),
-        method="nullspace" if method == "nullspace" else "hierarchy",
-        base_speed=BASE.speed,
-        base_yaw_rate=BASE.yaw_rate,
-        base_acceleration=0.8,
-        base_yaw_acceleration=1.3,
-        arm_velocity_scale=1.0,
-        arm_acceleration_scale=1.0,
-        joint_margin=0.005,
+    return ControllerConfig(
+        whole_body=WholeBodyConfig(
+            method="nullspace" if method == "nullspace" else "hierarchy",
+            base_speed=BASE.speed,
+            base_yaw_rate=BASE.yaw_rate,
+            base_acceleration=0.8,
+            base_yaw_acceleration=1.3,
+            arm_velocity_scale=1.0,
+            arm_acceleration_scale=1.0,
+            joint_margin=0.005,
+            # The plan has chosen its postures: in the null space nothing else is wanted, and where it leads past a
+            # singularity, damping would only lead off it.
+            hierarchy=HierarchyConfig(manipulability=0.0, joint_centre=0.0, damping=1e-5),
+        ),
+        motion=MotionConfig(tool_turn=1.0),
         # 4√2 m in 30 s with the quintic's peak at 1.875 of the mean.
-        tool_speed=0.8,
-        tool_turn=1.0,
-        # The plan has chosen its postures: in the null space nothing else is wanted, and where it leads past a
-        # singularity, damping would only lead off it.
-        hierarchy=HierarchyConfig(manipulability=0.0, joint_centre=0.0, damping=1e-5),
+        work=WorkConfig(tool_speed=0.8),
     )
 
 

@@ -38,8 +38,8 @@ def left(**changes):
             ticket(4, "DONE", cut_id="run-1"),
         ],
         "requests": [
-            (5, "ada", {"ok": True, "asked": {"type": "AcceptPoint", "point_id": "p1"}}),
-            (6, "ada", {"ok": True, "asked": {"type": "Start"}}),
+            (5, "ada", {"reason": None, "asked": {"type": "AcceptPoint", "point_id": "p1"}}),
+            (6, "ada", {"reason": None, "asked": {"type": "Start"}}),
         ],
         "told": told,
         "problem": "",
@@ -67,7 +67,10 @@ def test_what_was_told_and_is_in_no_row_is_lost():
     told = whole.tickets[:2] + [ticket(3, "CUTTING", cut_id="run-1"), ticket(4, "UNKNOWN", cut_id="run-1")]
     assert kinds(left(tickets=told)) == ["lost row"]
     assert kinds(left(requests=whole.requests[:1])) == ["lost row"]
-    refused = [(5, "ada", {"ok": False, "asked": {"type": "AcceptPoint", "point_id": "p1"}}), whole.requests[1]]
+    refused = [
+        (5, "ada", {"reason": {"code": "busy"}, "asked": {"type": "AcceptPoint", "point_id": "p1"}}),
+        whole.requests[1],
+    ]
     assert kinds(left(requests=refused)) == ["lost row"]
 
 

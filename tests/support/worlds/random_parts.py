@@ -12,6 +12,7 @@ from controller.motion.teleoperation import Teleoperation
 from controller.supervision.modes import Event
 from controller.work.blades import Blades
 from controller.work.movement import MotionResult
+from rolling_panda import reasons
 from rolling_panda.model.robot import RobotModel
 
 MODEL = RobotModel()
@@ -74,17 +75,17 @@ class Sequence:
                 return MotionResult(rest, self.blades.command(now))
             unknown = self._queue.get(self.in_canes).state == "UNKNOWN"
             self.abort()
-            return MotionResult(rest, None, (Event.LOST, "unknown") if unknown else None)
+            return MotionResult(rest, None, (Event.LOST, reasons.cutter_unsure()) if unknown else None)
         if self.ending:
             return MotionResult(rest, None, (Event.LOST, self.ending))
         if self._survey:
             self._survey -= 1
-            return MotionResult(WHEELS, None, None if self._survey else (Event.FINISHED, "surveyed"))
+            return MotionResult(WHEELS, None, None if self._survey else (Event.FINISHED, reasons.survey_blind()))
         ticket = self._queue.get(self.active)
         if ticket is None or ticket.state != "ACCEPTED" or ticket.accepted is not self._accepted:
             ticket = self._queue.next(lambda name: bool(self._permit(self._queue.get(name))))
             if ticket is None:
-                return MotionResult(rest, None, (Event.FINISHED, "no point"))
+                return MotionResult(rest, None, (Event.FINISHED, reasons.work_done()))
             self.active, self._accepted = ticket.point.point_id, ticket.accepted
             self._left = self._chance.randrange(2, 15)
         self._left -= 1
@@ -101,11 +102,11 @@ class Movement:
 
     chance = random.Random(0)
 
-    def __init__(self, config, robot_config, queue, lines, run_id, known, method=None, permit=lambda _: ""):
+    def __init__(self, config, robot_config, queue, lines, run_id, known, method=None, permit=lambda _: None):
         self.queue, saturation = queue, Saturation()
         Movement.newest = self
         self._setpoints, self._saturation = Setpoints(saturation), saturation
-        nothing = SimpleNamespace(reason="", model=SimpleNamespace(nearest=None))
+        nothing = SimpleNamespace(reason=None, model=SimpleNamespace(nearest=None))
         self.body = SimpleNamespace(robot=MODEL, measured=None, tracking_error=nothing, surroundings=nothing)
         self.sequence = Sequence(config, queue, run_id, self.chance, permit)
         follower = SimpleNamespace(jog=lambda xi, robot: SimpleNamespace(xi=np.clip(xi, -0.03, 0.03)))
@@ -140,8 +141,8 @@ class Movement:
 
     def busy(self, bridge):
         if self._home or self.sequence.cutting or (bridge is not None and bridge.cutter == "closing"):
-            return "busy"
-        return ""
+            return reasons.blades_closing()
+        return None
 
     def ramp(self):
         return MotionResult(self._saturation.ramp(self._setpoints.sent))
