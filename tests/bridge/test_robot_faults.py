@@ -26,7 +26,11 @@ def test_a_fault_is_told_once_when_it_begins_and_once_when_it_ends(faults: Robot
 def test_a_severe_fault_latches_a_stop_that_says_why(faults: RobotFaults) -> None:
     change = faults.follow(REFLEX, True, False, 1.0)
     assert change is not None and change.stop is not None
-    assert (change.stop.reason, change.stop.source, change.stop.user) == (REFLEX, "robot", "")
+    assert (change.stop.reason, change.stop.source, change.stop.user) == (
+        reasons.robot_fault_reported(REFLEX),
+        "robot",
+        "",
+    )
     assert faults.follow(REFLEX, True, True, 2.0) is None
 
 
@@ -51,7 +55,7 @@ def test_a_fault_during_a_stop_latches_when_that_stop_is_released(faults: RobotF
 def test_a_stop_with_a_long_reason_is_one_that_the_wire_carries(faults: RobotFaults) -> None:
     change = faults.follow("x" * 600, True, False, 1.0)
     assert change is not None and change.stop is not None
-    assert as_received(change.stop).reason == "x" * 500
+    assert as_received(change.stop).reason == reasons.robot_fault_reported("x" * 500)
 
 
 def test_releases_are_counted(faults: RobotFaults) -> None:
