@@ -6,7 +6,7 @@ from PIL import Image
 
 from perception.segmentation.frame import BACKGROUND, CANE, CORDON, GROUND, HOSE, NODE, TRUNK, WIRE
 from perception.training.wide.backgrounds import load_backgrounds
-from perception.training.wide.curves import Tubes, add_trellis, draw_wood, grow_vine
+from perception.training.wide.curves import Tubes, add_brush, add_trellis, draw_wood, grow_vine
 from perception.training.wide.drawing import FAR, Artist, Lens, trace
 from perception.training.wide.raster import draw_cones
 from rolling_panda.errors import InputError
@@ -67,6 +67,7 @@ def test_vines_of_rows_behind_are_background_and_the_own_ones_have_every_kind_of
     tubes, rng = Tubes(), np.random.default_rng(4)
     for _ in range(5):
         add_trellis(rng, tubes, 1.0, 0.9, 2.0, False)
+    add_brush(rng, tubes, draw_wood(rng), 5.0, 0.9, 2.0)
     assert set(np.concatenate(tubes.kind).tolist()) == {BACKGROUND}
 
 

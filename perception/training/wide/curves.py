@@ -108,7 +108,7 @@ def draw_wood(rng: np.random.Generator) -> Wood:
         cane=share @ _CANES * np.exp(rng.normal(0.0, 0.15)),
         spread=float(rng.uniform(0.05, 0.4)),
         upright=float(rng.choice([1.0, rng.uniform(0.0, 1.0)])),
-        lean=float(rng.normal(0.0, 0.5)),
+        lean=float(rng.normal(0.0, rng.choice([0.5, 1.5], p=[0.7, 0.3]))),
         droop=float(rng.choice([rng.uniform(0.0, 0.3), rng.exponential(1.0)])),
         crooked=float(rng.uniform(0.0, 0.22)),
         lateral=float(rng.choice([0.0, rng.uniform(0.0, 0.3)])),
@@ -240,6 +240,10 @@ def grow_vine(rng: np.random.Generator, tubes: Tubes, wood: Wood, x: float, z: f
         rng, thick * np.interp(t[:, 0], [0.0, 0.15, 0.85, 1.0], [1.3, 1.0, 0.9, rng.uniform(0.9, 1.6)]), 0.10
     )
     tubes.add(trunk, radii, kind(TRUNK), bark, BARK, rough)
+    # Old heads are lumps of many years' cuts.
+    for _ in range(int(rng.integers(0, 5))):
+        lump = trunk[-1] + rng.normal(0.0, 0.6 * thick, (2, 3))
+        tubes.add(lump, thick * rng.uniform(0.6, 1.3, 2), kind(TRUNK), _tinted(rng, bark, 0.1), BARK, rough)
     system = rng.choice(["cordon", "guyot", "head"], p=[0.65, 0.2, 0.15])
     for side in (-1.0, 1.0) if rng.random() < 0.7 else (float(rng.choice([-1.0, 1.0])),):
         if system == "head":
@@ -313,6 +317,17 @@ def grow_vine(rng: np.random.Generator, tubes: Tubes, wood: Wood, x: float, z: f
             for _ in range(int(rng.choice([0, 1, 2, 3], p=[0.06, 0.4, 0.4, 0.14]))):
                 from_ = stub[int(rng.integers(len(stub) // 2, len(stub)))]
                 grow_cane(rng, tubes, wood, from_, up + rng.normal(0.0, 0.35, 3), own)
+
+
+def add_brush(rng: np.random.Generator, tubes: Tubes, wood: Wood, z: float, height: float, wide: float) -> None:
+    """Append the canes of a far row without its vines, as background: they are drawn with few, long steps."""
+    for _ in range(int(rng.integers(20, 120))):
+        start = np.array([rng.uniform(-wide, wide), height + rng.normal(0.0, 0.05), z + rng.normal(0.0, 0.1)])
+        toward = np.array([wood.lean + rng.normal(0.0, 0.6), 1.0, rng.normal(0.0, 0.3)])
+        toward /= np.linalg.norm(toward)
+        cane = path(rng, start, toward, wood.length * rng.uniform(0.5, 1.2), wood.droop, 0.6, 0.1)
+        radii = np.linspace(wood.radius, wood.radius / 2.0, len(cane))
+        tubes.add(cane, radii, BACKGROUND, _tinted(rng, wood.cane, 0.2))
 
 
 def add_trellis(rng: np.random.Generator, tubes: Tubes, z: float, height: float, wide: float, own: bool) -> None:

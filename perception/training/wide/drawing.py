@@ -21,6 +21,7 @@ from perception.training.wide.curves import (
     PLASTIC,
     Tubes,
     Wood,
+    add_brush,
     add_clutter,
     add_trellis,
     draw_wood,
@@ -219,7 +220,7 @@ class Artist:
         if rng.random() < 0.85:
             add_trellis(rng, tubes, away, height, 2.5, True)
         add_clutter(rng, tubes, away, wood)
-        rows = int(rng.choice([0, 1, 2, 4, 7], p=[0.25, 0.2, 0.25, 0.2, 0.1]))
+        rows = int(rng.choice([0, 1, 2, 4, 7], p=[0.2, 0.2, 0.25, 0.2, 0.15]))
         spacing = float(rng.uniform(1.2, 3.0))
         for row in range(1, rows + 1):
             z = away + row * spacing
@@ -227,6 +228,8 @@ class Artist:
             reach = z * 0.9 + 0.5
             for _ in range(min(3 + row, 6)):
                 grow_vine(rng, tubes, other, float(rng.uniform(-reach, reach)), z, height, False)
+            if row > 1:
+                add_brush(rng, tubes, other, z, height, reach)
             if rng.random() < 0.8:
                 add_trellis(rng, tubes, z, height, reach + 1.0, False)
 
