@@ -9,11 +9,10 @@ from typing import Any, Generic, TypeVar
 from perception.config import PerceptionConfig
 from perception.pipeline import Perception
 from rolling_panda import messages as m
-from rolling_panda import topics
+from rolling_panda import reasons, topics
 from rolling_panda.errors import RollingPandaError
 from rolling_panda.messages.perception import CloseUpResult, Obstacles, PointCrop
 from rolling_panda.messages.robot import CameraFrame
-from rolling_panda.reasons import noted
 from rolling_panda.transport.inbox import Inbox, Received, Reply, Request
 from rolling_panda.transport.runner import Runner, Wire
 
@@ -80,7 +79,7 @@ class Worker(Generic[Job, Result]):
 @dataclass(frozen=True)
 class _Output:
     points: m.PruningPoints
-    withdrawn: tuple[str, ...]
+    withdrawn: tuple[m.Reason, ...]
     obstacles: Obstacles
     crops: tuple[PointCrop, ...]
     rejected_wood: str
@@ -126,7 +125,7 @@ class PerceptionProcess:
         self._out = []
         if not self._started:
             self._started = True
-            self._log("info", "perception is up and waits for camera frames", now)
+            self._log(reasons.perception_started(), now)
         while self._checks:
             self._out.append(self._checks.popleft())
         done = self._worker.poll()
@@ -173,15 +172,15 @@ class PerceptionProcess:
         self._add_new_crops(output.crops)
         ids = frozenset(point.point_id for point in output.points.points)
         if new := len(ids - self._point_ids):
-            self._log("info", f"{new} new pruning point{'' if new == 1 else 's'}, {len(ids)} in all", now)
-        for text in output.withdrawn:
+            self._log(reasons.new_point(len(ids)) if new == 1 else reasons.new_points(new, len(ids)), now)
+        for reason in output.withdrawn:
             # The controller warns where the point was accepted.
-            self._log("info", text, now)
+            self._log(reason, now)
         self._point_ids = ids
         if output.rejected_wood != self._rejected_wood and now - self._rejected_logged >= _REJECTED_PERIOD_S:
             self._rejected_wood, self._rejected_logged = output.rejected_wood, now
             if output.rejected_wood:
-                self._log("info", f"implausible wood left out of the obstacles: {output.rejected_wood}", now)
+                self._log(reasons.wood_implausible(output.rejected_wood), now)
 
     def _add_new_crops(self, crops: tuple[PointCrop, ...]) -> None:
         wanted = {(crop.point_id, crop.revision): crop for crop in crops}
@@ -193,13 +192,13 @@ class PerceptionProcess:
         # An error that repeats frame after frame is logged once.
         error = reason.split(":")[-1]
         if error != self._last_error:
-            self._log("error", f"a camera frame was refused: {reason}", now)
+            self._log(reasons.frame_refused(reason), now)
         self._last_error = error
 
     def _beat(self, now: float) -> None:
         timed_out = self._worker.busy_for(now) > self._config.frame_timeout_s
         if timed_out and not self._timed_out:
-            self._log("error", f"a frame has taken more than {self._config.frame_timeout_s:g} s", now)
+            self._log(reasons.frame_overdue(self._config.frame_timeout_s), now)
         self._timed_out = timed_out
         if not timed_out:
             self._sequence += 1
@@ -207,8 +206,8 @@ class PerceptionProcess:
             m.Heartbeat(process="perception", sequence=self._sequence, status="hangs in a frame" if timed_out else "")
         )
 
-    def _log(self, severity: m.Severity, text: str, now: float) -> None:
-        self._out.append(m.LogEvent(header=m.Header(now), process="perception", reason=noted(severity, text)))
+    def _log(self, reason: m.Reason, now: float) -> None:
+        self._out.append(m.LogEvent(header=m.Header(now), process="perception", reason=reason))
 
 
 def perception_runner(wire: Wire, config: PerceptionConfig, perception: Perception) -> Runner:

@@ -23,6 +23,7 @@ from perception.segmentation.segmenter import SHIPPED
 from perception.single_image import R_LEVEL, ImageCut, ImageResult, Photograph, find_cuts, load_photograph
 from rolling_panda.errors import InputError, RollingPandaError
 from rolling_panda.messages.types import WOOD_CLASSES
+from rolling_panda.reasons import text_of
 from rolling_panda.resources import resource
 
 #: Colour of each class in the palette of classes.png and overlay.png.
@@ -71,8 +72,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"rolling-panda perceive: {error}", file=sys.stderr)
         return 1
     print(f"{len(result.cuts)} points on {result.spurs} spurs; scale: {result.scale}")
-    for text in result.undecided:
-        print(f"undecided: {text}")
+    for reason in result.undecided:
+        print(f"undecided: {text_of(reason)}")
     return 0
 
 
@@ -106,7 +107,7 @@ def _write(out: Path, image: Path, photograph: Photograph, labels: Labels, resul
         "spurs": result.spurs,
         "canes": result.canes,
         "points": [_point(cut, photograph, scale) for cut in result.cuts],
-        "undecided": list(result.undecided),
+        "undecided": [text_of(reason) for reason in result.undecided],
     }
     (out / "points.json").write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
 
@@ -137,7 +138,7 @@ def _point(point: ImageCut, photograph: Photograph, scale: float) -> dict[str, A
         "confidence": round(cut.confidence, 3),
         "nodes_seen": cut.nodes_seen,
         "nodes_kept": cut.nodes_kept,
-        "reason": cut.reason,
+        "reason": text_of(cut.reason),
     }
 
 

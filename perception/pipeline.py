@@ -13,7 +13,7 @@ from perception.plant.capsules import CapsuleSet
 from perception.plant.map import PlantMap
 from perception.plant.model import Spur
 from perception.plant.numbering import SpurNumber, SpurNumbering
-from perception.plant.undecided_sites import NeedsAnotherLook, UndecidedSites, undecided_site
+from perception.plant.undecided_sites import UndecidedSites, undecided_site
 from perception.rules.keep_out import frame_keep_out, map_keep_out
 from perception.rules.manual import move_cut, place_cut
 from perception.rules.pruning import Decision, apply_rule
@@ -26,6 +26,7 @@ from perception.tracking.crop_cache import CropCache
 from perception.tracking.retained_canes import RetainedCanes
 from perception.tracking.tracker import Proposal, Tracker, TrackerUpdate
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.commands import (
     AddPoint,
     AddPointInImage,
@@ -96,7 +97,7 @@ class Perception:
         """Positions where wood was found cut."""
         self.camera_rays = CameraRays()
         self.plant_map = PlantMap()
-        self.withdrawn: tuple[str, ...] = ()
+        self.withdrawn: tuple[m.Reason, ...] = ()
         """Points withdrawn by the last frame, with the reasons."""
         self.obstacles: tuple[Capsule, ...] = ()
         """Obstacle map with the retained canes."""
@@ -119,7 +120,7 @@ class Perception:
         try:
             labels = self.segmenter.segment(view)
         except InputError as error:
-            self._site_messages = (undecided_site(str(error)),)
+            self._site_messages = (undecided_site(reasons.picture_unusable(str(error))),)
             return replace(self.points(), canes=())
         cylinders = self._obstacle_map.update(view, labels)
         self._frames += 1
@@ -165,12 +166,12 @@ class Perception:
         """
         point = self._tracker.find(frame.point_id)
         if point is None:
-            return failed_check(frame, "perception knows no such point")
+            return failed_check(frame, reasons.point_unknown_to_perception())
         view = decode_frame(frame, self._model)
         try:
             check = check_close_up(view, self.segmenter, point, frame.number, self._config)
         except InputError as error:
-            return failed_check(frame, str(error))
+            return failed_check(frame, reasons.picture_unusable(str(error)))
         if check.position is not None and check.tangent is not None:
             self._tracker.refine(point.point_id, np.array(check.position), np.array(check.tangent))
         return check
@@ -196,9 +197,9 @@ class Perception:
         if isinstance(request, AddPointInImage):
             ray = self.camera_rays.ray(request.sequence, request.u, request.v, self._model)
             if ray is None:
-                return _refused("that picture is not among the newest ones any more; click again")
+                return _refused(reasons.picture_too_old())
             return self._add(ray, request.user)
-        return _refused(f"perception cannot do {type(request).__name__}")
+        return _refused(reasons.request_unknown(type(request).__name__))
 
     def points(self) -> m.PruningPoints:
         """All points, undecided sites and canes."""
@@ -248,31 +249,31 @@ class Perception:
     def _add(self, ray: Ray, user: str) -> m.Answer:
         length = float(np.linalg.norm(ray.direction))
         if length < _MIN_NORM:
-            return _refused("a line of sight needs a direction")
+            return _refused(reasons.ray_without_direction())
         found = place_cut(self.plant_map, ray.origin, ray.direction / length, self._config.rule, self.obstacles, user)
-        if isinstance(found, str):
+        if isinstance(found, m.Reason):
             return _refused(found)
         for point in self._tracker.points():
             if distance(np.array(point.position), found[0].position) < _DUPLICATE:
-                return _refused(f"{point.point_id} is there already, within {1000 * _DUPLICATE:.0f} mm")
-        return m.Answer(ok=True, reason=self._tracker.add(Proposal(*found)).point_id)
+                return _refused(reasons.point_there_already(point.point_id, 1000 * _DUPLICATE))
+        return _done(reasons.said(self._tracker.add(Proposal(*found)).point_id))
 
     def _move(self, request: MovePoint) -> m.Answer:
         point = next((each for each in self._tracker.points() if each.point_id == request.point_id), None)
         if point is None:
-            return _refused(f"perception does not see {request.point_id} any more")
+            return _refused(reasons.point_unseen(request.point_id))
         if point.kind == "renewal cut":
-            return _refused("a renewal cut is on the old stub; reject it, and place one by hand")
+            return _refused(reasons.renewal_cut_fixed())
         position = np.array(point.position)
         cut = move_cut(self.plant_map, position, request.along, self._config.rule, self.obstacles, request.user)
-        if isinstance(cut, str):
+        if isinstance(cut, m.Reason):
             return _refused(cut)
-        return m.Answer(ok=True, reason=self._tracker.move(request.point_id, cut).reason)
+        return _done(self._tracker.move(request.point_id, cut).reason)
 
     def _set_rule(self, request: SetRule) -> m.Answer:
         rule = _with_numbers(self._config.rule, request.rule)
         if rule == self._config.rule:
-            return m.Answer(ok=True, reason="this rule is in force already")
+            return _done(reasons.rule_in_force())
         snapshot = _RuleSnapshot(
             self._config.rule,
             self._tracker.copy(),
@@ -290,7 +291,7 @@ class Perception:
         self._tracker.reset(proposals)
         self._retained_canes.select(self.plant_map.spurs, self._tracker.published_cuts(), rule)
         self._site_messages = self._undecided_sites()
-        return m.Answer(ok=True, reason=f"{len(proposals)} points by the new rule")
+        return _done(reasons.points_by_new_rule(len(proposals)))
 
     def _try_rule(self, request: EvaluateRule) -> m.Answer:
         """The effect of a rule, on a copy."""
@@ -305,20 +306,20 @@ class Perception:
             removed=tuple(name for name in now if name not in then),
             added=len(then.keys() - now.keys()),
         )
-        return m.Answer(ok=True, reason=f"{len(then)} points by that rule", effect=effect)
+        return _done(reasons.points_by_that_rule(len(then)), effect)
 
     def _undo_rule(self, request: UndoRule) -> m.Answer:
         if request.rule != _rule_message(self._config.rule):
-            return _refused("the rule has been changed since; look again")
+            return _refused(reasons.rule_changed_since())
         if not self._undo:
-            return _refused("perception knows of no rule before this one; set it by its numbers")
+            return _refused(reasons.no_rule_before())
         before = self._undo.pop()
         self._config = replace(self._config, rule=before.rule)
         cuts = self._severed[before.severed :]
         self._tracker.restore(before.tracker, lambda number, position: self._is_standing(number, position, cuts))
         self._undecided, self._site_messages = before.undecided, before.undecided_sites
         self._retained_canes.select(self.plant_map.spurs, self._tracker.published_cuts(), before.rule)
-        return m.Answer(ok=True, reason=f"{len(self._tracker.points())} points by the rule before")
+        return _done(reasons.points_by_rule_before(len(self._tracker.points())))
 
     def _is_standing(self, number: SpurNumber, position: Array, cuts: list[Array]) -> bool:
         """Whether none of some cuts was made at a position of a spur, or below it on the same cane."""
@@ -344,8 +345,8 @@ class Perception:
         return decisions
 
     def _update_undecided(self, number: SpurNumber, spur: Spur, decision: Decision, in_front: bool) -> None:
-        reasons = list(decision.undecided)
-        self._undecided.update(number, bool(decision.cuts), reasons, vector3(spur.position), in_front)
+        causes = list(decision.undecided)
+        self._undecided.update(number, bool(decision.cuts), causes, vector3(spur.position), in_front)
 
     def _undecided_sites(self) -> tuple[m.UndecidedSite, ...]:
         return self._undecided.remaining({SpurNumber(point.vine, point.spur) for point in self._tracker.points()})
@@ -377,12 +378,8 @@ class Perception:
             return False
         return bool(self._config.survey_min_depth <= np.median(depth) <= self._config.survey_max_depth)
 
-    def _no_survey(self) -> NeedsAnotherLook:
-        near, far = self._config.survey_min_depth, self._config.survey_max_depth
-        return NeedsAnotherLook(
-            f"no cordon is seen {near:g} to {far:g} m away: go there, or is the camera covered, or its depth missing "
-            "or in another unit?"
-        )
+    def _no_survey(self) -> m.Reason:
+        return reasons.no_cordon_in_range(self._config.survey_min_depth, self._config.survey_max_depth)
 
 
 def with_width_bias(config: PerceptionConfig, width_bias: float) -> PerceptionConfig:
@@ -390,8 +387,12 @@ def with_width_bias(config: PerceptionConfig, width_bias: float) -> PerceptionCo
     return replace(config, skeleton=replace(config.skeleton, width_bias=width_bias))
 
 
-def _refused(reason: str) -> m.Answer:
-    return m.Answer(ok=False, reason=reason)
+def _refused(reason: m.Reason) -> m.Answer:
+    return m.Answer(ok=False, reason=reasons.text_of(reason), refused=reason)
+
+
+def _done(reason: m.Reason, effect: m.RuleEffect | None = None) -> m.Answer:
+    return m.Answer(ok=True, reason=reasons.text_of(reason), refused=reason, effect=effect)
 
 
 def _rule_message(rule: RuleConfig) -> m.PruningRule:

@@ -17,8 +17,10 @@ from perception.rules.keep_out import frame_keep_out
 from perception.rules.pruning import Cut, apply_rule
 from perception.segmentation.frame import CANE, NODE, View
 from perception.skeleton.topology import perceive_plant
+from rolling_panda import reasons
 from rolling_panda.errors import InputError
 from rolling_panda.messages.robot import Intrinsics
+from rolling_panda.messages.types import Reason
 
 #: Wider photographs are scaled down to this, the width of the training images; smallest width and height (px).
 MAX_WIDTH, _MIN_SIZE = 848, 64
@@ -181,7 +183,7 @@ class ImageResult:
     """
 
     cuts: tuple[ImageCut, ...]
-    undecided: tuple[str, ...]
+    undecided: tuple[Reason, ...]
     spurs: int
     canes: int
     scale: str
@@ -197,7 +199,7 @@ def find_cuts(photograph: Photograph, labels: Labels, config: PerceptionConfig) 
     """
     if photograph.depth is None:
         assumed = _assumed_depth(photograph, labels)
-        if isinstance(assumed, str):
+        if isinstance(assumed, Reason):
             return ImageResult((), (assumed,), 0, 0, "none")
         depth = np.full(labels.shape, assumed, np.float32)
         config = _with_scale_uncertainty(config)
@@ -205,20 +207,21 @@ def find_cuts(photograph: Photograph, labels: Labels, config: PerceptionConfig) 
     else:
         depth, scale = photograph.depth, "depth image"
         if np.count_nonzero(_cane_mask(labels) & (depth > 0.0)) < _MIN_CANE_PIXELS:
-            return ImageResult((), ("no cane with depth was recognised: look again from 0.6 to 1 m",), 0, 0, scale)
+            return ImageResult((), (reasons.no_cane_with_depth(),), 0, 0, scale)
     view = photograph.view(depth)
     plant = perceive_plant(view, labels, config.skeleton)
-    cuts, undecided = [], []
+    cuts: list[ImageCut] = []
+    undecided: list[Reason] = []
     keep_out = frame_keep_out(view, labels, (), config.rule)
     for number, spur in enumerate(plant.spurs, 1):
         decision = apply_rule(spur, config.rule, plant.other_canes(spur), keep_out)
-        undecided += [f"spur {number}: {reason}" for reason in decision.undecided]
+        undecided += [reasons.spur_left(number, reason) for reason in decision.undecided]
         for cut in decision.cuts:
             u, v, _ = view.pixels(cut.position)[0]
             x, y, _ = view.pixels(cut.position + _ALONG * cut.tangent)[0]
             cuts.append(ImageCut(cut, (float(u), float(v)), (float(x), float(y)), number))
     if not plant.spurs:
-        undecided.append("no spur was recognised: the cordon with its spurs must be in the picture")
+        undecided.append(reasons.no_spur_recognised())
     return ImageResult(tuple(cuts), tuple(undecided), len(plant.spurs), sum(len(s.canes) for s in plant.spurs), scale)
 
 
@@ -237,12 +240,12 @@ def _cane_mask(labels: Labels) -> Mask:
     return np.isin(labels, (CANE, NODE))
 
 
-def _assumed_depth(photograph: Photograph, labels: Labels) -> float | str:
+def _assumed_depth(photograph: Photograph, labels: Labels) -> float | Reason:
     """Depth at which the visible canes would have a common thickness (m), or the reason why there is none."""
     wood = _cane_mask(labels)
     if np.count_nonzero(wood) < _MIN_CANE_PIXELS:
-        return "no cane was recognised in this picture"
+        return reasons.no_cane_recognised()
     width = 2.0 * float(np.median(distance_transform_edt(wood)[skeletonize(wood)])) - 1.0
     if width < _MIN_CANE_WIDTH:
-        return f"canes are {width:.1f} pixels wide; {_MIN_CANE_WIDTH:g} are needed: go nearer or give a larger picture"
+        return reasons.canes_too_narrow(width, _MIN_CANE_WIDTH)
     return photograph.intrinsics.fx * _COMMON_DIAMETER / width

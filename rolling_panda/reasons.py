@@ -1137,6 +1137,443 @@ def lines_left_out(cause: Reason, lines: float) -> None:
     """{cause} (and {lines:.0f} lines like it before)."""
 
 
+# Perception: explanations of cuts
+
+
+@_reason("info", "")
+def past_node(distance_mm: float, node: float) -> None:
+    """{distance_mm:.0f} mm past node {node:.0f}, so that {node:.0f} nodes and the basal bud stay."""
+
+
+@_reason("info", "")
+def midway_past_node(distance_mm: float, node: float) -> None:
+    """{distance_mm:.0f} mm past node {node:.0f}, midway to the next: {node:.0f} nodes and the basal bud stay."""
+
+
+@_reason("info", "")
+def spur_cut_only(place: Reason) -> None:
+    """Spur cut on the only cane on this spur: {place}."""
+
+
+@_reason("info", "")
+def spur_cut_lowest(canes: float, diameter_mm: float, place: Reason) -> None:
+    """Spur cut on the lowest of {canes:.0f} canes that is thick enough ({diameter_mm:.0f} mm): {place}."""
+
+
+@_reason("info", "")
+def spur_cut_thickest(canes: float, diameter_mm: float, place: Reason) -> None:
+    """Spur cut on the thickest of {canes:.0f} thin canes ({diameter_mm:.0f} mm): {place}."""
+
+
+@_reason("info", "")
+def guyot_cut_lower(distance_mm: float, node: float) -> None:
+    """Guyot, on the lower of two canes, the next spur: {distance_mm:.0f} mm past node {node:.0f}."""
+
+
+@_reason("info", "")
+def guyot_cut_upper(distance_mm: float, node: float) -> None:
+    """Guyot, on the upper of two canes, which will fruit: {distance_mm:.0f} mm past node {node:.0f}."""
+
+
+@_reason("info", "")
+def renewal_cut(others: float) -> None:
+    """Renewal cut: takes the old stub off with {others:.0f} other cane(s), just past the cane that stays."""
+
+
+@_reason("info", "")
+def placed_past_node(user: str, distance_mm: float, node: float) -> None:
+    """Placed by {user}: {distance_mm:.0f} mm past node {node:.0f} on this cane."""
+
+
+@_reason("info", "")
+def placed_below_nodes(user: str) -> None:
+    """Placed by {user}: below the first node on this cane."""
+
+
+@_reason("info", "")
+def moved_past_node(user: str, distance_mm: float, node: float) -> None:
+    """Moved by {user}: {distance_mm:.0f} mm past node {node:.0f} on this cane."""
+
+
+@_reason("info", "")
+def moved_below_nodes(user: str) -> None:
+    """Moved by {user}: below the first node on this cane."""
+
+
+# Perception: undecided sites
+
+
+@_reason("info", "")
+def old_cane_left() -> None:
+    """Last year's cane is left for a person."""
+
+
+@_reason("info", "")
+def canes_at_same_height() -> None:
+    """Two canes leave the spur at about the same height, so which is the lower is open."""
+
+
+@_reason("info", "")
+def no_cane_followed() -> None:
+    """No cane could be followed to this spur."""
+
+
+@_reason("info", "")
+def not_two_canes(canes: float) -> None:
+    """{canes:.0f} canes seen on the spur, and the Guyot rule is about two: left for a person."""
+
+
+@_reason("info", "")
+def low_cane_near_limit() -> None:
+    """A low cane is too near the least thickness to tell which cane should stay."""
+
+
+@_reason("info", "")
+def canes_equally_thin() -> None:
+    """All canes are thin and about equally thick, so which should stay is open."""
+
+
+@_reason("info", "")
+def cane_base_hidden() -> None:
+    """The base of the cane to keep is hidden, so its nodes cannot be counted from the first."""
+
+
+@_reason("info", "")
+def nodes_lacking(seen: float, needed: float) -> None:
+    """Only {seen:.0f} of {needed:.0f} nodes seen on the cane to keep; never guessed."""
+
+
+@_reason("info", "")
+def pruned_already(distance_mm: float, node: float) -> None:
+    """The cane ends {distance_mm:.0f} mm past node {node:.0f}: it is pruned already."""
+
+
+@_reason("info", "")
+def beyond_node_hidden(node: float) -> None:
+    """What lies beyond node {node:.0f} is not in view."""
+
+
+@_reason("info", "")
+def cut_place_hidden() -> None:
+    """The place of the cut is hidden."""
+
+
+@_reason("info", "")
+def node_may_be_hidden() -> None:
+    """A stretch of the cane to keep is hidden where another node may be."""
+
+
+@_reason("info", "")
+def nodes_side_by_side() -> None:
+    """Two nodes seem to sit side by side, so one may belong to another cane."""
+
+
+@_reason("info", "")
+def nodes_far_apart() -> None:
+    """Two nodes are so far apart that one between them may not have been seen."""
+
+
+@_reason("info", "")
+def cane_crosses_cut() -> None:
+    """Another cane passes so close to the cut that the shears would take it too."""
+
+
+@_reason("info", "")
+def blades_without_place() -> None:
+    """No place for the blades between two nodes."""
+
+
+@_reason("info", "")
+def cane_beyond_shears(diameter_mm: float) -> None:
+    """The cane is {diameter_mm:.0f} mm thick, more than the shears may cut."""
+
+
+@_reason("info", "")
+def stub_beyond_shears(diameter_mm: float) -> None:
+    """The stub is {diameter_mm:.0f} mm thick, more than the shears may cut."""
+
+
+@_reason("info", "cut this one by hand")
+def wire_near_cut(distance_mm: float) -> None:
+    """A wire or hose passes within {distance_mm:.0f} mm of the cut."""
+
+
+@_reason("info", "cut this one by hand")
+def wood_near_cut(kind: str, distance_mm: float) -> None:
+    """The {kind} is within {distance_mm:.0f} mm of the cut."""
+
+
+@_reason("info", "")
+def other_cane_left(why: Reason) -> None:
+    """The 1 other cane of this spur left for a person: {why}."""
+
+
+@_reason("info", "")
+def other_canes_left(canes: float, why: Reason) -> None:
+    """The {canes:.0f} other canes of this spur left for a person: {why}."""
+
+
+@_reason("info", "")
+def stub_unclear() -> None:
+    """The old stub is not seen clearly."""
+
+
+@_reason("info", "")
+def cane_below_keeper() -> None:
+    """One of them grows below the cane that stays."""
+
+
+@_reason("info", "")
+def stub_too_short(length_mm: float) -> None:
+    """The stub is free over {length_mm:.0f} mm only."""
+
+
+@_reason("info", "")
+def shears_touch_keeper() -> None:
+    """The shears would touch the cane that stays."""
+
+
+@_reason("info", "")
+def spur_at_image_edge() -> None:
+    """The spur is at the edge of the image, so not all of its canes may be in view."""
+
+
+@_reason("info", "")
+def stray_cane_hidden() -> None:
+    """A cane seems to start here, but its base is hidden."""
+
+
+@_reason("info", "check it yourself")
+def looks_exhausted(why: Reason, looks: float) -> None:
+    """{why}; {looks:.0f} looks from the front have not shown more."""
+
+
+@_reason("warning", "")
+def picture_unusable(detail: str) -> None:
+    """{detail}."""
+
+
+@_reason("info", "go there, or is the camera covered, or its depth missing or in another unit?")
+def no_cordon_in_range(near: float, far: float) -> None:
+    """No cordon is seen {near:g} to {far:g} m away."""
+
+
+@_reason("info", "")
+def spur_left(spur: float, why: Reason) -> None:
+    """Spur {spur:.0f}: {why}."""
+
+
+@_reason("info", "look again from 0.6 to 1 m")
+def no_cane_with_depth() -> None:
+    """No cane with depth was recognised."""
+
+
+@_reason("info", "")
+def no_spur_recognised() -> None:
+    """No spur was recognised: the cordon with its spurs must be in the picture."""
+
+
+@_reason("info", "")
+def no_cane_recognised() -> None:
+    """No cane was recognised in this picture."""
+
+
+@_reason("info", "go nearer or give a larger picture")
+def canes_too_narrow(width: float, needed: float) -> None:
+    """Canes are {width:.1f} pixels wide; {needed:g} are needed."""
+
+
+# Perception: points by hand and the rule
+
+
+@_reason("warning", "drive there, with Survey for instance, and click again")
+def row_unseen_there() -> None:
+    """This part of the row has not been seen yet."""
+
+
+@_reason("warning", "click on a blue line")
+def click_beside_cane(distance_mm: float) -> None:
+    """The nearest known cane is {distance_mm:.0f} mm beside the click."""
+
+
+@_reason("warning", "")
+def click_elsewhere(why: Reason, distance_mm: float) -> None:
+    """{why}; click {distance_mm:.0f} mm or more away along the cane."""
+
+
+@_reason("warning", "reject it, and place one by hand")
+def on_no_cane() -> None:
+    """It is on no known cane."""
+
+
+@_reason("warning", "")
+def cut_there_already() -> None:
+    """The cane has been cut there already."""
+
+
+@_reason("warning", "")
+def cane_begins_there() -> None:
+    """The cane begins there."""
+
+
+@_reason("warning", "")
+def node_too_near(distance_mm: float, needed_mm: float) -> None:
+    """{distance_mm:.0f} mm from a node: the blades need {needed_mm:.0f} mm."""
+
+
+@_reason("warning", "")
+def wire_passes_there(distance_mm: float) -> None:
+    """A wire passes within {distance_mm:.0f} mm of there."""
+
+
+@_reason("warning", "click again")
+def picture_too_old() -> None:
+    """That picture is not among the newest ones any more."""
+
+
+@_reason("warning", "")
+def request_unknown(request: str) -> None:
+    """Perception cannot do {request}."""
+
+
+@_reason("warning", "")
+def ray_without_direction() -> None:
+    """A line of sight needs a direction."""
+
+
+@_reason("warning", "")
+def point_there_already(point: str, distance_mm: float) -> None:
+    """{point} is there already, within {distance_mm:.0f} mm."""
+
+
+@_reason("warning", "reject it, and place one by hand")
+def renewal_cut_fixed() -> None:
+    """A renewal cut is on the old stub."""
+
+
+@_reason("info", "")
+def rule_in_force() -> None:
+    """This rule is in force already."""
+
+
+@_reason("info", "")
+def points_by_new_rule(points: float) -> None:
+    """{points:.0f} points by the new rule."""
+
+
+@_reason("info", "")
+def points_by_that_rule(points: float) -> None:
+    """{points:.0f} points by that rule."""
+
+
+@_reason("info", "")
+def points_by_rule_before(points: float) -> None:
+    """{points:.0f} points by the rule before."""
+
+
+@_reason("warning", "look again")
+def rule_changed_since() -> None:
+    """The rule has been changed since."""
+
+
+@_reason("warning", "set it by its numbers")
+def no_rule_before() -> None:
+    """Perception knows of no rule before this one."""
+
+
+# Perception: close-ups, withdrawals and the log
+
+
+@_reason("info", "")
+def camera_not_at_standoff(distance: float, near: float, far: float) -> None:
+    """The camera was {distance:.2f} m away; it has to be {near:g} to {far:g} m."""
+
+
+@_reason("info", "")
+def no_close_up(limit_s: float) -> None:
+    """No picture of it came within {limit_s:g} s."""
+
+
+@_reason("info", "")
+def place_outside_picture() -> None:
+    """The place was not inside the picture."""
+
+
+@_reason("info", "")
+def cane_hidden() -> None:
+    """Its cane is hidden."""
+
+
+@_reason("info", "")
+def no_cane_at_place() -> None:
+    """No cane runs through the place."""
+
+
+@_reason("info", "")
+def beyond_cut_hidden() -> None:
+    """What lies beyond the cut is hidden."""
+
+
+@_reason("info", "")
+def cane_end_unclear() -> None:
+    """Whether the cane goes on is not clear."""
+
+
+@_reason("info", "")
+def node_near_cut(distance_mm: float) -> None:
+    """A node is seen {distance_mm:.0f} mm from the cut."""
+
+
+@_reason("info", "")
+def node_before_cut_unseen() -> None:
+    """The node before the cut was not seen."""
+
+
+@_reason("warning", "")
+def point_unknown_to_perception() -> None:
+    """Perception knows no such point."""
+
+
+@_reason("info", "")
+def withdrawn_as_cut(point: str, vine: float, spur: float, frames: float) -> None:
+    """{point} (vine {vine:.0f}, spur {spur:.0f}) withdrawn: cut, as its wood was gone in {frames:.0f} frames."""
+
+
+@_reason("info", "")
+def withdrawn_as_elsewhere(point: str, vine: float, spur: float) -> None:
+    """{point} (vine {vine:.0f}, spur {spur:.0f}) withdrawn: closer looks put the cut elsewhere on this spur."""
+
+
+@_reason("info", "")
+def perception_started() -> None:
+    """Perception is up and waits for camera frames."""
+
+
+@_reason("info", "")
+def new_point(points: float) -> None:
+    """One new pruning point, {points:.0f} in all."""
+
+
+@_reason("info", "")
+def new_points(new: float, points: float) -> None:
+    """{new:.0f} new pruning points, {points:.0f} in all."""
+
+
+@_reason("info", "")
+def wood_implausible(counts: str) -> None:
+    """Implausible wood left out of the obstacles: {counts}."""
+
+
+@_reason("error", "")
+def frame_refused(detail: str) -> None:
+    """A camera frame was refused: {detail}."""
+
+
+@_reason("error", "")
+def frame_overdue(limit_s: float) -> None:
+    """A frame has taken more than {limit_s:g} s."""
+
+
 # Work: points
 
 

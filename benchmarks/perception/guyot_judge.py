@@ -8,6 +8,7 @@ from benchmarks.perception.judge import ON_AXIS, JudgedPoint, RowJudge, Sight, n
 from bridge.sim.vineyard.row import Array
 from bridge.sim.vineyard.truth import RightCut, judge_guyot
 from rolling_panda import messages as m
+from rolling_panda.reasons import text_of
 
 #: What the two canes of a vine's spur are cut for, lower one first; these numbers stand for the spur's in results.
 KINDS = ("spur cut", "cane cut")
@@ -70,7 +71,7 @@ class GuyotJudge(RowJudge):
             plane_error=None,
             nodes_left=None,
             confidence=point.confidence,
-            reason=point.reason,
+            reason=text_of(point.reason),
         )
         wanted = self._wanted.get((rod.vine, kind))
         if wanted is None or (rod.spur, rod.cane) != (0, wanted.cane):

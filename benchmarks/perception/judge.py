@@ -11,6 +11,7 @@ from bridge.sim.vineyard.row import Array, Rod, Row
 from bridge.sim.vineyard.truth import RightCut, judge
 from rolling_panda import messages as m
 from rolling_panda.messages.robot import Intrinsics
+from rolling_panda.reasons import text_of
 
 #: A point this near to the axis is on the wood (m).
 ON_AXIS = 0.010
@@ -130,7 +131,7 @@ class RowJudge:
         position, tangent = np.array(point.position), np.array(point.tangent)
         off_axis, rod = nearest_rod(self.row, position)
         truth = next(t for t in judge(self.row) if (t.vine, t.spur) == (rod.vine, rod.spur))
-        renewal = point.reason.startswith("Renewal")
+        renewal = point.kind == "renewal cut"
         cut: RightCut | None = truth.renewal if renewal else truth.cut
         right_cane = cut is not None and (rod.kind == "spur" if renewal else rod.cane == truth.keeper)
         along = cut.past_best(position) if right_cane and cut is not None else None
@@ -153,7 +154,7 @@ class RowJudge:
             plane_error=plane,
             nodes_left=nodes,
             confidence=point.confidence,
-            reason=point.reason,
+            reason=text_of(point.reason),
         )
 
 

@@ -97,7 +97,8 @@ def _upgraded(kind: str, body: Any) -> Any:
         body["state"] = "CUTTING"
     if body.get("reason") == "":
         del body["reason"]
-    return with_reason(body)
+    points = {name: with_reason(body[name]) for name in ("point", "accepted") if name in body}
+    return with_reason(body | points)
 
 
 def _written_by(ledger: Ledger) -> str:

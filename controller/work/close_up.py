@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.messages.perception import CloseUpResult, Finding
 
 #: A request is repeated this often until its picture has come (s).
@@ -81,9 +82,12 @@ class CloseUpClient:
         if asked is None:
             return None
         if asked.answer is None and now - asked.begun > self._timeout_s:
-            reason = f"no picture of it came within {self._timeout_s:g} s"
             asked.answer = CloseUpResult(
-                header=m.Header(), point_id=point_id, number=asked.number, finding="unseen", reason=reason
+                header=m.Header(),
+                point_id=point_id,
+                number=asked.number,
+                finding="unseen",
+                reason=reasons.no_close_up(self._timeout_s),
             )
         return asked.answer
 

@@ -159,7 +159,7 @@ def looked_again(perceived: m.PruningPoints, place: m.UndecidedSite) -> m.Reason
     if left is None:
         return reasons.looked_again(place.vine, place.spur, ", ".join(shown) or "none")
     made = reasons.looked_again_asks if left.needs == "operator" else reasons.looked_again_unclear
-    return made(place.vine, place.spur, reasons.said(left.reason))
+    return made(place.vine, place.spur, left.reason)
 
 
 def _wheels(robot: Measured, speed: float, turning: float) -> Array:

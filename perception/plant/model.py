@@ -6,6 +6,7 @@ from typing import Literal
 import numpy as np
 
 from perception.arrays import Array, interpolate
+from rolling_panda.messages.types import Reason
 
 #: Mean distance of the visible half of a cylinder from its axis, in radii.
 SURFACE_OFFSET = np.pi / 4
@@ -98,14 +99,14 @@ class Spur:
         axis: The stub from the cordon outwards, 2×3 in odom (m); None where it is not clearly visible.
         radius: Of the stub (m), 0 where it is not clearly visible.
         canes: Longest first.
-        incomplete: Reason why canes may be out of view; empty if none.
+        incomplete: Reason why canes may be out of view; None if none.
     """
 
     position: Array
     axis: Array | None
     radius: float
     canes: tuple[Cane, ...]
-    incomplete: str = ""
+    incomplete: Reason | None = None
 
 
 @dataclass(frozen=True)

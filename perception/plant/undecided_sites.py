@@ -6,28 +6,49 @@ from msgspec.structs import replace
 
 from perception.plant.numbering import SpurNumber
 from rolling_panda import messages as m
+from rolling_panda import reasons
 
 #: Observations from the front after which another look is not expected to help.
 _MAX_OBSERVATIONS = 12
+#: Codes of the reasons that another look may resolve.
+_LOOK_AGAIN = frozenset(
+    made.code
+    for made in (
+        reasons.no_cane_followed(),
+        reasons.cane_base_hidden(),
+        reasons.nodes_lacking(0, 0),
+        reasons.beyond_node_hidden(0),
+        reasons.cut_place_hidden(),
+        reasons.node_may_be_hidden(),
+        reasons.nodes_far_apart(),
+        reasons.stub_unclear(),
+        reasons.spur_at_image_edge(),
+        reasons.stray_cane_hidden(),
+        reasons.no_cordon_in_range(0, 0),
+    )
+)
 
 
-class NeedsAnotherLook(str):
-    """A reason that another look may resolve. Any other reason is for an operator."""
+def needs_of(reason: m.Reason) -> m.Need:
+    """Whether another look may resolve a reason, or its cause; any other reason is for an operator."""
+    causes = [value for _, value in reason.values if isinstance(value, m.Reason)]
+    again = reason.code in _LOOK_AGAIN or any(needs_of(cause) == "another look" for cause in causes)
+    return "another look" if again else "operator"
 
-    __slots__ = ()
 
-
-def undecided_site(reason: str, number: SpurNumber | None = None, position: m.Vector3 | None = None) -> m.UndecidedSite:
+def undecided_site(
+    reason: m.Reason, number: SpurNumber | None = None, position: m.Vector3 | None = None
+) -> m.UndecidedSite:
     """The message of a reason.
 
     Args:
-        reason: Text, or `NeedsAnotherLook`.
+        reason: Why it is undecided.
         number: Of the spur; None where it is about no spur in particular.
         position: Of the spur (m, odom).
     """
     return m.UndecidedSite(
-        reason=reason[:500],
-        needs="another look" if isinstance(reason, NeedsAnotherLook) else "operator",
+        reason=reason,
+        needs=needs_of(reason),
         vine=0 if number is None else number.vine,
         spur=0 if number is None else number.spur,
         position=position,
@@ -57,7 +78,7 @@ class UndecidedSites:
         self,
         number: SpurNumber,
         has_cuts: bool,
-        reasons: list[str],
+        causes: list[m.Reason],
         position: m.Vector3 | None = None,
         in_front: bool = True,
     ) -> None:
@@ -66,17 +87,17 @@ class UndecidedSites:
         Args:
             number: Of the spur.
             has_cuts: Whether cuts are proposed there as well.
-            reasons: An empty list closes the site.
+            causes: Why it is undecided; an empty list closes the site.
             position: Of the spur (m, odom).
             in_front: Whether the camera is in front of it. Other views do not overrule one from the front.
         """
         if in_front:
             self._observations[number] = self._observations.get(number, 0) + 1
         known = self._sites.get(number)
-        if not reasons:
+        if not causes:
             self._sites.pop(number, None)
         elif in_front or known is None or not known.in_front:
-            messages = tuple(undecided_site(reason, number, position) for reason in reasons)
+            messages = tuple(undecided_site(reason, number, position) for reason in causes)
             self._sites[number] = _Site(has_cuts, messages, in_front)
 
     def remaining(self, with_points: set[SpurNumber]) -> tuple[m.UndecidedSite, ...]:
@@ -92,5 +113,4 @@ class UndecidedSites:
         """Passed on to an operator after enough observations."""
         if site.needs != "another look" or observations < _MAX_OBSERVATIONS:
             return site
-        reason = f"{site.reason}; {observations} looks from the front have not shown more: check it yourself"
-        return replace(site, needs="operator", reason=reason[:500])
+        return replace(site, needs="operator", reason=reasons.looks_exhausted(site.reason, observations))

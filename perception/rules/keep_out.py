@@ -9,7 +9,9 @@ from perception.arrays import Array, Labels
 from perception.config import RuleConfig
 from perception.plant.capsules import CapsuleSet
 from perception.segmentation.frame import HOSE, WIRE, View
+from rolling_panda import reasons
 from rolling_panda.messages.perception import Capsule
+from rolling_panda.messages.types import Reason
 
 #: Approximate approach direction: the row runs along x of odom and the robot stands beside it.
 _APPROACH = np.array([0.0, 1.0, 0.0])
@@ -24,17 +26,17 @@ class KeepOut:
     """Forbidden and unfavourable places of a cut.
 
     Attributes:
-        reason: Why a cut at a position (3, m, odom) is forbidden; empty where it is allowed.
+        reason: Why a cut at a position (3, m, odom) is forbidden; None where it is allowed.
         fits: Whether the open blades at a position (3, m, odom) on wood with a tangent (3) have the controller's
             clearance from wires. Otherwise the controller may refuse the cut.
     """
 
-    reason: Callable[[Array], str]
+    reason: Callable[[Array], Reason | None]
     fits: Callable[[Array, Array], bool]
 
 
 #: No restriction.
-NO_KEEP_OUT = KeepOut(lambda position: "", lambda position, tangent: True)
+NO_KEEP_OUT = KeepOut(lambda position: None, lambda position, tangent: True)
 
 
 def frame_keep_out(view: View, labels: Labels, obstacles: tuple[Capsule, ...], rule: RuleConfig) -> KeepOut:
@@ -49,7 +51,7 @@ def frame_keep_out(view: View, labels: Labels, obstacles: tuple[Capsule, ...], r
     mapped = map_keep_out(obstacles, rule)
     wood_reason = _wood_reason(obstacles, rule)
 
-    def reason(position: Array) -> str:
+    def reason(position: Array) -> Reason | None:
         return (
             _wire_reason(rule) if wire_in_image(view, labels, position, rule.wire_distance) else wood_reason(position)
         )
@@ -65,7 +67,7 @@ def map_keep_out(obstacles: tuple[Capsule, ...], rule: RuleConfig) -> KeepOut:
     wires = CapsuleSet(obstacles, ("wire", "hose"))
     wood_reason = _wood_reason(obstacles, rule)
 
-    def reason(position: Array) -> str:
+    def reason(position: Array) -> Reason | None:
         near = wires.nearest(position[None])[0] < rule.wire_distance
         return _wire_reason(rule) if near else wood_reason(position)
 
@@ -126,17 +128,17 @@ def _wire_pixels(view: View, labels: Labels, at: tuple[float, float, float], rad
     return np.asarray(col + cols.start - u, float), np.asarray(row + rows.start - v, float)
 
 
-def _wire_reason(rule: RuleConfig) -> str:
-    return f"a wire or hose passes within {1000 * rule.wire_distance:.0f} mm of the cut; cut this one by hand"
+def _wire_reason(rule: RuleConfig) -> Reason:
+    return reasons.wire_near_cut(1000 * rule.wire_distance)
 
 
-def _wood_reason(obstacles: tuple[Capsule, ...], rule: RuleConfig) -> Callable[[Array], str]:
+def _wood_reason(obstacles: tuple[Capsule, ...], rule: RuleConfig) -> Callable[[Array], Reason | None]:
     wood = {kind: CapsuleSet(obstacles, (kind,)) for kind in ("cordon", "trunk")}
 
-    def reason(position: Array) -> str:
+    def reason(position: Array) -> Reason | None:
         for kind, capsules in wood.items():
             if capsules.nearest(position[None])[0] < rule.cordon_distance:
-                return f"the {kind} is within {1000 * rule.cordon_distance:.0f} mm of the cut; cut this one by hand"
-        return ""
+                return reasons.wood_near_cut(kind, 1000 * rule.cordon_distance)
+        return None
 
     return reason

@@ -10,8 +10,10 @@ from perception.config import RuleConfig
 from perception.plant.capsules import CapsuleSet
 from perception.plant.map import KnownCane, KnownSpur, PlantMap
 from perception.plant.numbering import SpurNumber
-from perception.rules.pruning import Cut, count_nodes, node_distance, thickness_reason
+from perception.rules.pruning import Cut, count_nodes, node_distance, too_thick
+from rolling_panda import reasons
 from rolling_panda.messages.perception import Capsule
+from rolling_panda.messages.types import Reason
 
 #: Largest distance of a click from a cane (m), and from far away the largest angle (rad).
 _MAX_DISTANCE, _MAX_ANGLE = 0.025, 0.012
@@ -43,7 +45,7 @@ def place_cut(
     config: RuleConfig,
     obstacles: tuple[Capsule, ...],
     user: str,
-) -> tuple[Cut, SpurNumber] | str:
+) -> tuple[Cut, SpurNumber] | Reason:
     """The cut on the cane nearest to a ray, or the reason why there is none.
 
     Args:
@@ -63,16 +65,16 @@ def place_cut(
 
     hit = _nearest(known, distances)
     if hit is None or hit.distance > _MAX_UNSEEN:
-        return "this part of the row has not been seen yet: drive there, with Survey for instance, and click again"
+        return reasons.row_unseen_there()
     if hit.distance > max(_MAX_DISTANCE, _MAX_ANGLE * hit.range):
-        return f"the nearest known cane is {1000 * hit.distance:.0f} mm beside the click: click on a blue line"
-    reason = ""
+        return reasons.click_beside_cane(1000 * hit.distance)
+    refused: list[Reason] = []
     for shift in sorted(np.arange(-_MAX_SHIFT, _MAX_SHIFT + _SHIFT_STEP / 2, _SHIFT_STEP).tolist(), key=abs):
-        cut = _cut_at(hit, hit.arc + shift, config, obstacles, f"Placed by {user}")
+        cut = _cut_at(hit, hit.arc + shift, config, obstacles, user, moved=False)
         if isinstance(cut, Cut):
             return cut, hit.spur.number
-        reason = reason or cut
-    return f"{reason}; click {1000 * _MAX_SHIFT:.0f} mm or more away along the cane"
+        refused.append(cut)
+    return reasons.click_elsewhere(refused[0], 1000 * _MAX_SHIFT)
 
 
 def move_cut(
@@ -82,7 +84,7 @@ def move_cut(
     config: RuleConfig,
     obstacles: tuple[Capsule, ...],
     user: str,
-) -> Cut | str:
+) -> Cut | Reason:
     """A cut shifted along its cane, or the reason why there is none.
 
     Args:
@@ -95,27 +97,33 @@ def move_cut(
     """
     hit = _nearest(known, lambda axis: (np.linalg.norm(axis - position, axis=1), np.zeros(len(axis))))
     if hit is None or hit.distance >= _ON_CANE:
-        return "it is on no known cane; reject it, and place one by hand"
-    return _cut_at(hit, hit.arc + along, config, obstacles, f"Moved by {user}")
+        return reasons.on_no_cane()
+    return _cut_at(hit, hit.arc + along, config, obstacles, user, moved=True)
 
 
-def _cut_at(hit: _Hit, arc: float, config: RuleConfig, obstacles: tuple[Capsule, ...], author: str) -> Cut | str:
+def _cut_at(
+    hit: _Hit, arc: float, config: RuleConfig, obstacles: tuple[Capsule, ...], user: str, moved: bool
+) -> Cut | Reason:
     cane = hit.cane.as_cane()
     if arc > cane.length:
-        return "the cane has been cut there already"
+        return reasons.cut_there_already()
     if arc < float(cane.arc[0]):
-        return "the cane begins there"
+        return reasons.cane_begins_there()
     position = cane.at(arc)
     nodes = count_nodes(cane, config)
     to_node = min((abs(node.arc - arc) for node in cane.nodes), default=np.inf)
     if to_node < _NODE_CLEARANCE:
-        return f"{1000 * to_node:.0f} mm from a node: the blades need {1000 * _NODE_CLEARANCE:.0f} mm"
-    if reason := thickness_reason("cane", cane.radius, config):
-        return reason
+        return reasons.node_too_near(1000 * to_node, 1000 * _NODE_CLEARANCE)
+    if too_thick(cane.radius, config):
+        return reasons.cane_beyond_shears(2000 * cane.radius)
     if CapsuleSet(obstacles, ("wire", "hose")).nearest(position[None])[0] < config.wire_distance:
-        return f"a wire passes within {1000 * config.wire_distance:.0f} mm of there"
+        return reasons.wire_passes_there(1000 * config.wire_distance)
     below = [node for node in nodes if node.arc < arc]
-    where = f"{1000 * (arc - below[-1].arc):.0f} mm past node {len(below)}" if below else "below the first node"
+    if below:
+        past = reasons.moved_past_node if moved else reasons.placed_past_node
+        reason = past(user, 1000 * (arc - below[-1].arc), len(below))
+    else:
+        reason = reasons.moved_below_nodes(user) if moved else reasons.placed_below_nodes(user)
     return Cut(
         kind="by hand",
         position=position,
@@ -124,7 +132,7 @@ def _cut_at(hit: _Hit, arc: float, config: RuleConfig, obstacles: tuple[Capsule,
         confidence=1.0,
         nodes_seen=len(nodes),
         nodes_kept=len(below),
-        reason=f"{author}: {where} on this cane.",
+        reason=reason,
         offset=arc - below[-1].arc if below else None,
         node_distance=node_distance(cane, tuple(below), position),
     )

@@ -10,6 +10,7 @@ Nothing is extrapolated: nodes that were not seen are not counted.
 
 import math
 from dataclasses import dataclass
+from typing import Final, Literal
 
 import numpy as np
 from msgspec.structs import replace
@@ -17,9 +18,9 @@ from msgspec.structs import replace
 from perception.arrays import Array, distance
 from perception.config import RuleConfig
 from perception.plant.model import Cane, Node, Spur
-from perception.plant.undecided_sites import NeedsAnotherLook
 from perception.rules.keep_out import NO_KEEP_OUT, KeepOut
-from rolling_panda.messages.types import CutKind
+from rolling_panda import reasons
+from rolling_panda.messages.types import CutKind, Reason
 
 #: Shear stress at which a cane parts under a flat-edged blade (Pa): Sessiz, Eliçin and Bayhan, "Cutting force and
 #: energy requirement of Boğazkere grape cane", Scientific Papers B, Horticulture LXIII, 2019, in the pruning season.
@@ -28,8 +29,7 @@ CUTTING_STRENGTH = 9.34e6
 #: Half the length of wood around a cut that must be visible (m).
 _VISIBLE_HALF_WIDTH = 0.008
 #: The Guyot rule never proposes the removal of last year's cane: its head is not visible from the front.
-_OLD_CANE = "last year's cane is left for a person"
-_SAME_HEIGHT = "two canes leave the spur at about the same height, so which is the lower is open"
+_OLD_CANE: Final = reasons.old_cane_left()
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Cut:
         confidence: 0…1, see `cut_confidence`.
         nodes_seen: Count nodes seen on the keeper.
         nodes_kept: Count nodes left.
-        reason: One sentence for a grower.
+        reason: Explanation for a grower.
         offset: Distance past the last kept node along the wood (m); None where no node is below the cut.
         node_distance: Distance to the nearest kept node (m); None where none is known.
     """
@@ -57,7 +57,7 @@ class Cut:
     confidence: float
     nodes_seen: int
     nodes_kept: int
-    reason: str
+    reason: Reason
     offset: float | None = None
     node_distance: float | None = None
 
@@ -67,13 +67,16 @@ class Decision:
     """Cuts of one spur, and the reasons for what is left undecided."""
 
     cuts: tuple[Cut, ...] = ()
-    undecided: tuple[str, ...] = ()
+    undecided: tuple[Reason, ...] = ()
 
 
 @dataclass(frozen=True)
 class _Keeper:
+    """The cane that stays, why it does, and the number of canes on the spur."""
+
     cane: Cane
-    reason: str
+    chosen: Literal["only", "lowest", "thickest", "lower", "upper"]
+    canes: int
     certainty: float = 1.0
 
 
@@ -99,45 +102,42 @@ def cutting_force(radius: float) -> float:
 
 def _prune_spur(spur: Spur, config: RuleConfig, others: list[Array], keep_out: KeepOut) -> Decision:
     if not spur.canes:
-        return Decision(undecided=(NeedsAnotherLook("no cane could be followed to this spur"),))
-    if spur.incomplete:
+        return Decision(undecided=(reasons.no_cane_followed(),))
+    if spur.incomplete is not None:
         return Decision(undecided=(spur.incomplete,))
     keeper = choose_keeper(spur, config)
-    if isinstance(keeper, str):
+    if isinstance(keeper, Reason):
         return Decision(undecided=(keeper,))
     wood = [cane.axis for cane in spur.canes if cane is not keeper.cane] + others
     shorten = _shorten(keeper, wood, config, keep_out)
-    if isinstance(shorten, str):
+    if isinstance(shorten, Reason):
         return Decision(undecided=(shorten,))
     if len(spur.canes) == 1:
         return Decision(cuts=(shorten,))
     renew = _renew(spur, keeper, shorten, config, keep_out)
-    if isinstance(renew, str):
+    if isinstance(renew, Reason):
         return Decision(cuts=(shorten,), undecided=(renew,))
     return Decision(cuts=(shorten, renew))
 
 
 def _prune_guyot(spur: Spur, config: RuleConfig, others: list[Array], keep_out: KeepOut) -> Decision:
-    if spur.incomplete:
+    if spur.incomplete is not None:
         return Decision(undecided=(spur.incomplete,))
     if len(spur.canes) != 2:
-        reason = f"{len(spur.canes)} canes seen on the spur, and the Guyot rule is about two: left for a person"
-        return Decision(undecided=(reason,))
+        return Decision(undecided=(reasons.not_two_canes(len(spur.canes)),))
     lower, upper = sorted(spur.canes, key=lambda cane: float(cane.base[2]))
     if float(upper.base[2] - lower.base[2]) < config.height_error:
-        return Decision(undecided=(_SAME_HEIGHT,))
+        return Decision(undecided=(reasons.canes_at_same_height(),))
     fruiting = replace(config, nodes_kept=config.fruiting_nodes)
     results = (
-        _shorten(_Keeper(lower, "the lower of two canes, the next spur"), [upper.axis, *others], config, keep_out),
-        _shorten(
-            _Keeper(upper, "the upper of two canes, which will fruit"), [lower.axis, *others], fruiting, keep_out, True
-        ),
+        _shorten(_Keeper(lower, "lower", 2), [upper.axis, *others], config, keep_out),
+        _shorten(_Keeper(upper, "upper", 2), [lower.axis, *others], fruiting, keep_out, True),
     )
     cuts = tuple(result for result in results if isinstance(result, Cut))
-    return Decision(cuts, (_OLD_CANE, *(result for result in results if isinstance(result, str))))
+    return Decision(cuts, (_OLD_CANE, *(result for result in results if isinstance(result, Reason))))
 
 
-def choose_keeper(spur: Spur, config: RuleConfig) -> _Keeper | str:
+def choose_keeper(spur: Spur, config: RuleConfig) -> _Keeper | Reason:
     """The cane that becomes the new spur, or the reason why none can be chosen.
 
     Args:
@@ -146,23 +146,22 @@ def choose_keeper(spur: Spur, config: RuleConfig) -> _Keeper | str:
     """
     canes = sorted(spur.canes, key=lambda cane: (float(cane.base[2]), -cane.radius))
     if len(canes) == 1:
-        return _Keeper(canes[0], "the only cane on this spur")
+        return _Keeper(canes[0], "only", 1)
     margin = config.diameter_error / np.sqrt(min(config.max_averaged, *(cane.observations for cane in canes)))
     keeper = _pick(canes, config.preferred_diameter)
     for limit in (config.preferred_diameter - margin, config.preferred_diameter + margin):
         if _pick(canes, limit) is not keeper:
-            return "a low cane is too near the least thickness to tell which cane should stay"
+            return reasons.low_cane_near_limit()
     thick = [cane for cane in canes if 2 * cane.radius >= config.preferred_diameter]
     if keeper not in thick:
         rival = max(cane.radius for cane in canes if cane is not keeper)
         if 2 * (keeper.radius - rival) < margin:
-            return "all canes are thin and about equally thick, so which should stay is open"
-        return _Keeper(keeper, f"the thickest of {len(canes)} thin canes ({2000 * keeper.radius:.0f} mm)")
+            return reasons.canes_equally_thin()
+        return _Keeper(keeper, "thickest", len(canes))
     clear = min((float(cane.base[2] - keeper.base[2]) for cane in thick if cane is not keeper), default=1.0)
     if clear < config.height_error:
-        return _SAME_HEIGHT
-    reason = f"the lowest of {len(canes)} canes that is thick enough ({2000 * keeper.radius:.0f} mm)"
-    return _Keeper(keeper, reason, float(np.clip(clear / (3 * config.height_error), 0.5, 1.0)))
+        return reasons.canes_at_same_height()
+    return _Keeper(keeper, "lowest", len(canes), float(np.clip(clear / (3 * config.height_error), 0.5, 1.0)))
 
 
 def _pick(canes: list[Cane], diameter: float) -> Cane:
@@ -176,50 +175,50 @@ def count_nodes(cane: Cane, config: RuleConfig) -> tuple[Node, ...]:
     return tuple(node for node in cane.nodes if node.arc > config.basal_bud_distance)
 
 
-def cut_arc(cane: Cane, config: RuleConfig) -> float | str:
+def cut_arc(cane: Cane, config: RuleConfig) -> float | Reason:
     """Arc length of the cut on a cane (m), or the reason why it cannot be placed."""
     kept = config.nodes_kept
     if cane.base_gap > config.max_base_gap:
-        return NeedsAnotherLook("the base of the cane to keep is hidden, so its nodes cannot be counted from the first")
+        return reasons.cane_base_hidden()
     nodes = count_nodes(cane, config)
     if len(nodes) < kept:
-        return NeedsAnotherLook(f"only {len(nodes)} of {kept} nodes seen on the cane to keep; never guessed")
+        return reasons.nodes_lacking(len(nodes), kept)
     last = nodes[kept - 1]
     internode = nodes[kept].arc - last.arc if len(nodes) > kept else None
     if internode is None:
         beyond = max(0.0, cane.length - last.arc)
         if cane.end == "free" and beyond < config.pruned_length:
-            return f"the cane ends {1000 * beyond:.0f} mm past node {kept}: it is pruned already"
+            return reasons.pruned_already(1000 * beyond, kept)
         if beyond < config.visible_beyond:
-            return NeedsAnotherLook(f"what lies beyond node {kept} is not in view")
-    if reason := _miscount_reason(cane, nodes, config):
+            return reasons.beyond_node_hidden(kept)
+    if (reason := _miscount_reason(cane, nodes, config)) is not None:
         return reason
     midway = internode is not None and internode < config.short_internode
     arc = last.arc + (internode / 2 if midway and internode is not None else config.offset)
     seen = [0.0, *(node.arc for node in cane.nodes)]
     for span in cane.hidden:
         if span.overlaps(arc - _VISIBLE_HALF_WIDTH, arc + _VISIBLE_HALF_WIDTH):
-            return NeedsAnotherLook("the place of the cut is hidden")
+            return reasons.cut_place_hidden()
         start, end = max(span.start, config.basal_bud_distance), min(span.end, last.arc)
         # A hidden stretch matters only where a node could be at a distance from those that were seen.
         if end > start and _largest_distance(start, end, seen) > config.hidden_node_distance:
-            return NeedsAnotherLook("a stretch of the cane to keep is hidden where another node may be")
+            return reasons.node_may_be_hidden()
     return arc
 
 
-def _miscount_reason(cane: Cane, nodes: tuple[Node, ...], config: RuleConfig) -> str:
-    """Why the count of nodes up to the cut is unreliable; empty if it is not."""
+def _miscount_reason(cane: Cane, nodes: tuple[Node, ...], config: RuleConfig) -> Reason | None:
+    """Why the count of nodes up to the cut is unreliable; None if it is not."""
     arcs = [node.arc for node in nodes[: config.nodes_kept + 1]]
     gaps = np.diff(arcs)
     kept_gaps = gaps[: config.nodes_kept - 1]
     if np.any(gaps < config.min_node_distance) or np.any(kept_gaps < config.min_internode):
-        return "two nodes seem to sit side by side, so one may belong to another cane"
+        return reasons.nodes_side_by_side()
     # The basal bud may be out of sight: it is then assumed at the end of its range.
     basal = max((node.arc for node in cane.nodes if node.arc <= config.basal_bud_distance), default=None)
     first = arcs[0] - (config.basal_bud_distance if basal is None else basal)
     if max([first, *kept_gaps]) > config.max_internode:
-        return NeedsAnotherLook("two nodes are so far apart that one between them may not have been seen")
-    return ""
+        return reasons.nodes_far_apart()
+    return None
 
 
 def _largest_distance(start: float, end: float, seen: list[float]) -> float:
@@ -228,7 +227,7 @@ def _largest_distance(start: float, end: float, seen: list[float]) -> float:
     return float(np.min(np.abs(places[:, None] - np.array(seen)[None]), axis=1).max())
 
 
-def clear_arc(cane: Cane, arc: float, others: list[Array], config: RuleConfig, keep_out: KeepOut) -> float | str:
+def clear_arc(cane: Cane, arc: float, others: list[Array], config: RuleConfig, keep_out: KeepOut) -> float | Reason:
     """Arc length nearest to that of a cut (m) where nothing else is between the open blades, or the reason.
 
     A place beside a wire is used only where there is no other.
@@ -240,7 +239,8 @@ def clear_arc(cane: Cane, arc: float, others: list[Array], config: RuleConfig, k
         config: Clearances and largest shift.
         keep_out: Keep-out zones of the blades.
     """
-    first_reason, tight = "", None
+    first_reason: Reason | None = None
+    tight = None
     for fraction in (0.0, 0.5, -0.5, 1.0, -1.0):
         place = arc + fraction * config.max_shift
         position = cane.at(place)
@@ -249,43 +249,35 @@ def clear_arc(cane: Cane, arc: float, others: list[Array], config: RuleConfig, k
         if any(
             len(axis) and np.linalg.norm(axis - position, axis=1).min() < config.crossing_distance for axis in others
         ):
-            reason = "another cane passes so close to the cut that the shears would take it too"
+            reason: Reason | None = reasons.cane_crosses_cut()
         else:
             reason = keep_out.reason(position)
-        if not reason and keep_out.fits(position, cane.tangent(place)):
+        if reason is None and keep_out.fits(position, cane.tangent(place)):
             return place
-        tight = place if tight is None and not reason else tight
+        tight = place if tight is None and reason is None else tight
         first_reason = first_reason or reason
-    return tight or first_reason or "no place for the blades between two nodes"
+    return tight or first_reason or reasons.blades_without_place()
 
 
-def thickness_reason(name: str, radius: float, config: RuleConfig) -> str:
-    """Why wood of a radius (m) cannot be cut; empty if it can."""
-    if 2 * radius <= config.max_diameter:
-        return ""
-    return f"the {name} is {2000 * radius:.0f} mm thick, more than the shears may cut"
+def too_thick(radius: float, config: RuleConfig) -> bool:
+    """Whether wood of a radius (m) cannot be cut."""
+    return 2 * radius > config.max_diameter
 
 
 def _shorten(
     keeper: _Keeper, others: list[Array], config: RuleConfig, keep_out: KeepOut, fruiting: bool = False
-) -> Cut | str:
+) -> Cut | Reason:
     cane, kept = keeper.cane, config.nodes_kept
     best = cut_arc(cane, config)
-    if isinstance(best, str):
+    if isinstance(best, Reason):
         return best
     arc = clear_arc(cane, best, others, config, keep_out)
-    if isinstance(arc, str):
+    if isinstance(arc, Reason):
         return arc
-    if reason := thickness_reason("cane", cane.radius, config):
-        return reason
+    if too_thick(cane.radius, config):
+        return reasons.cane_beyond_shears(2000 * cane.radius)
     nodes = count_nodes(cane, config)
     last = nodes[kept - 1].arc
-    where = f"{1000 * (arc - last):.0f} mm past node {kept}"
-    if config.system == "guyot":
-        reason = f"Guyot, on {keeper.reason}: {where}."
-    else:
-        midway = "midway to the next node, " if best - last < config.offset - 1e-9 else ""
-        reason = f"Spur cut on {keeper.reason}: {midway}{where}, so that {kept} nodes and the basal bud stay."
     return Cut(
         kind="cane cut" if fruiting else "spur cut",
         position=cane.at(arc),
@@ -294,10 +286,22 @@ def _shorten(
         confidence=cut_confidence(cane, arc, keeper.certainty, config),
         nodes_seen=len(nodes),
         nodes_kept=kept,
-        reason=reason,
+        reason=_explanation(keeper, 1000 * (arc - last), kept, best - last < config.offset - 1e-9),
         offset=arc - last,
         node_distance=node_distance(cane, nodes[:kept], cane.at(arc)),
     )
+
+
+def _explanation(keeper: _Keeper, distance_mm: float, kept: int, midway: bool) -> Reason:
+    if keeper.chosen == "lower":
+        return reasons.guyot_cut_lower(distance_mm, kept)
+    if keeper.chosen == "upper":
+        return reasons.guyot_cut_upper(distance_mm, kept)
+    place = reasons.midway_past_node(distance_mm, kept) if midway else reasons.past_node(distance_mm, kept)
+    if keeper.chosen == "only":
+        return reasons.spur_cut_only(place)
+    made = reasons.spur_cut_lowest if keeper.chosen == "lowest" else reasons.spur_cut_thickest
+    return made(keeper.canes, 2000 * keeper.cane.radius, place)
 
 
 def node_distance(cane: Cane, nodes: tuple[Node, ...], position: Array) -> float | None:
@@ -313,26 +317,31 @@ def cut_confidence(cane: Cane, arc: float, choice: float, config: RuleConfig) ->
     return float(np.clip(seen * min(1.0, 0.6 + pixels / 50.0) * choice, 0.0, 1.0))
 
 
-def _renew(spur: Spur, keeper: _Keeper, shorten: Cut, config: RuleConfig, keep_out: KeepOut) -> Cut | str:
+def _renew(spur: Spur, keeper: _Keeper, shorten: Cut, config: RuleConfig, keep_out: KeepOut) -> Cut | Reason:
     others = [cane for cane in spur.canes if cane is not keeper.cane]
-    rest = f"the {len(others)} other cane{'s' if len(others) > 1 else ''} of this spur left for a person: "
+
+    def left(why: Reason) -> Reason:
+        return reasons.other_cane_left(why) if len(others) == 1 else reasons.other_canes_left(len(others), why)
+
     if spur.axis is None or spur.radius <= 0.0:
-        return NeedsAnotherLook(rest + "the old stub is not seen clearly")
+        return left(reasons.stub_unclear())
     root, tip = spur.axis
     length = distance(tip, root)
     along = (tip - root) / length
     keeper_at = float((keeper.cane.base - root) @ along)
     nearest = min(float((cane.base - root) @ along) for cane in others)
     if nearest < keeper_at:
-        return rest + "one of them grows below the cane that stays"
+        return left(reasons.cane_below_keeper())
     room = min(nearest, length) - keeper_at
     if room < config.min_stub:
-        return rest + f"the stub is free over {1000 * max(room, 0.0):.0f} mm only"
+        return left(reasons.stub_too_short(1000 * max(room, 0.0)))
     position = root + (keeper_at + room / 2) * along
     if float(np.linalg.norm(keeper.cane.axis - position, axis=1).min()) < config.shears_clearance:
-        return rest + "the shears would touch the cane that stays"
-    if reason := keep_out.reason(position) or thickness_reason("stub", spur.radius, config):
-        return rest + reason
+        return left(reasons.shears_touch_keeper())
+    if (reason := keep_out.reason(position)) is not None:
+        return left(reason)
+    if too_thick(spur.radius, config):
+        return left(reasons.stub_beyond_shears(2000 * spur.radius))
     return Cut(
         kind="renewal cut",
         position=position,
@@ -341,6 +350,6 @@ def _renew(spur: Spur, keeper: _Keeper, shorten: Cut, config: RuleConfig, keep_o
         confidence=0.8 * shorten.confidence,
         nodes_seen=shorten.nodes_seen,
         nodes_kept=shorten.nodes_kept,
-        reason=f"Renewal cut: takes the old stub off with {len(others)} other cane(s), just past the cane that stays.",
+        reason=reasons.renewal_cut(len(others)),
         node_distance=node_distance(keeper.cane, keeper.cane.nodes, position),
     )

@@ -7,12 +7,13 @@ from scipy.spatial import cKDTree
 from perception.arrays import Array, Index, Labels, distance
 from perception.config import SkeletonConfig
 from perception.plant.model import SURFACE_OFFSET, Cane, Node, Plant, Span, Spur
-from perception.plant.undecided_sites import NeedsAnotherLook
 from perception.segmentation.depth_inpainting import inpaint_depth
 from perception.segmentation.frame import CORDON, OLD_CUT, SPUR, TRUNK, View, class_pixels
 from perception.skeleton.centreline import Centreline, base_radius, centrelines
 from perception.skeleton.fragments import find_cane_pixels, find_fragments
 from perception.skeleton.linking import link_fragments
+from rolling_panda import reasons
+from rolling_panda.messages.types import Reason
 
 #: 8-connectivity.
 _CONNECTIVITY = np.ones((3, 3), dtype=bool)
@@ -159,7 +160,7 @@ def _row_direction(cordon: Array, view: View) -> Array:
     return direction if float(direction[np.argmax(np.abs(direction))]) > 0.0 else -direction
 
 
-def _spur(view: View, cloud: Array, cordon: cKDTree | None, canes: list[Cane], incomplete: str) -> Spur:
+def _spur(view: View, cloud: Array, cordon: cKDTree | None, canes: list[Cane], incomplete: Reason | None) -> Spur:
     centre = cloud.mean(axis=0)
     spread, axes = _principal(cloud - centre)
     axis, radius = None, 0.0
@@ -183,13 +184,13 @@ def _principal(off: Array) -> tuple[Array, Array]:
     return np.sqrt(np.maximum(squares[::-1], 0.0)), axes.T[::-1]
 
 
-def _incomplete(view: View, cloud: Array, stray: bool, config: SkeletonConfig) -> str:
-    """Why some of the spur's canes may be out of view; empty if none are."""
+def _incomplete(view: View, cloud: Array, stray: bool, config: SkeletonConfig) -> Reason | None:
+    """Why some of the spur's canes may be out of view; None if none are."""
     height, width = view.depth.shape
     u, v, _ = view.pixels(cloud).T
     margin = config.border_margin
     if u.min() < margin or u.max() > width - margin or v.min() < margin or v.max() > height - 1:
-        return NeedsAnotherLook("the spur is at the edge of the image, so not all of its canes may be in view")
+        return reasons.spur_at_image_edge()
     if stray:
-        return NeedsAnotherLook("a cane seems to start here, but its base is hidden")
-    return ""
+        return reasons.stray_cane_hidden()
+    return None

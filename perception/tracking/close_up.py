@@ -16,8 +16,10 @@ from perception.skeleton.centreline import Centreline
 from perception.skeleton.topology import trace_canes
 from perception.tracking.presence import wood_presence
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.messages.perception import CloseUpResult, Finding
 from rolling_panda.messages.robot import CameraFrame
+from rolling_panda.messages.types import Reason
 from rolling_panda.model.wire_values import vector3
 
 #: Spacing of axis samples (m), and samples to either side in a tangent.
@@ -70,7 +72,9 @@ def check_close_up(
     u, v, z = view.pixels(position)[0]
     height, width = view.depth.shape
 
-    def result(finding: Finding, reason: str = "", cane: _Cane | None = None, shift: float = 0.0) -> CloseUpResult:
+    def result(
+        finding: Finding, reason: Reason | None = None, cane: _Cane | None = None, shift: float = 0.0
+    ) -> CloseUpResult:
         confirmed = cane if finding == "seen" else None
         return CloseUpResult(
             header=m.Header(view.stamp, "odom"),
@@ -85,11 +89,11 @@ def check_close_up(
         )
 
     if not limits.min_distance <= z <= limits.max_distance:
-        wanted = f"{limits.min_distance:g} to {limits.max_distance:g} m"
-        return result("unseen", f"the camera was {z:.2f} m away; it has to be {wanted}")
+        away = reasons.camera_not_at_standoff(float(z), limits.min_distance, limits.max_distance)
+        return result("unseen", away)
     half = round(view.intrinsics.fx * limits.half_window / z)
     if not (half / 2 <= u < width - half / 2 and half / 2 <= v < height - half / 2):
-        return result("unseen", "the place was not inside the picture")
+        return result("unseen", reasons.place_outside_picture())
     part = view.part(slice(round(v) - half, round(v) + half), slice(round(u) - half, round(u) + half))
     labels = segmenter.segment(part)
     beyond = wood_presence(part, labels, position + limits.probe_distance * along)[0]
@@ -101,33 +105,33 @@ def check_close_up(
     if cane is None:
         if beyond == "gone":
             return result("severed")
-        return result("unseen", "its cane is hidden" if beyond == "not visible" else "no cane runs through the place")
+        return result("unseen", reasons.cane_hidden() if beyond == "not visible" else reasons.no_cane_at_place())
     if cane.end < limits.probe_distance:
         if cane.end_reason == "free":
             return result("severed")
-        return result("unseen", "what lies beyond the cut is hidden", cane)
+        return result("unseen", reasons.beyond_cut_hidden(), cane)
     if beyond == "gone":
-        return result("unseen", "whether the cane goes on is not clear", cane)
+        return result("unseen", reasons.cane_end_unclear(), cane)
     if point.offset is None:
-        return result("seen", "", cane)
+        return result("seen", None, cane)
     expected = -point.offset
     kept = [arc for arc in cane.nodes if abs(arc - expected) < limits.max_node_shift]
     if kept:
-        return result("seen", "", cane, min(kept, key=lambda arc: abs(arc - expected)) - expected)
+        return result("seen", None, cane, min(kept, key=lambda arc: abs(arc - expected)) - expected)
     crowding = [arc for arc in cane.nodes if abs(arc) < limits.node_clearance]
     if crowding:
-        return result("changed", f"a node is seen {1e3 * abs(crowding[0]):.0f} mm from the cut", cane)
-    return result("seen", "the node before the cut was not seen", cane)
+        return result("changed", reasons.node_near_cut(1e3 * abs(float(crowding[0]))), cane)
+    return result("seen", reasons.node_before_cut_unseen(), cane)
 
 
-def failed_check(frame: CameraFrame, reason: str) -> CloseUpResult:
+def failed_check(frame: CameraFrame, reason: Reason) -> CloseUpResult:
     """The result of a check that was not possible."""
     return CloseUpResult(
         header=m.Header(frame.header.stamp, "odom"),
         point_id=frame.point_id,
         number=frame.number,
         finding="unseen",
-        reason=reason[:500],
+        reason=reason,
     )
 
 

@@ -19,6 +19,7 @@ from perception.rules.pruning import Cut, cutting_force
 from perception.segmentation.frame import View
 from perception.tracking.presence import wood_presence
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.messages.perception import point_digest
 from rolling_panda.messages.types import CutKind
 from rolling_panda.model.wire_values import vector3
@@ -52,7 +53,7 @@ class Proposal:
 class TrackerUpdate:
     """Points withdrawn by a frame, with the reason, and positions where it showed wood cut (3, m, odom)."""
 
-    withdrawn: tuple[str, ...]
+    withdrawn: tuple[m.Reason, ...]
     severed: tuple[Array, ...]
 
 
@@ -189,7 +190,7 @@ class Tracker:
                 severed.append(track.position)
             if track.published is not None:
                 self._withdrawn[track.point_id] = track.published
-                withdrawn.append(f"{track.point_id} (vine {track.number.vine}, spur {track.number.spur}) {reason}")
+                withdrawn.append(reason)
         self._tracks = kept
         self._publish(supported, observations)
         return TrackerUpdate(tuple(withdrawn), tuple(severed))
@@ -296,7 +297,7 @@ class Tracker:
                 supported.append(known[t])
         return supported + [self._start(proposal) for p, proposal in enumerate(proposals) if p not in used]
 
-    def _withdrawal(self, track: _Track, view: View, labels: Labels, competing: dict[Site, int]) -> str | None:
+    def _withdrawal(self, track: _Track, view: View, labels: Labels, competing: dict[Site, int]) -> m.Reason | None:
         """Why a track without support is withdrawn; None to keep it.
 
         `competing` has the hits of the supported track of each site.
@@ -307,14 +308,14 @@ class Tracker:
             return None
         track.gone = track.gone + 1 if presence == "gone" else 0
         if track.gone >= self._config.gone_frames:
-            return f"withdrawn: the wood beyond it was gone in {track.gone} frames, so it has been cut"
+            return reasons.withdrawn_as_cut(track.point_id, track.number.vine, track.number.spur, track.gone)
         against = competing.get(track.site, 0)
         if track.published is not None and not against:
             return None
         track.misses += 1
         outvoted = track.published is not None and against > max(track.hits, self._config.min_hits - 1)
         if outvoted or track.misses >= (_MAX_MISSES_UNPUBLISHED if track.published is None else _MAX_MISSES):
-            return "withdrawn: closer looks put the cut elsewhere on this spur"
+            return reasons.withdrawn_as_elsewhere(track.point_id, track.number.vine, track.number.spur)
         return None
 
     def _publish(self, supported: list[_Track], observations: Mapping[SpurNumber, int]) -> None:
@@ -350,7 +351,7 @@ class Tracker:
             nodes_kept=min(cut.nodes_kept, 100),
             vine=track.number.vine,
             spur=track.number.spur,
-            reason=cut.reason[:500],
+            reason=cut.reason,
             kind=cut.kind,
             position_covariance=_symmetric(position_covariance(track.position_scatter, count)),
             tangent_covariance=_symmetric(direction_covariance(track.tangent_scatter, count, track.tangent)),

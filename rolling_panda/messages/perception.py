@@ -20,6 +20,7 @@ from rolling_panda.messages.types import (
     Name,
     Need,
     NonNegative,
+    Reason,
     Text,
     UnitVector3,
     Vector3,
@@ -41,7 +42,7 @@ class PruningPoint(Struct, frozen=True, forbid_unknown_fields=True):
         nodes_kept: Number of count nodes that stay below the cut.
         vine: Number of the vine along the row, as perceived.
         spur: Number of the spur position on that vine, as perceived.
-        reason: Reason for the cut, in one sentence for a grower.
+        reason: Explanation of the cut for a grower.
         kind: `spur cut` shortens the cane that stays, `renewal cut` removes the old stub, `cane cut` shortens the
             fruiting cane, `by hand` was placed by a person.
         position_covariance: Covariance of the position (m²): xx, xy, xz, yy, yz, zz.
@@ -64,7 +65,7 @@ class PruningPoint(Struct, frozen=True, forbid_unknown_fields=True):
     nodes_kept: Annotated[int, Meta(ge=0, le=100)]
     vine: Annotated[int, Meta(ge=0, le=100000)]
     spur: Annotated[int, Meta(ge=0, le=100000)]
-    reason: Text
+    reason: Reason
     kind: CutKind = "spur cut"
     position_covariance: Covariance | None = None
     tangent_covariance: Covariance | None = None
@@ -98,14 +99,14 @@ class UndecidedSite(Struct, frozen=True, forbid_unknown_fields=True):
     """A spur without a pruning point.
 
     Attributes:
-        reason: Reason, as text.
+        reason: Reason.
         needs: Another look by the camera, or a decision by the operator.
         vine: Number of the vine; 0 for no particular spur.
         spur: Number of the spur on that vine; 0 for no particular spur.
         position: Position of the spur in odom (m), if known.
     """
 
-    reason: Text
+    reason: Reason
     needs: Need
     vine: Annotated[int, Meta(ge=0, le=100000)] = 0
     spur: Annotated[int, Meta(ge=0, le=100000)] = 0
@@ -183,7 +184,7 @@ class CloseUpResult(Message, frozen=True, kw_only=True):
         point_id: The point.
         number: `number` of the request.
         finding: State of the cane.
-        reason: Reason for `unseen` or `changed`, as text.
+        reason: Reason for `unseen` or `changed`, or a remark on `seen`; None without one.
         position: Position of the cut by this picture in odom (m); None unless `seen`.
         tangent: Unit tangent of the cane there in odom; None unless `seen`.
         distance: Distance of the camera from the point (m).
@@ -194,7 +195,7 @@ class CloseUpResult(Message, frozen=True, kw_only=True):
     point_id: Name
     number: Count
     finding: Finding
-    reason: Text = ""
+    reason: Reason | None = None
     position: Vector3 | None = None
     tangent: UnitVector3 | None = None
     distance: NonNegative = 0.0

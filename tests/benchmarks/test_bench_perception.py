@@ -30,9 +30,9 @@ ROW = grow(VineyardConfig(vines=1), 11)
 TRUTHS = [truth for truth in judge(ROW) if truth.cut is not None]
 
 
-def point(position, tangent, reason="Spur cut.") -> m.PruningPoint:
+def point(position, tangent) -> m.PruningPoint:
     tangent = np.array(tangent) / np.linalg.norm(tangent)
-    return pruning_point("p1", vector3(np.array(position)), vector3(tangent), vine=1, spur=1, reason=reason)
+    return pruning_point("p1", vector3(np.array(position)), vector3(tangent), vine=1, spur=1)
 
 
 @pytest.mark.parametrize("past", [0.0, 0.006, -0.006])

@@ -41,7 +41,7 @@ def test_a_lost_picture_is_asked_for_anew_and_a_look_ends_whatever_comes() -> No
     assert numbers == {1, 2, 3, 4}
     assert client.answer("a", 4.9) is None
     answer = client.answer("a", 5.1)
-    assert answer is not None and answer.finding == "unseen" and "no picture" in answer.reason
+    assert answer is not None and answer.finding == "unseen" and answer.reason.code == "no_close_up"
 
 
 def test_two_points_are_looked_at_at_once_and_what_nobody_asked_for_is_nobodys() -> None:

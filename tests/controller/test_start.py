@@ -75,6 +75,16 @@ def test_the_reason_of_a_point_in_a_ledger_of_schema_2_is_restored_from_its_text
     assert restored(tmp_path).tickets == (row, msgspec.structs.replace(row, reason=None))
 
 
+def test_a_point_that_an_earlier_version_explained_in_words_is_restored(tmp_path):
+    point = msgspec.structs.replace(pruning_point("p1"), reason=reasons.said("lowest cane"))
+    row = TicketRow(point=point, state="ACCEPTED", accepted=point, user="ada")
+    body = msgspec.json.decode(msgspec.json.encode(row))
+    body["point"]["reason"] = body["accepted"]["reason"] = "lowest cane"
+    with Ledger(tmp_path) as ledger:
+        ledger.append([Entry("t", "ticket", "p1", json.dumps(body))])
+    assert restored(tmp_path).tickets == (row,)
+
+
 def started(name, version):
     return Entry("t", "start", name, json.dumps({"program": {"version": version}}))
 

@@ -13,9 +13,9 @@ from rolling_panda.reasons import text_of
 from tests.support.controller_at_work import CONFIG, finish, robot, run_until
 from tests.support.points import point
 
-UNCLEAR = m.UndecidedSite("its base is hidden", "another look", 1, 2)
+UNCLEAR = m.UndecidedSite(reasons.cane_base_hidden(), "another look", 1, 2)
 ROBOT = RobotModel()
-ASKING = m.UndecidedSite("two canes are alike", "operator", 1, 3)
+ASKING = m.UndecidedSite(reasons.canes_at_same_height(), "operator", 1, 3)
 
 
 def surveying(distance, *undecided_sites, **changes):
@@ -113,7 +113,7 @@ def test_what_holds_the_base_back_pauses_it_with_the_reason():
 
 
 def test_a_place_left_open_is_looked_at_from_both_sides_and_from_before_it():
-    place = m.UndecidedSite("its base is hidden", "another look", 1, 2, position=(1.9, 0.8, 0.95))
+    place = m.UndecidedSite(reasons.cane_base_hidden(), "another look", 1, 2, position=(1.9, 0.8, 0.95))
     r = robot()
     r.step()
     tell(r, place)
@@ -136,7 +136,7 @@ def test_a_place_left_open_is_looked_at_from_both_sides_and_from_before_it():
     assert len(places) == 3, stood
     np.testing.assert_allclose(np.diff(places), 0.22, atol=0.02)
     assert abs(places[1] - stood[-1][1]) < 0.03, "the camera is before the place once"
-    assert r.state.reason == reasons.looked_again_unclear(1, 2, reasons.said("its base is hidden"))
+    assert r.state.reason == reasons.looked_again_unclear(1, 2, reasons.cane_base_hidden())
 
 
 def tool_ahead(r):
@@ -150,7 +150,7 @@ def tool_ahead(r):
     ("undecided_sites", "points", "says"),
     [
         ((), ("p7",), reasons.looked_again(1, 2, "p7")),
-        (("two canes are alike",), (), reasons.looked_again_asks(1, 2, reasons.said("two canes are alike"))),
+        ((reasons.canes_at_same_height(),), (), reasons.looked_again_asks(1, 2, reasons.canes_at_same_height())),
         ((), (), reasons.looked_again(1, 2, "none")),
     ],
 )
@@ -158,5 +158,5 @@ def test_what_came_of_the_look_is_told(undecided_sites, points, says):
     left = tuple(m.UndecidedSite(why, "operator", 1, 2, position=(0.4, 0.8, 0.95)) for why in undecided_sites)
     shown = tuple(point(name, (0.4, 0.75, 1.0), vine=1, spur=2) for name in points)
     told = m.PruningPoints(header=m.Header(), segmenter="none", frames=1, points=shown, undecided_sites=left)
-    place = m.UndecidedSite("hidden", "another look", 1, 2, position=(0.4, 0.8, 0.95))
+    place = m.UndecidedSite(reasons.cut_place_hidden(), "another look", 1, 2, position=(0.4, 0.8, 0.95))
     assert looked_again(told, place) == says

@@ -18,6 +18,7 @@ from perception.segmentation.frame import View, decode_frame
 from perception.segmentation.segmenter import LabelImageSegmenter
 from perception.tracking.close_up import check_close_up
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.messages.perception import CloseUpResult
 from rolling_panda.model.robot import RobotModel, configuration
 from rolling_panda.model.wire_values import vector3
@@ -109,6 +110,6 @@ def test_after_the_cut_it_says_that_the_wood_beyond_is_off_and_before_never(scen
 def test_from_too_far_or_out_of_the_picture_it_says_nothing_and_why(scene: Scene) -> None:
     cut = scene.cuts[0]
     far = look(view_from_clear(scene.row, cut, clearance=0.6), point(cut))
-    assert far.finding == "unseen" and "away" in far.reason and far.position is None
+    assert far.finding == "unseen" and far.reason.code == "camera_not_at_standoff" and far.position is None
     beside = look(scene.views[0], point(cut, aside=0.6))
-    assert beside.finding == "unseen" and "picture" in beside.reason
+    assert beside.finding == "unseen" and beside.reason == reasons.place_outside_picture()

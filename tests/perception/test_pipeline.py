@@ -17,6 +17,7 @@ from perception.segmentation.frame import decode_frame
 from perception.segmentation.segmenter import LabelImageSegmenter
 from perception.skeleton.topology import perceive_plant
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.commands import AddPoint, AddPointInImage, EvaluateRule, MovePoint, SetRule, UndoRule
 from rolling_panda.errors import MessageError
 from rolling_panda.messages.perception import point_digest
@@ -73,7 +74,7 @@ def test_a_corrupt_frame_changes_nothing(model, frames):
 def test_without_labels_a_site_stays_undecided_with_the_reason(model, frames):
     result = perception(model).process(msgspec.structs.replace(frames[0], labels_zlib=b""))
     assert not result.points
-    assert "label image" in result.undecided_sites[0].reason
+    assert result.undecided_sites[0].reason.code == "picture_unusable"
 
 
 def test_an_empty_view_gives_no_points(model, frames):
@@ -94,13 +95,13 @@ def shown(model, frames):
 def test_another_rule_changes_the_points_at_once_and_back_again(model, frames):
     seen, before = shown(model, frames)
     answer = seen.answer(SetRule(user="Ada", rule=m.PruningRule(nodes_kept=1)))
-    assert answer.ok and "points by the new rule" in answer.reason
+    assert answer.ok and answer.refused.code == "points_by_new_rule"
     fewer = seen.points().points
     assert fewer and all(point.nodes_kept == 1 for point in fewer)
     # One node lower on the same canes.
     low = {(point.vine, point.spur): point.position[2] for point in fewer}
     for point in before:
-        if (point.vine, point.spur) in low and "Spur cut" in point.reason:
+        if (point.vine, point.spur) in low and point.kind == "spur cut":
             assert point.position[2] - low[point.vine, point.spur] > 0.04
     assert seen.answer(SetRule(user="Ada")).ok
     after = np.array([point.position for point in seen.points().points])
@@ -130,8 +131,8 @@ def test_a_click_into_the_picture_adds_a_point_that_stays(model, frames):
     beyond = np.array(before[0].position) + 0.02 * np.array(before[0].tangent)
     assert np.linalg.norm(np.array(added.position) - beyond) < 0.006
     again = seen.answer(click)
-    assert not again.ok and f"{answer.reason} is there already" in again.reason
-    assert added.reason.startswith("Placed by Ada") and added.radius == pytest.approx(before[0].radius, abs=0.001)
+    assert not again.ok and again.refused == reasons.point_there_already(answer.reason, 10.0)
+    assert added.reason.code == "placed_past_node" and added.radius == pytest.approx(before[0].radius, abs=0.001)
     assert seen.answer(SetRule(user="Ada", rule=m.PruningRule(nodes_kept=1))).ok
     assert answer.reason in {point.point_id for point in seen.points().points}, "another rule does not take it away"
 
@@ -142,7 +143,7 @@ def test_clicks_that_mean_no_cane_are_refused(model, frames):
     old = seen.answer(AddPointInImage(user="Ada", sequence=999, u=0.5, v=0.5))
     away = seen.answer(AddPoint(user="Ada", origin=(0.0, 0.0, 1.0), direction=(0.0, -1.0, 0.0)))
     assert not (sky.ok or old.ok or away.ok)
-    assert "click on a blue line" in sky.reason and "newest" in old.reason
+    assert sky.refused.code == "click_beside_cane" and old.refused == reasons.picture_too_old()
     assert seen.points().points == before
 
 
@@ -173,7 +174,10 @@ def test_a_point_says_how_sure_it_is_and_what_is_near(model, frames):
         assert point.digest == point_digest(point)
         assert point.cordon_distance is None or point.cordon_distance > -0.02
         if point.kind == "spur cut":
-            assert 0.01 < point.offset <= 0.021 and f"{1000 * point.offset:.0f} mm" in point.reason
+            assert (
+                0.01 < point.offset <= 0.021
+                and dict(dict(point.reason.values)["place"].values)["distance_mm"] == 1000 * point.offset
+            )
     assert any(point.cordon_distance is not None for point in points)
     assert seen.points().rule == m.PruningRule()
 
@@ -208,7 +212,7 @@ def test_a_point_that_a_person_moves_stays_there_and_its_spur_gets_no_other(mode
     seen, before = shown(model, frames)
     point = next(each for each in before if each.kind == "spur cut")
     refused = seen.answer(MovePoint(user="Ada", point_id="p999", along=0.005))
-    assert not refused.ok and "p999" in refused.reason
+    assert not refused.ok and refused.refused == reasons.point_unseen("p999")
     answer = seen.answer(MovePoint(user="Ada", point_id=point.point_id, along=0.005))
     assert answer.ok, answer.reason
     moved = {each.point_id: each for each in seen.points().points}[point.point_id]
@@ -282,10 +286,11 @@ def test_a_revision_never_has_two_contents_though_a_rule_is_taken_back(model, fr
 
 def test_a_rule_that_was_changed_since_or_never_cannot_be_taken_back(model, frames):
     seen, _ = shown(model, frames)
-    assert "knows of no rule before" in seen.answer(UndoRule(user="Ada", rule=m.PruningRule())).reason
+    assert seen.answer(UndoRule(user="Ada", rule=m.PruningRule())).refused == reasons.no_rule_before()
     seen.answer(SetRule(user="Ada", rule=m.PruningRule(nodes_kept=1)))
     before = held(seen)
-    assert "changed since" in seen.answer(UndoRule(user="Ada", rule=m.PruningRule(nodes_kept=3))).reason
+    undone = seen.answer(UndoRule(user="Ada", rule=m.PruningRule(nodes_kept=3)))
+    assert undone.refused == reasons.rule_changed_since()
     assert held(seen) == before
 
 
@@ -323,7 +328,7 @@ def test_what_was_cut_meanwhile_does_not_come_back_with_the_rule(model, frames):
     after = row.sever(number, where(rod)[1])
     for k in range(4, 7):
         seen.process(survey_frame(camera, after, model, k))
-    assert len(seen.withdrawn) == 1 and "it has been cut" in seen.withdrawn[0]
+    assert len(seen.withdrawn) == 1 and seen.withdrawn[0].code == "withdrawn_as_cut"
     seen.answer(UndoRule(user="Ada", rule=rule))
     assert seen.withdrawn == (), "what a frame took away is told once"
     back = {point.point_id for point in seen.points().points}

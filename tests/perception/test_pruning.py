@@ -8,9 +8,11 @@ from hypothesis import strategies as st
 from perception.config import RuleConfig
 from perception.plant.model import Cane, Node, Span, Spur
 from perception.rules.keep_out import KeepOut
-from perception.rules.pruning import apply_rule, choose_keeper, count_nodes, cut_arc, cutting_force
+from perception.rules.pruning import Decision, apply_rule, choose_keeper, count_nodes, cut_arc, cutting_force
+from rolling_panda import reasons
 
 RULE = RuleConfig()
+WIRE = reasons.wire_near_cut(6.0)
 
 
 def cane(nodes=(0.02, 0.10, 0.18, 0.26), length=0.5, radius=0.004, base=(0.0, 0.0, 1.0), **changes):
@@ -32,7 +34,8 @@ def test_a_single_cane_is_cut_two_centimetres_past_the_second_count_node():
     np.testing.assert_allclose(cut.position, [0.0, 0.0, 1.20], atol=1e-9)
     np.testing.assert_allclose(cut.tangent, [0.0, 0.0, 1.0], atol=1e-9)
     assert (cut.nodes_seen, cut.nodes_kept) == (3, 2)
-    assert "node 2" in cut.reason
+    assert cut.reason == reasons.spur_cut_only(reasons.past_node(1000 * cut.offset, 2))
+    assert cut.offset == pytest.approx(0.02)
 
 
 def test_a_short_internode_is_halved():
@@ -44,24 +47,26 @@ def test_an_unseen_basal_bud_changes_nothing():
 
 
 def test_a_spur_that_was_not_seen_enough_stays_undecided():
-    assert "only 1 of 2" in str(cut_arc(cane(nodes=(0.02, 0.1)), RULE))
-    assert "not in view" in str(cut_arc(cane(nodes=(0.02, 0.1, 0.18), length=0.19), RULE))
-    assert "pruned already" in str(cut_arc(cane(nodes=(0.02, 0.1, 0.18), length=0.2, end="free"), RULE))
-    assert "another node may be" in str(cut_arc(cane(nodes=(0.02, 0.1, 0.22), hidden=(Span(0.15, 0.17),)), RULE))
-    assert "cut is hidden" in str(cut_arc(cane(hidden=(Span(0.195, 0.205),)), RULE))
-    assert "side by side" in str(cut_arc(cane(nodes=(0.02, 0.1, 0.12, 0.2)), RULE))
-    assert "base" in str(cut_arc(cane(base_gap=0.03), RULE))
-    assert apply_rule(spur(), RULE).undecided and not apply_rule(spur(), RULE).cuts
-    assert apply_rule(replace(spur(cane()), incomplete="edge"), RULE).undecided == ("edge",)
-    assert "thick" in apply_rule(spur(cane(radius=0.009)), RULE).undecided[0]
+    assert cut_arc(cane(nodes=(0.02, 0.1)), RULE) == reasons.nodes_lacking(1, 2)
+    assert cut_arc(cane(nodes=(0.02, 0.1, 0.18), length=0.19), RULE) == reasons.beyond_node_hidden(2)
+    pruned = cut_arc(cane(nodes=(0.02, 0.1, 0.18), length=0.2, end="free"), RULE)
+    assert pruned.code == "pruned_already" and dict(pruned.values) == {"distance_mm": pytest.approx(20.0), "node": 2}
+    assert cut_arc(cane(nodes=(0.02, 0.1, 0.22), hidden=(Span(0.15, 0.17),)), RULE) == reasons.node_may_be_hidden()
+    assert cut_arc(cane(hidden=(Span(0.195, 0.205),)), RULE) == reasons.cut_place_hidden()
+    assert cut_arc(cane(nodes=(0.02, 0.1, 0.12, 0.2)), RULE) == reasons.nodes_side_by_side()
+    assert cut_arc(cane(base_gap=0.03), RULE) == reasons.cane_base_hidden()
+    assert apply_rule(spur(), RULE) == Decision((), (reasons.no_cane_followed(),))
+    edge = reasons.spur_at_image_edge()
+    assert apply_rule(replace(spur(cane()), incomplete=edge), RULE) == Decision((), (edge,))
+    assert apply_rule(spur(cane(radius=0.009)), RULE).undecided == (reasons.cane_beyond_shears(18.0),)
 
 
 def test_nodes_too_near_or_too_far_apart_are_not_counted():
     """One of them may be another cane's where they cross; or one between them was taken for something else."""
-    assert "side by side" in str(cut_arc(cane(nodes=(0.02, 0.1, 0.145, 0.2)), RULE))
-    assert "far apart" in str(cut_arc(cane(nodes=(0.02, 0.1, 0.26)), RULE))
-    assert "far apart" in str(cut_arc(cane(nodes=(0.02, 0.18, 0.26)), RULE))
-    assert "far apart" in str(cut_arc(cane(nodes=(0.19, 0.26)), RULE))
+    assert cut_arc(cane(nodes=(0.02, 0.1, 0.145, 0.2)), RULE) == reasons.nodes_side_by_side()
+    assert cut_arc(cane(nodes=(0.02, 0.1, 0.26)), RULE) == reasons.nodes_far_apart()
+    assert cut_arc(cane(nodes=(0.02, 0.18, 0.26)), RULE) == reasons.nodes_far_apart()
+    assert cut_arc(cane(nodes=(0.19, 0.26)), RULE) == reasons.nodes_far_apart()
     near_the_cut = cut_arc(cane(nodes=(0.02, 0.1, 0.18, 0.225)), RULE)
     assert near_the_cut == cut_arc(cane(nodes=(0.02, 0.1, 0.18, 0.32)), RULE) == pytest.approx(0.2)
 
@@ -81,9 +86,9 @@ def test_the_keeper_is_the_lowest_thick_cane_else_the_thickest():
 
 def test_a_choice_within_the_noise_is_no_choice():
     doubtful = cane(radius=0.00305, base=(0.02, 0.0, 0.93))
-    assert "too near" in choose_keeper(spur(doubtful, cane(base=(0.0, 0.0, 0.99))), RULE)
+    assert choose_keeper(spur(doubtful, cane(base=(0.0, 0.0, 0.99))), RULE) == reasons.low_cane_near_limit()
     twins = cane(base=(0.02, 0.0, 0.97)), cane(base=(-0.02, 0.0, 0.972))
-    assert "same height" in choose_keeper(spur(*twins), RULE)
+    assert choose_keeper(spur(*twins), RULE) == reasons.canes_at_same_height()
 
 
 def test_the_old_stub_goes_in_one_cut_beyond_the_keeper():
@@ -96,7 +101,7 @@ def test_the_old_stub_goes_in_one_cut_beyond_the_keeper():
 
 def test_a_cut_where_another_cane_crosses_is_left_alone():
     crossing = np.array([[0.1 * k - 0.5, 0.008, 1.2] for k in range(11)])
-    assert "another cane" in apply_rule(spur(cane()), RULE, crossing).undecided[0]
+    assert apply_rule(spur(cane()), RULE, crossing).undecided == (reasons.cane_crosses_cut(),)
     assert apply_rule(spur(cane()), RULE, crossing + [0.0, 0.03, 0.0]).cuts
     assert apply_rule(spur(cane()), RULE, np.zeros((0, 3))).cuts
 
@@ -108,19 +113,21 @@ def test_a_cut_gives_way_to_a_cane_or_a_wire_that_crosses_a_little_off_and_stays
         assert 0.0 < (1.2 - cut.position[2]) * side <= RULE.max_shift + 1e-9
         assert np.linalg.norm(crossing - cut.position, axis=1).min() >= RULE.crossing_distance
     (cut,) = apply_rule(spur(cane()), RULE, None, wire_from(1.196, 1.214)).cuts
-    assert cut.position[2] == pytest.approx(1.2 - RULE.max_shift / 2) and "16 mm past node 2" in cut.reason
-    assert apply_rule(spur(cane()), RULE, None, wire_from(0.0, 9.0)).undecided == ("a wire is there",)
+    assert cut.position[2] == pytest.approx(1.2 - RULE.max_shift / 2)
+    assert cut.reason == reasons.spur_cut_only(reasons.past_node(1000 * cut.offset, 2))
+    assert cut.offset == pytest.approx(0.020 - RULE.max_shift / 2)
+    assert apply_rule(spur(cane()), RULE, None, wire_from(0.0, 9.0)).undecided == (WIRE,)
 
 
 @pytest.mark.parametrize(("tight", "best"), [((1.19, 1.203), 1.20425), ((1.197, 1.21), 1.19575), ((1.1, 1.3), 1.2)])
 def test_where_the_blades_only_just_have_room_a_better_place_nearby_is_taken(tight, best):
-    beside = KeepOut(lambda place: "", lambda place, tangent: not tight[0] < place[2] < tight[1])
+    beside = KeepOut(lambda place: None, lambda place, tangent: not tight[0] < place[2] < tight[1])
     (cut,) = apply_rule(spur(cane()), RULE, None, beside).cuts
     assert cut.position[2] == pytest.approx(best)
 
 
 def wire_from(low, high):
-    return KeepOut(lambda place: "a wire is there" if low < place[2] < high else "", lambda place, tangent: True)
+    return KeepOut(lambda place: WIRE if low < place[2] < high else None, lambda place, tangent: True)
 
 
 def test_blades_keep_10_mm_from_the_nodes():
@@ -144,22 +151,25 @@ def test_a_diameter_seen_often_leaves_less_in_doubt():
 def test_a_cane_that_runs_into_another_is_cut_where_enough_of_it_is_seen_and_a_pruned_one_never_again():
     going_on = cane(nodes=(0.02, 0.10, 0.18), length=0.212, end="hidden")
     assert cut_arc(going_on, RULE) == pytest.approx(0.20)
-    assert "pruned already" in cut_arc(replace(going_on, end="free"), RULE)
-    assert "not in view" in cut_arc(cane(nodes=(0.02, 0.10, 0.18), length=0.205, end="hidden"), RULE)
+    assert cut_arc(replace(going_on, end="free"), RULE).code == "pruned_already"
+    assert cut_arc(cane(nodes=(0.02, 0.10, 0.18), length=0.205, end="hidden"), RULE) == reasons.beyond_node_hidden(2)
 
 
 def test_a_stub_is_not_cut_where_the_blades_must_not_go():
     low, high = cane(base=(0.025, 0.0, 0.93)), cane(base=(0.0, 0.0, 0.99))
-    cordon = KeepOut(lambda place: "the cordon is near" if place[2] < 1.0 else "", lambda place, tangent: True)
+    near = reasons.wood_near_cut("cordon", 30.0)
+    cordon = KeepOut(lambda place: near if place[2] < 1.0 else None, lambda place, tangent: True)
     decision = apply_rule(spur(low, high), RULE, None, cordon)
-    assert [cut.kind for cut in decision.cuts] == ["spur cut"] and "cordon" in decision.undecided[0]
+    assert [cut.kind for cut in decision.cuts] == ["spur cut"] and decision.undecided == (
+        reasons.other_cane_left(near),
+    )
 
 
 def test_a_cane_below_the_keeper_is_left_for_a_person():
     thin = cane(radius=0.0025, base=(0.02, 0.0, 0.93))
     decision = apply_rule(spur(thin, cane(base=(0.0, 0.0, 0.99))), RULE)
     assert len(decision.cuts) == 1
-    assert "below the cane that stays" in decision.undecided[0]
+    assert decision.undecided == (reasons.other_cane_left(reasons.cane_below_keeper()),)
 
 
 internodes = st.lists(st.floats(0.012, 0.12), min_size=0, max_size=8)
@@ -212,7 +222,7 @@ def guyot_cane(nodes, x, height, radius=0.004, length=1.0):
     return Cane(axis, arc, radius, tuple(Node(node, 30) for node in nodes), (), "image border", 0.0)
 
 
-def guyot_spur(*canes, incomplete=""):
+def guyot_spur(*canes, incomplete=None):
     return Spur(np.array([0.0, 0.0, 0.9]), None, 0.0, tuple(canes), incomplete)
 
 
@@ -226,7 +236,8 @@ def test_the_lower_cane_keeps_two_nodes_and_the_upper_one_eight():
     # 20 mm past the second and the eighth node; the basal bud is not counted.
     np.testing.assert_allclose(short.position, [0.0, 0.0, 0.90 + 0.18 + 0.02], atol=1e-9)
     np.testing.assert_allclose(long.position, [0.06, 0.0, 0.93 + 0.66 + 0.02], atol=1e-9)
-    assert "person" in decision.undecided[0]
+    assert decision.undecided == (reasons.old_cane_left(),)
+    assert [cut.reason.code for cut in decision.cuts] == ["guyot_cut_lower", "guyot_cut_upper"]
 
 
 def test_the_operators_numbers_of_nodes_are_kept():
@@ -237,20 +248,21 @@ def test_the_operators_numbers_of_nodes_are_kept():
 def test_a_cane_that_leaves_the_view_too_early_is_not_tipped():
     decision = apply_rule(guyot_spur(LOWER, guyot_cane(TEN[:6], 0.06, 0.93, length=0.45)), GUYOT)
     assert [cut.kind for cut in decision.cuts] == ["spur cut"]
-    assert any("only 5 of 8 nodes" in reason for reason in decision.undecided)
+    assert reasons.nodes_lacking(5, 8) in decision.undecided
 
 
 @pytest.mark.parametrize("canes", [(), (LOWER,), (LOWER, UPPER, guyot_cane(TEN, 0.1, 0.95))])
 def test_anything_but_two_canes_is_left_for_a_person(canes):
     decision = apply_rule(guyot_spur(*canes), GUYOT)
-    assert not decision.cuts and f"{len(canes)} canes" in decision.undecided[0]
+    assert not decision.cuts and decision.undecided == (reasons.not_two_canes(len(canes)),)
 
 
 def test_doubts_end_in_no_cut():
-    assert not apply_rule(guyot_spur(LOWER, UPPER, incomplete="edge"), GUYOT).cuts
-    assert "same height" in apply_rule(guyot_spur(LOWER, guyot_cane(TEN, 0.06, 0.902)), GUYOT).undecided[0]
+    assert not apply_rule(guyot_spur(LOWER, UPPER, incomplete=reasons.spur_at_image_edge()), GUYOT).cuts
+    alike = guyot_spur(LOWER, guyot_cane(TEN, 0.06, 0.902))
+    assert apply_rule(alike, GUYOT).undecided == (reasons.canes_at_same_height(),)
     close = apply_rule(guyot_spur(LOWER, guyot_cane(TEN, 0.01, 0.93)), GUYOT)
-    assert not close.cuts and any("another cane passes" in reason for reason in close.undecided)
+    assert not close.cuts and reasons.cane_crosses_cut() in close.undecided
     thick = apply_rule(guyot_spur(LOWER, guyot_cane(TEN, 0.06, 0.93, radius=0.009)), GUYOT)
     assert [cut.kind for cut in thick.cuts] == ["spur cut"]
 

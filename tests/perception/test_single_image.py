@@ -13,6 +13,7 @@ from bridge.sim.vineyard.grow import grow
 from bridge.sim.vineyard.truth import judge
 from perception.config import PerceptionConfig
 from perception.single_image import Photograph, find_cuts, load_photograph
+from rolling_panda import reasons
 from rolling_panda.errors import InputError
 from tests.support.cameras import looking_left
 
@@ -56,22 +57,26 @@ def test_without_depth_they_are_pixels_near_the_same_places(picture):
 def test_a_picture_without_wood_gives_a_reason_and_no_point(picture):
     photograph, labels, _ = picture
     flat = Photograph(photograph.color, None, photograph.intrinsics, True, (848, 480))
-    for picture_without in (photograph, flat):
+    for picture_without, why in ((photograph, reasons.no_cane_with_depth()), (flat, reasons.no_cane_recognised())):
         result = find_cuts(picture_without, np.zeros_like(labels), PerceptionConfig())
-        assert not result.cuts and "no cane" in result.undecided[0]
+        assert not result.cuts and result.undecided == (why,)
 
 
 def test_depth_that_is_nowhere_on_wood_gives_no_point(picture):
     photograph, labels, _ = picture
     blind = Photograph(photograph.color, np.zeros_like(photograph.depth), photograph.intrinsics, False, (848, 480))
     result = find_cuts(blind, labels, PerceptionConfig())
-    assert not result.cuts and "no cane with depth" in result.undecided[0]
+    assert not result.cuts and result.undecided == (reasons.no_cane_with_depth(),)
 
 
 def test_every_point_has_its_reason_and_a_direction_along_the_wood(picture):
     photograph, labels, _ = picture
     for point in find_cuts(photograph, labels, PerceptionConfig()).cuts:
-        assert point.cut.reason.endswith(".") and 0.0 < point.cut.confidence <= 1.0
+        assert (
+            point.cut.reason.code.startswith("spur_cut")
+            or point.cut.reason.code == "renewal_cut"
+            and 0.0 < point.cut.confidence <= 1.0
+        )
         # Away from the cordon is up in this picture.
         assert point.beyond[1] < point.pixel[1]
 

@@ -11,6 +11,7 @@ from perception.rules.pruning import Cut
 from perception.segmentation.frame import View
 from perception.skeleton.fragments import CANE
 from perception.tracking.tracker import Proposal, Tracker, direction_covariance, position_covariance
+from rolling_panda import reasons
 from rolling_panda.messages.robot import Intrinsics
 
 CONFIG = TrackerConfig()
@@ -53,7 +54,7 @@ def test_a_point_shows_after_enough_frames_agree():
 def test_where_most_looks_cut_an_internode_is_taken_whole_not_half_way_to_where_others_did():
     def look(offset, noise=0.0):
         one = proposal(y=0.1 - offset + noise)
-        return replace(one, cut=replace(one.cut, offset=offset, reason=f"{1000 * offset:.0f} mm"))
+        return replace(one, cut=replace(one.cut, offset=offset, reason=reasons.said(f"{1000 * offset:.0f}")))
 
     tracker, noise = Tracker(CONFIG), (0.001, -0.001, 0.001, -0.001, 0.0)
     for each in noise[:3]:
@@ -62,7 +63,7 @@ def test_where_most_looks_cut_an_internode_is_taken_whole_not_half_way_to_where_
     # A wire comes into view, and the blades give way to it.
     for each in noise:
         (point,) = feed(tracker, view(), look(0.0105, each)).points
-    assert point.offset == 0.0105 and point.reason == "10 mm" and point.revision == 2
+    assert point.offset == 0.0105 and point.reason == reasons.said("10") and point.revision == 2
     assert point.position[1] == pytest.approx(0.0895, abs=1e-3)
     # One look that does not see it changes nothing.
     (point,) = feed(tracker, view(), look(0.02)).points
@@ -171,7 +172,8 @@ def test_a_cut_cane_takes_its_point_away_and_says_so():
         feed(tracker, view(), proposal())
     results = [feed(tracker, view(cane=False)) for _ in range(CONFIG.gone_frames)]
     assert [len(result.points) for result in results] == [1] * (CONFIG.gone_frames - 1) + [0]
-    assert "has been cut" in results[-1].withdrawn[0]
+    (withdrawn,) = results[-1].withdrawn
+    assert withdrawn.code == "withdrawn_as_cut" and dict(withdrawn.values)["frames"] == CONFIG.gone_frames
 
 
 def test_a_spur_has_one_cut_of_a_kind_and_the_better_supported_one_wins():
@@ -186,7 +188,7 @@ def test_a_spur_has_one_cut_of_a_kind_and_the_better_supported_one_wins():
         withdrawn += result.withdrawn
     (new,) = tracker.points()
     assert new.point_id != old.point_id and new.position[1] == pytest.approx(-0.07)
-    assert len(withdrawn) == 1 and "elsewhere" in withdrawn[0]
+    assert withdrawn == [reasons.withdrawn_as_elsewhere(old.point_id, old.vine, old.spur)]
 
 
 def test_a_point_gives_way_as_soon_as_more_looks_put_the_cut_elsewhere():
@@ -198,7 +200,7 @@ def test_a_point_gives_way_as_soon_as_more_looks_put_the_cut_elsewhere():
     assert [told.points[0].point_id for told in elsewhere[:-1]] == [first.point_id] * CONFIG.min_hits
     (second,) = elsewhere[-1].points
     assert second.point_id != first.point_id
-    assert "elsewhere on this spur" in elsewhere[-1].withdrawn[0]
+    assert elsewhere[-1].withdrawn == (reasons.withdrawn_as_elsewhere(first.point_id, first.vine, first.spur),)
 
 
 def test_spurs_keep_their_numbers_while_the_robot_drives_on():

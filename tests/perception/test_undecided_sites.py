@@ -1,25 +1,29 @@
 """What is left open is remembered per spur, with what it needs, until it is settled."""
 
 from perception.plant.numbering import SpurNumber
-from perception.plant.undecided_sites import NeedsAnotherLook, UndecidedSites, undecided_site
+from perception.plant.undecided_sites import UndecidedSites, undecided_site
+from rolling_panda import reasons
 
+ALIKE = reasons.canes_at_same_height()
 FIRST, SECOND = SpurNumber(1, 1), SpurNumber(2, 1)
 
 
 def test_a_reason_says_whether_another_look_may_help_or_only_a_person():
-    assert undecided_site(NeedsAnotherLook("the place is hidden"), FIRST).needs == "another look"
-    for_a_person = undecided_site("two canes are alike", FIRST)
+    assert undecided_site(reasons.cut_place_hidden(), FIRST).needs == "another look"
+    for cause, needs in ((reasons.stub_unclear(), "another look"), (reasons.cane_below_keeper(), "operator")):
+        assert undecided_site(reasons.other_canes_left(2, cause), FIRST).needs == needs
+    for_a_person = undecided_site(ALIKE, FIRST)
     assert (for_a_person.needs, for_a_person.vine, for_a_person.spur) == ("operator", 1, 1)
 
 
 def test_what_a_spur_lacked_stays_told_while_others_are_looked_at_and_ends_when_it_is_settled():
     sites = UndecidedSites()
-    sites.update(SECOND, False, ["two canes are alike"])
-    sites.update(FIRST, False, [NeedsAnotherLook("hidden")])
+    sites.update(SECOND, False, [ALIKE])
+    sites.update(FIRST, False, [reasons.cane_base_hidden()])
     open_sites = [(each.vine, each.reason) for each in sites.remaining(set())]
     assert open_sites == [
-        (1, "hidden"),
-        (2, "two canes are alike"),
+        (1, reasons.cane_base_hidden()),
+        (2, ALIKE),
     ]
     sites.update(FIRST, True, [])
     assert [each.vine for each in sites.remaining(set())] == [2]
@@ -29,19 +33,19 @@ def test_what_a_spur_lacked_stays_told_while_others_are_looked_at_and_ends_when_
 
 def test_a_look_that_saw_too_little_is_not_told_of_a_spur_that_has_its_point():
     sites = UndecidedSites()
-    sites.update(FIRST, False, [NeedsAnotherLook("hidden")])
+    sites.update(FIRST, False, [reasons.cane_base_hidden()])
     assert sites.remaining({FIRST}) == () and len(sites.remaining({SECOND})) == 1
-    sites.update(FIRST, True, ["the other cane is left for a person"])
+    sites.update(FIRST, True, [reasons.other_cane_left(reasons.cane_below_keeper())])
     assert len(sites.remaining({FIRST})) == 1
 
 
 def test_what_was_seen_from_before_a_place_is_not_taken_back_from_aside():
     sites = UndecidedSites()
-    sites.update(FIRST, False, [NeedsAnotherLook("at the edge")], (1.0, 0.8, 0.9), in_front=False)
-    sites.update(FIRST, False, ["two canes are alike"], (1.0, 0.8, 0.9))
-    sites.update(FIRST, False, [NeedsAnotherLook("at the edge")], (1.0, 0.8, 0.9), in_front=False)
+    sites.update(FIRST, False, [reasons.spur_at_image_edge()], (1.0, 0.8, 0.9), in_front=False)
+    sites.update(FIRST, False, [ALIKE], (1.0, 0.8, 0.9))
+    sites.update(FIRST, False, [reasons.spur_at_image_edge()], (1.0, 0.8, 0.9), in_front=False)
     (told,) = sites.remaining(set())
-    assert (told.reason, told.needs, told.position) == ("two canes are alike", "operator", (1.0, 0.8, 0.9))
+    assert (told.reason, told.needs, told.position) == (ALIKE, "operator", (1.0, 0.8, 0.9))
     sites.update(FIRST, True, [], in_front=False)
     assert sites.remaining(set()) == ()
 
@@ -49,11 +53,11 @@ def test_what_was_seen_from_before_a_place_is_not_taken_back_from_aside():
 def test_looks_enough_from_before_a_place_leave_it_to_a_person():
     sites = UndecidedSites()
     for looks in range(1, 15):
-        sites.update(FIRST, False, [NeedsAnotherLook("its base is hidden")])
+        sites.update(FIRST, False, [reasons.cane_base_hidden()])
         (told,) = sites.remaining(set())
         assert told.needs == ("another look" if looks < 12 else "operator")
-    assert told.reason == "its base is hidden; 14 looks from the front have not shown more: check it yourself"
+    assert told.reason == reasons.looks_exhausted(reasons.cane_base_hidden(), 14)
     aside = UndecidedSites()
     for _ in range(30):
-        aside.update(FIRST, False, [NeedsAnotherLook("at the edge")], in_front=False)
+        aside.update(FIRST, False, [reasons.spur_at_image_edge()], in_front=False)
     assert aside.remaining(set())[0].needs == "another look"

@@ -130,9 +130,9 @@ def _places(page: Page, server: PlayedServer) -> None:
     working(page, server)
     where = (1.4, 0.8, 0.9)
     server.undecided_sites = (
-        m.UndecidedSite("no node seen above the cordon", "another look", 3, 1, where),
-        m.UndecidedSite("leaves hide the cane", "another look", 3, 2, where),
-        m.UndecidedSite("a wire passes 3 mm from where the cut would be", "operator", 3, 4, where),
+        m.UndecidedSite(reasons.nodes_lacking(0, 2), "another look", 3, 1, where),
+        m.UndecidedSite(reasons.cane_base_hidden(), "another look", 3, 2, where),
+        m.UndecidedSite(reasons.wire_near_cut(6.0), "operator", 3, 4, where),
     )
     server.tell(server.page_points())
     page.locator(".undecided-sites summary").first.click()

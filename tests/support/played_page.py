@@ -18,6 +18,7 @@ from playwright.sync_api import (
 )
 
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from tests.support.chromium import FLAT_FLAGS
 from tests.support.page_host import NOTHING, ORIGIN, page_host
 from tests.support.played_server import PlayedServer, point
@@ -86,8 +87,8 @@ def server() -> PlayedServer:
             point(3, "DONE", spur=2, cut_id="c1"),
         ),
         undecided_sites=(
-            m.UndecidedSite("no node seen above the cordon", "another look", 1, 3),
-            m.UndecidedSite("a wire passes close to the cut", "operator", 1, 4),
+            m.UndecidedSite(reasons.nodes_lacking(0, 2), "another look", 1, 3),
+            m.UndecidedSite(reasons.wire_near_cut(6.0), "operator", 1, 4),
         ),
     )
 

@@ -95,7 +95,7 @@ def point(number: int, state: m.PointState, vine: int = 1, spur: int = 1, **chan
         nodes_kept=2,
         vine=vine,
         spur=spur,
-        reason="lowest cane of the spur: keeps two buds, cut above the second",
+        reason=reasons.spur_cut_lowest(3, 8.0, reasons.past_node(20.0, 2)),
         position_covariance=(4e-6, 0.0, 0.0, 9e-6, 0.0, 4e-6),
         tangent_covariance=(1e-3, 0.0, 0.0, 1e-3, 0.0, 0.0),
         offset=0.02,

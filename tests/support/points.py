@@ -5,6 +5,7 @@ from typing import Any
 import msgspec
 
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.messages.supervision import PreviewedCut
 
 
@@ -23,7 +24,7 @@ def point(
         nodes_kept=2,
         vine=0,
         spur=0,
-        reason="test",
+        reason=reasons.said("test"),
     )
     return msgspec.structs.replace(usual, **changes)
 

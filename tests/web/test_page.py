@@ -385,5 +385,5 @@ def test_places_without_a_point_are_told_by_what_they_need(page: Page) -> None:
     expect(look.locator("summary")).to_have_text("1 place needs another look")
     expect(person.locator("summary")).to_have_text("1 place for you to decide")
     person.locator("summary").click()
-    expect(person.locator("li")).to_have_text("Vine 1 · spur 4: a wire passes close to the cut")
-    expect(look.locator("li")).to_have_text("Vine 1 · spur 3: no node seen above the cordon")
+    expect(person.locator("li")).to_have_text("Vine 1 · spur 4: " + reasons.text_of(reasons.wire_near_cut(6.0)))
+    expect(look.locator("li")).to_have_text("Vine 1 · spur 3: " + reasons.text_of(reasons.nodes_lacking(0, 2)))

@@ -137,7 +137,7 @@ class RpOrder extends HTMLElement {
     if (name) setText(name, `${point.point.point_id} · vine ${point.point.vine}, spur ${point.point.spur}`);
     if (way) setText(way, point.plan ? cutTime(point.plan) : "");
     setAttribute(row, "data-point-id", point.point.point_id);
-    setAttribute(row, "title", why || point.point.reason);
+    setAttribute(row, "title", why || reasonText(point.point.reason));
     row.classList.toggle("dragged", point.point.point_id === this.dragged);
     setAttribute(row, "aria-selected", String(point.point.point_id === selected.get()));
   }

@@ -168,7 +168,7 @@ export class RpPoint extends HTMLElement {
     );
     const kept = `Keeps ${point.nodes_kept} of ${counted(point.nodes_seen, "node")}`;
     this.facts.title = `${kept}; the cane is ${thick} thick; confidence ${sure}${planWords(row)}`;
-    setText(this.reason, [planned, reasonText(entry.reason), point.reason].filter(Boolean).join(" · "));
+    setText(this.reason, [planned, reasonText(entry.reason), reasonText(point.reason)].filter(Boolean).join(" · "));
     this.reason.title = this.reason.textContent ?? "";
     const [yes, no] = isUnknown(row)
       ? ["I have looked: it is cut", "I have looked: it is not cut"]

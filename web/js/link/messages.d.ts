@@ -120,8 +120,8 @@ export interface PruningPoint {
   vine: number;
   /** Number of the spur position on that vine, as perceived. */
   spur: number;
-  /** Reason for the cut, in one sentence for a grower. */
-  reason: string;
+  /** Explanation of the cut for a grower. */
+  reason: Reason;
   /** `spur cut` shortens the cane that stays, `renewal cut` removes the old stub, `cane cut` shortens the fruiting cane, `by hand` was placed by a person. */
   kind: CutKind;
   /** Covariance of the position (m²): xx, xy, xz, yy, yz, zz. */
@@ -473,8 +473,8 @@ export interface PagePoint {
 
 /** A spur without a pruning point. */
 export interface UndecidedSite {
-  /** Reason, as text. */
-  reason: string;
+  /** Reason. */
+  reason: Reason;
   /** Another look by the camera, or a decision by the operator. */
   needs: Need;
   /** Number of the vine; 0 for no particular spur. */

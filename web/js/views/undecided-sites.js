@@ -3,6 +3,7 @@
 import { whyNot } from "../control/allowed.js";
 import { ask } from "../link/api.js";
 import { link, now, pageState } from "../state/page-state.js";
+import { reasonText } from "../state/reasons.js";
 import { drawOn } from "../state/signals.js";
 import { element, setEnabled, setText } from "./dom.js";
 
@@ -45,7 +46,8 @@ export function undecidedList(needs, title) {
 
 /** @param {UndecidedSite} site */
 function siteWords(site) {
-  return site.vine === 0 ? site.reason : `Vine ${site.vine} · spur ${site.spur}: ${site.reason}`;
+  const why = reasonText(site.reason);
+  return site.vine === 0 ? why : `Vine ${site.vine} · spur ${site.spur}: ${why}`;
 }
 
 /**
