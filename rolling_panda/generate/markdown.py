@@ -1,4 +1,4 @@
-"""The generated blocks of `docs/wire.md`, between markers."""
+"""The generated blocks of `docs/wire.md` and `docs/reasons.md`, between markers."""
 
 import re
 from collections.abc import Callable, Iterable, Mapping
@@ -16,6 +16,7 @@ from rolling_panda.reasons import CATALOGUE
 from rolling_panda.topics import SERVICES, TOPICS
 
 _BLOCK = re.compile(r"(<!-- generated: ([a-z-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
+_VALUE = re.compile(r"\{[^}]*\}")
 _PLAIN: dict[Any, str] = {
     bool: "bool",
     int: "int",
@@ -225,7 +226,8 @@ def table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
 def reasons_table() -> str:
     """One row for each reason, by code."""
     entries = sorted(CATALOGUE.values(), key=lambda entry: entry.code)
-    rows = [(f"`{entry.code}`", entry.severity, entry.text, entry.act) for entry in entries]
+    # As code, since Markdown's `attr_list` takes a bare `{why}` at the end of a cell for an attribute of the cell.
+    rows = [(f"`{entry.code}`", entry.severity, _VALUE.sub(r"`\g<0>`", entry.text), entry.act) for entry in entries]
     return table(("code", "severity", "text", "what to do"), rows)
 
 

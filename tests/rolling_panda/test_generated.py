@@ -13,6 +13,7 @@ from rolling_panda.generate.description import describe, reachable
 from rolling_panda.generate.javascript import js_type, messages_module, messages_types
 from rolling_panda.messages import page
 from rolling_panda.mode_table import ROWS, SEVERITY, Event
+from rolling_panda.reasons import CATALOGUE
 from rolling_panda.topics import SERVICES, TOPICS
 
 
@@ -105,6 +106,16 @@ def test_the_safety_document_shows_every_transition_and_who_may_cause_it() -> No
             assert f"| {row.before} → {row.after} | {row.event.value} | {row.who} |" in text
     assert "| any but ESTOP_LATCHED → ESTOP_LATCHED | stop | anyone |" in text
     assert "| any but FAULT, ESTOP_LATCHED → FAULT | fault | system |" in text
+
+
+def test_the_document_of_reasons_has_every_text_with_its_values_as_code() -> None:
+    text = (ROOT / "docs" / "reasons.md").read_text(encoding="utf-8").split("<!-- generated: reasons -->")[1]
+    rows = dict(re.findall(r"^\| `(\w+)` \| (.*) \|$", text, re.MULTILINE))
+    assert list(rows) == sorted(CATALOGUE)
+    for code, entry in CATALOGUE.items():
+        severity, told, act = rows[code].split(" | ")
+        assert (severity, told.replace("`", ""), act) == (entry.severity, entry.text, entry.act)
+        assert not re.search(r"(?<!`)\{|\}(?!`)", told), told
 
 
 def test_the_diagram_has_every_mode() -> None:
