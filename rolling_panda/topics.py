@@ -1,6 +1,6 @@
 """The topic table. Publishers, subscribers, staleness limits and `docs/wire.md` derive from it.
 
-A key is `rp/<robot_id>/v2/<topic>`.
+A key is `rp/<robot_id>/v3/<topic>`.
 """
 
 from dataclasses import dataclass

@@ -27,7 +27,7 @@ from tests.support.processes.demo import TracedDemo, running_demo
 pytestmark = pytest.mark.paced
 
 DOCUMENT = (Path(__file__).resolve().parents[2] / "docs/wire.md").read_text()
-ROOT = "rp/rp1/v2"
+ROOT = "rp/rp1/" + re.findall(r"`(v\d+)` is the schema version", DOCUMENT)[0]
 #: Long enough for an answer over loopback, and for ten of the bridge's states.
 LISTEN_S = 0.5
 
