@@ -5,7 +5,6 @@ from collections import deque
 from controller.ledger.journal import LedgerState
 from rolling_panda import messages as m
 from rolling_panda import reasons
-from rolling_panda.reasons import text_of
 from rolling_panda.transport.inbox import Reply
 
 #: Time limit of a record; after it the answer is "not recorded" (s).
@@ -44,4 +43,4 @@ class CommitBarrier:
 def _unrecorded(message: object, why: m.Reason) -> object:
     if not isinstance(message, Reply) or message.answer is None or not message.answer.ok:
         return message
-    return Reply(message.request, m.Answer(ok=False, reason=text_of(why), refused=why))
+    return Reply(message.request, m.Answer(ok=False, reason=why))

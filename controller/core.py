@@ -47,7 +47,7 @@ from rolling_panda.config import RobotConfig
 from rolling_panda.errors import ControlError
 from rolling_panda.messages.perception import CloseUpRequest, CloseUpResult, Obstacles
 from rolling_panda.messages.supervision import StopRecord
-from rolling_panda.reasons import said, text_of
+from rolling_panda.reasons import said
 from rolling_panda.transport.inbox import Answered, Inbox, Rejected, Reply, Request
 
 _STATE_S = 0.05
@@ -201,7 +201,7 @@ class Controller:
         told = [reasons.message_rejected(each.topic, each.reason) for each in rejected]
         for answered in inbox.drain(Answered):
             if not answered.message.answer.ok:
-                told.append(reasons.release_refused(said(answered.message.answer.reason)))
+                told.append(reasons.release_refused(answered.message.answer.reason or said("")))
         return [m.LogEvent(header=m.Header(now), process="controller", reason=reason) for reason in told]
 
     def answer(self, intent: intents.Intent, now: float) -> m.Answer:
@@ -216,14 +216,13 @@ class Controller:
         command = COMMAND_OF.get(type(intent))
         if command is None:
             unknown = reasons.command_unknown(type(intent).__name__)
-            return m.Answer(ok=False, reason=text_of(unknown), refused=unknown)
+            return m.Answer(ok=False, reason=unknown)
         reason = refusal(command, now, self._situation(now, intent)) or self._handlers[command.message](intent, now)
-        told = "" if reason is None else text_of(reason)
         row = RequestRow(asked=intent, reason=reason, mode=self.mode)
         self._journal.add("request", intent.user, row)
         if reason is not None:
             self._event_log.log(reasons.command_refused(intent.user, command.words, reason))
-            return m.Answer(ok=False, reason=told, refused=reason)
+            return m.Answer(ok=False, reason=reason)
         if command.log is not None:
             self._event_log.log(command.log(intent))
         return m.Answer(ok=True)

@@ -388,11 +388,11 @@ def with_width_bias(config: PerceptionConfig, width_bias: float) -> PerceptionCo
 
 
 def _refused(reason: m.Reason) -> m.Answer:
-    return m.Answer(ok=False, reason=reasons.text_of(reason), refused=reason)
+    return m.Answer(ok=False, reason=reason)
 
 
 def _done(reason: m.Reason, effect: m.RuleEffect | None = None) -> m.Answer:
-    return m.Answer(ok=True, reason=reasons.text_of(reason), refused=reason, effect=effect)
+    return m.Answer(ok=True, reason=reason, effect=effect)
 
 
 def _rule_message(rule: RuleConfig) -> m.PruningRule:

@@ -16,7 +16,7 @@ from msgspec.structs import replace
 from recorder.player import Player, is_played
 from recorder.recording import read_recording
 from rolling_panda import messages as m
-from rolling_panda import topics
+from rolling_panda import reasons, topics
 from rolling_panda.cli.child_processes import ChildProcesses
 from rolling_panda.cli.demo import choose_router_port, write_secret
 from rolling_panda.closing import Closing
@@ -32,7 +32,7 @@ from rolling_panda.transport.zenoh import Router, Transport
 
 _HOST = "127.0.0.1"
 _PERIOD_S, _STATE_PERIOD_S = 0.01, 0.1
-_REFUSED = m.Answer(ok=False, reason="this is a recording; nothing can be asked of the robot")
+_REFUSED = m.Answer(ok=False, reason=reasons.recording_only())
 #: Processes that the replay stands in for.
 _REPLAYED: tuple[m.Process, ...] = ("bridge", "controller", "perception")
 

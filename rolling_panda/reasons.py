@@ -480,6 +480,29 @@ def release_refused(cause: Reason) -> None:
     """The stop is not released: {cause}."""
 
 
+# Services
+
+
+@_reason("warning", "ask again")
+def answer_late(process: str) -> None:
+    """{process} did not answer in time; nothing was done."""
+
+
+@_reason("warning", "see the state")
+def answer_missing() -> None:
+    """It was taken up, but there is no answer in time."""
+
+
+@_reason("warning", "")
+def nobody_answers() -> None:
+    """Nobody answers."""
+
+
+@_reason("warning", "")
+def recording_only() -> None:
+    """This is a recording; nothing can be asked of the robot."""
+
+
 # Commands
 
 

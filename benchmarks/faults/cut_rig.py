@@ -318,7 +318,7 @@ class CutRig(Processes):
         if intent is None:
             return ""
         answer = self.ask(intent)
-        return "nobody answered" if answer is None else answer.reason
+        return "nobody answered" if answer is None or answer.reason is None else text_of(answer.reason)
 
     def at_work(self) -> None:
         """Lead the robot on until it works.

@@ -32,7 +32,6 @@ from rolling_panda.messages.supervision import StopState
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import Limits
 from rolling_panda.model.wire_values import actuated
-from rolling_panda.reasons import text_of
 from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.topics import BRIDGE, CLOSE_UP_REQUEST, CUT, MOTION, ODOMETRY, TOKEN
 from rolling_panda.transport.rejections import Rejections
@@ -247,7 +246,7 @@ class BridgeCore:
         """Release the latched stop that the request names. Nothing moves before a setpoint at rest has come."""
         reason = self._latch.release(request)
         if reason is not None:
-            return m.Answer(ok=False, reason=text_of(reason), refused=reason)
+            return m.Answer(ok=False, reason=reason)
         self._halt()
         self._faults.released(now)
         self._stops_changed()

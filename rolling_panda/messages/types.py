@@ -150,12 +150,10 @@ class Answer(Message, frozen=True, kw_only=True):
 
     Attributes:
         ok: Whether the request was executed.
-        reason: Reason for a refusal, as text.
-        refused: The same as data, where its code is in the catalogue.
+        reason: Reason of a refusal, or what was done; None where there is nothing to tell.
         effect: Answer to `EvaluateRule`.
     """
 
     ok: bool
-    reason: Text = ""
-    refused: Reason | None = None
+    reason: Reason | None = None
     effect: RuleEffect | None = None

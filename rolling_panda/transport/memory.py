@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.topics import TOPIC_OF, Service, Topic
 from rolling_panda.transport.codec import StrictDecoder, encode
 from rolling_panda.transport.runner import Core, Runner
@@ -85,7 +86,7 @@ class MemoryWire:
         """Call a service; `done` gets its answer."""
         future = self._world.request(service.server, request)
         future.add_done_callback(
-            lambda answered: done(answered.result() or m.Answer(ok=False, reason="nobody answers"))
+            lambda answered: done(answered.result() or m.Answer(ok=False, reason=reasons.nobody_answers()))
         )
 
     def present(self) -> frozenset[str]:
@@ -231,9 +232,7 @@ class World:
         end = self.now + limit_s
         while not future.done() and self.now < end:
             self.tick()
-        return (future.result() if future.done() else None) or m.Answer(
-            ok=False, reason=f"the {process} did not answer"
-        )
+        return (future.result() if future.done() else None) or m.Answer(ok=False, reason=reasons.answer_late(process))
 
     def _deliver(self, message: m.Message) -> None:
         topic = TOPIC_OF[type(message)]

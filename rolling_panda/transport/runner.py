@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.topics import SERVICES, TOPICS, Service, Topic
 from rolling_panda.transport.access import CALLERS
 from rolling_panda.transport.inbox import Answered, Inbox, Rejected, Reply, Request
@@ -245,10 +246,8 @@ class Runner:
             return future.result(service.timeout_s - _ANSWER_MARGIN_S)
         except FutureTimeoutError:
             if future.cancel():
-                return m.Answer(
-                    ok=False, reason=f"{service.server} did not answer in time; nothing was done, ask again"
-                )
-            return m.Answer(ok=False, reason="it was taken up, but there is no answer in time: see the state")
+                return m.Answer(ok=False, reason=reasons.answer_late(service.server))
+            return m.Answer(ok=False, reason=reasons.answer_missing())
 
     def _call(self, service: Service[Any], request: Any) -> None:
         def done(answer: m.Answer) -> None:

@@ -19,6 +19,7 @@ from rolling_panda import reasons
 from rolling_panda.closing import Closing
 from rolling_panda.config import TransportConfig
 from rolling_panda.errors import MessageError, ServiceError, TransportError
+from rolling_panda.reasons import said
 from rolling_panda.topics import Service, Topic, key
 from rolling_panda.transport.access import ONLOOKER
 from rolling_panda.transport.codec import StrictDecoder, encode
@@ -201,7 +202,7 @@ class Transport(Onlooker):
                     request = decoder.decode(_bounded(payload.to_bytes() if payload is not None else b""))
                 except MessageError as error:
                     self._reject(service.name, str(error))
-                    result: m.Answer | None = m.Answer(ok=False, reason=str(error)[:500])
+                    result: m.Answer | None = m.Answer(ok=False, reason=said(str(error)))
                 else:
                     result = answer(request)
                 if result is not None:
@@ -243,7 +244,7 @@ class Transport(Onlooker):
             try:
                 answer = self.call(service, request)
             except ServiceError as error:
-                answer = m.Answer(ok=False, reason=str(error)[:500])
+                answer = m.Answer(ok=False, reason=said(str(error)))
             done(answer)
 
         threading.Thread(target=call, daemon=True).start()

@@ -112,5 +112,4 @@ class RobotCommands:
 
 def result_of(answer: m.Answer) -> Result:
     """The result of a request that a process has answered."""
-    reason = answer.refused or (reasons.said(answer.reason) if answer.reason else None)
-    return Result(200 if answer.ok else 409, reason, answer.effect)
+    return Result(200 if answer.ok else 409, answer.reason, answer.effect)

@@ -63,7 +63,7 @@ def test_the_stop_halts_a_moving_robot_and_only_a_reset_with_a_start_moves_it_ag
     loop.run(2.0)
     assert loop.state is not None and loop.state.mode == "ESTOP_LATCHED"
     refused = loop.command(intents.Start(user="test"))
-    assert not refused.ok and "stop" in refused.reason.lower()
+    assert not refused.ok and refused.reason.code == "impossible_in_estop"
     assert loop.command(intents.Reset(user="test", role="supervisor", reason="the test goes on")).ok
     loop.run(2.0)
     assert loop.state.mode == "IDLE"

@@ -38,14 +38,14 @@ def test_messages_requests_and_presence_pass_and_nobody_hears_themselves(wire):
     router, s = wire
     bridge, own = s["bridge"].feed(MOTION, 100), s["controller"].feed(MOTION, 100)
     publisher = s["controller"].publisher(MOTION)
-    s["bridge"].serve(RELEASE, lambda request: m.Answer(ok=False, reason=request.reason))
+    s["bridge"].serve(RELEASE, lambda request: m.Answer(ok=False, reason=said(request.reason)))
     time.sleep(0.3)
     publisher.put(COMMAND)
     assert eventually(bridge.drain)
     time.sleep(0.1)
     # Zenoh itself hands a session what it publishes, once; the router sends nothing back.
     assert len(own.drain()) == 1
-    assert s["controller"].call(RELEASE, ASKED).reason == "trial"
+    assert s["controller"].call(RELEASE, ASKED).reason == said("trial")
     assert eventually(lambda: s["server"].present() == {"bridge", "controller", "server"})
 
 

@@ -240,7 +240,7 @@ def test_the_emergency_stop_button_stops_latches_and_has_to_be_released_first(be
     assert 0.0 < bench.moved_within(0.5) <= 0.3
     assert bench.state.stop_id.startswith("hardware-")
     assert bench.stops.hardware
-    assert "button is pressed" in bench.core.on_release(release(bench.state.stop_id), bench.now).reason
+    assert "button is pressed" in text_of(bench.core.on_release(release(bench.state.stop_id), bench.now).reason)
     bench.robot.now = replace(bench.robot.now, emergency=False)
     bench.run(0.01, FORWARD)
     assert bench.state.stop_id and bench.moved_within(0.01) == 0.0

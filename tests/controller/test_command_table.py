@@ -37,7 +37,7 @@ def controller():
 def test_the_controller_answers_every_command_of_the_table(controller, command):
     answer = controller.answer(example(command.message), 0.0)
     assert answer.ok or answer.reason
-    assert answer.refused is None or answer.refused.code != "command_unknown"
+    assert answer.reason is None or answer.reason.code != "command_unknown"
 
 
 def test_an_intent_outside_the_table_is_refused(controller):
@@ -45,7 +45,7 @@ def test_an_intent_outside_the_table_is_refused(controller):
         """No row has it."""
 
     answer = controller.answer(Dance(user="ada"), 0.0)
-    assert answer.refused == reasons.command_unknown("Dance")
+    assert answer.reason == reasons.command_unknown("Dance")
 
 
 def test_every_command_is_a_request_of_its_process():

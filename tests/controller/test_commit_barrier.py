@@ -8,7 +8,10 @@ from rolling_panda.transport.inbox import Reply, Request
 
 
 def reply(ok=True):
-    return Reply(Request("please", 0.0, lambda: True, lambda answer: None), m.Answer(ok=ok, reason="" if ok else "no"))
+    return Reply(
+        Request("please", 0.0, lambda: True, lambda answer: None),
+        m.Answer(ok=ok, reason=None if ok else reasons.said("no")),
+    )
 
 
 def test_nothing_is_said_before_its_record_is_durable():
@@ -32,10 +35,10 @@ def test_a_failure_and_a_silence_turn_a_consent_into_a_refusal():
     waiting.hold(1, 0.0, refused := reply(ok=False))
     waiting.hold(1, 0.0, "state")
     failed, *others = waiting.settle(LedgerState(0, "disk full"), 0.0)
-    assert failed.answer.refused == reasons.decision_unrecorded(reasons.ledger_failed("disk full"))
+    assert failed.answer.reason == reasons.decision_unrecorded(reasons.ledger_failed("disk full"))
     assert not failed.answer.ok
     assert others == [refused, "state"]
     waiting.hold(2, 10.0, reply())
     assert waiting.settle(LedgerState(0), 10.5) == []
     (late,) = waiting.settle(LedgerState(0), 10.75)
-    assert late.answer.refused == reasons.decision_unrecorded(reasons.ledger_silent(0.75))
+    assert late.answer.reason == reasons.decision_unrecorded(reasons.ledger_silent(0.75))

@@ -38,7 +38,7 @@ def test_somebody_else_neither_starts_nor_moves_what_another_holds():
     r.step()
     assert r.ask(intents.Arm(user="ada")).ok
     for intent in (intents.Start(user="bob"), intents.Home(user="bob")):
-        assert r.ask(intent).refused == reasons.control_held("ada")
+        assert r.ask(intent).reason == reasons.control_held("ada")
     assert r.ask(intents.AcceptAll(user="bob")).ok
     r.teleop = TeleopTarget(sequence=1, hold=True, user="bob", base=BaseVelocity(0.2, 0.0))
     r.run(0.5)
@@ -52,12 +52,12 @@ def test_a_viewer_moves_nothing():
     r = robot()
     r.step()
     answer = r.ask(intents.Arm(user="eve", role="viewer"))
-    assert not answer.ok and answer.refused == reasons.viewer_only()
+    assert not answer.ok and answer.reason == reasons.viewer_only()
 
 
 def test_who_takes_control_gets_a_robot_at_rest_and_has_to_resume():
     r = far_at_work()
-    assert r.ask(intents.TakeControl(user="bob")).refused == reasons.control_unconfirmed("ada")
+    assert r.ask(intents.TakeControl(user="bob")).reason == reasons.control_unconfirmed("ada")
     assert r.ask(intents.TakeControl(user="bob", confirm=True)).ok
     out = r.step()
     assert r.controller.mode == "PAUSED"
@@ -66,8 +66,8 @@ def test_who_takes_control_gets_a_robot_at_rest_and_has_to_resume():
         out = r.step()
         assert r.now < 10.0
     assert moving < 0.05 and not np.any(newest(out, m.MotionCommand).xi)
-    assert "ada" not in r.ask(intents.Resume(user="bob")).reason
-    assert r.ask(intents.Start(user="ada")).refused == reasons.control_held("bob")
+    assert r.ask(intents.Resume(user="bob")).reason != reasons.control_held("ada")
+    assert r.ask(intents.Start(user="ada")).reason == reasons.control_held("bob")
     assert r.ask(intents.Start(user="bob")).ok
 
 
@@ -85,7 +85,7 @@ def test_a_stop_is_for_a_supervisor_to_reset():
     r.stop()
     r.run(0.3)
     refused = r.ask(intents.Reset(user="ada", role="operator", reason="looked"))
-    assert not refused.ok and "supervisor" in refused.reason
+    assert not refused.ok and refused.reason.code == "right_missing"
     assert r.ask(intents.Reset(user="ada", role="supervisor", reason="looked")).ok
 
 
@@ -118,20 +118,20 @@ def ready_and_unwatched():
 
 def test_work_does_not_begin_unwatched():
     r = ready_and_unwatched()
-    assert r.ask(intents.Start(user="ada")).refused.code == "never_watched"
+    assert r.ask(intents.Start(user="ada")).reason.code == "never_watched"
 
 
 @pytest.mark.parametrize(("age_s", "begins"), [(1.9, True), (2.1, False)])
 def test_what_who_asks_has_seen_comes_with_what_they_ask(age_s, begins):
     r = ready_and_unwatched()
     answer = r.ask(intents.Start(user="ada", view_age_s=age_s))
-    assert answer.refused == (None if begins else reasons.unwatched(2.1, 2.0))
+    assert answer.reason == (None if begins else reasons.unwatched(2.1, 2.0))
 
 
 def test_what_a_viewer_has_seen_lets_nothing_begin():
     r = ready_and_unwatched()
     assert not r.ask(intents.Arm(user="eve", role="viewer", view_age_s=0.1)).ok
-    assert r.ask(intents.Start(user="ada")).refused.code == "never_watched"
+    assert r.ask(intents.Start(user="ada")).reason.code == "never_watched"
 
 
 def test_a_controller_that_starts_while_a_stop_is_latched_is_stopped():
@@ -140,4 +140,4 @@ def test_a_controller_that_starts_while_a_stop_is_latched_is_stopped():
     assert r.controller.mode == "ESTOP_LATCHED"
     r.step()
     refused = r.ask(intents.Arm(user="ada"))
-    assert not refused.ok and "reset the stop first" in refused.reason
+    assert not refused.ok and refused.reason.code == "impossible_in_estop"

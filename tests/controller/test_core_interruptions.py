@@ -68,7 +68,7 @@ def test_nothing_begins_to_move_while_the_blades_close():
     assert r.ask(intents.Pause(user="ada")).ok
     assert r.ask(intents.Resume(user="ada")).ok
     for intent in (intents.Start(user="ada"), intents.Home(user="ada")):
-        assert "blades" in r.ask(intent).reason
+        assert r.ask(intent).reason == reasons.blades_closing()
     r.teleop = TeleopTarget(sequence=1, hold=True, user="ada", base=BaseVelocity(0.3, 0.0))
     # The cut ends, but what was held before moves nothing.
     r.run(1.0)

@@ -157,11 +157,11 @@ def test_where_nothing_accepted_can_be_reached_no_work_begins_and_that_is_said()
     assert p.robot.ask(intents.Arm(user="ada")).ok
     p.robot.run(0.1)
     assert p.robot.state.allowed["Start"] is not None
-    assert p.robot.ask(intents.Start(user="ada")).refused == reasons.none_reachable(1)
+    assert p.robot.ask(intents.Start(user="ada")).reason == reasons.none_reachable(1)
     assert p.robot.ask(intents.RejectPoint(user="ada", point_id="high", reason="too high")).ok
     p.robot.run(0.1)
     assert entry(p.robot, "high").state == "REJECTED"
-    assert p.robot.ask(intents.Start(user="ada")).refused == reasons.none_accepted()
+    assert p.robot.ask(intents.Start(user="ada")).reason == reasons.none_accepted()
 
 
 def test_what_could_not_be_reached_is_accepted_again_once_a_plan_can() -> None:

@@ -33,7 +33,7 @@ def test_a_failure_is_a_fault_and_the_robot_rests_within_a_second():
     run_until(r, lambda s: s.mode == "FAULT", r.now + 0.1)
     at_rest(r, 1.0)
     assert r.state.reason == reasons.ledger_failed(r.ledger.failure) and r.cuts == []
-    assert r.ask(intents.Acknowledge(user="ada", role="supervisor")).refused.code == "cause_remains"
+    assert r.ask(intents.Acknowledge(user="ada", role="supervisor")).reason.code == "cause_remains"
     r.stop()
     run_until(r, lambda s: s.mode == "ESTOP_LATCHED", r.now + 0.2)
 

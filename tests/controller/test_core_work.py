@@ -171,7 +171,7 @@ def test_stale_sensors_stop_and_need_an_acknowledgement_after_the_cause_is_gone(
     r.run(0.5)
     assert r.state.mode == "PROTECTIVE_STOP" and "Joint states" in text_of(r.state.reason)
     assert np.abs(r.record[-1]).max() == 0.0
-    assert "still there" in r.ask(intents.Acknowledge(user="ada")).reason
+    assert r.ask(intents.Acknowledge(user="ada")).reason.code == "cause_remains"
     r.frozen_sensors = False
     r.run(0.5)
     assert not r.ask(intents.Acknowledge(user="ada")).ok
@@ -211,7 +211,7 @@ def test_refusals_say_why_and_allowed_agrees_with_them():
     r = robot()
     r.run(0.1)
     idle = reasons.impossible_in_idle("start")
-    assert r.ask(intents.Start(user="ada")).refused == r.state.allowed["Start"] == idle
+    assert r.ask(intents.Start(user="ada")).reason == r.state.allowed["Start"] == idle
     decisions = {"AcceptPoint", "RejectPoint", "ReconsiderPoint", "ResolvePoint", "AcceptAll", "SetApproach"}
     orders = {"MoveInQueue", "ResetOrder", "RestoreAccepted"}
     previews = {"RequestPreview", "ApprovePreview", "RequirePreview"}
@@ -228,8 +228,8 @@ def test_refusals_say_why_and_allowed_agrees_with_them():
         "Reset",
     }
     assert r.ask(intents.Arm(user="ada")).ok
-    assert r.ask(intents.Start(user="ada")).refused == reasons.none_accepted()
-    assert r.ask(intents.Resume(user="ada")).refused == reasons.impossible_in_ready("resume")
+    assert r.ask(intents.Start(user="ada")).reason == reasons.none_accepted()
+    assert r.ask(intents.Resume(user="ada")).reason == reasons.impossible_in_ready("resume")
 
 
 @pytest.mark.parametrize("phase", ["APPROACH", "ADVANCE"])
@@ -274,7 +274,7 @@ def test_a_rule_that_is_taken_back_brings_its_acceptances_and_the_log_says_so():
     r.run(0.1)
     assert entry(r, "a").state == "PROPOSED" and "cuts 50 mm away" in text_of(entry(r, "a").reason)
     assert any("a: The acceptance is void: The rule is now: Spur, nodes kept: 1" in text for text in r.events)
-    assert r.ask(intents.RestoreAccepted(user="eve", rule=usual)).refused == reasons.nothing_to_restore()
+    assert r.ask(intents.RestoreAccepted(user="eve", rule=usual)).reason == reasons.nothing_to_restore()
     assert r.ask(intents.RestoreAccepted(user="eve", rule=short)).ok
     r.show((high,), usual)
     r.run(0.1)

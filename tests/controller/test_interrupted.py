@@ -66,7 +66,7 @@ def test_a_protective_stop_tells_it_through_its_acknowledgement_and_what_ended_b
 def test_a_pause_ends_the_work_on_a_point_so_that_its_approach_can_be_turned():
     r = at_work()
     turned = intents.SetApproach(user="ada", point_id="p0", azimuth=0.3)
-    assert "pause first" in r.ask(turned).reason
+    assert r.ask(turned).reason.code == "point_worked_on"
     assert r.ask(intents.Pause(user="ada")).ok
     r.run(0.1)
     assert r.ask(turned).ok

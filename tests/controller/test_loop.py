@@ -160,7 +160,7 @@ def test_operator_is_answered_a_stop_latches_and_a_reset_releases_it(rest):
     assert numbers == sorted(set(numbers))
     assert all(command.xi == (0.0,) * 9 for command in commands)
 
-    refused = rest.server.call(INTENT, intents.Start(user="ada")).refused
+    refused = rest.server.call(INTENT, intents.Start(user="ada")).reason
     assert refused == reasons.impossible_in_idle("start")
     rest.until(lambda: rest.state.peek().message.allowed["Arm"] is None)
     assert rest.server.call(INTENT, intents.Arm(user="ada")).ok
@@ -200,7 +200,7 @@ def test_a_heartbeat_that_stands_still_is_no_sign_of_life(rest):
     rest.until(lambda: rest.mode() == "READY" and rest.state.peek().message.allowed["Home"] is None)
     rest.beats = False
     rest.until(lambda: rest.state.peek().message.allowed["Home"] is not None)
-    assert "silent" in rest.server.call(INTENT, intents.Home(user="ada")).reason
+    assert rest.server.call(INTENT, intents.Home(user="ada")).reason.code == "process_silent"
 
 
 def test_what_is_no_intent_is_refused_and_logged(rest, endpoint):

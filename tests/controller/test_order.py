@@ -156,12 +156,12 @@ def test_the_plan_says_at_once_what_a_turn_means():
 def test_what_cannot_be_turned_is_refused():
     r = accepted(robot())
     too_far = r.ask(intents.SetApproach(user="ada", point_id="a", azimuth=LARGEST + 0.1))
-    assert not too_far.ok and too_far.refused.code == "approach_too_far"
-    assert r.ask(intents.SetApproach(user="ada", point_id="b", azimuth=0.1)).refused == reasons.point_unknown("b")
+    assert not too_far.ok and too_far.reason.code == "approach_too_far"
+    assert r.ask(intents.SetApproach(user="ada", point_id="b", azimuth=0.1)).reason == reasons.point_unknown("b")
     assert r.ask(intents.Start(user="ada")).ok
     r.run(1.5)
     assert r.state.active_point_id == "a"
-    assert r.ask(intents.SetApproach(user="ada", point_id="a", azimuth=0.1)).refused == reasons.point_worked_on("a")
+    assert r.ask(intents.SetApproach(user="ada", point_id="a", azimuth=0.1)).reason == reasons.point_worked_on("a")
 
 
 def test_a_restart_keeps_it_and_taking_it_back_leaves_it_to_the_search():

@@ -237,7 +237,7 @@ def test_a_watchdog_that_holds_the_robot_without_refusing_commands_changes_no_to
 def test_before_anything_was_measured_all_motion_is_refused():
     r = robot()
     answer = r.controller.answer(intents.Arm(user="ada", role="operator"), 0.0)
-    assert not answer.ok and answer.refused == reasons.nothing_received(topics.JOINTS.name)
+    assert not answer.ok and answer.reason == reasons.nothing_received(topics.JOINTS.name)
 
 
 def test_at_the_start_nothing_was_interrupted():
@@ -268,10 +268,10 @@ def test_a_protective_stop_says_why_and_what_it_interrupted_and_is_left_a_second
     assert r.state.reason.code == "joints_stale"
     r.teleop = None
     r.run(2.0)
-    assert r.ask(intents.Acknowledge(user="ada")).refused.code == "cause_remains"
+    assert r.ask(intents.Acknowledge(user="ada")).reason.code == "cause_remains"
     r.frozen_sensors = False
     r.run(0.5)
-    assert r.ask(intents.Acknowledge(user="ada")).refused == reasons.cause_recent(1.0)
+    assert r.ask(intents.Acknowledge(user="ada")).reason == reasons.cause_recent(1.0)
     r.run(0.7)
     assert r.ask(intents.Acknowledge(user="ada")).ok
     r.run(0.1)

@@ -59,7 +59,7 @@ class FakePerception:
         self.camera_rays = SimpleNamespace(add=lambda frame: self.noted.append(frame.header.frame_id))
 
     def answer(self, request):
-        return m.Answer(ok=True, reason=f"kept {request.rule.nodes_kept}")
+        return m.Answer(ok=True, reason=reasons.said(f"kept {request.rule.nodes_kept}"))
 
     def check_close_up(self, frame):
         return CloseUpResult(header=m.Header(), point_id=frame.point_id, number=1, finding="unseen")
@@ -228,7 +228,7 @@ def test_a_request_is_answered_between_frames_and_its_points_are_sent_at_once(pa
     asking.start()
     turns(loop, lambda: wire.sent[POINTS.name])
     asking.join(5.0)
-    assert said == [m.Answer(ok=True, reason="kept 3")]
+    assert said == [m.Answer(ok=True, reason=reasons.said("kept 3"))]
     assert wire.sent[POINTS.name][-1].frames == 7
 
 

@@ -95,7 +95,7 @@ def shown(model, frames):
 def test_another_rule_changes_the_points_at_once_and_back_again(model, frames):
     seen, before = shown(model, frames)
     answer = seen.answer(SetRule(user="Ada", rule=m.PruningRule(nodes_kept=1)))
-    assert answer.ok and answer.refused.code == "points_by_new_rule"
+    assert answer.ok and answer.reason.code == "points_by_new_rule"
     fewer = seen.points().points
     assert fewer and all(point.nodes_kept == 1 for point in fewer)
     # One node lower on the same canes.
@@ -127,14 +127,15 @@ def test_a_click_into_the_picture_adds_a_point_that_stays(model, frames):
     )
     answer = seen.answer(click)
     assert answer.ok, answer.reason
-    added = {point.point_id: point for point in seen.process(frames[0]).points}[answer.reason]
+    added = {point.point_id: point for point in seen.process(frames[0]).points}[reasons.text_of(answer.reason)]
     beyond = np.array(before[0].position) + 0.02 * np.array(before[0].tangent)
     assert np.linalg.norm(np.array(added.position) - beyond) < 0.006
     again = seen.answer(click)
-    assert not again.ok and again.refused == reasons.point_there_already(answer.reason, 10.0)
+    assert not again.ok and again.reason == reasons.point_there_already(reasons.text_of(answer.reason), 10.0)
     assert added.reason.code == "placed_past_node" and added.radius == pytest.approx(before[0].radius, abs=0.001)
     assert seen.answer(SetRule(user="Ada", rule=m.PruningRule(nodes_kept=1))).ok
-    assert answer.reason in {point.point_id for point in seen.points().points}, "another rule does not take it away"
+    kept = {point.point_id for point in seen.points().points}
+    assert reasons.text_of(answer.reason) in kept, "another rule does not take it away"
 
 
 def test_clicks_that_mean_no_cane_are_refused(model, frames):
@@ -143,7 +144,7 @@ def test_clicks_that_mean_no_cane_are_refused(model, frames):
     old = seen.answer(AddPointInImage(user="Ada", sequence=999, u=0.5, v=0.5))
     away = seen.answer(AddPoint(user="Ada", origin=(0.0, 0.0, 1.0), direction=(0.0, -1.0, 0.0)))
     assert not (sky.ok or old.ok or away.ok)
-    assert sky.refused.code == "click_beside_cane" and old.refused == reasons.picture_too_old()
+    assert sky.reason.code == "click_beside_cane" and old.reason == reasons.picture_too_old()
     assert seen.points().points == before
 
 
@@ -212,7 +213,7 @@ def test_a_point_that_a_person_moves_stays_there_and_its_spur_gets_no_other(mode
     seen, before = shown(model, frames)
     point = next(each for each in before if each.kind == "spur cut")
     refused = seen.answer(MovePoint(user="Ada", point_id="p999", along=0.005))
-    assert not refused.ok and refused.refused == reasons.point_unseen("p999")
+    assert not refused.ok and refused.reason == reasons.point_unseen("p999")
     answer = seen.answer(MovePoint(user="Ada", point_id=point.point_id, along=0.005))
     assert answer.ok, answer.reason
     moved = {each.point_id: each for each in seen.points().points}[point.point_id]
@@ -286,11 +287,11 @@ def test_a_revision_never_has_two_contents_though_a_rule_is_taken_back(model, fr
 
 def test_a_rule_that_was_changed_since_or_never_cannot_be_taken_back(model, frames):
     seen, _ = shown(model, frames)
-    assert seen.answer(UndoRule(user="Ada", rule=m.PruningRule())).refused == reasons.no_rule_before()
+    assert seen.answer(UndoRule(user="Ada", rule=m.PruningRule())).reason == reasons.no_rule_before()
     seen.answer(SetRule(user="Ada", rule=m.PruningRule(nodes_kept=1)))
     before = held(seen)
     undone = seen.answer(UndoRule(user="Ada", rule=m.PruningRule(nodes_kept=3)))
-    assert undone.refused == reasons.rule_changed_since()
+    assert undone.reason == reasons.rule_changed_since()
     assert held(seen) == before
 
 

@@ -57,4 +57,4 @@ def test_a_server_sees_the_robot_of_the_recording_and_moves_in_it(server: tuple[
 def test_nothing_can_be_asked_of_a_recorded_robot(server: tuple[Replay, Transport]) -> None:
     _, wire = server
     answer = wire.call(topics.INTENT, intents.Arm(user="ada"))
-    assert not answer.ok and "recording" in answer.reason
+    assert not answer.ok and answer.reason.code == "recording_only"

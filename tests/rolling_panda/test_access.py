@@ -102,21 +102,21 @@ def test_a_service_is_asked_by_its_callers_and_answered_by_its_process(certifica
         Transport(settings, "controller", "rp1") as controller,
         Transport(settings, "server", "rp1") as server,
     ):
-        bridge.serve(RELEASE, lambda request: m.Answer(ok=True, reason="the bridge"))
-        controller.serve(INTENT, lambda request: m.Answer(ok=True, reason="the controller"))
+        bridge.serve(RELEASE, lambda request: m.Answer(ok=True, reason=said("the bridge")))
+        controller.serve(INTENT, lambda request: m.Answer(ok=True, reason=said("the controller")))
         time.sleep(0.3)
-        assert controller.call(RELEASE, release).reason == "the bridge"
+        assert controller.call(RELEASE, release).reason == said("the bridge")
         with pytest.raises(ServiceError):
             server.call(RELEASE, release)
         assert server.present() == {"bridge", "controller", "server"}
         with Transport(settings, "perception", "rp1") as perception:
             # What it declares to answer does not count, and what it asks is not answered.
-            perception.serve(RELEASE, lambda request: m.Answer(ok=True, reason="not the bridge"))
+            perception.serve(RELEASE, lambda request: m.Answer(ok=True, reason=said("not the bridge")))
             time.sleep(0.3)
-            assert {controller.call(RELEASE, release).reason for _ in range(10)} == {"the bridge"}
+            assert {controller.call(RELEASE, release).reason for _ in range(10)} == {said("the bridge")}
             with pytest.raises(ServiceError):
                 perception.call(INTENT, intents.Arm(user="eve"))
-        assert server.call(INTENT, intents.Arm(user="ada")).reason == "the controller"
+        assert server.call(INTENT, intents.Arm(user="ada")).reason == said("the controller")
 
 
 def test_the_table_names_the_callers_of_every_service() -> None:

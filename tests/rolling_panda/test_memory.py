@@ -26,7 +26,7 @@ class Core:
         self.answers += [answered.message.answer for answered in inbox.drain(Answered)]
         out, self.says = self.says, []
         while (request := inbox.next_request()) is not None:
-            out.append(Reply(request, m.Answer(ok=True, reason=type(request.message).__name__)))
+            out.append(Reply(request, m.Answer(ok=True, reason=said(type(request.message).__name__))))
         return out
 
     def stop(self, request, wall_time):
@@ -102,9 +102,9 @@ def test_requests_are_answered_by_the_process_of_the_service():
     world.add("bridge", bridge, 0.001)
     controller = Core([m.ReleaseStop(stop_id="s", user="ada", reason="gone")])
     node = world.add("controller", controller, 0.01)
-    assert world.ask("controller", intents.Arm(user="ada")) == m.Answer(ok=True, reason="Arm")
+    assert world.ask("controller", intents.Arm(user="ada")) == m.Answer(ok=True, reason=said("Arm"))
     world.run(0.03)
-    assert controller.answers == [m.Answer(ok=True, reason="ReleaseStop")]
+    assert controller.answers == [m.Answer(ok=True, reason=said("ReleaseStop"))]
     node.suspended = True
     assert not world.ask("controller", intents.Arm(user="ada"), 0.1).ok
     assert not world.ask("perception", intents.Arm(user="ada"), 0.1).ok

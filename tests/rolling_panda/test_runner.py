@@ -164,10 +164,10 @@ def test_a_request_is_answered_by_a_step(parts):
         runner.turn(clock.now)
     request = core.inbox.next_request()
     assert (request.message, request.at, core.inbox.next_request()) == ("please", clock.now, None)
-    core.says = [Reply(request, m.Answer(ok=True, reason="done"))]
+    core.says = [Reply(request, m.Answer(ok=True, reason=said("done")))]
     runner.turn(clock.now)
     caller.join(5.0)
-    assert answers == [m.Answer(ok=True, reason="done")]
+    assert answers == [m.Answer(ok=True, reason=said("done"))]
 
 
 def test_a_request_whose_caller_has_given_up_is_not_executed(parts, monkeypatch):

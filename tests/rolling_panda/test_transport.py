@@ -17,7 +17,7 @@ from rolling_panda import reasons
 from rolling_panda.config import TransportConfig
 from rolling_panda.errors import ServiceError, TransportError
 from rolling_panda.messages.robot import CameraFrame, Intrinsics
-from rolling_panda.reasons import text_of
+from rolling_panda.reasons import said, text_of
 from rolling_panda.topics import CAMERA, HEARTBEAT, INTENT, MOTION, Service, Topic, key
 from rolling_panda.transport.codec import StrictDecoder
 from rolling_panda.transport.rejections import Rejections
@@ -154,11 +154,11 @@ def test_a_service_answers_what_it_was_asked(controller: Transport, bridge: Tran
 
     def answer(intent: intents.Intent) -> m.Answer:
         asked.append(intent)
-        return m.Answer(ok=False, reason="not while it rains")
+        return m.Answer(ok=False, reason=said("not while it rains"))
 
     controller.serve(INTENT, answer)
     until(lambda: answered(bridge))
-    assert bridge.call(INTENT, intents.RejectPoint(user="ada", point_id="p1", reason="too thick")).reason == (
+    assert bridge.call(INTENT, intents.RejectPoint(user="ada", point_id="p1", reason="too thick")).reason == said(
         "not while it rains"
     )
     assert asked[-1] == intents.RejectPoint(user="ada", point_id="p1", reason="too thick")
@@ -176,7 +176,7 @@ def test_a_request_that_is_none_is_answered_with_the_reason(controller: Transpor
     controller.serve(INTENT, lambda intent: m.Answer(ok=True))
     until(lambda: answered(bridge))
     refused = bridge.call(INTENT, intents.AcceptAll(user="ada", confidence=math.nan))
-    assert not refused.ok and "confidence" in refused.reason
+    assert not refused.ok and "confidence" in text_of(refused.reason)
     assert [row.topic for row in controller.rejections.counts()] == [INTENT.name]
 
 
@@ -194,7 +194,7 @@ def test_a_request_without_end_is_refused_though_each_field_is_right(
         request = b"\xdf" + (1 + times).to_bytes(4, "big") + fields
         answer = StrictDecoder(m.Answer).decode(foreign.ask(key("rp1", INTENT.name), request, 20.0))
         assert answer.ok is allowed and len(heard) == 1
-    assert "at most" in answer.reason
+    assert "at most" in text_of(answer.reason)
     foreign.close()
 
 

@@ -18,6 +18,7 @@ from rolling_panda.messages.supervision import (
     StopRecord,
     StopState,
 )
+from rolling_panda.reasons import said
 from tests.support import controller_at_work
 from tests.support.fake_wire import (
     FakeWire,
@@ -44,7 +45,7 @@ def server(running):
     running.wire.asked.clear()
     for sent in running.wire.sent.values():
         sent.clear()
-    running.wire.answer = lambda request: m.Answer(ok=True, reason="done")
+    running.wire.answer = lambda request: m.Answer(ok=True, reason=said("done"))
     return running
 
 
@@ -101,7 +102,7 @@ def test_each_request_becomes_its_intent(server, client, path, body, intent):
 
 
 def test_a_refusal_of_the_catalogue_comes_with_its_code_and_values(server, client):
-    server.wire.answer = lambda request: m.Answer(ok=False, reason="words", refused=reasons.control_held("bob"))
+    server.wire.answer = lambda request: m.Answer(ok=False, reason=reasons.control_held("bob"))
     refused = reasons.control_held("bob")
     content = {"ok": False, "reason": reasons.text_of(refused), "code": "control_held", "values": {"user": "bob"}}
     answer = client.post("/api/arm")
@@ -109,7 +110,7 @@ def test_a_refusal_of_the_catalogue_comes_with_its_code_and_values(server, clien
 
 
 def test_a_refusal_comes_with_its_reason_and_is_left_to_the_controller_to_log(server, client):
-    server.wire.answer = lambda request: m.Answer(ok=False, reason="arm first")
+    server.wire.answer = lambda request: m.Answer(ok=False, reason=said("arm first"))
     answer = client.post("/api/start")
     assert (answer.status_code, answer.json()["reason"]) == (409, "arm first")
     texts = [event["text"] for event in client.get("/api/events").json()["events"]]

@@ -15,6 +15,7 @@ from rolling_panda.commands import (
 )
 from rolling_panda.errors import ServiceError
 from rolling_panda.messages.perception import PointCrop
+from rolling_panda.reasons import said
 from tests.support.fake_wire import FakeWire, controller_state, pruning_point, pruning_points
 from tests.support.running_server import eventually, running_server
 
@@ -28,7 +29,7 @@ def running():
 @pytest.fixture
 def server(running):
     running.wire.asked.clear()
-    running.wire.answer = lambda request: m.Answer(ok=True, reason="p9")
+    running.wire.answer = lambda request: m.Answer(ok=True, reason=said("p9"))
     return running
 
 
@@ -95,7 +96,7 @@ def test_a_viewer_may_not_ask_and_a_refusal_or_silence_is_told(server):
             assert client.post(f"/api/{path}", json={}).status_code == 403
     assert server.wire.asked == []
     with server.client(user="ann") as client:
-        server.wire.answer = lambda request: m.Answer(ok=False, reason="no known cane there")
+        server.wire.answer = lambda request: m.Answer(ok=False, reason=said("no known cane there"))
         answer = client.post("/api/points/by-hand", json={"origin": [0.0, 0.0, 1.0], "direction": [0.0, 1.0, 0.0]})
         assert (answer.status_code, answer.json()["reason"]) == (409, "no known cane there")
 
@@ -119,7 +120,7 @@ def test_what_a_rule_would_change_is_told_with_the_acceptances_and_nothing_is_lo
     with server.client(user="ann") as client:
         queue_of(server, r1="ACCEPTED", r2="UNREACHABLE", r3="PROPOSED", r4="ACCEPTED", r5="ACCEPTED")
         eventually(lambda: len(client.get("/api/points").json()["points"]) == 5)
-        server.wire.answer = lambda request: m.Answer(ok=True, reason="7 points", effect=EFFECT)
+        server.wire.answer = lambda request: m.Answer(ok=True, reason=said("7 points"), effect=EFFECT)
         events = len(client.get("/api/events").json()["events"])
         answer = client.post("/api/rule/what-if", json={"nodes_kept": 3})
         assert (answer.status_code, answer.json()) == (
@@ -148,11 +149,13 @@ def test_a_rule_is_taken_back_by_perception_first_and_then_its_acceptances_by_th
         assert isinstance(second, RestoreAccepted) and (second.user, second.rule) == ("ann", rule)
         # Where perception cannot, nobody's acceptance is touched.
         server.wire.asked.clear()
-        server.wire.answer = lambda request: m.Answer(ok=False, reason="the rule has been changed since; look again")
+        server.wire.answer = lambda request: m.Answer(
+            ok=False, reason=said("the rule has been changed since; look again")
+        )
         answer = client.post("/api/rule/undo", json={"nodes_kept": 3})
         assert (answer.status_code, answer.json()["reason"]) == (409, "the rule has been changed since; look again")
         assert [type(each) for each in server.wire.asked] == [UndoRule]
-        server.wire.answer = lambda request: m.Answer(ok=isinstance(request, UndoRule), reason="it began since")
+        server.wire.answer = lambda request: m.Answer(ok=isinstance(request, UndoRule), reason=said("it began since"))
         answer = client.post("/api/rule/undo", json={"nodes_kept": 3})
         assert answer.json()["code"] == "acceptances_not_restored"
         assert answer.json()["values"]["cause"]["values"] == {"text": "it began since"}

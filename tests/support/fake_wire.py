@@ -41,7 +41,7 @@ class FakeWire:
         self.plain = False
         self.sent = defaultdict(list)
         self.asked = []
-        self.answer = lambda request: m.Answer(ok=True, reason="done")
+        self.answer = lambda request: m.Answer(ok=True, reason=said("done"))
         self.processes = {"bridge", "controller", "perception", "server"}
         self.on_reject = lambda topic, reason: None
         self.services = {}

@@ -9,6 +9,7 @@ from controller.planning.work_plan import PlanRequest
 from rolling_panda import commands as intents
 from rolling_panda.config import RobotConfig
 from rolling_panda.messages.supervision import PreviewMotion, PreviewState, SessionPlan
+from rolling_panda.reasons import text_of
 from tests.support.controller_at_work import CONFIG, robot
 from tests.support.sent import newest
 
@@ -49,7 +50,7 @@ class Previewed:
     def ask(self, kind, **content):
         answer = self.robot.ask(kind(user="ada", **content))
         self.robot.run(0.1)
-        return answer.reason if not answer.ok else ""
+        return "" if answer.reason is None else text_of(answer.reason)
 
     def previewed(self, *point_ids):
         """Accept these, all where none is named, and wait for the preview of all that is accepted."""

@@ -58,8 +58,7 @@ class Desk:
     def answer(self, intent, now):
         refused = self.handlers[type(intent)](intent, 0.0)
         self.journal.add("request", intent.user, RequestRow(asked=intent, reason=refused, mode="READY"))
-        told = "" if refused is None else text_of(refused)
-        return m.Answer(ok=refused is None, reason=told, refused=refused)
+        return m.Answer(ok=refused is None, reason=refused)
 
     def step(self, inbox, now):
         out = []
@@ -122,7 +121,7 @@ class Operator:
                 continue
             if answer.ok:
                 self.accepted.add(name)
-            if answer.ok or "is " in answer.reason:
+            if answer.ok or answer.reason.code in ("point_unknown", "not_acceptable"):
                 self.next += 1
             self.look()
 

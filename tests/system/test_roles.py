@@ -7,6 +7,7 @@ import pytest
 from rolling_panda import topics
 from rolling_panda.messages.supervision import PreviewState
 from rolling_panda.messages.types import Answer
+from rolling_panda.reasons import said
 from tests.support.fake_wire import HEADER, FakeWire, controller_state, telling
 from tests.support.running_server import running_server
 
@@ -22,7 +23,7 @@ def server(request):
     wire = FakeWire()
     with running_server(wire) as running, telling(wire):
         if request.param == "all is refused":
-            wire.answer = lambda request: Answer(ok=False, reason="as things are, nobody may")
+            wire.answer = lambda request: Answer(ok=False, reason=said("as things are, nobody may"))
             wire.deliver(topics.CONTROLLER, controller_state(mode="ESTOP_LATCHED"))
             wire.deliver(topics.PREVIEW, PreviewState(header=HEADER, required=True, phase="expired"))
         yield running

@@ -27,7 +27,7 @@ from controller.ledger.store import Entry, Ledger, read
 from controller.work.point_queue import PointQueue
 from controller.work.queue_requests import QueueRequests
 from rolling_panda import messages as m
-from rolling_panda.reasons import said, text_of
+from rolling_panda.reasons import said
 from tests.support.fake_wire import FakeWire
 from tests.support.points import point as pruning_point
 from tests.support.running_server import running_server
@@ -76,8 +76,7 @@ class Robot:
         refused = self.handlers[type(intent)](intent, 0.0)
         self.journal.add("request", intent.user, RequestRow(asked=intent, reason=refused, mode="READY"))
         self.record()
-        told = "" if refused is None else text_of(refused)
-        return m.Answer(ok=refused is None, reason=told, refused=refused)
+        return m.Answer(ok=refused is None, reason=refused)
 
 
 class Operators(RuleBasedStateMachine):

@@ -22,6 +22,7 @@ from rolling_panda.config import RobotConfig
 from rolling_panda.messages.perception import Obstacles
 from rolling_panda.messages.supervision import BaseVelocity, ControlState, TeleopTarget
 from rolling_panda.model.robot import RobotModel, configuration, pose_message
+from rolling_panda.reasons import text_of
 from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.transport.memory import Link
 from server.auth.sessions import Session
@@ -96,7 +97,7 @@ class FaultyWorld(RobotWorld):
         """What the operator asks must be granted here."""
         answer = super().command(intent)
         if not answer.ok:
-            raise RuntimeError(f"{type(intent).__name__}: {answer.reason}")
+            raise RuntimeError(f"{type(intent).__name__}: {answer.reason and text_of(answer.reason)}")
         return answer
 
     def work(self) -> None:
