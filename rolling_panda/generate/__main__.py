@@ -28,7 +28,7 @@ def generated(root: Path = ROOT) -> dict[Path, str]:
     return {
         root / "web" / "js" / "link" / "messages.js": messages_module(),
         root / "web" / "js" / "link" / "messages.d.ts": messages_types(),
-        root / "web" / "js" / "link" / "reasons.js": reasons_module(),
+        root / "web" / "js" / "state" / "catalogue.js": reasons_module(),
         root / "assets" / "config" / "router.json5": router_config(),
         wire: fill(wire.read_text(encoding="utf-8")),
         reasons_page: fill(reasons_page.read_text(encoding="utf-8"), reasons_blocks, "docs/reasons.md"),

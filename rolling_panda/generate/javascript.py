@@ -1,4 +1,4 @@
-"""`web/js/link/messages.js` and `.d.ts`: constants and types of the page's messages; `reasons.js`: the catalogue.
+"""`web/js/link/messages.js` and `.d.ts`: constants and types of the page's messages; `catalogue.js`: the reasons.
 
 Types are in a separate file, which browsers do not fetch.
 """
@@ -70,7 +70,7 @@ def messages_types() -> str:
 
 
 def reasons_module() -> str:
-    """Text of `web/js/link/reasons.js`: severity, text and advice of each reason."""
+    """Text of `web/js/state/catalogue.js`: severity, text and advice of each reason."""
     header = _HEADER.replace("rolling_panda/messages/", "rolling_panda/reasons.py")
     rows = (
         f"  {entry.code}: {json.dumps([entry.severity, entry.text, entry.act], ensure_ascii=False)},\n"
@@ -78,7 +78,7 @@ def reasons_module() -> str:
     )
     return (
         f"{header}\n/**\n * Severity of each reason, its English text with its values in braces, and what to do.\n *\n"
-        ' * @type {Readonly<Record<string, readonly [import("./messages.js").Severity, string, string]>>}\n */\n'
+        ' * @type {Readonly<Record<string, readonly [import("../link/messages.js").Severity, string, string]>>}\n */\n'
         f"export const REASONS = Object.freeze({{\n{''.join(rows)}}});\n"
     )
 

@@ -61,7 +61,7 @@ def test_the_page_makes_only_reasons_of_the_catalogue_with_all_of_their_values()
 
 
 def test_the_page_has_every_reason():
-    module = (ROOT / "web" / "js" / "link" / "reasons.js").read_text(encoding="utf-8")
+    module = (ROOT / "web" / "js" / "state" / "catalogue.js").read_text(encoding="utf-8")
     rows = dict(re.findall(r"^  (\w+): (\[.*\]),$", module, re.MULTILINE))
     entries = reasons.CATALOGUE.values()
     assert {code: json.loads(row) for code, row in rows.items()} == {

@@ -4,10 +4,11 @@ from string import Formatter
 
 import msgspec
 import pytest
-from playwright.sync_api import Page
+from playwright.sync_api import Page, expect
 
 from rolling_panda import reasons
 from rolling_panda.messages import Reason
+from server.api.responses import outcome
 from tests.support.played_server import PlayedServer
 
 pytestmark = pytest.mark.browser
@@ -47,3 +48,12 @@ def test_a_reason_of_another_version_is_shown_with_its_values(server: PlayedServ
 def test_modes_and_states_have_their_labels(server: PlayedServer, page: Page) -> None:
     (text,) = shown(page, [reasons.wrong_mode("Home", "READY", "PROTECTIVE_STOP")])
     assert "Ready" in text and "Protective stop" in text and "PROTECTIVE_STOP" not in text
+
+
+def test_a_refused_request_is_shown_with_the_page_s_own_words(server: PlayedServer, page: Page) -> None:
+    """The answer has its reason as data; its English text is for scripts."""
+    why = reasons.decision_unrecorded(reasons.wrong_mode("Home", "READY", "PROTECTIVE_STOP"))
+    server.answers["/api/home"] = (409, outcome(False, why))
+    page.locator("#home").click()
+    expect(page.locator(".toast")).to_contain_text("It was decided, but is not recorded: Home is possible in Ready; ")
+    expect(page.locator(".toast")).to_contain_text("the mode is Protective stop")

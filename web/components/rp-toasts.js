@@ -1,6 +1,5 @@
 // Toasts above the log, which contains them too.
 
-import { inWords } from "../js/state/format.js";
 import { dismissToast, toasts } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
 import { element } from "../js/views/dom.js";
@@ -31,7 +30,7 @@ class RpToasts extends HTMLElement {
           "div",
           { class: "toast", data: { severity: toast.severity } },
           icon(toast.severity),
-          element("span", { text: inWords(toast.text) }),
+          element("span", { text: toast.text }),
           close,
         );
         shown.set(toast.id, node);

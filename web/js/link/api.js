@@ -1,6 +1,7 @@
 // REST requests. Every refusal is shown and logged.
 
 import { link, say, showToast } from "../state/page-state.js";
+import { reasonText } from "../state/reasons.js";
 
 /**
  * `status` is 0 if the server was not reached; `link` answers an invitation.
@@ -87,9 +88,21 @@ async function answerOf(response) {
   } catch {
     // Not JSON: the status has to do.
   }
-  const reason = typeof body?.reason === "string" ? body.reason : detailOf(body);
+  const text = typeof body?.reason === "string" ? body.reason : detailOf(body);
+  const reason = typeof body?.code === "string" ? reasonText(reasonOf(body)) : text;
   if (response.ok) return { ok: body?.ok !== false, reason, link: typeof body?.link === "string" ? body.link : "" };
   return { ok: false, reason: reason || STATUS_WORDS[response.status] || `the server answered ${response.status}` };
+}
+
+/**
+ * The reason of a refusal, whose values an answer has by name.
+ *
+ * @param {{code: string, values: Record<string, any>}} body
+ * @returns {import("../state/reasons.js").Reason}
+ */
+function reasonOf({ code, values }) {
+  const plain = Object.entries(values ?? {}).map(([name, value]) => [name, value?.code ? reasonOf(value) : value]);
+  return { code, values: /** @type {[string, string|number][]} */ (plain) };
 }
 
 /**

@@ -37,16 +37,6 @@ export const PHASE_WORDS = Object.freeze({
 
 /** @type {Readonly<Record<string, string>>} */
 const RAW_WORDS = Object.freeze({ ...MODE_WORDS, ...POINT_WORDS });
-const RAW = new RegExp(`\\b(${Object.keys(RAW_WORDS).join("|")})\\b`, "g");
-
-/**
- * Replace names of modes and states in a text by their labels.
- *
- * @param {string} text
- */
-export function inWords(text) {
-  return text.replace(RAW, (name) => RAW_WORDS[name] ?? name);
-}
 
 /**
  * The label of a mode or state; other names as they are.

@@ -1,6 +1,6 @@
 // Reasons as text for people.
 
-import { REASONS } from "../link/reasons.js";
+import { REASONS } from "./catalogue.js";
 import { labelOf } from "./format.js";
 
 /** @typedef {{code: string, values: readonly (readonly [string, string|number|Reason])[]}} Reason */

@@ -3,7 +3,7 @@
 import { countOf } from "../control/allowed.js";
 import { holder } from "../control/lease.js";
 import { hardwareStopPressed } from "../control/stop.js";
-import { counted, inWords } from "../state/format.js";
+import { counted } from "../state/format.js";
 import { isGone, isLive, isOpening, link, pageState, points, preview, staleWords } from "../state/page-state.js";
 import { reasonText } from "../state/reasons.js";
 import { history } from "./history.js";
@@ -59,7 +59,7 @@ function noLink() {
  * @returns {Alarm}
  */
 function alarm(id, severity, text, act) {
-  return { id, severity, text: inWords(text), act };
+  return { id, severity, text, act };
 }
 
 /** @returns {Alarm[]} */

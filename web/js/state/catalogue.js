@@ -4,7 +4,7 @@
 /**
  * Severity of each reason, its English text with its values in braces, and what to do.
  *
- * @type {Readonly<Record<string, readonly [import("./messages.js").Severity, string, string]>>}
+ * @type {Readonly<Record<string, readonly [import("../link/messages.js").Severity, string, string]>>}
  */
 export const REASONS = Object.freeze({
   said: ["info", "{text}", ""],
