@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rolling_panda.errors import RollingPandaError
 from rolling_panda.generate import safety
-from rolling_panda.generate.javascript import messages_module, messages_types, reasons_module
+from rolling_panda.generate.javascript import messages_module, messages_types, reasons_catalogue
 from rolling_panda.generate.markdown import fill, reasons_table
 from rolling_panda.transport.access import access_control
 
@@ -28,7 +28,7 @@ def generated(root: Path = ROOT) -> dict[Path, str]:
     return {
         root / "web" / "js" / "link" / "messages.js": messages_module(),
         root / "web" / "js" / "link" / "messages.d.ts": messages_types(),
-        root / "web" / "js" / "state" / "catalogue.js": reasons_module(),
+        root / "web" / "text" / "reasons.en.json": reasons_catalogue(),
         root / "assets" / "config" / "router.json5": router_config(),
         wire: fill(wire.read_text(encoding="utf-8")),
         reasons_page: fill(reasons_page.read_text(encoding="utf-8"), reasons_blocks, "docs/reasons.md"),

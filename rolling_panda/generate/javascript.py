@@ -1,4 +1,4 @@
-"""`web/js/link/messages.js` and `.d.ts`: constants and types of the page's messages; `catalogue.js`: the reasons.
+"""`web/js/link/messages.js` and `.d.ts`: constants and types of the page's messages; and the catalogue of reasons.
 
 Types are in a separate file, which browsers do not fetch.
 """
@@ -69,18 +69,13 @@ def messages_types() -> str:
     return "\n".join(parts)
 
 
-def reasons_module() -> str:
-    """Text of `web/js/state/catalogue.js`: severity, text and advice of each reason."""
-    header = _HEADER.replace("rolling_panda/messages/", "rolling_panda/reasons.py")
+def reasons_catalogue() -> str:
+    """Text of `web/text/reasons.en.json`: severity, text and advice of each reason."""
     rows = (
-        f"  {entry.code}: {json.dumps([entry.severity, entry.text, entry.act], ensure_ascii=False)},\n"
+        f"  {json.dumps(entry.code)}: {json.dumps([entry.severity, entry.text, entry.act], ensure_ascii=False)}"
         for entry in CATALOGUE.values()
     )
-    return (
-        f"{header}\n/**\n * Severity of each reason, its English text with its values in braces, and what to do.\n *\n"
-        ' * @type {Readonly<Record<string, readonly [import("../link/messages.js").Severity, string, string]>>}\n */\n'
-        f"export const REASONS = Object.freeze({{\n{''.join(rows)}}});\n"
-    )
+    return "{\n" + ",\n".join(rows) + "\n}\n"
 
 
 def js_type(hint: Any) -> str:

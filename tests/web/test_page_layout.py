@@ -223,9 +223,8 @@ def test_the_page_is_small_and_keeps_to_its_own_files() -> None:
             first.add(script)
             imported = re.findall(r'^(?:import|export) [^;]*?"(\.[^"]+)";', sent[script], re.MULTILINE)
             waiting += [(script.parent / name).resolve() for name in imported]
-    texts = folder / "js" / "state" / "catalogue.js"
-    assert sum(len(sent[script].encode()) for script in first - {texts}) < 150_000, "code that it fetches at first"
-    assert texts in first and len(sent[texts].encode()) < 48_000, "texts of all reasons that it fetches at first"
+    assert sum(len(sent[script].encode()) for script in first) < 150_000, "what the page fetches before it is used"
+    assert (folder / "text" / "reasons.en.json").stat().st_size < 48_000, "and the texts of all reasons"
     later = {"rp-charts.js", "rp-report.js", "rp-order.js", "rp-preview.js", "preview.js"}
     later |= {"rp-robots.js", "lease-worker.js"}
     elsewhere = {"sign-in.js", "frame.js", "offscreen-framebuffer.js"}

@@ -1,7 +1,13 @@
 // Reasons as text for people.
 
-import { REASONS } from "./catalogue.js";
 import { labelOf } from "./format.js";
+
+/**
+ * Severity, text and advice of each reason, by its code; generated.
+ *
+ * @type {Readonly<Record<string, readonly [import("../link/messages.js").Severity, string, string]>>}
+ */
+const REASONS = await (await fetch(new URL("../../text/reasons.en.json", import.meta.url))).json();
 
 /** @typedef {{code: string, values: readonly (readonly [string, string|number|Reason])[]}} Reason */
 
