@@ -16,6 +16,7 @@ from bridge.sim.camera.config import CameraConfig
 from bridge.sim.vineyard.config import VineyardConfig
 from rolling_panda.config import RobotConfig, load_section
 from rolling_panda.errors import RollingPandaError
+from rolling_panda.reasons import text_of
 from rolling_panda.resources import resource
 from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.runtime.process import ProcessContext, add_common_arguments, run_process, state_folder
@@ -67,7 +68,7 @@ def _begin_anew(words: Sequence[str]) -> int:
     except (RollingPandaError, OSError) as error:
         print(f"rolling-panda bridge: {error}", file=sys.stderr)
         return 1
-    print(f"{done}; a stop is latched, which a supervisor has to reset once the bridge runs")
+    print(f"{text_of(done)}; a stop is latched, which a supervisor has to reset once the bridge runs")
     return 0
 
 

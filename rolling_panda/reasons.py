@@ -1160,6 +1160,19 @@ def lines_left_out(cause: Reason, lines: float) -> None:
     """{cause} (and {lines:.0f} lines like it before)."""
 
 
+# Bridge: its stored state
+
+
+@_reason("warning", "")
+def bridge_state_absent() -> None:
+    """There was no stored state of the bridge."""
+
+
+@_reason("warning", "")
+def bridge_state_set_aside(path: str) -> None:
+    """The stored state of the bridge is set aside in {path}."""
+
+
 # Perception: explanations of cuts
 
 

@@ -7,9 +7,10 @@ from typing import Any
 
 import msgspec
 
+from rolling_panda import reasons
 from rolling_panda.messages.supervision import StopRecord
-from rolling_panda.messages.types import Epoch
-from rolling_panda.reasons import said, with_reason
+from rolling_panda.messages.types import Epoch, Reason
+from rolling_panda.reasons import with_reason
 from rolling_panda.runtime.latest_file import KeptValue, LatestFileWriter
 from rolling_panda.runtime.state_folder import read_kept, replace_durably
 
@@ -52,18 +53,18 @@ def _upgraded(content: Any) -> Any:
     return content
 
 
-def begin_anew(folder: Path) -> str:
-    """Set the stored state aside, whatever it is, and latch a stop in its place. Returns a description.
+def begin_anew(folder: Path) -> Reason:
+    """Set the stored state aside, whatever it is, and latch a stop in its place. Returns what was done.
 
     The stops of before are unknown: a supervisor has to inspect the robot and reset before anything moves.
 
     Raises:
         OSError: The folder cannot be written.
     """
-    path, done = folder / _NAME, "there was no stored state of the bridge"
+    path, done = folder / _NAME, reasons.bridge_state_absent()
     if path.exists():
         aside = path.replace(path.with_suffix(".aside"))
-        done = f"the stored state of the bridge is set aside in {aside}"
-    stop = StopRecord(f"anew-{secrets.token_hex(8)}", "bridge", "", said(done), time.time())
+        done = reasons.bridge_state_set_aside(str(aside))
+    stop = StopRecord(f"anew-{secrets.token_hex(8)}", "bridge", "", done, time.time())
     replace_durably(path, msgspec.json.encode(Remembered(stops=(stop,))))
     return done

@@ -6,7 +6,7 @@ import pytest
 from bridge.core.state_memory import Remembered, begin_anew, open_memory
 from rolling_panda.errors import InputError
 from rolling_panda.messages.supervision import StopRecord
-from rolling_panda.reasons import said
+from rolling_panda.reasons import bridge_state_absent, said
 
 
 def test_what_is_kept_is_known_after_a_restart(tmp_path):
@@ -32,7 +32,7 @@ def test_a_bridge_without_a_memory_begins_anew_with_a_stop(tmp_path):
     begin_anew(tmp_path)
     memory = open_memory(tmp_path)
     (stop,) = memory.value.stops
-    assert (stop.source, stop.user) == ("bridge", "") and stop.reason
+    assert (stop.source, stop.user) == ("bridge", "") and stop.reason == bridge_state_absent()
     memory.close()
 
 

@@ -129,7 +129,7 @@ class Askers(RuleBasedStateMachine):
         self.start()
         assert self.memory is not None
         (stop,) = self.memory.value.stops
-        assert "set aside" in text_of(stop.reason)
+        assert stop.reason.code == "bridge_state_set_aside"
         assert self.core.on_release(m.ReleaseStop(stop_id=stop.stop_id, user="ada", reason="looked"), self.now).ok
 
     @invariant()

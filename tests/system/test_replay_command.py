@@ -63,7 +63,7 @@ def test_a_recording_is_shown_moved_in_and_asked_in_vain(tmp_path: Path) -> None
             client.post("/api/replay", json={"position_s": 1.0, "playing": False})
             eventually(lambda: client.get("/api/points").json()["points"][0]["entry"]["state"] == "PROPOSED")
             refused = client.post("/api/arm", json={})
-            assert refused.status_code == 409 and "recording" in refused.json()["reason"]
+            assert refused.status_code == 409 and refused.json()["code"] == "recording_only"
     finally:
         replay.terminate()
         code = replay.wait(20)
