@@ -95,7 +95,8 @@ def _bounded(value: str | float | Reason) -> str | float | Reason:
     """The value within the bounds of the wire, which refuses a whole message for one value out of them."""
     if isinstance(value, Reason):
         return value
-    return value[:500] if isinstance(value, str) else max(-1e9, min(1e9, value))
+    # A number is a float on the wire, so it is one here.
+    return value[:500] if isinstance(value, str) else max(-1e9, min(1e9, float(value)))
 
 
 def _reason(severity: Severity, act: str) -> Callable[[Callable[P, None]], Callable[P, Reason]]:

@@ -13,8 +13,8 @@ from benchmarks.faults.kinds import FAULTS
 from benchmarks.faults.run import deal, main, run_trial, start
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.messages.supervision import BaseVelocity
-from rolling_panda.reasons import text_of
 from tests.support.worlds.faulty_world import FaultyWorld
 from tests.support.worlds.world import RecordedController
 
@@ -151,14 +151,14 @@ def test_commands_by_somebody_else_under_the_robots_own_token_are_seen_stopped_a
         world.drive()
         world.held = None
     world.intruder, said, step = partial(thief, world.commanded), [], world.bridge.step
-    world.bridge.step = lambda *now: (out := step(*now), said.extend(text_of(event.reason) for event in out.events))[0]
+    world.bridge.step = lambda *now: (out := step(*now), said.extend(event.reason for event in out.events))[0]
     before = world.robot.now.position
     world.run(1.0)
     assert world.controller.mode == "ESTOP_LATCHED" and abs(world.robot.now.velocity).max() < 1e-3
     assert "commands of another sender" in bridge_state(world).stopped_by
     assert 0.05 < abs(world.robot.now.position - before).max() < 1.0
-    told = [text for text in said if "commanded to move" in text]
-    assert told == (["the robot is commanded to move, though the controller's mode is IDLE"] if mode == "IDLE" else [])
+    told = [reason for reason in said if reason.code in ("moved_in_mode", "moved_without_mode")]
+    assert told == ([reasons.moved_in_mode("IDLE")] if mode == "IDLE" else [])
     # The token that is known to others is worth nothing any more.
     stop_id = bridge_state(world).stop_id
     world.people = ("ada",)

@@ -226,6 +226,7 @@ def test_refusals_say_why_and_allowed_agrees_with_them():
         "Home",
         "Acknowledge",
         "Reset",
+        "Teleoperation",
     }
     assert r.ask(intents.Arm(user="ada")).ok
     assert r.ask(intents.Start(user="ada")).reason == reasons.none_accepted()

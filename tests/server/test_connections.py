@@ -145,7 +145,7 @@ def test_a_request_that_was_broken_off_is_not_carried_out_but_a_stop_is(plain):
         half_sent("/api/arm").close()
         # The stop does not even wait for its body.
         assert b" 408 " not in heard(half_sent("/api/stop"))
-        eventually(lambda: reasons.software_stop("ann", "software stop") in noted(plain))
+        eventually(lambda: reasons.software_stop("ann", reasons.said("software stop")) in noted(plain))
         assert plain.wire.asked == []
 
 
