@@ -30,6 +30,9 @@ import { RpPoint, RpRejectForm } from "./rp-point.js";
 const MAY = /** @type {const} */ (["AcceptPoint", "RejectPoint", "ResolvePoint"]);
 /** Height of a group's sticky heading (px). */
 const HEADING = 20;
+
+/** A row that did not move for this many frames is where it stays. */
+const STILL_FRAMES = 3;
 /** Rows of Page up and Page down. */
 const PAGE = 6;
 /**
@@ -168,15 +171,18 @@ class RpQueue extends HTMLElement {
     const item = this.rows.get(selected.get());
     const list = this.list;
     if (!item || !list) return;
+    let [still, left] = [0, 60];
     const scroll = () => {
+      const before = list.scrollTop;
       const [box, frame] = [item.getBoundingClientRect(), list.getBoundingClientRect()];
       const top = frame.top + HEADING;
       if (box.top < top || box.height > frame.bottom - top) list.scrollTop += box.top - top;
       else if (box.bottom > frame.bottom) list.scrollTop += box.bottom - frame.bottom;
+      // Rows that come into view get their heights in a frame to come, and push this one away.
+      still = list.scrollTop === before ? still + 1 : 0;
+      if (still < STILL_FRAMES && left-- > 0) window.requestAnimationFrame(scroll);
     };
     scroll();
-    // Rows out of view get their heights in the next frame.
-    window.requestAnimationFrame(scroll);
   }
 
   /**
