@@ -26,15 +26,15 @@ help:
 demo: $(VENV)/.project
 	@exec $(BIN)/rolling-panda demo $(ARGS)
 
-# First the tests that others may run beside, on every core; then those that keep real time, two at once; then those that
-# anything beside them would disturb. Training has its own target, since nothing else needs PyTorch.
+# First the tests that others may run beside, one more at once than there are cores, since a browser's test waits as much as
+# it computes; then those that keep real time, two at once; then those that anything beside them would disturb. Training has its own target, since nothing else needs PyTorch.
 TRAINING_TESTS := tests/perception/test_training.py tests/perception/test_wide_training.py
 WITHOUT_TRAINING := $(TRAINING_TESTS:%=--ignore %)
 test: check browser systemd drivers
 ifdef ARGS
 	$(BIN)/pytest $(ARGS)
 else
-	$(BIN)/pytest -n auto --dist worksteal -m "not (paced or alone or slow)" $(WITHOUT_TRAINING)
+	$(BIN)/pytest -n $$(($$(nproc) + 1)) --dist worksteal -m "not (paced or alone or slow)" $(WITHOUT_TRAINING)
 	$(BIN)/pytest -n 2 --dist loadfile -m "paced and not (alone or slow)" $(WITHOUT_TRAINING)
 	$(BIN)/pytest -m "alone and not slow" $(WITHOUT_TRAINING)
 	@echo "make test-training runs the tests of the training; it installs PyTorch"
