@@ -29,8 +29,8 @@ class CommitBarrier:
             number, since, message = self._waiting[0]
             why = None
             if number > ledger.durable:
-                if ledger.failure:
-                    why = reasons.ledger_failed(ledger.failure)
+                if ledger.failure is not None:
+                    why = ledger.failure
                 elif now - since > _PATIENCE_S:
                     why = reasons.ledger_silent(now - since)
                 else:

@@ -63,10 +63,10 @@ def noted(severity: Severity, text: str) -> Reason:
     return {"info": said, "warning": warned, "error": failed}[severity](text)
 
 
-def with_reason(stored: Any) -> Any:
-    """A decoded row or stop with its reason as data; earlier versions stored text."""
-    if isinstance(stored, dict) and isinstance(text := stored.get("reason"), str):
-        return stored | {"reason": msgspec.to_builtins(said(text))}
+def with_reason(stored: Any, field: str = "reason") -> Any:
+    """A decoded row or stop whose field is a reason as data; earlier versions stored text."""
+    if isinstance(stored, dict) and isinstance(text := stored.get(field), str):
+        return stored | {field: msgspec.to_builtins(said(text))}
     return stored
 
 
@@ -224,6 +224,11 @@ def foreign_motion() -> None:
 @_reason("error", "")
 def ledger_failed(detail: str) -> None:
     """{detail}."""
+
+
+@_reason("error", "free the disk or replace it")
+def file_unwritable(path: str, detail: str) -> None:
+    """{path} cannot be written: {detail}."""
 
 
 @_reason("error", "")
@@ -444,11 +449,6 @@ def robot_fault_reported(detail: str) -> None:
 @_reason("warning", "")
 def emergency_stop(cause: Reason) -> None:
     """Emergency stop: {cause}."""
-
-
-@_reason("warning", "")
-def software_stop_unnamed(cause: Reason) -> None:
-    """Software stop: {cause}."""
 
 
 @_reason("info", "")

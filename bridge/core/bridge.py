@@ -14,7 +14,7 @@ from bridge.core.cut_memory import CutMemory
 from bridge.core.cut_orders import FORGETFUL, CutOrders
 from bridge.core.fence import SILENT_S, Fence
 from bridge.core.interface import Measurement, Robot, Setpoint
-from bridge.core.latch import StopLatch
+from bridge.core.latch import StopLatch, told
 from bridge.core.limiter import Limiter
 from bridge.core.odometer import Odometer
 from bridge.core.refusals import Refusals
@@ -32,6 +32,7 @@ from rolling_panda.messages.supervision import StopState
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import Limits
 from rolling_panda.model.wire_values import actuated
+from rolling_panda.reasons import text_of
 from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.topics import BRIDGE, CLOSE_UP_REQUEST, CUT, MOTION, ODOMETRY, TOKEN
 from rolling_panda.transport.rejections import Rejections
@@ -220,11 +221,7 @@ class BridgeCore:
     def on_stop(self, request: m.StopRequest, now: float, wall_time: float = 0.0) -> None:
         """Latch a stop; repetitions change nothing. `wall_time` (s since 1970) is for people."""
         if self._latch.stop(request, wall_time):
-            who = request.user or request.source
-            by_button = request.source == "hardware"
-            self._log(
-                reasons.emergency_stop(request.reason) if by_button else reasons.software_stop(who, request.reason)
-            )
+            self._log(told(request))
             self._stops_changed()
 
     def _stops_changed(self) -> None:
@@ -290,7 +287,8 @@ class BridgeCore:
     def _watch_robot(self, now: float) -> None:
         measured = self._measured
         # A bridge that cannot store stops and tokens could move the robot after a restart.
-        fault = measured.fault or self._memory.failure
+        unwritable = self._memory.failure
+        fault = measured.fault or ("" if unwritable is None else text_of(unwritable))
         change = self._faults.follow(fault, measured.severe, bool(self._latch.stop_id), now)
         if change is not None:
             self._halt()

@@ -4,7 +4,6 @@ from rolling_panda import reasons
 from rolling_panda.messages.robot import ReleaseStop, StopRequest
 from rolling_panda.messages.supervision import StopRecord
 from rolling_panda.messages.types import Reason
-from rolling_panda.reasons import text_of
 
 #: Number of latched stops in the message, newest first, and of remembered released ids.
 _MOST, _OVER = 50, 1000
@@ -17,14 +16,14 @@ class StopLatch:
     """
 
     def __init__(
-        self, stops: tuple[StopRecord, ...] = (), released: tuple[str, ...] = (), released_by: str = ""
+        self, stops: tuple[StopRecord, ...] = (), released: tuple[str, ...] = (), released_by: Reason | None = None
     ) -> None:
         """Start with the stored stops.
 
         Args:
             stops: Latched stops, newest first.
             released: Ids that do not latch any more.
-            released_by: User and reason of the last release.
+            released_by: Who made the last release and why; None before the first.
         """
         self.stops = stops
         self.released_by = released_by
@@ -38,12 +37,9 @@ class StopLatch:
         return self.stops[0].stop_id if self.stops else ""
 
     @property
-    def stopped_by(self) -> str:
-        """Who pressed the newest one and why."""
-        if not self.stops:
-            return ""
-        newest = self.stops[0]
-        return f"{newest.user or newest.source}: {text_of(newest.reason)}"[:500]
+    def stopped_by(self) -> Reason | None:
+        """Who made the newest stop and why; None without one."""
+        return told(self.stops[0]) if self.stops else None
 
     @property
     def over(self) -> tuple[str, ...]:
@@ -77,5 +73,12 @@ class StopLatch:
         while len(self._over) > _OVER:
             self._over.pop(next(iter(self._over)))
         self.stops = ()
-        self.released_by = f"{request.user}: {request.reason}"[:500]
+        self.released_by = reasons.stop_reset(request.user, request.reason)
         return None
+
+
+def told(stop: StopRecord | StopRequest) -> Reason:
+    """Who stopped and why."""
+    if stop.source == "hardware":
+        return reasons.emergency_stop(stop.reason)
+    return reasons.software_stop(stop.user or stop.source, stop.reason)

@@ -25,14 +25,14 @@ class Remembered(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         token: Random part of the token; None without a holder.
         stops: Latched stops, newest first.
         released: Ids of released stops; late repetitions of them do not latch.
-        released_by: User and reason of the last release.
+        released_by: Who made the last release and why; None before the first.
     """
 
     epoch: Epoch = 0
     token: str | None = None
     stops: tuple[StopRecord, ...] = ()
     released: tuple[str, ...] = ()
-    released_by: str = ""
+    released_by: Reason | None = None
 
 
 def open_memory(folder: Path) -> KeptValue[Remembered]:
@@ -48,9 +48,12 @@ def open_memory(folder: Path) -> KeptValue[Remembered]:
 
 
 def _upgraded(content: Any) -> Any:
-    if isinstance(content, dict) and isinstance(stops := content.get("stops"), list):
-        return content | {"stops": [with_reason(stop) for stop in stops]}
-    return content
+    if isinstance(content, dict):
+        if isinstance(stops := content.get("stops"), list):
+            content = content | {"stops": [with_reason(stop) for stop in stops]}
+        if content.get("released_by") == "":
+            content = content | {"released_by": None}
+    return with_reason(content, "released_by")
 
 
 def begin_anew(folder: Path) -> Reason:

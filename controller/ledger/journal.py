@@ -39,7 +39,7 @@ class LedgerState:
     """Durability of the records: all up to number `durable` are on disk. `failure` is the reason why others are not."""
 
     durable: int = 0
-    failure: str = ""
+    failure: m.Reason | None = None
 
 
 class TicketRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -101,8 +101,8 @@ class Journal:
         return self._number
 
     @property
-    def failure(self) -> str:
-        """Reason why the ledger cannot record; empty if it can."""
+    def failure(self) -> m.Reason | None:
+        """Reason why the ledger cannot record; None if it can."""
         return self._state.failure
 
     def add(self, kind: Kind, name: str, body: msgspec.Struct) -> int:
@@ -137,8 +137,8 @@ class Journal:
 
     def trouble(self, now: float, patience_s: float) -> m.Reason | None:
         """Reason why the ledger is not reliable; None if it is."""
-        if self._state.failure:
-            return reasons.ledger_failed(self._state.failure)
+        if self._state.failure is not None:
+            return self._state.failure
         if self._unwritten_since is not None and now - self._unwritten_since > patience_s:
             return reasons.ledger_silent(now - self._unwritten_since)
         return None

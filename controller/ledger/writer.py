@@ -101,7 +101,7 @@ class LedgerWriter:
                 store = store or self._open()
                 store.append(_entry(at, record) for at, record in batch)
             except LedgerError as error:
-                self._state = LedgerState(self._state.durable, str(error))
+                self._state = LedgerState(self._state.durable, reasons.ledger_failed(str(error)))
                 with self._some:
                     if self._closing:
                         break

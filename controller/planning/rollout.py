@@ -171,7 +171,7 @@ class _Run:
             epoch=_TOKEN.epoch,
             watchdog=False,
             stop_id="",
-            stopped_by="",
+            stopped_by=None,
             cutter="closing" if cut_id and not done else "open",
             cut_id=cut_id,
             outcome="DONE" if done else "",

@@ -24,7 +24,7 @@ class StopLatch:
         self._asked: intents.Reset | None = None
         self._asked_at = 0.0
         self._due: m.ReleaseStop | None = None
-        self._released_by = ""
+        self._released_by: m.Reason | None = None
         self._told: tuple[str, ...] | None = None
 
     @property
@@ -63,7 +63,9 @@ class StopLatch:
                 self._latch(record)
                 latched = _reason(record)
         if bridge is not None and bridge.stop_id and bridge.stop_id not in self._pending:
-            record = StopRecord(bridge.stop_id, "bridge", "", reasons.said(bridge.stopped_by), max(0.0, wall_time))
+            record = StopRecord(
+                bridge.stop_id, "bridge", "", bridge.stopped_by or reasons.stop_latched(), max(0.0, wall_time)
+            )
             self._latch(record)
             latched = latched or _reason(record)
         return latched
@@ -98,7 +100,7 @@ class StopLatch:
             return False
         self._over |= set(self._pending)
         self._pending = {}
-        self._released_by = f"{self._asked.user}: {self._asked.reason}"[:500]
+        self._released_by = self.reset_reason
         return True
 
     def _latch(self, record: StopRecord) -> None:
@@ -107,7 +109,9 @@ class StopLatch:
 
 
 def _reason(stop: StopRecord) -> m.Reason:
+    if stop.source == "bridge":
+        # The bridge tells who stopped in its reason.
+        return stop.reason
     if stop.source == "hardware":
         return reasons.emergency_stop(stop.reason)
-    who = stop.user or ("" if stop.source == "bridge" else stop.source)
-    return reasons.software_stop(who, stop.reason) if who else reasons.software_stop_unnamed(stop.reason)
+    return reasons.software_stop(stop.user or stop.source, stop.reason)

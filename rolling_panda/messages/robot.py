@@ -165,7 +165,7 @@ class BridgeState(Message, frozen=True, kw_only=True):
         moving: Whether any actuator is sent a velocity other than zero.
         watchdog: True while no valid setpoint has arrived within the deadline: base 0, arm holds, cutter inhibited.
         stop_id: The latched software stop; empty without one.
-        stopped_by: User and reason of that stop.
+        stopped_by: Who stopped and why; None without a stop.
         cutter: State of the blades.
         cut_id: The last requested cut; empty before the first.
         outcome: Outcome of that cut; empty during the cut.
@@ -183,7 +183,7 @@ class BridgeState(Message, frozen=True, kw_only=True):
     epoch: Epoch
     watchdog: bool
     stop_id: Annotated[str, Meta(max_length=64)]
-    stopped_by: Text
+    stopped_by: Reason | None
     cutter: Literal["open", "closing", "opening", "jammed"]
     cut_id: Annotated[str, Meta(max_length=64)]
     outcome: Outcome

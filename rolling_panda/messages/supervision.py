@@ -244,13 +244,13 @@ class StopState(Message, frozen=True, kw_only=True):
     Attributes:
         process: The sender.
         stops: Latched stops, newest first.
-        released_by: User and reason of the last release; empty before the first.
+        released_by: Who made the last reset and why; None before the first.
         hardware: Whether the hardware stop is pressed; always false from the controller.
     """
 
     process: Process
     stops: tuple[StopRecord, ...]
-    released_by: Text = ""
+    released_by: Reason | None = None
     hardware: bool = False
 
 

@@ -6,6 +6,8 @@ from typing import Generic, TypeVar
 
 import msgspec
 
+from rolling_panda import reasons
+from rolling_panda.messages.types import Reason
 from rolling_panda.runtime.state_folder import replace_durably
 
 #: Time between attempts after a failed write (s).
@@ -26,8 +28,8 @@ class LatestFileWriter:
         self._waiting: bytes | None = None
         self._changed = threading.Condition()
         self._ended = False
-        #: Error of the last write; empty after a success.
-        self.failure = ""
+        #: Error of the last write; None after a success.
+        self.failure: Reason | None = None
         self._thread = threading.Thread(target=self._write, name=f"keep {path.name}", daemon=True)
         self._thread.start()
 
@@ -59,14 +61,14 @@ class LatestFileWriter:
             try:
                 replace_durably(self._path, content)
             except OSError as error:
-                self.failure = f"{self._path} cannot be written: {error.strerror}"
+                self.failure = reasons.file_unwritable(str(self._path), error.strerror or "")
                 with self._changed:
                     if self._ended:
                         return
                     self._changed.wait(_RETRY_S)
                 continue
             with self._changed:
-                self.failure = ""
+                self.failure = None
                 if self._waiting is content:
                     self._waiting = None
 
@@ -84,9 +86,9 @@ class KeptValue(Generic[Value]):
         self._writer = writer
 
     @property
-    def failure(self) -> str:
-        """Why the newest value is not on disk; empty when it is, or is being written."""
-        return "" if self._writer is None else self._writer.failure
+    def failure(self) -> Reason | None:
+        """Why the newest value is not on disk; None when it is, or is being written."""
+        return None if self._writer is None else self._writer.failure
 
     @property
     def kept(self) -> bool:

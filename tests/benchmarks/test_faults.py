@@ -155,7 +155,7 @@ def test_commands_by_somebody_else_under_the_robots_own_token_are_seen_stopped_a
     before = world.robot.now.position
     world.run(1.0)
     assert world.controller.mode == "ESTOP_LATCHED" and abs(world.robot.now.velocity).max() < 1e-3
-    assert "commands of another sender" in bridge_state(world).stopped_by
+    assert bridge_state(world).stopped_by == reasons.software_stop("controller", reasons.foreign_motion())
     assert 0.05 < abs(world.robot.now.position - before).max() < 1.0
     told = [reason for reason in said if reason.code in ("moved_in_mode", "moved_without_mode")]
     assert told == ([reasons.moved_in_mode("IDLE")] if mode == "IDLE" else [])

@@ -161,7 +161,7 @@ def test_the_software_stop_latches_and_release_moves_nothing(bench: Bench) -> No
     bench.run(0.5, FORWARD)
     assert 0.0 < bench.moved_within(0.5) <= 0.2
     assert (bench.state.stop_id, bench.state.watchdog) == ("s1", False)
-    assert bench.state.stopped_by == "ada: button"
+    assert bench.state.stopped_by == reasons.software_stop("ada", said("button"))
     assert not bench.core.on_release(release("other"), bench.now).ok
     bench.run(0.1, FORWARD)
     assert bench.core.on_release(release(), bench.now).ok
@@ -194,10 +194,13 @@ def test_a_latched_stop_survives_a_restart_of_the_bridge(bench: Bench) -> None:
     assert third.state.stop_id == ""
 
 
+UNWRITABLE = reasons.file_unwritable("bridge.json", "Read-only file system")
+
+
 class Disk(KeptValue[Remembered]):
     """A memory whose disk is slow or broken."""
 
-    kept, failure = True, ""  # type: ignore[assignment]
+    kept, failure = True, None  # type: ignore[assignment]
 
 
 def test_a_stop_is_told_to_be_latched_once_a_restart_would_find_it(bench: Bench) -> None:
@@ -219,15 +222,15 @@ def test_a_bridge_that_cannot_remember_holds_the_robot_and_says_why(bench: Bench
     disk = Disk(Remembered())
     bench.core = BridgeCore(bench.robot, BridgeConfig(), MODEL.limits, odometer(), "sim", memory=disk)
     bench.drive_on()
-    disk.failure, disk.kept = "bridge.json cannot be written: Read-only file system", False  # type: ignore[misc]
+    disk.failure, disk.kept = UNWRITABLE, False  # type: ignore[misc]
     bench.run(1.0, FORWARD)
     assert bench.moved_within(0.3) == 0.0 and bench.state.watchdog
-    assert any("Read-only file system" in line for line in bench.log)
+    assert text_of(reasons.robot_faulty(text_of(UNWRITABLE))) in bench.log
     bench.core.on_stop(stop(), bench.now)
     bench.run(0.1, FORWARD)
     assert any(out.stops and out.stops.stops for out in bench.outputs), "who stops is not kept waiting for ever"
     assert bench.core.on_release(release(), bench.now).ok
-    disk.failure, disk.kept = "", True  # type: ignore[misc]
+    disk.failure, disk.kept = None, True  # type: ignore[misc]
     bench.run(0.2, REST)
     bench.run(0.3, FORWARD)
     assert bench.robot.sent[-1].xi == pytest.approx(FORWARD)
@@ -422,10 +425,10 @@ def test_the_robot_is_told_which_command_it_follows_and_when_by_the_machines_clo
 def test_what_the_transport_refused_is_told_with_the_bridges_own() -> None:
     table = Rejections()
     core = BridgeCore(IdealRobot(), BridgeConfig(), MODEL.limits, odometer(), "sim", rejections=table)
-    table.add("command/motion", reasons.said("no message"))
+    table.add("command/motion", said("no message"))
     states = [out.state for out in (core.step(tick * 1e-3) for tick in range(1, 1100)) if out.state is not None]
     assert [(row.topic, row.reason, row.count) for row in states[-1].rejections] == [
-        ("command/motion", reasons.said("no message"), 1)
+        ("command/motion", said("no message"), 1)
     ]
 
 

@@ -73,10 +73,13 @@ def test_before_any_command_the_robot_is_held_and_told_to_rest(bench: Bench) -> 
 
 def test_who_released_the_last_stops_is_told_after_a_restart() -> None:
     bench = Bench()
-    memory = KeptValue(Remembered(released=("s1",), released_by="ada: checked"))
+    memory = KeptValue(Remembered(released=("s1",), released_by=reasons.stop_reset("ada", "checked")))
     bench.core = BridgeCore(bench.robot, BridgeConfig(), MODEL.limits, odometer(), "sim", memory=memory)
     out = tick(bench)
-    assert out.stops is not None and (out.stops.stops, out.stops.released_by) == ((), "ada: checked")
+    assert out.stops is not None and (out.stops.stops, out.stops.released_by) == (
+        (),
+        reasons.stop_reset("ada", "checked"),
+    )
 
 
 def test_what_is_measured_is_in_the_state_and_the_joint_states(bench: Bench) -> None:
@@ -132,7 +135,10 @@ def test_a_stop_its_release_and_who_did_both_are_told_in_the_next_tick(bench: Be
     out = tick(bench)
     assert lines(out) == [("info", text_of(reasons.stop_reset("ada", "checked")))]
     assert out.state is not None and out.state.stop_id == ""
-    assert out.stops is not None and (out.stops.stops, out.stops.released_by) == ((), "ada: checked")
+    assert out.stops is not None and (out.stops.stops, out.stops.released_by) == (
+        (),
+        reasons.stop_reset("ada", "checked"),
+    )
     assert bench.robot.sent[-1].releases == 1
     refused = bench.core.on_release(release(), bench.now)
     assert refused.ok is False and refused.reason
@@ -372,7 +378,12 @@ def test_what_must_survive_a_restart_is_kept(bench: Bench) -> None:
     assert bench.core.on_release(release("s1"), bench.now).ok
     bench.core.on_stop(stop("s2"), bench.now, 6.0)
     kept = memory.value
-    assert (kept.epoch, kept.token, kept.released, kept.released_by) == (1, bench.token, ("s1",), "ada: checked")
+    assert (kept.epoch, kept.token, kept.released, kept.released_by) == (
+        1,
+        bench.token,
+        ("s1",),
+        reasons.stop_reset("ada", "checked"),
+    )
     assert [(each.stop_id, each.wall_time) for each in kept.stops] == [("s2", 6.0)]
 
 

@@ -7,6 +7,8 @@ from rolling_panda.messages.robot import ReleaseStop, StopRequest
 from rolling_panda.messages.supervision import StopRecord
 from rolling_panda.reasons import said
 
+RELEASED = reasons.stop_reset("ada", "checked")
+
 
 def stop(stop_id: str) -> StopRequest:
     return StopRequest(stop_id=stop_id, source="page", user="ada", reason=said("button"))
@@ -23,12 +25,12 @@ def test_every_stop_is_kept_and_all_hold_until_the_newest_is_released() -> None:
     assert not latch.stop(stop("a"), 12.0)
     assert [(each.stop_id, each.wall_time) for each in latch.stops] == [("b", 11.0), ("a", 10.0)]
     assert latch.stops[0] == StopRecord("b", "page", "ada", said("button"), 11.0)
-    assert latch.stop_id == "b" and latch.released_by == ""
-    assert latch.stopped_by == "ada: button"
+    assert latch.stop_id == "b" and latch.released_by is None
+    assert latch.stopped_by == reasons.software_stop("ada", said("button"))
     assert latch.release(release("a")) == reasons.another_stop_latched("b", "a")
     assert latch.stop_id == "b"
     assert latch.release(release("b")) is None
-    assert latch.stop_id == "" and latch.stops == () and latch.released_by == "ada: checked"
+    assert latch.stop_id == "" and latch.stops == () and latch.released_by == RELEASED
 
 
 def test_a_clock_before_1970_and_a_long_reason_spoil_no_message() -> None:
@@ -36,9 +38,9 @@ def test_a_clock_before_1970_and_a_long_reason_spoil_no_message() -> None:
     for stop_id, wall_time in (("a", -5.0), ("b", 0.5)):
         latch.stop(StopRequest(stop_id=stop_id, source="page", user="ada", reason=said("x" * 500)), wall_time)
     assert [each.wall_time for each in latch.stops] == [0.5, 0.0]
-    assert latch.stopped_by == "ada: " + "x" * 495
+    assert latch.stopped_by == reasons.software_stop("ada", said("x" * 500))
     latch.release(ReleaseStop(stop_id="b", user="ada", reason="y" * 500))
-    assert latch.released_by == "ada: " + "y" * 495
+    assert latch.released_by == reasons.stop_reset("ada", "y" * 500)
 
 
 def test_late_repetitions_of_released_stops_do_not_latch_again() -> None:
@@ -56,7 +58,7 @@ def test_a_restart_releases_nothing_and_forgets_nothing() -> None:
     latch.release(release("a"))
     latch.stop(stop("b"))
     again = StopLatch(latch.stops, latch.over, latch.released_by)
-    assert again.stop_id == "b" and again.released_by == "ada: checked"
+    assert again.stop_id == "b" and again.released_by == RELEASED
     assert not again.stop(stop("a"))
 
 
@@ -76,6 +78,15 @@ def test_of_very_many_released_stops_the_last_thousand_are_remembered() -> None:
         assert latch.release(release(f"s{number}")) is None
     assert latch.over == tuple(f"s{number}" for number in range(5, 1005))
     assert not latch.stop(stop("s5")) and latch.stop(stop("s4"))
+
+
+def test_without_a_user_the_process_is_told_and_the_button_as_an_emergency_stop() -> None:
+    latch = StopLatch()
+    assert latch.stopped_by is None
+    latch.stop(StopRequest(stop_id="a", source="page", user="", reason=said("button")))
+    assert latch.stopped_by == reasons.software_stop("page", said("button"))
+    latch.stop(StopRequest(stop_id="b", source="hardware", user="", reason=reasons.button_pressed()))
+    assert latch.stopped_by == reasons.emergency_stop(reasons.button_pressed())
 
 
 def test_while_the_button_is_pressed_nothing_is_released() -> None:

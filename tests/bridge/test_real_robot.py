@@ -88,7 +88,7 @@ def test_a_reflex_is_told_in_the_arms_words_and_recovered_from_by_a_persons_word
     assert rig.until(lambda: rig.state.stop_id != "", FORWARD)
     rig.run(0.6, FORWARD)
     assert rig.at_rest(), "the base went on without the arm"
-    assert "joint_reflex" in rig.state.stopped_by
+    assert "joint_reflex" in text_of(rig.state.stopped_by)
     assert plant.arm.tell()["recoveries"] == recoveries
     assert release(rig).ok
     rig.run(0.5, REST)

@@ -34,7 +34,7 @@ def test_a_failure_and_a_silence_turn_a_consent_into_a_refusal():
     waiting.hold(1, 0.0, reply())
     waiting.hold(1, 0.0, refused := reply(ok=False))
     waiting.hold(1, 0.0, "state")
-    failed, *others = waiting.settle(LedgerState(0, "disk full"), 0.0)
+    failed, *others = waiting.settle(LedgerState(0, reasons.ledger_failed("disk full")), 0.0)
     assert failed.answer.reason == reasons.decision_unrecorded(reasons.ledger_failed("disk full"))
     assert not failed.answer.ok
     assert others == [refused, "state"]

@@ -28,11 +28,11 @@ def at_rest(r, within_s):
 
 def test_a_failure_is_a_fault_and_the_robot_rests_within_a_second():
     r = driving()
-    r.ledger = LedgerState(r.ledger.durable, "cannot write the ledger: database or disk is full")
+    r.ledger = LedgerState(r.ledger.durable, reasons.ledger_failed("the disk is full"))
     r.step()
     run_until(r, lambda s: s.mode == "FAULT", r.now + 0.1)
     at_rest(r, 1.0)
-    assert r.state.reason == reasons.ledger_failed(r.ledger.failure) and r.cuts == []
+    assert r.state.reason == r.ledger.failure and r.cuts == []
     assert r.ask(intents.Acknowledge(user="ada", role="supervisor")).reason.code == "cause_remains"
     r.stop()
     run_until(r, lambda s: s.mode == "ESTOP_LATCHED", r.now + 0.2)
@@ -69,7 +69,7 @@ def test_the_blades_wait_for_the_record_of_their_intent():
 def test_work_goes_on_when_the_cause_has_gone_and_somebody_says_so():
     r = driving()
     durable = r.ledger.durable
-    r.ledger = LedgerState(durable, "disk full")
+    r.ledger = LedgerState(durable, reasons.ledger_failed("disk full"))
     run_until(r, lambda s: s.mode == "FAULT", r.now + 0.1)
     r.run(0.5)
     r.ledger = LedgerState(r.controller.recorded)

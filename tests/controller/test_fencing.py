@@ -14,7 +14,7 @@ def drawn():
 
 def bridge(token="", epoch=1):
     return m.BridgeState(
-        header=m.Header(1.0), kind="sim", epoch=epoch, watchdog=False, stop_id="", stopped_by="", cutter="open",
+        header=m.Header(1.0), kind="sim", epoch=epoch, watchdog=False, stop_id="", stopped_by=None, cutter="open",
         cut_id="", outcome="", real_time_factor=1.0, holder=m.fingerprint(token) if token else "",
     )  # fmt: skip
 

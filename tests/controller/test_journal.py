@@ -50,7 +50,7 @@ def test_a_slow_ledger_that_goes_on_is_no_trouble():
 
 def test_a_failure_is_trouble_at_once_until_it_is_over():
     journal = Journal()
-    journal.observe(LedgerState(0, "disk full"), 0.0)
+    journal.observe(LedgerState(0, reasons.ledger_failed("disk full")), 0.0)
     assert journal.trouble(0.0, 0.6) == reasons.ledger_failed("disk full")
     journal.observe(LedgerState(0), 1.0)
     assert journal.trouble(1.0, 0.6) is None

@@ -10,6 +10,7 @@ from tests.support.fake_wire import as_received, bridge_state
 
 BRIDGE = bridge_state()
 RESET = intents.Reset(user="ada", role="supervisor", reason="looked at it")
+PRESSED = reasons.software_stop("eve", said("dog in the row"))
 
 
 def stop(stop_id):
@@ -17,7 +18,7 @@ def stop(stop_id):
 
 
 def bridge(stop_id):
-    return msgspec.structs.replace(BRIDGE, stop_id=stop_id, stopped_by="eve: dog in the row")
+    return msgspec.structs.replace(BRIDGE, stop_id=stop_id, stopped_by=PRESSED)
 
 
 def test_a_stop_latches_once_and_says_who_and_why():
@@ -28,10 +29,10 @@ def test_a_stop_latches_once_and_says_who_and_why():
 
 def test_a_stop_that_only_the_bridge_has_seen_latches_too():
     latch = StopLatch()
-    assert latch.update((), bridge("a"), 7.0) == reasons.software_stop_unnamed(said("eve: dog in the row"))
+    assert latch.update((), bridge("a"), 7.0) == PRESSED
     assert latch.update((), bridge("a"), 8.0) is None
     (record,) = latch.message().stops
-    assert record == StopRecord("a", "bridge", "", said("eve: dog in the row"), 7.0)
+    assert record == StopRecord("a", "bridge", "", PRESSED, 7.0)
 
 
 def test_a_clock_before_1970_spoils_no_record():
@@ -48,7 +49,7 @@ def test_what_was_latched_before_a_start_is_not_released_by_itself():
     before.update((stop("a"),), BRIDGE)
     latch = StopLatch(before.message().stops)
     assert not latch.released(BRIDGE) and latch.latched == reasons.software_stop("eve", said("dog in the row"))
-    assert latch.message().released_by == ""
+    assert latch.message().released_by is None
 
 
 def test_an_emergency_stop_is_told_from_a_software_stop_and_a_process_stands_for_a_person():
@@ -57,7 +58,6 @@ def test_an_emergency_stop_is_told_from_a_software_stop_and_a_process_stands_for
         ("hardware", "eve", reasons.emergency_stop(said("the button"))),
         ("server", "", reasons.software_stop("server", said("the button"))),
         ("server", "eve", reasons.software_stop("eve", said("the button"))),
-        ("bridge", "", reasons.software_stop_unnamed(said("the button"))),
     ):
         pressed = m.StopRequest(stop_id="a", source=source, user=user, reason=said("the button"))
         assert StopLatch().update((pressed,), BRIDGE) == told
@@ -126,16 +126,16 @@ def test_a_reset_of_a_stop_that_is_not_the_newest_any_more_is_refused():
     assert latch.ask_release(looked_at_b, bridge("b"), 1.0) is None
     assert latch.release_due().stop_id == "b"
     assert latch.released(BRIDGE)
-    assert latch.message().released_by == "ada: looked at it"
+    assert latch.message().released_by == reasons.stop_reset("ada", "looked at it")
 
 
-def test_a_long_reason_of_a_reset_is_cut_to_what_the_wire_carries():
+def test_a_long_reason_of_a_reset_fits_the_wire():
     latch = StopLatch()
     latch.update((stop("a"),), bridge("a"))
     latch.ask_release(msgspec.structs.replace(RESET, reason="x" * 500), bridge("a"), 1.0)
     latch.release_due()
     assert latch.released(BRIDGE)
-    assert as_received(latch.message()).released_by == "ada: " + "x" * 495
+    assert as_received(latch.message()).released_by == reasons.stop_reset("ada", "x" * 500)
 
 
 def test_before_the_bridge_has_said_what_it_holds_a_reset_is_refused_and_later_it_is_not_lost():

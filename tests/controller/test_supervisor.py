@@ -304,7 +304,7 @@ def test_the_way_home_needs_measurements():
 
 def test_a_ledger_that_takes_nothing_is_a_fault():
     r = ready()
-    r.ledger = LedgerState(failure="the disk is full")
+    r.ledger = LedgerState(failure=reasons.ledger_failed("the disk is full"))
     r.run(0.1)
     assert (r.state.mode, r.state.reason) == ("FAULT", reasons.ledger_failed("the disk is full"))
 
@@ -317,7 +317,7 @@ def test_a_stop_that_only_the_bridge_knows_is_kept_with_its_time_and_reset_throu
     assert [(stop.stop_id, stop.source, stop.wall_time) for stop in kept] == [("pressed-there", "bridge", 1e9)]
     assert (r.state.mode, r.state.reason) == (
         "ESTOP_LATCHED",
-        reasons.software_stop_unnamed(reasons.said("ada")),
+        reasons.software_stop("ada", reasons.said("dog")),
     )
     assert r.ask(intents.Reset(user="ada", role="supervisor", reason="looked")).ok
     reset = reasons.mode_changed("ESTOP_LATCHED", "IDLE", reasons.stop_reset("ada", "looked"))

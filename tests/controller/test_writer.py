@@ -8,7 +8,7 @@ import pytest
 
 from controller.ledger import writer as writer_module
 from controller.ledger.check import reading, verify
-from controller.ledger.journal import Record, TicketRow
+from controller.ledger.journal import LedgerState, Record, TicketRow
 from controller.ledger.store import Ledger, read
 from controller.ledger.writer import LedgerWriter
 from rolling_panda import messages as m
@@ -87,11 +87,11 @@ def test_a_full_disk_is_told_and_nothing_is_lost_when_there_is_room_again(writer
     writer = writers(lambda: disk)
     writer.write([record(1)])
     until(lambda: writer.state.failure)
-    assert "disk is full" in writer.state.failure and writer.state.durable == 0
+    assert writer.state == LedgerState(0, reasons.ledger_failed("cannot write: database or disk is full"))
     writer.write([record(2)])
     disk.full = False
     until(lambda: writer.state.durable == 2)
-    assert writer.state.failure == "" and len(disk.rows) == 2
+    assert writer.state.failure is None and len(disk.rows) == 2
 
 
 def test_a_ledger_that_cannot_be_opened_is_told_and_tried_again(tmp_path, writers):

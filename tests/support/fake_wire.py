@@ -96,7 +96,7 @@ def odometry(sequence=1, x=0.0):
 
 def bridge_state(stop_id=""):
     return m.BridgeState(
-        header=HEADER, kind="sim", epoch=1, watchdog=False, stop_id=stop_id, stopped_by="", cutter="open", cut_id="",
+        header=HEADER, kind="sim", epoch=1, watchdog=False, stop_id=stop_id, stopped_by=None, cutter="open", cut_id="",
         outcome="", real_time_factor=1.0,
     )  # fmt: skip
 

@@ -20,7 +20,7 @@ from rolling_panda.messages.supervision import (
     StopState,
     VineReport,
 )
-from rolling_panda.reasons import text_of
+from rolling_panda.reasons import said, text_of
 from tests.support.page_parts import accepted, choose, held, planned, queue, ready, show, show_mode, working
 from tests.support.played_server import PlayedServer, bridge, controller, point
 from tests.support.points import rolled_out
@@ -234,13 +234,13 @@ def _stopped(page: Page, server: PlayedServer) -> None:
             stop_id=f"s{number}",
             source="server",
             user=user,
-            reason=reasons.said("stop button"),
+            reason=said("stop button"),
             wall_time=MORNING - 60 * number,
         )
         for number, user in ((1, "Ada"), (2, "Bob"))
     )
     server.stopped = (StopState(process="bridge", stops=records), StopState(process="controller", stops=records))
-    server.bridge = bridge(stop_id="s1", stopped_by="Ada: stop button")
+    server.bridge = bridge(stop_id="s1", stopped_by=reasons.software_stop("Ada", said("stop button")))
     show_mode(page, server, controller("ESTOP_LATCHED", reason="stopped by Ada: stop button"))
     expect(page.locator("rp-stop-banner")).to_be_visible()
 

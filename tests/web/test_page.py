@@ -186,8 +186,8 @@ def test_space_stops_even_on_a_focused_button_and_inside_the_view(page: Page, se
 def test_a_stop_says_who_and_who_latched_it_and_is_reset_with_a_reason(page: Page, server: PlayedServer) -> None:
     banner = page.locator("rp-stop-banner")
     expect(banner).to_be_hidden()
-    server.bridge = bridge(stop_id="s1", stopped_by="Ada: space bar")
-    expect(banner).to_contain_text("Pressed by Ada: space bar")
+    server.bridge = bridge(stop_id="s1", stopped_by=reasons.software_stop("Ada", reasons.said("space bar")))
+    expect(banner).to_contain_text(text_of(reasons.software_stop("Ada", reasons.said("space bar"))))
     expect(banner.locator('[data-by="bridge"]')).to_have_attribute("data-acknowledged", "true")
     expect(banner.locator('[data-by="controller"]')).to_have_attribute("data-acknowledged", "false")
     server.controller = controller("ESTOP_LATCHED", reason="stopped by Ada")

@@ -9,6 +9,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.messages import page as p
 from rolling_panda.resources import resource
 from server.api.page_files import minified
@@ -22,7 +23,7 @@ pytestmark = pytest.mark.browser
 @pytest.mark.parametrize("size", [(1280, 800), (1024, 768), (820, 1180)])
 def test_fits_the_screen_with_the_stop_on_top(page: Page, server: PlayedServer, size: tuple[int, int]) -> None:
     page.set_viewport_size({"width": size[0], "height": size[1]})
-    server.bridge = bridge(stop_id="s1", stopped_by="Ada: stop button")
+    server.bridge = bridge(stop_id="s1", stopped_by=reasons.software_stop("Ada", reasons.said("stop button")))
     server.controller = controller("ESTOP_LATCHED")
     expect(page.locator("rp-stop-banner")).to_be_visible()
     leave, stop = box_of(page.locator("#sign-out")), box_of(page.locator("#stop"))
@@ -84,7 +85,7 @@ def a_whole_job(page: Page, server: PlayedServer) -> None:
             tell("AUTO", f"{phase.lower()} of {name}, vine 1, spur {number}", phase=phase, active_point_id=name)
         states[number - 1] = end
         tell("PAUSED", f"{name} is {end}; a person has to look at it before the work goes on")
-    server.bridge = bridge(stop_id="s1", stopped_by="Ada: stop button")
+    server.bridge = bridge(stop_id="s1", stopped_by=reasons.software_stop("Ada", reasons.said("stop button")))
     tell("ESTOP_LATCHED", "stopped by Ada: stop button")
     expect(page.locator("rp-stop-banner")).to_be_visible()
     server.bridge = bridge()
@@ -142,7 +143,7 @@ def test_the_queue_has_room_for_five_points_on_a_small_screen(page: Page, server
 
 def test_a_telephone_scrolls_one_column_and_keeps_the_stop(page: Page, server: PlayedServer) -> None:
     page.set_viewport_size({"width": 390, "height": 844})
-    server.bridge = bridge(stop_id="s1", stopped_by="Ada: stop button")
+    server.bridge = bridge(stop_id="s1", stopped_by=reasons.software_stop("Ada", reasons.said("stop button")))
     for part in ("#start", "#reset", "#teleop", "#accept-all", "rp-gauge >> nth=0", "#log-filter"):
         page.locator(part).scroll_into_view_if_needed()
         box = box_of(page.locator(part))
@@ -159,7 +160,7 @@ def test_on_small_screens_neither_banner_hides_the_view(
     page: Page, server: PlayedServer, size: tuple[int, int]
 ) -> None:
     page.set_viewport_size({"width": size[0], "height": size[1]})
-    server.bridge = bridge(stop_id="s1", stopped_by="Ada: stop button")
+    server.bridge = bridge(stop_id="s1", stopped_by=reasons.software_stop("Ada", reasons.said("stop button")))
     expect(page.locator("rp-stop-banner")).to_be_visible()
     server.online = False
     server.sockets[-1].close()
@@ -182,7 +183,7 @@ def test_on_a_telephone_the_stop_lies_over_nothing(page: Page, server: PlayedSer
 
 def test_without_a_link_nothing_is_pushed_off_a_tablet(page: Page, server: PlayedServer) -> None:
     page.set_viewport_size({"width": 820, "height": 1180})
-    server.bridge = bridge(stop_id="s1", stopped_by="Ada: stop button")
+    server.bridge = bridge(stop_id="s1", stopped_by=reasons.software_stop("Ada", reasons.said("stop button")))
     expect(page.locator("#reset")).to_be_visible()
     expect(page.locator("#invite")).to_be_visible()
     server.online = False

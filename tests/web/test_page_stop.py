@@ -25,7 +25,7 @@ def clock(page: Page, record: StopRecord) -> str:
 
 def test_who_has_latched_it_is_told_with_the_time(page: Page, server: PlayedServer) -> None:
     banner = page.locator("rp-stop-banner")
-    server.bridge = bridge(stop_id="s1", stopped_by="Ada: branch")
+    server.bridge = bridge(stop_id="s1", stopped_by=reasons.software_stop("Ada", said("branch")))
     server.stopped = (StopState(process="bridge", stops=(ADA,)),)
     expect(banner.locator('[data-by="bridge"]')).to_contain_text(f"latched at {clock(page, ADA)}")
     expect(banner.locator('[data-by="controller"]')).to_contain_text("not confirmed yet")
@@ -38,15 +38,15 @@ def test_who_has_latched_it_is_told_with_the_time(page: Page, server: PlayedServ
 
 def test_a_second_stop_does_not_hide_the_first(page: Page, server: PlayedServer) -> None:
     banner = page.locator("rp-stop-banner")
-    server.bridge = bridge(stop_id="s2", stopped_by="Bob: space bar")
+    server.bridge = bridge(stop_id="s2", stopped_by=reasons.software_stop("Bob", said("space bar")))
     server.controller = controller("ESTOP_LATCHED")
     server.stopped = tuple(StopState(process=process, stops=(BOB, ADA)) for process in ("bridge", "controller"))
-    expect(banner.locator(".who")).to_contain_text("Pressed by Bob: space bar")
+    expect(banner.locator(".who")).to_contain_text(text_of(reasons.software_stop("Bob", said("space bar"))))
     expect(banner.locator(".earlier")).to_have_text(f"Before that: Ada, {clock(page, ADA)}")
 
 
 def test_a_pressed_button_on_the_robot_comes_before_the_reset(page: Page, server: PlayedServer) -> None:
-    server.bridge = bridge(stop_id="s1", stopped_by="Ada: branch")
+    server.bridge = bridge(stop_id="s1", stopped_by=reasons.software_stop("Ada", said("branch")))
     server.controller = controller("ESTOP_LATCHED")
     server.stopped = (StopState(process="bridge", stops=(ADA,), hardware=True),)
     page.locator("#reset-reason").fill("row is clear")
@@ -65,7 +65,7 @@ def test_no_notice_lies_over_the_field_for_the_reason(page: Page, server: Played
     page.keyboard.down("h")
     until(page, lambda: server.holds()[-1:] == [True])
     server.tell(p.HoldEnded(reason=reasons.hold_stopped()))
-    server.bridge = bridge(stop_id="s1", stopped_by="Ada: stop button")
+    server.bridge = bridge(stop_id="s1", stopped_by=reasons.software_stop("Ada", said("stop button")))
     server.controller = controller("ESTOP_LATCHED", reason="stopped by Ada")
     field = box_of(page.locator("rp-stop-banner input"))
     notice = box_of(page.locator(".toast").first)

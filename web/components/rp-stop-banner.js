@@ -56,8 +56,8 @@ class RpStopBanner extends HTMLElement {
       if (!shown) return;
       // Without a link no reset is possible, and two banners leave little of the view.
       form.hidden = hint.hidden = link.get().status !== "open";
-      const told = state?.bridge?.stopped_by || (byController ? reasonText(state?.controller?.reason) : "");
-      setText(who, told ? `Pressed by ${told}` : "Pressed on this page; waiting for the robot to say so");
+      const told = state?.bridge?.stopped_by ?? (byController ? state?.controller?.reason : null);
+      setText(who, reasonText(told) || "Pressed on this page; waiting for the robot to say so");
       const newest = state?.bridge?.stop_id ?? "";
       bridge.show(byBridge, sinceWords(state, "bridge", newest));
       controller.show(byController, sinceWords(state, "controller", newest));

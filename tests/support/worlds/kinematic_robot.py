@@ -11,6 +11,7 @@ from controller.core import Controller
 from controller.ledger.journal import LedgerState, Records
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.messages.perception import Capsule, CloseUpRequest, CloseUpResult, Obstacles
 from rolling_panda.messages.supervision import Person, Presence, TeleopTarget
 from rolling_panda.model.differential_drive import NXI, Array
@@ -209,7 +210,7 @@ class KinematicRobot:
             epoch=self._fence.epoch,
             watchdog=False,
             stop_id=self.stop_id,
-            stopped_by="ada" if self.stop_id else "",
+            stopped_by=reasons.software_stop("ada", reasons.said("dog")) if self.stop_id else None,
             cutter="closing" if self._cut_id and not done else "open",
             cut_id=self._cut_id,
             outcome=self.outcome if done else "",

@@ -144,7 +144,7 @@ class Judge:
         if bridge is not None and bridge.message.stop_id:
             self.at_controller.add(bridge.message.stop_id)
         self.shown = bridge is not None and not bridge.message.stop_id
-        self.failure = "" if ledger is None else ledger.message.failure
+        self.failure = None if ledger is None else ledger.message.failure
 
     def stepped(self, world, motion):
         now, mode = world.now, world.controller.mode

@@ -19,6 +19,7 @@ from controller.core import Controller
 from controller.ledger.journal import LedgerState, Records
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.config import RobotConfig
 from rolling_panda.messages.perception import Obstacles
 from rolling_panda.messages.supervision import BaseVelocity, ControlState, Person, Presence, StopState, TeleopTarget
@@ -58,7 +59,7 @@ class RandomWorld:
         self.people = {name: Somebody() for name in PEOPLE}
         self.names, self.offsets, self.revision = ["p0", "p1", "p2"], [0.0] * 3, 1
         self.disk, self.rows, self.durable, self.kept_stops = self.judge.disk, [], 0, ()
-        self.ledger_failure, self.ledger_stuck = "", 0
+        self.ledger_failure, self.ledger_stuck = None, 0
         self.deaf = self.mute = 0
         self.orders, self.motions, self.stop_ids = [], [], []
         self.start_bridge()
@@ -203,7 +204,7 @@ class RandomWorld:
 
     def help_on(self):
         """Somebody does what brings the robot to work, so that much of the time it is at work."""
-        self.ledger_failure, self.robot.now = "", replace(self.robot.now, emergency=False)
+        self.ledger_failure, self.robot.now = None, replace(self.robot.now, emergency=False)
         mode, user = self.controller.mode, self.chance.choice(("ada", "ada", "ada", "bob"))
         steps = {
             "IDLE": intents.Arm, "READY": intents.Start, "PAUSED": intents.Resume,
@@ -328,7 +329,7 @@ class RandomWorld:
 
     def break_ledger(self):
         if self.chance.random() < 0.3:
-            self.ledger_failure = "the disk is full"
+            self.ledger_failure = reasons.ledger_failed("the disk is full")
         else:
             self.ledger_stuck = self.chance.choice((5, 30, 100))
 

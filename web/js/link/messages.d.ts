@@ -254,8 +254,8 @@ export interface BridgeState {
   watchdog: boolean;
   /** The latched software stop; empty without one. */
   stop_id: string;
-  /** User and reason of that stop. */
-  stopped_by: string;
+  /** Who stopped and why; None without a stop. */
+  stopped_by: Reason|null;
   /** State of the blades. */
   cutter: "open"|"closing"|"opening"|"jammed";
   /** The last requested cut; empty before the first. */
@@ -349,8 +349,8 @@ export interface StopState {
   process: Process;
   /** Latched stops, newest first. */
   stops: StopRecord[];
-  /** User and reason of the last release; empty before the first. */
-  released_by: string;
+  /** Who made the last reset and why; None before the first. */
+  released_by: Reason|null;
   /** Whether the hardware stop is pressed; always false from the controller. */
   hardware: boolean;
 }
