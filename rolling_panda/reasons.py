@@ -441,11 +441,6 @@ def button_pressed() -> None:
     """The emergency stop button of the robot is pressed."""
 
 
-@_reason("error", "")
-def robot_fault_reported(detail: str) -> None:
-    """{detail}."""
-
-
 @_reason("warning", "")
 def emergency_stop(cause: Reason) -> None:
     """Emergency stop: {cause}."""
@@ -2350,8 +2345,8 @@ def setpoints_arrive() -> None:
 
 
 @_reason("warning", "")
-def robot_faulty(detail: str) -> None:
-    """The robot does not move: {detail}."""
+def robot_faulty(cause: Reason) -> None:
+    """The robot does not move: {cause}."""
 
 
 @_reason("info", "")
@@ -2360,13 +2355,13 @@ def robot_ready_again() -> None:
 
 
 @_reason("info", "")
-def cut_reported(cut: str, detail: str) -> None:
-    """Cut {cut}: {detail}."""
+def cut_reported(cut: str, result: Reason) -> None:
+    """Cut {cut}: {result}."""
 
 
 @_reason("warning", "")
-def cut_not_done(cut: str, outcome: str, detail: str) -> None:
-    """Cut {cut} is {outcome}: {detail}."""
+def cut_not_done(cut: str, outcome: str, cause: Reason) -> None:
+    """Cut {cut} is {outcome}: {cause}."""
 
 
 @_reason("error", "stop the robot")
@@ -2392,3 +2387,141 @@ def emergency_button_pressed() -> None:
 @_reason("warning", "look at the newest stop first")
 def another_stop_latched(latched: str, asked: str) -> None:
     """The latched stop is {latched}, not {asked}."""
+
+
+# Bridge: devices
+
+
+@_reason("error", "")
+def device_fault(device: str, detail: str) -> None:
+    """The {device} reports: {detail}."""
+
+
+@_reason("error", "")
+def both_faults(first: Reason, second: Reason) -> None:
+    """{first}; {second}."""
+
+
+@_reason("warning", "start it without that to move the robot")
+def bridge_reads_only() -> None:
+    """The bridge was started with --readonly."""
+
+
+@_reason("error", "see whether the base is on and its nodes run")
+def base_silent(topic: str) -> None:
+    """The base sends no wheel speeds on {topic}."""
+
+
+@_reason("error", "see whether the base is on and its nodes run")
+def base_unmonitored(topic: str) -> None:
+    """The base sends no emergency-stop state on {topic}."""
+
+
+@_reason("error", "")
+def base_stopped(causes: str) -> None:
+    """Emergency stop of the base: {causes}."""
+
+
+@_reason("error", "confirm it at the base")
+def base_stop_unconfirmed() -> None:
+    """The emergency stop of the base is being confirmed."""
+
+
+@_reason("error", "")
+def base_runaway() -> None:
+    """The wheels turn though zero is commanded; the relay board was told to stop the motors."""
+
+
+@_reason("error", "")
+def arm_connecting() -> None:
+    """The arm is not connected yet."""
+
+
+@_reason("error", "")
+def arm_process_ended() -> None:
+    """The process of the arm has ended."""
+
+
+@_reason("error", "")
+def arm_silent() -> None:
+    """The control box of the arm sends no state."""
+
+
+@_reason("error", "")
+def arm_reflex(errors: str) -> None:
+    """The arm has stopped by a reflex: {errors}."""
+
+
+@_reason("error", "release it")
+def arm_user_stopped() -> None:
+    """The user stop of the arm is pressed."""
+
+
+@_reason("error", "")
+def arm_not_ready(mode: str) -> None:
+    """The arm is not ready to move: it is in {mode}."""
+
+
+@_reason("error", "")
+def arm_not_recovered(detail: str) -> None:
+    """The arm cannot recover: {detail}."""
+
+
+@_reason("info", "")
+def no_cut_yet() -> None:
+    """Nothing has been cut yet."""
+
+
+@_reason("info", "")
+def blades_met() -> None:
+    """The blades met."""
+
+
+@_reason("warning", "")
+def inhibited_before_closing() -> None:
+    """The cutter was inhibited before the blades began to close."""
+
+
+@_reason("warning", "")
+def inhibited_while_closing() -> None:
+    """The cutter was inhibited while the blades closed."""
+
+
+@_reason("warning", "")
+def cutter_silent(limit_s: float) -> None:
+    """The cutter did not answer within {limit_s:g} s."""
+
+
+@_reason("warning", "")
+def cutter_jam_reported(detail: str) -> None:
+    """The blades have jammed: {detail}."""
+
+
+@_reason("warning", "")
+def blades_not_closed() -> None:
+    """The blades have jammed before their end position."""
+
+
+@_reason("warning", "set [real.cutter] service")
+def no_cutter() -> None:
+    """No cutter is configured."""
+
+
+@_reason("info", "")
+def wood_severed(wood: str) -> None:
+    """Severed: {wood}."""
+
+
+@_reason("warning", "")
+def nothing_between_blades() -> None:
+    """Nothing was between the blades."""
+
+
+@_reason("warning", "")
+def blades_on_hard_part(kind: str) -> None:
+    """The blades have jammed on a {kind}."""
+
+
+@_reason("warning", "")
+def wood_beyond_blades(kind: str, diameter_mm: float) -> None:
+    """The blades have jammed: the {kind} is {diameter_mm:.0f} mm thick."""

@@ -23,6 +23,7 @@ from bridge.core.picture import Picture
 from bridge.core.state_memory import open_memory
 from bridge.loop import bridge_runner
 from controller.config import ControllerConfig
+from rolling_panda import reasons
 from rolling_panda.config import load_section
 from rolling_panda.messages.types import Outcome
 from rolling_panda.model.robot import RobotModel
@@ -53,7 +54,12 @@ class BladesApart:
     def read(self) -> Measurement:
         """The newest measurement."""
         return Measurement(
-            np.array(self._position), self._velocity.copy(), self._cutter, self._cut_id, self._outcome, "by the plant"
+            np.array(self._position),
+            self._velocity.copy(),
+            self._cutter,
+            self._cut_id,
+            self._outcome,
+            reasons.blades_met(),
         )
 
     def write(self, setpoint: Setpoint) -> None:

@@ -32,7 +32,6 @@ from rolling_panda.messages.supervision import StopState
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import Limits
 from rolling_panda.model.wire_values import actuated
-from rolling_panda.reasons import text_of
 from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.topics import BRIDGE, CLOSE_UP_REQUEST, CUT, MOTION, ODOMETRY, TOKEN
 from rolling_panda.transport.rejections import Rejections
@@ -287,8 +286,7 @@ class BridgeCore:
     def _watch_robot(self, now: float) -> None:
         measured = self._measured
         # A bridge that cannot store stops and tokens could move the robot after a restart.
-        unwritable = self._memory.failure
-        fault = measured.fault or ("" if unwritable is None else text_of(unwritable))
+        fault = measured.fault or self._memory.failure
         change = self._faults.follow(fault, measured.severe, bool(self._latch.stop_id), now)
         if change is not None:
             self._halt()

@@ -4,17 +4,21 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from bridge.core.picture import Picture
-from rolling_panda.messages.types import Outcome
+from rolling_panda import reasons
+from rolling_panda.messages.types import Outcome, Reason
 from rolling_panda.model.differential_drive import Array
 
 CutterState = Literal["open", "closing", "opening", "jammed"]
+
+NO_CUT = reasons.no_cut_yet()
 
 
 @dataclass(frozen=True)
 class Measurement:
     """Measured state of the robot: ξ and its rates over [θ_l, θ_r, q₁…q₇] (rad, rad/s), and the cutter.
 
-    `fault` is the reason why the robot cannot move, empty without one. A person has to release a `severe` fault.
+    `detail` explains `outcome`; it is `NO_CUT` before the first cut. `fault` is the reason why the robot cannot move,
+    None without one. A person has to release a `severe` fault.
     `emergency` tells whether the emergency stop button is pressed. `battery` is the charge (0…1), None if unknown.
     """
 
@@ -23,8 +27,8 @@ class Measurement:
     cutter: CutterState
     cut_id: str
     outcome: Outcome
-    detail: str
-    fault: str = ""
+    detail: Reason
+    fault: Reason | None = None
     severe: bool = False
     emergency: bool = False
     battery: float | None = None

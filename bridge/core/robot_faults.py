@@ -31,32 +31,30 @@ class RobotFaults:
     def __init__(self, draw: Callable[[], str] = draw_id) -> None:
         """Start without a fault; `draw` draws the random part of a stop's id."""
         self._draw = draw
-        self.current = ""
+        self.current: Reason | None = None
         self.releases = 0
         self._recovering_until = float("-inf")
 
-    def follow(self, fault: str, severe: bool, stopped: bool, now: float) -> FaultChange | None:
+    def follow(self, fault: Reason | None, severe: bool, stopped: bool, now: float) -> FaultChange | None:
         """Change of the fault by the newest measurement; None without one.
 
         Args:
-            fault: Why the robot does not move; empty when it does.
+            fault: Why the robot does not move; None when it does.
             severe: Whether a person has to release it.
             stopped: Whether a stop is latched already.
             now: Present time.
         """
         new = fault != self.current
         # A fault that persists after its release latches a new stop.
-        again = bool(fault) and severe and not stopped and now >= self._recovering_until
+        again = fault is not None and severe and not stopped and now >= self._recovering_until
         if not new and not again:
             return None
         self.current = fault
-        if not fault:
+        if fault is None:
             return FaultChange(reasons.robot_ready_again(), None)
         stop = None
         if severe and not stopped and now >= self._recovering_until:
-            stop = StopRequest(
-                stop_id=f"robot-{self._draw()}", source="robot", user="", reason=reasons.robot_fault_reported(fault)
-            )
+            stop = StopRequest(stop_id=f"robot-{self._draw()}", source="robot", user="", reason=fault)
         return FaultChange(reasons.robot_faulty(fault), stop)
 
     def released(self, now: float) -> None:

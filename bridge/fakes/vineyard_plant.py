@@ -12,6 +12,7 @@ from bridge.core.picture import Picture
 from bridge.fakes.bodies import TICK_S
 from bridge.sim.robot.robot import SimulatedRobot
 from rolling_panda.model.differential_drive import Array
+from rolling_panda.reasons import text_of
 
 _PICTURE_TICKS = 10
 # For a slow machine: the blades take a third of a second of simulated time.
@@ -100,7 +101,7 @@ class VineyardPlant:
             time.sleep(TICK_S)
         # Real blades report closure, not whether anything was cut.
         if now.cutter == "jammed" or not self._blades:
-            return now.detail
+            return text_of(now.detail)
         self.closures += 1
         return ""
 

@@ -4,11 +4,15 @@ from dataclasses import dataclass
 from multiprocessing.context import SpawnContext
 from typing import Any
 
+import msgspec
 import numpy as np
 
+from rolling_panda import reasons
+from rolling_panda.messages.types import Reason
 from rolling_panda.model.differential_drive import Array
 
-_TEXT = 400
+# Room for a reason with one text of 500 characters, each of which JSON may write as six bytes.
+_ROOM = 3200
 _TRIES = 100
 
 
@@ -39,7 +43,7 @@ class ArmState:
         at: Time of the write (s, monotonic).
         position: Joint angles (7, rad).
         velocity: Their velocities (7, rad/s).
-        fault: Reason why the arm does not follow; empty without a fault.
+        fault: Reason why the arm does not follow; None without a fault.
         severe: Whether a person has to release the fault.
         success_rate: Fraction of the last 100 commands that arrived in time.
         commands: Number of commands since the start.
@@ -48,7 +52,7 @@ class ArmState:
     at: float
     position: Array
     velocity: Array
-    fault: str
+    fault: Reason | None
     severe: bool
     success_rate: float
     commands: int
@@ -56,11 +60,11 @@ class ArmState:
 
 @dataclass(frozen=True)
 class Note:
-    """One write: how many there have been, the numbers, the text."""
+    """One write: how many there have been, the numbers, the words."""
 
     number: int
     values: Array
-    text: str
+    words: bytes
 
 
 class SharedNote:
@@ -70,14 +74,14 @@ class SharedNote:
         """Room for `size` numbers, all zero."""
         # Two counters precede the numbers: writes begun and writes ended. They differ during a write.
         self._numbers: Any = context.RawArray("d", size + 2)
-        self._text: Any = context.RawArray("c", _TEXT)
+        self._words: Any = context.RawArray("c", _ROOM)
 
-    def write(self, values: Array, text: str = "") -> None:
-        """Replace the content; one writer only."""
+    def write(self, values: Array, words: bytes = b"") -> None:
+        """Replace the content; one writer only. The words contain no zero byte."""
         numbers = np.frombuffer(self._numbers)
         numbers[0] += 1
         numbers[2:] = values
-        self._text.raw = text.encode()[:_TEXT].decode(errors="ignore").encode().ljust(_TEXT, b"\0")
+        self._words.raw = words[:_ROOM].ljust(_ROOM, b"\0")
         numbers[1] = numbers[0]
 
     def read(self) -> Note:
@@ -85,11 +89,11 @@ class SharedNote:
         numbers = np.frombuffer(self._numbers)
         for _ in range(_TRIES):
             ended = numbers[1]
-            values, text = numbers[2:].copy(), self._text.raw
+            values, words = numbers[2:].copy(), self._words.raw
             if numbers[0] == ended:
                 break
         # A writer that died during a write leaves an inconsistent note, which its age reveals.
-        return Note(int(ended), values, text.rstrip(b"\0").decode(errors="replace"))
+        return Note(int(ended), values, words.rstrip(b"\0"))
 
 
 class ArmLink:
@@ -113,10 +117,21 @@ class ArmLink:
     def tell(self, state: ArmState) -> None:
         """The arm's side: replace the state."""
         numbers = [state.severe, state.success_rate, state.commands]
-        self._up.write(np.concatenate([[state.at], state.position, state.velocity, numbers]), state.fault)
+        fault = b"" if state.fault is None else msgspec.json.encode(state.fault)
+        self._up.write(np.concatenate([[state.at], state.position, state.velocity, numbers]), fault)
 
     def state(self) -> ArmState:
         """The bridge's side: the newest state; `at` is 0 before the first."""
         note = self._up.read()
         v = note.values
-        return ArmState(float(v[0]), v[1:8], v[8:15], note.text, bool(v[15]), float(v[16]), int(v[17]))
+        return ArmState(float(v[0]), v[1:8], v[8:15], _fault(note.words), bool(v[15]), float(v[16]), int(v[17]))
+
+
+def _fault(words: bytes) -> Reason | None:
+    if not words:
+        return None
+    try:
+        return msgspec.json.decode(words, type=Reason)
+    except ValueError:
+        # Of a writer that died while it wrote.
+        return reasons.arm_process_ended()

@@ -19,11 +19,13 @@ from bridge.real.mp500 import Mp500
 from bridge.real.panda import Panda
 from bridge.real.realsense import RealSense, open_realsense
 from bridge.real.robot import RealRobot
+from rolling_panda import reasons
 from rolling_panda.bounds import wider
 from rolling_panda.config import RobotConfig, TransportConfig, load_section
 from rolling_panda.errors import InputError
 from rolling_panda.messages.types import BridgeKind
 from rolling_panda.model.robot import RobotModel
+from rolling_panda.reasons import text_of
 from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.transport.rejections import Rejections
 from rolling_panda.transport.zenoh import ForeignWire
@@ -49,7 +51,7 @@ class NoCutter:
 
     def cut(self, cut_id: str) -> None:
         """Fail."""
-        self._status = CutterStatus("open", cut_id, "FAILED_NOT_CUT", "no cutter is configured: [real.cutter] service")
+        self._status = CutterStatus("open", cut_id, "FAILED_NOT_CUT", reasons.no_cutter())
 
     def close(self) -> None:
         """Nothing to let go of."""
@@ -170,8 +172,9 @@ def wait_for_states(devices: Devices, limit_s: float = _FIRST_STATE_S) -> None:
     end = time.monotonic() + limit_s
     while not (devices.base.told and devices.arm.told):
         if time.monotonic() > end:
-            silent = devices.arm.read().fault if devices.base.told else devices.base.read().fault
-            raise InputError(f"no state within {limit_s:.0f} s: {silent}. See: rolling-panda bridge real --check")
+            fault = devices.arm.read().fault if devices.base.told else devices.base.read().fault
+            why = "" if fault is None else f": {text_of(fault)}"
+            raise InputError(f"no state within {limit_s:.0f} s{why}. See: rolling-panda bridge real --check")
         time.sleep(0.02)
 
 

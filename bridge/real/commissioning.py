@@ -12,7 +12,9 @@ from bridge.real.build import Devices, NoCutter, open_devices, wait_for_states
 from bridge.real.config import RealConfig
 from rolling_panda.config import RobotConfig, TransportConfig, load_section
 from rolling_panda.errors import InputError
+from rolling_panda.messages.types import Reason
 from rolling_panda.model.robot import ARM_Q, Limits, RobotModel
+from rolling_panda.reasons import text_of
 
 _WATCH_S = 2.0
 # Long enough for the arm's process to start and connect.
@@ -94,7 +96,7 @@ def _base(base: mp500.Mp500, rates: dict[str, float]) -> list[Finding]:
         Finding("base: wheel speeds", f"{wheels:.0f} a second", f"{_LEAST_WHEELS_HZ:.0f}", wheels >= _LEAST_WHEELS_HZ),
         Finding("base: at rest", f"{speed:.3f} rad/s", f"under {_AT_REST}", wheels > 0.0 and speed < _AT_REST),
         Finding("base: emergency-stop state", f"{monitored:.0f} a second", "1 or more", monitored >= 1.0),
-        Finding("base: free to move", state.fault or "yes", "no stop pressed", not state.fault),
+        Finding("base: free to move", _told(state.fault), "no stop pressed", state.fault is None),
         Finding("base: own odometry", f"{odometry:.0f} a second", "1 or more", odometry >= 1.0),
         Finding("base: battery", charge, f"{100 * _LEAST_BATTERY:.0f} % or more", state.battery >= _LEAST_BATTERY),
         Finding("base: unreadable messages", str(base.rejected), "0", base.rejected == 0),
@@ -107,7 +109,7 @@ def _arm(devices: Devices, config: RealConfig, limits: Limits) -> list[Finding]:
     margin = float(np.minimum(q - limits.lower[ARM_Q], limits.upper[ARM_Q] - q).min())
     speed = float(np.abs(arm.velocity).max())
     return [
-        Finding("arm: ready to move", arm.fault or "yes", f"{config.arm.address} answers", told and not arm.fault),
+        Finding("arm: ready to move", _told(arm.fault), f"{config.arm.address} answers", told and arm.fault is None),
         Finding(
             "arm: distance to a joint's limit",
             f"{margin:.2f} rad" if told else "unknown",
@@ -128,6 +130,10 @@ def _hand(devices: Devices, config: RealConfig, frames: int, lasted: float) -> l
         return [*findings, Finding("cutter", "none", '[real.cutter] service = "…"', False)]
     # Any request would move the blades.
     return [*findings, Finding("cutter", f"{config.cutter.service}, not asked", "try it with the blades guarded", True)]
+
+
+def _told(fault: Reason | None) -> str:
+    return "yes" if fault is None else text_of(fault)
 
 
 def _kernel(config: RealConfig) -> Finding:

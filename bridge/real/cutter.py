@@ -9,11 +9,12 @@ import threading
 import time
 from dataclasses import dataclass
 
-from bridge.core.interface import CutterState
+from bridge.core.interface import NO_CUT, CutterState
 from bridge.real import ros_messages as ros
 from bridge.real.config import CutterConfig
+from rolling_panda import reasons
 from rolling_panda.errors import MessageError, ServiceError
-from rolling_panda.messages.types import Outcome
+from rolling_panda.messages.types import Outcome, Reason
 from rolling_panda.transport.zenoh import ForeignWire
 
 
@@ -24,7 +25,7 @@ class CutterStatus:
     state: CutterState
     cut_id: str = ""
     outcome: Outcome = ""
-    detail: str = ""
+    detail: Reason = NO_CUT
 
 
 class Cutter:
@@ -33,6 +34,7 @@ class Cutter:
     def __init__(self, wire: ForeignWire, config: CutterConfig, moving: bool = True) -> None:
         """Open the blades, whatever they were at, unless `moving` is off."""
         self._wire, self._config = wire, config
+        self._silent = reasons.cutter_silent(config.timeout_s)
         self._status = CutterStatus("opening" if moving else "open")
         self._enabled = False
         self._interrupted = threading.Event()
@@ -72,19 +74,19 @@ class Cutter:
             self._open("")
         while (cut_id := self._orders.get()) is not None:
             if not self._enabled or self._interrupted.is_set():
-                self._end(cut_id, "FAILED_NOT_CUT", "the cutter was inhibited before the blades began to close")
+                self._end(cut_id, "FAILED_NOT_CUT", reasons.inhibited_before_closing())
                 continue
-            said = self._call_service(True)
+            failure = self._call_service(True)
             if self._interrupted.is_set():
-                self._end(cut_id, "UNKNOWN", "the cutter was inhibited while the blades closed")
-            elif said is None:
-                self._end(cut_id, "UNKNOWN", f"the cutter did not answer within {self._config.timeout_s} s")
-            elif said == "":
-                self._end(cut_id, "DONE", "the blades met")
+                self._end(cut_id, "UNKNOWN", reasons.inhibited_while_closing())
+            elif failure is None:
+                self._end(cut_id, "DONE", reasons.blades_met())
+            elif failure == self._silent:
+                self._end(cut_id, "UNKNOWN", failure)
             else:
-                self._end(cut_id, "FAILED_NOT_CUT", f"jam: {said}", "jammed")
+                self._end(cut_id, "FAILED_NOT_CUT", failure, "jammed")
 
-    def _end(self, cut_id: str, outcome: Outcome, detail: str, state: CutterState = "opening") -> None:
+    def _end(self, cut_id: str, outcome: Outcome, detail: Reason, state: CutterState = "opening") -> None:
         self._status = CutterStatus(state, cut_id, outcome, detail)
         self._open(cut_id)
 
@@ -92,18 +94,20 @@ class Cutter:
         """Open the blades, however often it takes."""
         while not self._closing.is_set():
             last = self._status
-            if self._call_service(False) == "":
+            if self._call_service(False) is None:
                 self._status = CutterStatus("open", last.cut_id, last.outcome, last.detail)
                 return
             self._status = CutterStatus("jammed", last.cut_id, last.outcome, last.detail)
             time.sleep(self._config.retry_s)
 
-    def _call_service(self, shut: bool) -> str | None:
-        """Close or open. Returns the reason of a failure, empty on success, None without an answer in time."""
+    def _call_service(self, shut: bool) -> Reason | None:
+        """Close or open. Returns the reason of a failure, None on success."""
         config = self._config
         try:
             data = self._wire.ask(config.service, ros.encode(ros.make(ros.SET_BOOL, data=shut)), config.timeout_s)
             reply = ros.decode(ros.SET_BOOL_REPLY, data)
         except (ServiceError, MessageError):
+            return self._silent
+        if reply.success:
             return None
-        return "" if reply.success else (str(reply.message) or "the blades did not reach their end position")
+        return reasons.cutter_jam_reported(str(reply.message)) if reply.message else reasons.blades_not_closed()

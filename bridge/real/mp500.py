@@ -19,7 +19,9 @@ import numpy as np
 from bridge.core.watchdog import Watchdog
 from bridge.real import ros_messages as ros
 from bridge.real.config import BaseConfig
+from rolling_panda import reasons
 from rolling_panda.errors import MessageError, ServiceError
+from rolling_panda.messages.types import Reason
 from rolling_panda.model.differential_drive import Array, DifferentialDrive
 from rolling_panda.transport.zenoh import ForeignWire
 
@@ -34,6 +36,7 @@ _LONGEST_GAP = 0.25
 _SERVICE_S = 1.0
 # A service without arguments: CDR header, and one byte since a structure has at least one.
 _EMPTY_REQUEST = b"\x00\x01\x00\x00\x00"
+_RUNAWAY = reasons.base_runaway()
 
 
 @dataclass(frozen=True)
@@ -43,7 +46,7 @@ class BaseState:
     Attributes:
         position: Angles of the wheels since the start, left and right (2, rad).
         velocity: Their speeds (2, rad/s).
-        fault: Reason why the base may not move; empty without a fault.
+        fault: Reason why the base may not move; None without a fault.
         severe: Whether a person has to release the fault.
         battery: Charge 0…1; NaN if unknown.
         emergency: Whether an emergency stop, by button or scanner, is active or not yet confirmed.
@@ -51,7 +54,7 @@ class BaseState:
 
     position: Array
     velocity: Array
-    fault: str
+    fault: Reason | None
     severe: bool
     battery: float
     emergency: bool
@@ -80,15 +83,18 @@ class Mp500:
         self._target = self._sent = np.zeros(2)
         self._position = self._velocity = np.zeros(2)
         self._stamp = self._wheels_at = self._emergency_at = float("-inf")
-        self._emergency, self._cause, self._pressed = FREE, "", False
+        self._emergency, self._pressed = FREE, False
+        self._cause: Reason | None = None
         self._rest_since: float | None = None
-        self._runaway = ""
+        self._runaway = False
         self._battery = float("nan")
         #: Number of messages by topic, and of unreadable ones.
         self.heard: Counter[str] = Counter()
         self.rejected = 0
         prefix = f"{config.namespace}/" if config.namespace else ""
         self._prefix = prefix
+        self._silent = reasons.base_silent(prefix + WHEELS)
+        self._unmonitored = reasons.base_unmonitored(prefix + EMERGENCY)
         wire.subscribe(prefix + WHEELS, self._on_wheels)
         wire.subscribe(prefix + EMERGENCY, self._on_emergency)
         wire.subscribe(prefix + BATTERY, self._on_battery)
@@ -121,7 +127,7 @@ class Mp500:
     def release(self) -> None:
         """Release the relay board's soft stop, on behalf of a person; returns at once."""
         with self._lock:
-            self._runaway = ""
+            self._runaway = False
             self._rest_since = None
         self._call(SOFT_RELEASE)
 
@@ -173,21 +179,21 @@ class Mp500:
         # With the motors off the base may be pushed by hand.
         if self._emergency != FREE or float(np.abs(self._velocity).max()) <= _REST:
             return False
-        self._runaway = "the wheels turn though zero is commanded; the relay board was told to stop the motors"
+        self._runaway = True
         return True
 
-    def _fault(self, now: float) -> tuple[str, bool]:
-        """Why the base may not move, and whether a person has to release it; empty and False when it may."""
+    def _fault(self, now: float) -> tuple[Reason | None, bool]:
+        """Why the base may not move, and whether a person has to release it; None and False when it may."""
         config = self._config
         if self._runaway:
-            return self._runaway, True
+            return _RUNAWAY, True
         if self._emergency != FREE:
             return self._cause, True
         if now - self._wheels_at > config.stale_s:
-            return f"base: no wheel speeds on {self._prefix}{WHEELS}", False
+            return self._silent, False
         if now - self._emergency_at > config.unmonitored_s:
-            return f"base: no emergency-stop state on {self._prefix}{EMERGENCY}", False
-        return "", False
+            return self._unmonitored, False
+        return None, False
 
     def _on_wheels(self, data: bytes, at: float) -> None:
         self.heard[WHEELS] += 1
@@ -223,10 +229,11 @@ class Mp500:
         }
         names = ", ".join(name for name, active in causes.items() if active)
         stopped = message.software_stop or message.emergency_state != FREE
+        cause = reasons.base_stopped(names) if names else reasons.base_stop_unconfirmed()
         with self._lock:
             self._emergency = int(message.emergency_state) or int(message.software_stop)
             self._emergency_at, self._pressed = at, message.emergency_state != FREE
-            self._cause = f"base: emergency stop ({names or 'being confirmed'})" if stopped else ""
+            self._cause = cause if stopped else None
 
     def _on_battery(self, data: bytes, at: float) -> None:
         self.heard[BATTERY] += 1

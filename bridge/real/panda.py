@@ -10,6 +10,7 @@ import numpy as np
 
 from bridge.real.arm_link import ArmLink, ArmState
 from bridge.real.config import ArmConfig
+from rolling_panda import reasons
 from rolling_panda.errors import InputError
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import Limits
@@ -17,6 +18,7 @@ from rolling_panda.model.robot import Limits
 # Age limit of a state (s): the control box sends 1,000 a second, and stops an arm that lost 20.
 _STALE_S = 0.08
 _CLOSE_S = 2.0
+_ENDED, _SILENT = reasons.arm_process_ended(), reasons.arm_silent()
 
 
 class Panda:
@@ -43,9 +45,9 @@ class Panda:
         """The newest state."""
         state = self._link.state()
         if not self._process.is_alive():
-            return replace(state, fault="arm: its process has ended", severe=True)
-        if time.monotonic() - state.at > _STALE_S and not state.fault:
-            return replace(state, fault="arm: no state from its control box", severe=False)
+            return replace(state, fault=_ENDED, severe=True)
+        if time.monotonic() - state.at > _STALE_S and state.fault is None:
+            return replace(state, fault=_SILENT, severe=False)
         return state
 
     def write(self, velocity: Array) -> None:

@@ -15,6 +15,8 @@ from panda_py import libfranka
 from bridge.real.arm_follower import ArmFollower
 from bridge.real.arm_link import ArmLink, ArmState
 from bridge.real.config import ArmConfig
+from rolling_panda import reasons
+from rolling_panda.messages.types import Reason
 from rolling_panda.model.robot import Limits
 from rolling_panda.runtime.scheduling import set_priority
 
@@ -46,7 +48,7 @@ def run(config: ArmConfig, limits: Limits, link: ArmLink, moving: bool, parent: 
             session.serve()
         except RuntimeError as error:
             # Base class of all errors of libfranka.
-            session.say(f"arm: {_words(error)}")
+            session.say(reasons.device_fault("arm", _words(error)))
             time.sleep(_RETRY_S)
 
 
@@ -58,7 +60,8 @@ class _Session:
         self._success_rate, self._commands = 0.0, 0
         self._seen = 0
         self._releases = link.target().releases
-        self._fault, self._severe = "arm: not connected yet", False
+        self._fault: Reason | None = reasons.arm_connecting()
+        self._severe = False
 
     def ended(self) -> bool:
         """Whether the bridge is closing or gone."""
@@ -66,8 +69,8 @@ class _Session:
         silent = time.monotonic() - target.at > _ORPHAN_S
         return target.closing or (silent and os.getppid() != self._parent)
 
-    def say(self, fault: str, severe: bool = False) -> None:
-        """Report the reason why the arm does not follow to the bridge."""
+    def say(self, fault: Reason | None, severe: bool = False) -> None:
+        """Report to the bridge why the arm does not follow; None if it does."""
         self._fault, self._severe = fault, severe
         self._send_state()
 
@@ -90,7 +93,7 @@ class _Session:
             if self._severe and self._link.target().releases != self._releases:
                 self._releases = self._link.target().releases
                 self._recover(robot)
-            elif self._fault or not self._moving:
+            elif self._fault is not None or not self._moving:
                 robot.read(self._watch)
             else:
                 self._follow(robot)
@@ -98,13 +101,14 @@ class _Session:
     def _check(self, state: Any) -> None:
         """Check whether the arm can be commanded. A fault that needs a release stays until the release."""
         if state.robot_mode == _MODE.kReflex:
-            reasons = str(state.last_motion_errors) + str(state.current_errors)
-            self._fault, self._severe = self._fault if self._severe else f"arm: reflex {reasons}", True
+            if not self._severe:
+                self._fault = reasons.arm_reflex(str(state.last_motion_errors) + str(state.current_errors))
+            self._severe = True
         elif state.robot_mode == _MODE.kUserStopped:
-            self._fault, self._severe = "arm: its user stop is pressed", True
+            self._fault, self._severe = reasons.arm_user_stopped(), True
         elif not self._severe:
             idle = state.robot_mode in (_MODE.kIdle, _MODE.kMove)
-            self._fault = "" if idle else f"arm: it is in {state.robot_mode}, not ready to move"
+            self._fault = None if idle else reasons.arm_not_ready(str(state.robot_mode))
 
     def _recover(self, robot: Any) -> None:
         """A person has said that the arm may go on."""
@@ -113,9 +117,9 @@ class _Session:
         try:
             robot.automatic_error_recovery()
         except RuntimeError as error:
-            self.say(f"arm: cannot recover: {_words(error)}", severe=True)
+            self.say(reasons.arm_not_recovered(_words(error)), severe=True)
         else:
-            self.say("")
+            self.say(None)
 
     def _follow(self, robot: Any) -> None:
         # libfranka's own limits are off: its velocities end 0.01 to 0.06 rad/s below the data sheet's, and where lost
@@ -125,7 +129,7 @@ class _Session:
                 self._command, libfranka.ControllerMode.kJointImpedance, limit_rate=False, cutoff_frequency=_NO_FILTER
             )
         except RuntimeError as error:
-            self.say(f"arm: {_words(error)}", severe=True)
+            self.say(reasons.device_fault("arm", _words(error)), severe=True)
 
     def _command(self, state: Any, duration: Any) -> Any:
         """Libfranka's callback, each millisecond."""
@@ -151,7 +155,7 @@ class _Session:
         if (severe, fault) != (self._severe, self._fault):
             self._send_state()
         released = self._link.target().releases != self._releases
-        return not (self.ended() or (released and self._severe) or (self._moving and not self._fault))
+        return not (self.ended() or (released and self._severe) or (self._moving and self._fault is None))
 
     def _note(self, state: Any) -> None:
         self._position, self._velocity = np.array(state.q), np.array(state.dq)

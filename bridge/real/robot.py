@@ -1,5 +1,6 @@
 """The real robot behind the bridge's interface: base, arm, cutter and camera."""
 
+from functools import reduce
 from typing import Protocol
 
 import numpy as np
@@ -9,9 +10,10 @@ from bridge.core.picture import Picture
 from bridge.real.arm_link import ArmState
 from bridge.real.cutter import CutterStatus
 from bridge.real.mp500 import BaseState
+from rolling_panda import reasons
 from rolling_panda.model.differential_drive import Array
 
-READ_ONLY = "the bridge was started with --readonly"
+READ_ONLY = reasons.bridge_reads_only()
 
 
 class Base(Protocol):
@@ -91,6 +93,7 @@ class RealRobot:
     def read(self) -> Measurement:
         """The newest of every device; a fault of one is a fault of the robot."""
         base, arm, blades = self._base.read(), self._arm.read(), self._blades.read()
+        faults = [fault for fault in (None if self._moving else READ_ONLY, base.fault, arm.fault) if fault is not None]
         return Measurement(
             np.concatenate([base.position, arm.position]),
             np.concatenate([base.velocity, arm.velocity]),
@@ -98,7 +101,7 @@ class RealRobot:
             blades.cut_id,
             blades.outcome,
             blades.detail,
-            fault="; ".join(filter(None, ["" if self._moving else READ_ONLY, base.fault, arm.fault])),
+            fault=reduce(reasons.both_faults, faults) if faults else None,
             severe=base.severe or arm.severe,
             emergency=base.emergency,
             battery=base.battery if 0.0 <= base.battery <= 1.0 else None,

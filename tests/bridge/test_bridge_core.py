@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from bridge.config import BridgeConfig, OdometryConfig
 from bridge.core.bridge import TICK_S, BridgeCore
 from bridge.core.cut_memory import ForLife
-from bridge.core.interface import Measurement, Setpoint
+from bridge.core.interface import NO_CUT, Measurement, Setpoint
 from bridge.core.odometer import Odometer
 from bridge.core.picture import Picture
 from bridge.core.state_memory import Remembered
@@ -31,7 +31,7 @@ class IdealRobot:
     """Does at once what it is told, and remembers it."""
 
     def __init__(self) -> None:
-        self.now = Measurement(np.concatenate([np.zeros(2), MIDDLE]), np.zeros(9), "open", "", "", "")
+        self.now = Measurement(np.concatenate([np.zeros(2), MIDDLE]), np.zeros(9), "open", "", "", NO_CUT)
         self.sent: list[Setpoint] = []
         self.cuts: list[str] = []
         self.points: list[str] = []
@@ -50,7 +50,7 @@ class IdealRobot:
         self.now = replace(self.now, cutter="closing", cut_id=cut_id, outcome="")
 
     def end_cut(self, outcome: m.Outcome) -> None:
-        self.now = replace(self.now, cutter="open", outcome=outcome, detail="said the robot")
+        self.now = replace(self.now, cutter="open", outcome=outcome, detail=said("by the robot"))
 
     def capture(self, expose: bool) -> Picture | None:
         return PICTURE if expose else None
@@ -225,7 +225,7 @@ def test_a_bridge_that_cannot_remember_holds_the_robot_and_says_why(bench: Bench
     disk.failure, disk.kept = UNWRITABLE, False  # type: ignore[misc]
     bench.run(1.0, FORWARD)
     assert bench.moved_within(0.3) == 0.0 and bench.state.watchdog
-    assert text_of(reasons.robot_faulty(text_of(UNWRITABLE))) in bench.log
+    assert text_of(reasons.robot_faulty(UNWRITABLE)) in bench.log
     bench.core.on_stop(stop(), bench.now)
     bench.run(0.1, FORWARD)
     assert any(out.stops and out.stops.stops for out in bench.outputs), "who stops is not kept waiting for ever"

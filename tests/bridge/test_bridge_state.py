@@ -18,12 +18,14 @@ from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.model.differential_drive import Array
-from rolling_panda.reasons import button_pressed, robot_fault_reported, said, severity_of, text_of
+from rolling_panda.reasons import button_pressed, said, severity_of, text_of
 from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.topics import CUT, MOTION, ODOMETRY, TOKEN, Topic
 from tests.bridge.test_bridge_core import FORWARD, Bench, IdealRobot, cut, odometer, release, stop
 from tests.support.bridge_rig import MODEL, PICTURE, REST
 from tests.support.fake_wire import as_received
+
+SILENT, REFLEX = reasons.base_silent("drives/joint_states"), reasons.arm_reflex("joint_reflex")
 
 
 @pytest.fixture
@@ -227,7 +229,7 @@ def test_an_end_of_a_cut_is_told_at_once_and_a_bad_one_is_a_warning(bench: Bench
     bench.robot.end_cut("FAILED_NOT_CUT")
     tick(bench)
     told = [line for out in bench.outputs for line in lines(out) if "c1" in line[1]]
-    assert told == [("warning", text_of(reasons.cut_not_done("c1", "FAILED_NOT_CUT", "said the robot")))]
+    assert told == [("warning", text_of(reasons.cut_not_done("c1", "FAILED_NOT_CUT", said("by the robot"))))]
     assert (bench.state.cut_id, bench.state.outcome) == ("c1", "FAILED_NOT_CUT")
 
 
@@ -272,10 +274,10 @@ def test_scenery_has_the_time_at_which_it_was_told() -> None:
 
 def test_a_robot_that_cannot_move_cuts_nothing_and_the_order_is_used_up(bench: Bench) -> None:
     bench.run(0.1, REST)
-    bench.robot.now = replace(bench.robot.now, fault="arm: reflex")
+    bench.robot.now = replace(bench.robot.now, fault=REFLEX)
     bench.run(0.02, REST)
     bench.core.on_cut(cut(bench, "c1"), bench.now)
-    assert refused_cuts(bench) == {reasons.robot_faulty("arm: reflex"): 1}
+    assert refused_cuts(bench) == {reasons.robot_faulty(REFLEX): 1}
     assert tick(bench).state is not None
     assert (bench.state.cut_id, bench.state.outcome, bench.robot.cuts) == ("c1", "FAILED_NOT_CUT", [])
     assert not bench.robot.sent[-1].blades
@@ -322,33 +324,29 @@ def test_following_and_its_end_are_told_at_once(bench: Bench) -> None:
 def test_a_fault_is_told_once_as_a_warning_and_its_end_as_information(bench: Bench) -> None:
     bench.drive_on()
     told = len(bench.log)
-    bench.robot.now = replace(bench.robot.now, fault="base: no wheel speeds")
+    bench.robot.now = replace(bench.robot.now, fault=SILENT)
     bench.run(0.1, FORWARD)
-    bench.robot.now = replace(bench.robot.now, fault="")
+    bench.robot.now = replace(bench.robot.now, fault=None)
     bench.run(0.1, FORWARD)
     events = [event for out in bench.outputs for event in out.events][told:]
-    own = [
-        (severity_of(event.reason), text_of(event.reason))
-        for event in events
-        if "no wheel speeds" in text_of(event.reason) or "ready" in text_of(event.reason)
-    ]
-    assert [severity for severity, _ in own] == ["warning", "info"]
-    assert "base: no wheel speeds" in own[0][1]
+    own = [event.reason for event in events if event.reason.code.startswith("robot_")]
+    assert own == [reasons.robot_faulty(SILENT), reasons.robot_ready_again()]
+    assert [severity_of(reason) for reason in own] == ["warning", "info"]
     assert all((event.process, event.header.stamp > 0.0) == ("bridge", True) for event in events)
 
 
-def fails(bench: Bench, fault: str) -> None:
-    bench.robot.now = replace(bench.robot.now, fault=fault, severe=bool(fault))
+def fails(bench: Bench, fault: m.Reason | None) -> None:
+    bench.robot.now = replace(bench.robot.now, fault=fault, severe=fault is not None)
 
 
 def test_a_severe_fault_is_a_stop_once_and_again_where_the_robot_does_not_recover_from_it(bench: Bench) -> None:
     bench.run(0.1, REST)
-    fails(bench, "arm: reflex")
+    fails(bench, REFLEX)
     for _ in range(3):
         bench.now += TICK_S
         bench.hear(bench.core.step(bench.now, wall_time=9.0), REST)
     (first,) = bench.stops.stops
-    assert (first.source, first.reason, first.wall_time) == ("robot", robot_fault_reported("arm: reflex"), 9.0)
+    assert (first.source, first.reason, first.wall_time) == ("robot", REFLEX, 9.0)
     assert bench.state.stop_id == first.stop_id
     assert bench.core.on_release(release(first.stop_id), bench.now).ok
     bench.run(2.5, REST)
@@ -356,7 +354,7 @@ def test_a_severe_fault_is_a_stop_once_and_again_where_the_robot_does_not_recove
     bench.run(1.0, REST)
     (second,) = bench.stops.stops
     assert second.source == "robot" and second.stop_id != first.stop_id
-    fails(bench, "")
+    fails(bench, None)
     bench.run(0.1, REST)
     assert bench.state.stop_id == second.stop_id, "a person has to look first"
 
@@ -364,7 +362,7 @@ def test_a_severe_fault_is_a_stop_once_and_again_where_the_robot_does_not_recove
 def test_a_severe_fault_under_a_stop_adds_none(bench: Bench) -> None:
     bench.run(0.1, REST)
     bench.core.on_stop(stop(), bench.now)
-    fails(bench, "arm: reflex")
+    fails(bench, REFLEX)
     bench.run(0.1, REST)
     assert [each.stop_id for each in bench.stops.stops] == ["s1"]
 
@@ -417,10 +415,10 @@ def test_braking_after_its_controllers_mode_has_ended_is_no_motion_against_that_
 
 def test_after_a_fault_nothing_moves_before_a_setpoint_at_rest(bench: Bench) -> None:
     bench.drive_on()
-    bench.robot.now = replace(bench.robot.now, fault="arm: reflex")
+    bench.robot.now = replace(bench.robot.now, fault=REFLEX)
     bench.run(0.5, REST)
     bench.run(0.2, FORWARD)
-    bench.robot.now = replace(bench.robot.now, fault="")
+    bench.robot.now = replace(bench.robot.now, fault=None)
     # Longer than a fault is waited for to stay away.
     bench.run(3.0, FORWARD)
     assert bench.moved_within(3.0) == 0.0

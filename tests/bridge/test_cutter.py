@@ -4,7 +4,9 @@ import pytest
 from bridge.config import BridgeConfig
 from bridge.sim.robot.cutter import Cutter, close_blades
 from bridge.sim.vineyard.row import Rod, Row
-from rolling_panda.messages.types import WoodClass
+from rolling_panda import reasons
+from rolling_panda.messages.types import Reason, WoodClass
+from rolling_panda.reasons import text_of
 
 CONFIG = BridgeConfig()
 # Blades 1 m up, approaching along world y; the tool's y points down, so upright canes pass the blade plane squarely.
@@ -38,7 +40,7 @@ def test_a_cane_between_the_blades_is_severed_at_the_blade_plane() -> None:
 def test_only_what_is_within_the_opening_and_the_blades_reach(x: float, y: float, cut: bool) -> None:
     result = close_blades(Row((upright(x, y),)), TOOL, CONFIG)
     assert bool(result.severed) == cut
-    assert result.detail == ("" if cut else "nothing between the blades")
+    assert result.detail == (reasons.wood_severed("cane") if cut else reasons.nothing_between_blades())
     assert not result.jammed
 
 
@@ -52,22 +54,23 @@ def test_two_canes_are_both_severed_and_both_reported() -> None:
     result = close_blades(row, TOOL, CONFIG)
     assert [item.index for item in result.severed] == [0, 1]
     assert result.row.rods[2] is row.rods[2]
+    assert result.detail == reasons.wood_severed("cane, cane")
 
 
 @pytest.mark.parametrize(
-    ("hard", "words"),
+    ("hard", "why"),
     [
-        (along_row("wire", 1.0, 0.00125), "a wire"),
-        (along_row("cordon", 1.01, 0.015), "a cordon"),
-        (upright(kind="post", radius=0.038, x=0.04), "a post"),
-        (upright(radius=0.013), "26 mm is too thick"),
+        (along_row("wire", 1.0, 0.00125), reasons.blades_on_hard_part("wire")),
+        (along_row("cordon", 1.01, 0.015), reasons.blades_on_hard_part("cordon")),
+        (upright(kind="post", radius=0.038, x=0.04), reasons.blades_on_hard_part("post")),
+        (upright(radius=0.013), reasons.wood_beyond_blades("cane", 26.0)),
     ],
 )
-def test_wire_post_and_thick_wood_jam_the_blades_and_nothing_is_severed(hard: Rod, words: str) -> None:
+def test_wire_post_and_thick_wood_jam_the_blades_and_nothing_is_severed(hard: Rod, why: Reason) -> None:
     row = Row((upright(0.005), hard))
     result = close_blades(row, TOOL, CONFIG)
     assert result.jammed
-    assert words in result.detail
+    assert text_of(result.detail) == text_of(why)
     assert result.severed == ()
     assert result.row is row
 
@@ -77,7 +80,7 @@ def test_a_wire_beside_the_blade_plane_does_not_jam() -> None:
 
 
 def test_nothing_at_all_is_nothing() -> None:
-    assert close_blades(Row(()), TOOL, CONFIG).detail == "nothing between the blades"
+    assert close_blades(Row(()), TOOL, CONFIG).detail == reasons.nothing_between_blades()
 
 
 def test_the_blades_meet_after_the_closing_time_and_open_as_long() -> None:
@@ -88,7 +91,7 @@ def test_the_blades_meet_after_the_closing_time_and_open_as_long() -> None:
         steps += 1
         assert cutter.state == "closing"
     assert steps + 1 == 300
-    cutter.finish("DONE", "severed 1 cane", jammed=False)
+    cutter.finish("DONE", reasons.wood_severed("cane"), jammed=False)
     for _ in range(299):
         cutter.step(0.001, True)
         assert cutter.state == "opening"
@@ -103,4 +106,5 @@ def test_an_inhibited_cutter_opens_without_cutting() -> None:
     assert not cutter.step(0.001, True)
     assert not cutter.step(0.001, False)
     assert (cutter.state, cutter.outcome) == ("opening", "FAILED_NOT_CUT")
+    assert cutter.detail == reasons.inhibited_while_closing()
     assert not any(cutter.step(0.001, True) for _ in range(1000))

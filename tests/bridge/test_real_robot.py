@@ -10,6 +10,7 @@ from bridge.core.bridge import TICK_S
 from bridge.core.robot_time import RealTime
 from bridge.real import mp500
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.reasons import text_of
 from tests.support.bridge_rig import FORWARD, REST, Parts, Rig
 from tests.support.extras import need
@@ -18,6 +19,8 @@ from tests.support.real_rig import RealPlant
 need("real")
 
 pytestmark = pytest.mark.paced
+
+SILENT = reasons.base_silent(mp500.WHEELS)
 
 
 @pytest.fixture(scope="module")
@@ -37,8 +40,8 @@ def rig(plant: RealPlant) -> Iterator[Rig]:
     rig.close()
 
 
-def log(rig: Rig) -> str:
-    return "\n".join(text_of(event.reason) for out in rig.outputs for event in out.events)
+def log(rig: Rig) -> list[m.Reason]:
+    return [event.reason for out in rig.outputs for event in out.events]
 
 
 def release(rig: Rig) -> m.Answer:
@@ -71,7 +74,7 @@ def test_an_emergency_stop_is_latched_and_its_release_waits_for_the_button(rig: 
     assert rig.until(lambda: rig.state.stop_id != "", FORWARD)
     rig.run(0.5, FORWARD)
     assert rig.at_rest()
-    assert "button" in log(rig)
+    assert reasons.emergency_stop(reasons.button_pressed()) in log(rig)
     assert not release(rig).ok
     plant.base.tell("free")
     rig.run(0.3, FORWARD)
@@ -102,10 +105,20 @@ def test_a_base_that_tells_nothing_stops_everything_without_a_latch(rig: Rig, pl
     rig.run(0.9, FORWARD)
     assert rig.at_rest()
     assert rig.state.watchdog
-    assert mp500.WHEELS in log(rig)
+    assert reasons.robot_faulty(SILENT) in log(rig)
     plant.base.tell("free")
     rig.run(0.5, FORWARD)
     assert rig.at_rest(), "it went on without a setpoint at rest"
     assert rig.state.stop_id == ""
     assert goes_on(rig)
     assert rig.plant.breaches() == []
+
+
+def test_the_faults_of_two_devices_are_both_told(rig: Rig, plant: RealPlant) -> None:
+    rig.drive_on()
+    plant.base.tell(f"mute {mp500.WHEELS}")
+    plant.arm.tell("press")
+    both = reasons.both_faults(SILENT, reasons.arm_user_stopped())
+    assert rig.until(lambda: reasons.robot_faulty(both) in log(rig), FORWARD)
+    plant.base.tell("free")
+    plant.arm.tell("free")

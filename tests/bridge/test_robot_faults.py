@@ -2,10 +2,9 @@ import pytest
 
 from bridge.core.robot_faults import RobotFaults
 from rolling_panda import reasons
-from rolling_panda.reasons import text_of
 from tests.support.fake_wire import as_received
 
-STALE, REFLEX = "base: no wheel speeds", "arm: reflex"
+STALE, REFLEX = reasons.base_silent("drives/joint_states"), reasons.arm_reflex("joint_reflex")
 
 
 @pytest.fixture
@@ -14,23 +13,19 @@ def faults() -> RobotFaults:
 
 
 def test_a_fault_is_told_once_when_it_begins_and_once_when_it_ends(faults: RobotFaults) -> None:
-    assert faults.follow("", False, False, 0.0) is None
+    assert faults.follow(None, False, False, 0.0) is None
     began = faults.follow(STALE, False, False, 1.0)
     assert began is not None
-    assert STALE in text_of(began.told) and began.stop is None
+    assert began.told == reasons.robot_faulty(STALE) and began.stop is None
     assert faults.follow(STALE, False, False, 2.0) is None
-    ended = faults.follow("", False, False, 3.0)
+    ended = faults.follow(None, False, False, 3.0)
     assert ended is not None and ended.told == reasons.robot_ready_again()
 
 
 def test_a_severe_fault_latches_a_stop_that_says_why(faults: RobotFaults) -> None:
     change = faults.follow(REFLEX, True, False, 1.0)
     assert change is not None and change.stop is not None
-    assert (change.stop.reason, change.stop.source, change.stop.user) == (
-        reasons.robot_fault_reported(REFLEX),
-        "robot",
-        "",
-    )
+    assert (change.stop.reason, change.stop.source, change.stop.user) == (REFLEX, "robot", "")
     assert faults.follow(REFLEX, True, True, 2.0) is None
 
 
@@ -53,9 +48,9 @@ def test_a_fault_during_a_stop_latches_when_that_stop_is_released(faults: RobotF
 
 
 def test_a_stop_with_a_long_reason_is_one_that_the_wire_carries(faults: RobotFaults) -> None:
-    change = faults.follow("x" * 600, True, False, 1.0)
+    change = faults.follow(reasons.device_fault("arm", "x" * 600), True, False, 1.0)
     assert change is not None and change.stop is not None
-    assert as_received(change.stop).reason == reasons.robot_fault_reported("x" * 500)
+    assert as_received(change.stop).reason == reasons.device_fault("arm", "x" * 500)
 
 
 def test_releases_are_counted(faults: RobotFaults) -> None:

@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bridge.config import BridgeConfig
-from bridge.core.interface import CutterState
+from bridge.core.interface import NO_CUT, CutterState
 from bridge.sim.vineyard.row import Rod, Row
-from rolling_panda.messages.types import Outcome
+from rolling_panda import reasons
+from rolling_panda.messages.types import Outcome, Reason
 from rolling_panda.model.differential_drive import Array
 
 Mask = NDArray[np.bool_]
@@ -27,12 +28,12 @@ class SeveredRod:
 
 @dataclass(frozen=True)
 class CutResult:
-    """Result of closing the blades: the new row, the severed rods, and the reason if there are none."""
+    """Result of closing the blades: the new row, the severed rods, and what was severed or why nothing."""
 
     row: Row
     severed: tuple[SeveredRod, ...]
     jammed: bool
-    detail: str
+    detail: Reason
 
 
 class Cutter:
@@ -46,12 +47,12 @@ class Cutter:
         self.cut_id = ""
         self.point_id = ""
         self.outcome: Outcome = ""
-        self.detail = ""
+        self.detail = NO_CUT
 
     def start(self, cut_id: str, point_id: str) -> None:
         """Start to close."""
         self.cut_id, self.point_id = cut_id, point_id
-        self.outcome, self.detail = "", ""
+        self.outcome = ""
         self.state, self._remaining = "closing", self._config.close_s
 
     def step(self, dt: float, enabled: bool) -> bool:
@@ -62,7 +63,7 @@ class Cutter:
         if self.state == "open":
             return False
         if self.state == "closing" and not enabled:
-            self.finish("FAILED_NOT_CUT", "the cutter was inhibited before the blades met", jammed=False)
+            self.finish("FAILED_NOT_CUT", reasons.inhibited_while_closing(), jammed=False)
             return False
         self._remaining -= dt
         if self._remaining > dt / 2:
@@ -72,7 +73,7 @@ class Cutter:
         self.state = "open"
         return False
 
-    def finish(self, outcome: Outcome, detail: str, jammed: bool) -> None:
+    def finish(self, outcome: Outcome, detail: Reason, jammed: bool) -> None:
         """Set the outcome and start to open."""
         self.outcome, self.detail = outcome, detail
         self.state, self._remaining = "jammed" if jammed else "opening", self._config.close_s
@@ -92,7 +93,7 @@ def close_blades(row: Row, T_world_tool: Array, config: BridgeConfig) -> CutResu
     """
     standing = [(i, rod) for i, rod in row.standing() if rod.kind not in _IGNORED]
     if not standing:
-        return CutResult(row, (), False, "nothing between the blades")
+        return CutResult(row, (), False, reasons.nothing_between_blades())
     R, p = T_world_tool[:3, :3], T_world_tool[:3, 3]
     starts = (np.array([rod.start for _, rod in standing]) - p) @ R
     ends = (np.array([rod.end for _, rod in standing]) - p) @ R
@@ -107,19 +108,19 @@ def close_blades(row: Row, T_world_tool: Array, config: BridgeConfig) -> CutResu
         index, rod = standing[k]
         local = rod.at(float(fraction[k]))[1] if crosses[k] else 0.0
         if rod.kind not in _SOFT and touched[k]:
-            return CutResult(row, (), True, f"a {rod.kind} is between the blades")
+            return CutResult(row, (), True, reasons.blades_on_hard_part(rod.kind))
         if 2 * local > config.largest_diameter:
-            return CutResult(row, (), True, f"{rod.kind} of {2000 * local:.0f} mm is too thick for the blades")
+            return CutResult(row, (), True, reasons.wood_beyond_blades(rod.kind, 2000 * local))
         if crosses[k]:
             cuts.append((index, rod, float(fraction[k])))
     if not cuts:
-        return CutResult(row, (), False, "nothing between the blades")
+        return CutResult(row, (), False, reasons.nothing_between_blades())
     severed = tuple(SeveredRod(index, rod, rod.at(along)[0]) for index, rod, along in cuts)
     for index, _, along in cuts:
         # An earlier cut may have removed the rod.
         if row.rods[index] is not None:
             row = row.sever(index, along)
-    return CutResult(row, severed, False, "")
+    return CutResult(row, severed, False, reasons.wood_severed(", ".join(item.rod.kind for item in severed)))
 
 
 def _plane_crossing(starts: Array, ends: Array) -> Array:

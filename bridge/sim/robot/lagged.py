@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 
 from bridge.core.bridge import TICK_S
-from bridge.core.interface import Measurement, Setpoint
+from bridge.core.interface import NO_CUT, Measurement, Setpoint
 from bridge.core.picture import Picture
 from bridge.sim.robot.trace import ROW, Trace
+from rolling_panda import reasons
 
 
 class LaggedRobot:
@@ -16,7 +17,7 @@ class LaggedRobot:
 
     def __init__(self, arm: tuple[float, ...]) -> None:
         """Stand at rest with the arm in this posture (7, rad)."""
-        self.now = Measurement(np.array([0.0, 0.0, *arm]), np.zeros(9), "open", "", "", "")
+        self.now = Measurement(np.array([0.0, 0.0, *arm]), np.zeros(9), "open", "", "", NO_CUT)
         self.rows: list[tuple[float, np.ndarray[Any, Any], np.ndarray[Any, Any], int, int]] = []
         #: Rows of the record at which a bridge started; the acceleration limit does not hold across them.
         self.begun: list[int] = []
@@ -36,7 +37,7 @@ class LaggedRobot:
 
     def cut(self, cut_id: str, point_id: str) -> None:
         """Cuts at once."""
-        self.now = replace(self.now, cut_id=cut_id, outcome="DONE")
+        self.now = replace(self.now, cut_id=cut_id, outcome="DONE", detail=reasons.blades_met())
 
     def capture(self, expose: bool) -> Picture | None:
         """There is no camera."""

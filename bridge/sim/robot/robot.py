@@ -9,7 +9,6 @@ Physics assumptions in addition to those of `bridge.sim.robot.model`:
 """
 
 import math
-from collections import Counter
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,6 +26,7 @@ from bridge.sim.vineyard.row import Row
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.wire_values import vector3
+from rolling_panda.reasons import text_of
 
 _DISPLAYED = frozenset({"post", "trunk", "cordon", "spur", "cane", "node", "wire", "hose", "old cut"})
 _WHEELS_ON_FLOOR = 3
@@ -237,7 +237,7 @@ class SimulatedRobot:
         tool = self.true_tool()
         result = close_blades(self.row, tool, self._config)
         self.row = result.row
-        self._cutter.finish("DONE" if result.severed else "FAILED_NOT_CUT", _detail(result), result.jammed)
+        self._cutter.finish("DONE" if result.severed else "FAILED_NOT_CUT", result.detail, result.jammed)
         if self._trace is not None:
             self._trace.event(self._cut_event(result, tool, setpoint))
 
@@ -250,7 +250,7 @@ class SimulatedRobot:
             "cut_id": cutter.cut_id,
             "point_id": cutter.point_id,
             "outcome": cutter.outcome,
-            "detail": cutter.detail,
+            "detail": text_of(cutter.detail),
             "blade": tool[:3, 3].tolist(),
             "blade_normal": tool[:3, 1].tolist(),
             "severed": [
@@ -278,13 +278,6 @@ class SimulatedRobot:
         row["cutter"] = CUTTER.index(self._cutter.state)
         row["contacts"], row["self_contacts"] = self.contacts, self.self_contacts
         trace.commit()
-
-
-def _detail(result: CutResult) -> str:
-    if not result.severed:
-        return result.detail
-    counts = Counter(item.rod.kind for item in result.severed)
-    return "severed " + " and ".join(f"{count} {kind}{'s' * (count > 1)}" for kind, count in counts.items())
 
 
 def _capsules(row: Row) -> tuple[Capsule, ...]:

@@ -170,7 +170,7 @@ class Robot:
 
     def __init__(self, judge, chance):
         self._judge, self._chance, self._ends = judge, chance, 0
-        self.now = Measurement(np.array([0.0, 0.0, *ARM]), np.zeros(9), "open", "", "", "")
+        self.now = Measurement(np.array([0.0, 0.0, *ARM]), np.zeros(9), "open", "", "", reasons.blades_met())
 
     def read(self):
         return self.now
