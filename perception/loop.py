@@ -8,6 +8,7 @@ from typing import Any, Generic, TypeVar
 
 from perception.config import PerceptionConfig
 from perception.pipeline import Perception
+from perception.segmentation.frame import CorruptFrameError
 from rolling_panda import messages as m
 from rolling_panda import reasons, topics
 from rolling_panda.errors import RollingPandaError
@@ -82,7 +83,7 @@ class _Output:
     withdrawn: tuple[m.Reason, ...]
     obstacles: Obstacles
     crops: tuple[PointCrop, ...]
-    rejected_wood: str
+    rejected_wood: tuple[m.Reason, ...]
     reply: Reply | None
 
 
@@ -115,7 +116,7 @@ class PerceptionProcess:
         self._obstacles_sent = self._crop_sent = self._rejected_logged = -1e9
         self._started = False
         self._last_error = ""
-        self._rejected_wood = ""
+        self._rejected_wood: tuple[m.Reason, ...] = ()
         self._point_ids: frozenset[str] = frozenset()
         self._timed_out = False
         self._out: list[object] = []
@@ -130,7 +131,7 @@ class PerceptionProcess:
             self._out.append(self._checks.popleft())
         done = self._worker.poll()
         if isinstance(done, RollingPandaError):
-            self._log_refused(str(done), now)
+            self._log_refused(done.reason if isinstance(done, CorruptFrameError) else reasons.said(str(done)), now)
         elif done is not None:
             self._accept(done, now)
         frame = inbox.newest(CameraFrame)
@@ -179,8 +180,8 @@ class PerceptionProcess:
         self._point_ids = ids
         if output.rejected_wood != self._rejected_wood and now - self._rejected_logged >= _REJECTED_PERIOD_S:
             self._rejected_wood, self._rejected_logged = output.rejected_wood, now
-            if output.rejected_wood:
-                self._log(reasons.wood_implausible(output.rejected_wood), now)
+            for reason in output.rejected_wood:
+                self._log(reason, now)
 
     def _add_new_crops(self, crops: tuple[PointCrop, ...]) -> None:
         wanted = {(crop.point_id, crop.revision): crop for crop in crops}
@@ -188,12 +189,11 @@ class PerceptionProcess:
         self._out += new.values()
         self._crop_cycle = {key: crop for key, crop in self._crop_cycle.items() if key in wanted} | new
 
-    def _log_refused(self, reason: str, now: float) -> None:
+    def _log_refused(self, cause: m.Reason, now: float) -> None:
         # An error that repeats frame after frame is logged once.
-        error = reason.split(":")[-1]
-        if error != self._last_error:
-            self._log(reasons.frame_refused(reason), now)
-        self._last_error = error
+        if cause.code != self._last_error:
+            self._log(reasons.frame_refused(cause), now)
+        self._last_error = cause.code
 
     def _beat(self, now: float) -> None:
         timed_out = self._worker.busy_for(now) > self._config.frame_timeout_s

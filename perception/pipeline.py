@@ -1,6 +1,7 @@
 """Camera frames in, pruning points out."""
 
 import copy
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,6 +9,7 @@ from msgspec.structs import replace
 
 from perception.arrays import Array, Labels, distance
 from perception.config import PerceptionConfig, RuleConfig
+from perception.obstacles.cylinder_fit import Rejection
 from perception.obstacles.obstacle_map import ObstacleMap
 from perception.plant.capsules import CapsuleSet
 from perception.plant.map import PlantMap
@@ -17,7 +19,7 @@ from perception.plant.undecided_sites import UndecidedSites, undecided_site
 from perception.rules.keep_out import frame_keep_out, map_keep_out
 from perception.rules.manual import move_cut, place_cut
 from perception.rules.pruning import Decision, apply_rule
-from perception.segmentation.frame import CORDON, View, decode_frame
+from perception.segmentation.frame import CORDON, UnusablePictureError, View, decode_frame
 from perception.segmentation.segmenter import Segmenter
 from perception.skeleton.topology import perceive_plant
 from perception.tracking.camera_rays import CameraRays, Ray
@@ -36,7 +38,6 @@ from rolling_panda.commands import (
     SetRule,
     UndoRule,
 )
-from rolling_panda.errors import InputError
 from rolling_panda.messages.perception import Capsule, CloseUpResult, PointCrop
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.model.robot import RobotModel
@@ -54,6 +55,14 @@ _IN_FRONT = 0.3
 _MAX_UNDO = 20
 #: A position nearer than this to a cut that was made has been cut (m).
 _SAME_CUT = 0.02
+_REJECTED: dict[Rejection, Callable[[float, str], m.Reason]] = {
+    "off the row": reasons.wood_off_row,
+    "that another one is": reasons.wood_there_twice,
+    "leaning": reasons.wood_leaning,
+    "lying": reasons.wood_lying,
+    "too thick": reasons.wood_too_thick,
+    "hardly seen": reasons.wood_hardly_seen,
+}
 
 
 @dataclass(frozen=True)
@@ -109,7 +118,7 @@ class Perception:
             frame: As received.
 
         Raises:
-            MessageError: The frame is corrupt; nothing changes.
+            CorruptFrameError: The frame is corrupt; nothing changes.
         """
         view = decode_frame(frame, self._model)
         self._stamp = view.stamp
@@ -119,8 +128,8 @@ class Perception:
             return self.points()
         try:
             labels = self.segmenter.segment(view)
-        except InputError as error:
-            self._site_messages = (undecided_site(reasons.picture_unusable(str(error))),)
+        except UnusablePictureError as error:
+            self._site_messages = (undecided_site(error.reason),)
             return replace(self.points(), canes=())
         cylinders = self._obstacle_map.update(view, labels)
         self._frames += 1
@@ -162,7 +171,7 @@ class Perception:
             frame: As received, with the id of the point.
 
         Raises:
-            MessageError: The frame is corrupt; nothing changes.
+            CorruptFrameError: The frame is corrupt; nothing changes.
         """
         point = self._tracker.find(frame.point_id)
         if point is None:
@@ -170,8 +179,8 @@ class Perception:
         view = decode_frame(frame, self._model)
         try:
             check = check_close_up(view, self.segmenter, point, frame.number, self._config)
-        except InputError as error:
-            return failed_check(frame, reasons.picture_unusable(str(error)))
+        except UnusablePictureError as error:
+            return failed_check(frame, error.reason)
         if check.position is not None and check.tangent is not None:
             self._tracker.refine(point.point_id, np.array(check.position), np.array(check.tangent))
         return check
@@ -214,10 +223,9 @@ class Perception:
         )
 
     @property
-    def rejected_wood(self) -> str:
-        """Counts of implausible posts, trunks, cordons and wires as text; empty for none."""
-        counts = sorted(self._obstacle_map.rejected.items())
-        return ", ".join(f"{n} {kind}{'' if n == 1 else 's'} {reason}" for (kind, reason), n in counts)
+    def rejected_wood(self) -> tuple[m.Reason, ...]:
+        """What of posts, trunks, cordons and wires is not among the obstacles, as it is implausible."""
+        return tuple(_REJECTED[why](n, kind) for (kind, why), n in sorted(self._obstacle_map.rejected.items()))
 
     @property
     def crops(self) -> tuple[PointCrop, ...]:

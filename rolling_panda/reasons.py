@@ -1380,11 +1380,6 @@ def looks_exhausted(why: Reason, looks: float) -> None:
     """{why}; {looks:.0f} looks from the front have not shown more."""
 
 
-@_reason("warning", "")
-def picture_unusable(detail: str) -> None:
-    """{detail}."""
-
-
 @_reason("info", "go there, or is the camera covered, or its depth missing or in another unit?")
 def no_cordon_in_range(near: float, far: float) -> None:
     """No cordon is seen {near:g} to {far:g} m away."""
@@ -1592,13 +1587,93 @@ def new_points(new: float, points: float) -> None:
 
 
 @_reason("info", "")
-def wood_implausible(counts: str) -> None:
-    """Implausible wood left out of the obstacles: {counts}."""
+def wood_off_row(count: float, kind: str) -> None:
+    """Left out of the obstacles: {count:.0f} {kind}, off the row."""
+
+
+@_reason("info", "")
+def wood_there_twice(count: float, kind: str) -> None:
+    """Left out of the obstacles: {count:.0f} {kind}, where a longer one is."""
+
+
+@_reason("info", "")
+def wood_leaning(count: float, kind: str) -> None:
+    """Left out of the obstacles: {count:.0f} {kind}, leaning."""
+
+
+@_reason("info", "")
+def wood_lying(count: float, kind: str) -> None:
+    """Left out of the obstacles: {count:.0f} {kind}, lying."""
+
+
+@_reason("info", "")
+def wood_too_thick(count: float, kind: str) -> None:
+    """Left out of the obstacles: {count:.0f} {kind}, too thick."""
+
+
+@_reason("info", "")
+def wood_hardly_seen(count: float, kind: str) -> None:
+    """Left out of the obstacles: {count:.0f} {kind}, hardly seen."""
 
 
 @_reason("error", "")
-def frame_refused(detail: str) -> None:
-    """A camera frame was refused: {detail}."""
+def frame_refused(cause: Reason) -> None:
+    """A camera frame was refused: {cause}."""
+
+
+@_reason("error", "")
+def frame_posture_invalid(frame: float) -> None:
+    """The posture of frame {frame:.0f} is not of 12 finite numbers."""
+
+
+@_reason("error", "")
+def frame_intrinsics_invalid(frame: float, fx: float, fy: float, cx: float, cy: float) -> None:
+    """The camera model of frame {frame:.0f} is invalid: focal lengths {fx:g} and {fy:g}, centre {cx:g} and {cy:g}."""
+
+
+@_reason("error", "")
+def frame_depth_unit_invalid(frame: float, unit_m: float, limit_m: float) -> None:
+    """The depth unit of frame {frame:.0f} is {unit_m:g} m; allowed is more than 0, at most {limit_m:g} m."""
+
+
+@_reason("error", "")
+def frame_class_unknown(frame: float, index: float, classes: float) -> None:
+    """Frame {frame:.0f} has the class {index:.0f}; there are {classes:.0f}, from 0."""
+
+
+@_reason("error", "")
+def frame_image_corrupt(frame: float, image: str, detail: str) -> None:
+    """The {image} image of frame {frame:.0f} is corrupt: {detail}."""
+
+
+@_reason("error", "")
+def frame_image_size_wrong(frame: float, image: str, width: float, height: float) -> None:
+    """The {image} image of frame {frame:.0f} has not the bytes of {width:.0f}×{height:.0f} pixels."""
+
+
+@_reason("error", "")
+def colour_not_jpeg(frame: float, detail: str) -> None:
+    """The colour image of frame {frame:.0f} is not a JPEG: {detail}."""
+
+
+@_reason("error", "")
+def colour_size_wrong(frame: float, width: float, height: float, columns: float, rows: float) -> None:
+    """The colour image of frame {frame:.0f} has {width:.0f}×{height:.0f} pixels, not {columns:.0f}×{rows:.0f}."""
+
+
+@_reason("warning", "see whether the lens is covered or the exposure wrong")
+def picture_blank(brightest: float) -> None:
+    """The colour image is blank: its brightest value is {brightest:.0f} of 255."""
+
+
+@_reason("warning", "choose the segmenter network")
+def frame_without_labels(segmenter: str) -> None:
+    """The frame has no label image for {segmenter}; only the simulated camera sends one."""
+
+
+@_reason("warning", "install the network's weights, or name a file of them")
+def network_missing(detail: str) -> None:
+    """No segmentation without the network's weights: {detail}."""
 
 
 @_reason("error", "")

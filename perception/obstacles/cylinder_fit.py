@@ -7,6 +7,7 @@ are outliers. Implausible fits are rejected and counted.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,9 @@ from perception.config import ObstacleConfig
 from perception.obstacles.occupancy import OccupiedCells
 from perception.plant.model import SURFACE_OFFSET
 from rolling_panda.messages.types import WoodClass
+
+#: Why wood is implausible.
+Rejection = Literal["off the row", "that another one is", "leaning", "lying", "too thick", "hardly seen"]
 
 #: Index of each cell along its line, in cells.
 Levels = NDArray[np.int_]
@@ -82,15 +86,18 @@ def row_plane(occupied: dict[WoodClass, OccupiedCells]) -> RowPlane:
     return RowPlane(x, np.array(y))
 
 
-def fit_cylinders(kind: WoodClass, cells: OccupiedCells, config: ObstacleConfig) -> tuple[list[Cylinder], list[str]]:
-    """The cylinders of a group of cells, and reasons of rejected ones: `leaning`, `lying`, `too thick`, `hardly seen`.
+def fit_cylinders(
+    kind: WoodClass, cells: OccupiedCells, config: ObstacleConfig
+) -> tuple[list[Cylinder], list[Rejection]]:
+    """The cylinders of a group of cells, and why others were rejected.
 
     Args:
         kind: Class of the wood.
         cells: Cells of one group, near the plane of the row.
         config: Limits of plausible wood.
     """
-    cylinders, rejected, scattered = [], [], 0
+    cylinders, scattered = [], 0
+    rejected: list[Rejection] = []
     for line, count, levels in _lines(kind, cells, config):
         if levels < config.min_cells:
             scattered += count

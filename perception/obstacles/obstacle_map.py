@@ -12,7 +12,7 @@ import numpy as np
 
 from perception.arrays import Array, Index, Labels
 from perception.config import ObstacleConfig
-from perception.obstacles.cylinder_fit import Cylinder, RowPlane, fit_cylinders, row_plane
+from perception.obstacles.cylinder_fit import Cylinder, Rejection, RowPlane, fit_cylinders, row_plane
 from perception.obstacles.occupancy import OccupancyGrid, OccupiedCells
 from perception.plant.capsules import CapsuleSet
 from perception.segmentation.frame import View
@@ -27,8 +27,8 @@ _SHAPES: dict[WoodClass, str] = {"post": "upright", "trunk": "upright", "cordon"
 #: A post and a trunk with a smaller distance between their surfaces are the same thing (m).
 _SAME = 0.01
 
-#: Cylinders of a group, and the reasons of rejected ones.
-Fit = tuple[list[Cylinder], list[str]]
+#: Cylinders of a group, and why others were rejected.
+Fit = tuple[list[Cylinder], list[Rejection]]
 
 
 class ObstacleMap:
@@ -41,7 +41,7 @@ class ObstacleMap:
             kind: OccupancyGrid(kind, config.cell_size, config.min_hits, config.max_cells) for kind in _SHAPES
         }
         self._fits: dict[WoodClass, list[tuple[Array, Fit]]] = {}
-        self.rejected: Counter[tuple[WoodClass, str]] = Counter()
+        self.rejected: Counter[tuple[WoodClass, Rejection]] = Counter()
         """Implausible wood by class and reason, as of the last frame."""
 
     def update(self, view: View, labels: Labels) -> tuple[Capsule, ...]:
@@ -75,8 +75,8 @@ class ObstacleMap:
             self.rejected[kind, "off the row"] += off_row
         cells = cells.select(near)
         fits = self._fit(kind, cells, self._groups(kind, cells.position))
-        for _, reasons in fits:
-            self.rejected.update((kind, reason) for reason in reasons)
+        for _, rejections in fits:
+            self.rejected.update((kind, why) for why in rejections)
         return [
             Capsule(kind, vector3(each.start), vector3(each.end), each.radius, each.radius)
             for cylinders, _ in fits

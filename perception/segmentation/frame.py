@@ -11,13 +11,35 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from perception.arrays import Array, Index, Labels
-from rolling_panda.errors import MessageError
+from rolling_panda import reasons
+from rolling_panda.errors import InputError, MessageError
 from rolling_panda.messages.robot import CameraFrame, Intrinsics
-from rolling_panda.messages.types import WOOD_CLASSES
+from rolling_panda.messages.types import WOOD_CLASSES, Reason
 from rolling_panda.model.robot import RobotModel, configuration
+from rolling_panda.reasons import text_of
 
 #: Class indices, in the order of `WOOD_CLASSES`.
 BACKGROUND, GROUND, POST, TRUNK, CORDON, SPUR, CANE, NODE, WIRE, HOSE, OLD_CUT = range(len(WOOD_CLASSES))
+#: Largest depth of one count (m).
+_MAX_DEPTH_UNIT = 0.01
+
+
+class CorruptFrameError(MessageError):
+    """A frame is corrupt; `reason` says how."""
+
+    def __init__(self, reason: Reason) -> None:
+        """Store the reason."""
+        super().__init__(text_of(reason))
+        self.reason = reason
+
+
+class UnusablePictureError(InputError):
+    """A frame cannot be segmented; `reason` says why."""
+
+    def __init__(self, reason: Reason) -> None:
+        """Store the reason."""
+        super().__init__(text_of(reason))
+        self.reason = reason
 
 
 @dataclass(frozen=True)
@@ -64,7 +86,7 @@ class View:
         """A window of the frame as a frame of its own, clipped to the image.
 
         Raises:
-            MessageError: The colour image is no JPEG of the right size.
+            CorruptFrameError: The colour image is no JPEG of the right size.
         """
         k = self.intrinsics
         top, bottom = max(0, rows.start), min(k.height, rows.stop)
@@ -87,16 +109,16 @@ class View:
         """The colour image, H×W×3, RGB.
 
         Raises:
-            MessageError: It is not a JPEG of the size of the intrinsics.
+            CorruptFrameError: It is not a JPEG of the size of the intrinsics.
         """
         k = self.intrinsics
         try:
             with Image.open(io.BytesIO(self.color_jpeg), formats=("JPEG",)) as image:
                 if image.size != (k.width, k.height):
-                    raise MessageError(f"colour image is {image.size}; the intrinsics say {(k.width, k.height)}")
+                    raise CorruptFrameError(reasons.colour_size_wrong(self.sequence, *image.size, k.width, k.height))
                 return np.asarray(image.convert("RGB"), dtype=np.uint8)
         except (OSError, SyntaxError) as error:
-            raise MessageError(f"colour image is not a JPEG: {error}") from error
+            raise CorruptFrameError(reasons.colour_not_jpeg(self.sequence, str(error))) from error
 
 
 def decode_frame(frame: CameraFrame, model: RobotModel) -> View:
@@ -107,22 +129,22 @@ def decode_frame(frame: CameraFrame, model: RobotModel) -> View:
         model: The robot; its `data` is overwritten.
 
     Raises:
-        MessageError: An image is corrupt or of the wrong size, a class is unknown, or a number is not finite.
+        CorruptFrameError: An image is corrupt or of the wrong size, a class is unknown, or a number is not finite.
     """
     k = frame.intrinsics
     posture = (frame.base.x, frame.base.y, frame.base.phi, *frame.position)
     if len(frame.position) != 9 or not all(math.isfinite(value) for value in posture):
-        raise MessageError(f"frame {frame.sequence}: the posture must be 12 finite numbers, got {posture}")
+        raise CorruptFrameError(reasons.frame_posture_invalid(frame.sequence))
     if not (k.fx > 0.0 and k.fy > 0.0 and all(math.isfinite(value) for value in (k.fx, k.fy, k.cx, k.cy))):
-        raise MessageError(f"frame {frame.sequence}: focal lengths must be positive and finite, got {k}")
-    if not 0.0 < frame.depth_unit <= 0.01:
-        raise MessageError(f"frame {frame.sequence}: depth_unit {frame.depth_unit} is outside 0…0.01 m")
+        raise CorruptFrameError(reasons.frame_intrinsics_invalid(frame.sequence, k.fx, k.fy, k.cx, k.cy))
+    if not 0.0 < frame.depth_unit <= _MAX_DEPTH_UNIT:
+        raise CorruptFrameError(reasons.frame_depth_unit_invalid(frame.sequence, frame.depth_unit, _MAX_DEPTH_UNIT))
     counts = _image(frame.depth_zlib, k, "<u2", "depth", frame.sequence)
     labels = None
     if frame.labels_zlib:
         labels = _image(frame.labels_zlib, k, "u1", "label", frame.sequence)
         if labels.max(initial=0) >= len(WOOD_CLASSES):
-            raise MessageError(f"frame {frame.sequence}: class {labels.max()} is unknown, of {len(WOOD_CLASSES)}")
+            raise CorruptFrameError(reasons.frame_class_unknown(frame.sequence, float(labels.max()), len(WOOD_CLASSES)))
     T_odom_camera = model.pose(configuration(frame.base, frame.position), model.camera_id)
     return View(
         sequence=frame.sequence,
@@ -143,11 +165,9 @@ def _image(data: bytes, k: Intrinsics, kind: str, name: str, sequence: int) -> N
         # One byte more than expected detects a longer stream and bounds the memory that a hostile one can use.
         raw = unpack.decompress(data, expected + 1)
     except zlib.error as error:
-        raise MessageError(f"frame {sequence}: the {name} image is corrupt: {error}") from error
+        raise CorruptFrameError(reasons.frame_image_corrupt(sequence, name, str(error))) from error
     if len(raw) != expected or not unpack.eof:
-        raise MessageError(
-            f"frame {sequence}: the {name} image does not have the {expected} bytes of {k.width}×{k.height}"
-        )
+        raise CorruptFrameError(reasons.frame_image_size_wrong(sequence, name, k.width, k.height))
     return np.frombuffer(raw, dtype=kind).reshape(k.height, k.width)
 
 

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from onnxruntime.capi import onnxruntime_pybind11_state as ort
 
 from perception.arrays import Labels
-from perception.segmentation.frame import View
-from rolling_panda.errors import ConfigError, InputError
+from perception.segmentation.frame import UnusablePictureError, View
+from rolling_panda import reasons
+from rolling_panda.errors import ConfigError
 from rolling_panda.messages.types import WOOD_CLASSES
 
 #: Input channels: red, green, blue, inverse depth.
@@ -93,8 +94,8 @@ class NetworkSegmenter:
         """Classes by colour and depth.
 
         Raises:
-            InputError: The colour image is blank.
-            MessageError: The colour image is corrupt.
+            UnusablePictureError: The colour image is blank.
+            CorruptFrameError: The colour image is corrupt.
         """
         return self.classify(view.color(), view.depth)
 
@@ -102,7 +103,7 @@ class NetworkSegmenter:
         """H×W indices into `WOOD_CLASSES` of a colour image (H×W×3), with a depth image (H×W, m) if there is one.
 
         Raises:
-            InputError: The colour image is blank.
+            UnusablePictureError: The colour image is blank.
         """
         return self.classify_surely(color, depth, ["classes"])[0]
 
@@ -112,13 +113,10 @@ class NetworkSegmenter:
         """Classes as of `classify`, and the probability of each pixel's class (H×W), or None if the network has none.
 
         Raises:
-            InputError: The colour image is blank.
+            UnusablePictureError: The colour image is blank.
         """
         if int(color.max()) < _MIN_BRIGHTNESS or float(color[::4, ::4].std()) < _MIN_CONTRAST:
-            raise InputError(
-                f"the colour image is blank (brightest {color.max()} of 255): "
-                "is the lens covered, or the exposure wrong?"
-            )
+            raise UnusablePictureError(reasons.picture_blank(float(color.max())))
         height, width = color.shape[:2]
         image = network_input(color, depth)
         below, right = -height % self._multiple, -width % self._multiple

@@ -4,9 +4,11 @@ from pathlib import Path
 from typing import Protocol
 
 from perception.arrays import Labels
-from perception.segmentation.frame import View
+from perception.segmentation.frame import UnusablePictureError, View
 from perception.segmentation.network_segmenter import NetworkSegmenter
-from rolling_panda.errors import ConfigError, InputError, ModelError
+from rolling_panda import reasons
+from rolling_panda.errors import ConfigError, ModelError
+from rolling_panda.messages.types import Reason
 from rolling_panda.resources import resource
 
 SEGMENTERS = ("network", "labels")
@@ -29,7 +31,7 @@ class Segmenter(Protocol):
         """H×W indices into `WOOD_CLASSES`.
 
         Raises:
-            InputError: It cannot work on this frame.
+            UnusablePictureError: It cannot work on this frame.
         """
 
 
@@ -43,10 +45,10 @@ class LabelImageSegmenter:
         """The frame's own label image.
 
         Raises:
-            InputError: The frame has none, as on a real robot.
+            UnusablePictureError: The frame has none, as on a real robot.
         """
         if view.labels is None:
-            raise InputError(f"the segmenter '{self.name}' needs a label image; only the simulated camera sends one")
+            raise UnusablePictureError(reasons.frame_without_labels(self.name))
         return view.labels
 
 
@@ -56,7 +58,7 @@ class NoSegmenter:
     name = "none"
     width_bias = 0.0
 
-    def __init__(self, reason: str) -> None:
+    def __init__(self, reason: Reason) -> None:
         """Store the reason given for every frame."""
         self._reason = reason
 
@@ -64,9 +66,9 @@ class NoSegmenter:
         """Never returns.
 
         Raises:
-            InputError: Always.
+            UnusablePictureError: Always.
         """
-        raise InputError(self._reason)
+        raise UnusablePictureError(self._reason)
 
 
 def choose_segmenter(name: str, weights: Path | None = None, threads: int = 2) -> Segmenter:
@@ -90,4 +92,4 @@ def choose_segmenter(name: str, weights: Path | None = None, threads: int = 2) -
         return NetworkSegmenter(resource(SHIPPED), threads)
     except ModelError as error:
         # Without the shipped file the program still runs, and every frame reports the missing file.
-        return NoSegmenter(f"no segmentation without the network's weights: {error}")
+        return NoSegmenter(reasons.network_missing(str(error)))

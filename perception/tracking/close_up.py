@@ -65,8 +65,8 @@ def check_close_up(
         config: Section `[perception]`.
 
     Raises:
-        InputError: The image is blank.
-        MessageError: The image is corrupt.
+        UnusablePictureError: The image is blank.
+        CorruptFrameError: The image is corrupt.
     """
     limits, position, along = config.close_up, np.array(point.position), np.array(point.tangent)
     u, v, z = view.pixels(position)[0]

@@ -54,7 +54,7 @@ class CropCache:
         """A crop centred on a position (3, m, odom) at a spur; None where no image shows that position.
 
         Raises:
-            MessageError: The image is corrupt.
+            CorruptFrameError: The image is corrupt.
         """
         known = self._best.get(number)
         if known is None:

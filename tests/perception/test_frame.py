@@ -7,10 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from perception.segmentation.frame import class_pixels, decode_frame
+from perception.segmentation.frame import CorruptFrameError, UnusablePictureError, class_pixels, decode_frame
 from perception.segmentation.segmenter import LabelImageSegmenter
 from rolling_panda import messages as m
-from rolling_panda.errors import InputError, MessageError
+from rolling_panda import reasons
 from rolling_panda.messages.robot import CameraFrame, Intrinsics
 from rolling_panda.model.robot import RobotModel
 
@@ -48,37 +48,40 @@ def test_points_and_pixels_are_inverse(model):
 
 
 @pytest.mark.parametrize(
-    ("changes", "says"),
+    ("changes", "code"),
     [
-        ({"depth_zlib": b"rubbish"}, "corrupt"),
-        ({"depth_zlib": b""}, "bytes of"),
-        ({"depth_zlib": zlib.compress(b"\0" * 7)}, "bytes of"),
-        ({"depth_zlib": zlib.compress(b"\0" * (WIDTH * HEIGHT * 2 + 1))}, "bytes of"),
-        ({"depth_zlib": zlib.compress(bytes(1 << 26))}, "bytes of"),
-        ({"labels_zlib": zlib.compress(b"\0" * 5)}, "label image"),
-        ({"labels_zlib": zlib.compress(b"\xff" * (WIDTH * HEIGHT))}, "class 255"),
-        ({"position": (float("nan"),) * 9}, "finite"),
-        ({"position": (0.0,) * 8}, "posture"),
-        ({"base": m.PlanarPose(float("inf"), 0.0, 0.0)}, "finite"),
-        ({"intrinsics": Intrinsics(WIDTH, HEIGHT, 0.0, 20.0, 15.5, 11.5)}, "focal"),
-        ({"depth_unit": float("nan")}, "depth_unit"),
+        ({"depth_zlib": b"rubbish"}, "frame_image_corrupt"),
+        ({"depth_zlib": b""}, "frame_image_size_wrong"),
+        ({"depth_zlib": zlib.compress(b"\0" * 7)}, "frame_image_size_wrong"),
+        ({"depth_zlib": zlib.compress(b"\0" * (WIDTH * HEIGHT * 2 + 1))}, "frame_image_size_wrong"),
+        ({"depth_zlib": zlib.compress(bytes(1 << 26))}, "frame_image_size_wrong"),
+        ({"labels_zlib": zlib.compress(b"\0" * 5)}, "frame_image_size_wrong"),
+        ({"labels_zlib": zlib.compress(b"\xff" * (WIDTH * HEIGHT))}, "frame_class_unknown"),
+        ({"position": (float("nan"),) * 9}, "frame_posture_invalid"),
+        ({"position": (0.0,) * 8}, "frame_posture_invalid"),
+        ({"base": m.PlanarPose(float("inf"), 0.0, 0.0)}, "frame_posture_invalid"),
+        ({"intrinsics": Intrinsics(WIDTH, HEIGHT, 0.0, 20.0, 15.5, 11.5)}, "frame_intrinsics_invalid"),
+        ({"depth_unit": float("nan")}, "frame_depth_unit_invalid"),
     ],
 )
-def test_a_bad_frame_is_refused(model, changes, says):
-    with pytest.raises(MessageError, match=says):
+def test_a_bad_frame_is_refused(model, changes, code):
+    with pytest.raises(CorruptFrameError) as refused:
         decode_frame(good_frame(**changes), model)
+    assert refused.value.reason.code == code
 
 
 def test_a_colour_image_that_is_none_is_refused(model):
-    with pytest.raises(MessageError, match="not a JPEG"):
+    with pytest.raises(CorruptFrameError) as refused:
         decode_frame(good_frame(color_jpeg=b"no picture"), model).color()
+    assert refused.value.reason.code == "colour_not_jpeg"
 
 
 def test_without_labels_the_label_segmenter_says_why(model):
     segmenter = LabelImageSegmenter()
     assert segmenter.name == "simulator labels"
-    with pytest.raises(InputError, match="needs a label image"):
+    with pytest.raises(UnusablePictureError) as refused:
         segmenter.segment(decode_frame(good_frame(labels_zlib=b""), model))
+    assert refused.value.reason == reasons.frame_without_labels("simulator labels")
     assert segmenter.segment(decode_frame(good_frame(), model)).shape == (HEIGHT, WIDTH)
 
 

@@ -6,10 +6,10 @@ import pytest
 
 from perception.config import PerceptionConfig
 from perception.loop import PerceptionProcess, Worker
+from perception.segmentation.frame import CorruptFrameError
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.commands import SetRule
-from rolling_panda.errors import MessageError
 from rolling_panda.messages.perception import Capsule, CloseUpResult, PointCrop
 from rolling_panda.messages.robot import CameraFrame, Intrinsics
 from rolling_panda.reasons import severity_of
@@ -51,7 +51,7 @@ class FakePerception:
 
     withdrawn = ()
     crops = ()
-    rejected_wood = ""
+    rejected_wood = ()
     obstacles = (Capsule("wire", (0.0, 0.75, 1.2), (2.0, 0.75, 1.2), 0.004, 0.004),)
 
     def __init__(self):
@@ -73,7 +73,7 @@ class FakePerception:
         if what == "hang":
             self.release.wait(10.0)
         if what == "corrupt":
-            raise MessageError("frame 1: the depth image is corrupt")
+            raise CorruptFrameError(reasons.frame_image_corrupt(frame.sequence, "depth", "it ends"))
         self.newest = m.PruningPoints(header=m.Header(), segmenter="s", frames=self.processed, points=())
         return self.newest
 
@@ -121,7 +121,7 @@ def test_obstacles_are_sent_once_a_second_from_the_first_frame_on(parts):
 def test_what_was_left_out_is_told_when_it_changes_and_at_most_once_a_minute(parts):
     wire, perception, loop = parts
 
-    def told(rejected_wood, second):
+    def told(second, *rejected_wood):
         perception.rejected_wood = rejected_wood
         before = perception.newest
         loop.see(str(second), float(second))
@@ -129,14 +129,15 @@ def test_what_was_left_out_is_told_when_it_changes_and_at_most_once_a_minute(par
         step_until(
             loop, lambda: sent and perception.newest is not before and sent[-1] == perception.newest, float(second)
         )
-        return [dict(e.reason.values)["counts"] for e in wire.sent[EVENT.name] if e.reason.code == "wood_implausible"]
+        return [e.reason for e in wire.sent[EVENT.name] if e.reason.code.startswith("wood_")]
 
-    assert told("1 trunk leaning", 0) == ["1 trunk leaning"]
+    first = [reasons.wood_leaning(1, "trunk"), reasons.wood_too_thick(1, "post")]
+    assert told(0, *first) == first
     for second in range(2, 130, 2):
-        texts = told(f"{second} wires off the row", second)
-    assert len(texts) == 3
-    same = texts[-1]
-    assert told(same, 200) == told(same, 270) == texts
+        rejected = told(second, reasons.wood_off_row(second, "wire"))
+    assert len(rejected) == 4
+    same = rejected[-1]
+    assert told(200, same) == told(270, same) == rejected
 
 
 def test_the_heartbeat_counts_turns_and_stops_counting_when_a_frame_hangs(parts):
@@ -162,7 +163,9 @@ def test_a_corrupt_frame_is_told_once_and_sends_no_points(parts):
     for _ in range(20):
         loop.step(0.2)
         time.sleep(0.001)
-    assert [severity_of(event.reason) for event in events] == ["info", "error"]
+    refused = reasons.frame_refused(reasons.frame_image_corrupt(1, "depth", "it ends"))
+    assert [event.reason for event in events] == [reasons.perception_started(), refused]
+    assert severity_of(refused) == "error"
     assert not wire.sent[POINTS.name]
 
 

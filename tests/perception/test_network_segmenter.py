@@ -10,10 +10,11 @@ from bridge.sim.camera.config import CameraConfig
 from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
-from perception.segmentation.frame import View
+from perception.segmentation.frame import CorruptFrameError, UnusablePictureError, View
 from perception.segmentation.network_segmenter import NetworkSegmenter, network_input
 from perception.segmentation.segmenter import SHIPPED, NoSegmenter, choose_segmenter
-from rolling_panda.errors import ConfigError, InputError, MessageError, ModelError
+from rolling_panda import reasons
+from rolling_panda.errors import ConfigError, ModelError
 from rolling_panda.messages.robot import Intrinsics
 from rolling_panda.messages.types import WOOD_CLASSES
 from rolling_panda.resources import resource
@@ -70,14 +71,15 @@ def test_a_frame_is_decoded_and_its_depth_used(tmp_path):
 @pytest.mark.parametrize("color", [np.zeros((64, 64, 3), np.uint8), np.full((64, 64, 3), 255, np.uint8)])
 def test_a_picture_of_nothing_is_declined(tmp_path, color):
     segmenter = NetworkSegmenter(written(tmp_path, onnx_by_hand.brightest_channel(CLASSES)))
-    with pytest.raises(InputError, match="is blank"):
+    with pytest.raises(UnusablePictureError) as refused:
         segmenter.classify(color, None)
+    assert refused.value.reason == reasons.picture_blank(float(color.max()))
 
 
 def test_a_frame_without_a_picture_is_refused(tmp_path):
     segmenter = NetworkSegmenter(written(tmp_path, onnx_by_hand.brightest_channel(CLASSES)))
     broken = view(np.zeros((64, 64, 3), np.uint8))
-    with pytest.raises(MessageError, match="not a JPEG"):
+    with pytest.raises(CorruptFrameError):
         segmenter.segment(View(0, 0.0, broken.intrinsics, broken.depth, None, b"", broken.R, broken.t))
 
 
@@ -117,8 +119,10 @@ def test_without_the_shipped_weights_every_frame_is_declined_with_the_reason(mon
     monkeypatch.setattr("perception.segmentation.segmenter.resource", missing)
     segmenter = choose_segmenter("network")
     assert isinstance(segmenter, NoSegmenter)
-    with pytest.raises(InputError, match="without the network's weights: assets/network/vine.onnx"):
+    with pytest.raises(UnusablePictureError) as refused:
         segmenter.segment(view(np.zeros((64, 64, 3), np.uint8)))
+    missing_file = "assets/network/vine.onnx is not part of this installation"
+    assert refused.value.reason == reasons.network_missing(missing_file)
 
 
 def test_the_shipped_network_is_small_and_carries_its_card():

@@ -13,13 +13,12 @@ from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from perception.config import PerceptionConfig
 from perception.pipeline import Perception, with_width_bias
-from perception.segmentation.frame import decode_frame
+from perception.segmentation.frame import CORDON, POST, CorruptFrameError, decode_frame
 from perception.segmentation.segmenter import LabelImageSegmenter
 from perception.skeleton.topology import perceive_plant
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.commands import AddPoint, AddPointInImage, EvaluateRule, MovePoint, SetRule, UndoRule
-from rolling_panda.errors import MessageError
 from rolling_panda.messages.perception import point_digest
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.transport.codec import StrictDecoder, encode
@@ -66,7 +65,7 @@ def test_a_corrupt_frame_changes_nothing(model, frames):
     for frame in frames[:3]:
         seen.process(frame)
         undisturbed.process(frame)
-    with pytest.raises(MessageError):
+    with pytest.raises(CorruptFrameError):
         seen.process(msgspec.structs.replace(frames[3], depth_zlib=frames[3].depth_zlib[:-9]))
     assert seen.process(frames[3]) == undisturbed.process(frames[3])
 
@@ -74,7 +73,17 @@ def test_a_corrupt_frame_changes_nothing(model, frames):
 def test_without_labels_a_site_stays_undecided_with_the_reason(model, frames):
     result = perception(model).process(msgspec.structs.replace(frames[0], labels_zlib=b""))
     assert not result.points
-    assert result.undecided_sites[0].reason.code == "picture_unusable"
+    assert result.undecided_sites[0].reason.code == "frame_without_labels"
+
+
+def test_what_cannot_be_a_post_is_told_with_its_count(model, frames):
+    seen = perception(model)
+    for frame in frames:
+        labels = np.frombuffer(zlib.decompress(frame.labels_zlib), np.uint8).copy()
+        labels[labels == CORDON] = POST
+        seen.process(msgspec.structs.replace(frame, labels_zlib=zlib.compress(labels.tobytes())))
+    (lying,) = (reason for reason in seen.rejected_wood if reason.code == "wood_lying")
+    assert dict(lying.values)["kind"] == "post" and dict(lying.values)["count"] >= 1.0
 
 
 def test_an_empty_view_gives_no_points(model, frames):
